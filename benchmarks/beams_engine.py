@@ -1,0 +1,185 @@
+"""Speed of the beam engine: Lan's network, a cantilever, a V-beam through its bifurcations, gradients, a batch.
+
+Run: python benchmarks/beams_engine.py [--peer]. With --peer the same curves are traced by openseespy in the same run,
+interleaved, if it can be imported (Debian: libblas3, liblapack3 and libgfortran5 must be there); it follows the
+unstable branch of the V-beam. Minima of repeats after warm-up; the error is against the finest engine mesh.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.beams import (
+    CLAMPED,
+    Beam,
+    Control,
+    Displacement,
+    Loading,
+    Network,
+    Node,
+    PointLoad,
+    Polynomial,
+    Section,
+    gradient,
+    guided,
+    trace,
+    trace_many,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+MM = 1e-3
+SHAPE = np.array([3.05, 1.877, 1.244, 2.40, 1.3092, -1.5707, -0.7560, 1.5707, 0.3013, 1.5707, 0.226, -1.148, 3.45])
+
+
+def lan(x: Any = SHAPE) -> Network:
+    section = Section(2e9, 10 * MM, 1 * MM, axial=False)
+    cm = 1e-2
+    nodes = {
+        "n1": Node(0.25 * cm, 0, CLAMPED),
+        "n2": Node(x[12] * cm, 0, CLAMPED),
+        "n3": Node(x[0] * cm, x[1] * cm),
+        "n4": Node(x[2] * cm, x[3] * cm),
+        "n5": Node(0.25 * cm, 4 * cm, guided(np.pi / 2)),
+    }
+    ends = [("n1", "n3", 0.4592), ("n2", "n3", 1.6382), ("n3", "n4", -4.081), ("n4", "n5", 2.394)]
+    beams = {
+        f"b{k}": Beam(a, b, section, Polynomial((c, x[4 + 2 * k], x[5 + 2 * k]))) for k, (a, b, c) in enumerate(ends)
+    }
+    return Network(nodes, beams)
+
+
+def cantilever() -> Network:
+    section = Section(2.4e9, 0.1, 1e-3, axial=False)
+    return Network({"root": Node(0, 0, CLAMPED), "tip": Node(0.4, 0)}, {"x": Beam("root", "tip", section)})
+
+
+def v_beam() -> Network:
+    length, angle = 35 * MM, np.radians(7)
+    section = Section(1477e6, 6 * MM, 1 * MM)
+    nodes = {"wall": Node(0, 0, CLAMPED), "d": Node(length * np.cos(angle), length * np.sin(angle), guided(np.pi / 2))}
+    return Network(nodes, {"v": Beam("wall", "d", section)})
+
+
+def best(work: Callable[[], Any], repeats: int = 15) -> float:
+    """Return the shortest of several runs [ms], after one to warm up."""
+    work()
+    times = []
+    for _ in range(repeats):
+        start = time.perf_counter()
+        work()
+        times.append(time.perf_counter() - start)
+    return 1e3 * min(times)
+
+
+def report(name: str, network: Network, drive: Any) -> None:
+    exact = trace(network, drive, Control(tolerance=1e-11))
+    truth = exact.effort[exact.at_asked]
+    for tolerance in (1e-3, 1e-4, 1e-5, 1e-6, 1e-8):
+        control = Control(tolerance=tolerance)
+        path = trace(network, drive, control)
+        error = np.abs(path.effort[path.at_asked] - truth).max() / np.abs(truth).max()
+        took = best(lambda control=control: trace(network, drive, control))
+        print(f"{name:12s} tolerance {tolerance:.0e}  {took:8.2f} ms  error {error:.1e}  {len(path)} points")
+
+
+def main() -> None:
+    curve = Displacement("n5", -np.pi / 2, np.arange(1, 33) * 0.5 * MM)
+    report("lan", lan(), curve)
+    force = 10 * 2e-2 / 0.4**2
+    report("cantilever", cantilever(), Loading((PointLoad("tip", fy=-1.0),), np.linspace(0.1, 1, 10) * force))
+    report("v-beam", v_beam(), Displacement("d", -np.pi / 2, np.linspace(0.02, 1, 50) * 7 * MM))
+    path = trace(lan(), curve, Control(tolerance=1e-5))
+    print(f"13 gradients {best(lambda: gradient(path, lan, SHAPE), 5):8.2f} ms for 32 points")
+    rng = np.random.default_rng(0)
+    many = [lan(SHAPE * (1 + 1e-3 * rng.standard_normal(13))) for _ in range(200)]
+    for workers in (1, 2):
+        start = time.perf_counter()
+        outcomes = trace_many(many, curve, Control(tolerance=1e-5), workers=workers)
+        rate = sum(outcome.value is not None for outcome in outcomes) / (time.perf_counter() - start)
+        print(f"batch        {rate:8.0f} designs a second, {workers} processes (start included)")
+    if "--peer" in sys.argv:
+        peer(curve)
+
+
+def peer(curve: Displacement) -> None:
+    """Trace Lan's curve and the V-beam by corotational elements of openseespy (mm, N), in turn with the engine."""
+    try:
+        import openseespy.opensees as ops
+    except (ImportError, RuntimeError) as error:
+        print(f"peer         openseespy cannot be used here: {error}")
+        return
+    # Young's modulus, area, second moment [MPa, mm]; Lan's beams do not stretch: 1e4 times their area
+    compare(ops, "lan", lan(), curve, (2000.0, 10.0 * 1e4, 10.0 / 12))
+    travel = Displacement("d", -np.pi / 2, np.linspace(0.02, 1, 50) * 7 * MM)
+    compare(ops, "v-beam", v_beam(), travel, (1477.0, 6.0, 0.5))
+
+
+def compare(ops: Any, name: str, network: Network, drive: Displacement, section: tuple[float, float, float]) -> None:
+    """Print times of both, interleaved, and their ratio; the peer stays on the path that it starts on."""
+    path = trace(network, drive, Control(tolerance=1e-8, branch="primary"))
+    exact = path.effort[path.at_asked]
+    for count, tolerance in ((20, 1e-3), (80, 1e-4)):
+        theirs, ours = [], []
+        for _ in range(4):
+            theirs.append(best(lambda count=count: _opensees(ops, path, drive, count, section), 1))
+            ours.append(best(lambda tolerance=tolerance: trace(network, drive, Control(tolerance=tolerance)), 5))
+        error = np.abs(_opensees(ops, path, drive, count, section) - exact).max() / np.abs(exact).max()
+        print(
+            f"peer {name:8s} {count} elements a beam  {min(theirs):8.2f} ms  difference {error:.1e}; "
+            f"engine at {tolerance:.0e} {min(ours):8.2f} ms: {min(theirs) / min(ours):.0f} times"
+        )
+
+
+def _opensees(ops: Any, path: Any, curve: Displacement, count: int, section: tuple[float, float, float]) -> Any:
+    ops.wipe()
+    ops.model("basic", "-ndm", 2, "-ndf", 3)
+    network, tags = path.layout.network, {}
+    for tag, (name, node) in enumerate(network.nodes.items(), 1):
+        tags[name] = tag
+        ops.node(tag, 1e3 * node.x, 1e3 * node.y)
+    for name, node in network.nodes.items():
+        if node.support.across:
+            ops.fix(tags[name], 1, int(node.support.along), 1)
+    ops.geomTransf("Corotational", 1)
+    tag, element = 100, 0
+    young, area, inertia = section
+    for name, beam in network.beams.items():
+        fitted, fine = path.fits[name], np.linspace(0, 1, 20 * count + 1)
+        angle = fitted.angle(0.5 * (fine[1:] + fine[:-1]), 0.5)
+        step = 1e3 * fitted.length / (20 * count)
+        x = 1e3 * network.nodes[beam.start].x + np.concatenate([[0], np.cumsum(np.cos(angle))]) * step
+        y = 1e3 * network.nodes[beam.start].y + np.concatenate([[0], np.cumsum(np.sin(angle))]) * step
+        before = tags[beam.start]
+        for k in range(1, count + 1):
+            after = tags[beam.end] if k == count else (tag := tag + 1)
+            if k < count:
+                ops.node(after, float(x[20 * k]), float(y[20 * k]))
+            element += 1
+            ops.element("elasticBeamColumn", element, before, after, area, young, inertia, 1)
+            before = after
+    ops.timeSeries("Linear", 1)
+    ops.pattern("Plain", 1, 1)
+    ops.load(tags[curve.node], 0.0, -1.0, 0.0)
+    ops.constraints("Plain")
+    ops.numberer("RCM")
+    ops.system("BandGeneral")
+    ops.test("NormDispIncr", 1e-8, 50)
+    ops.algorithm("Newton")
+    ops.integrator("DisplacementControl", tags[curve.node], 2, -1e3 * float(curve.points[0]))
+    ops.analysis("Static")
+    force = []
+    for _ in curve.points:
+        if ops.analyze(1) != 0:
+            raise RuntimeError("openseespy did not converge")
+        force.append(ops.getTime())
+    return np.array(force)
+
+
+if __name__ == "__main__":
+    main()

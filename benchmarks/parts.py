@@ -1,0 +1,58 @@
+"""Parts of a run that users wait for, each beside a plain numpy task of known size, in one run.
+
+The best of several rounds counts; the ratio to the peer is what to compare between machines.
+
+Run: python benchmarks/parts.py
+"""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+import cfmkit
+from cfmkit.families import family
+from cfmkit.families.cam.outline import flank_edge
+from cfmkit.numerics.biarcs import fit_arcs
+from cfmkit.plots.render import render
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+CONFIG = Path(__file__).resolve().parent.parent / "configs" / "cam.yaml"
+
+
+def best(task: Callable[[], object], rounds: int = 7) -> float:
+    """Return the best wall time of a task [s]."""
+    times = []
+    for _ in range(rounds):
+        start = time.perf_counter()
+        task()
+        times.append(time.perf_counter() - start)
+    return min(times)
+
+
+def main() -> None:
+    """Print one line per part."""
+    spec = cfmkit.load(CONFIG)
+    result = cfmkit.analyze(spec)
+    edge = flank_edge(result.state.assembly.profile)
+    numbers = np.random.default_rng(0).normal(size=100_000)
+    parts = {
+        "analyse a cam, 2 x 481 points": lambda: cfmkit.analyze(spec),
+        "all metrics of its curve": lambda: cfmkit.evaluate(result),
+        "arcs within 5 um through its flank": lambda: fit_arcs(edge.points, edge.tangents, 5e-6, 1e-3),
+        "all of its figures as PNG": lambda: render(family("cam"), result),
+    }
+    peer = best(lambda: np.sort(numbers), 40)
+    print(f"{'sort 100 000 floats (the peer)':40s} {1e3 * peer:8.2f} ms")
+    for name, task in parts.items():
+        seconds = best(task, 3 if "PNG" in name else 40)
+        print(f"{name:40s} {1e3 * seconds:8.2f} ms   {seconds / peer:7.2f} x the peer")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,64 @@
+"""What a user waits for: whole processes, beside what the libraries alone cost to import.
+
+Each command runs several times, interleaved with the others, and its best time counts.
+Ratios are against an interpreter that only imports numpy (or numpy and matplotlib where
+pictures are drawn), measured in the same run: the machine's mood cancels.
+
+Run: python benchmarks/startup.py
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+CFMKIT = str(Path(sys.executable).with_name("cfmkit"))
+CONFIG = str(Path(__file__).resolve().parent.parent / "configs" / "cam.yaml")
+ROUNDS = 7
+
+PEERS = {
+    "import numpy": [sys.executable, "-c", "import numpy"],
+    "import numpy, matplotlib's Agg": [
+        sys.executable,
+        "-c",
+        "import numpy, matplotlib.figure, matplotlib.backends.backend_agg",
+    ],
+}
+COMMANDS = {
+    # name: (arguments, limit of the project's goals [s], peer)
+    "--help": (["--help"], 0.3, "import numpy"),
+    "check": (["check", CONFIG], 0.8, "import numpy"),
+    "analyze --no-plots": (["analyze", CONFIG, "--no-plots", "-q", "-o", "a"], 1.0, "import numpy"),
+    "analyze": (["analyze", CONFIG, "-q", "-o", "b"], 2.5, "import numpy, matplotlib's Agg"),
+    "design": (["design", CONFIG, "-q", "-o", "c"], None, "import numpy, matplotlib's Agg"),
+}
+
+
+def best_times(folder: str) -> dict[str, float]:
+    """Return the best wall time of each peer and command [s], measured in turn."""
+    calls = PEERS | {name: [CFMKIT, *arguments] for name, (arguments, _, _) in COMMANDS.items()}
+    best = dict.fromkeys(calls, float("inf"))
+    for _ in range(ROUNDS):
+        for name, call in calls.items():
+            start = time.perf_counter()
+            subprocess.run(call, cwd=folder, check=True, capture_output=True)
+            best[name] = min(best[name], time.perf_counter() - start)
+    return best
+
+
+def main() -> None:
+    """Print one line per command."""
+    with tempfile.TemporaryDirectory() as folder:
+        best = best_times(folder)
+    for name in PEERS:
+        print(f"{name:32s} {best[name]:6.2f} s")
+    for name, (_, limit, peer) in COMMANDS.items():
+        goal = f"goal {limit:.1f} s" if limit else ""
+        print(f"cfmkit {name:25s} {best[name]:6.2f} s   {best[name] / best[peer]:5.1f} x {peer}   {goal}")
+
+
+if __name__ == "__main__":
+    main()

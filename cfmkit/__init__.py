@@ -1,0 +1,108 @@
+"""cfmkit: design and analysis of constant-force mechanisms.
+
+    import cfmkit
+
+    spec = cfmkit.load("cam.yaml")
+    result = cfmkit.analyze(spec)
+    result.curve.force
+
+Arrays are read-only and in SI units. The names below are imported when they are
+first used, so that ``import cfmkit`` itself costs nothing.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from cfmkit._version import __version__
+
+if TYPE_CHECKING:
+    from cfmkit.api import analyze, check, design, drawing, dumps, evaluate, load, loads
+    from cfmkit.curves import Curve
+    from cfmkit.errors import (
+        CfmError,
+        DataError,
+        ExitCode,
+        FolderInUse,
+        GeometryError,
+        InputError,
+        OutputError,
+        Problem,
+        QuantityError,
+        SolutionError,
+        SpecError,
+        UsageError,
+    )
+    from cfmkit.families.base import Run
+    from cfmkit.results import Design, Finding, Quantity, Result, Status
+    from cfmkit.spec import Spec
+
+_HOMES = {
+    "cfmkit.api": ("analyze", "check", "design", "drawing", "dumps", "evaluate", "load", "loads"),
+    "cfmkit.curves": ("Curve",),
+    "cfmkit.errors": (
+        "CfmError",
+        "DataError",
+        "ExitCode",
+        "FolderInUse",
+        "GeometryError",
+        "InputError",
+        "OutputError",
+        "Problem",
+        "QuantityError",
+        "SolutionError",
+        "SpecError",
+        "UsageError",
+    ),
+    "cfmkit.families.base": ("Run",),
+    "cfmkit.results": ("Design", "Finding", "Quantity", "Result", "Status"),
+    "cfmkit.spec": ("Spec",),
+}
+_HOME = {name: module for module, names in _HOMES.items() for name in names}
+
+__all__ = [
+    "CfmError",
+    "Curve",
+    "DataError",
+    "Design",
+    "ExitCode",
+    "Finding",
+    "FolderInUse",
+    "GeometryError",
+    "InputError",
+    "OutputError",
+    "Problem",
+    "Quantity",
+    "QuantityError",
+    "Result",
+    "Run",
+    "SolutionError",
+    "Spec",
+    "SpecError",
+    "Status",
+    "UsageError",
+    "__version__",
+    "analyze",
+    "check",
+    "design",
+    "drawing",
+    "dumps",
+    "evaluate",
+    "load",
+    "loads",
+]
+
+
+def __getattr__(name: str) -> Any:
+    """Import a public name when it is first asked for."""
+    if name not in _HOME:
+        raise AttributeError(f"module 'cfmkit' has no attribute {name!r}")
+    value = getattr(import_module(_HOME[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    """Return the public names, imported or not."""
+    return sorted({*globals(), *__all__})

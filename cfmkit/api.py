@@ -1,0 +1,181 @@
+"""The functions of ``import cfmkit``: from a specification to curves, designs, metrics and drawings.
+
+Everything is a value: nothing here prints, plots or writes to a disk.
+"""
+
+from __future__ import annotations
+
+import os
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+from cfmkit.errors import UsageError
+from cfmkit.families import family
+from cfmkit.families.base import Run
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Mapping
+
+    from matplotlib.figure import Figure
+
+    from cfmkit.geometry import Drawing
+    from cfmkit.metrics import Outcome, Window
+    from cfmkit.results import Design, Quantity, Result
+    from cfmkit.spec import Spec
+
+
+def load(path: str | os.PathLike[str], changes: Iterable[str] = ()) -> Spec:
+    """Return the specification in a YAML file.
+
+    Parameters
+    ----------
+    path : path-like
+        The file; ``-`` is standard input.
+    changes : iterable of str
+        Values that replace those of the file, as ``--set`` takes them:
+        ``["mechanism.roller_radius=10 mm"]``.
+
+    Raises
+    ------
+    cfmkit.errors.UsageError
+        If the file cannot be read.
+    cfmkit.errors.SpecError
+        With every problem in it.
+    """
+    from cfmkit.specfile import bind, read_spec
+
+    return bind(read_spec(os.fspath(path), changes))
+
+
+def loads(text: str | bytes, source: str = "text") -> Spec:
+    """Return the specification that YAML text says.
+
+    Parameters
+    ----------
+    text : str or bytes
+        The specification.
+    source : str
+        What messages call it.
+
+    Raises
+    ------
+    cfmkit.errors.SpecError
+        With every problem in it.
+    """
+    from cfmkit.specfile import bind
+    from cfmkit.yamlio import read_document
+
+    return bind(read_document(text, source))
+
+
+def dumps(spec: Spec, complete: bool = False) -> str:
+    """Return a specification as YAML text that `loads` reads back to an equal one.
+
+    Parameters
+    ----------
+    spec : Spec
+        What to write.
+    complete : bool
+        Write every default too.
+    """
+    from cfmkit.yamlio import dump
+
+    return dump(spec, complete)
+
+
+def analyze(spec: Spec, run: Run | None = None) -> Result:
+    """Return the curves of a mechanism, its scalar results and what is wrong with it.
+
+    Parameters
+    ----------
+    spec : Spec
+        Of any family.
+    run : Run, optional
+        Seed, progress report, time budget.
+
+    Examples
+    --------
+    >>> import cfmkit
+    >>> result = cfmkit.analyze(cfmkit.load("configs/cam.yaml"))
+    >>> result.status.key, len(result.curve.branches)
+    ('complete', 2)
+    """
+    return family(spec.family).analyze(spec, run or Run())
+
+
+def design(spec: Spec, run: Run | None = None) -> Design:
+    """Return a complete specification that meets the targets of the `design` block, or why there is none.
+
+    Raises
+    ------
+    cfmkit.errors.UsageError
+        If the family has nothing to design.
+    """
+    record = family(spec.family)
+    if record.design is None:
+        raise UsageError(f"a {spec.family} mechanism cannot be designed, only analysed")
+    return record.design(spec, run or Run())
+
+
+def evaluate(result: Result, names: Iterable[str] | None = None, window: Window | None = None) -> dict[str, Quantity]:
+    """Return constant-force metrics and the family's own scalar results, by name, in SI.
+
+    Parameters
+    ----------
+    result : Result
+        Of any status.
+    names : iterable of str, optional
+        Only these; ``[branch]`` picks a branch. Default: all.
+    window : Window, optional
+        Where to measure; default: ``analysis.window``, else the full travel.
+
+    Raises
+    ------
+    cfmkit.errors.UsageError
+        If one of the names does not exist.
+    """
+    from cfmkit.metrics import evaluate as measured
+
+    return measured(result, names, window)
+
+
+def check(result: Result) -> tuple[Outcome, ...]:
+    """Return what became of each requirement of the specification."""
+    from cfmkit.metrics import check as checked
+    from cfmkit.metrics import values_of_family
+
+    values = values_of_family(family(result.spec.family).values)
+    return checked(result.spec.requirements, result, values)
+
+
+def resolve(spec: Spec) -> Spec:
+    """Return the specification with every derived part written out."""
+    record = family(spec.family)
+    resolved: Spec = record.resolve(spec) if record.resolve else spec
+    return resolved
+
+
+def drawing(spec: Spec) -> Drawing:
+    """Return the outlines of the parts that can be cut or printed.
+
+    Raises
+    ------
+    cfmkit.errors.UsageError
+        If the family has nothing to cut.
+    cfmkit.errors.SolutionError
+        If the mechanism cannot exist as described.
+    """
+    record = family(spec.family)
+    if record.outline is None:
+        raise UsageError(f"a {spec.family} mechanism has no part to draw")
+    drawn: Drawing = import_module(record.outline).drawing(spec)
+    return drawn
+
+
+def figures(result: Result) -> Mapping[str, Callable[[], Figure]]:
+    """Return what draws each of the family's pictures of a result, by name; nothing where it draws none."""
+    record = family(result.spec.family)
+    if record.draw is None or not result.curves:
+        return {}
+    drawn: Mapping[str, Callable[[], Figure]] = import_module(record.draw).figures(result)
+    return drawn

@@ -1,0 +1,92 @@
+"""Many networks under one drive: in this process or over several, one outcome each, failures kept as such."""
+
+from __future__ import annotations
+
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from functools import partial
+from multiprocessing import get_context
+from typing import TYPE_CHECKING, Any
+
+from cfmkit.beams.tracing import trace
+from cfmkit.errors import CfmError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Iterator
+
+    from cfmkit.beams.drive import Control, Drive
+    from cfmkit.beams.network import Network
+    from cfmkit.beams.path import Path
+    from cfmkit.curves import FloatArray
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What came of one network.
+
+    Attributes
+    ----------
+    status, message : str
+        Name and sentence of the path's status; ``INVALID`` and the reason where the network cannot exist.
+    value : Any
+        What was collected from the path; None where there is no path.
+    """
+
+    status: str
+    message: str
+    value: Any
+
+
+@dataclass(frozen=True)
+class Asked:
+    """Drive, effort and stability at the points asked for that were reached."""
+
+    drive: FloatArray
+    effort: FloatArray
+    stable: Any
+
+
+def asked(path: Path) -> Asked:
+    """Return a path's values at the points asked for: the default of what `trace_many` collects."""
+    keep = path.at_asked
+    return Asked(path.drive[keep], path.effort[keep], path.stable[keep])
+
+
+def trace_many(
+    networks: Iterable[Network],
+    drive: Drive,
+    control: Control | None = None,
+    collect: Callable[[Path], Any] = asked,
+    workers: int = 1,
+) -> Iterator[Outcome]:
+    """Yield one outcome for each network, in their order; nothing but the collected values is kept.
+
+    Parameters
+    ----------
+    networks : iterable of Network
+        Taken one by one in one process, all at once for several.
+    drive : Displacement, Rotation or Loading
+        What is done to each.
+    control : Control, optional
+        As in `trace`.
+    collect : callable
+        From a path to what is wanted of it; must be importable for several workers.
+    workers : int
+        Processes to use.
+    """
+    one = partial(_outcome, drive=drive, control=control, collect=collect)
+    if workers <= 1:
+        yield from map(one, networks)
+        return
+    many = list(networks)
+    size = max(1, len(many) // (8 * workers))
+    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+        yield from pool.map(one, many, chunksize=size)
+
+
+def _outcome(network: Network, drive: Drive, control: Control | None, collect: Callable[[Path], Any]) -> Outcome:
+    try:
+        path = trace(network, drive, control)
+    except CfmError as error:
+        return Outcome("INVALID", str(error), None)
+    return Outcome(path.status.name, path.message, collect(path))

@@ -1,0 +1,174 @@
+"""A beam between two nodes: its shape, its section, how it closes the gap between the nodes, how its ends are joined.
+
+Closure: nodes and shapes that are given rounded do not fit exactly. "rotscale" turns each shape and scales it so
+that it does, and reports by how much; "raw" keeps shape and length and forces the beam into place, prestressed.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass, fields, is_dataclass
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from cfmkit.beams.shapes import STRAIGHT, Course, Shape
+from cfmkit.errors import InputError
+
+if TYPE_CHECKING:
+    from cfmkit.beams.section import Section
+
+Joint = Literal["rigid", "pin"]
+Closure = Literal["rotscale", "raw"]
+
+_PANELS = 8
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(12)
+
+
+@dataclass(frozen=True)
+class Beam:
+    """A beam from node `start` to node `end`.
+
+    Parameters
+    ----------
+    start, end : str
+        Names of the nodes.
+    section : Section
+        Cross-section and material.
+    shape : Shape
+        Reference shape; straight unless given.
+    closure : {"rotscale", "raw"}
+        How the shape is fitted between its ends.
+    start_joint, end_joint : {"rigid", "pin"}
+        Whether the end turns with the node.
+    start_offset, end_offset : (float, float)
+        Rigid arms from the node to the beam's end [m], as they lie before any load; they turn with the node.
+    """
+
+    start: str
+    end: str
+    section: Section
+    shape: Shape = STRAIGHT
+    closure: Closure = "rotscale"
+    start_joint: Joint = "rigid"
+    end_joint: Joint = "rigid"
+    start_offset: tuple[float, float] = (0.0, 0.0)
+    end_offset: tuple[float, float] = (0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        """Check the choices."""
+        if self.closure not in ("rotscale", "raw"):
+            raise InputError(f"closure must be 'rotscale' or 'raw', got {self.closure!r}")
+        for joint in (self.start_joint, self.end_joint):
+            if joint not in ("rigid", "pin"):
+                raise InputError(f"a joint is 'rigid' or 'pin', got {joint!r}")
+        if self.start == self.end:
+            raise InputError(f"a beam needs two different nodes, got {self.start!r} twice")
+
+
+@dataclass(frozen=True)
+class Fit:
+    """How a shape was fitted between its ends.
+
+    Attributes
+    ----------
+    rotation : float
+        Turn of the shape [rad]; as given plus this is as used.
+    scale : float
+        Factor on the shape's size [1].
+    gap : float
+        Distance between the far end of the shape as given and its node [m].
+    length : float
+        Arc length as used [m].
+    """
+
+    rotation: Any
+    scale: Any
+    gap: float
+    length: Any
+    course: Course
+
+    def angle(self, t: Any, inside: float) -> Any:
+        """Return the reference angle [rad] as used."""
+        return self.course.angle(t, inside) + self.rotation
+
+    def speed(self, t: Any, inside: float) -> Any:
+        """Return ds/dt [m] as used."""
+        return self.course.speed(t, inside) * self.scale
+
+    def arc(self, t: float) -> Any:
+        """Return the fraction of the arc length at t."""
+        if self.course.uniform:
+            return t
+        return _integral(self.course, 0.0, t)[1] / _integral(self.course, 0.0, 1.0)[1]
+
+    def parameter(self, fraction: float) -> float:
+        """Return t at a fraction of the arc length."""
+        if self.course.uniform or fraction in (0.0, 1.0):
+            return fraction
+        from cfmkit.numerics.roots import bracketed_root
+
+        return bracketed_root(lambda t: float(np.real(self.arc(t))) - fraction, 0.0, 1.0)
+
+
+def fit(beam: Beam, reach: Any) -> Fit:
+    """Return the beam's shape fitted to the vector `reach` between its ends, a complex pair (dx, dy) [m].
+
+    Raises
+    ------
+    cfmkit.errors.InputError
+        If the ends coincide, or the shape closes on itself.
+    """
+    dx, dy = reach
+    distance = (dx * dx + dy * dy) ** 0.5
+    if not np.real(distance) > 0:
+        raise InputError(f"the ends of the beam {beam.start}-{beam.end} coincide")
+    course = beam.shape.course(distance)
+    (cx, cy), length = _integral(course, 0.0, 1.0)
+    own = (cx * cx + cy * cy) ** 0.5
+    if not np.real(own) > 1e-9 * np.real(length):
+        raise InputError(f"the shape of the beam {beam.start}-{beam.end} returns to its start: it cannot be fitted")
+    gap = float(np.hypot(np.real(dx - cx), np.real(dy - cy)))
+    if beam.closure == "raw":
+        return Fit(0.0, 1.0, gap, length, course)
+    rotation = _angle(dx * cx + dy * cy, dy * cx - dx * cy)
+    scale = distance / own
+    return Fit(rotation, scale, gap, length * scale, course)
+
+
+def same_value(one: Any, other: Any) -> bool:
+    """Tell whether two values are equal to the last bit; records by their fields, arrays by their entries."""
+    if one is other:
+        return True
+    if type(one) is not type(other):
+        return False
+    if is_dataclass(one):
+        return all(same_value(getattr(one, f.name), getattr(other, f.name)) for f in fields(one))
+    return bool(np.array_equal(one, other)) if isinstance(one, np.ndarray) else bool(one == other)
+
+
+def _integral(course: Course, start: float, stop: float) -> tuple[tuple[Any, Any], Any]:
+    """Return the integrals of (cos, sin) of the angle and of the speed between two parameters."""
+    inner = course.breaks[(course.breaks > start) & (course.breaks < stop)]
+    edges = np.concatenate([[start], inner, [stop]])
+    x: Any = 0.0
+    y: Any = 0.0
+    length: Any = 0.0
+    for left, right in itertools.pairwise(edges):
+        panels = np.linspace(left, right, _PANELS + 1)
+        half = 0.5 * (panels[1] - panels[0])
+        t = ((panels[:-1] + half)[:, None] + half * _NODES).ravel()
+        weights = np.tile(half * _WEIGHTS, _PANELS)
+        inside = 0.5 * (left + right)
+        speed, angle = course.speed(t, inside) * weights, course.angle(t, inside)
+        x = x + (speed * np.cos(angle)).sum()
+        y = y + (speed * np.sin(angle)).sum()
+        length = length + speed.sum()
+    return (x, y), length
+
+
+def _angle(x: Any, y: Any) -> Any:
+    """Return the angle of (x, y), for complex values too: real quadrant, analytic remainder."""
+    rough = float(np.arctan2(np.real(y), np.real(x)))
+    c, s = np.cos(rough), np.sin(rough)
+    return rough + np.arctan((y * c - x * s) / (x * c + y * s))

@@ -1,0 +1,187 @@
+"""Decisions where stability changes: stay on the path, leave it for a stable branch, come back to it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.beams.events import Singular, leave, locate, pose_change
+from cfmkit.beams.kernels.march import DONE, INERTIA, LONG, STALLED
+from cfmkit.beams.path import Event, PathStatus
+from cfmkit.beams.solver import FORCE_WEIGHT, Spot
+
+if TYPE_CHECKING:
+    from cfmkit.beams.run import Run
+    from cfmkit.curves import FloatArray
+
+BEFORE_END = 1e-4  # share of the drive's range by which the end of a branch is passed over
+_LEGS = 60
+_FINEST = 1e-5  # share of the range below which a change of stability is not looked into with shorter steps
+_SAME = 1e-6  # largest difference of poses of two solutions that are one
+
+
+@dataclass(frozen=True)
+class BranchEnd:
+    """Where a path that was left for a branch becomes stable again: drive, state, an equilibrium beyond, inertia."""
+
+    drive: float
+    y: FloatArray
+    beyond: Spot
+    before: int
+    after: int
+
+
+def cross(run: Run) -> Spot | None:
+    """Handle a change of inertia between the last two points; return where to go on, None to stop."""
+    other = run.spot(-1)
+    one, beyond = run.fine_spot(-2), run.fine_spot(-1)
+    _point_along(run, other)
+    senses = np.sign(run.points.info[-2:, 4])
+    fold = not run.natural and bool(senses[0] != senses[1])
+    found = None if one is None or beyond is None else locate(run.fine, one, beyond, run.natural, fold)
+    if found is None or one is None:
+        before, after = (int(run.points.info[k, 0]) for k in (-2, -1))
+        ahead = abs(float(run.points.drive[-1] - run.points.drive[-2]))
+        if run.natural and after > before and ahead > _FINEST * run.span:
+            run.drop_last()  # it may lie on another path: a sharp corner was passed in one step
+            run.entry = 0.25 * ahead
+            return run.spot(-1)
+        run.events.append(Event("unresolved", other.drive * run.unit, before, after))
+        return other
+    kind = "limit point" if found.fold else "bifurcation"
+    run.events.append(Event(kind, found.spot.drive * run.unit, found.before, found.after))
+    if run.first is None and not found.fold and found.after > found.before:
+        run.first = found
+    if found.fold or found.after <= found.before or run.control.branch == "primary":
+        return other
+    forward = float(np.sign(other.drive - one.drive))
+    left = leave(run.fine, found, run.control.sign, forward)
+    left = None if left is None else run.settled(run.fine.reduce(left))
+    if left is None:
+        return _no_branch(run, found, other)
+    run.drop_last()
+    run.branch = f"bifurcated at {found.spot.drive * run.unit:.6g}, sign {run.control.sign:+d}"
+    run.append(run.as_points(left, -1))
+    run.entry = 0.5 * abs(left.drive - found.spot.drive)
+    run.closed = False
+    run.end = _end_of_branch(run, other, found) if run.natural else None
+    return left
+
+
+def _no_branch(run: Run, found: Singular, other: Spot) -> Spot | None:
+    """Handle a bifurcation without a stable branch nearby: the mechanism jumps there."""
+    if run.control.through_folds:
+        return other
+    run.drop_last()
+    run.status = PathStatus.JUMPS
+    run.message = f"no stable equilibrium near {found.spot.drive * run.unit:.6g}: it jumps to a distant one there"
+    return None
+
+
+def _point_along(run: Run, spot: Spot) -> None:
+    """Turn the tangent of the last point the way the path came: after a limit point the drive goes back."""
+    n = run.solver.n
+    came = np.append(run.points.y[-1, :n] - run.points.y[-2, :n], run.points.drive[-1] - run.points.drive[-2])
+    weights = np.append(np.where(np.arange(n) < run.solver.n_free, 1.0, FORCE_WEIGHT), 1.0)
+    if float((weights * came) @ spot.tangent) < 0:
+        spot.tangent *= -1.0
+
+
+def _end_of_branch(run: Run, other: Spot, found: Singular) -> BranchEnd | None:
+    """Return where the path that was left becomes stable again: there the branch may rejoin it."""
+
+    start = other
+    for _ in range(_LEGS):
+        ahead = run.targets[run.asked() :]
+        ahead = ahead[(ahead - start.drive) * np.sign(run.targets[-1] - start.drive) > 1e-9 * run.span]
+        if not len(ahead):
+            run.closed = True
+            return None
+        step = float(np.sign(ahead[0] - start.drive)) * 0.02 * run.span
+        options = run.options(start, step)
+        code, points = run.solver.march(start, ahead, options, run.control.most_points + len(ahead))
+        run.too_long |= code == LONG
+        if code != INERTIA:
+            run.closed = code == DONE
+            return None
+        earlier = points.take([-2]) if len(points) > 1 else run.as_points(start, -1)
+        start = run.last(points)
+        if start.unstable <= found.before:
+            break
+    one = run.fine.solve(run.fine.expand(earlier.y[-1]), float(earlier.drive[-1]))
+    beyond = run.fine.solve(run.fine.expand(points.y[-1]), float(points.drive[-1]))
+    closing = None if one is None or beyond is None else locate(run.fine, one, beyond, natural=True)
+    if closing is None or beyond is None:
+        return None
+    reduced = run.fine.reduce
+    return BranchEnd(closing.spot.drive, reduced(closing.spot).y, reduced(beyond), closing.before, closing.after)
+
+
+def rejoin(run: Run, spot: Spot) -> Spot | None:
+    """Go back to the path that the branch left, if the branch has come close to it; else go on along the branch."""
+    end, run.end = run.end, None
+    if end is None:
+        run.status, run.message = PathStatus.LOST, "the path was lost"
+        return None
+    apart = max(pose_change(run.solver, y, end.y) for y in run.points.y[-8:])
+    if pose_change(run.solver, spot.y, end.y) > 0.5 * apart:
+        return spot
+    run.closed = True
+    start = run.solver.solve(end.beyond.y, end.drive + np.sign(end.drive - spot.drive) * BEFORE_END * run.span)
+    if start is None or start.unstable > end.after:
+        start = end.beyond
+    run.events.append(Event("bifurcation", end.drive * run.unit, end.before, end.after))
+    run.branch = "primary"
+    run.append(run.as_points(start, -1))
+    return start
+
+
+def hop(run: Run, spot: Spot, asked: int) -> Spot | None:
+    """Step over the end of a branch onto the path that it joins there: a small change for a small advance."""
+    forward = float(np.sign(run.targets[asked] - spot.drive))
+    for power in range(-6, -1):
+        ahead = 10.0**power * run.span
+        wide = run.fine.solve(run.fine.expand(spot.y), spot.drive + forward * ahead)
+        if wide is None or wide.unstable > spot.unstable:
+            continue
+        near = run.settled(run.fine.reduce(wide))
+        if near is None or pose_change(run.solver, near.y, spot.y) > 0.2 * np.sqrt(ahead / run.span) + 1e-3:
+            continue
+        back = run.fine.solve(wide.y, spot.drive - forward * ahead)
+        found = None if back is None or back.unstable == wide.unstable else locate(run.fine, wide, back, True)
+        place, before = (spot.drive, near.unstable) if found is None else (found.spot.drive, found.after)
+        run.events.append(Event("bifurcation", place * run.unit, before, near.unstable))
+        run.branch = "primary"
+        run.append(run.as_points(near, -1))
+        return near
+    run.stop(STALLED)
+    return None
+
+
+def relabel(run: Run, primary: Run) -> None:
+    """Give the points of a branch that lie on the primary path its name: the end of the branch was stepped over.
+
+    `primary` is the same network followed without leaving the primary path. Where exactly the branch ended is not
+    known then: the event says so.
+    """
+    places = {int(number): k for k, number in enumerate(primary.points.info[:, 1]) if number >= 0}
+    last = max(k for k, name in enumerate(run.branches) if name != "primary")
+    first = last + 1
+    for index in range(last, 0, -1):
+        number = int(run.points.info[index, 1])
+        if number < 0:
+            continue
+        if number not in places or run.branches[index] == "primary":
+            break
+        if pose_change(run.solver, run.points.y[index], primary.points.y[places[number]]) > _SAME:
+            break
+        first = index
+    if first > last:
+        return
+    before, after = (int(run.points.info[k, 0]) for k in (first - 1, first))
+    if last + 1 < len(run.branches):  # the hop onto the primary path came too late
+        run.events.pop()
+    run.events.append(Event("unresolved", float(run.points.drive[first]) * run.unit, before, after))
+    run.branches[first:] = ["primary"] * (len(run.points) - first)

@@ -1,0 +1,165 @@
+"""Where stability changes along a path: limit points and bifurcations, found, told apart, and left for a stable branch.
+
+At a singular point the tangent has a null vector. Where the drive has an extreme on the path it is a limit point, else
+a bifurcation: there the null vector points along the path that crosses.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.beams.solver import FORCE_WEIGHT, Solver, Spot
+
+if TYPE_CHECKING:
+    from cfmkit.beams.expanded import ExpandedSolver
+    from cfmkit.curves import FloatArray
+
+_SEARCHES = 40
+_CLOSE = 1e-6  # share of the determinant at the ends that is near enough to interpolate the rest
+_FIRST_KICK, _KICK, _KICKS = 1e-3, 0.06, 16  # how far from a bifurcation its branch is entered [rad]
+
+
+@dataclass(frozen=True)
+class Singular:
+    """A singular point: the equilibrium, its null vector and which kind it is."""
+
+    spot: Spot
+    null: FloatArray
+    fold: bool
+    before: int
+    after: int
+
+
+def locate(solver: Solver, one: Spot, other: Spot, natural: bool, fold: bool = False) -> Singular | None:
+    """Return the singular point between two neighbouring equilibria with different inertia.
+
+    The determinant of the tangent, with the sign that the inertia gives it, is brought near zero by the Illinois
+    variant of the rule of false position. The last bit is interpolated: at a bifurcation no bordered system is
+    regular, so that Newton's method does not get there.
+    """
+    search = _Search(solver, one, other, natural)
+    for attempt in range(_SEARCHES):
+        if not search.closer(middle=attempt % 6 == 5):
+            break
+    if not search.near_enough():
+        return None
+    return _singular(solver, search.interpolated(), (one, other), fold)
+
+
+class _Search:
+    """A bracket around a singular point on the path between two equilibria."""
+
+    def __init__(self, solver: Solver, one: Spot, other: Spot, natural: bool) -> None:
+        self.solver, self.one, self.other = solver, one, other
+        weights = np.where(np.arange(solver.n) < solver.n_free, 1.0, FORCE_WEIGHT)
+        chord = np.append(weights * (other.y - one.y)[: solver.n], other.drive - one.drive)
+        self.border = solver.unit if natural else chord
+        self.start, self.stop = self._level(one), self._level(other)
+        self.samples = [(0.0, self._measure(one), one), (1.0, self._measure(other), other)]
+        self.low, self.high = self.samples[0][:2], self.samples[1][:2]
+        self.scale = max(abs(self.low[1]), abs(self.high[1]))
+
+    def _level(self, spot: Spot) -> float:
+        return float(self.border[:-1] @ spot.y[: self.solver.n] + self.border[-1] * spot.drive)
+
+    def _measure(self, spot: Spot) -> float:
+        """Return the size of the tangent's determinant: positive with the inertia of the first end, else negative."""
+        matrix, _ = self.solver.tangent_at(spot.y, spot.drive)
+        size = float(np.exp(np.linalg.slogdet(matrix)[1]))
+        return size if spot.unstable == self.one.unstable else -size
+
+    def closer(self, middle: bool) -> bool:
+        """Shrink the bracket once; tell whether to go on."""
+        (low, f_low), (high, f_high) = self.low, self.high
+        share = 0.5 * (low + high) if middle else (low * f_high - high * f_low) / (f_high - f_low)
+        _, _, base = min(self.samples, key=lambda sample: abs(sample[0] - share))
+        at = next(sample[0] for sample in self.samples if sample[2] is base)
+        y = base.y + (share - at) * (self.other.y - self.one.y)
+        drive = base.drive + (share - at) * (self.other.drive - self.one.drive)
+        near = self.solver.solve(y, drive, self.border, self.start + share * (self.stop - self.start))
+        if near is None:
+            return False
+        value = self._measure(near)
+        self.samples.append((share, value, near))
+        if value > 0:
+            self.low, self.high = (share, value), (high, f_high if middle else 0.5 * f_high)
+        else:
+            self.high, self.low = (share, value), (low, f_low if middle else 0.5 * f_low)
+        return abs(value) > _CLOSE * self.scale and self.high[0] - self.low[0] > 1e-13
+
+    def near_enough(self) -> bool:
+        """Tell whether the determinant has come down to a small share of what it is at the ends."""
+        return min(abs(sample[1]) for sample in self.samples) < 0.05 * self.scale
+
+    def interpolated(self) -> Spot:
+        """Return the point where the determinant vanishes, from the samples nearest to it."""
+        ranked = sorted((s for s in self.samples), key=lambda sample: abs(sample[1]))
+        chosen = [ranked[0]]
+        for sample in ranked[1:]:
+            if len(chosen) < 4 and all(abs(sample[1] - c[1]) > 1e-3 * abs(sample[1]) for c in chosen):
+                chosen.append(sample)
+        values = np.array([c[1] for c in chosen])
+        weights = np.array([np.prod([v / (v - u) for v in values if v != u]) for u in values])
+        y = sum(w * c[2].y for w, c in zip(weights, chosen, strict=True))
+        drive = float(sum(w * c[2].drive for w, c in zip(weights, chosen, strict=True)))
+        return Spot(np.asarray(y), drive, chosen[0][2].tangent)
+
+
+def _singular(solver: Solver, spot: Spot, ends: tuple[Spot, Spot], fold: bool) -> Singular:
+    """Find the null vector in the scaling that balances a regular tangent nearby."""
+    one, other = ends
+    balance = np.ones(solver.n)
+    regular, _ = solver.tangent_at(one.y, one.drive)
+    for _ in range(8):
+        balance /= np.sqrt(np.abs(regular * np.outer(balance, balance)).max(axis=1))
+    matrix, _ = solver.tangent_at(spot.y, spot.drive)
+    null = _null_vector(matrix * np.outer(balance, balance))
+    direction = null * balance
+    direction *= np.sign(direction[np.argmax(np.abs(null))]) / np.linalg.norm(direction)
+    return Singular(spot, direction, fold, one.unstable, other.unstable)
+
+
+def _null_vector(matrix: FloatArray) -> FloatArray:
+    """Return the eigenvector of a nearly singular matrix by inverse iteration."""
+    shift = 1e-14 * float(np.abs(matrix).max())
+    inverse = np.linalg.inv(matrix + shift * np.eye(len(matrix)))
+    null = inverse[:, np.abs(inverse).max(axis=0).argmax()]
+    for _ in range(3):
+        null = inverse @ (null / np.linalg.norm(null))
+    return np.asarray(null / np.linalg.norm(null))
+
+
+def leave(solver: ExpandedSolver, singular: Singular, sign: int, forward: float) -> Spot | None:
+    """Return an equilibrium on the branch that crosses at a bifurcation, on the stable side of it.
+
+    `sign` says which of the two mirror images; `forward` is the sense in which the drive goes. None if the branch
+    leads backwards (the bifurcation is subcritical) or is not more stable.
+    """
+    spot = singular.spot
+    border = np.append(singular.null, 0.0)
+    level = float(singular.null @ spot.y[: solver.n])
+    kick = _FIRST_KICK
+    for _ in range(_KICKS):
+        guess = solver.shifted(spot.y, spot.drive, sign * kick * singular.null)
+        moved = pose_change(solver, guess, spot.y)
+        if not 0.3 * _KICK <= moved <= _KICK:
+            kick *= 0.7 * _KICK / moved if moved > 0 else 10.0
+            continue
+        near = solver.solve(guess, spot.drive, border, level + sign * kick)
+        if near is None or pose_change(solver, near.y, guess) > 0.5 * _KICK:
+            kick *= 0.5
+            continue
+        ahead = (near.drive - spot.drive) * forward > 0
+        settled = solver.solve(near.y, near.drive)
+        return settled if settled is not None and ahead and settled.unstable < singular.after else None
+    return None
+
+
+def pose_change(solver: Solver, one: FloatArray, other: FloatArray) -> float:
+    """Return the largest difference of positions (in mean beam lengths) and rotations of two states."""
+    change = np.abs(one - other)
+    inner = change[solver.n :].reshape(-1, 6)[:, :3]
+    return float(max(inner.max(initial=0.0), change[: solver.n_free].max(initial=0.0)))

@@ -1,0 +1,63 @@
+"""A stated imperfection: beams bent slightly in the form of the first buckling mode, so that no bifurcation is left.
+
+The mode is the null vector at the first bifurcation of the perfect path. The rotations that it gives the sections
+are added to the angles of the unloaded shapes, which are then fitted between their nodes as always; the size is the
+largest displacement of the mode that they stand for.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.beams.network import Network
+from cfmkit.beams.shapes import Bent
+
+if TYPE_CHECKING:
+    from cfmkit.beams.events import Singular
+    from cfmkit.beams.expanded import ExpandedSolver
+    from cfmkit.beams.run import Run
+    from cfmkit.curves import FloatArray
+
+_KICK = 1e-5  # of the mode, to difference its states
+_DEGREE = 14  # of the polynomials that the rotations are given as
+
+
+def imperfect(run: Run, size: float) -> tuple[Network, str]:
+    """Return the network with a mode of this size [m] in its shapes, and the sentence that names it.
+
+    `run` has followed the primary path of the perfect network.
+    """
+    network = run.layout.network
+    if run.first is None:
+        return network, "none: the perfect path has no bifurcation"
+    rotation, reach = _mode(run.fine, run.first)
+    share = size / (reach * run.layout.scales.length)
+    cut, beams, row = run.fine.cut, dict(network.beams), 0
+    for number, (name, beam) in enumerate(network.beams.items()):
+        t: list[float] = []
+        for segment in range(cut.beam_segment[number], cut.beam_segment[number + 1]):
+            steps = slice(cut.segment_step[segment], cut.segment_step[segment + 1])
+            t += [*cut.edges[steps, 0].tolist(), float(cut.edges[steps, 1][-1])]
+        turn = np.polynomial.Chebyshev.fit(t, share * rotation[row : row + len(t)], _DEGREE, domain=[0.0, 1.0])
+        beams[name] = replace(beam, shape=Bent(beam.shape, tuple(turn.coef.tolist())))
+        row += len(t)
+    place = run.first.spot.drive * run.unit
+    bent = Network(network.nodes, beams, network.links, network.springs, network.loads)
+    return bent, f"{size:.6g} m of the buckling mode at {place:.6g}"
+
+
+def _mode(solver: ExpandedSolver, singular: Singular) -> tuple[FloatArray, float]:
+    """Return the rotations along the segments by the null vector, and its largest displacement, dimensionless."""
+    from cfmkit.beams.kernels import entry
+
+    spot, sides = singular.spot, []
+    for kick in (_KICK, -_KICK):
+        states = np.empty((len(solver.cut.edges) + solver.n_segments, 7))
+        y = solver.shifted(spot.y, spot.drive, kick * singular.null)
+        entry.states(solver.model, solver.n_free, y, spot.drive, states)
+        sides.append(states)
+    slope = (sides[0] - sides[1]) / (2 * _KICK)
+    return slope[:, 2], float(np.hypot(slope[:, 0], slope[:, 1]).max())

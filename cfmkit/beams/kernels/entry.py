@@ -1,0 +1,98 @@
+"""The doors to the compiled code, cached on disk.
+
+The compiler's cache looks at the time stamp of the file that a function stands in and at the values it closes
+over. The kernels stand in several files, so the doors close over a digest of all of them: change any, and nothing
+old is used.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import logging
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cfmkit.beams.kernels import march as _march
+from cfmkit.beams.kernels import newton as _newton
+from cfmkit.beams.kernels import observe as _observe
+from cfmkit.beams.kernels.compiler import door
+
+_follow, _solve, _forces, _states = _march.march, _newton.solve, _observe.forces, _observe.states
+
+
+def digest() -> str:
+    """Return a digest of the sources of all kernels."""
+    whole = hashlib.sha256()
+    for path in sorted(Path(__file__).parent.glob("*.py")):
+        whole.update(path.read_bytes())
+    return whole.hexdigest()
+
+
+def _doors(stamp: str) -> tuple[Any, ...]:
+    @door
+    def real(task, m, n_free, one, options, arrays, scratch):
+        _ = stamp
+        a, b, c, d, e, f = arrays
+        if task == SOLVE:
+            return _solve(m, n_free, a[0], d, b, one, (options[0], options[1]), c, scratch)
+        if task == MARCH:
+            return _follow(m, n_free, f, one, c, b, options, a, d, e, scratch)
+        _forces(m, n_free, a, d, e, scratch)
+        return 0, 0
+
+    @door
+    def states(m, n_free, y, drive, out):
+        _ = stamp
+        return _states(m, n_free, y, drive, out)
+
+    return real, states
+
+
+SOLVE, MARCH, FORCES = 0, 1, 2
+STAMP = digest()
+_real, states = _doors(STAMP)
+
+
+def announce() -> None:
+    """Say so, once, where the engine has not been compiled yet from these sources."""
+    mark = Path(_real.stats.cache_path) / f"beams-{STAMP[:16]}.compiled"
+    if mark.exists():
+        return
+    logging.getLogger("cfmkit.beams").warning("compiling the beam engine: once, about half a minute")
+    with contextlib.suppress(OSError):
+        mark.parent.mkdir(parents=True, exist_ok=True)
+        mark.touch()
+
+
+announce()
+
+
+def solve(
+    m: Any, n_free: int, y: Any, state: Any, border: Any, target: float, limits: Any, tangent: Any, scratch: Any
+) -> tuple[int, int]:
+    """Solve for one equilibrium; see `cfmkit.beams.kernels.newton.solve`."""
+    result: tuple[int, int] = _real(
+        SOLVE, m, n_free, target, limits, (y[None], border, tangent, state, _NONE, y), scratch
+    )
+    return result
+
+
+def march(
+    m: Any, n_free: int, y: Any, drive: float, tangent: Any, targets: Any, options: Any, outs: Any, scratch: Any
+) -> tuple[int, int]:
+    """Follow a path; see `cfmkit.beams.kernels.march.march`; outs: unknowns, drives, info."""
+    result: tuple[int, int] = _real(
+        MARCH, m, n_free, drive, options, (outs[0], targets, tangent, outs[1], outs[2], y), scratch
+    )
+    return result
+
+
+def forces(m: Any, n_free: int, ys: Any, drives: Any, out: Any, scratch: Any) -> None:
+    """Set values, residual forces and spring energy at points; see `cfmkit.beams.kernels.observe.forces`."""
+    _real(FORCES, m, n_free, 0.0, drives, (ys, drives, drives, drives, out, drives), scratch)
+
+
+_NONE = np.zeros((0, 0))

@@ -1,0 +1,223 @@
+"""Following a path of equilibria: extrapolation from the last points, Newton, steps by the change of rotation."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cfmkit.beams.kernels.compiler import kernel
+from cfmkit.beams.kernels.dense import copy
+from cfmkit.beams.kernels.newton import SOLVED, solve
+
+DONE, STALLED, INERTIA, LONG, FULL, OUTSIDE = 0, 1, 2, 3, 4, 5
+"""Why a march ended: all asked points reached; the smallest step failed; the number of unstable directions changed;
+a segment is too long for its load; no room for more points; the drive left its range."""
+
+KEPT = 4  # points that the extrapolation uses
+SHORT = 0.25  # dM1/dM0 of a segment below which it must be split
+INFO = 6  # unstable directions, index of the asked point or -1, parameter, iterations, d(drive)/ds, shortness
+
+
+@kernel
+def _predict(times, past, count, t, y):
+    """Extrapolate the kept points (newest first) to t by their polynomial."""
+    for k in range(y.shape[0]):
+        y[k] = 0.0
+    for i in range(count):
+        weight = 1.0
+        for j in range(count):
+            if j != i:
+                weight *= (t - times[j]) / (times[i] - times[j])
+        for k in range(y.shape[0]):
+            y[k] += weight * past[i, k]
+
+
+@kernel
+def _remember(times, past, count, t, y, drive):
+    """Put a point in front of the kept ones; return how many there are."""
+    for i in range(KEPT - 1, 0, -1):
+        times[i] = times[i - 1]
+        copy(past[i], past[i - 1])
+    times[0] = t
+    for k in range(y.shape[0]):
+        past[0, k] = y[k]
+    past[0, y.shape[0]] = drive
+    return min(count + 1, KEPT)
+
+
+@kernel
+def _changes(y, other, n_free, n):
+    """Return the largest difference of the poses of two states."""
+    change = 0.0
+    for i in range(y.shape[0]):
+        if i < n_free or (i >= n and (i - n) % 6 < 3):
+            change = max(change, abs(y[i] - other[i]))
+    return change
+
+
+@kernel
+def _border(natural, tangent, weight, n_free, border):
+    """Set the bordering row: the drive itself, or the weighted tangent."""
+    n = border.shape[0] - 1
+    for i in range(n + 1):
+        border[i] = 0.0
+    if natural:
+        border[n] = 1.0
+        return
+    norm = tangent[n] * tangent[n]
+    for i in range(n):
+        w = 1.0 if i < n_free else weight
+        border[i] = w * tangent[i]
+        norm += w * tangent[i] * tangent[i]
+    border[n] = tangent[n]
+    scale = 1.0 / np.sqrt(norm)
+    for i in range(n + 1):
+        border[i] *= scale
+        tangent[i] *= scale
+
+
+@kernel
+def _store(k, y, state, row, out_y, out_drive, out_info):
+    copy(out_y[k], y)
+    out_drive[k] = state[0]
+    out_info[k, 0], out_info[k, 1], out_info[k, 2] = state[1], row[0], row[1]
+    out_info[k, 3], out_info[k, 4], out_info[k, 5] = row[2], row[3], state[2]
+
+
+@kernel
+def _aim(y, state, border, tangent, paths, natural, goal, ahead):
+    """Set the first guess of the next point; return the right side of the bordering row.
+
+    paths: times, kept points, how many, present parameter. In natural steps the right side is the drive's value.
+    """
+    times, past, count, t, guess = paths
+    n, size = border.shape[0] - 1, y.shape[0]
+    _predict(times, past, count, t + ahead, guess)
+    if count == 1:
+        for i in range(n):
+            guess[i] += tangent[i] * ahead
+        guess[size] += tangent[n] * ahead
+    copy(y, guess)
+    if natural:
+        state[0] = goal
+        return goal
+    state[0] = guess[size]
+    level = border[n] * past[0, size] + ahead
+    for i in range(n):
+        level += border[i] * past[0, i]
+    return level
+
+
+@kernel
+def _next_step(natural, step, old, targets, asked):
+    """Return the advance to the next point, whether it lands on an asked value, and that value of the drive."""
+    if not natural:
+        return abs(step), False, 0.0
+    left = targets[asked] - old
+    if abs(left) <= abs(step) * 1.0001:
+        return left, True, targets[asked]
+    ahead = step if left * step > 0.0 else -step
+    return ahead, False, old + ahead
+
+
+@kernel
+def _forward(border, tangent):
+    """Tell whether a tangent exists and goes the way of the bordering row."""
+    along = 0.0
+    for i in range(border.shape[0]):
+        along += border[i] * tangent[i]
+    return along > 0.0
+
+
+@kernel
+def march(m, n_free, y, drive, tangent, targets, options, out_y, out_drive, out_info, scratch):
+    """Follow the path from the equilibrium (y, drive) through the targets.
+
+    options: tolerance, iterations, natural (1) or arc length (0), first, smallest and largest step, largest change of
+    a pose in a step, weight of forces in the arc length, lowest and highest drive, whether to stop where the
+    inertia changes, inertia at the start. Returns why it ended and the number of points stored.
+    """
+    natural, step, smallest, greatest, turn = options[2] > 0.5, options[3], options[4], options[5], options[6]
+    n, size = tangent.shape[0] - 1, y.shape[0]
+    times, past = np.zeros(KEPT), np.zeros((KEPT, size + 1))
+    guess, new, state, row = np.empty(size + 1), np.empty(size), np.empty(4), np.empty(4)
+    border, new_tangent, unit = np.empty(n + 1), np.empty(n + 1), np.zeros(n + 1)
+    unit[n] = 1.0
+    t, stored, asked, index = (drive if natural else 0.0), 0, 0, options[11]
+    count = _remember(times, past, 0, t, y, drive)
+    while asked < targets.shape[0]:
+        if stored + targets.shape[0] - asked + 1 >= out_y.shape[0]:
+            return FULL, stored
+        old = past[0]
+        _border(natural, tangent, options[7], n_free, border)
+        ahead, landing, goal = _next_step(natural, step, old[size], targets, asked)
+        goal = _aim(new, state, border, tangent, (times, past, count, t, guess), natural, goal, ahead)
+        code, iterations = solve(m, n_free, new, state, border, goal, (options[0], options[1]), new_tangent, scratch)
+        moved, missed = _changes(new, old, n_free, n), _changes(new, guess, n_free, n)
+        near = moved <= turn and (count == 1 or missed <= 0.4 * moved + 1e-7)
+        if code != SOLVED or not near or not (natural or _forward(border, new_tangent)):
+            step = 0.5 * ahead if natural else 0.5 * step
+            if abs(step) < smallest:
+                return STALLED, stored
+            continue
+        if state[2] < SHORT:
+            return LONG, stored
+        if not natural:
+            outs = (out_y, out_drive, out_info)
+            asked, stored = _between(m, n_free, old, new, state, targets, asked, stored, options, outs, unit, scratch)
+            if asked >= targets.shape[0]:
+                return DONE, stored
+        row[0], row[1], row[2], row[3] = -1.0, t + ahead, float(iterations), new_tangent[n]
+        if landing:
+            row[0] = float(asked)
+            asked += 1
+        _store(stored, new, state, row, out_y, out_drive, out_info)
+        stored += 1
+        t += ahead
+        count = _remember(times, past, count, t, new, state[0])
+        copy(tangent, new_tangent)
+        if options[10] > 0.5 and state[1] != index:
+            return INERTIA, stored
+        index = state[1]
+        if state[0] < options[8] or state[0] > options[9]:
+            return OUTSIDE, stored
+        if missed < 0.1 * moved + (1e-9 if landing else 0.0) and (landing or (count > 2 and moved < 0.5 * turn)):
+            step = np.sign(step) * min(greatest, 1.6 * abs(step))
+    return DONE, stored
+
+
+@kernel
+def _between(m, n_free, old, new, state, targets, asked, stored, options, outs, unit, scratch):
+    """Solve at the asked values of the drive that a step of arc length has passed; return (asked, stored).
+
+    Values in the direction of the first target count as asked once each; a value passed again on the way back
+    after a fold is stored again.
+    """
+    size = new.shape[0]
+    n_all = targets.shape[0]
+    y, s = np.empty(size), np.empty(4)
+    row, tangent = np.empty(4), np.empty(unit.shape[0])
+    before, after = old[size], state[0]
+    rising = after > before
+    first = 0 if (rising == (targets[n_all - 1] > targets[0]) or n_all == 1) else n_all - 1
+    for i in range(n_all):
+        k = i if first == 0 else n_all - 1 - i
+        value = targets[k]
+        inside = (before < value <= after) if rising else (after <= value < before)
+        if not inside or stored >= outs[0].shape[0] - 2:
+            continue
+        share = (value - before) / (after - before)
+        for i in range(size):
+            y[i] = old[i] + share * (new[i] - old[i])
+        s[0] = value
+        code, iterations = solve(m, n_free, y, s, unit, value, (options[0], options[1]), tangent, scratch)
+        n = unit.shape[0] - 1
+        if code == SOLVED and _changes(y, new, n_free, n) <= 1.5 * _changes(new, old, n_free, n) + 1e-7:
+            row[0], row[1], row[2], row[3] = float(k), -1.0, float(iterations), (1.0 if rising else -1.0)
+            _store(stored, y, s, row, outs[0], outs[1], outs[2])
+            stored += 1
+            if k == n_all - 1:
+                return n_all, stored
+            asked = max(asked, k + 1) if asked < n_all - 1 else asked
+        elif k == n_all - 1:
+            return n_all, stored
+    return asked, stored

@@ -1,0 +1,208 @@
+"""Equilibrium: the global system of a network, Newton's method with one bordering row, inertia of the tangent."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cfmkit.beams.kernels.chain import C_D, E2, SMALL, E, F, G, pose_of, sweep, unfold
+from cfmkit.beams.kernels.compiler import kernel
+from cfmkit.beams.kernels.dense import clear, copy_matrix, lu_solve, positive_count
+from cfmkit.beams.kernels.springs import add_block, add_entry, add_force, add_loads, add_springs, jacobian
+
+SOLVED, SINGULAR, DIVERGED, SLOW = 0, 1, 2, 3
+LARGEST_TURN = 1.0  # longest Newton step [rad or lengths]: longer ones are shortened, not refused
+
+
+@kernel
+def all_values(m, y, drive, values):
+    """Set the values of all degrees of freedom."""
+    for i in range(values.shape[0]):
+        slot = m.slot[i]
+        values[i] = y[slot] if slot >= 0 else m.base[i] + drive * m.rate[i]
+
+
+@kernel
+def assemble(m, y, drive, n_free, h, residual, values, ends, rel, store, work):
+    """Set the Jacobian `h` (unknowns z, then the drive) and the residuals of equilibrium and closure.
+
+    residual (dofs + 3 beams): forces on every degree of freedom, free or not, then closure errors; the order of the
+    rows of `h` is that of z. Returns the inertia that the eliminated unknowns contribute and the shortness measure.
+    """
+    clear(h)
+    for i in range(residual.shape[0]):
+        residual[i] = 0.0
+    all_values(m, y, drive, values)
+    n_beams = m.beam_end.shape[0]
+    n_dofs = values.shape[0]
+    n = n_free + 3 * n_beams
+    w = work[4]
+    ja, jb, force = w[0:3, :4], w[3:6, :4], w[6]
+    index, least = 0, 1.0
+    add_loads(m, values, drive, h, residual, work)
+    add_springs(m, values, h, residual, work)
+    for e in range(n_beams):
+        ia, ib = m.beam_end[e, 0], m.beam_end[e, 1]
+        arm_a, arm_b = pose_of(m, values, ia, ends[0]), pose_of(m, values, ib, ends[1])
+        jacobian(m, ia, arm_a, ja)
+        jacobian(m, ib, arm_b, jb)
+        change, short = sweep(m, e, y, (n_free, n), drive, ends, rel[e], store, work)
+        index += change
+        least = min(least, short)
+        own = n + 6 * m.beam_segment[e] + 3
+        last = n_free + 3 * e
+        for r in range(3):
+            force[r] = y[own + r] + rel[e, SMALL, r, 0]
+        add_force(m, h, residual, ia, arm_a, ja, force)
+        for r in range(3):
+            force[r] = -y[last + r]
+        add_force(m, h, residual, ib, arm_b, jb, force)
+        add_block(m, h, ia, ia, ja, rel[e, G], ja)
+        _couple(m, h, e, last, ia, ib, ja, jb, rel[e])
+        for r in range(3):
+            residual[n_dofs + 3 * e + r] = rel[e, C_D, r, 0]
+            h[last + r, n] += rel[e, C_D, r, 1]
+    return index, least
+
+
+@kernel
+def _couple(m, h, e, last, ia, ib, ja, jb, rel):
+    """Add the blocks between a beam's last force and the degrees of freedom of its ends."""
+    n = h.shape[0] - 1
+    for a in range(4):
+        da, db = m.place_dof[ia, a], m.place_dof[ib, a]
+        row_a, row_b = m.slot[da], m.slot[db]
+        for r in range(3):
+            start, closure = 0.0, 0.0
+            for s in range(3):
+                start += ja[s, a] * rel[E2, s, r]
+                closure += rel[E, r, s] * ja[s, a]
+            if row_a >= 0:
+                h[row_a, last + r] += start
+                h[last + r, row_a] += closure
+            else:
+                h[last + r, n] += closure * m.rate[da]
+            if row_b >= 0:
+                h[row_b, last + r] -= jb[r, a]
+                h[last + r, row_b] -= jb[r, a]
+            else:
+                h[last + r, n] -= jb[r, a] * m.rate[db]
+        if row_a >= 0:
+            for s in range(3):
+                h[row_a, n] += ja[s, a] * rel[SMALL, s, 1]
+    for r in range(3):
+        for s in range(3):
+            h[last + r, last + s] += rel[F, r, s]
+
+
+@kernel
+def right_sides(m, residual, h, y, drive, n_free, border, target, rhs):
+    """Set the two right sides: the Newton step, and the tangent with unit advance along the border."""
+    n = h.shape[0] - 1
+    n_dofs = m.slot.shape[0]
+    clear(rhs)
+    for i in range(n_dofs):
+        if m.slot[i] >= 0:
+            rhs[m.slot[i], 0] = -residual[i]
+    for i in range(n - n_free):
+        rhs[n_free + i, 0] = -residual[n_dofs + i]
+    along = border[n] * drive
+    for i in range(n):
+        h[n, i] = border[i]
+        along += border[i] * y[i]
+    h[n, n] = border[n]
+    rhs[n, 0] = target - along
+    rhs[n, 1] = 1.0
+
+
+@kernel
+def tangent_index(h, n_free, eliminated, scratch):
+    """Return the number of unstable directions from the Jacobian (forces positive: minus the energy's Hessian)."""
+    n = h.shape[0] - 1
+    for i in range(n):
+        for j in range(n):
+            scratch[i, j] = 0.5 * (h[i, j] + h[j, i])
+    return positive_count(scratch[:n, :n]) - (n - n_free) + eliminated
+
+
+@kernel
+def largest(dy, y, n_free, n):
+    """Return the largest increment: poses as they are, forces relative to the largest force."""
+    scale = 1.0
+    for i in range(n_free, y.shape[0]):
+        if (i < n or (i - n) % 6 > 2) and abs(y[i]) > scale:
+            scale = abs(y[i])
+    pose, force = 0.0, 0.0
+    for i in range(y.shape[0]):
+        size = abs(dy[i])
+        if not np.isfinite(size):
+            return np.inf, np.inf
+        if i < n_free or (i >= n and (i - n) % 6 < 3):
+            pose = max(pose, size)
+        else:
+            force = max(force, size)
+    return pose, force / scale
+
+
+@kernel
+def solve(m, n_free, y, state, border, target, limits, tangent, scratch):
+    """Newton's method for equilibrium with border . (z, drive) = target; y and state[0] (the drive) are updated.
+
+    limits: (tolerance, most iterations). On return tangent holds d(z, drive) per unit along the border and
+    state[1:4] the number of unstable directions, the shortness measure and the last increment.
+    Returns a code and the number of iterations.
+    """
+    h, h2, rhs, residual, values, ends, rel, store, work, dy = scratch
+    n = h.shape[0] - 1
+    before = 0.0
+    for iteration in range(int(limits[1])):
+        index, least = assemble(m, y, state[0], n_free, h, residual, values, ends, rel, store, work)
+        right_sides(m, residual, h, y, state[0], n_free, border, target, rhs)
+        copy_matrix(h2, h)
+        if not lu_solve(h2, rhs):
+            return SINGULAR, iteration
+        for i in range(n):
+            dy[i] = rhs[i, 0]
+        _unfold_all(m, n_free, n, rhs[n, 0], values, rel, store, dy, work)
+        pose, force = largest(dy, y, n_free, n)
+        if not (np.isfinite(pose) and np.isfinite(force)):
+            return DIVERGED, iteration
+        share = min(1.0, LARGEST_TURN / pose) if pose > 0.0 else 1.0
+        for i in range(dy.shape[0]):
+            y[i] += share * dy[i]
+        state[0] += share * rhs[n, 0]
+        size = max(pose, force)
+        growth = 30.0
+        if before > 0.0:
+            growth = max(growth, size / (before * before))
+        if share == 1.0 and (growth * size * size < limits[0] or size < 1e-2 * limits[0]):
+            for i in range(n + 1):
+                tangent[i] = rhs[i, 1]
+            state[1] = tangent_index(h, n_free, index, h2)
+            state[2], state[3] = least, size
+            return SOLVED, iteration + 1
+        before = size
+        if size > 1e6:
+            return DIVERGED, iteration
+    return SLOW, int(limits[1])
+
+
+@kernel
+def _unfold_all(m, n_free, n, ddrive, values, rel, store, dy, work):
+    """Set the increments of the segments' unknowns from those of z (already in dy) and of the drive."""
+    dpose, jac, pose = work[7, 0], work[7, 1:4, :4], work[7, 4]
+    for e in range(m.beam_end.shape[0]):
+        ia = m.beam_end[e, 0]
+        arm = pose_of(m, values, ia, pose)
+        jacobian(m, ia, arm, jac)
+        for r in range(3):
+            dpose[r] = 0.0
+            for a in range(4):
+                d = m.place_dof[ia, a]
+                slot = m.slot[d]
+                change = dy[slot] if slot >= 0 else m.rate[d] * ddrive
+                dpose[r] += jac[r, a] * change
+        last = n_free + 3 * e
+        unfold(m, e, (n_free, n), store, dpose, dy[last : last + 3], ddrive, dy)
+
+
+__all__ = ["DIVERGED", "SINGULAR", "SLOW", "SOLVED", "add_entry", "all_values", "assemble", "solve"]

@@ -1,0 +1,149 @@
+"""Springs and loads at attachments: their forces and exact tangents."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cfmkit.beams.kernels.chain import pose_of
+from cfmkit.beams.kernels.compiler import kernel
+from cfmkit.beams.kernels.dense import clear
+
+LINE, TURN, SLIDE = 0, 1, 2
+"""Kinds: along the line between two places (stiffness, free length), between two rotations (stiffness, free
+angle), along a fixed direction (stiffness, cos, sin, free gap)."""
+
+
+@kernel
+def jacobian(m, i, arm, jac):
+    """Set the 3 x 4 derivative of the pose of attachment i by its degrees of freedom."""
+    fc, fs = m.place_frame[i, 0], m.place_frame[i, 1]
+    clear(jac)
+    jac[0, 0], jac[0, 1], jac[0, 2] = fc, -fs, -arm[1]
+    jac[1, 0], jac[1, 1], jac[1, 2] = fs, fc, arm[0]
+    jac[2, 3] = 1.0
+
+
+@kernel
+def add_entry(m, h, i, j, value):
+    """Add d(residual i)/d(dof j) to the system; driven degrees of freedom go to the drive's column."""
+    row = m.slot[i]
+    if row < 0 or value == 0.0:
+        return
+    column = m.slot[j]
+    if column >= 0:
+        h[row, column] += value
+    elif m.rate[j] != 0.0:
+        h[row, h.shape[0] - 1] += value * m.rate[j]
+
+
+@kernel
+def add_block(m, h, i, j, left, block, right):
+    """Add left^T block right for the degrees of freedom of attachments i and j."""
+    for a in range(4):
+        for b in range(4):
+            value = 0.0
+            for r in range(3):
+                if left[r, a] != 0.0:
+                    inner = 0.0
+                    for s in range(3):
+                        inner += block[r, s] * right[s, b]
+                    value += left[r, a] * inner
+            add_entry(m, h, m.place_dof[i, a], m.place_dof[j, b], value)
+
+
+@kernel
+def add_force(m, h, residual, i, arm, jac, force):
+    """Add a force (fx, fy, moment) at attachment i to the residual, with the part of the tangent that its arm makes."""
+    d = m.place_dof[i]
+    for a in range(4):
+        residual[d[a]] += jac[0, a] * force[0] + jac[1, a] * force[1] + jac[2, a] * force[2]
+    add_entry(m, h, d[2], d[2], -(arm[0] * force[0] + arm[1] * force[1]))
+
+
+@kernel
+def add_loads(m, values, drive, h, residual, work):
+    """Add the point loads, dead or turning with their node."""
+    pose, jac, force, column = work[5, 0], work[5, 1:4, :4], work[5, 4], work[5, 5]
+    n = h.shape[0] - 1
+    for k in range(m.load_place.shape[0]):
+        i = m.load_place[k]
+        arm = pose_of(m, values, i, pose)
+        jacobian(m, i, arm, jac)
+        for r in range(3):
+            force[r] = m.load_value[k, 0, r] + drive * m.load_value[k, 1, r]
+            column[r] = m.load_value[k, 1, r]
+        if m.load_follows[k]:
+            _turn(force, pose[2])
+            _turn(column, pose[2])
+        add_force(m, h, residual, i, arm, jac, force)
+        d = m.place_dof[i]
+        for a in range(4):
+            row = m.slot[d[a]]
+            if row >= 0:
+                h[row, n] += jac[0, a] * column[0] + jac[1, a] * column[1] + jac[2, a] * column[2]
+            if m.load_follows[k]:
+                add_entry(m, h, d[a], d[3], -jac[0, a] * force[1] + jac[1, a] * force[0])
+
+
+@kernel
+def _turn(force, angle):
+    c, s = np.cos(angle), np.sin(angle)
+    force[0], force[1] = c * force[0] - s * force[1], s * force[0] + c * force[1]
+
+
+@kernel
+def _spring_law(kind, value, pa, pb, force, block):
+    """Set the force on place b and its derivative by the pose of b (that by a is opposite); return the energy."""
+    clear(block)
+    force[0] = force[1] = force[2] = 0.0
+    k = value[0]
+    if kind == TURN:
+        gap = pb[2] - pa[2] - value[1]
+        force[2] = -k * gap
+        block[2, 2] = -k
+        return 0.5 * k * gap * gap
+    dx, dy = pb[0] - pa[0], pb[1] - pa[1]
+    if kind == SLIDE:
+        ex, ey = value[1], value[2]
+        gap = dx * ex + dy * ey - value[3]
+        across = 0.0
+    else:
+        length = np.sqrt(dx * dx + dy * dy)
+        gap = length - value[1]
+        if length > 0.0:
+            ex, ey, across = dx / length, dy / length, k * gap / length
+        else:
+            ex, ey, across = 0.0, 0.0, k
+    force[0], force[1] = -k * gap * ex, -k * gap * ey
+    block[0, 0] = -k * ex * ex - across * ey * ey
+    block[0, 1] = (across - k) * ex * ey
+    block[1, 0] = block[0, 1]
+    block[1, 1] = -k * ey * ey - across * ex * ex
+    return 0.5 * k * gap * gap
+
+
+@kernel
+def add_springs(m, values, h, residual, work):
+    """Add the springs; return their energy."""
+    w = work[6]
+    pa, pb, force, block = w[0], w[1], w[2], w[3:6, :3]
+    ja, jb = w[6:9, :4], w[9:12, :4]
+    energy = 0.0
+    for k in range(m.spring_kind.shape[0]):
+        i, j = m.spring_place[k, 0], m.spring_place[k, 1]
+        arm_a, arm_b = pose_of(m, values, i, pa), pose_of(m, values, j, pb)
+        jacobian(m, i, arm_a, ja)
+        jacobian(m, j, arm_b, jb)
+        energy += _spring_law(m.spring_kind[k], m.spring_value[k], pa, pb, force, block)
+        add_force(m, h, residual, j, arm_b, jb, force)
+        for r in range(3):
+            force[r] = -force[r]
+        add_force(m, h, residual, i, arm_a, ja, force)
+        add_block(m, h, i, i, ja, block, ja)
+        add_block(m, h, j, j, jb, block, jb)
+        for r in range(3):
+            for s in range(3):
+                block[r, s] = -block[r, s]
+        add_block(m, h, i, j, ja, block, jb)
+        add_block(m, h, j, i, jb, block, ja)
+    return energy

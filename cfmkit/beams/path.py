@@ -1,0 +1,251 @@
+"""The outcome of a trace: converged equilibria in the order of the path, and what can be asked about them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.beams.drive import Loading
+from cfmkit.beams.network import LineLoad
+from cfmkit.beams.recover import Sampler, Sections, extremes, sections
+from cfmkit.curves import read_only
+
+if TYPE_CHECKING:
+    from cfmkit.beams.beam import Fit
+    from cfmkit.beams.layout import Layout
+    from cfmkit.beams.solver import Points, Solver
+    from cfmkit.curves import FloatArray
+
+
+class PathStatus(Enum):
+    """How a path ended."""
+
+    COMPLETE = "all points asked for were reached"
+    LIMIT_POINT = "the drive cannot go further: a limit point"
+    JUMPS = "stability is lost and no stable equilibrium is near"
+    LOST = "the path was lost: no step converged"
+    OUTSIDE = "the path left the range of the drive"
+    FULL = "the path has more points than allowed"
+    NO_START = "no equilibrium under the constant loads"
+    INACCURATE = "the tolerance could not be reached"
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something on the path: a limit point, a bifurcation, or a change of stability that was not resolved.
+
+    `drive` is where (SI); `before` and `after` count the unstable directions on both sides.
+    """
+
+    kind: str
+    drive: float
+    before: int
+    after: int
+
+
+@dataclass(frozen=True)
+class StressPeak:
+    """The largest stress at every point [Pa], the beam that has it and the place on it (fraction of its length)."""
+
+    value: FloatArray
+    beam: Any
+    place: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Path:
+    """Equilibria of a network under a drive.
+
+    Attributes
+    ----------
+    status, message : PathStatus, str
+        Whether all points asked for were reached, and if not, why and where.
+    branch : (n,) array of str
+        Which branch each point is on.
+    events : tuple of Event
+        Limit points and bifurcations, in path order.
+    error : float
+        Estimated error of forces and positions, relative to the largest of the path: the change with half the step.
+    accurate : (n,) array of bool
+        False at the points of a path that misses its tolerance whose own error is above it, or not known.
+    imperfection : str
+        What was added to the shapes (`Control.imperfection`): its size and mode; empty for the network as given.
+    """
+
+    solver: Solver
+    points: Points
+    branch: Any
+    status: PathStatus
+    message: str
+    events: tuple[Event, ...]
+    error: float
+    accurate: Any
+    imperfection: str = ""
+
+    def __len__(self) -> int:
+        """Return the number of points."""
+        return len(self.points)
+
+    @property
+    def layout(self) -> Layout:
+        """The index map."""
+        return self.solver.layout
+
+    @cached_property
+    def drive(self) -> FloatArray:
+        """Value of the drive at every point [m, rad or 1]."""
+        return read_only(self.points.drive * self.layout.scales.drive)
+
+    @cached_property
+    def unstable(self) -> Any:
+        """Number of unstable directions while the drive is held."""
+        return read_only(self.points.info[:, 0], np.int64)
+
+    @property
+    def stable(self) -> Any:
+        """Whether the equilibrium is stable while the drive is held."""
+        return read_only(self.unstable == 0, np.bool_)
+
+    @cached_property
+    def asked(self) -> Any:
+        """Index of the point asked for, -1 for points in between."""
+        return read_only(self.points.info[:, 1], np.int64)
+
+    @cached_property
+    def at_asked(self) -> Any:
+        """Indices of the points that were asked for, in path order."""
+        return read_only(np.flatnonzero(self.asked >= 0), np.int64)
+
+    @cached_property
+    def fits(self) -> dict[str, Fit]:
+        """How each beam was fitted between its nodes."""
+        return self.layout.fits
+
+    @cached_property
+    def _observed(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        from cfmkit.beams.kernels import entry
+
+        s, dofs = self.solver, self.layout.dof_count
+        out = np.empty((len(self), 2 * dofs + 1))
+        if len(self):
+            entry.forces(s.model, s.n_free, np.ascontiguousarray(self.points.y), self.points.drive, out, s.scratch)
+        return out[:, :dofs], out[:, dofs : 2 * dofs], out[:, -1]
+
+    def motion(self, node: str) -> FloatArray:
+        """Return displacement and rotation of a node, (n, 3) [m, m, rad]."""
+        values, scales = self._observed[0], self.layout.scales
+        master = self.layout.network.master_of(node)
+        first = self.layout.first[master]
+        frame = self.layout.direction[master]
+        c, s = np.cos(frame), np.sin(frame)
+        a, b, turn = (values[:, first + k] for k in range(3))
+        (x, y), (mx, my) = self.layout.position(node), self.layout.position(master)
+        ax, ay = x - mx, y - my
+        dx = (c * a - s * b) * scales.length + np.cos(turn) * ax - np.sin(turn) * ay - ax
+        dy = (s * a + c * b) * scales.length + np.sin(turn) * ax + np.cos(turn) * ay - ay
+        return read_only(np.stack([dx, dy, turn], axis=-1))
+
+    def reaction(self, node: str) -> FloatArray:
+        """Return force and moment that support and drive exert on a node, (n, 3) [N, N, N m]."""
+        residual, scales = self._observed[1], self.layout.scales
+        first, frame = self.layout.first[node], self.layout.direction[node]
+        c, s = np.cos(frame), np.sin(frame)
+        a, b, moment = (-residual[:, first + k] for k in range(3))
+        force = scales.force
+        return read_only(np.stack([(c * a - s * b) * force, (s * a + c * b) * force, moment * scales.moment], axis=-1))
+
+    @cached_property
+    def effort(self) -> FloatArray:
+        """What the drive works with: the force along it [N], the moment [N m], or for loads the displacement [J]."""
+        scales, drive = self.layout.scales, self.layout.drive
+        if isinstance(drive, Loading):
+            return read_only(self._load_displacement(drive))
+        dof, sense = self.layout.driven  # type: ignore[misc]
+        unit = scales.moment if dof == self.layout.first[drive.node] + 2 else scales.force
+        return read_only(-self._observed[1][:, dof] * sense * unit)
+
+    def _load_displacement(self, drive: Loading) -> FloatArray:
+        total = np.zeros(len(self))
+        for load in drive.loads:
+            if isinstance(load, LineLoad):
+                total += self._line_work(load)
+                continue
+            moved = self.motion(load.node)
+            c, s = (np.cos(moved[:, 2]), np.sin(moved[:, 2])) if load.follows else (1.0, 0.0)
+            fx, fy = c * load.fx - s * load.fy, s * load.fx + c * load.fy
+            total += fx * moved[:, 0] + fy * moved[:, 1] + load.moment * moved[:, 2]
+        return total
+
+    def _line_work(self, load: LineLoad) -> FloatArray:
+        """Return the line load's work-conjugate displacement [J] by Simpson's rule over the samples."""
+        from scipy.integrate import simpson
+
+        sampler, scales = self.sampler, self.layout.scales
+        beam = list(self.layout.network.beams).index(load.beam)
+        rows = sampler.rows(beam)
+        rest = self.solver.unstressed()
+        from cfmkit.beams.kernels import entry
+
+        still = np.empty(sampler.states.shape[1:])
+        entry.states(sampler.model, self.solver.n_free, rest, 0.0, still)
+        moved = (sampler.states[:, rows.index, :2] - still[rows.index, :2]) * scales.length
+        length = float(np.real(self.fits[load.beam].length)) * sampler.place(beam, rows.t)
+        density = load.wx * moved[..., 0] + load.wy * moved[..., 1]
+        total = np.zeros(len(self))
+        for first in range(0, len(rows.t), sampler.per_segment):
+            part = slice(first, first + sampler.per_segment)
+            total += simpson(density[:, part], x=length[part], axis=1)
+        return total
+
+    def end_force(self, beam: str, end: int) -> FloatArray:
+        """Return (h, v, m) on the first (0) or last (1) section of a beam, (n, 3) [N, N, N m].
+
+        It is what the part after the section exerts on the part before it, in global axes.
+        """
+        s, scales = self.solver, self.layout.scales
+        index = list(self.layout.network.beams).index(beam)
+        at = s.n_free + 3 * index if end == 1 else s.n + 6 * int(s.cut.beam_segment[index]) + 3
+        return read_only(self.points.y[:, at : at + 3] * np.array([scales.force, scales.force, scales.moment]))
+
+    @cached_property
+    def sampler(self) -> Sampler:
+        """States along all beams (computed when first asked for)."""
+        return Sampler(self.solver, self.points)
+
+    @cached_property
+    def energy(self) -> FloatArray:
+        """Strain energy of beams and springs at every point [J]."""
+        return read_only((self.sampler.energy() + self._observed[2]) * self.layout.scales.moment)
+
+    def shape(self, beam: str, point: int) -> FloatArray:
+        """Return the deformed centre line of a beam at one point, (k, 2) [m]."""
+        rows = self.sampler.rows(list(self.layout.network.beams).index(beam))
+        return read_only(self.sampler.states[point, rows.index, :2] * self.layout.scales.length)
+
+    def sections(self, beam: str) -> Sections:
+        """Return section forces and stresses along a beam at all points; arrays (n, k)."""
+        index = list(self.layout.network.beams).index(beam)
+        rows = self.sampler.rows(index)
+        states = self.sampler.states[:, rows.index]
+        t = np.broadcast_to(rows.t, states.shape[:2])
+        return sections(self.sampler, index, states, t, np.broadcast_to(rows.step, t.shape))
+
+    def beam_stress(self, beam: str, axial: bool = True) -> tuple[FloatArray, FloatArray]:
+        """Return the largest stress of a beam at every point [Pa] and its place (fraction of the length)."""
+        return extremes(self.sampler, list(self.layout.network.beams).index(beam), axial)
+
+    def peak_stress(self, axial: bool = True) -> StressPeak:
+        """Return the largest stress of the network at every point, with its place."""
+        names = list(self.layout.network.beams)
+        found = [self.beam_stress(name, axial) for name in names]
+        values = np.array([value for value, _ in found])
+        best = values.argmax(axis=0)
+        pick = np.arange(len(self))
+        places = np.array([place for _, place in found])
+        return StressPeak(
+            read_only(values[best, pick]), read_only(np.array(names)[best], np.str_), read_only(places[best, pick])
+        )

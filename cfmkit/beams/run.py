@@ -1,0 +1,280 @@
+"""One attempt at a path on one mesh: legs of marching, joined where the path needs a decision."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.beams import branches
+from cfmkit.beams.discretise import Mesh
+from cfmkit.beams.expanded import ExpandedSolver
+from cfmkit.beams.kernels.march import DONE, FULL, INERTIA, INFO, LONG, OUTSIDE, STALLED
+from cfmkit.beams.path import Event, Path, PathStatus
+from cfmkit.beams.solver import Points, Solver, Spot, march_options
+from cfmkit.curves import read_only
+
+if TYPE_CHECKING:
+    from cfmkit.beams.drive import Control
+    from cfmkit.beams.events import Singular
+    from cfmkit.beams.layout import Layout
+    from cfmkit.curves import FloatArray
+
+_HOPS = 60  # decisions on one path
+_FINE_STEPS = 8
+_SMALLEST = 1e-7  # shortest step as a share of the drive's range
+
+
+@dataclass
+class Run:
+    """One attempt at a path on one mesh."""
+
+    layout: Layout
+    mesh: Mesh
+    control: Control
+    status: PathStatus = PathStatus.COMPLETE
+    message: str = ""
+    events: list[Event] = field(default_factory=list)
+    branch: str = "primary"
+    too_long: bool = False
+    end: branches.BranchEnd | None = None
+    error: float = np.inf  # as estimated
+    first: Singular | None = None  # the first bifurcation at which stability is lost
+    closed: bool = True  # no branch, or its end is known, or it is known to have none before the last point asked for
+    entry: float = np.inf  # first step on a branch that was just entered
+
+    def __post_init__(self) -> None:
+        """Build the solver."""
+        self.solver = Solver(self.layout, self.mesh, min(1e-9, 1e-3 * self.control.tolerance))
+        self.targets = self.layout.drive.points / self.layout.scales.drive
+        self.points: Points = Points(np.empty((0, self.solver.size)), np.empty(0), np.empty((0, INFO)))
+        self.branches: list[str] = []
+        self.span = float(np.ptp(np.append(self.targets, 0.0)))
+        self.natural = not self.control.through_folds
+
+    @property
+    def unit(self) -> float:
+        """SI value of one unit of the drive."""
+        return self.layout.scales.drive
+
+    @cached_property
+    def fine(self) -> ExpandedSolver:
+        """The same segments with many more steps.
+
+        Integration forward breaks the symmetry of a beam by its error, and that acts on a bifurcation as an
+        imperfection does: singular points are looked for where that error is rounding.
+        """
+        steps = max(_FINE_STEPS, 2 * self.mesh.steps)
+        return ExpandedSolver(self.layout, Mesh(self.mesh.segments, steps), 1e-11)
+
+    def follow(self) -> None:
+        """Trace from rest to the last point asked for, or to where it ends, and name the branches."""
+        self._follow()
+        if self.natural and not self.closed and not self.too_long:
+            primary = Run(self.layout, self.mesh, replace(self.control, branch="primary"))
+            primary.follow()
+            branches.relabel(self, primary)
+
+    def _follow(self) -> None:
+        spot, share = self.solver.rest()
+        if spot is None:
+            self.status = PathStatus.NO_START
+            self.message = f"no equilibrium under the constant loads: lost at {share:.3g} of them"
+            return
+        spot.tangent *= float(np.sign(self.targets[np.flatnonzero(self.targets)[0]]))
+        asked = 0
+        if self.targets[0] == 0.0:
+            asked = 1
+        self.append(self.as_points(spot, 0 if asked else -1))
+        hops = 0
+        while asked < len(self.targets) and hops < _HOPS:
+            code, asked, spot = self._leg(spot, asked)
+            hops += 1
+            if code == DONE and asked == len(self.targets):
+                return
+            if code == INERTIA:
+                following = branches.cross(self)
+            elif code == DONE:
+                following = branches.rejoin(self, spot)
+            elif code == STALLED and self.natural and self.branch != "primary":
+                following = branches.hop(self, spot, asked)
+            else:
+                self.stop(code)
+                return
+            if following is None:
+                return
+            spot = following
+            if self.too_long:
+                return
+            asked = self.asked()
+
+    def asked(self) -> int:
+        """Return the number of points asked for that are done."""
+        done = self.points.info[:, 1]
+        return int(done.max()) + 1 if len(done) else 0
+
+    def as_points(self, spot: Spot, asked: int) -> Points:
+        """Return one equilibrium as a list of points."""
+        info = np.array([[spot.unstable, asked, 0.0, 0.0, spot.tangent[-1], spot.shortness]])
+        return Points(spot.y[None], np.array([spot.drive]), info)
+
+    def append(self, points: Points) -> None:
+        """Add points to the path, on the present branch."""
+        self.points = self.points.joined(points)
+        self.branches += [self.branch] * len(points)
+
+    def spot(self, index: int) -> Spot:
+        """Return a stored point as a place to go on from, with its tangent."""
+        again = self.solver.solve(self.points.y[index], float(self.points.drive[index]))
+        if again is not None:
+            return again
+        return Spot(self.points.y[index], float(self.points.drive[index]), self.solver.unit.copy())
+
+    def settled(self, spot: Spot) -> Spot | None:
+        """Return an equilibrium of another mesh, solved on this one, if it is near and as stable."""
+        near = self.solver.solve(spot.y, spot.drive)
+        return near if near is not None and near.unstable == spot.unstable else None
+
+    def fine_spot(self, index: int) -> Spot | None:
+        """Return a stored point, solved again on the fine mesh."""
+        return self.fine.solve(self.fine.expand(self.points.y[index]), float(self.points.drive[index]))
+
+    def _leg(self, spot: Spot, asked: int) -> tuple[int, int, Spot]:
+        """March once; return why it ended, the points done and the last spot."""
+        left, numbers = self._left(spot, asked)
+        options = self.options(spot, self._first_step(spot, asked))
+        room = max(len(left) + 2, self.control.most_points - len(self.points))
+        code, points = self.solver.march(spot, left, options, room)
+        if self.natural:
+            points.info[:, 1] = numbers[points.info[:, 1].astype(int)]
+        self.append(points)
+        if len(points):
+            spot = self.spot(-1) if code == STALLED else self.last(points)
+        return code, self.asked(), spot
+
+    def _left(self, spot: Spot, asked: int) -> tuple[FloatArray, FloatArray]:
+        """Return the values of the drive still to be reached and the numbers of those that were asked for.
+
+        A branch that is known to end is followed to just before its end. The last number stands for no number.
+        """
+        if not self.natural:
+            return self.targets, np.append(np.arange(len(self.targets)), -1)
+        left, numbers = self.targets[asked:], np.arange(asked, len(self.targets))
+        if self.end is not None:
+            sense = np.sign(self.end.drive - spot.drive)
+            last = self.end.drive - sense * branches.BEFORE_END * self.span
+            inside = np.logical_and.accumulate((last - left) * sense > 0)
+            if not inside.all():
+                left, numbers = np.append(left[inside], last), np.append(numbers[inside], -1)
+        return left, np.append(numbers, -1)
+
+    def last(self, points: Points) -> Spot:
+        """Return the last of some points as a place to go on from."""
+        return Spot(points.y[-1], float(points.drive[-1]), self.solver.unit.copy(), int(points.info[-1, 0]))
+
+    def _first_step(self, spot: Spot, asked: int) -> float:
+        if self.control.first_step is not None:
+            return self.control.first_step * self.span
+        if not self.natural:
+            return 0.02 * min(self.span, 1.0)
+        ahead = float(self.targets[asked] - spot.drive)
+        step, self.entry = min(abs(ahead), 0.05 * self.span, self.entry), np.inf
+        return float(np.sign(ahead)) * step
+
+    def options(self, spot: Spot, step: float) -> FloatArray:
+        """Return the options of a march from a point."""
+        low, high = min(0.0, float(self.targets.min())), max(0.0, float(self.targets.max()))
+        return march_options(
+            self.solver.tolerance,
+            step,
+            self.control.largest_turn,
+            self.natural,
+            _SMALLEST * self.span,
+            self.span if self.natural else 1.0,
+            (low - 0.5 * self.span, high + 0.5 * self.span),
+            spot.unstable,
+        )
+
+    def drop_last(self) -> None:
+        """Take back the last point."""
+        self.points = self.points.take(slice(0, -1))
+        self.branches.pop()
+
+    def stop(self, code: int) -> None:
+        """Set the status of a march that ended early."""
+        where = f"at {float(self.points.drive[-1]) * self.unit:.6g}" if len(self.points) else "at rest"
+        if code == LONG:
+            self.too_long = True
+            self.status, self.message = PathStatus.LOST, f"a segment is too long for its load {where}"
+        elif code == FULL:
+            self.status, self.message = PathStatus.FULL, f"stopped after {len(self.points)} points {where}"
+        elif code == OUTSIDE:
+            self.status, self.message = PathStatus.OUTSIDE, f"the drive left its range {where}"
+        elif self.natural:
+            self.status = PathStatus.LIMIT_POINT
+            self.message = (
+                f"the drive cannot go on {where}: a limit point, or a turn too sharp to follow; "
+                "follow the path by its arc length (through_folds)"
+            )
+        else:
+            self.status, self.message = PathStatus.LOST, f"no step converged {where}"
+
+    def estimate(self) -> float:
+        """Return the largest of `errors` at up to four points: spread out, and where the forces are largest."""
+        if not len(self.points):
+            return 0.0
+        samples = np.linspace(0, len(self.points) - 1, 4)[1:].astype(int)
+        hardest = np.abs(self.points.y[:, self.solver.n_free : self.solver.n]).max(axis=1).argmax()
+        return float(self.errors(np.unique(np.append(samples, hardest))).max())
+
+    def errors(self, indices: Any) -> FloatArray:
+        """Return the difference to a mesh of twice the steps at points: forces and positions, relative to the path.
+
+        Infinite where the finer mesh has no equilibrium nearby.
+        """
+        fine = Solver(self.layout, self.mesh.finer(), self.solver.tolerance)
+        scale = max(1e-12, float(np.abs(self.points.y[:, self.solver.n_free : self.solver.n]).max()))
+        return np.array([self._error_at(fine, int(index), scale) for index in indices])
+
+    def _error_at(self, fine: Solver, index: int, scale: float) -> float:
+        """Return the difference to a finer mesh at this drive, or across the path where it turns back."""
+        n, free = self.solver.n, self.solver.n_free
+        y, drive = self.points.y[index], float(self.points.drive[index])
+        near = fine.solve(y, drive)
+        far = 0.1 * max(1.0, scale)
+        if near is None or abs(near.y - y).max() > far:
+            border = self.spot(index).tangent
+            near = fine.solve(y, drive, border, float(border[:-1] @ y[:n] + border[-1] * drive))
+        if near is None or abs(near.y - y).max() > far:
+            return np.inf
+        change = np.abs(near.y - y)
+        return max(float(change[:free].max(initial=0.0)), float(change[free:n].max() / scale), abs(near.drive - drive))
+
+    def path(self) -> Path:
+        """Return the outcome; where the tolerance is not reached, every point is judged by itself."""
+        accurate = np.ones(len(self.points), dtype=bool)
+        if not self.error <= self.control.tolerance:
+            accurate = self.errors(range(len(self.points))) <= self.control.tolerance
+            self._say_inaccurate(int((~accurate).sum()))
+        return Path(
+            solver=self.solver,
+            points=self.points,
+            branch=np.array(self.branches, dtype=np.str_),
+            status=self.status,
+            message=self.message or self.status.value,
+            events=tuple(self.events),
+            error=self.error,
+            accurate=read_only(accurate, np.bool_),
+        )
+
+    def _say_inaccurate(self, count: int) -> None:
+        """Say so in the message, and in the status unless that already says why the path ended."""
+        limit = self.control.tolerance
+        share = f"{count} of {len(self.points)} points"
+        text = f"the tolerance of {limit:.3g} was not reached: error {self.error:.3g}, {share}"
+        if self.status is PathStatus.COMPLETE:
+            self.status, self.message = PathStatus.INACCURATE, text
+        else:
+            self.message = f"{self.message}; {text}"

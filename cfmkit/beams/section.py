@@ -1,0 +1,127 @@
+"""Rectangular cross-sections: constant or piecewise-linear thickness, and which deformations count.
+
+Bending always counts; stretching and shear by choice (theory of Reissner, 1972). A section that does not stretch
+is exactly inextensible, not merely stiff.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.curves import read_only
+from cfmkit.errors import InputError
+
+if TYPE_CHECKING:
+    from cfmkit.curves import FloatArray
+
+
+@dataclass(frozen=True)
+class Taper:
+    """A thickness that is linear between stations along the beam.
+
+    Parameters
+    ----------
+    stations : (n,) array
+        Fractions of the arc length, from 0 to 1, not decreasing; a station given twice is a step.
+    values : (n,) array
+        Thickness there [m].
+    """
+
+    stations: FloatArray
+    values: FloatArray
+
+    def __post_init__(self) -> None:
+        """Freeze and check the arrays."""
+        object.__setattr__(self, "stations", read_only(self.stations))
+        values = np.asarray(self.values)
+        object.__setattr__(self, "values", read_only(values, values.dtype if values.dtype.kind == "c" else float))
+        s = self.stations
+        if s.ndim != 1 or s.shape != self.values.shape or len(s) < 2:
+            raise InputError("a taper needs as many values as stations, at least two of each")
+        if s[0] != 0 or s[-1] != 1 or (np.diff(s) < 0).any():
+            raise InputError("the stations of a taper must go from 0 to 1 and never back")
+        if not (self.values.real > 0).all():
+            raise InputError("every thickness of a taper must be positive")
+
+    def at(self, place: Any, inside: float) -> Any:
+        """Return the thickness at places of the linear piece that holds the place `inside`."""
+        i = int(np.clip(np.searchsorted(self.stations, inside, side="right") - 1, 0, len(self.stations) - 2))
+        left, right = self.stations[i], self.stations[i + 1]
+        share = (place - left) / (right - left)
+        return self.values[i] * (1 - share) + self.values[i + 1] * share
+
+
+@dataclass(frozen=True)
+class Section:
+    """A rectangle: `thickness` in the plane of bending, `width` out of it.
+
+    Parameters
+    ----------
+    youngs_modulus : float
+        [Pa].
+    width : float
+        Out of the plane [m].
+    thickness : float or Taper
+        In the plane [m].
+    axial, shear : bool
+        Whether the beam stretches, and whether it shears.
+    poisson_ratio : float
+        For the shear modulus [1].
+    shear_factor : float
+        Share of the area that carries shear [1]; 5/6 for a rectangle.
+    """
+
+    youngs_modulus: float
+    width: float
+    thickness: float | Taper
+    axial: bool = True
+    shear: bool = False
+    poisson_ratio: float = 0.3
+    shear_factor: float = 5.0 / 6.0
+
+    def __post_init__(self) -> None:
+        """Check the values."""
+        for name in ("youngs_modulus", "width", "shear_factor"):
+            _positive(name, getattr(self, name))
+        if not isinstance(self.thickness, Taper):
+            _positive("thickness", self.thickness)
+        if not -1 < np.real(self.poisson_ratio) < 0.5 + 1e-12:
+            raise InputError(f"poisson_ratio must be between -1 and 0.5, got {self.poisson_ratio}")
+
+    @property
+    def stations(self) -> FloatArray:
+        """Places where the thickness has a kink or a step, ends included (fractions of the arc length)."""
+        if isinstance(self.thickness, Taper):
+            return read_only(np.unique(self.thickness.stations))
+        return read_only([0.0, 1.0])
+
+    def thickness_at(self, place: Any, inside: float) -> Any:
+        """Return the thickness [m] at places on the piece that holds `inside` (fractions of the arc length)."""
+        if isinstance(self.thickness, Taper):
+            return self.thickness.at(place, inside)
+        return self.thickness + 0.0 * place
+
+    def rigidities(self, place: Any, inside: float) -> tuple[Any, Any, Any]:
+        """Return EI [N m2] and the compliances 1/EA, 1/(GA) [1/N] at places; a compliance left out is zero.
+
+        Examples
+        --------
+        >>> bending, axial, shear = Section(2e9, 10e-3, 1e-3, axial=False).rigidities(np.array([0.5]), 0.5)
+        >>> float(bending[0].round(9)), float(axial[0]), float(shear[0])
+        (0.001666667, 0.0, 0.0)
+        """
+        t = self.thickness_at(place, inside)
+        area = self.width * t
+        bending = self.youngs_modulus * area * t * t / 12
+        axial = (1.0 if self.axial else 0.0) / (self.youngs_modulus * area)
+        modulus = self.shear_factor * self.youngs_modulus / (2 * (1 + self.poisson_ratio))
+        shear = (1.0 if self.shear else 0.0) / (modulus * area)
+        return bending, axial, shear
+
+
+def _positive(name: str, value: Any) -> None:
+    if not (np.isfinite(value) and np.real(value) > 0):
+        raise InputError(f"{name} must be positive, got {value}")

@@ -1,0 +1,207 @@
+"""One network on one mesh: its arrays, its unstressed state, single solves, marches."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.beams.discretise import Grid, Mesh, assemble_model, grid, table
+from cfmkit.beams.kernels import entry
+from cfmkit.beams.kernels.march import INFO
+from cfmkit.beams.kernels.newton import SOLVED
+from cfmkit.beams.kernels.rk8 import WEIGHTS
+
+if TYPE_CHECKING:
+    from cfmkit.beams.kernels.model import Model
+    from cfmkit.beams.layout import Layout
+    from cfmkit.curves import FloatArray
+
+ITERATIONS = 16
+FORCE_WEIGHT = 1e-3  # of a dimensionless force in the arc length
+
+
+@dataclass
+class Points:
+    """Points of a path in dimensionless form."""
+
+    y: FloatArray
+    drive: FloatArray
+    info: FloatArray
+
+    def __len__(self) -> int:
+        """Return the number of points."""
+        return len(self.drive)
+
+    def joined(self, other: Points) -> Points:
+        """Return these points followed by others."""
+        return Points(*(np.concatenate(pair) for pair in zip(self.parts, other.parts, strict=True)))
+
+    def take(self, keep: Any) -> Points:
+        """Return the points that `keep` selects."""
+        return Points(*(part[keep] for part in self.parts))
+
+    @property
+    def parts(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """The three arrays."""
+        return self.y, self.drive, self.info
+
+
+@dataclass
+class Spot:
+    """One equilibrium: unknowns, drive, tangent, number of unstable directions, shortness measure, last increment."""
+
+    y: FloatArray
+    drive: float
+    tangent: FloatArray
+    unstable: int = 0
+    shortness: float = 1.0
+    increment: float = 0.0
+
+
+class Solver:
+    """Equilibria of a layout on a mesh. Holds work space: not for two threads at once."""
+
+    def __init__(self, layout: Layout, mesh: Mesh, tolerance: float = 1e-11) -> None:
+        """Build the arrays."""
+        self.layout, self.mesh, self.tolerance = layout, mesh, tolerance
+        self.cut = grid(layout, mesh)
+        self.table = table(layout, self.cut)
+        self.model: Model = self._build()
+        self.n_free = int((self.model.slot >= 0).sum())
+        self.n_beams = len(self.model.beam_end)
+        self.n_dofs = len(self.model.slot)
+        self.n_segments = len(self.cut.segment_step) - 1
+        self.n = self.n_free + 3 * self.n_beams
+        self.size = self.n + 6 * self.n_segments
+        self.scratch = self._scratch()
+        self.limits = np.array([tolerance, float(ITERATIONS)])
+        self.unit = np.zeros(self.n + 1)
+        self.unit[-1] = 1.0
+
+    def _build(self) -> Model:
+        return assemble_model(self.layout, self.cut, self.table)
+
+    def _scratch(self) -> tuple[Any, ...]:
+        n, dofs = self.n + 1, self.n_dofs
+        return (
+            np.zeros((n, n)),
+            np.zeros((n, n)),
+            np.zeros((n, 2)),
+            np.zeros(dofs + 3 * self.n_beams),
+            np.zeros(dofs),
+            np.zeros((2, 3)),
+            np.zeros((self.n_beams, 6, 3, 3)),
+            np.zeros((self.n_segments, 6, 3, 3)),
+            np.zeros((8, 12, 20)),
+            np.zeros(self.size),
+        )
+
+    def unstressed(self) -> FloatArray:
+        """Return the unknowns of the network at rest, before any load or displacement."""
+        y = np.zeros(self.size)
+        y[self.n :].reshape(-1, 6)[:, :2] = self.unstressed_of(self.model, self.cut)
+        return y
+
+    @staticmethod
+    def unstressed_of(m: Model, cut: Grid) -> FloatArray:
+        """Return where the segments start before any load, (segments, 2), dimensionless."""
+        steps = cut.edges[:, 1] - cut.edges[:, 0]
+        turns = np.exp(1j * m.table[:, :, 0]) * m.table[:, :, 1]
+        runs = (turns * WEIGHTS).sum(axis=1) * steps
+        starts = np.empty(len(m.segment_step) - 1, dtype=complex)
+        for beam in range(len(m.beam_end)):
+            place = m.beam_end[beam, 0]
+            at = complex(*(m.place_origin[place] + m.place_arm[place]))
+            for segment in range(m.beam_segment[beam], m.beam_segment[beam + 1]):
+                starts[segment] = at
+                at += runs[m.segment_step[segment] : m.segment_step[segment + 1]].sum()
+        return np.stack([starts.real, starts.imag], axis=1)
+
+    def ramp(self) -> Model:
+        """Return the arrays with a factor on all constant loads and displacements in the place of the drive."""
+        return assemble_model(self.layout, self.cut, self.table, ramp=True)
+
+    def solve(
+        self, y: FloatArray, drive: float, border: FloatArray | None = None, target: float | None = None
+    ) -> Spot | None:
+        """Return the equilibrium near (y, drive) where border . (z, drive) = target; at this drive by default."""
+        new, state, tangent = y.copy(), np.zeros(4), np.zeros(self.n + 1)
+        state[0] = drive
+        border = self.unit if border is None else border
+        goal = drive if target is None else target
+        code, _ = entry.solve(self.model, self.n_free, new, state, border, goal, self.limits, tangent, self.scratch)
+        if code != SOLVED:
+            return None
+        return Spot(new, float(state[0]), tangent, int(state[1]), float(state[2]), float(state[3]))
+
+    def tangent_at(self, y: FloatArray, drive: float) -> tuple[FloatArray, FloatArray]:
+        """Return the tangent by the unknowns z, symmetrised, and by the drive."""
+        out = np.empty((1, 2 * self.n_dofs + 1))
+        entry.forces(self.model, self.n_free, y.copy()[None], np.array([drive]), out, self.scratch)
+        h = self.scratch[0][: self.n]
+        return 0.5 * (h[:, : self.n] + h[:, : self.n].T), h[:, self.n].copy()
+
+    def march(self, spot: Spot, targets: FloatArray, options: FloatArray, room: int) -> tuple[int, Points]:
+        """Follow the path from `spot`; return why the march ended and its points."""
+        return self._march(self.model, spot, targets, options, room)
+
+    def _march(
+        self, model: Model, spot: Spot, targets: FloatArray, options: FloatArray, room: int
+    ) -> tuple[int, Points]:
+        y, drive, info = np.empty((room, self.size)), np.empty(room), np.empty((room, INFO))
+        code, stored = entry.march(
+            model,
+            self.n_free,
+            spot.y.copy(),
+            spot.drive,
+            spot.tangent.copy(),
+            np.array(targets),
+            options,
+            (y, drive, info),
+            self.scratch,
+        )
+        return int(code), Points(y[:stored], drive[:stored], info[:stored])
+
+    def rest(self) -> tuple[Spot | None, float]:
+        """Return the equilibrium from which the drive starts, or None and the share of the preload reached."""
+        zero = Spot(self.unstressed(), 0.0, np.zeros(self.n + 1))
+        ramp = self.ramp()
+        constant = bool(ramp.rate.any() or ramp.load_value.any() or ramp.line_load.any())
+        if constant:
+            options = march_options(self.tolerance, 0.25, 0.35)
+            code, points = self._march(ramp, zero, np.array([1.0]), options, 400)
+            if code != 0:
+                return None, float(points.drive[-1]) if len(points) else 0.0
+            zero = Spot(points.y[-1], 0.0, zero.tangent)
+        return self.solve(zero.y, 0.0), 1.0
+
+
+def march_options(
+    tolerance: float,
+    step: float,
+    turn: float,
+    natural: bool = True,
+    smallest: float = 1e-7,
+    greatest: float = np.inf,
+    bounds: tuple[float, float] = (-np.inf, np.inf),
+    watch: int | None = None,
+) -> FloatArray:
+    """Return the options of a march; `watch` is the inertia whose change ends it, None to go on."""
+    return np.array(
+        [
+            tolerance,
+            ITERATIONS,
+            float(natural),
+            step,
+            smallest,
+            greatest,
+            turn,
+            FORCE_WEIGHT,
+            bounds[0],
+            bounds[1],
+            float(watch is not None),
+            float(watch or 0),
+        ]
+    )

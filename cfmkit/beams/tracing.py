@@ -1,0 +1,75 @@
+"""Tracing: from a network and a drive to the path of its equilibria."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.beams.discretise import Mesh
+from cfmkit.beams.drive import Control, Drive
+from cfmkit.beams.layout import Layout
+from cfmkit.curves import read_only
+
+if TYPE_CHECKING:
+    from cfmkit.beams.network import Network
+    from cfmkit.beams.path import Path
+    from cfmkit.beams.run import Run
+
+_ROUNDS = 8  # meshes tried before giving up on the tolerance
+
+
+def trace(network: Network, drive: Drive, control: Control | None = None) -> Path:
+    """Return the path of equilibria of a network under a drive, from rest through all points asked for.
+
+    Parameters
+    ----------
+    network : Network
+        What it is.
+    drive : Displacement, Rotation or Loading
+        What is done to it.
+    control : Control, optional
+        Accuracy, folds, branches.
+
+    Returns
+    -------
+    Path
+        Converged points only. `Path.status` says whether the path reaches all points asked for, and if not, why.
+    """
+    control = control or Control()
+    if control.imperfection == 0.0:
+        return _solved(network, drive, control).path()
+    from cfmkit.beams.imperfection import imperfect
+
+    perfect = replace(control, imperfection=0.0)
+    bent, name = imperfect(_solved(network, drive, replace(perfect, branch="primary")), control.imperfection)
+    path = _solved(bent, drive, perfect).path()
+    branch = path.branch if bent is network else np.where(path.branch == "primary", "imperfect", path.branch)
+    return replace(path, imperfection=name, branch=read_only(branch, np.str_))
+
+
+def _solved(network: Network, drive: Drive, control: Control) -> Run:
+    """Return the run on the first mesh that reaches the tolerance, or on the last that is tried."""
+    from cfmkit.beams.run import Run  # loads the compiler
+
+    layout = Layout(network, drive)
+    mesh = first_mesh(control.tolerance)
+    for round_ in range(_ROUNDS):
+        run = Run(layout, mesh, control)
+        run.follow()
+        if run.too_long and round_ < _ROUNDS - 1:
+            mesh = mesh.shorter()
+            continue
+        run.error = run.estimate()
+        if run.error <= control.tolerance or round_ == _ROUNDS - 1:
+            break
+        mesh = mesh.finer()
+    return run
+
+
+def first_mesh(tolerance: float) -> Mesh:
+    """Return the mesh that is tried first for a tolerance."""
+    if tolerance >= 2e-5:
+        return Mesh(2, 1)
+    return Mesh(2, 2 if tolerance >= 1e-7 else 4)

@@ -1,0 +1,1 @@
+"""Rigid parts that families share: cam profiles and the tracks of rollers on them."""

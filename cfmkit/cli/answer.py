@@ -1,0 +1,64 @@
+"""What a verb gives back: data for ``--json``, a view for the terminal, an exit code."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from cfmkit.errors import ExitCode
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from cfmkit.cli.terminal import Terminal
+
+
+def _nothing(_terminal: Terminal) -> None:
+    """Show nothing."""
+
+
+@dataclass(frozen=True)
+class Answer:
+    """The outcome of one command.
+
+    Attributes
+    ----------
+    data : mapping
+        More of the JSON document than the envelope has; values for its keys replace them.
+    view : callable
+        Shows the answer on a terminal; not called under ``--json`` and ``-q``.
+    exit_code : ExitCode
+        Of the process.
+    complaints : tuple of str
+        Lines for standard error, whatever the options.
+    quiet_complaints : tuple of str
+        More of them where the view is not shown.
+    errors : tuple of mapping
+        The same for the JSON document.
+    """
+
+    data: Mapping[str, Any] = field(default_factory=dict)
+    view: Callable[[Terminal], None] = _nothing
+    exit_code: ExitCode = ExitCode.OK
+    complaints: tuple[str, ...] = ()
+    quiet_complaints: tuple[str, ...] = ()
+    errors: tuple[Mapping[str, Any], ...] = ()
+
+
+def document(answer: Answer) -> dict[str, Any]:
+    """Return the JSON document of an answer: the same keys first, whatever the verb and the outcome."""
+    envelope = {
+        "status": status_of(answer.exit_code),
+        "message": "",
+        "exit_code": int(answer.exit_code),
+        "metrics": {},
+        "requirements": [],
+        "warnings": [],
+        "errors": list(answer.errors),
+    }
+    return envelope | dict(answer.data)
+
+
+def status_of(code: ExitCode) -> str:
+    """Return the status that goes with an exit code where no solver gave one."""
+    return "complete" if code is ExitCode.OK else code.name.lower()

@@ -1,0 +1,126 @@
+"""Verbs as commands: found in the folder `verbs`, imported when they are needed."""
+
+from __future__ import annotations
+
+import dataclasses
+import inspect
+import pkgutil
+from dataclasses import dataclass
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, get_type_hints
+
+import typer
+from typer.core import TyperGroup
+
+from cfmkit.cli import verbs
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from types import ModuleType
+
+    from cfmkit.cli.answer import Answer
+    from cfmkit.cli.options import Common
+    from cfmkit.cli.terminal import Terminal
+
+_STYLE: dict[str, Any] = {
+    "rich_markup_mode": "rich",
+    "context_settings": {"help_option_names": ["-h", "--help"]},
+    "add_completion": False,
+    "pretty_exceptions_enable": False,
+}
+
+
+@dataclass(frozen=True)
+class Request:
+    """A command line that was understood: what to call, and with which options."""
+
+    run: Callable[[Any, Terminal], Answer]
+    options: Common
+
+
+class Verbs(TyperGroup):
+    """The group of all verbs; each module is imported when its command is asked for."""
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        """Return the names of all verbs, in the order of the help."""
+        return sorted(names(), key=lambda name: _module(name).PLACE)
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        """Return one verb as a command, None if there is no such verb."""
+        return _command(cmd_name) if cmd_name in names() else None
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """Find the verb that the arguments begin with."""
+        if args and args[0] not in names() and not args[0].startswith("-"):
+            ctx.fail(_unknown(args[0]))
+        return super().resolve_command(ctx, args)
+
+
+def names() -> list[str]:
+    """Return the names of all verbs."""
+    return [item.name.replace("_", "-") for item in pkgutil.iter_modules(verbs.__path__)]
+
+
+def _unknown(name: str) -> str:
+    from difflib import get_close_matches
+
+    near = get_close_matches(name, names(), n=1)
+    hint = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(sorted(names()))}"
+    return f"there is no command {name!r}; {hint}"
+
+
+def _module(name: str) -> ModuleType:
+    return import_module(f"{verbs.__name__}.{name.replace('-', '_')}")
+
+
+def _command(name: str) -> Any:
+    """Return the command of a verb: its options are the fields of the module's `Options`."""
+    module = _module(name)
+
+    def callback(**values: Any) -> Request:
+        return Request(module.run, module.Options(**values))
+
+    hints = get_type_hints(module.Options, include_extras=True)
+    fields = dataclasses.fields(module.Options)
+    callback.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
+        [_parameter(field, hints[field.name]) for field in sorted(fields, key=_place)]
+    )
+    callback.__annotations__ = {field.name: hints[field.name] for field in fields}
+    app = typer.Typer(**_STYLE)
+    app.command(name, help=inspect.getdoc(module.run))(callback)
+    return typer.main.get_command(app)
+
+
+def _parameter(field: dataclasses.Field[Any], hint: Any) -> inspect.Parameter:
+    default = inspect.Parameter.empty if field.default is dataclasses.MISSING else field.default
+    return inspect.Parameter(field.name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=hint)
+
+
+def _place(field: dataclasses.Field[Any]) -> int:
+    """Return where an option stands in the help: what is common to all verbs comes last."""
+    from cfmkit.cli.options import Common
+
+    return int(field.name in {item.name for item in dataclasses.fields(Common)})
+
+
+def parse(app: typer.Typer, arguments: list[str]) -> Request | None:
+    """Return what a command line asks for; None if the parser answered it itself (``--help``).
+
+    Raises
+    ------
+    Exception
+        Of typer's kind, if it is malformed.
+    """
+    try:
+        request = typer.main.get_command(app).main(arguments, "cfmkit", standalone_mode=False)
+    except SystemExit:
+        # The reader of the help text has left.
+        return None
+    return request if isinstance(request, Request) else None
+
+
+def program(callback: Callable[..., Any], text: str, epilog: str) -> typer.Typer:
+    """Return the program: the group of all verbs, with what stands before them as `callback`."""
+    app = typer.Typer(cls=Verbs, **_STYLE)
+    app.callback(invoke_without_command=True, help=text, epilog=epilog)(callback)
+    return app

@@ -1,0 +1,99 @@
+"""From whatever ended a command to an exit code, lines for the user and the JSON document."""
+
+from __future__ import annotations
+
+import signal
+import traceback
+from contextlib import suppress
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from cfmkit.cli.answer import Answer, document
+from cfmkit.errors import CfmError, ExitCode, OutputError, SpecError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from cfmkit.cli.terminal import Terminal
+
+ParserError: type[Exception] = typer.BadParameter.__mro__[1]
+"""What the option parser raises; typer does not name it itself."""
+
+
+class Stopped(BaseException):
+    """A signal asked the process to end; not an Exception, so that nothing swallows it."""
+
+    def __init__(self, number: int) -> None:
+        """Keep the signal's number."""
+        self.exit_code = ExitCode(128 + number)
+        self.told = "interrupted" if number == signal.SIGINT else "terminated"
+        super().__init__(self.told)
+
+
+def fail(error: BaseException, terminal: Terminal) -> ExitCode:
+    """Tell the user what ended the command; return the exit code."""
+    if terminal.tracebacks:
+        terminal.complain("".join(traceback.format_exception(error)).rstrip("\n").split("\n"))
+    answer = answer_to(error)
+    terminal.complain(answer.complaints)
+    if terminal.json:
+        # What could not be written may be this very output.
+        with suppress(OutputError):
+            terminal.document(document(answer))
+    return answer.exit_code
+
+
+def answer_to(error: BaseException) -> Answer:
+    """Return the answer that an exception is."""
+    code, lines, entries = code_of(error), list(_lines(error)), list(_entries(error))
+    data = {"message": "; ".join(str(entry["message"]) for entry in entries)}
+    return Answer(data, exit_code=code, complaints=tuple(lines), errors=tuple(entries))
+
+
+def code_of(error: BaseException) -> ExitCode:
+    """Return the exit code that an exception becomes."""
+    if isinstance(error, ParserError):
+        return ExitCode.USAGE
+    if isinstance(error, CfmError | Stopped):
+        return error.exit_code
+    return ExitCode.IO if isinstance(error, OSError) else ExitCode.BUG
+
+
+def _lines(error: BaseException) -> Iterator[str]:
+    """Yield what standard error shows; faults of a file start with their place, as editors want it."""
+    if isinstance(error, SpecError):
+        yield from map(str, error.problems)
+        return
+    for entry in _entries(error):
+        yield f"error    {entry['message']}"
+
+
+def _entries(error: BaseException) -> Iterator[dict[str, Any]]:
+    if isinstance(error, SpecError):
+        yield from (asdict(problem) for problem in error.problems)
+    else:
+        yield {"message": _sentence(error)}
+
+
+def _sentence(error: BaseException) -> str:
+    if isinstance(error, ParserError):
+        return _of_the_parser(error)
+    if isinstance(error, Stopped):
+        return error.told
+    if isinstance(error, OSError):
+        place = f"{error.filename}: " if error.filename else ""
+        return f"{place}{(error.strerror or str(error)).lower()}"
+    if code_of(error) is not ExitCode.BUG:
+        return " ".join(str(error).split())
+    told = " ".join(f"{type(error).__name__}: {error}".split())
+    return f"this is a bug in cfmkit: {told}; -vv shows where"
+
+
+def _of_the_parser(error: Any) -> str:
+    """Return what is wrong with the command line, and where to look."""
+    message = " ".join(error.format_message().split()).rstrip(".")
+    context = getattr(error, "ctx", None)
+    command = context.command_path if context else "cfmkit"
+    return f"{message}; see '{command} --help'"

@@ -1,0 +1,114 @@
+"""The program ``cfmkit``: parse, one call, print."""
+
+from __future__ import annotations
+
+import signal
+import sys
+import threading
+import warnings
+from dataclasses import replace
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from cfmkit._version import __version__
+from cfmkit.cli import streams
+from cfmkit.cli.answer import document
+from cfmkit.cli.commands import parse, program
+from cfmkit.cli.failures import Stopped, fail
+from cfmkit.cli.terminal import Terminal
+from cfmkit.errors import ExitCode
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from types import FrameType
+
+TEXT = "Design and analysis of constant-force mechanisms, from a YAML spec to a part that can be cut."
+EPILOG = (
+    "Exit codes: 0 ok, 2 usage, 3 invalid spec or data, 4 no solution, 5 a requirement is missed, 6 partial, "
+    "7 input/output, 8 folder in use, 70 a bug, 130 and 143 stopped by a signal."
+)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the program; return its exit code.
+
+    Parameters
+    ----------
+    arguments : sequence of str, optional
+        Without the program's name; default: those of the process.
+    """
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    streams.prepare()
+    try:
+        return int(_run(given))
+    finally:
+        streams.settle()
+
+
+def _run(given: list[str]) -> ExitCode:
+    terminal = Terminal.guess(given)
+    try:
+        _listen()
+        if not sys.warnoptions:
+            # Libraries warn about their own affairs; what concerns the user is in the results.
+            warnings.simplefilter("ignore")
+        return _answer(given, terminal)
+    except Stopped as stop:
+        return fail(stop, terminal)
+    except Exception as error:
+        return _failed(error, terminal)
+
+
+def _answer(given: list[str], terminal: Terminal) -> ExitCode:
+    request = parse(program(_before_the_verb, TEXT, EPILOG), given)
+    if request is None:
+        streams.put("")
+        return ExitCode.OK
+    wishes = replace(
+        terminal,
+        json=request.options.json,
+        quiet=getattr(request.options, "quiet", False),
+        verbose=request.options.verbose,
+    )
+    answer = request.run(request.options, wishes)
+    hidden = wishes.json or wishes.quiet
+    wishes.complain((*answer.complaints, *(answer.quiet_complaints if hidden else ())))
+    if wishes.json:
+        wishes.document(document(answer))
+    elif not wishes.quiet:
+        answer.view(wishes)
+    return answer.exit_code
+
+
+def _failed(error: Exception, terminal: Terminal) -> ExitCode:
+    """Tell of an error; a signal may arrive while that is done."""
+    try:
+        return fail(error, terminal)
+    except Stopped as stop:
+        return stop.exit_code
+    except Exception as second:
+        return fail(second, replace(terminal, json=False))
+
+
+def _listen() -> None:
+    """Turn the first signal into `Stopped`; a second one ends the process at once."""
+
+    def stop(number: int, _frame: FrameType | None) -> None:
+        signal.signal(number, signal.SIG_DFL)
+        raise Stopped(number)
+
+    if threading.current_thread() is threading.main_thread():
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, stop)
+
+
+def _before_the_verb(
+    ctx: typer.Context,
+    version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,
+) -> Any:
+    if version:
+        streams.put(f"cfmkit {__version__}\n")
+        raise typer.Exit
+    if ctx.invoked_subcommand is None:
+        ctx.fail("a command is missing")

@@ -1,0 +1,151 @@
+"""How far a study is, on standard error: a bar for whoever watches, else a line now and then.
+
+The first Ctrl-C asks the study to finish what runs and to write what there is; the
+second ends it at once.
+"""
+
+from __future__ import annotations
+
+import signal
+import sys
+import time
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+from cfmkit.cli import streams
+from cfmkit.cli.failures import Stopped
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from types import FrameType
+
+    from cfmkit.cli.terminal import Terminal
+
+LINE_EVERY = 10.0
+"""Seconds between two lines where nobody watches."""
+
+DRAW_EVERY = 0.1
+"""Seconds between two pictures of the bar."""
+
+RECENT = 30.0
+"""Seconds over which the rate is taken."""
+
+
+class StudyProgress:
+    """A monitor of a study that tells the user, and listens to Ctrl-C.
+
+    Attributes
+    ----------
+    stopped : bool
+        Whether the user asked to stop.
+    """
+
+    def __init__(self, terminal: Terminal) -> None:
+        """Know whom to tell."""
+        self._tells = not (terminal.json or terminal.quiet)
+        self._bar = _StudyBar() if self._tells and sys.stderr is not None and sys.stderr.isatty() else None
+        self.stopped = False
+        self._all = self._done = self._failed = self._reused = 0
+        self._start = self._told = time.monotonic()
+        self._marks: list[tuple[float, int]] = [(self._start, 0)]
+
+    def total(self, points: int) -> None:
+        """Take how many points there are."""
+        self._all = points
+
+    def done(self, points: int, failed: int, reused: bool) -> None:
+        """Take that more points are finished."""
+        self._done += points
+        self._failed += failed
+        self._reused += points if reused else 0
+        now = time.monotonic()
+        if self._tells and now - self._told >= (LINE_EVERY if self._bar is None else DRAW_EVERY):
+            self._told = now
+            self._tell(now)
+
+    def stopping(self) -> bool:
+        """Return whether the user asked to stop."""
+        return self.stopped
+
+    def _tell(self, now: float) -> None:
+        if self._bar is not None:
+            self._bar.show(self._done, self._all, self._sentence(now))
+        else:
+            streams.complain(f"{self._done} of {self._all} points, {self._sentence(now)}\n")
+
+    def _sentence(self, now: float) -> str:
+        rate = self._rate(now)
+        left = f", {duration((self._all - self._done) / rate)} left" if rate else ""
+        return f"{rate:.3g}/s{left}, {self._failed} failed"
+
+    def _rate(self, now: float) -> float:
+        """Return points a second over the last while; what came from the journal does not count."""
+        fresh = self._done - self._reused
+        self._marks.append((now, fresh))
+        while len(self._marks) > 2 and now - self._marks[0][0] > RECENT:
+            self._marks.pop(0)
+        since, before = self._marks[0]
+        return (fresh - before) / (now - since) if now > since else 0.0
+
+    def interrupt(self, number: int, _frame: FrameType | None) -> None:
+        """Take Ctrl-C: the first time as a wish to stop soon, the second time at once."""
+        if self.stopped:
+            signal.signal(number, signal.SIG_DFL)
+            raise Stopped(number)
+        self.stopped = True
+        if self._bar is not None:
+            self._bar.close()
+            self._bar = None
+        streams.complain("stopping after the points that run now; press Ctrl-C again to end at once\n")
+
+    def close(self) -> None:
+        """Remove the bar."""
+        if self._bar is not None:
+            self._bar.close()
+
+
+def duration(seconds: float) -> str:
+    """Return a time in words: ``40 s``, ``3 min``, ``2.5 h``."""
+    if seconds < 100:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60:.0f} min" if seconds < 6000 else f"{seconds / 3600:.1f} h"
+
+
+@contextmanager
+def watching(terminal: Terminal) -> Iterator[StudyProgress]:
+    """Yield a monitor that tells the user and listens to Ctrl-C; both end with the block."""
+    monitor = StudyProgress(terminal)
+    before = signal.signal(signal.SIGINT, monitor.interrupt)
+    try:
+        yield monitor
+    finally:
+        monitor.close()
+        if not monitor.stopped:
+            signal.signal(signal.SIGINT, before)
+
+
+class _StudyBar:
+    """A progress bar that appears with the first report and leaves nothing behind."""
+
+    def __init__(self) -> None:
+        self._progress: Any = None
+        self._task: Any = None
+
+    def show(self, done: int, total: int, text: str) -> None:
+        if self._progress is None:
+            self._start(total)
+        self._progress.update(self._task, completed=done, description=text)
+
+    def close(self) -> None:
+        if self._progress is not None:
+            self._progress.stop()
+            self._progress = None
+
+    def _start(self, total: int) -> None:
+        from rich.console import Console
+        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+
+        columns = BarColumn(), MofNCompleteColumn(), TextColumn("{task.description}")
+        self._progress = Progress(*columns, console=Console(stderr=True), transient=True)
+        self._task = self._progress.add_task("", total=total)
+        self._progress.start()

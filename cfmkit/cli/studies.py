@@ -1,0 +1,187 @@
+"""What the verbs that evaluate many points have in common: a folder, a journal, an executor, a page."""
+
+from __future__ import annotations
+
+import os
+import time
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from cfmkit.cli.answer import Answer
+from cfmkit.cli.options import Computing
+from cfmkit.errors import ExitCode, UsageError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from cfmkit.cli.progress import StudyProgress
+    from cfmkit.cli.terminal import Terminal
+    from cfmkit.store import RunFolder
+    from cfmkit.studies.engine import Records, Work
+    from cfmkit.studies.executors import Executor
+    from cfmkit.studies.journal import Journal
+
+Jobs = Annotated[
+    int | None,
+    typer.Option("-j", "--jobs", metavar="N", min=1, help="Processes; default: all cores.", show_default=False),
+]
+ClusterAddress = Annotated[
+    str | None,
+    typer.Option(
+        "--cluster",
+        metavar="ADDRESS|local",
+        help="Dask scheduler to work on, e.g. tcp://host:8786, or a local one. Needs cfmkit\\[cluster].",
+        show_default=False,
+    ),
+]
+MaxPoints = Annotated[int, typer.Option("--max-points", metavar="N", min=1, help="Refuse studies with more points.")]
+Timeout = Annotated[
+    float | None,
+    typer.Option("--timeout-per-point", metavar="S", help="Give up a point after S seconds.", show_default=False),
+]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Studying(Computing):
+    """What a verb takes that evaluates many points."""
+
+    jobs: Jobs = None
+    cluster: ClusterAddress = None
+    max_points: MaxPoints = 1_000_000
+    timeout_per_point: Timeout = None
+
+
+@dataclass(frozen=True)
+class Desk:
+    """Where a study works: its folder, its journal, and who is told how far it is."""
+
+    folder: RunFolder
+    journal: Journal
+    progress: StudyProgress
+
+
+def prepare_process() -> None:
+    """Keep numerical libraries to one thread; call it before the first import of numpy."""
+    from cfmkit.studies.executors import ONE_THREAD
+
+    for name, value in ONE_THREAD.items():
+        os.environ.setdefault(name, value)
+
+
+@contextmanager
+def desk(out: str, terminal: Terminal) -> Iterator[Desk]:
+    """Lock the folder and open the journal; Ctrl-C asks to stop inside the block."""
+    from cfmkit.cli.progress import watching
+    from cfmkit.store import RunFolder
+    from cfmkit.studies.journal import Journal
+
+    with RunFolder(out) as folder, Journal(folder.journal) as journal, watching(terminal) as progress:
+        if journal.damaged:
+            terminal.complain([f"journal  {journal.damaged} damaged records are computed again"])
+        yield Desk(folder, journal, progress)
+
+
+def executor_for(work: Work, options: Studying) -> Executor:
+    """Return what gets the points done: processes, a cluster, or this process where that is enough.
+
+    Raises
+    ------
+    cfmkit.errors.UsageError
+        If options contradict each other.
+    """
+    from cfmkit.studies.executors import cores, serial
+    from cfmkit.studies.pool import Pool
+
+    timeout = options.timeout_per_point
+    if timeout is not None and timeout <= 0:
+        raise UsageError(f"--timeout-per-point: {timeout:g} is not allowed: must be > 0")
+    jobs = options.jobs or cores()
+    if options.cluster is not None:
+        from cfmkit.studies.cluster import Cluster
+
+        if timeout is not None:
+            raise UsageError(
+                "--timeout-per-point needs processes of this machine: a cluster cannot end one point alone"
+            )
+        return Cluster(options.cluster, jobs)
+    count = -(-len(work.plan) // work.step)
+    if timeout is not None:
+        return Pool(min(jobs, count), timeout * work.step)
+    return serial if min(jobs, count) == 1 else Pool(min(jobs, count))
+
+
+def compute(work: Work, options: Studying, place: Desk) -> Records:
+    """Return the rows of a study, as far as the user lets it run."""
+    from cfmkit.studies.engine import run
+
+    return run(work, executor_for(work, options), place.journal, place.progress)
+
+
+@dataclass(frozen=True)
+class Ending:
+    """How a study ended.
+
+    Attributes
+    ----------
+    records : Records
+        Its rows.
+    code : ExitCode
+        Of the process.
+    data : mapping
+        What metrics.json says.
+    folder : str
+        Where it was written.
+    files : tuple of str
+        What was written.
+    seconds : float
+        How long it took.
+    """
+
+    records: Records
+    code: ExitCode
+    data: dict[str, Any]
+    folder: str
+    files: tuple[str, ...]
+    seconds: float
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether points are missing because the user stopped."""
+        return self.code is ExitCode.INTERRUPTED
+
+
+def answer(ending: Ending, source: str) -> Answer:
+    """Return the answer of a finished study."""
+    spec = ending.records.work.study.spec
+    data = ending.data | {"family": spec.family, "name": spec.name, "out": ending.folder}
+    data |= {"files": list(ending.files), "reused": ending.records.reused}
+
+    def view(terminal: Terminal) -> None:
+        from cfmkit.cli.study_page import show_study
+
+        show_study(ending, source, terminal)
+
+    return Answer(data, view, ending.code, tuple(_complaints(ending)))
+
+
+def _complaints(ending: Ending) -> Iterator[str]:
+    records = ending.records
+    if ending.interrupted:
+        missing = len(records) - records.finished
+        yield f"interrupted  {missing} of {len(records)} points were not computed; run the same command again to go on"
+    if records.bugs:
+        yield f"error    {records.bugs} points hit a bug in cfmkit; -vv shows the first"
+
+
+def tracebacks(records: Records, terminal: Terminal) -> None:
+    """Show the first traceback, if the user wants to see it."""
+    if records.bug and terminal.tracebacks:
+        terminal.complain(records.bug.rstrip("\n").split("\n"))
+
+
+def now() -> float:
+    """Return the time of a clock that only runs forward [s]."""
+    return time.perf_counter()

@@ -1,0 +1,82 @@
+"""From the rows of a study to its pictures."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.plots.findings import Findings, Line, Scale
+from cfmkit.plots.study import figures
+from cfmkit.plots.style import png
+from cfmkit.tables import border_values, read_csv
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from cfmkit.curves import FloatArray
+    from cfmkit.studies.engine import Records
+    from cfmkit.studies.plan import Plan, Variable
+    from cfmkit.studies.summary import Summary
+    from cfmkit.tables import Table
+
+
+def pictures(records: Records, summary: Summary) -> Iterator[tuple[str, bytes]]:
+    """Yield the pictures of a study as PNG, below ``figures/``; none of one that was not finished."""
+    if records.finished < len(records) or not summary.usable:
+        return
+    found = findings(records, summary)
+    lines, labels = curves(records, found) if len(found.varied) == 1 else ([], ("", ""))
+    for stem, draw in figures(found, lines, labels).items():
+        yield f"figures/{stem}.png", png(draw())
+
+
+def findings(records: Records, summary: Summary) -> Findings:
+    """Return what the pictures show."""
+    study, plan = records.work.study, records.work.plan
+    values = np.concatenate([values for _, values, _ in summary.kept])
+    meets = np.concatenate([meets for _, _, meets in summary.kept])
+    metrics = [
+        Scale(
+            study.names[column], study.metrics[column].dimension, _border(values[:, k], study.metrics[column].dimension)
+        )
+        for k, column in enumerate(summary.shown)
+    ]
+    drawn = [metric for metric in metrics if np.isfinite(metric.values).any()]
+    varied = [_scale(item, shown) for item, shown in zip(plan.variables, plan.shown(0, len(plan)), strict=True)]
+    return Findings(tuple(varied), tuple(drawn), _shape(plan), meets, summary.best)
+
+
+def _border(values: FloatArray, dimension: str) -> FloatArray:
+    return border_values(values, dimension)
+
+
+def _scale(item: Variable, shown: np.ndarray) -> Scale:
+    if item.dimension != "text":
+        return Scale(item.path, item.dimension, shown.astype(np.float64))
+    words = tuple(dict.fromkeys(map(str, item.shown)))
+    return Scale(item.path, item.dimension, np.array([float(words.index(str(one))) for one in shown]), words)
+
+
+def _shape(plan: Plan) -> tuple[int, ...]:
+    return () if plan.joint else tuple(len(item.values) for item in plan.variables)
+
+
+def curves(records: Records, found: Findings) -> tuple[list[Line], tuple[str, str]]:
+    """Return the curves that the study kept, with the labels of their axes."""
+    lines: list[Line] = []
+    labels = ("", "")
+    for indices, rows in records.batches():
+        for k, text in rows.curves.items():
+            table = read_csv(text)
+            motion, effort = table.columns[1], table.columns[2]
+            labels = (motion.header.replace("_", " "), effort.header.replace("_", " "))
+            lines.append(Line(float(found.varied[0].values[int(indices[k])]), _branches(table)))
+    return lines, labels
+
+
+def _branches(table: Table) -> dict[str, tuple[FloatArray, FloatArray]]:
+    """Return the branches of the nominal curve, in path order."""
+    branch = np.array(table.columns[0].cells())
+    motion, effort = (np.array(column.cells(), dtype=np.float64) for column in table.columns[1:3])
+    return {name: (motion[branch == name], effort[branch == name]) for name in dict.fromkeys(branch.tolist())}

@@ -1,0 +1,131 @@
+"""``cfmkit analyze``: what a mechanism does as it is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from cfmkit.cli.measuring import Measuring
+from cfmkit.cli.options import Common, Computing
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from cfmkit.cli.answer import Answer
+    from cfmkit.cli.terminal import Terminal
+    from cfmkit.experiment.measured import Measured
+    from cfmkit.families.base import Run
+    from cfmkit.report import Report
+    from cfmkit.spec import Spec
+    from cfmkit.studies.fidelity import Comparison
+
+PLACE = 20
+
+Data = Annotated[
+    str | None,
+    typer.Option("--data", metavar="FILE.csv", help="Measured curve to lay over, with the errors.", show_default=False),
+]
+
+
+CompareFidelity = Annotated[
+    bool, typer.Option("--compare-fidelity", help="Lay the curves of all models over each other, with the differences.")
+]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Options(Computing, Measuring, Common):
+    """Arguments and options."""
+
+    data: Data = None
+    compare_fidelity: CompareFidelity = False
+
+
+def run(options: Options, terminal: Terminal) -> Answer:
+    """Analyse a mechanism as it is: curve, metrics, requirements, figures; beside a measured curve if there is one."""
+    from cfmkit.cli.runs import Verb, execute
+
+    work = compute
+    if options.data is not None:
+        from cfmkit.cli.measuring import read_measured
+
+        work = partial(compute_beside, read_measured(options.data, options.units))
+    elif options.units is not None:
+        from cfmkit.errors import UsageError
+
+        raise UsageError("--units is for a measurement: name it with --data")
+    if options.compare_fidelity:
+        work = partial(compute_each, work)
+    return execute(Verb("analyze", "analysed", work), options, terminal)
+
+
+def compute(spec: Spec, run: Run) -> Report:
+    """Return the report on a mechanism as it is."""
+    from cfmkit import api
+    from cfmkit.report import report_on
+
+    return report_on(api.analyze(spec, run))
+
+
+def compute_beside(source: Measured, spec: Spec, run: Run) -> Report:
+    """Return the report on a mechanism beside its measured curve."""
+    from cfmkit.experiment.comparison import compare
+    from cfmkit.experiment.supplements import comparison_data, comparison_files, comparison_lines
+    from cfmkit.report import Supplement
+
+    found = compute(spec, run)
+    if not found.result.curves:
+        return found
+    comparison = compare(found.result, source)
+    return found.beside(
+        comparison.metrics(),
+        Supplement(
+            comparison_data(comparison, source),
+            comparison_files(comparison, source, spec.name),
+            comparison_lines(comparison, source),
+            source.warnings,
+        ),
+    )
+
+
+def compute_each(work: Callable[[Spec, Run], Report], spec: Spec, run: Run) -> Report:
+    """Return the report on a mechanism beside the curves of its other models."""
+    from cfmkit.report import Supplement
+    from cfmkit.studies.fidelity import choices_of, compare, data_of, lines_of
+
+    choices = choices_of(spec)
+    found = work(spec, run)
+    compared = compare(found.result, choices, run)
+    drawn = {"figures/fidelity.png": partial(_picture, compared)} if compared.curves else {}
+    return found.beside(
+        compared.metrics(),
+        Supplement(
+            data_of(compared), drawn, lines_of(compared), compared.warnings, compared.curves, compared.shortfall
+        ),
+    )
+
+
+def _picture(compared: Comparison) -> bytes:
+    """Return the curves over each other as PNG."""
+    from cfmkit.plots.fidelity import Gap, fidelity_figure
+    from cfmkit.plots.style import png
+    from cfmkit.plots.text import Heading
+
+    solved = [item for item in compared.variants if item.result.curves]
+    gaps = [
+        Gap(
+            index,
+            "" if number else f"{item.name} \N{MINUS SIGN} {compared.finest}",
+            compared.places(item.name),
+            each.values,
+        )
+        for index, item in enumerate(solved)
+        if item.name != compared.finest
+        for number, each in enumerate(compared.differences(item).values())
+        if len(each.values)
+    ]
+    spec = compared.variants[0].result.spec
+    heading = Heading(spec.name, "one mechanism by several models", compared.shortfall)
+    return png(fidelity_figure(heading, [item.curves[0] for item in solved], gaps))

@@ -1,0 +1,108 @@
+"""``cfmkit calibrate``: values of a spec fitted to a measured curve."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from cfmkit.cli.measuring import Measuring
+from cfmkit.cli.options import Common, Computing
+
+if TYPE_CHECKING:
+    from cfmkit.cli.answer import Answer
+    from cfmkit.cli.terminal import Terminal
+    from cfmkit.experiment.calibration import Calibration
+    from cfmkit.experiment.measured import Measured
+    from cfmkit.families.base import Run
+    from cfmkit.report import Report
+    from cfmkit.spec import Spec
+
+PLACE = 34
+
+DataFile = Annotated[
+    str, typer.Argument(metavar="DATA.csv", help="The measured curve, as for `measure`.", show_default=False)
+]
+Fit = Annotated[
+    str,
+    typer.Option(
+        "--fit",
+        metavar="A.B,C.D",
+        show_default=False,
+        help="Numbers of the spec to fit, e.g. mechanism.rolling_friction,mechanism.rest_half_width.",
+    ),
+]
+Bounds = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--bounds", metavar="A.B=LOW:HIGH", help="Bounds of a fitted value, with units. Repeatable.", show_default=False
+    ),
+]
+LossName = Annotated[
+    str, typer.Option("--loss", metavar="NAME", help="How large errors count: linear, soft_l1, huber, cauchy.")
+]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Options(Computing, Measuring, Common):
+    """Arguments and options."""
+
+    data: DataFile
+    fit: Fit
+    bounds: Bounds = None
+    loss: LossName = "soft_l1"
+
+
+def run(options: Options, terminal: Terminal) -> Answer:
+    """Fit values of a spec to a measured curve: values, intervals, correlation, and what the data cannot tell."""
+    from cfmkit.cli.measuring import read_measured
+    from cfmkit.cli.runs import Verb, execute
+    from cfmkit.errors import UsageError
+    from cfmkit.numerics.fit import LOSSES
+
+    if options.loss not in LOSSES:
+        raise UsageError(f"--loss: there is no {options.loss!r}; there are {', '.join(LOSSES)}")
+    source = read_measured(options.data, options.units)
+    return execute(Verb("calibrate", "calibrated", partial(compute, options, source)), options, terminal)
+
+
+def compute(options: Options, source: Measured, spec: Spec, run: Run) -> Report:
+    """Return the report on the fitted mechanism."""
+    from cfmkit.experiment.calibration import calibrate, resolved
+    from cfmkit.experiment.parameters import parameters, read_bounds
+    from cfmkit.numerics.fit import LOSSES
+
+    start = resolved(spec)
+    chosen = parameters(start, options.fit.split(","), read_bounds(options.bounds or (), start))
+    loss = next(name for name in LOSSES if name == options.loss)
+    return report(calibrate(start, source, chosen, loss), source)
+
+
+def report(calibration: Calibration, source: Measured) -> Report:
+    """Return the report on a finished calibration."""
+    from dataclasses import replace
+
+    from cfmkit import api
+    from cfmkit.experiment import supplements as add
+    from cfmkit.report import Supplement, report_on
+    from cfmkit.tables import to_csv
+
+    found, after, name = report_on(calibration.result), calibration.after, calibration.spec.name
+    files = {
+        "calibrated.yaml": lambda: api.dumps(calibration.spec).encode(),
+        "parameters.csv": lambda: to_csv(add.parameters_table(calibration)),
+        "residuals.csv": lambda: to_csv(add.residuals_table(calibration)),
+        **add.comparison_files(after, source, name, calibration.before),
+    }
+    return replace(
+        found,
+        metrics=dict(found.metrics) | after.metrics(),
+        supplement=Supplement(
+            add.comparison_data(after, source) | add.calibration_data(calibration),
+            files,
+            (*add.comparison_lines(after, source), *add.calibration_lines(calibration)),
+            (*source.warnings, *calibration.warnings),
+        ),
+    )

@@ -1,0 +1,108 @@
+"""``cfmkit check``: are specs valid, without computing anything."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from cfmkit.cli.answer import Answer
+from cfmkit.cli.failures import answer_to
+from cfmkit.cli.options import Changing, Common, Quiet
+from cfmkit.errors import CfmError, ExitCode
+
+if TYPE_CHECKING:
+    from cfmkit.cli.terminal import Terminal
+    from cfmkit.spec import Spec
+
+PLACE = 40
+
+SpecFiles = Annotated[
+    list[str], typer.Argument(metavar="SPEC...", help="YAML files; - reads standard input.", show_default=False)
+]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Options(Changing, Common):
+    """Arguments and options."""
+
+    specs: SpecFiles
+    quiet: Quiet = False
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What became of one file: its spec, or the answer that its error is."""
+
+    file: str
+    spec: Spec | None
+    failure: Answer
+
+
+def run(options: Options, terminal: Terminal) -> Answer:
+    """Check specs without computing anything: every fault of every file, with its line and column."""
+    found = [_checked(name, options.changes) for name in options.specs]
+
+    def view(terminal: Terminal) -> None:
+        terminal.show(_table(found, terminal.verbose > 0))
+
+    return Answer(
+        {"files": [_record(item) for item in found], "message": _message(found)},
+        view,
+        _code([item.failure.exit_code for item in found]),
+        complaints=tuple(line for item in found for line in item.failure.complaints),
+        errors=tuple(entry for item in found for entry in item.failure.errors),
+    )
+
+
+def _checked(name: str, changes: tuple[str, ...]) -> Finding:
+    from cfmkit.specfile import bind, read_spec
+
+    try:
+        return Finding(name, bind(read_spec(name, changes)), Answer())
+    except CfmError as error:
+        return Finding(name, None, answer_to(error))
+
+
+def _code(codes: list[ExitCode]) -> ExitCode:
+    """Return the exit code of all files: an invalid one counts before a missing one."""
+    return next((code for code in (ExitCode.INVALID, ExitCode.USAGE) if code in codes), ExitCode.OK)
+
+
+def _message(found: list[Finding]) -> str:
+    bad = sum(item.spec is None for item in found)
+    return f"{bad} of {len(found)} files are not valid" if bad else ""
+
+
+def _record(item: Finding) -> dict[str, Any]:
+    """Return the entry of one file in the JSON document."""
+    about = {"family": item.spec.family, "name": item.spec.name} if item.spec else {"family": None, "name": None}
+    return {"file": item.file, "ok": item.spec is not None, **about, "errors": list(item.failure.errors)}
+
+
+def _table(found: list[Finding], requirements: bool) -> Any:
+    from rich.table import Table
+    from rich.text import Text
+
+    from cfmkit.cli.terminal import BAD, GOOD
+
+    grid = Table.grid(padding=(0, 2, 0, 0))
+    for item in found:
+        if item.spec is None:
+            count = len(item.failure.errors)
+            told = f"{count} problem{'s' if count > 1 else ''}"
+            grid.add_row(Text(item.file, overflow="fold"), Text("INVALID", BAD), Text(told))
+        else:
+            grid.add_row(
+                Text(item.file, overflow="fold"), Text("ok", GOOD), Text(f"{item.spec.family}  {item.spec.name}")
+            )
+            for requirement in item.spec.requirements if requirements else ():
+                grid.add_row("", "", Text(f"  {_required(requirement)}"))
+    return grid
+
+
+def _required(requirement: Any) -> str:
+    bounds = [f">= {requirement.min}"] if requirement.min is not None else []
+    bounds += [f"<= {requirement.max}"] if requirement.max is not None else []
+    return f"{requirement.metric} {' and '.join(bounds)}"

@@ -1,0 +1,93 @@
+"""``cfmkit export``: the parts of a spec as files to cut or print."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from cfmkit.cli.answer import Answer
+from cfmkit.cli.options import Common, OneSpec, Quiet
+
+if TYPE_CHECKING:
+    from cfmkit.cli.terminal import Terminal
+
+PLACE = 30
+
+Kerf = Annotated[
+    str | None,
+    typer.Option(
+        "--kerf", metavar="LENGTH", help="Width of the cut: adds a DXF moved by half of it.", show_default=False
+    ),
+]
+Tolerance = Annotated[
+    str | None,
+    typer.Option(
+        "--tolerance",
+        metavar="LENGTH",
+        help="Largest distance from the exact curves; default: 0.005 mm.",
+        show_default=False,
+    ),
+]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Options(OneSpec, Common):
+    """Arguments and options."""
+
+    kerf: Kerf = None
+    tolerance: Tolerance = None
+    quiet: Quiet = False
+
+
+def run(options: Options, terminal: Terminal) -> Answer:
+    """Write what is to be cut or printed, as it stands in a spec: DXF, SVG, CSV."""
+    from cfmkit import api
+    from cfmkit.cli.runs import folder_of, provenance
+    from cfmkit.export import files
+    from cfmkit.specfile import bind, read_spec
+    from cfmkit.store import RunFolder
+
+    out = folder_of(options, "export")
+    spec = bind(read_spec(options.spec, options.changes))
+    wishes = {"kerf": _length(options.kerf, "--kerf"), "tolerance": _length(options.tolerance, "--tolerance")}
+    given = {key: value for key, value in wishes.items() if value is not None}
+    with RunFolder(out) as folder:
+        for name, data in files(api.drawing(spec), **given).items():
+            folder.write(name, data)
+        origin = provenance("export", spec, options.spec, terminal)
+        manifest = folder.commit(origin | {"status": "complete", "exit_code": 0})
+    return _answer(out, [*manifest.files, "manifest.json"])
+
+
+def _length(text: str | None, option: str) -> float | None:
+    """Return a length above zero in m.
+
+    Raises
+    ------
+    cfmkit.errors.UsageError
+        If the text is not one.
+    """
+    from cfmkit.errors import QuantityError, UsageError
+    from cfmkit.units import read_quantity
+
+    if text is None:
+        return None
+    try:
+        value = read_quantity(text, "length")
+    except QuantityError as error:
+        raise UsageError(f"{option}: {error}") from None
+    if value <= 0:
+        raise UsageError(f"{option}: {text} is not allowed: must be > 0")
+    return value
+
+
+def _answer(out: str, names: list[str]) -> Answer:
+    def view(screen: Terminal) -> None:
+        from cfmkit.cli.layout import written
+
+        screen.show(*written(out, names, screen))
+
+    data: dict[str, Any] = {"out": out, "files": names}
+    return Answer(data, view)

@@ -1,0 +1,36 @@
+"""``cfmkit schema``: what editors need to complete and check specs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from cfmkit.cli.answer import Answer
+from cfmkit.cli.options import Common
+
+if TYPE_CHECKING:
+    from cfmkit.cli.terminal import Terminal
+
+PLACE = 70
+
+FamilyName = Annotated[
+    str | None, typer.Argument(metavar="[FAMILY]", help="One family only; default: all.", show_default=False)
+]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Options(Common):
+    """Arguments and options."""
+
+    family: FamilyName = None
+
+
+def run(options: Options, terminal: Terminal) -> Answer:
+    """Print the JSON schema of specs, for editors."""
+    from cfmkit import families
+    from cfmkit.keys import schema
+
+    found = schema(families.names() if options.family is None else [options.family])
+    return Answer({"schema": found}, lambda screen: screen.document(found))

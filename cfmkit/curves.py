@@ -1,0 +1,158 @@
+"""Force-displacement curves as values: ordered by path, read-only, in SI units.
+
+A curve keeps the order in which the mechanism passes through its states. It is
+never sorted and never interpolated across a fold.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+FloatArray = NDArray[np.float64]
+Kind = Literal["force", "torque"]
+
+
+def read_only(values: Any, dtype: Any = np.float64) -> NDArray[Any]:
+    """Return `values` as an array that cannot be written to (copied if it could be)."""
+    array = np.array(values, dtype=dtype)
+    array.setflags(write=False)
+    return array
+
+
+@dataclass(frozen=True)
+class Column:
+    """One more column of a curve: values in SI and the dimension that names their unit.
+
+    `dimension` is a name of `cfmkit.units` ("force", "length", "ratio", ...), or
+    "text" for labels.
+    """
+
+    values: NDArray[Any]
+    dimension: str
+
+    def __post_init__(self) -> None:
+        """Freeze the values."""
+        dtype: Any = np.str_ if self.dimension == "text" else np.float64
+        object.__setattr__(self, "values", read_only(self.values, dtype))
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A force over a displacement, or a torque over an angle.
+
+    Parameters
+    ----------
+    motion : (n,) array
+        Displacement [m] or angle [rad], in the order of the path.
+    effort : (n,) array
+        Force [N] or torque [N m] at those places.
+    branch : (n,) array of str
+        Name of the branch each point belongs to ("load", "unload", ...).
+    stable : (n,) array of bool
+        Whether the equilibrium is stable under the drive.
+    extra : mapping
+        Further columns by name, e.g. ``contact_force``.
+    kind : {"force", "torque"}
+        Which pair `motion` and `effort` are.
+    label : mapping
+        The value that distinguishes this curve from others of the same run,
+        name -> (SI value, dimension), e.g. ``{"preload": (0.0025, "length")}``,
+        or a word: ``{"fidelity": ("dynamic", "text")}``.
+    """
+
+    motion: FloatArray
+    effort: FloatArray
+    branch: NDArray[np.str_]
+    stable: NDArray[np.bool_]
+    extra: Mapping[str, Column] = field(default_factory=dict)
+    kind: Kind = "force"
+    label: Mapping[str, tuple[float | str, str]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Freeze the arrays and check that they belong together."""
+        for name, dtype in (("motion", float), ("effort", float), ("branch", np.str_), ("stable", bool)):
+            object.__setattr__(self, name, read_only(getattr(self, name), dtype))
+        object.__setattr__(self, "extra", MappingProxyType(dict(self.extra)))
+        object.__setattr__(self, "label", MappingProxyType(dict(self.label)))
+        lengths = {self.motion.shape, self.effort.shape, self.branch.shape, self.stable.shape}
+        lengths |= {column.values.shape for column in self.extra.values()}
+        if len(lengths) != 1 or self.motion.ndim != 1:
+            raise ValueError(f"columns of one curve must have one length, got {sorted(map(str, lengths))}")
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Return what pickling needs (mapping proxies do not pickle)."""
+        return (
+            type(self),
+            (self.motion, self.effort, self.branch, self.stable, dict(self.extra), self.kind, dict(self.label)),
+        )
+
+    def __len__(self) -> int:
+        """Return the number of points."""
+        return len(self.motion)
+
+    @property
+    def displacement(self) -> FloatArray:
+        """Displacement of a force curve [m]."""
+        return self._as("force", self.motion, "displacement")
+
+    @property
+    def force(self) -> FloatArray:
+        """Force of a force curve [N]."""
+        return self._as("force", self.effort, "force")
+
+    @property
+    def angle(self) -> FloatArray:
+        """Angle of a torque curve [rad]."""
+        return self._as("torque", self.motion, "angle")
+
+    @property
+    def torque(self) -> FloatArray:
+        """Torque of a torque curve [N m]."""
+        return self._as("torque", self.effort, "torque")
+
+    def _as(self, kind: Kind, values: FloatArray, name: str) -> FloatArray:
+        if self.kind != kind:
+            raise AttributeError(f"this is a {self.kind} curve: it has no {name}")
+        return values
+
+    @property
+    def motion_name(self) -> str:
+        """The name of the motion column: ``displacement`` or ``angle``."""
+        return "displacement" if self.kind == "force" else "angle"
+
+    @property
+    def motion_dimension(self) -> str:
+        """The dimension of the motion column: ``length`` or ``angle``."""
+        return "length" if self.kind == "force" else "angle"
+
+    @property
+    def branches(self) -> tuple[str, ...]:
+        """The names of the branches, in the order in which they first occur."""
+        return tuple(dict.fromkeys(self.branch.tolist()))
+
+    def columns(self) -> Iterator[tuple[str, Column]]:
+        """Yield every column of the curve by name, in the order of the CSV."""
+        yield "branch", Column(self.branch, "text")
+        yield self.motion_name, Column(self.motion, self.motion_dimension)
+        yield self.kind, Column(self.effort, self.kind)
+        yield "stable", Column(np.where(self.stable, "true", "false"), "text")
+        yield from self.extra.items()
+
+    def take(self, keep: NDArray[Any]) -> Curve:
+        """Return the curve at the points that `keep` (indices or a mask) selects."""
+        extra = {name: Column(column.values[keep], column.dimension) for name, column in self.extra.items()}
+        return Curve(
+            self.motion[keep], self.effort[keep], self.branch[keep], self.stable[keep], extra, self.kind, self.label
+        )
+
+    def on(self, branch: str) -> Curve:
+        """Return the points of one branch, in path order."""
+        return self.take(self.branch == branch)

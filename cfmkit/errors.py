@@ -1,0 +1,119 @@
+"""The exceptions of cfmkit and the exit code that each one becomes.
+
+::
+
+    CfmError                      70  a bug, if nothing more specific was raised
+     |-- UsageError                2  malformed option, missing file
+     |-- InputError                3  what the user gave is invalid
+     |    |-- SpecError            3  a specification: one Problem per fault, all at once
+     |    |-- QuantityError        3  text that is not the number or quantity wanted; also a ValueError
+     |    |-- GeometryError        3  an outline that cannot be drawn or cut as it is
+     |    `-- DataError            3  a data file
+     |-- SolutionError             4  nothing usable came out
+     |-- OutputError               7  a file could not be written
+     `-- FolderInUse               8  another live run owns the output folder
+
+A solver that stops early is not an exception: it is a `cfmkit.results.Status`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+
+class ExitCode(IntEnum):
+    """Process exit codes; `cfmkit --help` prints the same list."""
+
+    OK = 0
+    USAGE = 2
+    INVALID = 3
+    NO_SOLUTION = 4
+    REQUIREMENT_MISSED = 5
+    PARTIAL = 6
+    IO = 7
+    IN_USE = 8
+    BUG = 70
+    INTERRUPTED = 130
+    TERMINATED = 143
+
+
+class CfmError(Exception):
+    """Base of every error that cfmkit raises on purpose."""
+
+    exit_code = ExitCode.BUG
+
+
+class UsageError(CfmError):
+    """A command or call that is malformed, or names a file that is not there."""
+
+    exit_code = ExitCode.USAGE
+
+
+class InputError(CfmError):
+    """A value that the user gave is invalid."""
+
+    exit_code = ExitCode.INVALID
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One fault of a specification: where it is and what to do about it.
+
+    `source` is a file name or an option such as ``--set``; `line` and `column`
+    count from 1 and are 0 where the source has no lines.
+    """
+
+    source: str
+    line: int
+    column: int
+    path: str
+    message: str
+
+    def __str__(self) -> str:
+        """Return the one line that the user reads: ``file:line:col: path: message``."""
+        place = f"{self.source}:{self.line}:{self.column}" if self.line else self.source
+        return ": ".join(part for part in (place, self.path, self.message) if part)
+
+
+class SpecError(InputError):
+    """A specification that cannot be used; carries every fault found in it."""
+
+    def __init__(self, problems: tuple[Problem, ...] | list[Problem]) -> None:
+        """Keep the problems; the message has one line for each."""
+        self.problems = tuple(problems)
+        super().__init__("\n".join(str(problem) for problem in self.problems))
+
+    def __reduce__(self) -> tuple[type[SpecError], tuple[tuple[Problem, ...]]]:
+        """Return what pickling needs: worker processes hand these errors back."""
+        return type(self), (self.problems,)
+
+
+class QuantityError(InputError, ValueError):
+    """Text that is not the number or quantity that is wanted there."""
+
+
+class GeometryError(InputError):
+    """An outline that cannot be drawn or cut as it is: open, self-crossing, too coarse."""
+
+
+class DataError(InputError):
+    """A data file that cannot be used."""
+
+
+class SolutionError(CfmError):
+    """Nothing usable came out: infeasible, or no equilibrium at all."""
+
+    exit_code = ExitCode.NO_SOLUTION
+
+
+class OutputError(CfmError):
+    """A file could not be written, or a file that is not ours is in the way."""
+
+    exit_code = ExitCode.IO
+
+
+class FolderInUse(CfmError):
+    """Another live run owns the output folder."""
+
+    exit_code = ExitCode.IN_USE

@@ -1,0 +1,205 @@
+"""Strokes of a recording: split at reversals, robust against jitter, without the points at which it stood.
+
+A reversal is where the motion turns back by more than a stated part of its range;
+an encoder that flickers does not. Where the machine stands (before the start, at a
+reversal, at the end) many points at one place would weigh on every mean: they are
+counted and left out, all but the first and the last of each pause.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.errors import DataError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from cfmkit.curves import FloatArray
+    from cfmkit.experiment.reading import Recording
+
+REVERSAL = 0.02
+"""The motion has turned back when it has returned by this part of its range."""
+
+LOAD, UNLOAD = "load", "unload"
+
+_PAUSE = 0.02
+"""It stands where it moves at less than this part of its usual speed."""
+
+_SHORTEST_PAUSE = 12
+_JITTERS = 8.0
+_FEWEST = 4
+
+
+@dataclass(frozen=True)
+class Stroke:
+    """One way between two reversals.
+
+    Attributes
+    ----------
+    branch : str
+        ``load`` where the motion increases, ``unload`` where it decreases.
+    cycle : int
+        From 1; a cycle is one way up and one way down.
+    points : (n,) array of int
+        Indices into the recording, in its order, pauses left out.
+    """
+
+    branch: str
+    cycle: int
+    points: NDArray[np.intp]
+
+
+@dataclass(frozen=True)
+class Strokes:
+    """All strokes of a recording, and how many of its points belong to pauses."""
+
+    strokes: tuple[Stroke, ...]
+    pauses: int
+
+    @property
+    def cycles(self) -> tuple[tuple[Stroke, Stroke], ...]:
+        """The complete cycles: two strokes each, in their order."""
+        found = {number: [item for item in self.strokes if item.cycle == number] for number in self._numbers}
+        return tuple((pair[0], pair[1]) for pair in found.values() if len(pair) == 2)
+
+    @property
+    def _numbers(self) -> list[int]:
+        return sorted({item.cycle for item in self.strokes})
+
+
+def turning_points(motion: FloatArray, threshold: float) -> list[int]:
+    """Return the indices of first point, reversals and last point.
+
+    Parameters
+    ----------
+    motion : (n,) array
+        In the order of time.
+    threshold : float
+        How far the motion must come back from an extreme for it to be a reversal.
+
+    Examples
+    --------
+    >>> turning_points(np.array([0.0, 1.0, 0.9, 2.0, 1.0, 0.0]), 0.5)
+    [0, 3, 5]
+    """
+    values, found = motion.tolist(), [0]
+    low = high = 0
+    way = 0
+    for index, value in enumerate(values):
+        if value > values[high]:
+            high = index
+        if value < values[low]:
+            low = index
+        if way >= 0 and values[high] - value > threshold:
+            if way > 0 or high > low:
+                found.append(high)
+            way, low = -1, index
+        elif way <= 0 and value - values[low] > threshold:
+            if way < 0 or low > high:
+                found.append(low)
+            way, high = 1, index
+        if way > 0:
+            low = high
+        elif way < 0:
+            high = low
+    last = high if way > 0 else low if way < 0 else len(values) - 1
+    # What follows the last extreme without being a reversal is a pause or the release of the machine.
+    return sorted({*found, last})
+
+
+def split(recording: Recording, reversal: float = REVERSAL) -> Strokes:
+    """Return the strokes of a recording.
+
+    Parameters
+    ----------
+    recording : Recording
+        In the order of time.
+    reversal : float
+        Part of the range by which the motion must turn back to count as a reversal;
+        at least eight standard deviations of the jitter.
+
+    Raises
+    ------
+    cfmkit.errors.DataError
+        If no stroke has enough points.
+    """
+    motion = recording.motion
+    extent = float(np.ptp(motion))
+    turns = turning_points(motion, min(max(reversal * extent, _JITTERS * jitter_of(motion)), 0.5 * extent))
+    standing = pauses(motion, turns)
+    pieces = []
+    for number, (start, stop) in enumerate(pairwise(turns)):
+        inside = np.arange(start + (number > 0), stop + 1)
+        pieces.append(inside[~standing[inside]])
+    kept = [piece for piece in pieces if len(piece) >= _FEWEST]
+    if not kept:
+        raise DataError(
+            f"{recording.name}: no stroke has at least {_FEWEST} points: the {_word(recording)} jumps to and fro, or "
+            "the rows are not in the order of time"
+        )
+    return Strokes(_numbered(kept, motion), int(standing.sum()))
+
+
+def _word(recording: Recording) -> str:
+    return "displacement" if recording.kind == "force" else "angle"
+
+
+def _numbered(pieces: Sequence[NDArray[np.intp]], motion: FloatArray) -> tuple[Stroke, ...]:
+    """Return strokes with branch and cycle: a cycle starts with every stroke of the first one's direction."""
+    found: list[Stroke] = []
+    first = bool(motion[pieces[0][-1]] > motion[pieces[0][0]])
+    cycle = 0
+    for piece in pieces:
+        up = bool(motion[piece[-1]] > motion[piece[0]])
+        if up == first:
+            cycle += 1
+        found.append(Stroke(LOAD if up else UNLOAD, max(cycle, 1), piece))
+    return tuple(found)
+
+
+def jitter_of(motion: FloatArray) -> float:
+    """Return the standard deviation of the motion's noise, robustly, from its second differences."""
+    bends = np.abs(np.diff(motion, 2))
+    return 1.4826 * float(np.median(bends)) / 6.0**0.5 if len(bends) else 0.0
+
+
+def pauses(motion: FloatArray, turns: Sequence[int]) -> NDArray[np.bool_]:
+    """Return which points belong to pauses, the first and the last of each not counted.
+
+    Parameters
+    ----------
+    motion : (n,) array
+        In the order of time.
+    turns : sequence of int
+        First point, reversals, last point.
+    """
+    steps = np.abs(np.diff(motion))
+    jitter = jitter_of(motion) * 6.0**0.5
+    travelled = float(np.abs(np.diff(motion[np.asarray(turns)])).sum())
+    # Jitter makes single steps long: the usual step is what the strokes need, pauses aside.
+    usual = max(float(np.percentile(steps, 75)) if jitter == 0 else 0.0, travelled / len(motion))
+    span = int(max(_SHORTEST_PAUSE, np.ceil(4.0 * jitter / (_PAUSE * usual)))) if usual else _SHORTEST_PAUSE
+    marked = np.zeros(len(motion), dtype=bool)
+    if span >= len(motion) // 4:
+        return marked
+    return _standing(motion, span, max(_PAUSE * usual * span, 4.0 * jitter))
+
+
+def _standing(motion: FloatArray, span: int, slack: float) -> NDArray[np.bool_]:
+    """Return the points inside stretches of `span` steps over which the motion stays within `slack`."""
+    shifted = [motion[part * span // 4 : len(motion) - span + part * span // 4] for part in range(5)]
+    still = np.max(shifted, axis=0) - np.min(shifted, axis=0) <= slack
+    cover = np.zeros(len(motion) + 1, dtype=int)
+    np.add.at(cover, np.flatnonzero(still), 1)
+    np.add.at(cover, np.flatnonzero(still) + span + 1, -1)
+    inside = np.cumsum(cover[:-1]) > 0
+    edges = inside & ~(np.r_[False, inside[:-1]] & np.r_[inside[1:], False])
+    marked: NDArray[np.bool_] = inside & ~edges
+    return marked

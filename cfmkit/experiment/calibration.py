@@ -1,0 +1,203 @@
+"""Values of a specification fitted to a measured curve, with what the data cannot tell.
+
+The specification is resolved first: the built part keeps its shape while the values
+around it are fitted. Parameters that the data do not determine are named and nothing
+is fitted; those that they determine badly are fitted and named as such.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.errors import CfmError, SolutionError
+from cfmkit.experiment.comparison import Comparison, Samples, compare
+from cfmkit.families import family
+from cfmkit.families.base import Run
+from cfmkit.numerics.fit import Fit, LeastSquares, Loss, NotFinite, solve, unidentifiable
+from cfmkit.results import Finding
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from cfmkit.curves import FloatArray
+    from cfmkit.experiment.measured import Measured
+    from cfmkit.experiment.parameters import Parameter
+    from cfmkit.metrics import Window
+    from cfmkit.results import Result
+    from cfmkit.spec import Spec
+
+POOR = 0.3
+"""Parameters known to less than this part of their size are reported as badly known."""
+
+TIED = 0.999
+"""Parameters more correlated than this are reported as badly told apart."""
+
+FINDINGS = {
+    "weakly_identified": "the data determine a fitted value badly",
+    "at_bound": "a fitted value lies on its bound: the data ask for more",
+    "not_converged": "the fit stopped before it converged",
+}
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """A fitted specification.
+
+    Attributes
+    ----------
+    spec : Spec
+        With the fitted values, complete.
+    parameters : tuple of Parameter
+        What was fitted.
+    fit : Fit
+        Values and their uncertainty, in the order of the parameters.
+    before, after : Comparison
+        Model and measurement at the start and at the end.
+    result : Result
+        Of the fitted specification.
+    warnings : tuple of Finding
+        What the user must know about the fit.
+    """
+
+    spec: Spec
+    parameters: tuple[Parameter, ...]
+    fit: Fit
+    before: Comparison
+    after: Comparison
+    result: Result
+    warnings: tuple[Finding, ...] = ()
+
+
+def resolved(spec: Spec) -> Spec:
+    """Return a specification with its derived parts written out: the part that was built and measured."""
+    record = family(spec.family)
+    written: Spec = record.resolve(spec) if record.resolve else spec
+    return written
+
+
+def calibrate(
+    spec: Spec,
+    source: Measured,
+    parameters: Sequence[Parameter],
+    loss: Loss = "soft_l1",
+    window: Window | None = None,
+) -> Calibration:
+    """Return a specification whose model fits a measured curve.
+
+    Parameters
+    ----------
+    spec : Spec
+        Resolved; its values are the start.
+    source : Measured
+        What was measured.
+    parameters : sequence of Parameter
+        What to fit.
+    loss : {"linear", "soft_l1", "huber", "cauchy"}
+        Robust ones give outliers less weight.
+    window : Window, optional
+        Default: ``analysis.window``, where model and measurement exist.
+
+    Raises
+    ------
+    cfmkit.errors.SolutionError
+        If the start has no solution, or the data do not determine the parameters, which are named.
+    """
+    before = compare(_analysed(spec), source, window)
+    problem = _problem(spec, before, parameters)
+    _check(problem, problem.start, parameters)
+    fit = solve(problem, loss)
+    _check(problem, fit.values, parameters)
+    fitted = _with_values(spec, parameters, fit.values)
+    result = _analysed(fitted)
+    after = Comparison(before.samples, before.window, result.curve)
+    return Calibration(fitted, tuple(parameters), fit, before, after, result, tuple(_warnings(parameters, fit)))
+
+
+def _analysed(spec: Spec) -> Result:
+    result: Result = family(spec.family).analyze(spec, Run())
+    if not result.curves:
+        raise SolutionError(f"there is no curve to compare with: {result.message}")
+    return result
+
+
+def _with_values(spec: Spec, parameters: Sequence[Parameter], values: FloatArray) -> Spec:
+    return spec.replace({item.path: float(value) for item, value in zip(parameters, values, strict=True)})
+
+
+def _problem(spec: Spec, before: Comparison, parameters: Sequence[Parameter]) -> LeastSquares:
+    columns = np.array([(item.start, item.low, item.high, item.size) for item in parameters]).T
+    level = float(np.abs(np.concatenate([item.effort for item in before.samples])).max())
+    nothing = np.full(sum(len(item.motion) for item in before.samples), np.nan)
+
+    def residuals(values: FloatArray) -> FloatArray:
+        try:
+            curve = _analysed(_with_values(spec, parameters, values)).curve
+        except CfmError:
+            return nothing  # the solver then takes a shorter step
+        return np.concatenate([item.errors(curve) for item in before.samples])
+
+    return LeastSquares(residuals, columns[0], columns[1], columns[2], columns[3], level)
+
+
+def _check(problem: LeastSquares, values: FloatArray, parameters: Sequence[Parameter]) -> None:
+    """Raise if the data do not determine the parameters at some values."""
+    try:
+        groups = unidentifiable(problem, values)
+    except NotFinite:
+        raise SolutionError(
+            "the model has no equilibrium at some of the measured points; narrow the window (analysis.window), or "
+            "start from other values"
+        ) from None
+    if groups:
+        raise SolutionError("; ".join(_undetermined([parameters[k].path for k in group]) for group in groups))
+
+
+def _undetermined(paths: Sequence[str]) -> str:
+    if len(paths) == 1:
+        return f"the measured curve says nothing about {paths[0]}: changing it changes no force; leave it out of --fit"
+    told = f"{', '.join(paths[:-1])} and {paths[-1]}"
+    return f"the measured curve cannot tell {told} apart: one makes up for the other; fit only one of them"
+
+
+def _warnings(parameters: Sequence[Parameter], fit: Fit) -> list[Finding]:
+    """Return what is doubtful about a fit."""
+    found, half = [], fit.half_widths()
+    for k, item in enumerate(parameters):
+        if fit.at_bound[k]:
+            found.append(Finding("at_bound", f"{item.path} lies on its bound: the data ask for more"))
+        elif half[k] > POOR * item.size:
+            found.append(
+                Finding(
+                    "weakly_identified", f"{item.path} is known to ± {100 * half[k] / item.size:.0f} % of its size only"
+                )
+            )
+        for other in range(k):
+            if abs(fit.correlation[k, other]) > TIED:
+                told = f"{parameters[other].path} and {item.path} are badly told apart"
+                found.append(Finding("weakly_identified", f"{told} (correlation {fit.correlation[k, other]:.5f})"))
+    if not fit.converged:
+        found.append(Finding("not_converged", "the fit stopped before it converged; start from other values"))
+    return found
+
+
+def table(calibration: Calibration) -> list[dict[str, Any]]:
+    """Return one record a parameter in border units: value, 95 % interval, standard deviation, start."""
+    from cfmkit.units import border_unit, to_border
+
+    half, spread = calibration.fit.half_widths(), calibration.fit.deviations
+    records = []
+    for k, item in enumerate(calibration.parameters):
+        value = float(calibration.fit.values[k])
+        numbers = {
+            "value": value, "low_95": value - float(half[k]), "high_95": value + float(half[k]),
+            "standard_deviation": float(spread[k]), "start": item.start,
+        }  # fmt: skip
+        shown = {name: float(to_border(number, item.dimension)) for name, number in numbers.items()}
+        records.append({"path": item.path, "unit": border_unit(item.dimension)} | shown)
+    return records
+
+
+__all__ = ["FINDINGS", "Calibration", "Samples", "calibrate", "resolved", "table"]

@@ -1,0 +1,171 @@
+"""A model beside a measurement: errors in numbers, branch by branch, where both exist."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.errors import DataError
+from cfmkit.experiment.branches import LOAD
+from cfmkit.metrics import Undefined, Window, window_of
+from cfmkit.metrics.differences import Difference, counterpart, effort_at, largest, mean, overlap, rms, summarize
+from cfmkit.metrics.subjects import span_text
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from cfmkit.curves import Curve, FloatArray
+    from cfmkit.experiment.measured import Measured
+    from cfmkit.metrics.differences import Measure
+    from cfmkit.results import Quantity, Result
+
+MOST = 2000
+"""Points of a branch that are compared; more are averaged in groups."""
+
+
+@dataclass(frozen=True)
+class Samples:
+    """Measured points of one branch, all cycles, inside the window.
+
+    Attributes
+    ----------
+    branch : str
+        Name in the measurement.
+    model_branch : str
+        Name in the model.
+    motion, effort : (n,) array
+        As measured [m, N] or [rad, N m].
+    """
+
+    branch: str
+    model_branch: str
+    motion: FloatArray
+    effort: FloatArray
+
+    def errors(self, curve: Curve) -> FloatArray:
+        """Return model less measurement at every point; NaN where the model has no value."""
+        return model_at(curve, self.model_branch, self.motion) - self.effort
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """A model and a measurement, over a common window.
+
+    Attributes
+    ----------
+    samples : tuple of Samples
+        One a branch.
+    window : Window
+        Where they are compared.
+    curve : Curve
+        Of the model.
+    """
+
+    samples: tuple[Samples, ...]
+    window: Window
+    curve: Curve
+
+    def metrics(self) -> dict[str, Quantity]:
+        """Return root mean square, largest and mean error per branch, and over all, by name, SI."""
+        gap = "the model has no equilibrium at some of the points"
+        each = {item.branch: Difference(item.errors(self.curve), gap) for item in self.samples}
+        return summarize(each, _ERRORS, self.curve.kind)
+
+
+_ERRORS: dict[str, Measure] = {
+    "data_rmse": (rms, "root mean square of (model - measured) {}, at the measured points in the window"),
+    "data_error_max": (largest, "(model - measured) {} where it is largest in magnitude, in the window"),
+    "data_offset": (mean, "mean of (model - measured) {}, at the measured points in the window"),
+}
+"""What is told about the errors: name -> (function, definition)."""
+
+
+def compare(result: Result, source: Measured, window: Window | None = None) -> Comparison:
+    """Return a model beside a measurement.
+
+    Parameters
+    ----------
+    result : Result
+        With a curve.
+    source : Measured
+        What was measured; its raw points are compared.
+    window : Window, optional
+        Default: ``analysis.window``; in any case only where both exist on every branch.
+
+    Raises
+    ------
+    cfmkit.errors.DataError
+        If they are of different kinds, or have no travel in common.
+    """
+    curve, name = result.curve, source.recording.name
+    if curve.kind != source.recording.kind:
+        raise DataError(f"{name}: holds a {source.recording.kind} curve, but the mechanism has a {curve.kind} curve")
+    pairs = {branch: model_branch(curve, branch) for branch in source.raw[0].branches}
+    window = _common(curve, source, window or window_of(result), set(pairs.values()))
+    samples = tuple(_samples(source, branch, mine, window) for branch, mine in pairs.items())
+    if not all(len(item.motion) >= 2 for item in samples):
+        raise DataError(f"{name}: has fewer than 2 points in {span_text(window.lo, window.hi, curve.kind)} on a branch")
+    return Comparison(samples, window, curve)
+
+
+def model_branch(curve: Curve, measured: str) -> str:
+    """Return the branch of a model that a measured one is compared with: by name, else by its direction."""
+    return counterpart(curve, measured, 1.0 if measured == LOAD else -1.0)
+
+
+def model_at(curve: Curve, branch: str, motion: FloatArray) -> FloatArray:
+    """Return the effort of a model's branch at some places, linearly between its points.
+
+    Raises
+    ------
+    cfmkit.errors.DataError
+        If the branch turns back: it is many-valued, and a measurement does not say which value is meant.
+    """
+    try:
+        return effort_at(curve, branch, motion)
+    except Undefined:
+        raise DataError(
+            f"branch {branch!r} of the model turns back: it cannot be compared with a measurement"
+        ) from None
+
+
+def _common(curve: Curve, source: Measured, wanted: Window | None, branches: set[str]) -> Window:
+    """Return where every branch of model and measurement exists, inside the window that is wanted."""
+    from cfmkit.experiment.measured import common_window
+
+    measured, kind = common_window(source.raw), curve.kind
+    ends = [(float(part.motion.min()), float(part.motion.max())) for part in map(curve.on, branches)]
+    common = overlap([*ends, (measured.lo, measured.hi)], wanted)
+    if common is None:
+        told = span_text(measured.lo, measured.hi, kind)
+        where = f", window {span_text(wanted.lo, wanted.hi, kind)}" if wanted else ""
+        model = span_text(float(curve.motion.min()), float(curve.motion.max()), kind)
+        raise DataError(
+            f"{source.recording.name}: measurement ({told}) and model ({model}{where}) have no travel in common; "
+            "is the zero of the displacement the same?"
+        )
+    return common
+
+
+def _samples(source: Measured, branch: str, mine: str, window: Window) -> Samples:
+    parts = [curve.on(branch) for curve in source.raw]
+    slack = 1e-9 * (window.hi - window.lo)
+    keep = [(part.motion >= window.lo - slack) & (part.motion <= window.hi + slack) for part in parts]
+    motion = np.concatenate([part.motion[inside] for part, inside in zip(parts, keep, strict=True)])
+    effort = np.concatenate([part.effort[inside] for part, inside in zip(parts, keep, strict=True)])
+    motion, effort = _grouped([np.clip(motion, window.lo, window.hi), effort])
+    return Samples(branch, mine, motion, effort)
+
+
+def _grouped(columns: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray]:
+    """Return averages over groups of neighbours, where there are more points than it takes."""
+    count = len(columns[0])
+    size = -(-count // MOST) if count else 1
+    if size == 1:
+        return columns[0], columns[1]
+    edges = np.arange(0, count, size)
+    lengths = np.diff(np.append(edges, count))
+    one, other = (np.add.reduceat(values, edges) / lengths for values in columns)
+    return one, other

@@ -1,0 +1,192 @@
+"""Pictures of measurements: the loop, raw and filtered."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.experiment.comparison import model_at
+from cfmkit.plots.curves import Look, plot_curve
+from cfmkit.plots.place import Label, place_labels
+from cfmkit.plots.style import GREY, LINES, axes_mm, new_figure, styled
+from cfmkit.plots.text import Heading, axis_label, write_heading
+from cfmkit.units import to_border
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from numpy.typing import NDArray
+
+    from cfmkit.curves import Curve, FloatArray
+    from cfmkit.experiment.comparison import Comparison, Samples
+    from cfmkit.experiment.report import MeasureReport
+
+BINS = 1200
+"""Columns of points that a picture can show: more samples are drawn as their extremes."""
+
+
+def figures(report: MeasureReport) -> dict[str, Callable[[], Figure]]:
+    """Return what draws each picture of a measurement, by file stem."""
+    return {"loop": partial(loop, report)}
+
+
+@styled
+def loop(report: MeasureReport) -> Figure:
+    """Return the measured loop: whole and raw above, the window with the filtered branches below."""
+    source, window = report.source, report.numbers.window
+    figure = new_figure()
+    subject = "raw and filtered" if source.filtered else "raw"
+    write_heading(figure, Heading(source.recording.name, f"measured {source.recording.kind}, {subject}"))
+    upper, lower = axes_mm(figure, (17, 63, 138, 27.5)), axes_mm(figure, (17, 12, 138, 46))
+    thin = [thinned(curve) for curve in source.raw]
+    plain = Look(names=False, arrows=False)
+    plot_curve([replace(curve, label={}) for curve in thin] if len(thin) > 1 else thin[0], upper, plain)
+    upper.set_xlabel("")
+    upper.tick_params(labelbottom=False)
+    across = upper.get_xlim()
+    for curve in thin:
+        _draw_faint(curve, lower)
+    smooth = thinned(source.curve)
+    limits = _range_in(source.raw, (window.lo, window.hi))
+    motion = smooth.motion_dimension
+    ends = tuple(_from_border(value, motion) for value in across)
+    plot_curve(replace(smooth, label={}), lower, Look(window=((ends[0], ends[1]), limits)))
+    _note_window(report, lower)
+    return figure
+
+
+def _from_border(value: float, dimension: str) -> float:
+    from cfmkit.units import from_border
+
+    return float(from_border(value, dimension))
+
+
+def _draw_faint(curve: Curve, ax: Axes) -> None:
+    """Draw the raw samples of a curve in grey, branch by branch."""
+    for name in curve.branches:
+        part = curve.on(name)
+        x, y = to_border(part.motion, curve.motion_dimension), to_border(part.effort, curve.kind)
+        ax.plot(x, y, color=GREY, linewidth=0.5, alpha=0.55, zorder=2, gid="no-obstacle")
+
+
+def _range_in(curves: tuple[Curve, ...], window: tuple[float, float]) -> tuple[float, float]:
+    """Return limits of the effort that show what is in a window, with room around it."""
+    inside = np.concatenate(
+        [curve.effort[(curve.motion >= window[0]) & (curve.motion <= window[1])] for curve in curves]
+    )
+    low, high = float(inside.min()), float(inside.max())
+    room = 0.18 * (high - low) or 1e-3 * (abs(high) or 1.0)
+    return low - room, high + room
+
+
+def _note_window(report: MeasureReport, ax: Axes) -> None:
+    """Mark the window in which the numbers hold."""
+    dimension = report.source.raw[0].motion_dimension
+    low, high = (float(to_border(end, dimension)) for end in (report.numbers.window.lo, report.numbers.window.hi))
+    floor, ceiling = ax.get_ylim()
+    left, right = ax.get_xlim()
+    for place in (low, high):
+        if left < place < right:
+            ax.axvline(place, color=GREY, linewidth=0.7, dashes=(2, 2), zorder=1.5)
+    shown = np.linspace(max(low, left), min(high, right), 40)
+    text = "grey: raw" if report.source.filtered else ""
+    if text:
+        points = np.column_stack([shown, np.full(40, floor + 0.04 * (ceiling - floor))])
+        place_labels(ax, [Label(text, GREY, points, prefer=0.05)])
+
+
+def thinned(curve: Curve, bins: int = BINS) -> Curve:
+    """Return a curve for a picture: of each branch no more than the extremes of `bins` equal parts."""
+    keep: list[NDArray[np.intp]] = []
+    for name in curve.branches:
+        index = np.flatnonzero(curve.branch == name)
+        if len(index) <= 4 * bins:
+            keep.append(index)
+            continue
+        parts = np.array_split(index, bins)
+        found = [part[[0, int(curve.effort[part].argmin()), int(curve.effort[part].argmax()), -1]] for part in parts]
+        keep.append(np.unique(np.concatenate(found)))
+    return curve.take(np.concatenate(keep))
+
+
+@styled
+def overlay(comparison: Comparison, before: Comparison | None, heading: tuple[str, str]) -> Figure:
+    """Return model and measurement over each other, and what is left between them below.
+
+    Parameters
+    ----------
+    comparison : Comparison
+        Of the model to judge.
+    before : Comparison, optional
+        Of the model that a fit started from.
+    heading : (str, str)
+        Whose picture it is, and what it shows.
+    """
+    figure = new_figure()
+    write_heading(figure, Heading(*heading))
+    upper, lower = axes_mm(figure, (17, 41, 138, 49.5)), axes_mm(figure, (17, 12, 138, 24))
+    efforts = np.concatenate([item.effort for item in comparison.samples])
+    models = [comparison, *([before] if before else [])]
+    values = [efforts, *(item.errors(one.curve) + item.effort for one in models for item in one.samples)]
+    labels = [label for item in comparison.samples for label in _draw_measured(item, comparison, upper)]
+    for one in models:
+        labels += _draw_model(one, upper, dashed=one is before)
+    _fit_limits(upper, np.concatenate(values), comparison)
+    upper.tick_params(labelbottom=False)
+    upper.set_ylabel(axis_label(comparison.curve.kind, comparison.curve.kind))
+    _draw_errors(comparison, lower)
+    lower.set_xlim(upper.get_xlim())
+    place_labels(upper, labels)
+    return figure
+
+
+def _in_border(comparison: Comparison, motion: FloatArray, effort: FloatArray) -> FloatArray:
+    curve = comparison.curve
+    return np.column_stack([to_border(motion, curve.motion_dimension), to_border(effort, curve.kind)])
+
+
+def _draw_measured(samples: Samples, comparison: Comparison, ax: Axes) -> list[Label]:
+    points = _in_border(comparison, samples.motion, samples.effort)
+    ax.plot(*points.T, color=GREY, linewidth=0.5, alpha=0.6, zorder=2, gid="no-obstacle")
+    return [Label("measured", GREY, points, prefer=0.25)] if samples is comparison.samples[0] else []
+
+
+def _draw_model(comparison: Comparison, ax: Axes, dashed: bool) -> list[Label]:
+    """Draw the branches of a model over the window; return their names."""
+    labels = []
+    places = np.linspace(comparison.window.lo, comparison.window.hi, 400)
+    for number, samples in enumerate(comparison.samples):
+        points = _in_border(comparison, places, model_at(comparison.curve, samples.model_branch, places))
+        color = LINES[number % len(LINES)]
+        ax.plot(*points.T, color=color, linewidth=0.9 if dashed else 1.4, linestyle="--" if dashed else "-", zorder=3)
+        if not dashed:
+            labels.append(Label(f"model, {samples.model_branch}", color, points, prefer=0.7))
+        elif number == 0:
+            labels.append(Label("at the start of the fit", color, points, prefer=0.45))
+    return labels
+
+
+def _fit_limits(ax: Axes, values: FloatArray, comparison: Comparison) -> None:
+    finite = to_border(values[np.isfinite(values)], comparison.curve.kind)
+    low, high = float(finite.min()), float(finite.max())
+    room = 0.15 * (high - low) or 1e-3 * (abs(high) or 1.0)
+    ax.set_ylim(low - room, high + room)
+    motion = comparison.curve.motion_dimension
+    lo, hi = (float(to_border(end, motion)) for end in (comparison.window.lo, comparison.window.hi))
+    ax.set_xlim(lo - 0.02 * (hi - lo), hi + 0.02 * (hi - lo))
+
+
+def _draw_errors(comparison: Comparison, ax: Axes) -> None:
+    """Draw model less measurement, smoothed only by what the eye does."""
+    for number, samples in enumerate(comparison.samples):
+        points = _in_border(comparison, samples.motion, samples.errors(comparison.curve))
+        ax.plot(*points.T, color=LINES[number % len(LINES)], linewidth=0.6, alpha=0.8, zorder=3)
+    ax.axhline(0.0, color=GREY, linewidth=0.7, zorder=2)
+    curve = comparison.curve
+    ax.set_xlabel(axis_label(curve.motion_name, curve.motion_dimension))
+    ax.set_ylabel(axis_label("model \N{MINUS SIGN} measured", curve.kind))

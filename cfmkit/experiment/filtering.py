@@ -1,0 +1,223 @@
+"""Zero-phase Butterworth low-pass, applied to each branch separately.
+
+Run back and forth, the filter delays nothing, and its gain is the square of one pass's:
+at the stated cut-off of each pass it is 1/2. With `corrected` the cut-off of the passes
+is raised so that both together have -3 dB there. Second-order sections and an odd
+extension at the ends (3 (2 n + 1) points for n sections) keep it stable and true at the
+ends. Filtering across a reversal would smear the jump of the force there.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from cfmkit.errors import DataError, QuantityError, UsageError
+
+if TYPE_CHECKING:
+    from cfmkit.curves import FloatArray
+
+Per = Literal["time", "length", "angle"]
+
+DEFAULT_ORDER = 6
+_EVEN = 1e-3
+"""Steps that differ by less than this part of their mean are even."""
+
+_TEXT = re.compile(r"(?P<cutoff>.+?)(?:[, ]+order +(?P<order>[0-9]+))?(?P<corrected>[, ]+corrected)?")
+
+
+@dataclass(frozen=True)
+class LowPass:
+    """A zero-phase Butterworth low-pass.
+
+    Attributes
+    ----------
+    cutoff : float
+        [Hz] for `per` "time", [1/m] for "length", [1/rad] for "angle".
+    per : {"time", "length", "angle"}
+        What it counts cycles over.
+    order : int
+        Of each of the two passes.
+    corrected : bool
+        Whether both passes together have -3 dB at the cut-off, instead of -6 dB.
+    """
+
+    cutoff: float
+    per: Per
+    order: int = DEFAULT_ORDER
+    corrected: bool = False
+
+    def __post_init__(self) -> None:
+        """Refuse what is no filter."""
+        if not (self.cutoff > 0 and math.isfinite(self.cutoff)) or not 1 <= self.order <= 20:
+            raise UsageError("a filter needs a cut-off above zero and an order from 1 to 20")
+
+    def sections(self, step: float) -> FloatArray:
+        """Return the second-order sections of one pass for samples `step` [s, m or rad] apart.
+
+        The bilinear transform of the Butterworth poles exp(i theta), K = tan(pi f step).
+
+        Returns
+        -------
+        (m, 6) array
+            Rows b0, b1, b2, 1, a1, a2.
+
+        Raises
+        ------
+        cfmkit.errors.DataError
+            If the samples are too far apart for the cut-off.
+        """
+        if self.cutoff * step >= 0.5:
+            raise DataError(
+                f"the cut-off {self.told} is not below half the sampling rate; use one below {self._told(0.5 / step)}"
+            )
+        tangent = math.tan(math.pi * self.cutoff * step)
+        if self.corrected:
+            tangent /= (math.sqrt(2.0) - 1.0) ** (1.0 / (2 * self.order))
+        pairs = [
+            _pair(tangent, 2.0 * math.sin(math.pi * (2 * k + 1) / (2 * self.order))) for k in range(self.order // 2)
+        ]
+        if self.order % 2:
+            gain = tangent / (1.0 + tangent)
+            pairs.append([gain, gain, 0.0, 1.0, (tangent - 1.0) / (tangent + 1.0), 0.0])
+        return np.array(pairs)
+
+    @property
+    def told(self) -> str:
+        """The cut-off with its unit."""
+        return self._told(self.cutoff)
+
+    def _told(self, cutoff: float) -> str:
+        if self.per == "time":
+            return f"{cutoff:.4g} Hz"
+        if self.per == "length":
+            return f"{cutoff / 1e3:.4g} 1/mm"
+        return f"{cutoff * math.pi / 180:.4g} 1/deg"
+
+    @property
+    def sentence(self) -> str:
+        """What the filter is, for reports."""
+        at = "-3 dB both passes together" if self.corrected else "-3 dB each pass"
+        return f"Butterworth of order {self.order} per pass, back and forth, cut-off {self.told} ({at}), each branch"
+
+
+def _pair(tangent: float, damping: float) -> list[float]:
+    """Return the section of a pair of poles with s^2 + damping s + 1."""
+    square = tangent * tangent
+    scale = 1.0 + damping * tangent + square
+    gain = square / scale
+    return [gain, 2.0 * gain, gain, 1.0, 2.0 * (square - 1.0) / scale, (1.0 - damping * tangent + square) / scale]
+
+
+def read_filter(text: str) -> LowPass | None:
+    """Return the filter that a text says; None for ``none``.
+
+    Parameters
+    ----------
+    text : str
+        Such as ``2 Hz``, ``0.24 1/mm, order 3`` or ``2 Hz, corrected``.
+
+    Raises
+    ------
+    cfmkit.errors.UsageError
+        If it says none.
+    """
+    if text.strip() == "none":
+        return None
+    match = _TEXT.fullmatch(text.strip())
+    try:
+        cutoff, per = _read_cutoff(match["cutoff"] if match else text)
+    except QuantityError as error:
+        raise UsageError(f"--filter: {error}; write e.g. '2 Hz', '0.24 1/mm, order 3' or 'none'") from None
+    order = int(match["order"]) if match and match["order"] else DEFAULT_ORDER
+    return LowPass(cutoff, per, order, bool(match and match["corrected"]))
+
+
+def _read_cutoff(text: str) -> tuple[float, Per]:
+    from cfmkit.units import read_one_of
+
+    match = re.fullmatch(r"\s*(\S+) +1/(deg|rad)\s*", text)
+    if match:
+        from cfmkit.units import read_number
+
+        return read_number(match[1]) * (180.0 / math.pi if match[2] == "deg" else 1.0), "angle"
+    value, dimension = read_one_of(text, ("frequency", "curvature"))
+    if value <= 0:
+        raise QuantityError(f"a cut-off of {text.strip()} filters everything away")
+    return value, "time" if dimension == "frequency" else "length"
+
+
+def two_pass_gain(filtered_by: LowPass, frequency: float, step: float) -> float:
+    """Return the gain of both passes at a frequency, for samples `step` apart."""
+    delay = np.exp(-2j * math.pi * frequency * step * np.arange(3))
+    sections = filtered_by.sections(step)
+    return float(np.prod(np.abs((sections[:, :3] @ delay) / (sections[:, 3:] @ delay))) ** 2)
+
+
+def low_passed(values: FloatArray, over: FloatArray, filtered_by: LowPass) -> FloatArray:
+    """Return values of one branch, filtered.
+
+    Parameters
+    ----------
+    values : (n,) array
+        In the order of the branch.
+    over : (n,) array
+        Time [s], displacement [m] or angle [rad] of each, never turning back. Where the steps
+        are uneven the values are taken at even ones and brought back.
+    filtered_by : LowPass
+        What to let through.
+
+    Raises
+    ------
+    cfmkit.errors.DataError
+        If there are too few values, or they are too far apart.
+    """
+    steps = np.diff(over)
+    step = float(over[-1] - over[0]) / max(len(over) - 1, 1)
+    if step == 0 or not len(steps):
+        raise DataError("there is nothing to filter over: all points are at one place")
+    if np.abs(steps - step).max() <= _EVEN * abs(step):
+        return _both_ways(values, abs(step), filtered_by)
+    way = 1 if step > 0 else -1
+    even = np.linspace(over[0], over[-1], len(over))
+    smooth = _both_ways(np.interp(way * even, way * over, values), abs(step), filtered_by)
+    back: FloatArray = np.interp(way * over, way * even, smooth)
+    return back
+
+
+def _both_ways(values: FloatArray, step: float, filtered_by: LowPass) -> FloatArray:
+    sections = filtered_by.sections(step)
+    padding = 3 * (2 * len(sections) + 1)
+    if len(values) <= padding:
+        raise DataError(
+            f"a branch has {len(values)} points, and a filter of order {filtered_by.order} needs more than {padding}; "
+            "use a lower order or measure more points"
+        )
+    head, tail = 2.0 * values[0] - values[padding:0:-1], 2.0 * values[-1] - values[-2 : -padding - 2 : -1]
+    forth = _one_way(np.concatenate([head, values, tail]), sections)
+    return _one_way(forth[::-1], sections)[::-1][padding:-padding]
+
+
+def _one_way(values: FloatArray, sections: FloatArray) -> FloatArray:
+    """Return values after one pass that starts at rest at the first value.
+
+    Each section is a triangular system of bandwidth two; scipy.signal would do the same, but
+    takes longer to import than to filter.
+    """
+    from scipy.linalg.blas import dtbsv
+
+    rest = values[0]
+    signal = values - rest
+    for b0, b1, b2, _, a1, a2 in sections:
+        driven = b0 * signal
+        driven[1:] += b1 * signal[:-1]
+        driven[2:] += b2 * signal[:-2]
+        band = np.empty((3, len(signal)), order="F")
+        band[0], band[1], band[2] = 1.0, a1, a2
+        signal = dtbsv(2, band, driven, lower=1, diag=1)
+    filtered: FloatArray = signal + rest
+    return filtered

@@ -1,0 +1,83 @@
+"""The loop between the branches, what it says about friction, and how well cycles repeat."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.results import Quantity
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from cfmkit.curves import Curve, FloatArray
+    from cfmkit.metrics import Window
+
+PLACES = 513
+"""Places in the window at which cycles are compared."""
+
+
+def branch_at(curve: Curve, branch: str, places: FloatArray) -> FloatArray:
+    """Return the effort of one branch at some places, by linear interpolation.
+
+    Parameters
+    ----------
+    curve : Curve
+        Whose branch never turns back.
+    branch : str
+        Its name.
+    places : (n,) array
+        Motion [m or rad], inside what the branch covers.
+    """
+    part = curve.on(branch)
+    way = 1 if part.motion[-1] >= part.motion[0] else -1
+    values: FloatArray = np.interp(places, part.motion[::way], part.effort[::way])
+    return values
+
+
+def loop_area(motion: FloatArray, up: FloatArray, down: FloatArray) -> float:
+    """Return the area between the branches: the integral of (up - down) over the motion [J].
+
+    Parameters
+    ----------
+    motion : (n,) array
+        Increasing [m or rad].
+    up, down : (n,) array
+        Effort on each branch there [N or N m].
+
+    Examples
+    --------
+    >>> loop_area(np.array([0.0, 0.1]), np.array([2.0, 2.0]), np.array([1.0, 1.0]))
+    0.1
+    """
+    return float(np.trapezoid(up - down, motion))
+
+
+def repeatability(curves: Sequence[Curve], window: Window) -> dict[str, Quantity]:
+    """Return how far cycles differ: on each branch the root mean square over the window of the SD between cycles.
+
+    Parameters
+    ----------
+    curves : sequence of Curve
+        One a cycle.
+    window : Window
+        That all of them cover.
+
+    Returns
+    -------
+    dict of str to Quantity
+        ``force_repeatability[load]`` and so on; without a value where there is one cycle only.
+    """
+    kind = curves[0].kind
+    definition = f"sqrt(mean over the window of the variance (n - 1) of the {kind} between cycles at the same place)"
+    places = np.linspace(window.lo, window.hi, PLACES)
+    found = {}
+    for branch in curves[0].branches:
+        name = f"{kind}_repeatability[{branch}]"
+        if len(curves) < 2:
+            found[name] = Quantity(None, kind, definition, "there is one cycle only")
+            continue
+        forces = np.array([branch_at(curve, branch, places) for curve in curves])
+        found[name] = Quantity(float(np.sqrt(forces.var(axis=0, ddof=1).mean())), kind, definition)
+    return found

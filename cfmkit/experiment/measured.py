@@ -1,0 +1,252 @@
+"""What a recording says about a mechanism: raw and filtered curves, metrics, repeatability.
+
+A recording becomes one curve a cycle. Within a branch the samples stand in the order of
+the motion, so that the flicker of an encoder makes no folds; they are filtered before, in
+the order of time. The value of a metric is its mean over the complete cycles, or over what
+there is if none is complete.
+
+Reference
+---------
+[SS] S. Sanchez-Salinas et al., Mech. Mach. Theory 173 (2022) 104819, sec. 3.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.curves import Column, Curve, FloatArray
+from cfmkit.errors import DataError
+from cfmkit.experiment.branches import LOAD, UNLOAD, Stroke, Strokes, split
+from cfmkit.experiment.filtering import DEFAULT_ORDER, LowPass, low_passed
+from cfmkit.experiment.hysteresis import repeatability
+from cfmkit.metrics import Frame, Window, measure
+from cfmkit.results import Finding, Quantity
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from cfmkit.experiment.reading import Recording
+
+CYCLES_PER_STROKE = 60.0
+"""Cut-off of the filter that is used unless one is named, in cycles over the whole travel: 2 Hz in [SS]."""
+
+FINDINGS = {
+    "one_branch": "the recording has no way back: there is no loop",
+    "unfinished_cycle": "strokes that belong to no complete cycle are left out",
+    "pauses": "points at which the machine stood are left out",
+    "not_filtered": "there are too few points for the filter",
+    "negative_force": "the mean force is negative: the sign of the sensor may be turned",
+}
+
+
+@dataclass(frozen=True)
+class Measured:
+    """A recording as curves.
+
+    Attributes
+    ----------
+    recording : Recording
+        As recorded.
+    strokes : Strokes
+        How it was split.
+    raw : tuple of Curve
+        One a cycle, raw; columns `time` where there is one, and `raw`'s order is that of the motion.
+    filtered : tuple of Curve
+        The same points with filtered forces; empty without a filter.
+    low_pass : LowPass or None
+        The filter.
+    warnings : tuple of Finding
+        What the user must know.
+    """
+
+    recording: Recording
+    strokes: Strokes
+    raw: tuple[Curve, ...]
+    filtered: tuple[Curve, ...] = ()
+    low_pass: LowPass | None = None
+    warnings: tuple[Finding, ...] = ()
+
+    @cached_property
+    def curve(self) -> Curve:
+        """The filtered curve of the first cycle; the raw one where there is none."""
+        return (self.filtered or self.raw)[0]
+
+
+def measured(recording: Recording, low_pass: LowPass | str | None = "default") -> Measured:
+    """Return a recording as raw and filtered curves.
+
+    Parameters
+    ----------
+    recording : Recording
+        In the order of time.
+    low_pass : LowPass, "default" or None
+        Default: order 6 per pass, 60 cycles over the whole travel; left out, with a
+        warning, where there are too few points for that. None: no filter.
+
+    Raises
+    ------
+    cfmkit.errors.DataError
+        If there is no stroke in the recording, or a filter that was named cannot be used.
+    """
+    strokes = split(recording)
+    cycles = strokes.cycles or ((*strokes.strokes[:1],),)
+    warnings = _warnings(recording, strokes)
+    chosen = _default(recording) if isinstance(low_pass, str) else low_pass
+    raw = tuple(_curve(recording, cycle, recording.effort, strokes) for cycle in cycles)
+    if chosen is None:
+        return Measured(recording, strokes, raw, warnings=warnings)
+    try:
+        smooth = _smooth(recording, [stroke for cycle in cycles for stroke in cycle], chosen)
+    except DataError as problem:
+        if low_pass != "default":
+            raise DataError(f"{recording.name}: {problem}") from None
+        return Measured(recording, strokes, raw, warnings=(*warnings, Finding("not_filtered", str(problem))))
+    filtered = tuple(_curve(recording, cycle, smooth, strokes) for cycle in cycles)
+    return Measured(recording, strokes, raw, filtered, chosen, warnings)
+
+
+def _default(recording: Recording) -> LowPass:
+    cutoff = CYCLES_PER_STROKE / float(np.ptp(recording.motion))
+    return LowPass(cutoff, "length" if recording.kind == "force" else "angle", DEFAULT_ORDER)
+
+
+def _smooth(recording: Recording, strokes: Sequence[Stroke], chosen: LowPass) -> FloatArray:
+    """Return the efforts with every stroke filtered by itself."""
+    if chosen.per == "time" and recording.time is None:
+        raise DataError("a cut-off in Hz needs a column with the time; give it in 1/mm or 1/deg instead")
+    if chosen.per not in ("time", "length" if recording.kind == "force" else "angle"):
+        raise DataError(f"a cut-off of {chosen.told} does not fit a {recording.kind} curve")
+    smooth = np.array(recording.effort)
+    for stroke in strokes:
+        points = stroke.points if chosen.per == "time" else stroke.points[_by_motion(recording, stroke)]
+        over = recording.time if chosen.per == "time" else recording.motion
+        assert over is not None
+        smooth[points] = low_passed(recording.effort[points], over[points], chosen)
+    return smooth
+
+
+def _by_motion(recording: Recording, stroke: Stroke) -> NDArray[np.intp]:
+    """Return the order of a stroke's points along its way."""
+    motion = recording.motion[stroke.points]
+    return np.argsort(motion if stroke.branch == LOAD else -motion, kind="stable")
+
+
+def _curve(recording: Recording, cycle: Sequence[Stroke], effort: FloatArray, strokes: Strokes) -> Curve:
+    """Return the curve of one cycle."""
+    points = np.concatenate([stroke.points[_by_motion(recording, stroke)] for stroke in cycle])
+    branch = np.repeat([stroke.branch for stroke in cycle], [len(stroke.points) for stroke in cycle])
+    extra = {} if recording.time is None else {"time": Column(recording.time[points], "time")}
+    label = {"cycle": (float(cycle[0].cycle), "count")} if len(strokes.cycles) > 1 else {}
+    stable = np.ones(len(points), dtype=bool)
+    return Curve(recording.motion[points], effort[points], branch, stable, extra, recording.kind, label)
+
+
+def _warnings(recording: Recording, strokes: Strokes) -> tuple[Finding, ...]:
+    found = []
+    cycles = strokes.cycles
+    if not cycles:
+        only = strokes.strokes[0].branch
+        found.append(Finding("one_branch", f"there is the branch {only!r} only: no loop, and no hysteresis"))
+    left = len(strokes.strokes) - 2 * len(cycles)
+    if cycles and left:
+        found.append(
+            Finding("unfinished_cycle", f"{left} of {len(strokes.strokes)} strokes complete no cycle: left out")
+        )
+    if strokes.pauses:
+        told = f"{strokes.pauses} of {len(recording)} points at which the machine stood are left out"
+        found.append(Finding("pauses", told))
+    if float(recording.effort.mean()) < 0:
+        told = f"the mean {recording.kind} is negative: is the sensor's sign turned?"
+        found.append(Finding("negative_force", told))
+    return tuple(found)
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """Numbers of a measured mechanism.
+
+    Attributes
+    ----------
+    raw, filtered : mapping of str to Quantity
+        Metrics by name, SI; `filtered` is empty without a filter.
+    each : tuple of mapping
+        Raw metrics of every cycle.
+    window : Window
+        Where they hold.
+    """
+
+    raw: Mapping[str, Quantity]
+    filtered: Mapping[str, Quantity]
+    each: tuple[Mapping[str, Quantity], ...]
+    window: Window
+
+
+def numbers_of(source: Measured, frame: Frame | None = None, window: Window | None = None) -> Measurement:
+    """Return the metrics of a measured mechanism, raw and filtered, and its repeatability.
+
+    Parameters
+    ----------
+    source : Measured
+        With at least one cycle or branch.
+    frame : Frame, optional
+        Target and so on.
+    window : Window, optional
+        Default: what every branch of every cycle covers.
+
+    Raises
+    ------
+    cfmkit.errors.DataError
+        If a branch does not cover the window.
+    """
+    common = common_window(source.raw)
+    window = window or common
+    slack = 1e-9 * (window.hi - window.lo)
+    if window.lo < common.lo - slack or window.hi > common.hi + slack:
+        from cfmkit.metrics.subjects import span_text
+
+        kind = source.recording.kind
+        raise DataError(
+            f"{source.recording.name}: the window {span_text(window.lo, window.hi, kind)} is not measured on every "
+            f"branch: {span_text(common.lo, common.hi, kind)} is"
+        )
+    each = tuple(measure(curve, frame or Frame(), window) for curve in source.raw)
+    smooth = tuple(measure(curve, frame or Frame(), window) for curve in source.filtered)
+    return Measurement(_mean(each) | repeatability(source.raw, window), _mean(smooth) if smooth else {}, each, window)
+
+
+def common_window(curves: Sequence[Curve]) -> Window:
+    """Return the interval that every branch of every curve covers.
+
+    Raises
+    ------
+    cfmkit.errors.DataError
+        If there is none.
+    """
+    parts = [curve.motion[curve.branch == name] for curve in curves for name in curve.branches]
+    lo, hi = max(float(part.min()) for part in parts), min(float(part.max()) for part in parts)
+    if not lo < hi:
+        raise DataError("no part of the travel is measured on every branch")
+    return Window(lo, hi)
+
+
+def _mean(each: Sequence[Mapping[str, Quantity]]) -> dict[str, Quantity]:
+    """Return the mean of every metric over cycles; undefined where it is on one of them."""
+    found = {}
+    for name, first in each[0].items():
+        values = [item[name].value for item in each]
+        known = [value for value in values if value is not None]
+        if len(known) < len(values):
+            found[name] = next(item[name] for item in each if item[name].value is None)
+        else:
+            suffix = f"; mean of {len(each)} cycles" if len(each) > 1 else ""
+            found[name] = replace(first, value=float(np.mean(known)), definition=first.definition + suffix)
+    return found
+
+
+__all__ = ["FINDINGS", "LOAD", "UNLOAD", "Measured", "Measurement", "common_window", "measured", "numbers_of"]

@@ -1,0 +1,183 @@
+"""Which numbers of a specification are fitted, from where, within which bounds."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from cfmkit.errors import QuantityError, UsageError
+from cfmkit.studies.leaves import CannotVary, leaf
+from cfmkit.yamlio.shape import Slot
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+    from cfmkit.spec import Spec
+
+INSIDE = 1e-9
+"""How far inside an open bound a value stays, in sizes of the parameter."""
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A number that is fitted.
+
+    Attributes
+    ----------
+    path : str
+        Dotted.
+    dimension : str
+        Of `cfmkit.units`.
+    start, low, high : float
+        SI.
+    size : float
+        Typical size, SI.
+    """
+
+    path: str
+    dimension: str
+    start: float
+    low: float
+    high: float
+    size: float
+
+
+def parameters(
+    spec: Spec, paths: Iterable[str], bounds: Mapping[str, tuple[float, float]] | None = None
+) -> tuple[Parameter, ...]:
+    """Return the parameters at some paths of a specification.
+
+    Parameters
+    ----------
+    spec : Spec
+        Whose values are the start.
+    paths : iterable of str
+        Dotted paths of numbers.
+    bounds : mapping of str to (float, float)
+        SI; the specification's own bounds hold besides.
+
+    Raises
+    ------
+    cfmkit.errors.UsageError
+        If there is nothing to fit at a path, or a start is not inside its bounds.
+    """
+    names = [path.strip() for path in paths]
+    if not names or not all(names):
+        raise UsageError("--fit is empty; name one or more values, e.g. --fit mechanism.rolling_friction")
+    if twice := next((name for name in names if names.count(name) > 1), None):
+        raise UsageError(f"--fit names {twice!r} twice")
+    if strange := next((name for name in bounds or {} if name not in names), None):
+        raise UsageError(f"--bounds names {strange!r}, which --fit does not")
+    return tuple(_parameter(spec, name, (bounds or {}).get(name)) for name in names)
+
+
+def _parameter(spec: Spec, path: str, bounds: tuple[float, float] | None) -> Parameter:
+    try:
+        found = leaf(type(spec), path)
+    except CannotVary as problem:
+        raise UsageError(f"--fit: {problem}") from None
+    if found.kind not in ("quantity", "number"):
+        raise UsageError(f"--fit: {path!r} is not a number that can change by small steps")
+    value = _value(spec, path)
+    dimension = found.quantity.dimensions[0] if found.quantity else "ratio"
+    low, high = _limits(type(spec), path)
+    asked_low, asked_high = bounds or (-math.inf, math.inf)
+    size = _size(value, (max(low, asked_low), min(high, asked_high)), dimension)
+    margin = INSIDE * size
+    low = max(low + margin * _open(type(spec), path, "gt"), asked_low)
+    high = min(high - margin * _open(type(spec), path, "lt"), asked_high)
+    if not low < high or not low <= value <= high:
+        raise UsageError(
+            f"--fit: {path} starts at {_told(value, dimension)}, outside its bounds {_range(low, high, dimension)}"
+        )
+    return Parameter(path, dimension, value, low, high, size)
+
+
+def _value(spec: Spec, path: str) -> float:
+    try:
+        value: Any = spec.at(path)
+    except KeyError:
+        value = None
+    if value is None:
+        raise UsageError(f"--fit: {path!r} has no value to start from; give one with --set {path}=...")
+    if not isinstance(value, int | float) or isinstance(value, bool):
+        raise UsageError(f"--fit: {path!r} is a list here; name one item, as {path}.0")
+    return float(value)
+
+
+def _slots(spec_type: type[Spec], path: str) -> tuple[Slot, ...]:
+    here: tuple[Slot, ...] = (Slot(spec_type),)
+    for part in path.split("."):
+        key: str | int = int(part) if part.isdecimal() else part
+        here = tuple(inner for slot in here for inner in slot.child(key))
+    return here
+
+
+def _limits(spec_type: type[Spec], path: str) -> tuple[float, float]:
+    """Return the bounds that the specification sets."""
+    low, high = -math.inf, math.inf
+    for slot in _slots(spec_type, path):
+        bounds = slot.bounds
+        low = max(low, *(float(bounds[name]) for name in ("gt", "ge") if bounds.get(name) is not None), low)
+        high = min(high, *(float(bounds[name]) for name in ("lt", "le") if bounds.get(name) is not None), high)
+    return low, high
+
+
+def _open(spec_type: type[Spec], path: str, name: str) -> float:
+    return float(any(slot.bounds.get(name) is not None for slot in _slots(spec_type, path)))
+
+
+def _size(value: float, limits: tuple[float, float], dimension: str) -> float:
+    """Return how large a typical change is: the value itself; from zero a hundredth of the range, else one unit."""
+    from cfmkit.units import from_border
+
+    if value:
+        return abs(value)
+    width = limits[1] - limits[0]
+    return 0.01 * width if math.isfinite(width) else float(from_border(1.0, dimension))
+
+
+def _told(value: float, dimension: str) -> str:
+    from cfmkit.units import format_short
+
+    return format_short(value, dimension, 6)
+
+
+def _range(low: float, high: float, dimension: str) -> str:
+    return f"{_told(low, dimension)} ... {_told(high, dimension)}"
+
+
+def read_bounds(options: Iterable[str], spec: Spec) -> dict[str, tuple[float, float]]:
+    """Return what ``--bounds a.b=0:0.01`` says, by path, SI.
+
+    Raises
+    ------
+    cfmkit.errors.UsageError
+        If one is malformed.
+    """
+    found = {}
+    for option in options:
+        path, equals, text = (part.strip() for part in option.partition("="))
+        ends = text.split(":")
+        if not equals or len(ends) != 2:
+            raise UsageError(f"--bounds: {option!r} is not 'a.b=low:high'")
+        try:
+            about = leaf(type(spec), path)
+            low, high = (float(about.read(_number(end))[0]) for end in ends)
+        except (CannotVary, QuantityError, ValueError) as problem:
+            raise UsageError(f"--bounds: {option!r}: {problem}") from None
+        if not low < high:
+            raise UsageError(f"--bounds: {option!r} must be increasing")
+        found[path] = (low, high)
+    return found
+
+
+def _number(text: str) -> float | str:
+    """Return a bare number as one, anything else as it is."""
+    from cfmkit.units import read_number
+
+    try:
+        return read_number(text.strip())
+    except QuantityError:
+        return text.strip()

@@ -1,0 +1,129 @@
+"""A measurement as the files that `measure` writes; nothing here touches a disk."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.curves import Column
+from cfmkit.experiment.measured import Measured, Measurement, numbers_of
+from cfmkit.metrics import metrics_json, split_name
+from cfmkit.tables import Table, TableColumn, border_column, curve_table, to_csv
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from cfmkit.curves import Curve
+    from cfmkit.metrics import Frame, Window
+
+
+@dataclass(frozen=True)
+class MeasureReport:
+    """A measured mechanism with everything that is read off it.
+
+    Attributes
+    ----------
+    source : Measured
+        The curves.
+    numbers : Measurement
+        Their metrics.
+    """
+
+    source: Measured
+    numbers: Measurement
+
+    @cached_property
+    def data(self) -> dict[str, Any]:
+        """What metrics.json says: the contract's keys for the raw curve, the filtered one, and what was decided."""
+        source, low_pass = self.source, self.source.low_pass
+        decisions = source.recording.decisions
+        return {
+            "status": "complete",
+            "message": "",
+            "metrics": metrics_json(self.numbers.raw),
+            "requirements": [],
+            "warnings": [{"name": item.name, "message": item.message} for item in source.warnings],
+            "metrics_filtered": metrics_json(self.numbers.filtered),
+            "filter": low_pass.sentence if low_pass else None,
+            "window": _ends(self),
+            "cycles": len(source.raw),
+            "data": source.recording.name,
+            "reading": decisions.lines() if decisions else [],
+        }
+
+
+def _ends(report: MeasureReport) -> dict[str, Any]:
+    from cfmkit.units import border_unit, to_border
+
+    dimension = report.source.raw[0].motion_dimension
+    low, high = (float(to_border(end, dimension)) for end in (report.numbers.window.lo, report.numbers.window.hi))
+    return {"from": low, "to": high, "unit": border_unit(dimension)}
+
+
+def report_on(source: Measured, frame: Frame | None = None, window: Window | None = None) -> MeasureReport:
+    """Return the report on a measured mechanism."""
+    return MeasureReport(source, numbers_of(source, frame, window))
+
+
+def curves_table(source: Measured) -> Table:
+    """Return all cycles, raw and filtered, as one table in border units."""
+    curves = [_with_filtered(raw, number, source) for number, raw in enumerate(source.raw)]
+    table = curve_table([replace(curve, label={}) for curve in curves])
+    if len(curves) == 1:
+        return table
+    cycle = np.repeat([int(curve.label["cycle"][0]) for curve in source.raw], [len(curve) for curve in source.raw])
+    return Table((TableColumn("cycle", cycle), *table.columns))
+
+
+def _with_filtered(raw: Curve, number: int, source: Measured) -> Curve:
+    if not source.filtered:
+        return raw
+    smooth = {f"{raw.kind}_filtered": Column(source.filtered[number].effort, raw.kind)}
+    return replace(raw, extra=smooth | dict(raw.extra))
+
+
+def cycles_table(report: MeasureReport) -> Table:
+    """Return the raw metrics that have a value, one row a cycle."""
+    each = report.numbers.each
+    names = [name for name in each[0] if any(item[name].value is not None for item in each)]
+    numbers = [int(curve.label["cycle"][0]) if curve.label else 1 for curve in report.source.raw]
+    columns = [
+        border_column(
+            _column_name(name), [np.nan if item[name].value is None else item[name].value for item in each],
+            each[0][name].dimension,
+        )
+        for name in names
+    ]  # fmt: skip
+    return Table((TableColumn("cycle", np.array(numbers)), *columns))
+
+
+def _column_name(name: str) -> str:
+    """Return a metric's name for a header, where brackets hold units: ``force_mean load``."""
+    metric, branch = split_name(name)
+    return f"{metric} {branch}" if branch else metric
+
+
+def files(report: MeasureReport, plots: bool = True) -> Iterator[tuple[str, bytes]]:
+    """Yield every file of a measurement as (name below the folder, content).
+
+    Parameters
+    ----------
+    report : MeasureReport
+        Of one recording.
+    plots : bool
+        Whether to draw.
+    """
+    from cfmkit.jsontext import json_bytes
+
+    yield "curve.csv", to_csv(curves_table(report.source))
+    yield "cycles.csv", to_csv(cycles_table(report))
+    yield "metrics.json", json_bytes(report.data)
+    if plots:
+        from cfmkit.experiment.draw import figures
+        from cfmkit.plots.style import png
+
+        for stem, draw in figures(report).items():
+            yield f"figures/{stem}.png", png(draw())

@@ -1,0 +1,139 @@
+"""What a comparison or a calibration adds to a run: JSON keys, files, figures, lines for the page."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.experiment.calibration import table
+from cfmkit.experiment.report import curves_table
+from cfmkit.metrics.subjects import span_text
+from cfmkit.tables import Table, TableColumn, border_column, to_csv
+from cfmkit.units import format_short
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from cfmkit.experiment.calibration import Calibration
+    from cfmkit.experiment.comparison import Comparison
+    from cfmkit.experiment.measured import Measured
+
+
+def comparison_data(comparison: Comparison, source: Measured) -> dict[str, Any]:
+    """Return what metrics.json says about the data besides the errors, which are metrics."""
+    from cfmkit.units import border_unit, to_border
+
+    dimension, window = comparison.curve.motion_dimension, comparison.window
+    low, high = (float(to_border(end, dimension)) for end in (window.lo, window.hi))
+    decisions = source.recording.decisions
+    return {
+        "data": {
+            "file": source.recording.name,
+            "window": {"from": low, "to": high, "unit": border_unit(dimension)},
+            "points": sum(len(item.motion) for item in comparison.samples),
+            "reading": decisions.lines() if decisions else [],
+        }
+    }
+
+
+def comparison_lines(comparison: Comparison, source: Measured) -> tuple[tuple[str, str], ...]:
+    """Return the paragraphs that a page shows: how the file was read, and the errors."""
+    decisions, metrics, kind = source.recording.decisions, comparison.metrics(), comparison.curve.kind
+    several = len(comparison.samples) > 1
+    over = span_text(comparison.window.lo, comparison.window.hi, kind)
+    lines = [("read", text) for text in (decisions.lines() if decisions else [])]
+    for item in comparison.samples:
+        suffix = f"[{item.branch}]" if several else ""
+        values = [metrics[name + suffix].value for name in ("data_rmse", "data_offset", "data_error_max")]
+        told = ["no value" if value is None else format_short(value, kind) for value in values]
+        where = f" on {item.branch}" if several else ""
+        lines.append(("data", f"model - measured{where}: rms {told[0]}, mean {told[1]}, largest {told[2]} over {over}"))
+    return tuple(lines)
+
+
+def comparison_files(
+    comparison: Comparison, source: Measured, name: str, before: Comparison | None = None
+) -> Mapping[str, Callable[[], bytes]]:
+    """Return what makes the files of a comparison: the measured curve, and the figure."""
+    return {
+        "data.csv": lambda: to_csv(curves_table(source)),
+        "figures/data.png": partial(_overlay, comparison, before, name),
+    }
+
+
+def _overlay(comparison: Comparison, before: Comparison | None, name: str) -> bytes:
+    from cfmkit.experiment.draw import overlay
+    from cfmkit.plots.style import png
+
+    subject = "fitted model and measurement" if before else "model and measurement"
+    return png(overlay(comparison, before, (name, subject)))
+
+
+def calibration_data(calibration: Calibration) -> dict[str, Any]:
+    """Return what metrics.json says about a fit."""
+    fit = calibration.fit
+    return {
+        "parameters": table(calibration),
+        "correlation": [[float(value) for value in row] for row in fit.correlation],
+        "fit": {
+            "noise": {"value": _border(fit.noise, calibration), "unit": _unit(calibration)},
+            "samples_that_count_as_one": float(fit.inflation),
+            "degrees_of_freedom": float(fit.freedom),
+            "rms_at_the_start": {"value": _border(_rms(calibration.before), calibration), "unit": _unit(calibration)},
+            "converged": fit.converged,
+        },
+    }
+
+
+def _rms(comparison: Comparison) -> float:
+    errors = np.concatenate([item.errors(comparison.curve) for item in comparison.samples])
+    return float(np.sqrt(np.mean(errors**2)))
+
+
+def _border(value: float, calibration: Calibration) -> float:
+    from cfmkit.units import to_border
+
+    return float(to_border(value, calibration.after.curve.kind))
+
+
+def _unit(calibration: Calibration) -> str:
+    from cfmkit.units import border_unit
+
+    return border_unit(calibration.after.curve.kind)
+
+
+def calibration_lines(calibration: Calibration) -> tuple[tuple[str, str], ...]:
+    """Return the paragraphs that a page shows: each value with its interval."""
+    half = calibration.fit.half_widths()
+    lines = []
+    for k, item in enumerate(calibration.parameters):
+        value, width = float(calibration.fit.values[k]), float(half[k])
+        told = f"{_exact(value, item.dimension)} ± {_exact(width, item.dimension, 2)}"
+        lines.append(("fitted", f"{item.path} = {told} (95 %), from {_exact(item.start, item.dimension)}"))
+    return tuple(lines)
+
+
+def _exact(value: float, dimension: str, digits: int = 5) -> str:
+    return f"{value:.{digits}g}" if dimension == "ratio" else format_short(value, dimension, digits)
+
+
+def parameters_table(calibration: Calibration) -> Table:
+    """Return the fitted values as a table: units differ from row to row, so they have a column."""
+    records = table(calibration)
+    return Table(tuple(TableColumn(name, tuple(record[name] for record in records)) for name in records[0]))
+
+
+def residuals_table(calibration: Calibration) -> Table:
+    """Return what is left between model and measurement at every point that was fitted."""
+    after, curve = calibration.after, calibration.after.curve
+    branch = np.repeat([item.branch for item in after.samples], [len(item.motion) for item in after.samples])
+    motion = np.concatenate([item.motion for item in after.samples])
+    return Table(
+        (
+            TableColumn("branch", tuple(branch.tolist())),
+            border_column(curve.motion_name, motion, curve.motion_dimension),
+            border_column("residual", calibration.fit.residuals, curve.kind),
+        )
+    )

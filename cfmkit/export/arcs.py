@@ -1,0 +1,123 @@
+"""From the contours of a drawing to chains of arcs: what every writer of outlines starts from.
+
+Lines and arcs stay what they are; smooth edges become tangent-continuous arcs within
+the tolerance of the exact curve. What comes out is checked: edges meet, closed contours
+close, and nothing that is to be cut crosses itself or another cut.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+
+from cfmkit.errors import GeometryError
+from cfmkit.export.checks import check_outlines, place
+from cfmkit.geometry import Arc, Contour, Drawing, Edge, Line
+from cfmkit.numerics.arcchain import ArcChain
+from cfmkit.numerics.biarcs import CoarseDataError, fit_arcs
+from cfmkit.units import format_short
+
+TOLERANCE = 5e-6  # default distance of the arcs from the exact curve [m]
+_LEAN = 1e-3  # largest angle of the arcs to the exact curve [rad], as far as its points allow; see `outlines`
+_GAP = 1e-9  # two ends closer than this are one point [m]
+_STRAIGHT = 1e-12  # an arc no higher than this over its chord is a line [m]
+
+
+@dataclass(frozen=True)
+class Outline:
+    """One contour as a chain of arcs [m]; `circle` is (centre, radius) if it is one whole circle.
+
+    `layer`, `closed` and `hole` are those of the contour.
+    """
+
+    chain: ArcChain
+    layer: str
+    closed: bool = False
+    hole: bool = False
+    circle: tuple[complex, float] | None = None
+
+
+def outlines(drawing: Drawing, tolerance: float = TOLERANCE) -> tuple[Outline, ...]:
+    """Return the contours of a drawing as chains of arcs, checked.
+
+    The arcs' direction is kept within a milliradian too, as far as the points allow: on a
+    cam the force follows the slope, and arcs 5 um off the profile can lean by ten times that.
+
+    Parameters
+    ----------
+    drawing : Drawing
+        What to draw.
+    tolerance : float
+        Largest distance of the arcs from the exact smooth curves [m].
+
+    Raises
+    ------
+    cfmkit.errors.GeometryError
+        If edges do not meet, a closed contour is open, a smooth edge is given by too few
+        points, or a contour that is closed or to be cut crosses itself or another cut.
+    """
+    if not drawing.contours:
+        raise GeometryError(f"the drawing {drawing.name!r} has no contours")
+    found = tuple(_outline(contour, number, tolerance) for number, contour in enumerate(drawing.contours, start=1))
+    check_outlines(found)
+    return found
+
+
+def _outline(contour: Contour, number: int, tolerance: float) -> Outline:
+    name = f"contour {number} on layer {contour.layer!r}"
+    edges = [edge for edge in contour.edges if isinstance(edge, Arc) or not _is_point(edge)]
+    if not edges:
+        raise GeometryError(f"{name} has no edges")
+    _check_joints(edges, contour.closed, name)
+    chains = [_chain(edge, tolerance, f"{name}, edge {index}") for index, edge in enumerate(edges, start=1)]
+    nodes = np.concatenate([chains[0].nodes, *(chain.nodes[1:] for chain in chains[1:])])
+    bulges = np.concatenate([chain.bulges for chain in chains])
+    bulges[np.abs(bulges) * np.abs(np.diff(nodes)) < 2 * _STRAIGHT] = 0.0
+    chain = ArcChain(nodes, bulges)
+    whole = edges[0] if len(edges) == 1 and isinstance(edges[0], Arc) and edges[0].full else None
+    circle = (complex(*whole.center), whole.radius) if whole and contour.closed else None
+    return Outline(chain.closed() if contour.closed else chain, contour.layer, contour.closed, contour.hole, circle)
+
+
+def _is_point(edge: Edge) -> bool:
+    """Whether a line has no length: a dimension that is zero may leave one."""
+    return isinstance(edge, Line) and abs(edge.ends[1] - edge.ends[0]) < _GAP
+
+
+def _check_joints(edges: list[Edge], closed: bool, name: str) -> None:
+    ends = [edge.ends for edge in edges]
+    if not np.isfinite(ends).all():
+        raise GeometryError(f"{name} has a point that is not finite")
+    for index, (edge, following) in enumerate(itertools.pairwise(ends), start=1):
+        if abs(edge[1] - following[0]) > _GAP:
+            raise GeometryError(
+                f"{name}: edge {index + 1} begins at {place(following[0])}, but edge {index} ends at {place(edge[1])}"
+            )
+    if closed and abs(ends[-1][1] - ends[0][0]) > _GAP:
+        raise GeometryError(f"{name} is not closed: it begins at {place(ends[0][0])} and ends at {place(ends[-1][1])}")
+
+
+def _chain(edge: Edge, tolerance: float, name: str) -> ArcChain:
+    if isinstance(edge, Line):
+        return ArcChain(np.array(edge.ends), np.zeros(1))
+    if isinstance(edge, Arc):
+        return _arc_chain(edge, name)
+    try:
+        return fit_arcs(edge.points, edge.tangents, tolerance, _LEAN)
+    except CoarseDataError as error:
+        where = complex(*edge.points[error.index])
+        raise GeometryError(
+            f"{name}, near {place(where)}: {error} (tolerance {format_short(tolerance, 'length')})"
+        ) from error
+
+
+def _arc_chain(edge: Arc, name: str) -> ArcChain:
+    """Return the arc in equal pieces of at most half a turn."""
+    turn = edge.end - edge.start
+    if not edge.radius > 0 or turn == 0 or (abs(turn) > 2 * np.pi and not edge.full):
+        raise GeometryError(f"{name}: an arc needs a radius above zero and a turn of at most 360 deg, other than zero")
+    count = int(np.ceil(abs(turn) / np.pi - 1e-9))
+    nodes = complex(*edge.center) + edge.radius * np.exp(1j * np.linspace(edge.start, edge.end, count + 1))
+    return ArcChain(nodes, np.full(count, np.tan(turn / count / 4)))

@@ -1,0 +1,151 @@
+"""DXF R2010 in millimetres, for laser cutters, mills and CAD programs.
+
+Closed contours are one closed LWPOLYLINE each, arcs as bulges; whole circles are
+CIRCLEs. The same drawing gives the same bytes: dates and identifiers are fixed.
+"""
+
+from __future__ import annotations
+
+import io
+import os
+import sys
+import tempfile
+import threading
+from contextlib import contextmanager
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.errors import OutputError
+from cfmkit.export.arcs import TOLERANCE, Outline, outlines
+from cfmkit.export.checks import flat_points
+from cfmkit.export.layers import Look, looks
+from cfmkit.units import to_border
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+    from types import ModuleType
+
+    from cfmkit.geometry import Drawing
+
+_MILLIMETRES, _METRIC = 4, 1
+_DIGITS = 9  # of coordinates [mm]: a picometre, the scale of rounding errors
+_LOCK = threading.Lock()
+
+
+def write_dxf(drawing: Drawing, tolerance: float = TOLERANCE) -> bytes:
+    """Return the drawing as DXF.
+
+    Parameters
+    ----------
+    drawing : Drawing
+        What to draw.
+    tolerance : float
+        Largest distance of the arcs from the exact smooth curves [m].
+
+    Raises
+    ------
+    cfmkit.errors.GeometryError
+        If the drawing cannot be cut as it is.
+    """
+    return dxf_bytes(outlines(drawing, tolerance))
+
+
+def dxf_bytes(drawn: Sequence[Outline]) -> bytes:
+    """Return outlines as DXF; see `write_dxf`."""
+    layers = looks(outline.layer for outline in drawn)
+    with _LOCK, _same_bytes(_ezdxf()) as ezdxf:
+        document = ezdxf.new("R2010", units=_MILLIMETRES)
+        document.header["$MEASUREMENT"] = _METRIC
+        for name, look in layers.items():
+            _add_layer(document, name, look)
+        space = document.modelspace()
+        for outline in drawn:
+            _add_outline(space, outline)
+        _show_all(document, to_border(np.vstack([flat_points(outline.chain) for outline in drawn]), "length"))
+        return _encoded(document)
+
+
+def _add_layer(document: Any, name: str, look: Look) -> None:
+    attributes: dict[str, object] = {"color": look.index}
+    if look.dashes:
+        signed = [length * (-1) ** index for index, length in enumerate(look.dashes)]
+        document.linetypes.add(f"{name}-dashes", [sum(look.dashes), *signed])
+        attributes["linetype"] = f"{name}-dashes"
+    document.layers.add(name, **attributes)
+
+
+def _add_outline(space: Any, outline: Outline) -> None:
+    attributes = {"layer": outline.layer}
+    if outline.circle:
+        center, radius = (np.round(to_border(value, "length"), _DIGITS) for value in outline.circle)
+        space.add_circle((float(center.real), float(center.imag)), float(radius), dxfattribs=attributes)
+        return
+    nodes = np.round(to_border(outline.chain.nodes, "length"), _DIGITS) + 0.0
+    bulges = np.append(outline.chain.bulges, 0.0)
+    vertices = zip(nodes.real.tolist(), nodes.imag.tolist(), bulges.tolist(), strict=True)
+    kept = list(vertices)[:-1] if outline.closed else list(vertices)
+    space.add_lwpolyline(kept, format="xyb", close=outline.closed, dxfattribs=attributes)
+
+
+def _show_all(document: Any, points: Any) -> None:
+    """Set the extents, and what a viewer shows first."""
+    low, high = np.round(points.min(axis=0), _DIGITS), np.round(points.max(axis=0), _DIGITS)
+    document.modelspace().reset_extents((*low.tolist(), 0.0), (*high.tolist(), 0.0))
+    height = 1.1 * max(*(high - low).tolist(), 1.0)
+    document.set_modelspace_vport(height=height, center=tuple(((low + high) / 2).tolist()))
+
+
+def _encoded(document: Any) -> bytes:
+    # ezdxf collects the classes in a set, whose order differs between processes
+    document.classes.add_required_classes(document.dxfversion)
+    for key in sorted(document.classes.classes):
+        document.classes.classes.move_to_end(key)
+    text = io.StringIO()
+    document.write(text)
+    return bytes(document.encode(text.getvalue()))
+
+
+@contextmanager
+def _same_bytes(ezdxf: ModuleType) -> Iterator[ModuleType]:
+    """Have ezdxf write fixed dates and identifiers."""
+    before = ezdxf.options.write_fixed_meta_data_for_testing
+    ezdxf.options.write_fixed_meta_data_for_testing = True
+    try:
+        yield ezdxf
+    finally:
+        ezdxf.options.write_fixed_meta_data_for_testing = before
+
+
+def _ezdxf() -> ModuleType:
+    """Import ezdxf without a scan of all fonts and a cache in the home folder.
+
+    It does both on import, unless it finds that cache. We draw no text: an empty one will
+    do, in a folder that is gone afterwards. Call this with the lock held.
+    """
+    if "ezdxf" not in sys.modules:
+        try:
+            with tempfile.TemporaryDirectory(prefix="cfmkit-") as folder:
+                cache = Path(folder) / "ezdxf" / "font_manager_cache.json"
+                cache.parent.mkdir()
+                cache.write_text('{"version": 2, "font-faces": []}', encoding="utf-8")
+                with _environment("XDG_CACHE_HOME", folder):
+                    import_module("ezdxf")
+        except OSError as error:
+            raise OutputError(f"DXF needs a temporary folder for a moment: {error}; set TMPDIR to one") from error
+    return import_module("ezdxf")
+
+
+@contextmanager
+def _environment(name: str, value: str) -> Iterator[None]:
+    before = os.environ.get(name)
+    os.environ[name] = value
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ[name]
+        else:
+            os.environ[name] = before

@@ -1,0 +1,50 @@
+"""The layers of a drawing, and how each looks in every file format."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from cfmkit.errors import GeometryError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+
+@dataclass(frozen=True)
+class Look:
+    """Colour as AutoCAD index and as RGB, and the dashes [mm] of a line that nothing is cut along."""
+
+    index: int
+    rgb: str
+    dashes: tuple[float, ...] = ()
+
+
+_LOOKS = {
+    "cut": Look(1, "#ff0000"),
+    "path": Look(150, "#007fff", (6.0, 1.5, 1.0, 1.5)),
+    "reference": Look(8, "#808080"),
+}
+_OTHERS = (Look(6, "#ff00ff"), Look(4, "#00a0a0"), Look(30, "#ff8000"), Look(3, "#008000"))
+
+
+def looks(used: Iterable[str]) -> dict[str, Look]:
+    """Return the look of the three usual layers and of every other one in use, in that order."""
+    others = [name for name in dict.fromkeys(used) if name not in _LOOKS]
+    for name in others:
+        check_name(name, "layer")
+    return _LOOKS | {name: _OTHERS[index % len(_OTHERS)] for index, name in enumerate(others)}
+
+
+def check_name(name: str, what: str) -> str:
+    """Return `name` if it can be part of a file name and of every format.
+
+    Raises
+    ------
+    cfmkit.errors.GeometryError
+        If it cannot.
+    """
+    if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,99}", name):
+        raise GeometryError(f"{name!r} cannot name a {what}: use letters, digits, '-', '_' and '.', at most 100")
+    return name

@@ -1,0 +1,91 @@
+"""SVG at real size: one millimetre in the drawing is one millimetre on paper, y pointing up.
+
+Arcs are arcs (`A` commands), so that nothing is lost against the DXF.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.export.arcs import TOLERANCE, Outline, outlines
+from cfmkit.export.checks import flat_points
+from cfmkit.export.layers import Look, check_name, looks
+from cfmkit.units import to_border
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from cfmkit.geometry import Drawing
+
+_MARGIN = 5.0  # around the drawing [mm]
+_STROKE = 0.25  # width of every line [mm]
+
+
+def write_svg(drawing: Drawing, tolerance: float = TOLERANCE) -> bytes:
+    """Return the drawing as SVG 1.1 at real size.
+
+    Parameters
+    ----------
+    drawing : Drawing
+        What to draw.
+    tolerance : float
+        Largest distance of the arcs from the exact smooth curves [m].
+
+    Raises
+    ------
+    cfmkit.errors.GeometryError
+        If the drawing cannot be cut as it is.
+    """
+    return svg_bytes(drawing.name, outlines(drawing, tolerance))
+
+
+def svg_bytes(name: str, drawn: Sequence[Outline]) -> bytes:
+    """Return outlines as SVG; see `write_svg`."""
+    points = to_border(np.vstack([flat_points(outline.chain) for outline in drawn]), "length")
+    (left, low), (right, high) = points.min(axis=0) - _MARGIN, points.max(axis=0) + _MARGIN
+    width, height = _text(right - left), _text(high - low)
+    head = (
+        f'<svg xmlns="http://www.w3.org/2000/svg" version="1.1" width="{width}mm" height="{height}mm"'
+        f' viewBox="{_text(left)} {_text(-high)} {width} {height}">'
+    )
+    title = check_name(name, "drawing")
+    layers = [
+        line
+        for layer, look in looks(outline.layer for outline in drawn).items()
+        for line in _group(layer, look, [outline for outline in drawn if outline.layer == layer])
+    ]
+    lines = ['<?xml version="1.0" encoding="UTF-8"?>', head, f"<title>{title}</title>", *layers, "</svg>", ""]
+    return "\n".join(lines).encode()
+
+
+def _group(layer: str, look: Look, members: Sequence[Outline]) -> list[str]:
+    dashes = f' stroke-dasharray="{" ".join(map(_text, look.dashes))}"' if look.dashes else ""
+    style = f'fill="none" stroke="{look.rgb}" stroke-width="{_text(_STROKE)}" stroke-linejoin="round"{dashes}'
+    return [f'<g id="{layer}" {style}>', *map(_shape, members), "</g>"] if members else []
+
+
+def _shape(outline: Outline) -> str:
+    """Return one outline as a `circle` or a `path`; y is turned over, and with it the sense of every arc."""
+    if outline.circle:
+        center, radius = (to_border(value, "length") for value in outline.circle)
+        return f'<circle cx="{_text(center.real)}" cy="{_text(-center.imag)}" r="{_text(radius)}"/>'
+    nodes = to_border(outline.chain.nodes, "length")
+    steps = [f"M {_text(nodes[0].real)} {_text(-nodes[0].imag)}"]
+    for start, end, bulge in zip(nodes[:-1], nodes[1:], outline.chain.bulges.tolist(), strict=True):
+        point = f"{_text(end.real)} {_text(-end.imag)}"
+        if abs(bulge) * abs(end - start) < 1e-6:
+            steps.append(f"L {point}")
+        else:
+            radius = _text(abs(end - start) * (1 + bulge**2) / (4 * abs(bulge)))
+            steps.append(f"A {radius} {radius} 0 {int(abs(bulge) > 1)} {int(bulge < 0)} {point}")
+    if outline.closed:
+        steps[-1:] = ["Z"] if steps[-1].startswith("L") else [steps[-1], "Z"]
+    return f'<path d="{" ".join(steps)}"/>'
+
+
+def _text(value: float) -> str:
+    """Return millimetres with nanometres, without idle zeros."""
+    text = f"{value:.6f}".rstrip("0").rstrip(".")
+    return "0" if text == "-0" else text

@@ -1,0 +1,143 @@
+"""What a family of mechanisms must offer: a frozen record of functions, not a base class."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from cfmkit.curves import FloatArray
+    from cfmkit.results import Design, Result
+    from cfmkit.spec import Spec
+
+
+def _silent(_fraction: float, _text: str) -> None:
+    """Ignore progress: the default for library use."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """How a function is to be run: seed, progress report and time budget.
+
+    `progress` is called with a fraction in [0, 1] and a short text.
+    `time_budget` is in seconds, or None for no limit.
+    """
+
+    seed: int = 0
+    progress: Callable[[float, str], None] = _silent
+    time_budget: float | None = None
+
+
+@dataclass(frozen=True)
+class Measure:
+    """One number asked of each design of a block: a metric over a window, or a value of the family.
+
+    Attributes
+    ----------
+    name : str
+        ``force_ripple``, ``theoretical_force``; never with a branch in brackets.
+    window : tuple of (float, float), optional
+        Ends of the window [m or rad]; None: the full travel.
+    """
+
+    name: str
+    window: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True)
+class Block:
+    """Many variants of one specification, and what is to be known about each.
+
+    Attributes
+    ----------
+    values : mapping of str to (n,) array
+        Dotted path -> SI value in each variant; words and whole numbers as they are.
+    measures : tuple of Measure
+        What is asked.
+    size : int
+        n.
+    """
+
+    values: Mapping[str, NDArray[Any]]
+    measures: tuple[Measure, ...]
+    size: int
+
+
+@dataclass(frozen=True)
+class BlockAnswer:
+    """What a vectorised model knows about a block.
+
+    Attributes
+    ----------
+    done : (n,) array of bool
+        The variants that it solved completely; all others are analysed one by one.
+    values : tuple of mappings
+        For each measure: branch -> (n,) array of SI values, NaN where undefined. What
+        is no matter of one branch stands under the name "" alone.
+    target : (n,) array, optional
+        Force or torque that each curve should have [N or N m].
+    """
+
+    done: NDArray[Any]
+    values: tuple[Mapping[str, FloatArray], ...]
+    target: FloatArray | None = None
+
+
+@dataclass(frozen=True)
+class Family:
+    """One family of mechanisms, as the registry knows it.
+
+    Attributes
+    ----------
+    name, summary : str
+        As written in ``family:`` of a spec, and one line on what it is.
+    spec_type : type of Spec
+        What the YAML may say.
+    analyze : callable
+        ``analyze(spec, run) -> Result``.
+    design : callable, optional
+        ``design(spec, run) -> Design``; its spec is analysed like any other.
+    values : mapping
+        The family's own scalar results beside the metrics of the contract:
+        name -> (dimension, definition).
+    resolve : callable, optional
+        ``resolve(spec) -> spec`` with every derived part written out.
+    analyze_block : callable, optional
+        ``analyze_block(spec, block) -> answer``: many variants of a specification at once;
+        None where the model cannot vary these paths or measure these metrics.
+    gradient : callable, optional
+        ``gradient(spec, paths) -> {metric: {path: derivative}}``: exact derivatives [SI] of those
+        metrics (over the window of the analysis) and paths that the family knows; `local` asks for it.
+    draw : str, optional
+        ``"module"`` with ``figures(result)``, imported when drawing.
+    outline : str, optional
+        ``"module"`` with ``drawing(spec)``, imported when exporting.
+    headline : tuple of str
+        Values and metrics that are shown first after a run, in this order.
+    template : str
+        File name under ``cfmkit/templates/`` that ``cfmkit new`` starts from.
+    findings : mapping of str to str
+        Every warning or failure name the family can report, with its meaning.
+    references : tuple of str
+        The papers, in one line each.
+    """
+
+    name: str
+    summary: str
+    spec_type: type[Spec]
+    analyze: Callable[[Any, Run], Result]
+    design: Callable[[Any, Run], Design] | None = None
+    values: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+    resolve: Callable[[Any], Any] | None = None
+    analyze_block: Callable[[Any, Block], BlockAnswer | None] | None = None
+    gradient: Callable[[Any, Sequence[str]], Any] | None = None
+    draw: str | None = None
+    outline: str | None = None
+    headline: tuple[str, ...] = ()
+    template: str = ""
+    findings: dict[str, str] = field(default_factory=dict)
+    references: tuple[str, ...] = ()

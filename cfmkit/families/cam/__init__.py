@@ -1,0 +1,39 @@
+"""Cam mechanisms: rollers, cam and springs [Sanchez-Salinas et al. 2022]."""
+
+from __future__ import annotations
+
+from cfmkit.families.base import Family
+from cfmkit.families.cam.block import analyze_block
+from cfmkit.families.cam.build import resolve
+from cfmkit.families.cam.design import design
+from cfmkit.families.cam.findings import FINDINGS
+from cfmkit.families.cam.model import analyze
+from cfmkit.families.cam.spec import CamSpec
+from cfmkit.families.cam.values import DEFINITIONS
+
+FAMILY = Family(
+    name="cam",
+    summary="two rollers on a cam, pulled together by springs and up by braces",
+    spec_type=CamSpec,
+    analyze=analyze,
+    design=design,
+    values=DEFINITIONS,
+    resolve=resolve,
+    draw="cfmkit.families.cam.draw",
+    analyze_block=analyze_block,
+    outline="cfmkit.families.cam.outline",
+    headline=(
+        "force_constant",
+        "theoretical_force",
+        "force_mean",
+        "usable_stroke",
+        "spring_elongation_max",
+        "contact_force_max",
+    ),
+    template="cam.yaml",
+    findings=FINDINGS,
+    references=(
+        "S. Sanchez-Salinas, A. Garcia-Agundez, J. Lopez-Martinez, D. Garcia-Vallejo, "
+        "Mech. Mach. Theory 173 (2022) 104819, doi:10.1016/j.mechmachtheory.2022.104819",
+    ),
+)

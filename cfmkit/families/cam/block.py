@@ -1,0 +1,132 @@
+"""Many cams at once: the closed form of a profile cut for no friction, run with or without.
+
+Such a cam carries its roller along s = (x - x0)^2 / 2A, so that the state at every travel
+is explicit, and whole arrays of designs are one array operation. The formulas are those
+of `cam_profile` and `statics`, in the same order, for a cam with its own brace and
+roller, without weight. Everything else (an undercut cam, a stroke that the brace does not
+reach, a jam between two samples) is left to the model of one cam.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.families.base import BlockAnswer
+from cfmkit.families.cam.block_forces import METRICS, SCALARS, Designs, Slab, measured
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from cfmkit.curves import FloatArray
+    from cfmkit.families.base import Block
+    from cfmkit.families.cam.spec import CamSpec
+
+SLAB = 60_000
+"""Samples that are worked on together: few enough to stay in a processor's cache."""
+
+VARIED = {
+    "mechanism.brace_length": "brace",
+    "mechanism.rest_half_width": "x0",
+    "mechanism.roller_radius": "radius",
+    "mechanism.rolling_friction": "friction",
+    "mechanism.springs.stiffness": "stiffness",
+    "mechanism.springs.count": "count",
+    "mechanism.profile.force_constant": "constant",
+    "mechanism.profile.stroke": "stroke",
+    "design.force": "target",
+}
+"""What this model can vary, and what it is called here."""
+
+
+def analyze_block(spec: CamSpec, block: Block) -> BlockAnswer | None:
+    """Return what is asked about many variants of a cam; None where this model does not apply.
+
+    Parameters
+    ----------
+    spec : CamSpec
+        What is varied.
+    block : Block
+        The variants and the measures.
+    """
+    names = [measure.name for measure in block.measures]
+    if not _applies(spec, block) or not set(names) <= set(SCALARS) | set(METRICS):
+        return None
+    designs = _designs(spec, block)
+    done = designs.sound.copy()
+    values = [_empty(measure.name, block.size) for measure in block.measures]
+    for chosen in _slabs(np.flatnonzero(done), spec.analysis.points):
+        cams = Slab(designs.take(chosen), spec.analysis.points, "contact_force_max" in names)
+        done[chosen] = cams.solved
+        for measure, found in zip(block.measures, values, strict=True):
+            for branch, numbers in measured(cams, measure).items():
+                found[branch][chosen] = numbers
+    return BlockAnswer(done, tuple(values), designs.target)
+
+
+def _applies(spec: CamSpec, block: Block) -> bool:
+    mechanism, profile = spec.mechanism, spec.mechanism.profile
+    plain = (
+        spec.fidelity == "quasi-static"
+        and not spec.gravity
+        and not (mechanism.contact or mechanism.left or mechanism.errors or profile.file)
+        and profile.friction == 0
+        and profile.slope_factor == 1
+        and profile.offset == 0
+        and spec.analysis.path_method == "quadrature"
+        and spec.analysis.origin == "path-start"
+        and spec.analysis.travel is None
+        and profile.stroke is not None
+    )
+    if not plain or not set(block.values) <= set(VARIED):
+        return False
+    if isinstance(mechanism.springs.stiffness, tuple) or (spec.design is None and "design.force" in block.values):
+        return False
+    # A window cuts every curve at the same samples only if all have the same travel.
+    windowed = any(measure.window for measure in block.measures if measure.name in METRICS)
+    return not windowed or ("mechanism.profile.stroke" not in block.values and _covered(spec, block))
+
+
+def _covered(spec: CamSpec, block: Block) -> bool:
+    stroke = spec.mechanism.profile.stroke or 0.0
+    windows = [measure.window for measure in block.measures if measure.window and measure.name in METRICS]
+    return all(low >= 0 and high <= stroke for low, high in windows)
+
+
+def _designs(spec: CamSpec, block: Block) -> Designs:
+    mechanism, profile = spec.mechanism, spec.mechanism.profile
+    given = {VARIED[path]: np.asarray(values, dtype=np.float64) for path, values in block.values.items()}
+    base: dict[str, Any] = {
+        "brace": mechanism.brace_length,
+        "x0": mechanism.rest_half_width,
+        "radius": mechanism.roller_radius,
+        "friction": mechanism.rolling_friction,
+        "stiffness": mechanism.springs.stiffness,
+        "count": mechanism.springs.count or 1,
+        "constant": profile.force_constant,
+        "stroke": profile.stroke,
+    }
+    full = {name: np.broadcast_to(np.float64(value), block.size) for name, value in base.items()} | given
+    # Whole numbers above 1000 are no valid count; such a design is not sound.
+    count = np.where((full["count"] >= 1) & (full["count"] <= 1000), full["count"], -1.0)
+    full["stiffness"] = full["stiffness"] * count
+    del full["count"]
+    cut_for = ((profile.brace_length, "brace"), (profile.rest_half_width, "x0"), (profile.roller_radius, "radius"))
+    for fixed, name in cut_for:
+        if fixed is not None:
+            # Another part than the cam is cut for: the track is not the path.
+            full[name] = np.where(full[name] == fixed, full[name], np.nan)
+    force = 4.0 * full["stiffness"] * full["constant"]
+    target = given.get("target", force if spec.design is None else np.full(block.size, spec.design.force))
+    return Designs(**(full | {"target": target}))
+
+
+def _slabs(chosen: NDArray[np.intp], points: int) -> list[NDArray[np.intp]]:
+    size = max(1, SLAB // points)
+    return [chosen[start : start + size] for start in range(0, len(chosen), size)]
+
+
+def _empty(name: str, size: int) -> dict[str, FloatArray]:
+    branches = ("load", "unload") if name in METRICS and name != "hysteresis_area" else ("",)
+    return {branch: np.full(size, np.nan) for branch in branches}

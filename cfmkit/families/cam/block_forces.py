@@ -1,0 +1,289 @@
+"""Forces and metrics of many cams at all their samples, as arrays: (designs, points).
+
+Each cam carries its roller along s = (x - x0)^2 / 2A with its own brace and roller; the
+formulas are those of `cam_profile`, `statics` and `cfmkit.metrics`, in the same order.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from numpy.typing import NDArray
+
+    from cfmkit.curves import FloatArray
+    from cfmkit.families.base import Measure
+
+_SLACK = 1e-9
+
+
+def tangents(x: FloatArray, brace: FloatArray) -> FloatArray:
+    """Return `cam_profile.brace_tangent` where every brace has its own length."""
+    return x / ((brace - x) * (brace + x)) ** 0.5
+
+
+@dataclass(frozen=True)
+class Designs:
+    """One value of everything that decides a cam's forces for each design, (n,) each [SI]."""
+
+    brace: FloatArray
+    x0: FloatArray
+    radius: FloatArray
+    friction: FloatArray
+    stiffness: FloatArray
+    constant: FloatArray
+    stroke: FloatArray
+    target: FloatArray
+
+    def __len__(self) -> int:
+        """Return the number of designs."""
+        return len(self.brace)
+
+    def take(self, chosen: Any) -> Designs:
+        """Return some of the designs."""
+        return Designs(**{name: getattr(self, name)[chosen] for name in self.__dataclass_fields__})
+
+    @cached_property
+    def end(self) -> FloatArray:
+        """Path coordinate at which the stroke ends [m]."""
+        return self.x0 + (2.0 * self.constant * self.stroke) ** 0.5
+
+    @cached_property
+    def curvature_radius(self) -> FloatArray:
+        """Radius of curvature of the path at its start, where it is smallest [m]."""
+        p = tangents(self.x0, self.brace)
+        across = (self.brace - self.x0) * (self.brace + self.x0)
+        length = 1.0 + p * p
+        return length * length**0.5 / (1.0 / self.constant + self.brace**2 / (across * across**0.5))
+
+    @cached_property
+    def sound(self) -> NDArray[np.bool_]:
+        """Whether the closed form holds from the start of the stroke to its end."""
+        positive = np.ones(len(self), dtype=bool)
+        for value in (self.brace, self.x0, self.radius, self.stiffness, self.constant, self.stroke, self.target):
+            positive &= value > 0
+        reaches = self.end < self.brace - 2e-9 * (self.brace - self.x0)
+        fits = (self.radius <= self.curvature_radius) & (self.radius <= self.brace)
+        starts = self.x0 < self.brace * (1 - 1e-5)
+        return positive & reaches & fits & starts & (self.friction >= 0) & (self.friction < 1)
+
+
+@dataclass(frozen=True)
+class Forces:
+    """Force on the slider and at a contact, (designs, points) each [N], and where a lever is missing."""
+
+    slider: FloatArray
+    contact: FloatArray | None
+    moves: NDArray[np.bool_]
+
+
+class Slab:
+    """Some sound designs at all their samples; each quantity is computed when it is first asked for.
+
+    Parameters
+    ----------
+    designs : Designs
+        Sound ones.
+    points : int
+        Samples on each branch.
+    contacts : bool
+        Whether contact forces are wanted.
+    """
+
+    def __init__(self, designs: Designs, points: int, contacts: bool) -> None:
+        """Remember what is asked."""
+        self.designs, self.points, self.contacts = designs, points, contacts
+        self.spreads: dict[tuple[str, Any], _Spread] = {}
+
+    @cached_property
+    def travel(self) -> FloatArray:
+        """Travel of the slider [m]."""
+        cams = self.designs
+        at_end, at_start = (
+            (cams.brace - cams.end) * (cams.brace + cams.end),
+            (cams.brace - cams.x0) * (cams.brace + cams.x0),
+        )
+        drop = -(cams.end - cams.x0) * (cams.end + cams.x0) / (at_end**0.5 + at_start**0.5)
+        height = (cams.end - cams.x0) ** 2 / (2.0 * cams.constant) - drop
+        total = (height + at_end**0.5) - at_start**0.5
+        return total[:, None] * (np.arange(self.points) / (self.points - 1.0))
+
+    @cached_property
+    def stretch(self) -> FloatArray:
+        """x - x0 [m]."""
+        return (2.0 * self.designs.constant[:, None] * self.travel) ** 0.5
+
+    @cached_property
+    def tangent(self) -> FloatArray:
+        """Tangent of the brace's angle from the axis."""
+        return tangents(self.designs.x0[:, None] + self.stretch, self.designs.brace[:, None])
+
+    @cached_property
+    def slope(self) -> FloatArray:
+        """Slope of the path."""
+        return self.stretch / self.designs.constant[:, None] + self.tangent
+
+    @cached_property
+    def up(self) -> Forces:
+        """Forces on the way up."""
+        return self._forces(self.designs.friction)
+
+    @cached_property
+    def down(self) -> Forces:
+        """Forces on the way down."""
+        return self._forces(-self.designs.friction) if self.designs.friction.any() else self.up
+
+    def _forces(self, friction: FloatArray) -> Forces:
+        """Return the forces of one direction, as `statics.forces` does without weight."""
+        cams, mu = self.designs, friction[:, None]
+        turn = 1.0 + mu * self.slope
+        lever = self.slope - mu - self.tangent * turn
+        spring = 2.0 * cams.stiffness[:, None] * self.stretch
+        slider = 2.0 * spring * turn / lever
+        contact = (1.0 + self.slope * self.slope) ** 0.5 * spring / lever if self.contacts else None
+        # At the first sample the springs are at rest: no force, or without friction its limit, 4 K A.
+        ideal = friction == 0
+        limit = 4.0 * cams.stiffness * cams.constant
+        slider[:, 0] = np.where(ideal, limit, 0.0)
+        if contact is not None:
+            contact[:, 0] = np.where(ideal, 0.5 * limit * (1.0 + self.slope[:, 0] ** 2) ** 0.5, 0.0)
+        return Forces(slider, contact, np.asarray((lever[:, 1:] > 0).all(axis=1)))
+
+    @property
+    def solved(self) -> NDArray[np.bool_]:
+        """Whether a force was found at every sample."""
+        return self.up.moves & self.down.moves
+
+    def spread(self, branch: str, window: Any) -> _Spread:
+        """Return the forces of one branch inside a window."""
+        if (branch, window) not in self.spreads:
+            forces = self.up if branch == "load" else self.down
+            self.spreads[branch, window] = _Spread(self.travel, forces.slider, window)
+        return self.spreads[branch, window]
+
+
+class _Spread:
+    """The forces of one branch inside a window."""
+
+    def __init__(self, travel: FloatArray, force: FloatArray, window: tuple[float, float] | None) -> None:
+        self.motion, self.force = (travel, force) if window is None else _inside(travel, force, window)
+
+    @cached_property
+    def mean(self) -> FloatArray:
+        return np.asarray(self.force.mean(axis=1))
+
+    @cached_property
+    def max(self) -> FloatArray:
+        return np.asarray(self.force.max(axis=1))
+
+    @cached_property
+    def min(self) -> FloatArray:
+        return np.asarray(self.force.min(axis=1))
+
+    @cached_property
+    def deviation(self) -> FloatArray:
+        offset = self.force - self.mean[:, None]
+        return np.asarray(np.sqrt(np.einsum("ij,ij->i", offset, offset) / (offset.shape[1] - 1)))
+
+    @cached_property
+    def work(self) -> FloatArray:
+        steps = np.diff(self.motion, axis=1)
+        return np.asarray(np.einsum("ij,ij->i", steps, 0.5 * (self.force[:, 1:] + self.force[:, :-1])))
+
+
+def _inside(travel: FloatArray, force: FloatArray, window: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
+    """Return the samples in a window with its interpolated ends; all curves have the same travel."""
+    low, high = window
+    slack, first = _SLACK * (high - low), travel[0]
+    start, stop = int(np.searchsorted(first, low - slack)), int(np.searchsorted(first, high + slack, side="right"))
+    parts = [(travel[:, start:stop], force[:, start:stop])]
+    if start < stop and first[start] > low + slack:
+        parts.insert(0, _between(travel, force, start, low))
+    if start < stop and first[stop - 1] < high - slack and stop < travel.shape[1]:
+        parts.append(_between(travel, force, stop, high))
+    return np.hstack([motion for motion, _ in parts]), np.hstack([effort for _, effort in parts])
+
+
+def _between(travel: FloatArray, force: FloatArray, after: int, place: float) -> tuple[FloatArray, FloatArray]:
+    left, right = travel[:, after - 1], travel[:, after]
+    share = (place - left) / (right - left)
+    effort = force[:, after - 1] + share * (force[:, after] - force[:, after - 1])
+    return np.full((len(travel), 1), place), effort[:, None]
+
+
+def measured(cams: Slab, measure: Measure) -> Mapping[str, FloatArray]:
+    """Return what a measure is for some designs: branch -> (n,) values, "" for what belongs to no branch."""
+    if measure.name in SCALARS:
+        return {"": SCALARS[measure.name](cams)}
+    if measure.name == "hysteresis_area":
+        return {"": cams.spread("load", measure.window).work - cams.spread("unload", measure.window).work}
+    function = METRICS[measure.name]
+    return {branch: function(cams.spread(branch, measure.window), cams.designs) for branch in ("load", "unload")}
+
+
+def _ripple(one: _Spread, _cams: Designs) -> FloatArray:
+    return (one.max - one.min) / one.max
+
+
+def _half_band(one: _Spread, _cams: Designs) -> FloatArray:
+    return (one.max - one.min) / (one.max + one.min)
+
+
+def _from_mean(one: _Spread, _cams: Designs) -> FloatArray:
+    return np.maximum(one.max - one.mean, one.mean - one.min) / one.mean
+
+
+def _from_target(one: _Spread, cams: Designs) -> FloatArray:
+    return np.maximum(np.abs(one.max - cams.target), np.abs(one.min - cams.target)) / cams.target
+
+
+METRICS: dict[str, Callable[[_Spread, Designs], FloatArray]] = {
+    "force_mean": lambda one, _cams: one.mean,
+    "force_sd": lambda one, _cams: one.deviation,
+    "force_max": lambda one, _cams: one.max,
+    "force_min": lambda one, _cams: one.min,
+    "force_ripple": _ripple,
+    "half_band": _half_band,
+    "deviation_from_mean": _from_mean,
+    "deviation_from_target": _from_target,
+    "hysteresis_area": lambda one, _cams: one.work,
+}
+
+
+def _smallest_constant(cams: Slab) -> FloatArray:
+    one = cams.designs
+    p = tangents(one.x0, one.brace)
+    inverse = (1.0 + p * p) ** 1.5 / one.radius - (1.0 + p * p) ** 1.5 / one.brace
+    return np.where(inverse > 0, 1.0 / inverse, np.nan)
+
+
+def _largest_contact(cams: Slab) -> FloatArray:
+    contacts = [forces.contact for forces in (cams.up, cams.down) if forces.contact is not None]
+    return np.asarray(np.max([one.max(axis=1) for one in contacts], axis=0))
+
+
+def _half_gap(cams: Slab) -> FloatArray:
+    up, down = cams.up.slider, cams.down.slider
+    total = up + down
+    return np.asarray(np.where(total > 0, (up - down) / np.where(total > 0, total, 1.0), -np.inf).max(axis=1))
+
+
+SCALARS: dict[str, Callable[[Slab], FloatArray]] = {
+    "force_constant": lambda cams: cams.designs.constant,
+    "spring_stiffness": lambda cams: cams.designs.stiffness,
+    "theoretical_force": lambda cams: 4.0 * cams.designs.stiffness * cams.designs.constant,
+    "undercut_travel": lambda cams: np.zeros(len(cams.designs)),
+    "roller_radius_max": lambda cams: cams.designs.curvature_radius,
+    "force_constant_min": _smallest_constant,
+    "corner_force_max": lambda cams: np.full(len(cams.designs), np.nan),
+    "spring_elongation_max": lambda cams: 2.0 * cams.stretch[:, -1],
+    "contact_force_max": _largest_contact,
+    "brace_angle_max": lambda cams: np.arcsin((cams.designs.x0 + cams.stretch[:, -1]) / cams.designs.brace),
+    "friction_half_gap_max": _half_gap,
+}

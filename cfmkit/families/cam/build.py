@@ -1,0 +1,234 @@
+"""From a cam specification to the parts that the model works with."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from cfmkit.bodies.cam_cut import CamProfile, WholeCamUndercut, cut
+from cfmkit.bodies.cam_path import Path, reach
+from cfmkit.bodies.cam_profile import SlopeLaw
+from cfmkit.bodies.cam_track import Track
+from cfmkit.bodies.track_states import NoTrack
+from cfmkit.errors import SolutionError
+from cfmkit.families.cam.findings import finding, mm
+from cfmkit.families.cam.statics import GRAVITY, Loads
+
+if TYPE_CHECKING:
+    from cfmkit.families.cam.spec import CamSpec, Masses, Mechanism
+    from cfmkit.results import Finding
+
+
+CLOSE = 1e-6
+"""A travel that is short by so little is not short: on a nearly vertical path rounding in x alone costs 1e-8."""
+
+
+class CannotBuild(SolutionError):
+    """The mechanism cannot exist as described; carries the finding that says why."""
+
+    def __init__(self, name: str, message: str) -> None:
+        """Keep the finding."""
+        self.finding: Finding = finding(name, message)
+        super().__init__(message)
+
+
+@dataclass(frozen=True)
+class Assembly:
+    """A mechanism put together.
+
+    Attributes
+    ----------
+    spec : CamSpec
+        With every derived value written out.
+    profile : CamProfile
+        The cam as cut.
+    track : Track
+        Where the roller runs.
+    loads : Loads
+        Springs and weights.
+    stroke : float
+        Travel that the cut profile offers with its own brace [m]; short of the
+        specified stroke where the geometry ends first.
+    shortfall : Finding or None
+        Why `stroke` is short, if it is.
+    """
+
+    spec: CamSpec
+    profile: CamProfile
+    track: Track
+    loads: Loads
+    stroke: float
+    shortfall: Finding | None = None
+
+
+def resolve(spec: CamSpec) -> CamSpec:
+    """Return the spec with the cut profile written out: what was left to follow the mechanism is now fixed."""
+    mechanism = spec.mechanism
+    profile = mechanism.profile
+    stroke = profile.stroke or spec.analysis.travel or (spec.design.stroke if spec.design else None)
+    if stroke is None:
+        stroke = 0.5 * mechanism.brace_length
+    written = {
+        "brace_length": profile.brace_length or mechanism.brace_length,
+        "rest_half_width": profile.rest_half_width or mechanism.rest_half_width,
+        "roller_radius": profile.roller_radius or mechanism.roller_radius,
+        "stroke": stroke,
+    }
+    new_profile = profile.model_copy(update=written)
+    return spec.model_copy(update={"mechanism": mechanism.model_copy(update={"profile": new_profile})})
+
+
+def slope_law(spec: CamSpec) -> SlopeLaw:
+    """Return the slope law of a resolved spec's profile."""
+    profile = spec.mechanism.profile
+    return SlopeLaw(
+        force_constant=profile.force_constant,
+        rest_half_width=float(profile.rest_half_width or 0.0),
+        brace_length=float(profile.brace_length or 0.0),
+        friction=profile.friction,
+        slope_factor=profile.slope_factor,
+    )
+
+
+def hanging_weights(masses: Masses | None) -> tuple[float, float]:
+    """Return the weight that hangs on one roller and on the slider [N]: each brace counts half at each end."""
+    if masses is None:
+        return 0.0, 0.0
+    return GRAVITY * (masses.roller + 0.5 * masses.brace), GRAVITY * (masses.slider + masses.brace)
+
+
+def assemble(spec: CamSpec) -> Assembly:
+    """Return the mechanism put together.
+
+    Raises
+    ------
+    CannotBuild
+        If it cannot exist; the finding says why.
+    """
+    spec = resolve(spec)
+    mechanism, law = spec.mechanism, slope_law(spec)
+    stroke, radius = float(mechanism.profile.stroke or 0.0), float(mechanism.profile.roller_radius or 0.0)
+    missing = max(-mechanism.profile.offset, 0.0)
+    check_start(law, (mechanism.roller_radius, mechanism.brace_length), (radius + missing, law.brace_length))
+    path, end = reach(law, stroke, spec.analysis.path_method)
+    reached = float(path.travel(end))
+    shortfall = _shortfall(law, stroke, reached)
+    profile = _cut(path, radius, end)
+    # A flank with material missing is the flank for a larger roller, trimmed where that one undercuts it.
+    track = _track(_cut(path, radius + missing, end) if missing else profile, mechanism)
+    weights = hanging_weights(mechanism.masses) if spec.gravity else (0.0, 0.0)
+    loads = Loads(mechanism.springs.total, mechanism.rest_half_width, mechanism.brace_length, *weights)
+    return Assembly(spec, profile, track, loads, reached, shortfall)
+
+
+def displacement_origin(assembly: Assembly) -> float:
+    """Return what turns travel into the displacement that the spec asks for [m]."""
+    origin = assembly.spec.analysis.origin
+    if origin == "path-start":
+        return 0.0
+    below = cam_start_height(assembly.profile) if origin == "slider-from-cam" else 0.0
+    return assembly.track.start - below
+
+
+def check_start(law: SlopeLaw, *rollers: tuple[float, float]) -> None:
+    """Raise if there is no mechanism to begin with, whatever the force constant.
+
+    Parameters
+    ----------
+    law : SlopeLaw
+        The slope of the path.
+    rollers : (float, float)
+        Radius and brace length of each roller: the one built in, the one the cam is cut for [m].
+
+    Raises
+    ------
+    CannotBuild
+        If the braces do not reach, the rollers have no room, or the path does not rise.
+    """
+    x0, shortest = law.rest_half_width, min(brace for _, brace in rollers)
+    if x0 >= shortest * (1 - 1e-6):
+        raise CannotBuild(
+            "brace_too_short",
+            f"the braces ({mm(shortest)}) do not reach from the axis to the rollers, which start at "
+            f"{mm(x0)} from it; use a brace longer than {mm(x0)}",
+        )
+    for radius, brace in rollers:
+        if radius >= brace:
+            raise CannotBuild(
+                "rollers_collide",
+                f"there is no room for two rollers with a radius of {mm(radius)} on braces of {mm(brace)}; "
+                "use smaller rollers",
+            )
+    p = float(law.frictionless(x0))
+    if p + law.friction <= 0 or law.friction * p >= 1:
+        raise CannotBuild(
+            "design_singular",
+            f"a profile cut for a friction of {law.friction:g} has no upward start: |friction| must stay below "
+            f"{p if law.friction <= 0 else 1 / p:.3g}",
+        )
+
+
+def _shortfall(law: SlopeLaw, stroke: float, reached: float) -> Finding | None:
+    """Return why the profile ends at `reached` and not at `stroke` [m]; None if it does not."""
+    if reached >= stroke * (1 - CLOSE):
+        return None
+    ends = f"the stroke ends at {mm(reached)} of {mm(stroke)}"
+    if law.friction > 0 and law.vertical_at < law.brace_length:
+        return finding(
+            "path_vertical",
+            f"cut for a friction of {law.friction:g} the path turns vertical at x = {mm(law.vertical_at)}: {ends}; "
+            "use less friction or a larger force constant",
+        )
+    if reached <= 0:
+        raise CannotBuild(
+            "design_singular",
+            f"a profile cut for a friction of {law.friction:g} holds its roller: nowhere does the slider rise as the "
+            "rollers move out; use less friction or a smaller force constant",
+        )
+    return finding(
+        "brace_too_short",
+        f"the brace of {mm(law.brace_length)} turns horizontal too early: {ends}; use a longer brace or a smaller "
+        "force constant",
+    )
+
+
+def _cut(path: Path, roller_radius: float, end: float) -> CamProfile:
+    try:
+        return cut(path, roller_radius, end)
+    except WholeCamUndercut:
+        smallest = float(path.law.curvature_radius(path.law.rest_half_width))
+        raise CannotBuild(
+            "undercut_total",
+            f"nothing of the flank remains: the {mm(roller_radius)} roller is larger than the path's radius of "
+            f"curvature ({mm(smallest)} at the start), and the stroke ends before it would leave the cam's corner; "
+            "use a smaller roller, a larger force constant or a longer stroke",
+        ) from None
+
+
+def _track(profile: CamProfile, mechanism: Mechanism) -> Track:
+    try:
+        return Track(profile, mechanism.roller_radius, mechanism.brace_length, max(mechanism.profile.offset, 0.0))
+    except NoTrack as problem:
+        brace = mechanism.brace_length
+        if problem.reason == "brace":
+            raise CannotBuild(
+                "brace_too_short",
+                f"the braces ({mm(brace)}) do not reach from the axis to the rollers, which start at "
+                f"{mm(problem.start)} from it on this cam; use a brace longer than {mm(problem.start)}",
+            ) from None
+        if problem.reason == "crossed":
+            raise CannotBuild(
+                "flanks_collide",
+                f"on this cam the right roller would start at x = {mm(problem.start)}, across the axis; use a cam with "
+                "a larger rest half width, or rollers nearer to those it is cut for",
+            ) from None
+        raise CannotBuild(
+            "dead_point",
+            f"with a brace of {mm(brace)} the slider does not rise above its start while the rollers move out on this "
+            "cam; use a longer brace, or a cam cut for this one",
+        ) from None
+
+
+def cam_start_height(profile: CamProfile) -> float:
+    """Return the height of the flank's first point, before trimming, above the path's start [m]."""
+    return float(profile.flank(profile.path.law.rest_half_width)[1])

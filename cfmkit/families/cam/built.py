@@ -1,0 +1,254 @@
+"""Quasi-static analysis of a cam as it was built, from measured points of its flanks.
+
+The points are registered to the design, both flanks by one motion; what is left is the
+error of the profile. Both sides may differ: with the spring force S = K (x_R + x_L - 2 x0)
+on each roller the slider's force is the sum of what each side needs. The force is split
+into what the design gives, and what rest length, profile and friction add to it, one
+after the other, so that the parts add up.
+
+Reference
+---------
+[SS] S. Sanchez-Salinas et al., Mech. Mach. Theory 173 (2022) 104819, sec. 2.3 and 3.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.bodies.cam_built import BuiltTrack, built_flank, built_track
+from cfmkit.bodies.cam_flank import DesignFlank
+from cfmkit.bodies.cam_profile import brace_tangent
+from cfmkit.curves import Column, Curve
+from cfmkit.errors import DataError
+from cfmkit.families.cam.build import Assembly, CannotBuild, assemble, displacement_origin
+from cfmkit.families.cam.built_values import findings_of_built, values_of_built
+from cfmkit.families.cam.findings import finding, mm
+from cfmkit.numerics.registration import Registration, gaps_across, register
+from cfmkit.results import Result, Status
+from cfmkit.tables.labpoints import read_sides
+from cfmkit.tables.source import DataSource
+
+if TYPE_CHECKING:
+    from cfmkit.curves import FloatArray
+    from cfmkit.families.cam.spec import CamSpec
+    from cfmkit.families.cam.statics import Loads
+
+
+@dataclass(frozen=True)
+class Sides:
+    """Right and left roller at some slider positions: x [m] and slope of the track, each (n,)."""
+
+    x: tuple[FloatArray, FloatArray]
+    slope: tuple[FloatArray, FloatArray]
+
+    def spring(self, loads: Loads, rest: float) -> FloatArray:
+        """Return the spring force on each roller [N]; springs do not push."""
+        return loads.stiffness * np.maximum(self.x[0] + self.x[1] - 2.0 * rest, 0.0)
+
+    def forces(self, loads: Loads, friction: float, rest: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return the force on the slider and at the right and left contact [N]; NaN where nothing moves a side.
+
+        Parameters
+        ----------
+        loads : Loads
+            Springs and weights.
+        friction : float
+            Positive on the way up, negative on the way down.
+        rest : float
+            Half width at which the springs are at rest [m].
+        """
+        pull, contacts = np.full_like(self.x[0], loads.slider_weight), []
+        spring, weight = self.spring(loads, rest), loads.roller_weight
+        for x, slope in zip(self.x, self.slope, strict=True):
+            tangent = brace_tangent(x, loads.brace_length)
+            turn = 1.0 + friction * slope
+            lever = slope - friction - tangent * turn
+            lever = np.where(lever > 0, lever, np.nan)
+            pull = pull + (spring * turn + weight * (slope - friction)) / lever
+            contacts.append(np.hypot(1.0, slope) * (spring + weight * tangent) / lever)
+        return pull, contacts[0], contacts[1]
+
+
+@dataclass(frozen=True)
+class Built:
+    """A solved mechanism with a measured cam.
+
+    Attributes
+    ----------
+    assembly : Assembly
+        The design and the loads.
+    registration : Registration
+        Of the right and the left flank.
+    across : tuple of (n,) array
+        Errors in x at the same y, positive outside [m].
+    travel : (n,) array
+        From the start of the design's roller path [m].
+    sides : Sides
+        Where the rollers are.
+    shares : mapping
+        Parts of the force [N]: design, rest, profile, friction_up, friction_down, each (n,).
+    origin : float
+        What is added to the travel to give the displacement [m].
+    """
+
+    assembly: Assembly
+    registration: Registration
+    across: tuple[FloatArray, FloatArray]
+    travel: FloatArray
+    sides: Sides
+    shares: dict[str, FloatArray]
+    origin: float
+
+
+def analyze_built(spec: CamSpec) -> Result:
+    """Return the loop of a cam whose flanks were measured.
+
+    Raises
+    ------
+    cfmkit.errors.DataError
+        If the file with the points cannot be used.
+    """
+    try:
+        assembly = assemble(spec)
+    except CannotBuild as problem:
+        return Result(spec, Status.NO_EQUILIBRIUM, problem.finding.message, warnings=(problem.finding,))
+    registration = registered(assembly)
+    tracks = _tracks(assembly, registration)
+    travel, short = _travel(assembly, tracks)
+    built = _solved(assembly, registration, tracks, travel)
+    found = [*([finding("outside_profile", short)] if short else []), *findings_of_built(built)]
+    asked = assembly.spec.analysis.model_copy(
+        update={"travel": float(travel[-1]), "gravity": spec.gravity, "fidelity": "quasi-static"}
+    )
+    return Result(
+        spec=assembly.spec.model_copy(update={"analysis": asked}),
+        status=Status.PARTIAL if short else Status.COMPLETE,
+        message=short,
+        curves=(_curve(built),),
+        values=values_of_built(built),
+        warnings=tuple(found),
+        valid=((float(travel[0]) + built.origin, float(travel[-1]) + built.origin),),
+        target=spec.design.force if spec.design else float(built.shares["design"][-1]),
+        state=built,
+    )
+
+
+def registered(assembly: Assembly) -> Registration:
+    """Return the measured points of an assembly's cam, registered to its design."""
+    source = assembly.spec.mechanism.profile.file
+    if not isinstance(source, DataSource):
+        raise DataError("the specification names no file with measured points")
+    return register(read_sides(source.path), flanks_of(assembly))
+
+
+def flanks_of(assembly: Assembly) -> tuple[DesignFlank, DesignFlank]:
+    """Return the right and the left flank of the design."""
+    return DesignFlank(assembly.profile, 1.0), DesignFlank(assembly.profile, -1.0)
+
+
+def _tracks(assembly: Assembly, registration: Registration) -> tuple[BuiltTrack, BuiltTrack]:
+    mechanism, design = assembly.spec.mechanism, flanks_of(assembly)[0]
+    noise = float(mechanism.profile.noise or 0.0)
+    # The left flank's feet and errors are those of its mirror image.
+    found = []
+    for u, error, used in zip(registration.parameters, registration.errors, registration.used, strict=True):
+        if int(used.sum()) < 20:
+            raise DataError(
+                f"{mechanism.profile.file}: only {int(used.sum())} points of a flank lie on the design; is it the same "
+                "cam?"
+            )
+        flank = built_flank(design, u[used], error[used], noise)
+        found.append(built_track(flank, mechanism.roller_radius, mechanism.brace_length))
+    return found[0], found[1]
+
+
+def _travel(assembly: Assembly, tracks: tuple[BuiltTrack, BuiltTrack]) -> tuple[FloatArray, str]:
+    """Return the travels at which both sides were measured, and why they are short, if they are [m]."""
+    start = assembly.track.start
+    low = max(float(track.slider[0]) for track in tracks) - start
+    high = min(float(track.slider[-1]) for track in tracks) - start
+    asked = assembly.spec.analysis.travel
+    if high <= max(low, 0.0):
+        raise DataError(f"{assembly.spec.mechanism.profile.file}: the two flanks were measured at different heights")
+    short = ""
+    if asked is not None and asked > high * (1 + 1e-9):
+        short = f"the travel asked for is {mm(asked)}, but the flanks were measured up to {mm(high)} of travel only"
+    return np.linspace(max(low, 0.0), min(asked or high, high), assembly.spec.analysis.points), short
+
+
+def _solved(
+    assembly: Assembly, registration: Registration, tracks: tuple[BuiltTrack, BuiltTrack], travel: FloatArray
+) -> Built:
+    slider = assembly.track.start + travel
+    states = assembly.track.states(slider)
+    (right_x, right), (left_x, left) = (track.at(slider) for track in tracks)
+    sides = Sides((right_x, left_x), (right, left))
+    designed = Sides((states.x, states.x), (states.slope, states.slope))
+    return Built(
+        assembly,
+        registration,
+        across(assembly, registration),
+        travel,
+        sides,
+        shares_of(assembly, designed, sides),
+        displacement_origin(assembly),
+    )
+
+
+def across(assembly: Assembly, registration: Registration) -> tuple[FloatArray, FloatArray]:
+    """Return the errors of both flanks in x at the same y, positive outside [m]."""
+    right, left = (
+        flank.side * gaps_across(flank, points, u)
+        for flank, points, u in zip(flanks_of(assembly), registration.points, registration.parameters, strict=True)
+    )
+    return right, left
+
+
+def shares_of(assembly: Assembly, designed: Sides, sides: Sides) -> dict[str, FloatArray]:
+    """Return the parts of the force: what the design gives, and what each deviation adds to it [N]."""
+    loads, mechanism = assembly.loads, assembly.spec.mechanism
+    rest, drawn = loads.rest_half_width, float(mechanism.profile.rest_half_width or loads.rest_half_width)
+    ideal = designed.forces(loads, 0.0, drawn)[0]
+    longer = designed.forces(loads, 0.0, rest)[0]
+    smooth = sides.forces(loads, 0.0, rest)[0]
+    friction = mechanism.rolling_friction
+    return {
+        "design": ideal,
+        "rest": longer - ideal,
+        "profile": smooth - longer,
+        "friction_up": sides.forces(loads, friction, rest)[0] - smooth,
+        "friction_down": sides.forces(loads, -friction, rest)[0] - smooth,
+    }
+
+
+def _curve(built: Built) -> Curve:
+    """Return the closed loop with the parts of the force."""
+    loads, friction = built.assembly.loads, built.assembly.spec.mechanism.rolling_friction
+    up, down = (built.sides.forces(loads, mu, loads.rest_half_width) for mu in (friction, -friction))
+
+    def loop(one: FloatArray, other: FloatArray | None = None) -> FloatArray:
+        return np.concatenate([one, (one if other is None else other)[::-1]])
+
+    shares = built.shares
+    elongation = built.sides.x[0] + built.sides.x[1] - 2.0 * loads.rest_half_width
+    extra = {
+        "contact_force_right": Column(loop(up[1], down[1]), "force"),
+        "contact_force_left": Column(loop(up[2], down[2]), "force"),
+        "spring_elongation": Column(loop(elongation), "length"),
+        "roller_x_right": Column(loop(built.sides.x[0]), "length"),
+        "roller_x_left": Column(loop(built.sides.x[1]), "length"),
+        "force_of_design": Column(loop(shares["design"]), "force"),
+        "added_by_rest_length": Column(loop(shares["rest"]), "force"),
+        "added_by_profile": Column(loop(shares["profile"]), "force"),
+        "added_by_friction": Column(loop(shares["friction_up"], shares["friction_down"]), "force"),
+    }
+    with np.errstate(invalid="ignore"):
+        stable = (loop(up[1], down[1]) > 0) & (loop(up[2], down[2]) > 0)
+    branch = np.repeat(["load", "unload"], len(built.travel))
+    return Curve(loop(built.travel) + built.origin, loop(up[0], down[0]), branch, stable, extra)
+
+
+__all__ = ["Built", "Sides", "analyze_built", "registered"]

@@ -1,0 +1,120 @@
+"""Scalar results and findings of a cam that was measured."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.families.cam.findings import finding, mm
+from cfmkit.results import Quantity
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+
+    from cfmkit.curves import FloatArray
+    from cfmkit.families.cam.built import Built
+    from cfmkit.results import Finding
+
+BUILT_DEFINITIONS = {
+    "profile_rmse": ("length", "root mean square distance of the measured points from the design, along its normal"),
+    "profile_sd": ("length", "standard deviation (n - 1) of those distances"),
+    "profile_mean": ("length", "mean of those distances: positive where material is left"),
+    "profile_rmse_x": ("length", "root mean square error in x at the same y [SS, fig. 3]"),
+    "profile_sd_x": ("length", "standard deviation (n - 1) of the error in x"),
+    "profile_outliers": ("count", "measured points that the registration gave no weight"),
+    "registration_angle": ("angle", "turn that lays the measured points on the design"),
+    "registration_x": ("length", "shift in x after that turn"),
+    "registration_y": ("length", "shift in y after that turn"),
+    "registration_uncertainty": ("length", "standard deviation of the least certain motion of the registration"),
+    "profile_force_sd": ("force", "standard deviation (n - 1) of what the profile's errors add to the force"),
+    "profile_force_share": ("ratio", "that, over the mean force of the design [SS, fig. 13: 0.8 %]"),
+    "rest_force_mean": ("force", "mean of what the springs' rest length adds to the force of the design"),
+    "manufacturing_force_share": (
+        "ratio",
+        "median over the cams that are drawn of the standard deviation of the force error along the travel, over the "
+        "mean force [SS, fig. 13: 0.8 %]",
+    ),
+    "manufacturing_force_share_95": ("ratio", "what 95 % of the cams that are drawn stay below in that"),
+    "loop_area_per_friction": (
+        "energy",
+        "area of the loop per unit of rolling friction, over the window: a measured area over it is the friction",
+    ),
+}
+
+
+def values_of_built(built: Built) -> Mapping[str, Quantity]:
+    """Return the scalar results by name."""
+    found, used = built.registration, built.registration.used
+    errors = np.concatenate([item[keep] for item, keep in zip(found.errors, used, strict=True)])
+    across = np.concatenate([item[keep] for item, keep in zip(built.across, used, strict=True)])
+    inside = window_mask(built)
+    share = built.shares["profile"][inside]
+    numbers = {
+        "profile_rmse": _rms(errors),
+        "profile_sd": float(errors.std(ddof=1)),
+        "profile_mean": float(errors.mean()),
+        "profile_rmse_x": _rms(across),
+        "profile_sd_x": float(across.std(ddof=1)),
+        "profile_outliers": float(sum(int((~keep).sum()) for keep in used)),
+        "registration_angle": found.angle,
+        "registration_x": float(found.shift[0]),
+        "registration_y": float(found.shift[1]),
+        "registration_uncertainty": found.weakest(half_extent(built))[1],
+        "profile_force_sd": float(np.nanstd(share, ddof=1)),
+        "profile_force_share": float(np.nanstd(share, ddof=1) / np.nanmean(built.shares["design"][inside])),
+        "rest_force_mean": float(np.nanmean(built.shares["rest"][inside])),
+        "loop_area_per_friction": loop_area_per_friction(built),
+    }
+    return {name: Quantity(value, *BUILT_DEFINITIONS[name]) for name, value in numbers.items()}
+
+
+def window_mask(built: Built) -> NDArray[np.bool_]:
+    """Return which travels lie in ``analysis.window``."""
+    place, window = built.travel + built.origin, built.assembly.spec.analysis.window
+    if window is None:
+        return np.ones(len(place), dtype=bool)
+    inside: NDArray[np.bool_] = (place >= window[0]) & (place <= window[1])
+    return inside if inside.sum() > 2 else np.ones(len(place), dtype=bool)
+
+
+def loop_area_per_friction(built: Built) -> float:
+    """Return d(loop area)/d(friction) over the window [J], from a small friction either way."""
+    loads, small = built.assembly.loads, 1e-6
+    up, down = (built.sides.forces(loads, way * small, loads.rest_half_width)[0] for way in (1.0, -1.0))
+    inside = window_mask(built)
+    return float(np.trapezoid((up - down)[inside], built.travel[inside]) / small)
+
+
+def half_extent(built: Built) -> float:
+    """Return half the height of the measured part [m]: where an angle is felt."""
+    heights = np.concatenate([points[:, 1] for points in built.registration.points])
+    return 0.5 * float(np.ptp(heights))
+
+
+def findings_of_built(built: Built) -> list[Finding]:
+    """Return what the user must know about the measured profile."""
+    found = []
+    direction, deviation = built.registration.weakest(half_extent(built))
+    rmse = _rms(np.concatenate(built.registration.errors))
+    if deviation > 0.1 * rmse and rmse > 0:
+        names = ("the angle", "the shift in x", "the shift in y")
+        parts = [f"{100 * part**2:.0f} % {name}" for part, name in zip(direction, names, strict=True) if part**2 > 0.05]
+        found.append(
+            finding(
+                "registration_weak",
+                f"where the cam lies is known to ± {mm(deviation)} (one standard deviation) along its weakest "
+                f"direction: {', '.join(parts)}; a width error looks much like a shift along the steep flanks",
+            )
+        )
+    last = built.assembly.stroke
+    if built.travel[-1] < last * (1 - 1e-9) or built.travel[0] > 0:
+        span = f"{mm(float(built.travel[0]))} to {mm(float(built.travel[-1]))}"
+        found.append(finding("part_measured", f"the flanks were measured for {span} of travel only, of {mm(last)}"))
+    return found
+
+
+def _rms(values: FloatArray) -> float:
+    return float(np.sqrt(np.mean(values**2)))

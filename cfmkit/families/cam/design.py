@@ -1,0 +1,282 @@
+"""From targets to a cam: the force constant, the springs and the profile to cut.
+
+The force is F = 4 K A [SS, eq. 1]: of K and A one is given and the other follows, or
+both come from a catalogue. A profile that also carries weight is designed for the
+force that is left after the slider's own weight; its slope is steeper by
+c = F' / (F' - 2 w), w the weight that hangs on one roller.
+
+Reference
+---------
+[SS] S. Sanchez-Salinas et al., Mech. Mach. Theory 173 (2022) 104819.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.bodies.cam_path import reach
+from cfmkit.bodies.cam_profile import SlopeLaw, brace_tangent
+from cfmkit.families.cam.build import CLOSE, CannotBuild, check_start, hanging_weights
+from cfmkit.families.cam.findings import at_least, at_most, finding, mm
+from cfmkit.results import Design, Status
+from cfmkit.units import format_short
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    from cfmkit.families.base import Run
+    from cfmkit.families.cam.spec import CamDesign, CamSpec, CatalogueSpring, Springs
+    from cfmkit.results import Finding
+
+
+class Infeasible(Exception):
+    """No cam meets the targets; carries the finding and what would be feasible."""
+
+    def __init__(self, found: Finding, nearest: Mapping[str, str] | None = None) -> None:
+        """Keep the reason and the nearest feasible values by path."""
+        self.finding, self.nearest = found, dict(nearest or {})
+        super().__init__(found.message)
+
+
+@dataclass(frozen=True)
+class Choice:
+    """A force constant with the springs that go with it."""
+
+    force_constant: float
+    springs: Springs
+    active: tuple[str, ...] = ()
+    note: str = ""
+
+
+def design(spec: CamSpec, run: Run) -> Design:
+    """Return a complete specification whose cam meets the targets of the `design` block.
+
+    Parameters
+    ----------
+    spec : CamSpec
+        With a `design` block.
+    run : Run
+        Not needed here: the choice is in closed form.
+
+    Returns
+    -------
+    Design
+        INFEASIBLE, with the reason and the nearest feasible values, if there is none.
+    """
+    target = spec.design
+    if target is None:
+        return Design(None, Status.INVALID, "this spec has no 'design' block: add the targets 'force' and 'stroke'")
+    try:
+        return _design(spec, target)
+    except Infeasible as problem:
+        return Design(
+            None,
+            Status.INFEASIBLE,
+            problem.finding.message,
+            nearest_feasible=problem.nearest,
+            warnings=(problem.finding,),
+        )
+
+
+def _design(spec: CamSpec, target: CamDesign) -> Design:
+    pull, factor = shaping(spec, target)
+    _check_beginning(spec, target, factor)
+    smallest = _smallest_constant(spec, target, factor)
+    ways = {"force-constant": _from_springs, "stiffness": _from_constant, "catalogue": _from_catalogue}
+    choice = ways[target.choose](spec, target, pull, factor, smallest)
+    law = _law(spec, target, choice.force_constant, factor)
+    _check_stroke(law, target, choice.springs)
+    return Design(_written(spec, target, choice, factor), Status.COMPLETE, choice.note, active_bounds=choice.active)
+
+
+def shaping(spec: CamSpec, target: CamDesign) -> tuple[float, float]:
+    """Return the force F' that the springs provide [N] and the slope factor c of the profile."""
+    if not target.gravity:
+        return target.force, 1.0
+    roller, slider = hanging_weights(spec.mechanism.masses)
+    least = slider + 2.0 * roller
+    if target.force <= least:
+        raise Infeasible(
+            finding(
+                "weight_too_large",
+                f"the moving parts weigh {format_short(least, 'force')}: a force of "
+                f"{format_short(target.force, 'force')} does not even carry them; ask for more, or lighten the parts",
+            ),
+            {"design.force": f"more than {format_short(least, 'force')}"},
+        )
+    pull = target.force - slider
+    return pull, pull / (pull - 2.0 * roller)
+
+
+def _law(spec: CamSpec, target: CamDesign, force_constant: float, factor: float) -> SlopeLaw:
+    mechanism = spec.mechanism
+    return SlopeLaw(force_constant, mechanism.rest_half_width, mechanism.brace_length, target.friction, factor)
+
+
+def _check_beginning(spec: CamSpec, target: CamDesign, factor: float) -> None:
+    """Raise if no force constant gives a mechanism."""
+    mechanism = spec.mechanism
+    law = _law(spec, target, mechanism.rest_half_width, factor)
+    try:
+        check_start(law, (mechanism.roller_radius, mechanism.brace_length))
+    except CannotBuild as problem:
+        longer = {"mechanism.brace_length": f"more than {mm(mechanism.rest_half_width)}"}
+        raise Infeasible(problem.finding, longer if problem.finding.name == "brace_too_short" else None) from None
+
+
+def _smallest_constant(spec: CamSpec, target: CamDesign, factor: float) -> float | None:
+    """Return the smallest force constant without undercut [m]; None where undercut is accepted."""
+    if not target.avoid_undercut:
+        return None
+    mechanism = spec.mechanism
+    law = _law(spec, target, mechanism.rest_half_width, factor)
+    smallest = law.smallest_force_constant(mechanism.roller_radius)
+    if smallest is None:
+        flat = SlopeLaw(1e6 * law.brace_length, law.rest_half_width, law.brace_length, law.friction, factor)
+        largest = mm(float(flat.curvature_radius(law.rest_half_width)))
+        raise Infeasible(
+            finding(
+                "undercut",
+                f"no force constant avoids undercut: the {mm(mechanism.roller_radius)} roller is larger than the "
+                f"radius of curvature that the brace alone gives ({largest}); use a smaller roller",
+            ),
+            {"mechanism.roller_radius": f"less than {largest}"},
+        )
+    return smallest * (1 + 1e-12)
+
+
+def _from_springs(spec: CamSpec, target: CamDesign, pull: float, factor: float, smallest: float | None) -> Choice:
+    """Choose A from the springs; where that would undercut, the smallest A that does not, and softer springs."""
+    springs = spec.mechanism.springs
+    constant = pull / (4.0 * springs.total)
+    if smallest is None or constant >= smallest:
+        return Choice(constant, springs)
+    softer = springs.scaled_to(pull / (4.0 * smallest))
+    note = (
+        f"to avoid undercut A is raised from {mm(constant)} to {mm(smallest)}; the springs must then add up to "
+        f"{format_short(softer.total, 'stiffness')} instead of {format_short(springs.total, 'stiffness')}"
+    )
+    return Choice(smallest, softer, ("design.avoid_undercut",), note)
+
+
+def _from_constant(spec: CamSpec, target: CamDesign, pull: float, factor: float, smallest: float | None) -> Choice:
+    """Choose the stiffness from a given A."""
+    constant = target.force_constant or spec.mechanism.profile.force_constant
+    if smallest is not None and constant < smallest:
+        raise Infeasible(
+            finding(
+                "force_constant_too_small",
+                f"the force constant {mm(constant)} is below {mm(smallest)}, the smallest that avoids undercut",
+            ),
+            {"design.force_constant": at_least(smallest)},
+        )
+    return Choice(constant, spec.mechanism.springs.scaled_to(pull / (4.0 * constant)))
+
+
+def _from_catalogue(spec: CamSpec, target: CamDesign, pull: float, factor: float, smallest: float | None) -> Choice:
+    """Pick the spring and number whose cam has the smallest two-way deviation, within all limits."""
+    rejected: list[str] = []
+    fitting: list[tuple[float, Choice]] = []
+    for item, count in _offers(target):
+        springs = _bought(item, count)
+        constant = pull / (4.0 * springs.total)
+        label = f"{count} x {item.name}"
+        law = _law(spec, target, constant, factor)
+        reason = _why_not(law, target, springs, smallest)
+        if reason:
+            rejected.append(f"{label}: {reason}")
+            continue
+        gap = two_way_gap(law, target, spec.mechanism.rolling_friction)
+        if gap == float("inf"):
+            rejected.append(f"{label}: friction holds the roller")
+            continue
+        fitting.append((gap, Choice(constant, springs, note=f"{label} of the catalogue: A = {mm(constant)}")))
+    if not fitting:
+        raise Infeasible(finding("no_spring_fits", "no spring of the catalogue fits: " + "; ".join(rejected)))
+    return min(fitting, key=lambda pair: pair[0])[1]
+
+
+def _offers(target: CamDesign) -> Iterator[tuple[CatalogueSpring, int]]:
+    for item in target.catalogue:
+        for count in item.counts:
+            yield item, count
+
+
+def _bought(item: CatalogueSpring, count: int) -> Springs:
+    from cfmkit.families.cam.spec import Springs
+
+    return Springs(stiffness=item.stiffness, count=count, max_elongation=item.max_elongation)
+
+
+def _why_not(law: SlopeLaw, target: CamDesign, springs: Springs, smallest: float | None) -> str:
+    """Return why a catalogue choice is refused; empty if it is not."""
+    if smallest is not None and law.force_constant < smallest:
+        return f"undercut (A = {mm(law.force_constant)} < {mm(smallest)})"
+    try:
+        _check_stroke(law, target, springs)
+    except Infeasible as problem:
+        return problem.finding.name.replace("_", " ")
+    return ""
+
+
+def two_way_gap(law: SlopeLaw, target: CamDesign, friction: float) -> float:
+    """Return the largest |F/F0 - 1| of both directions over the stroke, the first fiftieth left out.
+
+    Infinite if friction holds the roller somewhere on the way up.
+    """
+    path, end = reach(law, target.stroke)
+    x = np.linspace(law.rest_half_width, end, 801)
+    x = x[path.travel(x) >= 0.02 * target.stroke]
+    stretch, slope = (x - law.rest_half_width) / law.force_constant, law.slope(x)
+    turned = np.stack([(slope - mu) / (1 + mu * slope) for mu in (friction, -friction)])
+    # F'/(4KA) = (D/A + (1 - 1/c) p)/(p - tan a): springs, and the weight that the profile carries.
+    carried = (1.0 - 1.0 / law.slope_factor) * turned
+    lever = turned - brace_tangent(x, law.brace_length)
+    if (lever[0] <= 0).any():
+        return float("inf")
+    force = (stretch + carried) / lever
+    return float(np.abs(force - 1.0).max())
+
+
+def _check_stroke(law: SlopeLaw, target: CamDesign, springs: Springs) -> None:
+    """Raise if the geometry, the friction designed for or the springs end before the stroke."""
+    path, end = reach(law, target.stroke)
+    reached = float(path.travel(end))
+    if reached < target.stroke * (1 - CLOSE):
+        name = "path_vertical" if law.vertical_at < law.brace_length else "brace_too_short"
+        if reached <= 0:  # cut for so much friction on the way down that the slider never rises
+            name = "design_singular"
+        raise Infeasible(
+            finding(name, f"with A = {mm(law.force_constant)} the stroke ends at {mm(reached)} of {mm(target.stroke)}"),
+            {"design.stroke": at_most(reached)},
+        )
+    elongation, limit = 2.0 * (end - law.rest_half_width), springs.max_elongation
+    if limit and elongation > limit:
+        shorter = float(path.travel(law.rest_half_width + 0.5 * limit))
+        raise Infeasible(
+            finding(
+                "spring_overstretched",
+                f"at full stroke the springs would be stretched by {mm(elongation)}, their limit is {mm(limit)}; "
+                f"the stroke they allow is {mm(shorter)}",
+            ),
+            {"design.stroke": at_most(shorter)},
+        )
+
+
+def _written(spec: CamSpec, target: CamDesign, choice: Choice, factor: float) -> CamSpec:
+    """Return the spec with the designed profile written out, so that it is a fixed part from now on."""
+    mechanism = spec.mechanism
+    profile = {
+        "force_constant": choice.force_constant,
+        "friction": target.friction,
+        "slope_factor": factor,
+        "stroke": target.stroke,
+        "brace_length": mechanism.brace_length,
+        "rest_half_width": mechanism.rest_half_width,
+        "roller_radius": mechanism.roller_radius,
+    }
+    springs = choice.springs.model_dump(exclude_none=True)
+    return spec.replace({"mechanism.profile": profile, "mechanism.springs": springs})

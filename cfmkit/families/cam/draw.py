@@ -1,0 +1,297 @@
+"""Pictures of a cam mechanism: its loop, itself to scale, and what limits it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.families.cam import draw_built
+from cfmkit.families.cam.pose import moment, pivoting, pose, scene, spring_count, start_curve, swallowtail
+from cfmkit.families.cam.values import theoretical_force
+from cfmkit.plots import parts
+from cfmkit.plots.bands import limits_on
+from cfmkit.plots.curves import Look, plot_curve
+from cfmkit.plots.diagram import Diagram, Limit, Region, Scale, Series, diagram_figure
+from cfmkit.plots.loop import loop_figure
+from cfmkit.plots.place import place_labels
+from cfmkit.plots.style import BLUE, GREY, ORANGE, PURPLE, TROUBLE, VERMILLION, new_figure, styled
+from cfmkit.plots.text import Heading, finite_range, right_axis, top_axis, value_text, write_heading
+from cfmkit.units import to_border
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from cfmkit.curves import FloatArray
+    from cfmkit.families.cam.model import Solution
+    from cfmkit.families.cam.pose import Scene
+    from cfmkit.plots.place import Label
+    from cfmkit.results import Result
+
+TRAVEL = Scale("displacement", "length")
+
+STACK_BELOW = 0.5
+"""Flat mechanisms, less high than this fraction of their width, are drawn below each other, not side by side."""
+
+
+def figures(result: Result) -> dict[str, Callable[[], Figure]]:
+    """Return what draws each picture of a result of the cam family, by file stem; empty if nothing was solved."""
+    solution = result.state
+    if solution is None or not result.curves:
+        return {}
+    if result.spec.at("analysis.fidelity") == "dynamic":
+        from cfmkit.families.cam import draw_dynamics
+
+        return draw_dynamics.figures(result)
+    if result.spec.at("mechanism.profile.file"):
+        return draw_built.figures(result)
+    makers = [loop, mechanism, curvature, contact, springs]
+    if solution.corner_travel > 0:
+        makers.append(undercut)
+    return {maker.__name__: partial(maker, result) for maker in makers} | draw_built.band_figures(result)
+
+
+@styled
+def draw_mechanism(solution: Solution, index: int, ax: Axes, view: Scene | None = None) -> Axes:
+    """Draw the mechanism to scale at one point of the solution; return the axes, which are in millimetres.
+
+    Parameters
+    ----------
+    solution : Solution
+        A solved mechanism.
+    index : int
+        Which of its points.
+    ax : Axes
+        To draw on.
+    view : Scene, optional
+        Of the same solution, where several positions are drawn.
+    """
+    view, here = view or scene(solution), pose(solution, index)
+    radius, height = solution.assembly.spec.mechanism.roller_radius, view.box[3] - view.box[1]
+    parts.plate(ax, view.plate)
+    parts.axis_of_symmetry(ax, view.box[1], view.box[3])
+    for side, name, at in ((1.0, "right", here), (-1.0, "left", here.mirrored())):
+        mirror = np.array([side, 1.0])
+        parts.edge(ax, view.flank * mirror, f"flank-{name}")
+        parts.edge(ax, view.path * mirror, f"path-{name}", color=BLUE, linewidth=0.7, dashes=(1, 2), zorder=2.4)
+        parts.roller(ax, at.roller, radius, f"roller-{name}")
+        parts.link(ax, at.slider, at.roller, f"brace-{name}")
+        parts.contact(ax, at.contact, f"contact-{name}")
+    parts.spring(ax, here.mirrored().roller, here.roller, 0.9 * radius)
+    x, y = here.slider
+    parts.slider(ax, (x, y), 0.035 * height)
+    parts.force_arrow(ax, (x, y + 0.02 * height), (x, y + 0.11 * height))
+    parts.to_scale(ax, view.box)
+    return ax
+
+
+def loop(result: Result) -> Figure:
+    """Return the force-displacement loop with the theoretical force and the requirement bands."""
+    solution: Solution = result.state
+    force = theoretical_force(solution)
+    name = "4KA + slider's weight" if solution.assembly.loads.slider_weight else "4KA"
+    look = Look(levels=(Limit(force, f"{name} = {value_text(force, 'force')}"),), regions=tuple(regions(solution)))
+    return loop_figure(result, look, "force over travel of the slider")
+
+
+def regions(solution: Solution) -> list[Region]:
+    """Return the parts of the displacement in which the mechanism does not work as intended."""
+    found, origin = [], solution.origin
+    asked, reached = solution.assembly.spec.analysis.travel, float(solution.travel[-1])
+    corner = min(solution.corner_travel, reached)
+    if corner > 0:
+        found.append(Region(origin, origin + corner, f"on the corner: first {value_text(corner, 'length')}"))
+    slack = np.flatnonzero(solution.elongation < -1e-12)
+    if len(slack) and float(solution.travel[slack[-1]]) > corner:
+        end = float(solution.travel[slack[-1]])
+        found.append(Region(origin, origin + end, f"springs slack: first {value_text(end, 'length')}"))
+    if asked and asked > reached * (1 + 1e-9):
+        text = f"the profile ends at {value_text(origin + reached, 'length')}"
+        found.append(Region(origin + reached, origin + asked, text))
+    return found
+
+
+@styled
+def mechanism(result: Result) -> Figure:
+    """Return the mechanism to scale at the start, in the middle and at the end of the travel."""
+    solution, heading = result.state, Heading.of(result, "mechanism to scale")
+    view = scene(solution)
+    slender = (view.box[3] - view.box[1]) / (view.box[2] - view.box[0])
+    stacked = slender < STACK_BELOW
+    across, up = (min(138.0, 45.0 / slender), min(138.0 * slender, 45.0)) if stacked else (43.5, 43.5 * slender)
+    figure = new_figure(160.0, 10.0 + (3 if stacked else 1) * (up + parts.TITLE) + heading.height_mm)
+    write_heading(figure, heading)
+    last = len(solution.travel) - 1
+    places = {"start": 0, "middle": last // 2, "end": last}
+    titles = [f"{name}: {moment(solution, index)}" for name, index in places.items()]
+    panels = parts.panels(figure, (across, up), titles, stacked)
+    names = _names_at_start, _names_of_parts, _names_of_lines
+    for ax, index, named in zip(panels, places.values(), names, strict=True):
+        draw_mechanism(solution, index, ax, view)
+        ax.tick_params(labelleft=stacked or index == 0, labelbottom=not stacked or index == last)
+        ax.set_xlabel("x [mm]" if not stacked or index == last else "")
+        place_labels(ax, named(solution, index, view))
+    panels[0].set_ylabel("y [mm]")
+    return figure
+
+
+def _names_at_start(solution: Solution, index: int, _view: Scene) -> list[Label]:
+    here = pose(solution, index)
+    return [parts.part_name("corner", [here.contact], (1.0, 0.6), TROUBLE)] if here.on_corner else []
+
+
+def _names_of_parts(solution: Solution, index: int, view: Scene) -> list[Label]:
+    here, number, height = pose(solution, index), spring_count(solution), view.box[3] - view.box[1]
+    radius, (x, y) = solution.assembly.spec.mechanism.roller_radius, here.roller
+    roller, pin = np.array(here.roller), np.array(here.slider)
+    spring = np.column_stack([np.linspace(-0.5, 0.5, 20) * x, np.full(20, y - 0.45 * radius)])
+    return [
+        parts.part_name("F", [pin + np.array([0.0, 0.06 * height])], (1.0, 0.0), VERMILLION),
+        parts.part_name("slider", [pin], (-1.0, 0.2)),
+        parts.part_name("brace", pin + np.linspace(0.2, 0.8, 20)[:, None] * (roller - pin), (1.0, 0.5)),
+        parts.part_name("roller", parts.ring(here.roller, radius, 25), (0.3, -1.0)),
+        parts.part_name("spring" if number == 1 else f"{number} springs", spring, (0.0, -1.0), ORANGE),
+    ]
+
+
+def _names_of_lines(_solution: Solution, _index: int, view: Scene) -> list[Label]:
+    return [
+        parts.part_name("cam", view.flank[len(view.flank) // 2 :] * np.array([0.4, 0.9]), (0.0, -1.0)),
+        parts.part_name("roller path", view.path, (1.0, -0.4), BLUE, prefer=0.1),
+    ]
+
+
+def curvature(result: Result) -> Figure:
+    """Return the radius of curvature of the roller path against the roller's radius."""
+    solution: Solution = result.state
+    profile = solution.assembly.profile
+    x = np.linspace(profile.path.law.rest_half_width, profile.end, 400)
+    radius = profile.path.law.curvature_radius(x)
+    flank = np.where(radius - profile.roller_radius > 0.5 * radius[0], radius - profile.roller_radius, np.nan)
+    cut_for, built = profile.roller_radius, solution.assembly.spec.mechanism.roller_radius
+    limits = [Limit(cut_for, f"roller {value_text(cut_for, 'length')}", trouble=profile.corner is not None)]
+    if built != cut_for:
+        limits.append(Limit(built, f"roller built in {value_text(built, 'length')}"))
+    found = []
+    if profile.corner:
+        first = f": the first {value_text(solution.corner_travel, 'length')} of travel"
+        text = f"undercut{first if solution.corner_travel > 0 else ''}"
+        found.append(Region(float(x[0]), profile.corner.first_contact, text))
+    scales = Scale("x of the roller's axis", "length"), Scale("radius of curvature", "length", log=True)
+    series = [Series(radius, "roller path", BLUE, prefer=0.5), Series(flank, "cam", GREY, dashed=True, prefer=0.15)]
+    heading = Heading.of(result, "is the roller small enough for its path?")
+    figure = diagram_figure(heading, [Diagram(x, *scales, series, limits, found)], top_mm=9.0)
+    travel = profile.path.travel(x) + solution.origin
+    top_axis(figure.axes[0], parts.mm(x), parts.mm(travel), TRAVEL.label)
+    return figure
+
+
+def contact(result: Result) -> Figure:
+    """Return the forces at the contact and in a brace, and the pressure angle, over the travel."""
+    solution: Solution = result.state
+    over, up, down = solution.travel + solution.origin, solution.up, solution.down
+    _, highest = finite_range(up.contact) or (0.0, 0.0)
+    alike = not np.any(np.abs(up.contact - down.contact) > 0.02 * highest)
+    series = [
+        Series(up.contact, "contact, up and down" if alike else "contact, up", BLUE, prefer=0.7),
+        Series(up.brace, "brace, up", PURPLE, prefer=0.5),
+    ]
+    if not alike:
+        series.append(Series(down.contact, "contact, down", VERMILLION, prefer=0.3))
+    angle = [Series(solution.pressure_angle, "between the brace's pull and the roller's motion", BLUE)]
+    found = regions(solution)
+    limits = [Limit(np.pi / 2, "90 deg: no lever on the roller"), *limits_on(result, "pressure_angle_max")]
+    unnamed = [replace(region, text="") for region in found]
+    diagrams = [
+        Diagram(over, TRAVEL, Scale("force", "force"), series, limits_on(result, "contact_force_max"), found),
+        Diagram(over, TRAVEL, Scale("pressure angle", "angle"), angle, limits, unnamed),
+    ]
+    return diagram_figure(Heading.of(result, "forces on the parts, and the pressure angle"), diagrams)
+
+
+def springs(result: Result) -> Figure:
+    """Return the elongation of the springs over the travel, with its limit, and the force of all of them."""
+    solution: Solution = result.state
+    limit, limits = (
+        solution.assembly.spec.mechanism.springs.max_elongation,
+        [*limits_on(result, "spring_elongation_max")],
+    )
+    if limit:
+        beyond = float(solution.elongation.max()) > limit * (1 + 1e-9)
+        limits.append(Limit(limit, f"limit {value_text(limit, 'length')}", trouble=beyond))
+    line, over = [Series(solution.elongation, "", BLUE)], solution.travel + solution.origin
+    diagram = Diagram(over, TRAVEL, Scale("elongation", "length"), line, limits, regions(solution))
+    figure = diagram_figure(Heading.of(result, "elongation of the springs"), [diagram], right_mm=17.0)
+    stiffness, count = float(to_border(solution.assembly.loads.stiffness, "stiffness")), spring_count(solution)
+    right_axis(figure.axes[0], stiffness, f"force of {'the spring' if count == 1 else f'the {count} springs'} [N]")
+    return figure
+
+
+@styled
+def undercut(result: Result) -> Figure:
+    """Return what undercut does: the roller on the corner, what is cut away, and the force there."""
+    solution: Solution = result.state
+    heading, force = Heading.of(result, "undercut at the start"), theoretical_force(solution)
+    figure = new_figure(160.0, 12.0 + 50.0 + 6.0 + heading.height_mm)
+    write_heading(figure, heading)
+    titles = "the roller pivots on the corner", "the corner, enlarged", "force on the slider [N]"
+    whole, detail, costs = parts.panels(figure, (37.0, 50.0), titles)
+    view = scene(solution)
+    _roller_on_corner(solution, whole, view)
+    _cut_away(solution, detail, view)
+    region = Region(solution.origin, solution.origin + solution.corner_travel, "on the corner")
+    look = Look(levels=(Limit(force, value_text(force, "force")),), regions=(region,))
+    plot_curve(start_curve(solution, 3.0 * solution.corner_travel), costs, look).set_ylabel("")
+    return figure
+
+
+def _roller_on_corner(solution: Solution, ax: Axes, view: Scene) -> None:
+    """Draw the roller at the start and where it leaves the corner."""
+    radius, (start, leaves) = solution.assembly.spec.mechanism.roller_radius, pivoting(solution)
+    corner = _cam_with_corner(solution, ax, view)
+    parts.roller(ax, start, radius, "roller-start")
+    parts.roller(ax, leaves, radius, "roller-leaves", ghost=True)
+    parts.close_up(ax, (start[0], start[1] + 0.35 * radius), 1.5 * radius)
+    ax.set_ylabel("y [mm]")
+    names = [
+        parts.part_name("corner", corner, (-1.0, 1.0), TROUBLE),
+        parts.part_name("start", [start], (-1.0, -1.0)),
+        parts.part_name("leaves the\ncorner here", parts.ring(leaves, radius), (0.3, 1.0), GREY, prefer=0.6),
+    ]
+    place_labels(ax, names)
+
+
+def _cut_away(solution: Solution, ax: Axes, view: Scene) -> None:
+    """Draw the part of the flank that the roller, at the start, cuts away."""
+    tail, profile = swallowtail(solution), solution.assembly.profile
+    corner = _cam_with_corner(solution, ax, view)
+    rim = parts.ring((profile.path.law.rest_half_width, 0.0), profile.roller_radius, 8000)
+    parts.edge(ax, tail, "cut-away", color=TROUBLE, linestyle="--", linewidth=1.0, zorder=3)
+    parts.edge(ax, rim, "roller-start", zorder=2.2)
+    x, y = 0.5 * (tail.max(axis=0) + tail.min(axis=0))
+    size = 0.75 * float(np.ptp(tail, axis=0).max())
+    parts.close_up(ax, (float(x), float(y)), size)
+    near = rim[(np.abs(rim - np.array([x, y])) < size).all(axis=1)]
+    names = [
+        parts.part_name("corner", corner, (-1.0, 1.0), TROUBLE),
+        parts.part_name("shifted path,\ncut away", tail, (0.5, -1.0), TROUBLE, prefer=0.2),
+        parts.part_name("roller at the start", near, (0.0, -1.0), prefer=0.8),
+    ]
+    place_labels(ax, names)
+
+
+def _cam_with_corner(solution: Solution, ax: Axes, view: Scene) -> FloatArray:
+    """Draw the cam and mark its corner; return the corner as an array of one point [m]."""
+    profile = solution.assembly.profile
+    assert profile.corner is not None
+    share = np.linspace(0.0, 1.0, 2000)
+    flank = np.column_stack(profile.flank(profile.start + (profile.end - profile.start) * share**2))
+    parts.plate(ax, view.plate)
+    parts.edge(ax, flank, "flank")
+    parts.contact(ax, profile.corner.point, "corner")
+    return flank[:1]

@@ -1,0 +1,149 @@
+"""Pictures of a cam mechanism in motion: its force over time and over displacement, contacts, rollers."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.families.cam.values import constant_force
+from cfmkit.plots.bands import limits_on
+from cfmkit.plots.curves import Look
+from cfmkit.plots.diagram import Diagram, Limit, Region, Scale, Series, diagram_figure
+from cfmkit.plots.loop import loop_figure
+from cfmkit.plots.place import Label, place_labels
+from cfmkit.plots.style import BLUE, GREY, PURPLE, VERMILLION, styled
+from cfmkit.plots.text import Heading, value_text
+from cfmkit.units import to_border
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from matplotlib.figure import Figure
+    from numpy.typing import NDArray
+
+    from cfmkit.curves import FloatArray
+    from cfmkit.families.cam.dynamics.model import Moved
+    from cfmkit.results import Result
+
+TIME = Scale("time", "time")
+ALIKE = 1e-9
+"""Sides whose values differ by less than this fraction of the largest are drawn as one line."""
+
+
+def figures(result: Result) -> dict[str, Callable[[], Figure]]:
+    """Return what draws each picture of a motion, by file stem.
+
+    Parameters
+    ----------
+    result : Result
+        Of the dynamic model; its `state` is the `Moved`.
+    """
+    makers = (motion, motion_force, motion_contact, motion_rollers)
+    return {maker.__name__: partial(maker, result) for maker in makers}
+
+
+def motion(result: Result) -> Figure:
+    """Return the force over time with that at rest in the same places, and their ratio."""
+    moved: Moved = result.state
+    times, force = moved.history.times, moved.history.force
+    constant = constant_force(moved.build.right)
+    forces = [Series(force, "in motion", BLUE, prefer=0.3), Series(moved.static, "at rest", GREY, True, prefer=0.1)]
+    ratio = [Series(force / moved.static, "in motion over at rest", BLUE, prefer=0.3)]
+    found = list(_regions(moved))
+    level = Limit(constant, f"{_constant_name(moved)} = {value_text(constant, 'force')}")
+    diagrams = [
+        Diagram(times, TIME, Scale("force", "force"), forces, [level], found),
+        Diagram(times, TIME, Scale("F / F at rest", "ratio"), ratio, [Limit(1.0, "")], _unnamed(found)),
+    ]
+    return diagram_figure(Heading.of(result, f"force that the motion needs: {_motion_text(moved)}"), diagrams)
+
+
+@styled
+def motion_force(result: Result) -> Figure:
+    """Return the force over the displacement with the requirement bands, and the quasi-static one."""
+    moved: Moved = result.state
+    figure = loop_figure(result, Look(), "force over displacement, in motion and at rest")
+    over = to_border(moved.displacement, "length")
+    points = np.column_stack([over, to_border(moved.static, "force")])
+    moving = np.column_stack([over, to_border(moved.history.force, "force")])
+    for ax in figure.axes:
+        ax.plot(*points.T, color=GREY, linewidth=1.2, linestyle="--", zorder=2.8, gid="static")
+    place_labels(
+        figure.axes[0], [Label("in motion", BLUE, moving, prefer=0.4), Label("at rest", GREY, points, prefer=0.7)]
+    )
+    return figure
+
+
+def motion_contact(result: Result) -> Figure:
+    """Return the forces of the cam on the rollers, and those in the braces, over time."""
+    moved: Moved = result.state
+    history, found = moved.history, list(_regions(moved))
+    contact = _sides(history.contact, "on a roller", (BLUE, VERMILLION))
+    roller_end = _sides(history.brace, "brace, at the roller", (PURPLE, VERMILLION))
+    slider_end = [
+        Series(item.values, item.name, item.color, True, 0.25)
+        for item in _sides(history.pin, "brace, at the slider", (PURPLE, VERMILLION))
+    ]
+    limits = [*limits_on(result, "contact_force_max"), *limits_on(result, "contact_force_min")]
+    diagrams = [
+        Diagram(history.times, TIME, Scale("contact force", "force"), contact, limits, found),
+        Diagram(
+            history.times, TIME, Scale("force in a brace", "force"), [*roller_end, *slider_end], (), _unnamed(found)
+        ),
+    ]
+    return diagram_figure(Heading.of(result, "forces of the cam on the rollers, and in the braces"), diagrams)
+
+
+def motion_rollers(result: Result) -> Figure:
+    """Return the speed of the slider and of the turning rollers over time."""
+    moved: Moved = result.state
+    history = moved.history
+    speed = [Series(history.moment.speed, "", BLUE)]
+    spin = _sides(history.spin, "", (BLUE, VERMILLION))
+    diagrams = [
+        Diagram(history.times, TIME, Scale("speed of the slider", "velocity"), speed),
+        Diagram(history.times, TIME, Scale("speed of a roller", "angular_velocity"), spin),
+    ]
+    return diagram_figure(Heading.of(result, "speed of the slider, and at which the rollers turn"), diagrams)
+
+
+def _sides(rows: FloatArray, name: str, colors: tuple[str, str]) -> list[Series]:
+    """Return one line where both sides are alike, else one for each."""
+    if not np.any(np.abs(rows[0] - rows[1]) > ALIKE * np.nanmax(np.abs(rows))):
+        return [Series(rows[0], name, colors[0])]
+    names = [f"{name}, {side}" if name else side for side in ("right", "left")]
+    return [
+        Series(row, text, color, prefer=place)
+        for row, text, color, place in zip(rows, names, colors, (0.65, 0.4), strict=True)
+    ]
+
+
+def _regions(moved: Moved) -> Iterator[Region]:
+    """Yield the spans of time in which the roller lifts off, the cable is slack, or the roller is on the corner."""
+    history = moved.history
+    lost = (history.contact[0] <= 0) | (history.contact[1] <= 0)
+    yield from _spans(history.times, lost, "lift-off")
+    yield from _spans(history.times, (history.force <= 0) & ~lost, "slack cable")
+    yield from _spans(history.times, history.on_corner, "on the corner")
+
+
+def _spans(times: FloatArray, where: NDArray[np.bool_], text: str) -> Iterator[Region]:
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], where, [False]]).astype(int)))
+    for index, (first, after) in enumerate(zip(edges[::2], edges[1::2], strict=True)):
+        yield Region(float(times[first]), float(times[after - 1]), "" if index else text)
+
+
+def _unnamed(regions: list[Region]) -> list[Region]:
+    return [Region(item.start, item.stop, "") for item in regions]
+
+
+def _constant_name(moved: Moved) -> str:
+    return "4KA + slider's weight" if moved.build.right.loads.slider_weight else "4KA"
+
+
+def _motion_text(moved: Moved) -> str:
+    plan = moved.build.motion
+    way = "up" if plan.stroke > 0 else "down"
+    return f"{value_text(abs(plan.stroke), 'length')} {way} in {value_text(plan.time, 'time')}"

@@ -1,0 +1,152 @@
+"""From a cam specification to a machine that can be moved."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from cfmkit.families.cam.build import Assembly, CannotBuild, assemble, cam_start_height
+from cfmkit.families.cam.dynamics.center import pieces_of
+from cfmkit.families.cam.dynamics.machine import Machine
+from cfmkit.families.cam.dynamics.motion import Cycloid
+from cfmkit.families.cam.dynamics.side import NoRise, Parts, Side
+from cfmkit.families.cam.statics import GRAVITY
+
+if TYPE_CHECKING:
+    from cfmkit.families.cam.spec import CamSpec, Dynamics, Errors, LeftMasses, Masses, Mechanism
+
+
+@dataclass(frozen=True)
+class Build:
+    """A mechanism put together for a motion.
+
+    Attributes
+    ----------
+    right, left : Assembly
+        The parts of each side.
+    machine : Machine
+        What moves.
+    motion : Cycloid
+        How the slider moves.
+    lift : float
+        Height of the origin of slider positions above the start of the roller path [m].
+    """
+
+    right: Assembly
+    left: Assembly
+    machine: Machine
+    motion: Cycloid
+    lift: float
+
+
+def build(spec: CamSpec) -> Build:
+    """Return the mechanism put together.
+
+    Raises
+    ------
+    CannotBuild
+        If it cannot exist; the finding says why.
+    """
+    motion, mechanism = stated_motion(spec), spec.mechanism
+    right = assemble(spec)
+    left = assemble(_left(right.spec)) if mechanism.left else right
+    lift = cam_start_height(right.profile) if motion.origin == "cam-start" else 0.0
+    machine = _machine(spec, (right, left), lift)
+    for name, side in (("right", machine.right), ("left", machine.left)):
+        _check(name, side)
+    return Build(right, left, machine, Cycloid(motion.slider_position, motion.stroke, motion.time), lift)
+
+
+def stated_motion(spec: CamSpec) -> Dynamics:
+    """Return the motion that the specification states.
+
+    Raises
+    ------
+    ValueError
+        If it states none; `CamSpec.fidelity` is dynamic only where it does.
+    """
+    if spec.analysis.dynamics is None:
+        raise ValueError("the specification states no motion")
+    return spec.analysis.dynamics
+
+
+def _left(spec: CamSpec) -> CamSpec:
+    """Return the spec whose right side is the left side of a resolved one."""
+    mechanism, left = spec.mechanism, spec.mechanism.left
+    if left is None:
+        return spec
+    changes = {
+        "brace_length": left.brace_length or mechanism.brace_length,
+        "roller_radius": left.roller_radius or mechanism.roller_radius,
+        "profile": left.profile or mechanism.profile,
+    }
+    return spec.model_copy(update={"mechanism": mechanism.model_copy(update=changes)})
+
+
+def _machine(spec: CamSpec, sides: tuple[Assembly, Assembly], lift: float) -> Machine:
+    mechanism, masses = spec.mechanism, spec.mechanism.masses
+    right, left = sides
+    pieces = pieces_of(right.track)
+    errors = _angles(mechanism.errors)
+    return Machine(
+        right=Side(parts_of(right.spec.mechanism, masses), pieces, errors[0], lift),
+        left=Side(
+            parts_of(left.spec.mechanism, masses, mechanism.left.masses if mechanism.left else None),
+            pieces if left is right else pieces_of(left.track),
+            errors[1],
+            lift,
+        ),
+        slider_mass=masses.slider if masses else 0.0,
+        stiffness=mechanism.springs.total,
+        rest_length=2.0 * mechanism.rest_half_width,
+        gravity=GRAVITY if spec.gravity else 0.0,
+        friction=mechanism.rolling_friction,
+    )
+
+
+def _angles(errors: Errors | None) -> tuple[float, float]:
+    """Return by how much the right and the left flank are turned, each counter-clockwise as seen on the right [rad]."""
+    if errors is None:
+        return 0.0, 0.0
+    return errors.slider_deviation - errors.flank_angle, -errors.slider_deviation - errors.flank_angle
+
+
+def parts_of(mechanism: Mechanism, masses: Masses | None, own: LeftMasses | None = None) -> Parts:
+    """Return brace and roller of a side; `own` replaces what it states. Defaults: a slender rod, a solid cylinder."""
+    length, radius = mechanism.brace_length, mechanism.roller_radius
+
+    def stated(name: str) -> float | None:
+        value: float | None = getattr(own, name, None)
+        return getattr(masses, name, None) if value is None else value
+
+    brace, roller = stated("brace") or 0.0, stated("roller") or 0.0
+    rod, cylinder = stated("brace_inertia"), stated("roller_inertia")
+    return Parts(
+        brace_length=length,
+        brace_mass=brace,
+        brace_inertia=slender_rod(brace, length) if rod is None else rod,
+        roller_radius=radius,
+        roller_mass=roller,
+        roller_inertia=solid_cylinder(roller, radius) if cylinder is None else cylinder,
+    )
+
+
+def slender_rod(mass: float, length: float) -> float:
+    """Return the moment of inertia of a slender rod about its middle [kg m^2]."""
+    return mass * length**2 / 12.0
+
+
+def solid_cylinder(mass: float, radius: float) -> float:
+    """Return the moment of inertia of a solid cylinder about its axis [kg m^2]."""
+    return mass * radius**2 / 2.0
+
+
+def _check(name: str, side: Side) -> None:
+    try:
+        _ = side.span
+    except NoRise:
+        raise CannotBuild(
+            "dead_point",
+            f"on the {name} side the slider rises nowhere as the roller moves out: the flank is turned too far "
+            "('mechanism.errors'), or the brace is too short for the profile",
+        ) from None

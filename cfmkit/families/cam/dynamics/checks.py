@@ -1,0 +1,167 @@
+"""What is wrong with a motion of a cam mechanism: each failure mode, found and put into numbers."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.families.cam.dynamics.build import slender_rod, solid_cylinder
+from cfmkit.families.cam.findings import finding, mm
+from cfmkit.units import format_short
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from numpy.typing import NDArray
+
+    from cfmkit.families.cam.dynamics.build import Build
+    from cfmkit.families.cam.dynamics.model import Moved
+    from cfmkit.results import Finding
+
+SIDES = ("right", "left")
+ROLLER_SHARE = (0.25, 2.0)
+"""Moment of inertia of a roller over that of a solid cylinder: below, its mass would lie within half the
+radius; above, outside of the roller (a thin ring has 2)."""
+BRACE_SHARE = (0.1, 3.0)
+"""The same for a brace over a slender rod: 3 has all its mass at the ends."""
+
+
+def findings_of(moved: Moved) -> tuple[Finding, ...]:
+    """Return every finding about a motion, the gravest first."""
+    checks = (_lift_off, _slack_cable, _held, _on_corner, _springs, _inertias, _friction)
+    return tuple(found for check in checks for found in check(moved))
+
+
+def outside(parts: Build, span: tuple[float, float]) -> Finding:
+    """Return what to say about a motion that leaves the profile."""
+    ends = sorted((parts.motion.start, parts.motion.start + parts.motion.stroke))
+    return finding(
+        "outside_profile",
+        f"the slider is to move from {mm(ends[0])} to {mm(ends[1])}, but profile and braces hold it between "
+        f"{mm(span[0])} and {mm(span[1])} only (heights above 'analysis.dynamics.origin')",
+    )
+
+
+def runs_on_corner(parts: Build) -> Finding:
+    """Return what to say about a motion on the corner that the nine-coordinate model cannot describe."""
+    above = max(side.stretches[-1].span[0] for side in (parts.machine.right, parts.machine.left))
+    return finding(
+        "contact_not_single_valued",
+        "on the corner of the cam the contact is no function of its height, as the nine-coordinate model needs it: "
+        f"start above {mm(above)}, or use 'analysis.dynamics.method: direct'",
+    )
+
+
+def _lift_off(moved: Moved) -> Iterator[Finding]:
+    alike = moved.build.machine.left == moved.build.machine.right
+    for side, contact in zip(SIDES[: 1 if alike else 2], moved.history.contact, strict=False):
+        lost = contact <= 0
+        if lost.any():
+            yield finding(
+                "lift_off",
+                f"the cam would have to pull {'each' if alike else f'the {side}'} roller with up to "
+                f"{_newton(-float(np.nanmin(contact)))} {_when(moved, lost)}: it leaves the cam there, "
+                "and what follows is not what happens",
+            )
+
+
+def _slack_cable(moved: Moved) -> Iterator[Finding]:
+    force = moved.history.force
+    lost = force <= 0
+    if lost.any():
+        yield finding(
+            "slack_cable",
+            f"the force falls to {_newton(float(np.nanmin(force)))}; it is not positive {_when(moved, lost)}: "
+            "a cable would go slack, the slider would have to be pushed",
+        )
+
+
+def _held(moved: Moved) -> Iterator[Finding]:
+    lost = ~np.isfinite(moved.history.force)
+    if not lost.any():
+        return
+    if moved.build.machine.friction and moved.build.motion.stroke > 0:
+        yield finding("up_jam", f"friction holds a roller {_when(moved, lost)}: no force moves the slider there")
+    else:
+        yield finding("dead_point", f"the slider has no lever on a roller {_when(moved, lost)}: the force has no bound")
+
+
+def _on_corner(moved: Moved) -> Iterator[Finding]:
+    corner = moved.history.on_corner
+    if corner.any():
+        yield finding("undercut", f"a roller pivots on the corner of its cam {_when(moved, corner)}")
+
+
+def _springs(moved: Moved) -> Iterator[Finding]:
+    elongation, limit = moved.history.elongation, moved.spec.mechanism.springs.max_elongation
+    slack = elongation < -1e-12
+    if slack.any():
+        yield finding(
+            "spring_slack",
+            f"the springs are up to {mm(-float(elongation.min()))} shorter than their rest length "
+            f"{_when(moved, slack)}: they carry nothing there",
+        )
+    if limit and elongation.max() > limit * (1 + 1e-9):
+        over = elongation > limit
+        yield finding(
+            "spring_overstretched",
+            f"the springs are stretched by {mm(float(elongation.max()))}, their limit is {mm(limit)}, "
+            f"exceeded {_when(moved, over)}",
+        )
+
+
+def _inertias(moved: Moved) -> Iterator[Finding]:
+    machine = moved.build.machine
+    sides = ((machine.right, "right"), (machine.left, "left"))
+    alike = machine.left.parts == machine.right.parts
+    for side, name in sides[: 1 if alike else 2]:
+        parts = side.parts
+        whose = "a" if alike else f"the {name}"
+        yield from _mismatch(
+            f"{whose} roller",
+            parts.roller_inertia,
+            solid_cylinder(parts.roller_mass, parts.roller_radius),
+            ROLLER_SHARE,
+        )
+        yield from _mismatch(
+            f"{whose} brace", parts.brace_inertia, slender_rod(parts.brace_mass, parts.brace_length), BRACE_SHARE
+        )
+
+
+def _mismatch(what: str, stated: float, expected: float, allowed: tuple[float, float]) -> Iterator[Finding]:
+    low, high = allowed
+    if stated and not low * expected <= stated <= high * expected:
+        body, size = ("solid cylinder", "radius") if "roller" in what else ("slender rod", "length")
+        share = f"{stated / expected:.3g} times" if expected else "more than"
+        yield finding(
+            "inertia_mismatch",
+            f"the moment of inertia of {what}, {format_short(stated, 'inertia')}, does not fit its mass and {size}: "
+            f"it is {share} that of a {body}, {format_short(expected, 'inertia')}; check unit and decimal point",
+        )
+
+
+def _friction(moved: Moved) -> Iterator[Finding]:
+    dynamics = moved.spec.analysis.dynamics
+    if dynamics and dynamics.method == "multibody" and moved.build.machine.friction:
+        yield finding(
+            "friction_left_out",
+            "the nine-coordinate model has no rolling resistance: 'mechanism.rolling_friction' = "
+            f"{moved.build.machine.friction:g} is left out; 'analysis.dynamics.method: direct' has it",
+        )
+
+
+def _when(moved: Moved, where: NDArray[np.bool_]) -> str:
+    """Return ``from 0.07 s (171.8 mm) to 0.09 s (195 mm)``: first and last of the marked points."""
+    first, last = np.flatnonzero(where)[[0, -1]]
+    ends = [_moment(moved, int(index)) for index in (first, last)]
+    many = "" if where[first : last + 1].all() else ", with gaps"
+    return f"at {ends[0]}" if first == last else f"from {ends[0]} to {ends[1]}{many}"
+
+
+def _moment(moved: Moved, index: int) -> str:
+    return f"{format_short(float(moved.history.times[index]), 'time')} ({mm(float(moved.displacement[index]))})"
+
+
+def _newton(force: float) -> str:
+    return format_short(force, "force")

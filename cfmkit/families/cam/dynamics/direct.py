@@ -1,0 +1,236 @@
+"""Forces of a given motion, from the position of the slider alone.
+
+The mechanism has one degree of freedom, so every velocity is a known function of
+the slider's position times its speed. With C the roller's centre, t the unit tangent
+of its curve, k the curvature, sigma the arc length, d = C - i S the brace (complex
+numbers, ' = d/dS):
+
+    sigma'  = Im d / Re(conj(d) t)                                from |d| = L
+    sigma'' = -(|d'|^2 + k sigma'^2 Re(conj(d) i t)) / Re(conj(d) t)
+
+and C' = t sigma', C'' = t sigma'' + i k t sigma'^2. Rolling without slip is integrable
+in the plane: the roller turns by sigma / r. With all accelerations known, the balance of
+each brace about the slider's pin gives the contact force, that of the roller the force at
+its axis, that of the brace the force at the pin, and that of the slider the force wanted: side
+by side, without symmetry, and with nothing to integrate. The power of all forces is the
+rate of the energy (`Response.energy`), which the tests use as a check.
+
+Rolling resistance, which the multibody model of [SS] lacks, is that of the quasi-static
+model: a force mu N against the motion of the roller's centre.
+
+Reference
+---------
+[SS] S. Sanchez-Salinas et al., Mech. Mach. Theory 173 (2022) 104819, sec. 4.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from cfmkit.families.cam.dynamics.motion import Moment
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from cfmkit.curves import FloatArray
+    from cfmkit.families.cam.dynamics.machine import Constants, Machine
+    from cfmkit.families.cam.dynamics.side import Stance
+
+    ComplexArray = NDArray[np.complex128]
+
+
+class Kinematics(NamedTuple):
+    """Both sides (right, left; x outwards) at n positions of the slider, each (2, n); ' is d/d(slider).
+
+    `center` C [m], `tangent` t, `brace` d [m], `lever` Re(conj(d) t) [m]; `way` sigma',
+    `bend` sigma'' [1/m]; `first` C', `second` C'' [1/m]; `swing`, `sway`: first and second
+    derivative of the brace's angle [rad/m, rad/m^2].
+    """
+
+    center: ComplexArray
+    tangent: ComplexArray
+    brace: ComplexArray
+    lever: FloatArray
+    way: FloatArray
+    bend: FloatArray
+    first: ComplexArray
+    second: ComplexArray
+    swing: FloatArray
+    sway: FloatArray
+
+
+class Loads(NamedTuple):
+    """What acts on rollers and braces beside the contact, each (2, n).
+
+    `roller`, `middle`: acceleration of the roller's axis and of the brace's middle, weight
+    counted as acceleration [m/s^2]; `turning`: angular acceleration of the brace [rad/s^2];
+    `rolling`: force that speeds up the roller's spin, along the tangent [N]; `springs`: on the roller [N].
+    """
+
+    roller: ComplexArray
+    middle: ComplexArray
+    turning: FloatArray
+    rolling: FloatArray
+    springs: ComplexArray
+
+
+@dataclass(frozen=True)
+class Response:
+    """Forces and speeds of a motion; rows of (2, n) arrays are right and left, x outwards.
+
+    Attributes
+    ----------
+    machine, moment : Machine, Moment
+        What was asked.
+    at : Kinematics
+        How the sides follow the slider.
+    force : (n,) array
+        On the slider, upwards [N].
+    contact, traction : (2, n) array
+        Normal and tangential force of the cam on a roller [N]; traction along the way up.
+    roller_pin, slider_pin : (2, n) complex array
+        Force on a brace at the roller's axis and at the slider [N].
+    on_corner : (n,) array of bool
+        Whether a roller pivots on the corner of its cam.
+    """
+
+    machine: Machine
+    moment: Moment
+    at: Kinematics
+    force: FloatArray
+    contact: FloatArray
+    traction: FloatArray
+    roller_pin: ComplexArray
+    slider_pin: ComplexArray
+    on_corner: NDArray[np.bool_]
+
+    @cached_property
+    def spin(self) -> FloatArray:
+        """Speed at which each roller turns, positive on the way up, (2, n) [rad/s]."""
+        spin: FloatArray = self.at.way * self.moment.speed / self.machine.constants.radius
+        return spin
+
+    @cached_property
+    def guide(self) -> FloatArray:
+        """Force of the slider's guide on it, to the right, (n,) [N]: zero where both sides are alike."""
+        side = self.slider_pin.real
+        guide: FloatArray = side[0] - side[1]
+        return guide
+
+    @cached_property
+    def elongation(self) -> FloatArray:
+        """Elongation of the springs, (n,) [m]."""
+        distance: FloatArray = np.abs(self.at.center[0] + self.at.center[1].conj())
+        return distance - self.machine.rest_length
+
+    @cached_property
+    def mass(self) -> FloatArray:
+        """Mass that moved with the slider would have the same kinetic energy, (n,) [kg]."""
+        parts, at = self.machine.constants, self.at
+        roller = (parts.roller_mass + parts.roller_inertia / parts.radius**2) * at.way**2
+        brace = parts.brace_mass * np.abs(at.first + 1j) ** 2 / 4.0 + parts.brace_inertia * at.swing**2
+        total: FloatArray = self.machine.slider_mass + (roller + brace).sum(axis=0)
+        return total
+
+    @cached_property
+    def energy(self) -> FloatArray:
+        """Kinetic and potential energy, (n,) [J]."""
+        parts, machine, position = self.machine.constants, self.machine, self.moment.position
+        center = self.at.center.imag
+        lifted = parts.roller_mass * center + parts.brace_mass * (center + position) / 2.0
+        height = machine.slider_mass * position + lifted.sum(axis=0)
+        stretch = np.maximum(self.elongation, 0.0)
+        potential = machine.gravity * height + machine.stiffness * stretch**2 / 2.0
+        total: FloatArray = potential + self.mass * self.moment.speed**2 / 2.0
+        return total
+
+
+def respond(machine: Machine, moment: Moment) -> Response:
+    """Return the forces of a motion.
+
+    Parameters
+    ----------
+    machine : Machine
+        The mechanism.
+    moment : Moment
+        Position, speed and acceleration of the slider; positions within ``machine.span``, and
+        speeds of one sign: rolling resistance acts against the motion, also where it begins and ends.
+    """
+    parts, stances = machine.constants, machine.stances(moment.position)
+    at = kinematics(stances, moment.position, parts.length)
+    loads = _loads(machine, parts, at, moment)
+    free = loads.springs - parts.roller_mass * loads.roller - loads.rolling * at.tangent
+    middle = parts.brace_mass * loads.middle
+    balance = parts.brace_inertia * loads.turning + _cross(at.brace, 0.5 * middle - free)
+    traction = loads.rolling
+    if machine.friction:
+        resistance = -machine.friction if moment.speed.sum() < 0 else machine.friction
+        lever = at.lever + resistance * _cross(at.brace, at.tangent)
+        contact = np.where(lever < 0, -balance / lever, np.nan)  # else friction holds the roller
+        free, traction = free - resistance * contact * at.tangent, traction + resistance * contact
+    else:
+        contact = -balance / at.lever
+    roller_pin = free - 1j * contact * at.tangent
+    slider_pin = middle - roller_pin
+    up = slider_pin.imag
+    force = machine.slider_mass * (moment.acceleration + machine.gravity) + (up[0] + up[1])
+    on_corner = stances[0].on_corner | stances[1].on_corner
+    return Response(machine, moment, at, force, contact, -traction, roller_pin, slider_pin, on_corner)
+
+
+def statics(machine: Machine, position: FloatArray, upward: bool = True) -> Response:
+    """Return the forces at rest at positions of the slider [m]; rolling resistance as on the way up, or down."""
+    still = np.zeros(position.shape)
+    creep = still if upward else still - np.finfo(float).tiny
+    return respond(machine, Moment(position, creep, still))
+
+
+def kinematics(stances: tuple[Stance, Stance], position: FloatArray, length: FloatArray) -> Kinematics:
+    """Return how both sides follow the slider; `length` of the braces is (2, 1) [m]."""
+    right, left = stances
+    center, tangent = np.array([right.center, left.center]), np.array([right.tangent, left.tangent])
+    curvature = np.array([right.curvature, left.curvature])
+    brace = center - 1j * position
+    product = brace.conj() * tangent  # its real part is Re(conj(d) t), its imaginary part -Re(conj(d) i t)
+    lever = product.real
+    way = brace.imag / lever
+    first = tangent * way
+    relative = first - 1j
+    bent = curvature * way * way
+    bend = (bent * product.imag - (relative.real**2 + relative.imag**2)) / lever
+    second = tangent * (bend + 1j * bent)
+    square = length * length
+    swing, sway = _cross(brace, relative) / square, _cross(brace, second) / square
+    return Kinematics(center, tangent, brace, lever, way, bend, first, second, swing, sway)
+
+
+def _loads(machine: Machine, parts: Constants, at: Kinematics, moment: Moment) -> Loads:
+    push, square = moment.acceleration, moment.speed * moment.speed
+    lift = 1j * machine.gravity
+    roller = at.first * push + at.second * square + lift
+    middle: ComplexArray = 0.5 * (roller + (1j * push + lift))
+    along = at.way * push + at.bend * square
+    return Loads(
+        roller=roller,
+        middle=middle,
+        turning=at.swing * push + at.sway * square,
+        rolling=parts.roller_inertia / parts.radius**2 * along,
+        springs=_springs(machine, at.center),
+    )
+
+
+def _springs(machine: Machine, center: ComplexArray) -> ComplexArray:
+    """Return the force of the springs on both rollers (2, n) [N]; springs do not push."""
+    gap = center[0] + center[1].conj()
+    distance = np.abs(gap)
+    pull = machine.stiffness * np.maximum(distance - machine.rest_length, 0.0) / distance * gap
+    # The left roller sees the opposite force in a mirror.
+    return np.array([-pull, -pull.conj()])
+
+
+def _cross(a: ComplexArray, b: ComplexArray) -> FloatArray:
+    return a.real * b.imag - a.imag * b.real

@@ -1,0 +1,172 @@
+"""Dynamic analysis of a cam mechanism: the force that a given motion of its slider needs.
+
+The curve is the force over the slider's displacement, in the order of time, with everything
+that happens at contacts, pins and springs beside it. The displacement is that of the quasi-static
+model, so that the two can be laid over each other.
+
+Reference
+---------
+[SS] S. Sanchez-Salinas et al., Mech. Mach. Theory 173 (2022) 104819, sec. 4 and 5.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.curves import Column, Curve
+from cfmkit.families.cam.build import CannotBuild, displacement_origin
+from cfmkit.families.cam.dynamics.build import Build, build, stated_motion
+from cfmkit.families.cam.dynamics.checks import findings_of, outside, runs_on_corner
+from cfmkit.families.cam.dynamics.direct import statics
+from cfmkit.families.cam.dynamics.history import History, direct_history, multibody_history
+from cfmkit.families.cam.dynamics.multibody import CornerContact
+from cfmkit.families.cam.dynamics.values import values_of
+from cfmkit.families.cam.values import constant_force
+from cfmkit.results import Result, Status
+
+if TYPE_CHECKING:
+    from cfmkit.curves import FloatArray
+    from cfmkit.families.base import Run
+    from cfmkit.families.cam.spec import CamSpec
+    from cfmkit.results import Finding
+
+
+@dataclass(frozen=True)
+class Moved:
+    """A mechanism that went through a motion, as checks, values and pictures need it.
+
+    Attributes
+    ----------
+    spec : CamSpec
+        Resolved.
+    build : Build
+        The parts.
+    history : History
+        Forces and speeds over time.
+    static : (n,) array
+        Force on the slider at rest in the same places [N].
+    displacement : (n,) array
+        Of the slider, from the origin that the analysis asks for [m].
+    """
+
+    spec: CamSpec
+    build: Build
+    history: History
+    static: FloatArray
+    displacement: FloatArray
+
+
+def analyze(spec: CamSpec, run: Run) -> Result:
+    """Return the force that the motion in ``analysis.dynamics`` needs, and everything that is wrong with it.
+
+    Parameters
+    ----------
+    spec : CamSpec
+        With a motion and masses.
+    run : Run
+        Not needed here: there is nothing to search.
+
+    Returns
+    -------
+    Result
+        Branch ``load`` for a motion upwards, ``unload`` downwards. PARTIAL if the motion leaves
+        the profile; NO_EQUILIBRIUM if the mechanism cannot exist, or the motion lies outside it.
+    """
+    try:
+        parts = build(spec)
+        times, missing = _inside(parts, spec)
+        moved = _moved(spec, parts, times)
+    except CannotBuild as problem:
+        return Result(spec, Status.NO_EQUILIBRIUM, problem.finding.message, warnings=(problem.finding,))
+    lost = int((~np.isfinite(moved.history.force)).sum())
+    status, message = Status.COMPLETE, ""
+    if missing:
+        status, message = Status.PARTIAL, missing[0].message
+    elif lost:
+        status, message = Status.PARTIAL, f"at {lost} of {len(times)} points no finite force moves the slider"
+    return Result(
+        spec=moved.spec,
+        status=status,
+        message=message,
+        curves=(_curve(moved),),
+        values=values_of(moved),
+        warnings=(*missing, *findings_of(moved)),
+        target=spec.design.force if spec.design else constant_force(parts.right),
+        state=moved,
+    )
+
+
+def _inside(parts: Build, spec: CamSpec) -> tuple[FloatArray, tuple[Finding, ...]]:
+    """Return the times at which the slider is where the flanks allow it, and what is said if those are not all."""
+    dynamics, motion = stated_motion(spec), parts.motion
+    times = motion.times(dynamics.points)
+    low, high = parts.machine.span
+    position, slack = motion.at(times).position, 1e-12 * (high - low)
+    inside = (position >= low - slack) & (position <= high + slack)
+    if inside.all():
+        return times, ()
+    found = outside(parts, (low, high))
+    if inside.sum() < 2 or dynamics.method == "multibody":
+        raise CannotBuild(found.name, found.message)
+    return times[inside], (found,)
+
+
+def _moved(spec: CamSpec, parts: Build, times: FloatArray) -> Moved:
+    low, high = parts.machine.span
+    upward = parts.motion.stroke > 0
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        history = _history(spec, parts, times)
+        static = statics(parts.machine, np.clip(history.moment.position, low, high), upward).force
+    displacement = history.moment.position + parts.lift - parts.right.track.start + displacement_origin(parts.right)
+    return Moved(_as_run(spec, parts), parts, history, static, displacement)
+
+
+def _history(spec: CamSpec, parts: Build, times: FloatArray) -> History:
+    if stated_motion(spec).method == "direct":
+        return direct_history(parts.machine, parts.motion, times)
+    try:
+        return multibody_history(parts.machine, parts.motion, len(times))
+    except CornerContact:
+        found = runs_on_corner(parts)
+        raise CannotBuild(found.name, found.message) from None
+
+
+def _as_run(spec: CamSpec, parts: Build) -> CamSpec:
+    """Return the spec with what the analysis fell back on written out."""
+    resolved, masses = parts.right.spec, spec.mechanism.masses
+    analysis = spec.analysis.model_copy(update={"fidelity": "dynamic", "gravity": spec.gravity})
+    changes: dict[str, object] = {"analysis": analysis}
+    if masses is not None:
+        own = parts.machine.right.parts
+        written = {"brace_inertia": own.brace_inertia, "roller_inertia": own.roller_inertia}
+        mechanism = resolved.mechanism.model_copy(update={"masses": masses.model_copy(update=written)})
+        changes["mechanism"] = mechanism
+    return resolved.model_copy(update=changes)
+
+
+def _curve(moved: Moved) -> Curve:
+    history, moment = moved.history, moved.history.moment
+    extra = {
+        "time": Column(history.times, "time"),
+        "speed": Column(moment.speed, "velocity"),
+        "acceleration": Column(moment.acceleration, "acceleration"),
+        "static_force": Column(moved.static, "force"),
+    }
+    sides = (
+        ("contact_force", history.contact, "force"),
+        ("traction", history.traction, "force"),
+        ("brace_force", history.brace, "force"),
+        ("slider_pin_force", history.pin, "force"),
+        ("roller_speed", history.spin, "angular_velocity"),
+    )
+    for name, rows, dimension in sides:
+        extra |= {f"{name}_{side}": Column(row, dimension) for side, row in zip(("right", "left"), rows, strict=True)}
+    extra["spring_elongation"] = Column(history.elongation, "length")
+    extra["contact"] = Column(np.where(history.on_corner, "corner", "flank"), "text")
+    branch = np.full(len(history.times), "load" if moved.build.motion.stroke > 0 else "unload")
+    with np.errstate(invalid="ignore"):
+        stable = (history.contact[0] > 0) & (history.contact[1] > 0)
+    return Curve(moved.displacement, history.force, branch, stable, extra)

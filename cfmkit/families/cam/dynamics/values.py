@@ -1,0 +1,95 @@
+"""Scalar results of a motion of a cam mechanism."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.families.cam.dynamics.direct import respond, statics
+from cfmkit.families.cam.statics import GRAVITY
+from cfmkit.families.cam.values import DEFINITIONS, constant_force
+from cfmkit.results import Quantity
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from cfmkit.curves import FloatArray
+    from cfmkit.families.cam.dynamics.machine import Machine
+    from cfmkit.families.cam.dynamics.model import Moved
+
+SLOW = 1.0
+"""Duration of the motion that the paper compares with [s]."""
+
+
+def values_of(moved: Moved) -> Mapping[str, Quantity]:
+    """Return the scalar results by name; None where a value does not exist."""
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        numbers = _shared(moved) | _own(moved)
+    return {name: Quantity(_finite(value), *DEFINITIONS[name]) for name, value in numbers.items()}
+
+
+def _shared(moved: Moved) -> dict[str, float]:
+    """Return the values that the quasi-static analysis has, too."""
+    right, history = moved.build.right, moved.history
+    return {
+        "force_constant": right.profile.path.law.force_constant,
+        "spring_stiffness": right.loads.stiffness,
+        "theoretical_force": constant_force(right),
+        "spring_elongation_max": _largest(history.elongation),
+        "contact_force_max": _largest(history.contact),
+    }
+
+
+def _own(moved: Moved) -> dict[str, float]:
+    history, machine = moved.history, moved.build.machine
+    moving = respond(machine, history.moment)
+    ratio = history.force / moved.static
+    return {
+        "contact_force_min": -_largest(-history.contact),
+        "brace_force_max": _largest(history.brace),
+        "roller_speed_max": _largest(np.abs(history.spin)),
+        "slider_speed_max": _largest(np.abs(history.moment.speed)),
+        "slider_acceleration_max": _largest(np.abs(history.moment.acceleration)),
+        "dead_weight_peak": _largest(np.abs(history.moment.acceleration)) / GRAVITY,
+        "moving_mass_max": _largest(moving.mass),
+        "force_peak_over_static": _largest(ratio) - 1.0,
+        "force_dip_under_static": 1.0 + _largest(-ratio),
+        "force_peak_over_slow": _largest(history.force / _slow(moved)) - 1.0,
+        "angle_error_effect": _angle_effect(moved),
+    }
+
+
+def _slow(moved: Moved) -> FloatArray:
+    """Return the force of the same motion within one second, at the same places [N]."""
+    scale = moved.build.motion.time / SLOW
+    position, speed, acceleration = moved.history.moment
+    moment = moved.history.moment._replace(speed=speed * scale, acceleration=acceleration * scale**2)
+    return respond(moved.build.machine, moment._replace(position=position)).force
+
+
+def _angle_effect(moved: Moved) -> float:
+    """Return how much larger the force at the end is, at rest, than with flanks at the right angles."""
+    machine, end = moved.build.machine, moved.history.moment.position[-1:]
+    right = _upright(machine)
+    if right == machine:
+        return 0.0
+    low, high = right.span
+    if not low <= end[0] <= high:
+        return np.nan
+    upward = moved.build.motion.stroke > 0
+    return float(statics(machine, end, upward).force[0] / statics(right, end, upward).force[0]) - 1.0
+
+
+def _upright(machine: Machine) -> Machine:
+    return replace(machine, right=replace(machine.right, angle=0.0), left=replace(machine.left, angle=0.0))
+
+
+def _largest(values: FloatArray) -> float:
+    finite = values[np.isfinite(values)]
+    return float(finite.max()) if finite.size else np.nan
+
+
+def _finite(value: float) -> float | None:
+    return value if np.isfinite(value) else None

@@ -1,0 +1,78 @@
+"""Everything a cam mechanism can suffer from, by name.
+
+The names are stable; the sentences say what the name means. The message that a
+run reports carries the numbers that decide and the cure.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from cfmkit.results import Finding
+from cfmkit.units import format_short
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+FINDINGS = {
+    "brace_too_short": "the roller is, or comes, as far from the axis as the brace is long",
+    "path_vertical": "the profile is cut for so much friction that the path turns vertical within the stroke",
+    "design_singular": "the profile is cut for so much friction on the way down that the path has no upward start",
+    "undercut": "the roller is larger than the path's radius of curvature: the cam starts with a corner",
+    "undercut_total": "the roller is so large that nothing of the flank remains",
+    "contact_not_single_valued": "while the roller pivots on the corner the contact does not move with the slider",
+    "corner_pressure": "on the sharp corner the contact pressure has no bound",
+    "up_jam": "friction holds the roller: no force moves the slider up",
+    "dead_point": "the slider cannot move the roller at the start: forces other than the springs' diverge",
+    "spring_slack": "the springs are shorter than their rest length and carry nothing",
+    "spring_overstretched": "the springs are stretched beyond their limit",
+    "lift_off": "the contact force is not positive: the roller leaves the cam",
+    "slack_cable": "the force on the slider is not positive: a cable would go slack",
+    "flanks_collide": "the two flanks cross the axis: no plate is left between them",
+    "rollers_collide": "the two rollers touch each other",
+    "outside_profile": "the travel asked for is longer than the cut profile allows",
+    "inertia_mismatch": "a moment of inertia does not fit the mass and the size of its part",
+    "symmetric_model": "the quasi-static model leaves out what makes the two sides differ",
+    "friction_left_out": "the nine-coordinate model has no rolling resistance",
+    "weight_too_large": "the force wanted does not even carry the weight of the moving parts",
+    "force_constant_too_small": "the force constant needed is below the one that avoids undercut",
+    "registration_weak": "measured points do not say well where the cam lies",
+    "part_measured": "the flanks were measured over a part of the travel only",
+    "no_spring_fits": "no spring of the catalogue meets the limits",
+}
+
+
+def finding(name: str, message: str, *cures: str) -> Finding:
+    """Return a finding of this family; the name must be one that `FINDINGS` explains."""
+    if name not in FINDINGS:
+        raise KeyError(name)
+    return Finding(name, message, cures)
+
+
+def mm(value: float) -> str:
+    """Return a length as the user reads it: four significant digits, in mm."""
+    return format_short(value, "length")
+
+
+def at_most(length: float) -> str:
+    """Return a length [m] rounded down to four digits: as good as feasible, and feasible."""
+    return _rounded(length, math.floor)
+
+
+def at_least(length: float) -> str:
+    """Return a length [m] rounded up to four digits.
+
+    Examples
+    --------
+    >>> at_least(0.0144645), at_most(0.1693794)
+    ('14.47 mm', '169.3 mm')
+    """
+    return _rounded(length, math.ceil)
+
+
+def _rounded(length: float, way: Callable[[float], int]) -> str:
+    if length < 1e-300:
+        return "0 mm"
+    digits = 3 - math.floor(math.log10(length * 1e3))
+    return f"{way(length * 1e3 * 10.0**digits) / 10.0**digits:.4g} mm"

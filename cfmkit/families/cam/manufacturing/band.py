@@ -1,0 +1,176 @@
+"""Forces of many cams with drawn errors, without friction: the band in which the force of one that is cut will lie.
+
+Waviness is a sum of waves of equal power between the stated wavelength and the length of the
+flank, with random phases. The roller is taken to touch every point of the flank, which holds
+for waves longer than its size makes it bridge.
+
+Reference
+---------
+[SS] S. Sanchez-Salinas et al., Mech. Mach. Theory 173 (2022) 104819, fig. 13.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.bodies.cam_flank import BuiltFlank, DesignFlank, arc_lengths
+from cfmkit.families.cam.built import Sides
+
+if TYPE_CHECKING:
+    from cfmkit.curves import FloatArray
+    from cfmkit.families.cam.build import Assembly
+    from cfmkit.families.cam.manufacturing.spec import Manufacturing
+    from cfmkit.numerics.registration import Frame
+
+WAVES = 24
+PLACES = 1600
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """The error of one flank that was drawn, with its derivatives over the arc length of the design.
+
+    Attributes
+    ----------
+    amplitude : float
+        Of each wave [m].
+    number, phase : (k,) array
+        Wave numbers [rad/m] and phases.
+    offset : float
+        [m].
+    angle : float
+        About the origin, positive where the cam grows wider towards the top [rad].
+    nominal : Frame
+        The design at `arc`.
+    arc : (n,) array
+        [m].
+    """
+
+    amplitude: float
+    number: FloatArray
+    phase: FloatArray
+    offset: float
+    angle: float
+    nominal: Frame
+    arc: FloatArray
+
+    @property
+    def low(self) -> float:
+        """First arc length [m]."""
+        return float(self.arc[0])
+
+    @property
+    def high(self) -> float:
+        """Last arc length [m]."""
+        return float(self.arc[-1])
+
+    def at(self, places: FloatArray, derivative: int = 0) -> FloatArray:
+        """Return the error [m] or one of its first two derivatives at the arc lengths of the design."""
+        power = self.number**derivative
+        turn = power * np.cos(np.multiply.outer(places, self.number) + self.phase + 0.5 * np.pi * derivative)
+        still = self.offset if derivative == 0 else 0.0
+        return np.asarray(self.amplitude * turn.sum(axis=1) + still + self.angle * self._lever(derivative))
+
+    def _lever(self, derivative: int) -> FloatArray:
+        """Return the normal displacement per angle, and its derivatives along the flank."""
+        at = self.nominal
+        along = (at.points * at.tangents).sum(axis=1)
+        beside = (at.points * at.normals).sum(axis=1)
+        return np.asarray((along, 1.0 - at.curvature * beside, np.zeros_like(along))[derivative])
+
+
+@dataclass(frozen=True)
+class Band:
+    """Forces of all drawn cams over the travel.
+
+    Attributes
+    ----------
+    travel : (n,) array
+        [m].
+    forces : (samples, n) array
+        Without friction [N].
+    design : (n,) array
+        Force of the design [N].
+    """
+
+    travel: FloatArray
+    forces: FloatArray
+    design: FloatArray
+
+    def quantile(self, share: float) -> FloatArray:
+        """Return the force that a share of the cams stays below at each travel [N]; NaN where not all have a flank."""
+        found, all_there = np.full(len(self.travel), np.nan), np.isfinite(self.forces).all(axis=0)
+        found[all_there] = np.quantile(self.forces[:, all_there], share, axis=0)
+        return found
+
+    def deviations(self) -> FloatArray:
+        """Return every cam's standard deviation of the error along the travel, over the mean force [SS, fig. 13]."""
+        errors = self.forces - self.design
+        found: FloatArray = np.nanstd(errors, axis=1, ddof=1) / float(np.nanmean(self.design))
+        return found
+
+
+def force_band(assembly: Assembly, tolerance: Manufacturing, travel: FloatArray, seed: int) -> Band:
+    """Return the forces of cams that are cut with errors.
+
+    Parameters
+    ----------
+    assembly : Assembly
+        The design and the loads.
+    tolerance : Manufacturing
+        Standard deviations of the errors.
+    travel : (n,) array
+        Where the force is wanted [m].
+    seed : int
+        Of the generator: the same seed draws the same cams.
+    """
+    generator = np.random.default_rng(seed)
+    flank = DesignFlank(assembly.profile, 1.0)
+    arc = arc_lengths(flank)
+    places = np.linspace(0.0, float(arc[1][-1]), PLACES)
+    nominal = flank.frame(np.interp(places, arc[1], arc[0]))
+    slider = assembly.track.start + travel
+    loads = assembly.loads
+
+    def side() -> tuple[FloatArray, FloatArray]:
+        error = _drawn(generator, tolerance, nominal, places)
+        built = BuiltFlank(flank, error, arc).frame(places)  # type: ignore[arg-type]
+        return _track(assembly, built, slider)
+
+    forces = np.empty((tolerance.samples, len(travel)))
+    for row in forces:
+        (right_x, right), (left_x, left) = side(), side()
+        row[:] = Sides((right_x, left_x), (right, left)).forces(loads, 0.0, loads.rest_half_width)[0]
+    states = assembly.track.states(slider)
+    designed = Sides((states.x, states.x), (states.slope, states.slope))
+    return Band(travel, forces, designed.forces(loads, 0.0, loads.rest_half_width)[0])
+
+
+def _drawn(generator: np.random.Generator, tolerance: Manufacturing, nominal: Frame, places: FloatArray) -> Drawn:
+    longest = float(places[-1])
+    shortest = min(tolerance.wavelength, longest)
+    lengths = np.exp(generator.uniform(np.log(shortest), np.log(longest), WAVES))
+    return Drawn(
+        tolerance.waviness * (2.0 / WAVES) ** 0.5,
+        2.0 * np.pi / lengths,
+        generator.uniform(0.0, 2.0 * np.pi, WAVES),
+        tolerance.offset * float(generator.normal()),
+        tolerance.angle * float(generator.normal()),
+        nominal,
+        places,
+    )
+
+
+def _track(assembly: Assembly, built: Frame, slider: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return x [m] and slope of the roller's centre, a radius away from every point of the flank; NaN outside."""
+    mechanism = assembly.spec.mechanism
+    x, y = (built.points + mechanism.roller_radius * built.normals).T
+    height = y + np.sqrt((mechanism.brace_length - x) * (mechanism.brace_length + x))
+    rising = np.concatenate([[True], np.diff(np.maximum.accumulate(height)) > 0])
+    slope = built.normals[:, 0] / -built.normals[:, 1]
+    at = height[rising]
+    found = tuple(np.interp(slider, at, values[rising], left=np.nan, right=np.nan) for values in (x, slope))
+    return found[0], found[1]

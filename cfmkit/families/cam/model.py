@@ -1,0 +1,241 @@
+"""Quasi-static analysis of a cam mechanism: both directions of travel, the closed loop.
+
+A specification with a motion goes to the dynamic model (`cfmkit.families.cam.dynamics`) instead.
+Friction opposes the motion, so the way up and the way down have different forces;
+the area between them is lost in one cycle. Where the cam is undercut the roller
+pivots on its corner, and the curve shows the force that really acts there.
+
+Reference
+---------
+[SS] S. Sanchez-Salinas et al., Mech. Mach. Theory 173 (2022) 104819, sec. 2 and 3.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from math import isclose
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.bodies.cam_profile import brace_tangent
+from cfmkit.curves import Column, Curve, FloatArray
+from cfmkit.families.cam.build import CLOSE, Assembly, CannotBuild, assemble, displacement_origin
+from cfmkit.families.cam.checks import findings_of
+from cfmkit.families.cam.findings import finding, mm
+from cfmkit.families.cam.statics import Forces, forces, jams
+from cfmkit.families.cam.values import theoretical_force, values_of
+from cfmkit.results import Result, Status
+
+if TYPE_CHECKING:
+    from cfmkit.bodies.track_states import TrackStates
+    from cfmkit.families.base import Run
+    from cfmkit.families.cam.manufacturing.band import Band
+    from cfmkit.families.cam.spec import CamSpec
+    from cfmkit.results import Finding
+
+
+@dataclass(frozen=True)
+class Solution:
+    """A solved mechanism, as the checks, the scalar values and the pictures need it.
+
+    Attributes
+    ----------
+    assembly : Assembly
+        The parts.
+    travel : (n,) array
+        Slider travel from the start of the roller path, increasing [m].
+    states : TrackStates
+        Where the rollers are at those travels.
+    up, down : Forces
+        On the way up and on the way down, both ordered by increasing travel.
+    origin : float
+        What is added to the travel to give the displacement [m].
+    band : Band or None
+        Forces of cams that are cut with errors.
+    """
+
+    assembly: Assembly
+    travel: FloatArray
+    states: TrackStates
+    up: Forces
+    down: Forces
+    origin: float
+    band: Band | None = None
+
+    @cached_property
+    def pressure_angle(self) -> FloatArray:
+        """Angle between the brace's pull and the roller's motion [rad]; at 90 deg the slider moves nothing."""
+        slope, tangent = self.states.slope, brace_tangent(self.states.x, self.assembly.track.brace_length)
+        angle: FloatArray = np.arctan2(1.0 + slope * tangent, slope - tangent)
+        return angle
+
+    @cached_property
+    def elongation(self) -> FloatArray:
+        """Elongation of the springs [m]."""
+        return 2.0 * (self.states.x - self.assembly.loads.rest_half_width)
+
+    @property
+    def corner_travel(self) -> float:
+        """Travel at which the roller leaves the corner [m]; 0 if there is none."""
+        track = self.assembly.track
+        return max(track.corner_end - track.start, 0.0)
+
+    @cached_property
+    def jams(self) -> tuple[tuple[float, float], ...]:
+        """Intervals of travel in which no force moves the slider up [m]."""
+        track, friction = self.assembly.track, self.assembly.spec.mechanism.rolling_friction
+        if not friction:
+            return ()
+        total = float(self.travel[-1])
+        missing = bool(np.isnan(self.up.slider).any())
+        states = self.states if missing or len(self.travel) < 100 else None
+        found = ((low - track.start, high - track.start) for low, high in jams(track, friction, states))
+        return tuple((max(low, 0.0), min(high, total)) for low, high in found if low < total)
+
+
+def analyze(spec: CamSpec, run: Run) -> Result:
+    """Return the force-displacement loop of a cam mechanism, with everything that is wrong with it.
+
+    Parameters
+    ----------
+    spec : CamSpec
+        The mechanism; what is left out is derived.
+    run : Run
+        Not needed here: the model is a closed form.
+
+    Returns
+    -------
+    Result
+        Branches ``load`` (up) and ``unload`` (down). NO_EQUILIBRIUM if the mechanism cannot
+        be built, PARTIAL if the curve ends before the travel asked for.
+    """
+    if spec.fidelity == "dynamic":
+        from cfmkit.families.cam.dynamics import analyze as analyze_motion
+
+        return analyze_motion(spec, run)
+    if spec.mechanism.profile.file is not None:
+        from cfmkit.families.cam.built import analyze_built
+
+        return analyze_built(spec)
+    try:
+        assembly = assemble(spec)
+    except CannotBuild as problem:
+        return Result(spec, Status.NO_EQUILIBRIUM, problem.finding.message, warnings=(problem.finding,))
+    solution = with_band(solve(assembly), run.seed)
+    shortfalls = _shortfalls(assembly, solution)
+    failed = int(np.isnan(solution.up.slider[1:]).sum() + np.isnan(solution.down.slider[1:]).sum())
+    warnings = (*shortfalls, *_left_out(spec), *findings_of(solution))
+    status, message = Status.COMPLETE, ""
+    if shortfalls:
+        status, message = Status.PARTIAL, shortfalls[0].message
+    elif failed:
+        status, message = Status.PARTIAL, f"{failed} of {2 * len(solution.travel)} points have no equilibrium"
+    return Result(
+        spec=_as_run(assembly.spec, solution),
+        status=status,
+        message=message,
+        curves=(_curve(solution),),
+        values=values_of(solution),
+        warnings=warnings,
+        valid=((solution.corner_travel + solution.origin, float(solution.travel[-1]) + solution.origin),),
+        target=spec.design.force if spec.design else theoretical_force(solution),
+        state=solution,
+    )
+
+
+def with_band(solution: Solution, seed: int) -> Solution:
+    """Return a solution with the forces of cams that are cut with errors, where the specification states any."""
+    tolerance = solution.assembly.spec.analysis.manufacturing
+    if tolerance is None:
+        return solution
+    from cfmkit.families.cam.manufacturing.band import force_band
+
+    return replace(solution, band=force_band(solution.assembly, tolerance, solution.travel, seed))
+
+
+def _as_run(spec: CamSpec, solution: Solution) -> CamSpec:
+    """Return the spec with what the analysis fell back on written out."""
+    reached, stroke = float(solution.travel[-1]), spec.mechanism.profile.stroke or 0.0
+    travel = spec.analysis.travel or (stroke if isclose(reached, stroke, rel_tol=CLOSE) else reached)
+    analysis = spec.analysis.model_copy(update={"travel": travel, "gravity": spec.gravity, "fidelity": "quasi-static"})
+    return spec.model_copy(update={"analysis": analysis})
+
+
+def solve(assembly: Assembly) -> Solution:
+    """Return states and forces over the travel that the analysis asks for, as far as the track goes."""
+    spec, track = assembly.spec, assembly.track
+    available = track.end - track.start
+    asked = spec.analysis.travel or available
+    travel = np.linspace(0.0, min(asked, available), spec.analysis.points)
+    states = track.states(track.start + travel)
+    friction = spec.mechanism.rolling_friction
+    up = forces(states, assembly.loads, friction)
+    down = forces(states, assembly.loads, -friction) if friction else up
+    return Solution(assembly, travel, states, up, down, displacement_origin(assembly))
+
+
+def _left_out(spec: CamSpec) -> tuple[Finding, ...]:
+    """Return what to say where the two sides differ: this model is symmetric."""
+    errors, found = spec.mechanism.errors, []
+    if errors and (errors.slider_deviation or errors.flank_angle):
+        found.append("'mechanism.errors'")
+    if spec.mechanism.left:
+        found.append("'mechanism.left'")
+    if not found:
+        return ()
+    message = (
+        f"the quasi-static model is symmetric: {' and '.join(found)} count in the dynamic model only; "
+        "give 'analysis.dynamics' a slow motion to see the effect"
+    )
+    return (finding("symmetric_model", message),)
+
+
+def _shortfalls(assembly: Assembly, solution: Solution) -> tuple[Finding, ...]:
+    """Return why the curve ends before what was asked for, or before the flank does."""
+    found = [assembly.shortfall] if assembly.shortfall else []
+    asked, reached = assembly.spec.analysis.travel, float(solution.travel[-1])
+    short = asked is not None and reached < asked * (1 - CLOSE)
+    if assembly.track.turns_back and (short or asked is None):
+        found.append(
+            finding(
+                "brace_too_short",
+                f"with a brace of {mm(assembly.track.brace_length)} on this cam the slider stops rising after "
+                f"{mm(reached)} of travel, before the flank ends, and the force has no bound there; use a longer "
+                "brace, or a cam cut for this one",
+            )
+        )
+    elif asked is not None and short:
+        found.append(
+            finding(
+                "outside_profile",
+                f"the travel asked for is {mm(asked)}, but the profile is cut for {mm(reached)} with these parts; "
+                "cut a longer profile or ask for less",
+            )
+        )
+    return tuple(found)
+
+
+def _curve(solution: Solution) -> Curve:
+    """Return the closed loop: up, then down."""
+
+    def loop(up: FloatArray, down: FloatArray | None = None) -> FloatArray:
+        return np.concatenate([up, (up if down is None else down)[::-1]])
+
+    up, down, states = solution.up, solution.down, solution.states
+    points = len(solution.travel)
+    force, contact = loop(up.slider, down.slider), loop(up.contact, down.contact)
+    with np.errstate(invalid="ignore"):
+        stable = (contact > 0) | (np.isfinite(force) & (loop(solution.elongation) == 0))
+    extra = {
+        "contact_force": Column(contact, "force"),
+        "brace_force": Column(loop(up.brace, down.brace), "force"),
+        "spring_elongation": Column(loop(solution.elongation), "length"),
+        "pressure_angle": Column(loop(solution.pressure_angle), "angle"),
+        "roller_x": Column(loop(states.x), "length"),
+        "roller_y": Column(loop(states.y), "length"),
+        "contact": Column(loop(np.where(states.on_corner, "corner", "flank")), "text"),
+    }
+    branch = np.repeat(["load", "unload"], points)
+    return Curve(loop(solution.travel) + solution.origin, force, branch, stable, extra)

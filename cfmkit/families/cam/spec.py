@@ -1,0 +1,294 @@
+"""What a YAML specification of a cam mechanism may say."""
+
+from __future__ import annotations
+
+from math import radians
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import Field, ValidationInfo, field_validator, model_validator
+
+from cfmkit.families.cam.manufacturing.spec import Manufacturing
+from cfmkit.materials import material
+from cfmkit.spec import Analysis, Model, Spec
+from cfmkit.tables.source import DataSource
+from cfmkit.units import Angle, Force, Inertia, Length, Mass, Ratio, Stiffness, Time
+
+Positive = Field(gt=0)
+PositiveLength = Annotated[Length, Field(gt=0)]
+PositiveStiffness = Annotated[Stiffness, Field(gt=0)]
+NonNegativeLength = Annotated[Length, Field(ge=0)]
+Friction = Annotated[Ratio, Field(ge=0, lt=1)]
+NonNegativeInertia = Annotated[Inertia, Field(ge=0)]
+SmallAngle = Annotated[Angle, Field(ge=-radians(45), le=radians(45))]
+DesignFriction = Annotated[Ratio, Field(gt=-1, lt=1)]
+
+
+class Springs(Model):
+    """Springs in parallel between the two roller axes."""
+
+    stiffness: PositiveStiffness | tuple[PositiveStiffness, ...] = Field(
+        description="of one spring, or a list with the measured value of each"
+    )
+    count: int | None = Field(
+        None, ge=1, le=1000, description="number of equal springs; default 1, or the list's length"
+    )
+    max_elongation: PositiveLength | None = Field(None, description="largest elongation that a spring may see")
+
+    @model_validator(mode="after")
+    def _count_fits_the_list(self) -> Self:
+        if isinstance(self.stiffness, tuple):
+            if not self.stiffness:
+                raise ValueError("'stiffness' needs at least one value")
+            if self.count not in (None, len(self.stiffness)):
+                raise ValueError(f"'count' is {self.count} but 'stiffness' lists {len(self.stiffness)} springs")
+        return self
+
+    @property
+    def total(self) -> float:
+        """K, the sum of all parallel springs [N/m]."""
+        if isinstance(self.stiffness, tuple):
+            return sum(self.stiffness)
+        return self.stiffness * (self.count or 1)
+
+    def scaled_to(self, total: float) -> Springs:
+        """Return springs of the same number whose stiffness adds up to `total` [N/m]."""
+        if isinstance(self.stiffness, tuple):
+            values = tuple(value * total / self.total for value in self.stiffness)
+            return self.model_copy(update={"stiffness": values})
+        return self.model_copy(update={"stiffness": total / (self.count or 1)})
+
+
+class Masses(Model):
+    """Moving masses, for gravity and for dynamics."""
+
+    slider: Annotated[Mass, Field(ge=0)] = Field(0.0, description="slider or pulling link, m2")
+    brace: Annotated[Mass, Field(ge=0)] = Field(0.0, description="one brace, centre of mass at mid-length, m3")
+    roller: Annotated[Mass, Field(ge=0)] = Field(0.0, description="one roller with its share of shaft and springs, m4")
+    brace_inertia: NonNegativeInertia | None = Field(
+        None, description="of one brace about its centre of mass, I3; default: m3 l^2/12, a slender rod"
+    )
+    roller_inertia: NonNegativeInertia | None = Field(
+        None, description="of one roller about its axis, I4; default: m4 r^2/2, a solid cylinder"
+    )
+
+
+class LeftMasses(Model):
+    """Masses of the left side that differ from those of the right."""
+
+    brace: Annotated[Mass, Field(ge=0)] | None = Field(None, description="left brace")
+    roller: Annotated[Mass, Field(ge=0)] | None = Field(None, description="left roller with its share")
+    brace_inertia: NonNegativeInertia | None = Field(None, description="of the left brace")
+    roller_inertia: NonNegativeInertia | None = Field(None, description="of the left roller")
+
+
+class Profile(Model):
+    """The cam as it is cut. What is left out follows the mechanism's own values."""
+
+    force_constant: PositiveLength = Field(description="A; the force is 4 K A, K the sum of all springs")
+    friction: DesignFriction = Field(
+        0.0, description="rolling friction it is cut for; positive: exact on the way up, negative: on the way down"
+    )
+    slope_factor: Annotated[Ratio, Field(ge=1)] = Field(
+        1.0, description="1, or more where the profile carries the weight of the moving parts"
+    )
+    stroke: PositiveLength | None = Field(None, description="slider travel that the flank is cut for")
+    brace_length: PositiveLength | None = Field(None, description="brace it is cut for")
+    rest_half_width: PositiveLength | None = Field(None, description="half width at which the path starts, x0")
+    roller_radius: PositiveLength | None = Field(None, description="roller it is cut for")
+    offset: Length = Field(0.0, description="material left on the flank beyond the profile, outward (a cutting error)")
+    file: str | None = Field(None, description="measured points of both flanks, a CSV beside the spec: x [mm], y [mm]")
+    noise: PositiveLength | None = Field(None, description="standard deviation of the points in `file`")
+
+    @field_validator("file", mode="wrap")
+    @classmethod
+    def _beside_the_spec(cls, value: Any, handler: Any, info: ValidationInfo) -> Any:
+        folder = getattr(value, "folder", None) or (info.context or {}).get("folder") or "."
+        return None if value is None else DataSource(handler(value), folder)
+
+    @model_validator(mode="after")
+    def _noise_is_stated(self) -> Self:
+        if (self.file is None) != (self.noise is None):
+            raise ValueError("'file' and 'noise' belong together: how exact are the measured points?")
+        return self
+
+
+class Plate(Model):
+    """The plate that the cam is cut from: what closes the contour beside the flanks."""
+
+    top_margin: NonNegativeLength = Field(0.010, description="plate above the end of the flanks")
+    base_height: NonNegativeLength = Field(0.040, description="tab below the cam that carries it; 0 for none")
+    base_width: PositiveLength | None = Field(None, description="width of the tab; default: what the rollers leave")
+    hole_diameter: NonNegativeLength = Field(0.0066, description="fixing holes; 0 for none")
+
+
+class Contact(Model):
+    """What decides the contact pressure between roller and cam."""
+
+    width: PositiveLength = Field(description="width of the line contact, usually the plate's thickness")
+    material: str = Field("steel-s235", description="a name from `show materials`; roller and cam alike")
+
+    @field_validator("material")
+    @classmethod
+    def _known(cls, name: str) -> str:
+        return material(name).name
+
+
+class Left(Model):
+    """Parts of the left side that differ from those of the right; what is left out is as on the right."""
+
+    brace_length: PositiveLength | None = Field(None, description="left brace")
+    roller_radius: PositiveLength | None = Field(None, description="left roller")
+    profile: Profile | None = Field(None, description="left flank, whole: what it leaves out follows the left side")
+    masses: LeftMasses | None = Field(None, description="of the left brace and roller")
+
+
+class Errors(Model):
+    """Angles at which the flanks stand wrongly, turned about the origin that `analysis.dynamics.origin` names."""
+
+    slider_deviation: SmallAngle = Field(
+        0.0, description="between the slider's way and the cam's axis: both flanks turned the same way"
+    )
+    flank_angle: SmallAngle = Field(
+        0.0, description="manufacturing error, both flanks turned against each other; positive: wider at the top"
+    )
+
+
+class Mechanism(Model):
+    """A cam between two rollers, springs between the rollers, braces to a slider; symmetric but for `left`."""
+
+    brace_length: PositiveLength = Field(description="l, between slider pin and roller axis")
+    rest_half_width: PositiveLength = Field(description="half the distance of the roller axes with the springs at rest")
+    roller_radius: PositiveLength = Field(description="r")
+    springs: Springs = Field(description="{stiffness, count}, or a list of measured stiffnesses")
+    rolling_friction: Friction = Field(0.0, description="mu = d/r, rolling resistance over roller radius")
+    masses: Masses | None = Field(None, description="needed for gravity and for dynamics")
+    profile: Profile = Field(description="the cam as cut")
+    left: Left | None = Field(None, description="what differs on the left side; for the dynamic model")
+    errors: Errors | None = Field(None, description="flanks at a wrong angle; for the dynamic model")
+    plate: Plate = Field(default_factory=Plate, description="what closes the contour of the part")
+    contact: Contact | None = Field(None, description="for the contact pressure")
+
+    @field_validator("springs", mode="before")
+    @classmethod
+    def _list_is_short_for_stiffness(cls, value: Any) -> Any:
+        return {"stiffness": value} if isinstance(value, tuple | list) else value
+
+
+class CatalogueSpring(Model):
+    """A spring that can be bought."""
+
+    name: str = Field(min_length=1, description="part number")
+    stiffness: PositiveStiffness = Field(description="of one spring")
+    max_elongation: PositiveLength | None = Field(None, description="largest elongation allowed")
+    counts: tuple[Annotated[int, Field(ge=1, le=1000)], ...] = Field((2,), description="numbers in parallel to try")
+
+
+class CamDesign(Model):
+    """What `cfmkit design` is to reach, and what it may choose."""
+
+    force: Annotated[Force, Field(gt=0)] = Field(description="constant force wanted, weight included if gravity is on")
+    stroke: PositiveLength = Field(description="slider travel wanted")
+    choose: Literal["force-constant", "stiffness", "catalogue"] = Field(
+        "force-constant",
+        description="what follows from F = 4KA: A from the springs, the stiffness from A, or both from a catalogue",
+    )
+    force_constant: PositiveLength | None = Field(
+        None, description="A to keep when choosing the stiffness; default: the mechanism's"
+    )
+    catalogue: tuple[CatalogueSpring, ...] = Field((), description="springs to pick from")
+    friction: DesignFriction = Field(
+        0.0, description="rolling friction to cut for; positive: exact on the way up, negative: on the way down"
+    )
+    avoid_undercut: bool = Field(False, description="take the smallest A whose path the roller can follow")
+    gravity: bool = Field(False, description="shape the profile so that the weight of the moving parts is carried too")
+
+    @model_validator(mode="after")
+    def _catalogue_where_needed(self) -> Self:
+        if (self.choose == "catalogue") != bool(self.catalogue):
+            raise ValueError("'catalogue' and 'choose: catalogue' belong together: give both or neither")
+        return self
+
+
+class Dynamics(Model):
+    """A motion that the slider is given, and how its forces are computed."""
+
+    motion: Literal["cycloidal"] = Field(
+        "cycloidal", description="from rest to rest without a jump of acceleration: s + h (t/T - sin(2 pi t/T)/(2 pi))"
+    )
+    slider_position: Length = Field(description="where the slider starts: its height above `origin`, not a travel")
+    stroke: Length = Field(description="how far it goes; negative: downwards")
+    time: Annotated[Time, Field(gt=0)] = Field(description="duration T")
+    points: int = Field(201, ge=5, le=1_000_000, description="points of the time history")
+    origin: Literal["path-start", "cam-start"] = Field(
+        "path-start", description="where heights are zero: at the first point of the roller path, or of the cam"
+    )
+    method: Literal["direct", "multibody"] = Field(
+        "direct", description="closed kinematics and power balance, or nine coordinates with Lagrange multipliers"
+    )
+
+    @field_validator("stroke")
+    @classmethod
+    def _moves(cls, stroke: float) -> float:
+        if stroke == 0:
+            raise ValueError("must not be 0: the slider has to move")
+        return stroke
+
+
+class CamAnalysis(Analysis):
+    """How a cam mechanism is run."""
+
+    travel: PositiveLength | None = Field(None, description="slider travel; default: the profile's stroke")
+    gravity: bool | None = Field(None, description="whether weight acts; default: as in design.gravity, else false")
+    fidelity: Literal["quasi-static", "dynamic"] | None = Field(
+        None, description="model; default: dynamic where `dynamics` is given, else quasi-static"
+    )
+    manufacturing: Manufacturing | None = Field(
+        None, description="errors of cutting: adds the band of forces they give"
+    )
+    dynamics: Dynamics | None = Field(None, description="motion for the dynamic model")
+    path_method: Literal["quadrature", "ode"] = Field("quadrature", description="how the path is integrated")
+    origin: Literal["path-start", "slider", "slider-from-cam"] = Field(
+        "path-start",
+        description=(
+            "zero of the displacement: travel from the start of the roller path, "
+            "the slider's height above that start, or above the first point of the cam"
+        ),
+    )
+
+
+class CamSpec(Spec):
+    """A cam mechanism: rollers, cam and springs."""
+
+    family: Literal["cam"]
+    mechanism: Mechanism
+    design: CamDesign | None = Field(None, description="what `cfmkit design` is to reach")
+    analysis: CamAnalysis = Field(default_factory=CamAnalysis, description="how it is run")
+
+    @model_validator(mode="after")
+    def _gravity_needs_masses(self) -> Self:
+        wanted = self.gravity or (self.design is not None and self.design.gravity)
+        if wanted and self.mechanism.masses is None:
+            raise ValueError("gravity needs the masses of the moving parts: add 'mechanism.masses'")
+        return self
+
+    @model_validator(mode="after")
+    def _dynamics_need_motion_and_masses(self) -> Self:
+        if self.fidelity == "dynamic" and self.analysis.dynamics is None:
+            raise ValueError("the dynamic model needs a motion: add 'analysis.dynamics'")
+        if self.fidelity == "dynamic" and self.mechanism.profile.file is not None:
+            raise ValueError("the dynamic model runs on the design: remove 'profile.file', or choose 'quasi-static'")
+        if self.fidelity == "dynamic" and self.mechanism.masses is None:
+            raise ValueError("the dynamic model needs the masses of the moving parts: add 'mechanism.masses'")
+        return self
+
+    @property
+    def fidelity(self) -> Literal["quasi-static", "dynamic"]:
+        """The model that the analysis uses."""
+        return self.analysis.fidelity or ("dynamic" if self.analysis.dynamics else "quasi-static")
+
+    @property
+    def gravity(self) -> bool:
+        """Whether weight acts in the analysis."""
+        if self.analysis.gravity is not None:
+            return self.analysis.gravity
+        return self.design is not None and self.design.gravity

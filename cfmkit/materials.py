@@ -1,0 +1,239 @@
+"""Named materials that constant-force mechanisms are made of, each with its source and its scatter.
+
+The nominal value is where a design starts; the scatter is what it must survive.
+For metals the low end is the minimum of the standard. For printed plastics the
+range is wide on purpose: orientation, layer adhesion, printer, humidity and the
+maker of the filament all move it, and none of them is known to this library.
+
+All values are at room temperature and for short loads. Plastics creep: a part
+that is held deflected loses force with time, which no modulus here shows.
+For plastics the yield strength is the stress at yield of a tensile test.
+"""
+
+from __future__ import annotations
+
+import difflib
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+from cfmkit.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+Range = tuple[float, float]
+
+
+class UnknownMaterial(InputError, ValueError):
+    """A material name that the library does not have (also a ValueError, for validators)."""
+
+
+@dataclass(frozen=True)
+class Scatter:
+    """From where to where a property is found in practice, low to high [Pa]."""
+
+    youngs_modulus: Range
+    yield_strength: Range | None = None
+
+
+@dataclass(frozen=True)
+class Material:
+    """One material.
+
+    Attributes
+    ----------
+    name : str
+        How a specification calls it.
+    youngs_modulus : float
+        Nominal elastic modulus [Pa].
+    poisson_ratio : float
+        Nominal Poisson ratio.
+    yield_strength : float or None
+        Nominal yield strength [Pa]; None where the source gives none.
+    density : float
+        [kg/m^3].
+    source : str
+        Where the numbers come from.
+    scatter : Scatter
+        Range of modulus and strength to expect.
+    aliases : tuple of str
+        Other words for it; a name that is not found is compared with these too.
+    """
+
+    name: str
+    youngs_modulus: float
+    poisson_ratio: float
+    yield_strength: float | None
+    density: float
+    source: str
+    scatter: Scatter
+    aliases: tuple[str, ...] = ()
+
+
+_METALS = (
+    Material(
+        "steel-1.4310", 179e9, 0.29, 965e6, 7900.0,
+        "E: EN 10151 strip 1.4310, cold rolled to Rm 1300 MPa, along the grain (189 GPa after tempering, 195 GPa at "
+        "Rm 1800 MPa). Yield: ASTM A666 type 301 full hard, minimum; upper end typical of strip +C1300.",
+        Scatter((175e9, 195e9), (930e6, 1300e6)), ("spring-steel", "aisi-301", "stainless-spring-steel", "301"),
+    ),
+    Material(
+        "steel-304", 200e9, 0.29, 205e6, 7900.0,
+        "E and density: EN 10088-1, steel 1.4301 (AISI 304). Yield: ASTM A240, annealed, minimum; upper end typical of "
+        "cold-rolled sheet. Poisson ratio: handbook value.",
+        Scatter((190e9, 200e9), (205e6, 310e6)), ("aisi-304", "1.4301", "stainless-steel"),
+    ),
+    Material(
+        "steel-s235", 210e9, 0.30, 235e6, 7850.0,
+        "EN 1993-1-1, sec. 3.2.6, and EN 10025-2, S235 up to 16 mm, minimum; upper end typical of mill certificates.",
+        Scatter((200e9, 212e9), (235e6, 340e6)), ("structural-steel", "mild-steel", "steel"),
+    ),
+    Material(
+        "aluminium-6061-t6", 68.9e9, 0.33, 276e6, 2700.0,
+        "Aluminum Association typical values, as in the ASM data sheet; low end of the yield: ASTM B209 minimum.",
+        Scatter((68e9, 70e9), (240e6, 290e6)), ("6061-t6", "aluminum-6061-t6", "al-6061"),
+    ),
+    Material(
+        "aluminium-7075-t6", 71.7e9, 0.33, 503e6, 2810.0,
+        "Aluminum Association typical values, as in the ASM data sheet; low end of the yield: typical of thick plate.",
+        Scatter((70e9, 72.5e9), (440e6, 540e6)), ("7075-t6", "aluminum-7075-t6", "al-7075"),
+    ),
+    Material(
+        "titanium-6al-4v", 113.8e9, 0.342, 880e6, 4430.0,
+        "ASM data sheet, Ti-6Al-4V (grade 5), annealed; low end of the yield: ASTM B265 minimum; modulus 105 to "
+        "120 GPa with texture and heat treatment.",
+        Scatter((105e9, 120e9), (828e6, 980e6)), ("ti-6al-4v", "ti64", "titanium"),
+    ),
+    Material(
+        "beryllium-copper", 131e9, 0.30, 1000e6, 8360.0,
+        "C17200 (CuBe2), precipitation hardened strip: typical data sheet range of the aged tempers TF00 to TH04.",
+        Scatter((120e9, 134e9), (890e6, 1380e6)), ("c17200", "cube2", "beryllium-bronze"),
+    ),
+)  # fmt: skip
+
+_PLASTICS = (
+    Material(
+        "pla", 3.0e9, 0.36, 45e6, 1240.0,
+        "Printed (filament): typical data sheet range, solid ASTM D638 / ISO 527 bars. Nominal: on edge, along the "
+        "strands; low end: modified PLA and between the layers (PolyTerra: 1.6 GPa, 12 MPa).",
+        Scatter((1.6e9, 4.0e9), (12e6, 65e6)), ("polylactide", "pla-plus"),
+    ),
+    Material(
+        "abs", 2.0e9, 0.35, 33e6, 1040.0,
+        "Printed (filament): typical data sheet range (1.4 GPa Kimya to 2.4 GPa Stratasys ABS-M30). Nominal: middle of "
+        "the range; strength as tested independently for ABS-M30 (ISO 527); low end: between the layers.",
+        Scatter((1.4e9, 2.5e9), (20e6, 43e6)), ("acrylonitrile-butadiene-styrene",),
+    ),
+    Material(
+        "petg", 2.0e9, 0.38, 45e6, 1270.0,
+        "Printed (filament): typical data sheet range; low end of the strength: between the layers (25 to 38 MPa).",
+        Scatter((1.5e9, 2.9e9), (25e6, 56e6)), ("pet-g",),
+    ),
+    Material(
+        "pa12-sls", 1.65e9, 0.39, 48e6, 930.0,
+        "Laser sintered: typical data sheet values (EOS PA 2200 class); scatter with powder refresh, orientation and "
+        "humidity (3D Systems: 1.39 GPa, 43 MPa).",
+        Scatter((1.35e9, 1.9e9), (40e6, 52e6)), ("pa12", "nylon-12", "nylon-sls", "pa-2200"),
+    ),
+    Material(
+        "pa12-mjf", 1.8e9, 0.43, 48e6, 1010.0,
+        "Multi Jet Fusion: HP 3D High Reusability PA 12 data sheet, balanced mode, ASTM D638, Z direction (Poisson "
+        "ratio 0.47 in XY); scatter: other print modes and the literature.",
+        Scatter((1.25e9, 1.9e9), (40e6, 54e6)), ("pa12", "nylon-12", "nylon-mjf"),
+    ),
+    Material(
+        "pom", 2.8e9, 0.37, 65e6, 1410.0,
+        "Polyoxymethylene, moulded or machined: typical data sheet range, ISO 527 (copolymer 2.5 to 2.9 GPa, 65 MPa: "
+        "Hostaform; homopolymer 3.0 to 3.2 GPa, 72 MPa: Delrin). Not the toughened grades.",
+        Scatter((2.5e9, 3.2e9), (60e6, 76e6)), ("delrin", "acetal", "polyoxymethylene", "hostaform"),
+    ),
+    Material(
+        "pa66", 1.4e9, 0.41, 55e6, 1140.0,
+        "Nylon 66, moulded, conditioned at 50 % humidity: Zytel 103HSL data sheet, ISO 527 (dry: 3.1 GPa, 85 MPa); "
+        "the scatter runs from wet to dry.",
+        Scatter((1.2e9, 3.1e9), (45e6, 85e6)), ("nylon", "nylon-66", "polyamide"),
+    ),
+    Material(
+        "pp", 1.4e9, 0.42, 32e6, 910.0,
+        "Polypropylene homopolymer, sheet and moulded: typical data sheet range, ISO 527 / ASTM D638.",
+        Scatter((1.1e9, 1.6e9), (30e6, 37e6)), ("polypropylene",),
+    ),
+    Material(
+        "pe-hd", 1.0e9, 0.44, 25e6, 955.0,
+        "High-density polyethylene, sheet and moulded: typical data sheet range, ISO 527.",
+        Scatter((0.7e9, 1.3e9), (20e6, 31e6)), ("hdpe", "polyethylene"),
+    ),
+    Material(
+        "pc", 2.4e9, 0.37, 65e6, 1200.0,
+        "Polycarbonate, moulded: Makrolon 2405 data sheet, ISO 527; scatter: typical data sheet range. Poisson ratio: "
+        "handbook value.",
+        Scatter((2.1e9, 2.5e9), (55e6, 70e6)), ("polycarbonate", "makrolon", "lexan"),
+    ),
+    Material(
+        "tpu-95a", 26e6, 0.48, 8.6e6, 1220.0,
+        "Printed (filament), Shore 95A: typical data sheet class; scatter of the modulus as measured on four printed "
+        "TPUs (Haid et al. 2022, 24 to 247 MPa). Strongly nonlinear: only for small strains.",
+        Scatter((24e6, 250e6), (5e6, 12e6)), ("tpu", "polyurethane"),
+    ),
+)  # fmt: skip
+
+_PAPERS = (
+    Material(
+        "pom-lan-2010", 2.0e9, 0.35, 76e6, 1410.0,
+        "Lan, Wang, Chen 2010, Table 2: E and yield stress of their polyoxymethylene (used there with a safety factor "
+        "of 1.58). Poisson ratio and density: typical POM; scatter: up to the data sheet values.",
+        Scatter((2.0e9, 3.2e9), (60e6, 76e6)),
+    ),
+    Material(
+        "pla-ding-2022", 1.477e9, 0.30, None, 1250.0,
+        "Ding, Li, Li 2022, sec. 6: printed PLA-ST; no strength is given there. Scatter of E: printed PLA, low side.",
+        Scatter((1.2e9, 2.0e9)),
+    ),
+    Material(
+        "abs-bilancia-2019", 1.8e9, 0.35, 42.5e6, 1040.0,
+        "Bilancia, Geraci, Berselli 2019, sec. 2.2: E, Poisson ratio, and the flexural yield strength (42.5 MPa) of "
+        "their ABS; density: typical ABS; scatter: printed ABS.",
+        Scatter((1.4e9, 2.5e9), (20e6, 43e6)),
+    ),
+    Material(
+        "steel-85-li-hao-2019", 200e9, 0.30, 980e6, 7850.0,
+        "Li, Hao 2019, sec. 7: spring steel 85, E. Yield: GB/T 1222, steel 85 quenched and tempered, minimum; Poisson "
+        "ratio, density and scatter: typical carbon spring steel.",
+        Scatter((195e9, 210e9), (980e6, 1200e6)),
+    ),
+)  # fmt: skip
+
+MATERIALS: Mapping[str, Material] = MappingProxyType({item.name: item for item in (*_METALS, *_PLASTICS, *_PAPERS)})
+"""Every material by name."""
+
+
+def material(name: str) -> Material:
+    """Return the material of that name.
+
+    Raises
+    ------
+    UnknownMaterial
+        If there is none; the message names the nearest ones.
+
+    Examples
+    --------
+    >>> material("pom").youngs_modulus
+    2800000000.0
+    """
+    if name in MATERIALS:
+        return MATERIALS[name]
+    near = _nearest(name)
+    hint = f"did you mean {' or '.join(map(repr, near))}?" if near else f"known: {', '.join(MATERIALS)}"
+    raise UnknownMaterial(f"there is no material {name!r}; {hint}")
+
+
+def _nearest(name: str) -> tuple[str, ...]:
+    """Return the names that `name` could have meant, by alias or by spelling."""
+    wanted = name.strip().lower().replace("_", "-").replace(" ", "-")
+    words: dict[str, list[str]] = {}
+    for item in MATERIALS.values():
+        for word in (item.name, *item.aliases):
+            words.setdefault(word, []).append(item.name)
+    close = [wanted] if wanted in words else difflib.get_close_matches(wanted, words, n=2, cutoff=0.6)
+    return tuple(dict.fromkeys(name for word in close for name in words[word]))

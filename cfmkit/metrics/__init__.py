@@ -1,0 +1,42 @@
+"""Constant-force metrics by name, over a stated window, per branch; and requirements on them.
+
+`table` lists what there is, `flatness` and `ranges` compute it, `traces` cuts
+windows, `subjects` is what a metric looks at, `evaluation` runs the table over a
+curve, `requirements` compares with bounds, `report` writes border units.
+"""
+
+from cfmkit.metrics.evaluation import Survey, evaluate, frame_of, measure, survey, window_of
+from cfmkit.metrics.report import as_json, metrics_json
+from cfmkit.metrics.requirements import Outcome, check, requirement_problems, validate_requirements
+from cfmkit.metrics.subjects import Branch, Cycle, Frame
+from cfmkit.metrics.table import TABLE, Definition, definitions, split_name, unknown_metric, values_of_family
+from cfmkit.metrics.traces import Trace, Undefined, Window, restrict, traces
+
+__all__ = [
+    "TABLE",
+    "Branch",
+    "Cycle",
+    "Definition",
+    "Frame",
+    "Outcome",
+    "Survey",
+    "Trace",
+    "Undefined",
+    "Window",
+    "as_json",
+    "check",
+    "definitions",
+    "evaluate",
+    "frame_of",
+    "measure",
+    "metrics_json",
+    "requirement_problems",
+    "restrict",
+    "split_name",
+    "survey",
+    "traces",
+    "unknown_metric",
+    "validate_requirements",
+    "values_of_family",
+    "window_of",
+]

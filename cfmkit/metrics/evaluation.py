@@ -1,0 +1,206 @@
+"""Values of metrics on a curve: per branch, and the worst branch where none is named."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import isfinite
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from cfmkit.errors import UsageError
+from cfmkit.metrics.subjects import Cycle, Frame, cycle
+from cfmkit.metrics.table import Definition, definitions, split_name, unknown_metric
+from cfmkit.metrics.traces import Undefined, Window
+from cfmkit.results import Quantity
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Iterator
+
+    from cfmkit.curves import Curve, Kind
+    from cfmkit.results import Result
+
+
+class Value(NamedTuple):
+    """A value in SI, or why there is none."""
+
+    value: float | None
+    reason: str = ""
+
+
+@dataclass(frozen=True)
+class Survey:
+    """All metrics of one curve over one window; each is computed when it is asked for."""
+
+    subject: Cycle
+
+    @property
+    def branches(self) -> tuple[str, ...]:
+        """The names of the branches."""
+        return tuple(branch.name for branch in self.subject.branches)
+
+    def each(self, definition: Definition, branch: str | None = None) -> tuple[Value, ...]:
+        """Return the values of a metric: of one branch, of every branch, or of the cycle as a whole."""
+        function = definition.function
+        if function is None:
+            return (Value(None, "it was not computed"),)
+        chosen = tuple(item for item in self.subject.branches if branch in (None, item.name))
+        if not chosen:
+            return (Value(None, self._no_branch(branch)),)
+        if definition.scope == "branch":
+            return tuple(_value(function, item) for item in chosen)
+        return (_value(function, self.subject if branch is None else Cycle(chosen, self.subject.frame)),)
+
+    def _no_branch(self, name: str | None) -> str:
+        if not self.branches:
+            return "the curve has no points"
+        return f"there is no branch {name!r}; there are {', '.join(map(repr, self.branches))}"
+
+    def worst(self, definition: Definition, values: tuple[Value, ...]) -> Value:
+        """Return the value that counts where no branch is named; undefined if it is so on any branch."""
+        if len(values) == 1:
+            return values[0]
+        known = [item for item in values if item.value is not None]
+        if len(known) < len(values):
+            return next(item for item in values if item.value is None)
+        return _WORST[definition.worst](known, self.subject.frame.target)
+
+
+def _height(item: Value) -> float:
+    return item.value if item.value is not None else 0.0
+
+
+def _farthest(values: list[Value], target: float | None) -> Value:
+    if target is None:
+        return min(values, key=_height)
+    return max(values, key=lambda item: abs(_height(item) - target))
+
+
+_WORST: dict[str, Callable[[list[Value], float | None], Value]] = {
+    "largest": lambda values, _target: max(values, key=_height),
+    "smallest": lambda values, _target: min(values, key=_height),
+    "farthest-from-target": _farthest,
+}
+
+
+def _value(function: Callable[..., float], subject: object) -> Value:
+    try:
+        value = float(function(subject))
+    except Undefined as gap:
+        return Value(None, gap.reason)
+    return Value(value) if isfinite(value) else Value(None, "it is not finite")
+
+
+def survey(curve: Curve, frame: Frame, window: Window | None = None) -> Survey:
+    """Return the metrics of a curve, measured in a frame over a window."""
+    return Survey(cycle(curve, frame, window))
+
+
+def measure(
+    curve: Curve, frame: Frame, window: Window | None = None, extra: Iterable[Definition] = ()
+) -> dict[str, Quantity]:
+    """Return every metric of a curve by name, with ``[branch]`` variants where there are several branches.
+
+    Parameters
+    ----------
+    curve : Curve
+        Computed or measured.
+    frame : Frame
+        Target, reference pose, allowable stress, band.
+    window : Window, optional
+        Where to measure; default: the whole of each branch.
+    extra : iterable of Definition
+        More metrics, computed by their functions.
+    """
+    return _all(survey(curve, frame, window), definitions(curve.kind, extra))
+
+
+@np.errstate(all="ignore")
+def _all(view: Survey, table: Iterable[Definition]) -> dict[str, Quantity]:
+    return dict(item for definition in table for item in _entries(view, definition))
+
+
+def _entries(view: Survey, definition: Definition) -> Iterator[tuple[str, Quantity]]:
+    """Yield the worst branch's value under the plain name, then each branch's."""
+    if definition.function is None:
+        return
+    values = view.each(definition)
+    yield definition.name, _quantity(definition, view.worst(definition, values))
+    if len(values) > 1:
+        for branch, value in zip(view.branches, values, strict=True):
+            yield f"{definition.name}[{branch}]", _quantity(definition, value)
+
+
+def _quantity(definition: Definition, value: Value) -> Quantity:
+    return Quantity(value.value, definition.dimension, definition.definition, value.reason)
+
+
+def frame_of(result: Result) -> Frame:
+    """Return what the curves of a result are measured against."""
+    band = getattr(getattr(result.spec, "analysis", None), "band", Frame.band)
+    return Frame(result.target, result.reference, result.allowable_stress, band, result.valid)
+
+
+def window_of(result: Result) -> Window | None:
+    """Return ``analysis.window`` of the specification, if it states one."""
+    # a family need not have this block, and no family is named here
+    ends = getattr(getattr(result.spec, "analysis", None), "window", None)
+    return Window(float(ends[0]), float(ends[1])) if ends is not None else None
+
+
+def kind_of(result: Result) -> Kind | None:
+    """Return the kind of the nominal curve; None without a curve."""
+    return result.curves[0].kind if result.curves else None
+
+
+def survey_of(result: Result, window: Window | None) -> Survey | None:
+    """Return the metrics of the nominal curve over a window; None without a curve."""
+    return survey(result.curves[0], frame_of(result), window) if result.curves else None
+
+
+def evaluate(
+    result: Result,
+    names: Iterable[str] | None = None,
+    window: Window | None = None,
+    extra_definitions: Iterable[Definition] = (),
+) -> dict[str, Quantity]:
+    """Return the metrics of the nominal curve and the family's own values, by name.
+
+    Parameters
+    ----------
+    result : Result
+        Of any status; without a curve only the family's values exist.
+    names : iterable of str, optional
+        Only these (``force_mean``, ``force_mean[load]``, a family's value); default: all.
+    window : Window, optional
+        Default: ``analysis.window``, else the full travel.
+    extra_definitions : iterable of Definition
+        A family's metrics beside those of the contract.
+
+    Returns
+    -------
+    dict of str to Quantity
+        SI; a value of None carries its reason. A family's own value replaces a metric of the same name.
+
+    Raises
+    ------
+    cfmkit.errors.UsageError
+        If one of `names` exists neither as a metric nor as a value of the family.
+    """
+    view = survey_of(result, window or window_of(result))
+    table = definitions(kind_of(result), extra_definitions)
+    if names is not None:
+        known = {item.name: item for item in table}
+        return {name: result.values.get(name) or _named(view, name, known, result) for name in names}
+    return ({} if view is None else _all(view, table)) | dict(result.values)
+
+
+@np.errstate(all="ignore")
+def _named(view: Survey | None, name: str, known: dict[str, Definition], result: Result) -> Quantity:
+    metric, branch = split_name(name)
+    if metric not in known:
+        raise UsageError(unknown_metric(metric, [*known, *result.values]))
+    definition = known[metric]
+    if view is None:
+        return Quantity(None, definition.dimension, definition.definition, result.message)
+    return _quantity(definition, view.worst(definition, view.each(definition, branch)))

@@ -1,0 +1,142 @@
+"""Metrics of what lies inside the window: statistics, deviations, hysteresis, stress.
+
+A branch whose mean is negative is judged in its own direction (the opposite sign
+convention gives the same ripple). Each function takes a `Branch` (or the
+`Cycle`) and returns SI, or raises `Undefined` with the reason.
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.metrics.traces import Trace, Undefined, Window
+
+if TYPE_CHECKING:
+    from cfmkit.curves import FloatArray
+    from cfmkit.metrics.subjects import Branch, Cycle
+
+UNIFORM_POINTS = 100
+"""Points at which `rms_to_target` is taken, the start excluded: Q of [Bilancia 2019, eq. 8]."""
+
+
+def mean(branch: Branch) -> float:
+    """Return the mean effort over the points in the window."""
+    return branch.spread.sign * branch.spread.mean
+
+
+def standard_deviation(branch: Branch) -> float:
+    """Return the sample standard deviation (n - 1) of the effort over the points in the window."""
+    effort = branch.inside.effort
+    if len(effort) < 2:
+        raise Undefined("a standard deviation needs two points")
+    offset = effort - mean(branch)
+    return sqrt(float(offset @ offset) / (len(effort) - 1))
+
+
+def largest(branch: Branch) -> float:
+    """Return the largest effort in the window."""
+    spread = branch.spread
+    return spread.max if spread.sign > 0 else -spread.min
+
+
+def smallest(branch: Branch) -> float:
+    """Return the smallest effort in the window."""
+    spread = branch.spread
+    return spread.min if spread.sign > 0 else -spread.max
+
+
+def ripple(branch: Branch) -> float:
+    """Return (max - min) / max."""
+    spread = branch.spread
+    return (spread.max - spread.min) / _positive(spread.max, branch)
+
+
+def half_band(branch: Branch) -> float:
+    """Return (max - min) / (max + min)."""
+    spread = branch.spread
+    return (spread.max - spread.min) / _positive(spread.max + spread.min, branch)
+
+
+def _positive(value: float, branch: Branch) -> float:
+    if value <= 0:
+        raise Undefined(f"the {branch.kind} changes sign or is zero")
+    return value
+
+
+def deviation_from_mean(branch: Branch) -> float:
+    """Return the largest ``|F - mean| / mean``."""
+    spread = branch.spread
+    return max(spread.max - spread.mean, spread.mean - spread.min) / _positive(spread.mean, branch)
+
+
+def deviation_from_target(branch: Branch) -> float:
+    """Return the largest ``|F - target| / target``."""
+    target = branch.frame.needed_target()
+    return max(abs(largest(branch) - target), abs(smallest(branch) - target)) / abs(target)
+
+
+def rms_to_target(branch: Branch) -> float:
+    """Return the root mean square of F - target at places uniform in the motion, the window's start excluded."""
+    target = branch.frame.needed_target()
+    branch.inside  # noqa: B018  (raises where the window is not covered)
+    lo, hi = branch.ends
+    places = lo + (hi - lo) * np.arange(1, UNIFORM_POINTS + 1) / UNIFORM_POINTS
+    function = branch.function
+    offset = np.interp(places, function.motion, function.effort) - target
+    return sqrt(float(offset @ offset) / UNIFORM_POINTS)
+
+
+def hysteresis_area(cycle: Cycle) -> float:
+    """Return the area between the branches ``load`` and ``unload`` in the window, positive where load lies above.
+
+    The trapezoids of each branch on its own points add up to those of their
+    difference on the union of the points, so no common grid is needed.
+    """
+    by_name = {branch.name: branch for branch in cycle.branches}
+    if not {"load", "unload"} <= set(by_name):
+        raise Undefined("a hysteresis loop needs the branches 'load' and 'unload'")
+    load, unload = by_name["load"], by_name["unload"]
+    window = load.window or _common(load, unload)
+    return _area(load, window) - _area(unload, window)
+
+
+def _common(one: Branch, other: Branch) -> Window:
+    """Return the travel that both branches cover."""
+    lo, hi = max(one.extent[0], other.extent[0]), min(one.extent[1], other.extent[1])
+    if not lo < hi:
+        raise Undefined("the branches 'load' and 'unload' have no travel in common")
+    return Window(lo, hi)
+
+
+def _area(branch: Branch, window: Window) -> float:
+    """Return the area under a branch, whichever way it runs."""
+    part = branch.inside if window == branch.window else branch.part(window)
+    if not isinstance(part, Trace):
+        raise Undefined(part)
+    way = np.sign(branch.trace.motion[-1] - branch.trace.motion[0])
+    return float(way) * part.work()
+
+
+def stress_max(branch: Branch) -> float:
+    """Return the largest stress in the window."""
+    return float(_stress(branch.inside).max())
+
+
+def safety_factor(branch: Branch) -> float:
+    """Return the allowable stress over the largest stress in the window."""
+    allowable = branch.frame.allowable_stress
+    if allowable is None:
+        raise Undefined("there is no allowable stress to compare with")
+    stress = stress_max(branch)
+    if stress <= 0:
+        raise Undefined("nothing is stressed")
+    return allowable / stress
+
+
+def _stress(trace: Trace) -> FloatArray:
+    if trace.stress is None:
+        raise Undefined("the curve has no column 'max_stress'")
+    return trace.stress

@@ -1,0 +1,43 @@
+"""Metrics for files: border units, one record each."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from cfmkit.units import border_unit, to_border
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from cfmkit.results import Quantity
+
+
+def as_json(quantity: Quantity) -> dict[str, Any]:
+    """Return ``{"value", "unit", "definition"}`` in border units; without a value also the reason.
+
+    Examples
+    --------
+    >>> from cfmkit.results import Quantity
+    >>> as_json(Quantity(0.24, "length", "usable travel"))
+    {'value': 240.0, 'unit': 'mm', 'definition': 'usable travel'}
+    """
+    unit, definition = border_unit(quantity.dimension), quantity.definition
+    if quantity.value is None:
+        return {"value": None, "unit": unit, "definition": definition} | _reason(quantity)
+    return {"value": finite_border(quantity.value, quantity.dimension), "unit": unit, "definition": definition}
+
+
+def finite_border(value: float, dimension: str) -> float | None:
+    """Return an SI value in its border unit; None where it is beyond what a float, and so JSON, can hold."""
+    number = float(to_border(value, dimension))
+    return number if math.isfinite(number) else None
+
+
+def _reason(quantity: Quantity) -> dict[str, str]:
+    return {"reason": quantity.reason} if quantity.reason else {}
+
+
+def metrics_json(quantities: Mapping[str, Quantity]) -> dict[str, dict[str, Any]]:
+    """Return the block ``metrics`` of metrics.json."""
+    return {name: as_json(quantity) for name, quantity in quantities.items()}

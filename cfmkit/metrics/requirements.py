@@ -1,0 +1,291 @@
+"""Requirements of a specification: are they well put, and does a result meet them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.errors import Problem, QuantityError, SpecError
+from cfmkit.metrics.evaluation import Survey, Value, kind_of, survey_of, window_of
+from cfmkit.metrics.report import finite_border
+from cfmkit.metrics.subjects import span_text
+from cfmkit.metrics.table import Definition, definitions, split_name, unknown_metric
+from cfmkit.metrics.traces import Window
+from cfmkit.units import DIMENSIONS, border_unit, format_short, read_one_of, to_border
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
+
+    from cfmkit.curves import Kind
+    from cfmkit.results import Result
+    from cfmkit.spec import Requirement, Spec
+
+ROUNDING = 1e-9
+"""A value on its bound is within it, whatever the conversion of units does to the last bits (relative)."""
+
+_MOTION = {"force": "length", "torque": "angle"}
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of one requirement; SI throughout.
+
+    Attributes
+    ----------
+    metric : str
+        As written in the requirement.
+    dimension : str
+        Of the metric.
+    value : float or None
+        The branch that is closest to breaking the requirement, or breaks it most; None: no value.
+    min, max : float or None
+        The bounds.
+    over : tuple of (float, float) or None
+        The window it was measured over; None: the full travel, or not a matter of a window.
+    kind : {"force", "torque"}
+        Of the curve, which says whether `over` is a length or an angle.
+    ok : bool
+        Whether it is met. Without a value it is not.
+    sentence : str
+        All of that in one line.
+    """
+
+    metric: str
+    dimension: str
+    value: float | None
+    min: float | None
+    max: float | None
+    over: tuple[float, float] | None
+    kind: Kind
+    ok: bool
+    sentence: str
+
+    @property
+    def unit(self) -> str:
+        """The border unit of value and bounds."""
+        return border_unit(self.dimension)
+
+    def as_json(self) -> dict[str, Any]:
+        """Return a JSON-ready record in border units."""
+        numbers = {key: self._border(getattr(self, key), self.dimension) for key in ("value", "min", "max")}
+        motion = _MOTION[self.kind]
+        over = None if self.over is None else [self._border(end, motion) for end in self.over]
+        window = {"over": over, "over_unit": None if over is None else border_unit(motion)}
+        return {"metric": self.metric, **numbers, "unit": self.unit, **window, "ok": self.ok, "sentence": self.sentence}
+
+    @staticmethod
+    def _border(value: float | None, dimension: str) -> float | None:
+        return None if value is None else finite_border(value, dimension)
+
+
+def validate_requirements(spec: Spec, known: Iterable[Definition], kind: Kind | None = None) -> None:
+    """Check the requirements of a specification as far as that needs no curve.
+
+    Parameters
+    ----------
+    spec : Spec
+        Its ``requirements``.
+    known : iterable of Definition
+        Every metric there is: ``definitions(kind, family's)``.
+    kind : {"force", "torque"} or None
+        Of the curve, if it is known: then windows in the wrong dimension are found too.
+
+    Raises
+    ------
+    cfmkit.errors.SpecError
+        One problem for each fault, at ``requirements.N.metric`` and so on.
+    """
+    problems = tuple(requirement_problems(spec.requirements, known, kind))
+    if problems:
+        raise SpecError(problems)
+
+
+def requirement_problems(
+    requirements: Sequence[Requirement], known: Iterable[Definition], kind: Kind | None = None
+) -> Iterator[Problem]:
+    """Yield what is wrong with requirements: unknown metrics, bounds and windows of the wrong dimension."""
+    table: dict[str, list[Definition]] = {}
+    for item in known:
+        table.setdefault(item.name, []).append(item)
+    for index, requirement in enumerate(requirements):
+        for key, message in _faults(requirement, table, kind):
+            yield Problem("", 0, 0, f"requirements.{index}.{key}", message)
+
+
+def _faults(
+    requirement: Requirement, table: Mapping[str, Sequence[Definition]], kind: Kind | None
+) -> Iterator[tuple[str, str]]:
+    """Yield (key, what is wrong) for one requirement."""
+    name, branch = split_name(requirement.metric)
+    if name not in table:
+        yield "metric", unknown_metric(name, table)
+        return
+    meant = table[name]
+    if branch is not None and not meant[0].per_branch:
+        yield "metric", f"{name!r} is not a matter of one branch; write it without [{branch}]"
+    yield from _bound_faults(requirement, tuple(dict.fromkeys(item.dimension for item in meant)))
+    if requirement.over is not None:
+        yield from _window_faults(requirement.over, meant[0], kind)
+
+
+def _bound_faults(requirement: Requirement, dimensions: tuple[str, ...]) -> Iterator[tuple[str, str]]:
+    bounds = []
+    for key, text in (("min", requirement.min), ("max", requirement.max)):
+        try:
+            bounds.append(_bound(text, dimensions))
+        except QuantityError as problem:
+            yield key, f"a bound of {requirement.metric!r}: {problem}"
+            return
+    low, high = bounds
+    if low is not None and high is not None and low > high:
+        yield "max", f"'max' ({requirement.max}) is below 'min' ({requirement.min})"
+
+
+def _window_faults(over: tuple[float, float], meant: Definition, kind: Kind | None) -> Iterator[tuple[str, str]]:
+    if meant.scope == "value":
+        yield "over", f"{meant.name!r} is not measured over a window; remove 'over'"
+        return
+    given = {getattr(end, "dimension", _MOTION.get(kind or "", "length")) for end in over}
+    if len(given) > 1:
+        yield "over", "one end is a length and the other an angle"
+    elif kind is not None and given != {_MOTION[kind]}:
+        right, wrong = DIMENSIONS[_MOTION[kind]].phrase, DIMENSIONS[given.pop()].phrase
+        yield "over", f"the curve is a {kind} curve: its window is {right}, not {wrong}"
+
+
+@lru_cache(maxsize=256)
+def _bound(text: str | None, dimensions: tuple[str, ...]) -> float | None:
+    return None if text is None else read_one_of(text, dimensions)[0]
+
+
+def check(
+    requirements: Sequence[Requirement], result: Result, extra_definitions: Iterable[Definition] = ()
+) -> tuple[Outcome, ...]:
+    """Return the outcome of every requirement on a result, in their order.
+
+    Where no branch is named, all branches must meet it. A metric that has no
+    value (the curve ends before the window does, there is no target) is missed.
+
+    Raises
+    ------
+    cfmkit.errors.SpecError
+        If a requirement is not well put: see `validate_requirements`.
+    """
+    kind = kind_of(result)
+    known = [*definitions(kind, extra_definitions), *_own(result)]
+    problems = tuple(requirement_problems(requirements, known, kind))
+    if problems:
+        raise SpecError(problems)
+    table = {item.name: item for item in reversed(known)}
+    surveys: dict[Window | None, Survey | None] = {}
+    return tuple(_outcome(requirement, result, table, surveys) for requirement in requirements)
+
+
+def _own(result: Result) -> Iterator[Definition]:
+    for name, quantity in result.values.items():
+        yield Definition(name, quantity.dimension, quantity.definition, scope="value", windowed=False)
+
+
+@np.errstate(all="ignore")
+def _outcome(
+    requirement: Requirement,
+    result: Result,
+    table: Mapping[str, Definition],
+    surveys: dict[Window | None, Survey | None],
+) -> Outcome:
+    definition = table[split_name(requirement.metric)[0]]
+    window = _window(requirement, result)
+    if window not in surveys:
+        surveys[window] = survey_of(result, window)
+    values = _values(requirement.metric, definition, surveys[window], result)
+    limits = Limits.of(requirement, definition.dimension)
+    value = min(values, key=limits.margin)
+    kind = kind_of(result) or "force"
+    measured = window if definition.scope != "value" else None
+    return Outcome(
+        requirement.metric,
+        definition.dimension,
+        value.value,
+        limits.min,
+        limits.max,
+        (measured.lo, measured.hi) if measured else None,
+        kind,
+        limits.met(value.value),
+        limits.sentence(requirement.metric, value, _over(definition, window, kind)),
+    )
+
+
+def _window(requirement: Requirement, result: Result) -> Window | None:
+    over = requirement.over
+    return window_of(result) if over is None else Window(float(over[0]), float(over[1]))
+
+
+def _values(name: str, definition: Definition, view: Survey | None, result: Result) -> tuple[Value, ...]:
+    """Return the values that must all keep the bounds."""
+    if name in result.values:
+        quantity = result.values[name]
+        return (Value(quantity.value, quantity.reason or "the mechanism has none"),)
+    return (Value(None, result.message),) if view is None else view.each(definition, split_name(name)[1])
+
+
+def _over(definition: Definition, window: Window | None, kind: Kind) -> str:
+    if not definition.windowed:
+        return ""
+    return f" over {span_text(window.lo, window.hi, kind)}" if window else " over the full travel"
+
+
+@dataclass(frozen=True)
+class Limits:
+    """The bounds of one requirement, as numbers and as they were written."""
+
+    dimension: str
+    min: float | None
+    max: float | None
+    text: str
+
+    @classmethod
+    def of(cls, requirement: Requirement, dimension: str) -> Limits:
+        """Return the bounds of a requirement that has been validated."""
+        low, high = _bound(requirement.min, (dimension,)), _bound(requirement.max, (dimension,))
+        if requirement.min is None:
+            text = f"allowed <= {requirement.max}"
+        elif requirement.max is None:
+            text = f"required >= {requirement.min}"
+        else:
+            text = f"required {requirement.min} ... {requirement.max}"
+        return cls(dimension, low, high, text)
+
+    def met(self, value: float | None) -> bool:
+        """Return whether a value keeps both bounds."""
+        if value is None:
+            return False
+        high = self.max is None or value <= self.max + ROUNDING * abs(self.max)
+        return high and (self.min is None or value >= self.min - ROUNDING * abs(self.min))
+
+    def margin(self, item: Value) -> float:
+        """Return how far a value is inside the bounds; least for none."""
+        if item.value is None:
+            return -float("inf")
+        gaps = [item.value - self.min] if self.min is not None else []
+        return min([*gaps, self.max - item.value] if self.max is not None else gaps)
+
+    def sentence(self, metric: str, item: Value, over: str) -> str:
+        """Return the outcome in one line."""
+        name, branch = split_name(metric)
+        words = name.replace("_", " ") + (f" on {branch}" if branch else "")
+        if item.value is None:
+            return f"{words}{over}: no value ({item.reason}), {self.text}: missed"
+        return f"{words} {self.shown(item.value)}{over}, {self.text}: {'ok' if self.met(item.value) else 'missed'}"
+
+    def shown(self, value: float) -> str:
+        """Return a value rounded for reading, but never so far that it seems to be on the other side of a bound."""
+        for digits in range(4, 18):
+            rounded = float(f"{to_border(value, self.dimension):.{digits}g}") / float(to_border(1.0, self.dimension))
+            if self.met(rounded) == self.met(value):
+                break
+        if self.dimension == "ratio" and "%" not in self.text:
+            return f"{value:.{digits}g}"
+        return format_short(value, self.dimension, digits)

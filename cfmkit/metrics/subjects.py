@@ -1,0 +1,235 @@
+"""What a metric looks at: one branch, or the whole cycle, in its frame of reference.
+
+Everything that several metrics need is computed once, when it is first asked for.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from math import isfinite
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from cfmkit.metrics.traces import Trace, Undefined, Window, covers, restrict, traces
+
+if TYPE_CHECKING:
+    from cfmkit.curves import Curve, FloatArray, Kind
+
+
+@dataclass(frozen=True)
+class Frame:
+    """What a curve is measured against.
+
+    Attributes
+    ----------
+    target : float or None
+        The force or torque it should have [N or N m].
+    reference : float or None
+        Motion of the reference pose [m or rad]; default: the centre of the window.
+    allowable_stress : float or None
+        [Pa].
+    band : float
+        Half width of the force band of ``usable_stroke``, as a fraction.
+    valid : tuple of (float, float) or None
+        Intervals of the motion in which the mechanism works as intended; None: everywhere.
+    """
+
+    target: float | None = None
+    reference: float | None = None
+    allowable_stress: float | None = None
+    band: float = 0.05
+    valid: tuple[tuple[float, float], ...] | None = None
+
+    def needed_target(self) -> float:
+        """Return the target, which may not be zero.
+
+        Raises
+        ------
+        Undefined
+            If there is none.
+        """
+        if not self.target:
+            raise Undefined("there is no target to compare with" if self.target is None else "the target is zero")
+        return self.target
+
+
+class Spread(NamedTuple):
+    """Mean and extremes of the effort over the points in the window, times `sign` so that the mean is not negative."""
+
+    mean: float
+    max: float
+    min: float
+    sign: float
+
+
+class Function(NamedTuple):
+    """A branch as a function of the motion: increasing motion, one effort for each."""
+
+    motion: FloatArray
+    effort: FloatArray
+
+    def at(self, place: float) -> float:
+        """Return the effort at a place, by linear interpolation."""
+        return float(np.interp(place, self.motion, self.effort))
+
+
+@dataclass(frozen=True, eq=False)
+class Branch:
+    """One branch of a curve, as metrics see it.
+
+    Attributes
+    ----------
+    trace : Trace
+        The whole branch, in path order.
+    kind : {"force", "torque"}
+        What its effort is.
+    frame : Frame
+        What it is measured against.
+    window : Window or None
+        Where it is measured; None: everywhere.
+    """
+
+    trace: Trace
+    kind: Kind
+    frame: Frame
+    window: Window | None = None
+
+    @property
+    def name(self) -> str:
+        """The name of the branch."""
+        return self.trace.name
+
+    @property
+    def extent(self) -> tuple[float, float]:
+        """Smallest and largest motion of the branch."""
+        return self.trace.extent
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Ends of the window, or of the branch where there is no window."""
+        return (self.window.lo, self.window.hi) if self.window else self.extent
+
+    @cached_property
+    def _inside(self) -> Trace | str:
+        part = self.part(self.window) if self.window else self.trace
+        return part if isinstance(part, str) else self._solved(part)
+
+    def _solved(self, part: Trace) -> Trace | str:
+        """Return a part all of whose points have a finite effort."""
+        if isfinite(part.effort.sum()):
+            return part
+        failed = len(part.effort) - int(np.isfinite(part.effort).sum())
+        return f"{failed} of {len(part.effort)} points of branch {self.name!r} in the window have no equilibrium"
+
+    @property
+    def inside(self) -> Trace:
+        """The part of the branch in the window.
+
+        Raises
+        ------
+        Undefined
+            If the branch does not cover the window, or has points without equilibrium in it.
+        """
+        if isinstance(self._inside, str):
+            raise Undefined(self._inside)
+        return self._inside
+
+    def part(self, window: Window) -> Trace | str:
+        """Return the part of the branch in some window, or why there is none."""
+        if covers(self.extent, window):
+            return restrict(self.trace, window)
+        return f"branch {self.name!r} covers {self.span(*self.extent)} only"
+
+    @cached_property
+    def spread(self) -> Spread:
+        """Mean and extremes in the window."""
+        effort = self.inside.effort
+        mean, high, low = float(effort.sum()) / len(effort), float(effort.max()), float(effort.min())
+        if mean < 0:
+            return Spread(-mean, -low, -high, -1.0)
+        return Spread(mean, high, low, 1.0)
+
+    @cached_property
+    def function(self) -> Function:
+        """The whole branch as a function of the motion.
+
+        Raises
+        ------
+        Undefined
+            If it folds back: a many-valued branch is never sorted.
+        """
+        way = self.trace.way
+        if not way:
+            raise Undefined(f"branch {self.name!r} turns back: its {self.kind} is many-valued")
+        return Function(self.trace.motion[::way], self.trace.effort[::way])
+
+    @cached_property
+    def around(self) -> tuple[FloatArray, FloatArray, int]:
+        """Motion and relative offset ``F / F_ref - 1``, increasing, with the reference pose at the index given.
+
+        Raises
+        ------
+        Undefined
+            If the branch does not reach the reference pose, is many-valued, or has no effort there.
+        """
+        place = self.reference
+        here, (motion, effort) = self.at(place), self.function
+        if here == 0:
+            raise Undefined(f"the {self.kind} at the reference pose is zero")
+        index, offset = int(motion.searchsorted(place)), effort / here - 1
+        motion = np.concatenate((motion[:index], [place], motion[index:]))
+        return motion, np.concatenate((offset[:index], [0.0], offset[index:])), index
+
+    @property
+    def reference(self) -> float:
+        """Motion of the reference pose."""
+        lo, hi = self.ends
+        return (lo + hi) / 2 if self.frame.reference is None else self.frame.reference
+
+    def at(self, place: float) -> float:
+        """Return the effort at one place of the branch.
+
+        Raises
+        ------
+        Undefined
+            If the branch does not get there, or is many-valued.
+        """
+        lo, hi = self.extent
+        slack = 1e-9 * (hi - lo)
+        if not lo - slack <= place <= hi + slack:
+            raise Undefined(f"branch {self.name!r} covers {self.span(lo, hi)} only")
+        return self.function.at(place)
+
+    def span(self, lo: float, hi: float) -> str:
+        """Return ``2 ... 240 mm`` for messages."""
+        return span_text(lo, hi, self.kind)
+
+
+def span_text(lo: float, hi: float, kind: Kind) -> str:
+    """Return an interval of the motion as text in border units, rounded to six digits."""
+    from cfmkit.units import border_unit, to_border
+
+    dimension = "length" if kind == "force" else "angle"
+    return f"{float(to_border(lo, dimension)):.6g} ... {float(to_border(hi, dimension)):.6g} {border_unit(dimension)}"
+
+
+@dataclass(frozen=True, eq=False)
+class Cycle:
+    """All branches of a curve together."""
+
+    branches: tuple[Branch, ...]
+    frame: Frame
+
+    @cached_property
+    def usable(self) -> tuple[float, float] | None:
+        """Start and end of the largest usable interval; None where the mechanism is usable nowhere."""
+        from cfmkit.metrics.ranges import usable_interval
+
+        return usable_interval(self)
+
+
+def cycle(curve: Curve, frame: Frame, window: Window | None = None) -> Cycle:
+    """Return a curve as metrics see it."""
+    return Cycle(tuple(Branch(trace, curve.kind, frame, window) for trace in traces(curve)), frame)

@@ -1,0 +1,246 @@
+"""The table of constant-force metrics: each by name, with dimension, definition, source and function.
+
+A metric of a force curve is called ``force_mean``; of a torque curve, where it
+is a torque over an angle, ``torque_mean``. Names without ``force_`` are the same
+for both.
+
+Sources
+-------
+[SS] Sanchez-Salinas et al., Mech. Mach. Theory 173 (2022) 104819.
+[D] Ding, Li, Li (2022), compliant mechanism with variable constant force.
+[B] Bilancia, Geraci, Berselli, SMASIS2019-5519.
+[L] Lan, Wang, Chen (2010), compliant constant-force mechanism of slender beams.
+[LH] Li, Hao, Chin. J. Mech. Eng. 32 (2019), doi:10.1186/s10033-019-0369-z.
+"""
+
+from __future__ import annotations
+
+import difflib
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any, Literal
+
+from cfmkit.metrics import flatness, ranges
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Mapping
+
+    from cfmkit.curves import Kind
+
+Worst = Literal["largest", "smallest", "farthest-from-target"]
+Scope = Literal["branch", "cycle", "loop", "value"]
+
+_PLACEHOLDERS: Mapping[Kind, Mapping[str, str]] = {
+    "force": {"effort": "force", "motion": "length", "work": "energy"},
+    "torque": {"effort": "torque", "motion": "angle", "work": "energy"},
+}
+_WORDS = {"force": "displacement", "torque": "angle"}
+
+
+@dataclass(frozen=True)
+class Definition:
+    """What a metric is.
+
+    Attributes
+    ----------
+    name : str
+        As requirements and tables call it.
+    dimension : str
+        A name of `cfmkit.units`, or "effort", "motion", "work": what that is depends on the curve.
+    definition : str
+        One sentence with the source; ``{effort}`` and ``{motion}`` stand for the curve's words.
+    function : callable or None
+        Takes a `Branch` (or the `Cycle`, see `scope`), returns SI or raises `Undefined`;
+        None: the family computes it and puts it into `Result.values`.
+    worst : {"largest", "smallest", "farthest-from-target"}
+        Which branch counts where none is named; without a target the farthest is the smallest.
+    scope : {"branch", "cycle", "loop", "value"}
+        What it belongs to: one branch; all branches together, or one of them alone; the
+        closed loop only; or no curve at all.
+    windowed : bool
+        Whether it looks only inside the window.
+    """
+
+    name: str
+    dimension: str
+    definition: str
+    function: Callable[[Any], float] | None = None
+    worst: Worst = "largest"
+    scope: Scope = "branch"
+    windowed: bool = True
+
+    @property
+    def per_branch(self) -> bool:
+        """Whether ``name[branch]`` means something."""
+        return self.scope in ("branch", "cycle")
+
+    def of(self, kind: Kind) -> Definition:
+        """Return the definition in the words and units of one kind of curve."""
+        text = self.definition.replace("{effort}", kind).replace("{motion}", _WORDS[kind])
+        return replace(self, dimension=_PLACEHOLDERS[kind].get(self.dimension, self.dimension), definition=text)
+
+
+_TABLE_3 = "[Sanchez-Salinas 2022, Table 3]"
+_DING = "[Ding 2022, sec. 6.2]"
+_LAN = "d is the end of the window, c where the {effort} first reaches 0.95 of that at d [Lan 2010, sec. 2]"
+
+_FLATNESS = (
+    Definition(
+        "force_mean",
+        "effort",
+        f"mean {{effort}} over the points in the window, interpolated ends included {_TABLE_3}",
+        flatness.mean,
+        "farthest-from-target",
+    ),
+    Definition(
+        "force_sd",
+        "effort",
+        f"standard deviation (n - 1) of the {{effort}} over the points in the window {_TABLE_3}",
+        flatness.standard_deviation,
+    ),
+    Definition("force_max", "effort", f"largest {{effort}} in the window {_TABLE_3}", flatness.largest),
+    Definition("force_min", "effort", f"smallest {{effort}} in the window {_TABLE_3}", flatness.smallest, "smallest"),
+    Definition(
+        "force_ripple",
+        "ratio",
+        f"(max - min)/max of the {{effort}} in the window: the fluctuation of {_DING}",
+        flatness.ripple,
+    ),
+    Definition(
+        "half_band",
+        "ratio",
+        "(max - min)/(max + min) of the {effort} in the window: half the width of the narrowest band that holds it",
+        flatness.half_band,
+    ),
+    Definition(
+        "deviation_from_mean",
+        "ratio",
+        f"largest |F - mean|/mean of the {{effort}} in the window {_DING}",
+        flatness.deviation_from_mean,
+    ),
+    Definition(
+        "deviation_from_target",
+        "ratio",
+        "largest |F - target|/target of the {effort} in the window",
+        flatness.deviation_from_target,
+    ),
+    Definition(
+        "rms_to_target",
+        "effort",
+        "sqrt(mean((F - target)^2)) of the {effort} at 100 places uniform in the {motion}, "
+        "the start of the window excluded [Bilancia 2019, eq. 8]",
+        flatness.rms_to_target,
+    ),
+)
+
+_RANGES = (
+    Definition("range_95", "motion", f"d - c: {_LAN}", ranges.range_95, "smallest", windowed=False),
+    Definition(
+        "range_95_fraction", "ratio", f"(d - c)/d: {_LAN}", ranges.range_95_fraction, "smallest", windowed=False
+    ),
+    *(
+        Definition(
+            name,
+            "motion",
+            f"widest interval around the reference pose (default: the centre of the window) in which the {{effort}} "
+            f"is within {percent} % of that at the pose [Li, Hao 2019, eq. 32]",
+            function,
+            "smallest",
+            windowed=False,
+        )
+        for name, percent, function in (
+            ("band_range_05pct", "0.5", ranges.band_range_05pct),
+            ("band_range_1pct", "1", ranges.band_range_1pct),
+            ("band_range_5pct", "5", ranges.band_range_5pct),
+        )
+    ),
+    *(
+        Definition(
+            name,
+            "motion",
+            f"{what} of the longest part of the travel on which every branch keeps the {{effort}} band (around the "
+            "target, else around the mean in the window), the allowable stress and its valid range",
+            function,
+            "smallest",
+            "cycle",
+            windowed=False,
+        )
+        for name, what, function in (
+            ("usable_stroke", "length", ranges.usable_stroke),
+            ("usable_start", "start", ranges.usable_start),
+            ("usable_end", "end", ranges.usable_end),
+        )
+    ),
+)
+
+_LOADS = (
+    Definition(
+        "hysteresis_area",
+        "work",
+        "closed integral of the {effort} over the {motion} in the window, positive where 'load' lies above 'unload' "
+        "[Sanchez-Salinas 2022, sec. 3]",
+        flatness.hysteresis_area,
+        scope="loop",
+    ),
+    Definition("stress_max", "stress", "largest stress in the window", flatness.stress_max),
+    Definition(
+        "safety_factor",
+        "ratio",
+        "allowable stress over the largest stress in the window; 1 or more is within the limit",
+        flatness.safety_factor,
+        "smallest",
+    ),
+)
+
+TABLE = (*_FLATNESS, *_RANGES, *_LOADS)
+"""Every metric of the contract, in the order in which they are shown."""
+
+
+@lru_cache(maxsize=4)
+def _table(kind: Kind) -> tuple[Definition, ...]:
+    return tuple(replace(item.of(kind), name=_named(item.name, kind)) for item in TABLE)
+
+
+def _named(name: str, kind: Kind) -> str:
+    return f"{kind}_{name.removeprefix('force_')}" if name.startswith("force_") else name
+
+
+def definitions(kind: Kind | None = "force", extra: Iterable[Definition] = ()) -> tuple[Definition, ...]:
+    """Return the metrics of one kind of curve, then those of a family.
+
+    Parameters
+    ----------
+    kind : {"force", "torque"} or None
+        None: both, where the kind is not known yet. Names that mean a length in one and an
+        angle in the other are there twice.
+    extra : iterable of Definition
+        A family's own (see `values_of_family`).
+    """
+    own = tuple(extra)
+    if kind is not None:
+        return (*_table(kind), *(item.of(kind) for item in own))
+    both = (*definitions("force", own), *definitions("torque", own))
+    return tuple({(item.name, item.dimension): item for item in both}.values())
+
+
+def values_of_family(values: Mapping[str, tuple[str, str]]) -> tuple[Definition, ...]:
+    """Return definitions of the scalar results that a family computes itself: name -> (dimension, definition)."""
+    return tuple(Definition(name, *about, scope="value", windowed=False) for name, about in values.items())
+
+
+def split_name(name: str) -> tuple[str, str | None]:
+    """Return metric and branch of ``force_mean[load]``; the branch is None where none is named."""
+    metric, bracket, rest = name.partition("[")
+    return metric, rest.removesuffix("]") if bracket else None
+
+
+def unknown_metric(name: str, known: Iterable[str]) -> str:
+    """Say that there is no such metric, and which one could be meant."""
+    names = list(dict.fromkeys(known))
+    other = {"force": "torque", "torque": "force"}.get(name.split("_")[0])
+    swapped = f"{other}_{name.partition('_')[2]}" if other else ""
+    if swapped in names:
+        return f"there is no metric {name!r} on a {other} curve; did you mean {swapped!r}?"
+    near = difflib.get_close_matches(name, names, n=1, cutoff=0.6)
+    hint = f"did you mean {near[0]!r}?" if near else "`cfmkit show metrics` lists them"
+    return f"there is no metric {name!r}; {hint}"

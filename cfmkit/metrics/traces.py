@@ -1,0 +1,188 @@
+"""Branches of a curve and their part inside a window, in the order of the path.
+
+A window keeps the samples inside it and adds interpolated end points where its
+ends lie strictly between two samples. It never reaches beyond the data. A
+branch that folds back in displacement enters and leaves a window several times:
+then every contiguous run inside is kept, in path order. A path that leaves over
+one end comes back over the same end, so nothing is bridged between two runs.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from cfmkit.curves import Curve, FloatArray
+
+TOLERANCE = 1e-9
+"""How far a sample may miss an end of the window and still count as on it, as a fraction of the window."""
+
+
+class Undefined(Exception):
+    """A metric has no value on this curve; `reason` says why. Caught where metrics are evaluated."""
+
+    def __init__(self, reason: str) -> None:
+        """Keep the reason, which follows "undefined: " in a sentence."""
+        self.reason = reason
+        super().__init__(reason)
+
+
+@dataclass(frozen=True)
+class Window:
+    """A closed interval of displacement [m] or angle [rad].
+
+    Raises
+    ------
+    ValueError
+        If it has no width.
+    """
+
+    lo: float
+    hi: float
+
+    def __post_init__(self) -> None:
+        """Refuse windows without width."""
+        if not self.lo < self.hi:
+            raise ValueError(f"a window must be increasing, got {self.lo!r} to {self.hi!r}")
+
+
+@dataclass(frozen=True, eq=False)
+class Trace:
+    """One branch of a curve, or the part of it inside a window, in path order.
+
+    Attributes
+    ----------
+    name : str
+        The branch.
+    motion, effort : (n,) array
+        Displacement and force [m, N], or angle and torque [rad, N m].
+    stress : (n,) array or None
+        The curve's column ``max_stress`` [Pa], if it has one.
+    """
+
+    name: str
+    motion: FloatArray
+    effort: FloatArray
+    stress: FloatArray | None = None
+
+    @cached_property
+    def way(self) -> int:
+        """1 if the motion never decreases along the path, -1 if it never increases, 0 if it turns back."""
+        steps = self.motion[1:] - self.motion[:-1]
+        if not len(steps) or steps.min() >= 0:
+            return 1
+        return -1 if steps.max() <= 0 else 0
+
+    @cached_property
+    def extent(self) -> tuple[float, float]:
+        """Smallest and largest motion."""
+        if self.way:
+            first, last = float(self.motion[0]), float(self.motion[-1])
+            return (first, last) if self.way > 0 else (last, first)
+        return float(self.motion.min()), float(self.motion.max())
+
+    def work(self) -> float:
+        """Return the integral of effort over motion along the path [J], by trapezoids."""
+        steps = self.motion[1:] - self.motion[:-1]
+        return float(steps @ (self.effort[1:] + self.effort[:-1])) / 2
+
+
+def traces(curve: Curve) -> tuple[Trace, ...]:
+    """Return the branches of a curve in the order in which they first occur."""
+    if not len(curve):
+        return ()
+    starts = np.flatnonzero(curve.branch[1:] != curve.branch[:-1]) + 1
+    names = [str(curve.branch[0]), *curve.branch[starts].tolist()]
+    if len(set(names)) == len(names):
+        ends = [0, *starts.tolist(), len(curve)]
+        return tuple(_trace(curve, name, slice(a, b)) for name, a, b in zip(names, ends[:-1], ends[1:], strict=True))
+    return tuple(_trace(curve, name, np.flatnonzero(curve.branch == name)) for name in dict.fromkeys(names))
+
+
+def _trace(curve: Curve, name: str, where: slice | NDArray[np.intp]) -> Trace:
+    stress = curve.extra["max_stress"].values[where] if "max_stress" in curve.extra else None
+    return Trace(name, curve.motion[where], curve.effort[where], stress)
+
+
+def covers(extent: tuple[float, float], window: Window) -> bool:
+    """Return whether data from `extent[0]` to `extent[1]` reach both ends of the window."""
+    slack = TOLERANCE * (window.hi - window.lo)
+    return extent[0] <= window.lo + slack and extent[1] >= window.hi - slack
+
+
+def restrict(trace: Trace, window: Window) -> Trace:
+    """Return the part of a branch inside the window, with interpolated ends; the caller checks `covers`."""
+    slack = TOLERANCE * (window.hi - window.lo)
+    if trace.extent[0] >= window.lo - slack and trace.extent[1] <= window.hi + slack:
+        return trace
+    return _straight(trace, window, slack) if trace.way else _folded(trace, window, slack)
+
+
+def _straight(trace: Trace, window: Window, slack: float) -> Trace:
+    """Return the part of a branch that never turns back."""
+    motion = trace.motion[:: trace.way]
+    first, last = int(motion.searchsorted(window.lo - slack)), int(motion.searchsorted(window.hi + slack, "right"))
+    # an end between two samples needs a point of its own: the segment it lies on, and how far along
+    head = _between(motion, first, window.lo) if first and motion[first] > window.lo + slack else None
+    tail = _between(motion, last, window.hi) if last < len(motion) and motion[last - 1] < window.hi - slack else None
+
+    def cut(values: FloatArray) -> FloatArray:
+        values = values[:: trace.way]
+        pieces = [_along(values, head), values[first:last], _along(values, tail)]
+        return np.concatenate(pieces)[:: trace.way] if head or tail else pieces[1][:: trace.way]
+
+    return Trace(trace.name, cut(trace.motion), cut(trace.effort), None if trace.stress is None else cut(trace.stress))
+
+
+def _between(motion: FloatArray, after: int, place: float) -> tuple[int, float]:
+    before = float(motion[after - 1])
+    return after, (place - before) / (float(motion[after]) - before)
+
+
+def _along(values: FloatArray, where: tuple[int, float] | None) -> FloatArray:
+    if where is None:
+        return values[:0]
+    after, part = where
+    before = values[after - 1 : after]
+    return before + part * (values[after : after + 1] - before)
+
+
+def _folded(trace: Trace, window: Window, slack: float) -> Trace:
+    """Return the part of a branch that turns back: several runs, perhaps."""
+    inside = (trace.motion >= window.lo - slack) & (trace.motion <= window.hi + slack)
+    where, level = _crossings(trace.motion, window, slack)
+    after = where.astype(np.intp) + 1
+    kept = np.insert(inside, after, True)
+    return Trace(
+        trace.name,
+        np.insert(trace.motion, after, level)[kept],
+        _inserted(trace.effort, where, after)[kept],
+        None if trace.stress is None else _inserted(trace.stress, where, after)[kept],
+    )
+
+
+def _crossings(motion: FloatArray, window: Window, slack: float) -> tuple[FloatArray, FloatArray]:
+    """Return where along the path, as fractional indices, the ends of the window are crossed between samples."""
+    places, levels = [], []
+    for level in (window.lo, window.hi):
+        offset = motion - level
+        side = (offset > slack).view(np.int8) - (offset < -slack).view(np.int8)
+        before = np.flatnonzero(side[1:] * side[:-1] < 0)
+        start = offset[before]
+        places.append(before + start / (start - offset[before + 1]))
+        levels.append(np.full(len(before), level))
+    where = np.concatenate(places)
+    order = np.argsort(where)
+    return where[order], np.concatenate(levels)[order]
+
+
+def _inserted(values: FloatArray, where: FloatArray, after: NDArray[np.intp]) -> FloatArray:
+    """Return `values` with linearly interpolated ones at the fractional indices `where`."""
+    before = values[after - 1]
+    return np.insert(values, after, before + (where - (after - 1)) * (values[after] - before))

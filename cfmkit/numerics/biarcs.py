@@ -1,0 +1,272 @@
+"""Fit a chain of circular arcs to a smooth curve given by exact points and unit tangents.
+
+Two arcs that meet with a common tangent (a biarc) join any two points with given
+tangents. Of the one-parameter family of biarcs the one with equal tangent lengths is
+taken: it depends on nothing but the data, turns with them and reverses with them [BM].
+
+Pieces run from sample to sample, each as long as the tolerance allows when the curve is
+swept from one end, and from the other. Between these two sets of knots the final ones
+are chosen, so that all pieces use about the same share of the tolerance, and a curve
+run backwards or seen in a mirror gets the same arcs.
+
+Beside the distance the angle between curve and arcs can be bounded, as far as the
+samples allow: arcs that stay within micrometres may still lean by hundredths.
+
+Between samples the curve is taken to be its cubic Hermite interpolant; how far that may
+be off is estimated by leaving each sample out in turn, and charged to the tolerance.
+
+Reference
+---------
+[BM] K. M. Bolton, Biarc curves, Computer-Aided Design 7 (1975) 89-92.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from math import atan, sqrt
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.numerics.arcchain import ArcChain
+from cfmkit.numerics.hermite import CoarseDataError, checked, cubic, doubt, slope, too_coarse
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from cfmkit.curves import FloatArray
+    from cfmkit.numerics.arcchain import ComplexArray
+
+__all__ = ["Biarc", "CoarseDataError", "biarc", "fit_arcs"]
+
+_SEARCH, _CHECK = 4, 16  # parts of each step between samples at which arcs are compared with the curve
+_TRIES = 25  # with less and less of the tolerance, before the fit is given up
+_MOST_TURN = 2.5  # of one piece [rad], so that no arc comes near a full turn
+_ROUNDING = 1e-3  # share of the tolerance kept back for rounding and for merging equal arcs
+
+
+@dataclass(frozen=True)
+class Biarc:
+    """Two arcs with the common tangent `direction` at `joint`; curvatures and bulges before and after it."""
+
+    joint: complex
+    direction: complex
+    curvatures: tuple[float, float]
+    bulges: tuple[float, float]
+
+    @property
+    def turn(self) -> float:
+        """The angle by which both arcs together turn to the left [rad]."""
+        return 4 * (atan(self.bulges[0]) + atan(self.bulges[1]))
+
+
+def biarc(p0: complex, t0: complex, p1: complex, t1: complex) -> Biarc | None:
+    """Return the biarc with equal tangent lengths, or None if the ends face the wrong way [BM].
+
+    Parameters
+    ----------
+    p0, p1 : complex
+        End points.
+    t0, t1 : complex
+        Unit tangents there.
+    """
+    chord, both, square = p1 - p0, t0 + t1, abs(p1 - p0) ** 2
+    ahead = (chord * both.conjugate()).real
+    if ahead <= 0:
+        return None
+    length = square / (ahead + sqrt(ahead**2 + square * abs(t0 - t1) ** 2))
+    joint = p0 + (chord + length * (t0 - t1)) / 2
+    direction = (chord - length * both) / abs(chord - length * both)
+    before, after = (p0 - joint) * direction.conjugate(), (p1 - joint) * direction.conjugate()
+    return Biarc(
+        joint,
+        direction,
+        (2 * before.imag / abs(before) ** 2, 2 * after.imag / abs(after) ** 2),
+        (before.imag / (abs(before) - before.real), after.imag / (abs(after) + after.real)),
+    )
+
+
+def fit_arcs(points: FloatArray, tangents: FloatArray, tolerance: float, lean: float = np.inf) -> ArcChain:
+    """Return a tangent-continuous chain of arcs within `tolerance` of the curve.
+
+    Parameters
+    ----------
+    points : (n, 2) array
+        Points on the curve, in order.
+    tangents : (n, 2) array
+        Unit tangents there, pointing along the order of the points.
+    tolerance : float
+        Largest distance of the curve from the chain, in the unit of the points.
+    lean : float
+        Largest angle between the curve and the chain [rad]. Pieces that go from one
+        sample to the next cannot be made shorter and are excepted.
+
+    Returns
+    -------
+    ArcChain
+        Begins and ends in the first and the last sample, with their tangents.
+
+    Raises
+    ------
+    CoarseDataError
+        If the samples are too far apart for the tolerance, or the curve has a corner.
+    """
+    curve = _Curve.of(points, tangents, (tolerance, lean), _SEARCH)
+    check = _Curve.of(points, tangents, (tolerance, lean), _CHECK)
+    for knots in curve.proposals():
+        used = [check.usage(i, j) for i, j in pairwise(knots)]
+        if max(used) <= 1:
+            return curve.chain(knots)
+        worst = knots[int(np.argmax(used))]
+        if knots[knots.index(worst) + 1] == worst + 1:
+            break
+    raise too_coarse(worst, len(points), "two arcs do not follow the curve from one to the next")
+
+
+@dataclass(frozen=True)
+class _Curve:
+    """Samples and probes between them, ready to be compared with arcs.
+
+    `targets` holds each sample followed by `stride` - 1 points between it and the next,
+    `headings` the unit tangents there, `weights` one over the distance allowed; `turning` and `bending`
+    sum up the signed and the absolute turn of the tangent.
+    """
+
+    points: list[complex]
+    tangents: list[complex]
+    turning: list[float]
+    bending: list[float]
+    arclength: FloatArray
+    targets: ComplexArray
+    headings: ComplexArray
+    weights: FloatArray
+    limits: tuple[float, float]
+    stride: int
+
+    @classmethod
+    def of(cls, points: FloatArray, tangents: FloatArray, limits: tuple[float, float], stride: int) -> _Curve:
+        tolerance = limits[0]
+        z, t = checked(points, tangents, tolerance)
+        unsure = doubt(z, t)
+        worst = int(np.argmax(unsure))
+        if unsure[worst] > tolerance / 2:
+            raise too_coarse(worst, len(z), f"it may be off by {unsure[worst] / tolerance:.2g} tolerances")
+        ends = z[:-1], t[:-1], z[1:], t[1:]
+        probes = np.arange(1, stride)[:, None] / stride
+        slopes = slope(*ends, probes)
+        allowed = np.full((len(z), stride), tolerance * (1 - _ROUNDING))
+        allowed[:-1, 1:] -= unsure[:, None]
+        step = np.angle(t[1:] / t[:-1])
+        return cls(
+            z.tolist(),
+            t.tolist(),
+            np.append(0.0, np.cumsum(step)).tolist(),
+            np.append(0.0, np.cumsum(np.abs(step))).tolist(),
+            np.append(0.0, np.cumsum(np.abs(np.diff(z)))),
+            np.append(np.vstack([z[:-1], cubic(*ends, probes)]).T.ravel(), z[-1]),
+            np.append(np.vstack([t[:-1], slopes / np.abs(slopes)]).T.ravel(), t[-1]),
+            1 / allowed.ravel()[: 1 - stride],
+            limits,
+            stride,
+        )
+
+    def piece(self, i: int, j: int) -> Biarc | None:
+        """Return the biarc from sample i to sample j, if it turns as the curve does."""
+        if self.bending[j] - self.bending[i] > _MOST_TURN:
+            return None
+        arcs = biarc(self.points[i], self.tangents[i], self.points[j], self.tangents[j])
+        wanted = self.turning[j] - self.turning[i]
+        return arcs if arcs is not None and abs(arcs.turn - wanted) < 1 else None
+
+    def usage(self, i: int, j: int) -> float:
+        """Return the share of the tolerance that a piece from sample i to sample j uses; above 1 it does not fit.
+
+        Distances grow with the cube of a piece's length and angles with its square: a
+        power of the angle lets one number stand for both.
+        """
+        arcs = self.piece(i, j)
+        if arcs is None:
+            return np.inf
+        span, turned = slice(self.stride * i, self.stride * j + 1), arcs.direction.conjugate()
+        local = (self.targets[span] - arcs.joint) * turned
+        x, y = local.real, local.imag
+        curvature = np.where(x < 0, *arcs.curvatures)
+        # distance from a circle through the origin along x, without the cancellation of |z - centre| - radius
+        power = curvature * (x * x + y * y) - 2 * y
+        radial = np.sqrt(np.abs(1 + curvature * power))
+        used = float((np.abs(power) / (1 + radial) * self.weights[span]).max())
+        if j == i + 1 or not np.isfinite(self.limits[1]):
+            return used
+        heading = self.headings[span] * turned
+        across = heading.imag * (1 - curvature * y) - heading.real * curvature * x
+        turned_off = float((np.abs(across) / radial).max())
+        return max(used, float((turned_off / self.limits[1]) ** 1.5))
+
+    def proposals(self) -> Iterator[list[int]]:
+        """Yield knots, the best ones first: spread evenly, or else as a sweep from the start leaves them."""
+        for spread in (True, False):
+            for share in 0.9 ** np.arange(_TRIES):
+                forward, backward = self.swept(share)
+                yield _balanced(forward, backward, self.arclength) if spread else forward
+
+    def swept(self, share: float) -> tuple[list[int], list[int]]:
+        """Return the knots of the longest pieces that use `share` of the tolerance, from the start and from the end."""
+        last = len(self.points) - 1
+        forward, backward, length = [0], [last], 1
+        while forward[-1] < last:
+            length = self._longest(forward[-1], 1, share, length)
+            forward.append(forward[-1] + length)
+        length = 1
+        while backward[-1] > 0:
+            length = self._longest(backward[-1], -1, share, length)
+            backward.append(backward[-1] - length)
+        return forward, backward[::-1]
+
+    def _longest(self, knot: int, way: int, share: float, guess: int) -> int:
+        """Return how many samples the longest fitting piece spans; one is always taken."""
+        room = len(self.points) - 1 - knot if way > 0 else knot
+        fits, fails, length, tries = 1, room + 1, guess, 0
+        while fails - fits > 1:
+            length = min(max(length, fits + 1), fails - 1, 4 * fits + 8 * guess)
+            used = self.usage(*sorted((knot, knot + way * length)))
+            fits, fails = (length, fails) if used <= share else (fits, length)
+            tries += 1
+            # the deviation grows with the cube of the length; where it does not, halve the bracket
+            growth = (share / max(used, 1e-9)) ** (1 / 3)
+            length = int(min(length * growth, room)) if tries % 3 and growth else (fits + fails) // 2
+        return fits
+
+    def chain(self, knots: list[int]) -> ArcChain:
+        """Return the chain of the pieces between the knots; equal arcs of a piece become one."""
+        nodes, bulges = [self.points[0]], list[float]()
+        for i, j in pairwise(knots):
+            arcs = self.piece(i, j)
+            if arcs is None:
+                raise too_coarse(i, len(self.points), "no two arcs join them")
+            uneven = abs(arcs.curvatures[0] - arcs.curvatures[1]) * abs(self.points[j] - self.points[i]) ** 2
+            if uneven > _ROUNDING**2 * self.limits[0]:
+                nodes.append(arcs.joint)
+                bulges.extend(arcs.bulges)
+            else:
+                bulges.append(float(np.tan(arcs.turn / 4)))
+            nodes.append(self.points[j])
+        return ArcChain(np.array(nodes), np.array(bulges))
+
+
+def _balanced(forward: list[int], backward: list[int], arclength: FloatArray) -> list[int]:
+    """Return knots between the latest (`forward`) and the earliest (`backward`) possible ones, spread evenly.
+
+    Rounding to a sample goes towards the middle of the curve where it is a tie, so that
+    the curve run backwards has the same knots.
+    """
+    if len(forward) != len(backward):
+        return min(forward, backward, key=len)
+    share = np.linspace(0, 1, len(forward))
+    target = arclength[forward] * (1 - share) + arclength[backward] * share
+    above = np.clip(np.searchsorted(arclength, target), 1, len(arclength) - 1)
+    lead = (target - arclength[above - 1]) - (arclength[above] - target)
+    tie = np.abs(lead) < 1e-9 * arclength[-1]
+    up = np.where(tie, target < arclength[-1] / 2, lead > 0)
+    inner = np.where(up, above, above - 1)[1:-1]
+    return sorted({0, *inner.tolist(), len(arclength) - 1})

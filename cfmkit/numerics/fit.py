@@ -1,0 +1,251 @@
+"""Nonlinear least squares with what an honest fit must say: uncertainty, correlation, and what cannot be told.
+
+Parameters are scaled by their sizes. Columns of the scaled Jacobian that vanish belong to
+parameters without effect; directions with a vanishing singular value to parameters that
+cannot be told apart. Residuals of a smooth misfit are not independent: the covariance is
+inflated by their correlation time, as if there were fewer of them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from cfmkit.curves import FloatArray
+
+Loss = Literal["linear", "soft_l1", "huber", "cauchy"]
+LOSSES: tuple[Loss, ...] = ("linear", "soft_l1", "huber", "cauchy")
+
+STEP = 1e-5
+"""Of finite differences, in sizes of the parameter."""
+
+NO_EFFECT = 1e-9
+"""A parameter has no effect if changing it by its size changes no value by more than this part of the data."""
+
+SINGULAR = 1e-5
+"""Unit columns of the Jacobian are dependent where a singular value is below this."""
+
+
+class NotFinite(ValueError):
+    """The residuals are not finite where the fit starts."""
+
+
+@dataclass(frozen=True)
+class LeastSquares:
+    """A problem: what to make small, from where, within which bounds.
+
+    Attributes
+    ----------
+    residuals : callable
+        ``residuals(values) -> (n,) array``; NaN where there is none.
+    start, low, high : (p,) array
+        Starting values and bounds.
+    size : (p,) array
+        Typical size of each parameter, positive.
+    level : float
+        Typical size of the data, in the unit of the residuals.
+    """
+
+    residuals: Callable[[FloatArray], FloatArray]
+    start: FloatArray
+    low: FloatArray
+    high: FloatArray
+    size: FloatArray
+    level: float
+
+    def jacobian(self, values: FloatArray) -> FloatArray:
+        """Return the derivatives of the residuals by the parameters in their sizes, by central differences.
+
+        At a bound, or where the residuals beyond are not finite, the difference is one-sided.
+        """
+        here = self.residuals(values)
+        return np.column_stack([self._column(values, here, k) for k in range(len(values))])
+
+    def _column(self, values: FloatArray, here: FloatArray, k: int) -> FloatArray:
+        ends = []
+        for way in (1.0, -1.0):
+            moved = np.array(values)
+            moved[k] = np.clip(values[k] + way * STEP * self.size[k], self.low[k], self.high[k])
+            found = self.residuals(moved) if moved[k] != values[k] else here
+            good = bool(np.isfinite(found).all())
+            ends.append((moved[k], found) if good else (values[k], here))
+        (above, upper), (below, lower) = ends
+        if above == below:
+            return np.zeros_like(here)
+        column: FloatArray = (upper - lower) * (self.size[k] / (above - below))
+        return column
+
+
+@dataclass(frozen=True)
+class Fit:
+    """The outcome of a fit.
+
+    Attributes
+    ----------
+    values : (p,) array
+        Best values.
+    covariance : (p, p) array
+        Of the values, inflated by `inflation`.
+    residuals : (n,) array
+        At the best values.
+    noise : float
+        Standard deviation of the residuals, by their median absolute deviation under a robust loss.
+    inflation : float
+        Correlation time of the residuals in samples: so many count as one.
+    at_bound : (p,) array of bool
+        Which values lie on a bound.
+    freedom : float
+        Degrees of freedom left.
+    converged : bool
+        Whether the solver says so.
+    """
+
+    values: FloatArray
+    covariance: FloatArray
+    residuals: FloatArray
+    noise: float
+    inflation: float
+    at_bound: Any
+    freedom: float
+    converged: bool
+
+    @property
+    def deviations(self) -> FloatArray:
+        """Standard deviation of each value."""
+        found: FloatArray = np.sqrt(np.diag(self.covariance))
+        return found
+
+    @property
+    def correlation(self) -> FloatArray:
+        """Correlation matrix of the values; 0 where one of them does not vary."""
+        spread = self.deviations
+        product = np.outer(spread, spread)
+        found: FloatArray = np.divide(self.covariance, product, out=np.zeros_like(product), where=product > 0)
+        return found
+
+    def half_widths(self, confidence: float = 0.95) -> FloatArray:
+        """Return half the width of each value's confidence interval, by Student's t."""
+        from scipy.special import stdtrit
+
+        found: FloatArray = float(stdtrit(self.freedom, 0.5 + 0.5 * confidence)) * self.deviations
+        return found
+
+
+def unidentifiable(problem: LeastSquares, values: FloatArray) -> tuple[tuple[int, ...], ...]:
+    """Return groups of parameters that the data do not determine at some values.
+
+    A group of one has no effect; in a group of several each can make up for the others.
+
+    Raises
+    ------
+    NotFinite
+        If the residuals are not finite there.
+    """
+    if not np.isfinite(problem.residuals(values)).all():
+        raise NotFinite
+    return dependent_columns(problem.jacobian(values), problem.level)
+
+
+def dependent_columns(jacobian: FloatArray, level: float) -> tuple[tuple[int, ...], ...]:
+    """Return groups of columns that vanish (alone) or are linearly dependent (together).
+
+    Parameters
+    ----------
+    jacobian : (n, p) array
+        Scaled.
+    level : float
+        What its entries are compared with.
+    """
+    largest = np.abs(jacobian).max(axis=0)
+    groups: list[tuple[int, ...]] = [(int(k),) for k in np.flatnonzero(largest <= NO_EFFECT * level)]
+    alive = np.flatnonzero(largest > NO_EFFECT * level)
+    if len(alive) > 1:
+        unit = jacobian[:, alive] / np.linalg.norm(jacobian[:, alive], axis=0)
+        _, singular, right = np.linalg.svd(unit, full_matrices=False)
+        for direction in right[singular < SINGULAR]:
+            groups.append(tuple(int(alive[k]) for k in np.flatnonzero(np.abs(direction) > 0.05)))
+    return tuple(dict.fromkeys(groups))
+
+
+def solve(problem: LeastSquares, loss: Loss = "soft_l1") -> Fit:
+    """Return the best values, by a trust-region method within the bounds.
+
+    Parameters
+    ----------
+    problem : LeastSquares
+        Whose Jacobian is not singular: ask `unidentifiable` first.
+    loss : {"linear", "soft_l1", "huber", "cauchy"}
+        How large residuals count. A robust loss starts from the linear fit and takes twice
+        the robust standard deviation of its residuals as the size beyond which they count less.
+
+    Raises
+    ------
+    NotFinite
+        If the residuals are not finite at the start.
+    """
+    if not np.isfinite(problem.residuals(problem.start)).all():
+        raise NotFinite
+    best = _minimum(problem, problem.start, "linear", 1.0)
+    noise = 1.4826 * float(np.median(np.abs(best.fun)))
+    if loss != "linear" and noise > 1e-12 * problem.level:
+        best = _minimum(problem, best.x * problem.size, loss, 2.0 * noise)
+    return _fit(problem, best, loss)
+
+
+def _minimum(problem: LeastSquares, start: FloatArray, loss: Loss, scale: float) -> Any:
+    from scipy.optimize import least_squares
+
+    size = problem.size
+    inside = np.clip(start, problem.low, problem.high)
+
+    def residuals(z: FloatArray) -> FloatArray:
+        return problem.residuals(z * size)
+
+    def jacobian(z: FloatArray) -> FloatArray:
+        return problem.jacobian(z * size)
+
+    return least_squares(
+        residuals,
+        inside / size,
+        jacobian,
+        bounds=(problem.low / size, problem.high / size),
+        loss=loss,
+        f_scale=scale,
+        xtol=1e-12,
+        ftol=1e-12,
+        gtol=1e-14,
+        max_nfev=200,
+    )
+
+
+def _fit(problem: LeastSquares, best: Any, loss: Loss) -> Fit:
+    values = best.x * problem.size
+    residuals = problem.residuals(values)
+    count, free = len(residuals), len(residuals) - len(values)
+    rms = float(np.sqrt((residuals**2).sum() / max(free, 1)))
+    noise = rms if loss == "linear" else 1.4826 * float(np.median(np.abs(residuals))) or rms
+    inflation = correlation_time(residuals)
+    # With a robust loss the solver's Jacobian is weighted, so that its square is the curvature of the loss.
+    _, singular, right = np.linalg.svd(best.jac, full_matrices=False)
+    inverse = (right.T / np.maximum(singular, 1e-14 * singular[0]) ** 2) @ right
+    covariance = noise**2 * inflation * inverse * np.outer(problem.size, problem.size)
+    freedom = max(count / inflation - len(values), 1.0)
+    return Fit(values, covariance, residuals, noise, inflation, best.active_mask != 0, freedom, bool(best.success))
+
+
+def correlation_time(residuals: FloatArray) -> float:
+    """Return how many successive residuals count as one: 1 + 2 sum of their correlations, at least 1."""
+    count = len(residuals)
+    centred = residuals - residuals.mean()
+    power = float(centred @ centred)
+    if power == 0 or count < 16:
+        return 1.0
+    spectrum = np.fft.rfft(centred, 2 * count)
+    correlations = np.fft.irfft(np.abs(spectrum) ** 2)[: count // 4] / power
+    end = int(np.argmax(correlations < 2.0 / np.sqrt(count))) or len(correlations)
+    return float(np.clip(1.0 + 2.0 * correlations[1:end].sum(), 1.0, count / 10))

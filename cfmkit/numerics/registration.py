@@ -1,0 +1,300 @@
+"""Measured points laid onto smooth curves by one rigid motion, robustly, with what is uncertain about it.
+
+Iterative closest point: each point finds its foot on its curve by Newton's method, then a
+weighted point-to-line Gauss-Newton step moves all points at once by an angle and a shift.
+Weights are Tukey's biweight of the normal residuals, c = 4.685, in units of their robust
+standard deviation on their curve, 1.4826 MAD; the iteration starts without weights. Several curves are
+registered jointly: one motion each would hide how they stand to each other.
+
+The motion is p -> R(angle) p + shift, about the origin.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+
+from cfmkit.numerics.fit import correlation_time
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from cfmkit.curves import FloatArray
+
+TUKEY = 4.685
+MAD = 1.4826
+_STEPS = 60
+_SAMPLES = 257
+_FEET = 12
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A smooth curve at some parameters.
+
+    Attributes
+    ----------
+    points, tangents, normals : (n, 2) array
+        Unit tangents along increasing parameter; unit normals to the outside.
+    speed : (n,) array
+        Length per parameter.
+    curvature : (n,) array
+        Positive where the curve bends away from its normal (convex outside).
+    """
+
+    points: FloatArray
+    tangents: FloatArray
+    normals: FloatArray
+    speed: FloatArray
+    curvature: FloatArray
+
+
+class SmoothCurve(Protocol):
+    """What points can be registered to."""
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """First and last parameter."""
+
+    def frame(self, parameter: FloatArray) -> Frame:
+        """Return the curve at parameters between its ends."""
+
+
+@dataclass(frozen=True)
+class Registration:
+    """Where measured points lie on their curves.
+
+    Attributes
+    ----------
+    angle : float
+        Of the motion from measured to registered points [rad].
+    shift : (2,) array
+        Of the motion, after the turn.
+    points : tuple of (n, 2) array
+        Registered points of each curve.
+    parameters : tuple of (n,) array
+        Of their feet.
+    errors : tuple of (n,) array
+        Distance from the curve along its normal; positive outside.
+    weights : tuple of (n,) array
+        Last weights; 0 for outliers and for points beyond the ends of their curve.
+    covariance : (3, 3) array
+        Of angle and shift, inflated where successive residuals are alike.
+    """
+
+    angle: float
+    shift: FloatArray
+    points: tuple[FloatArray, ...]
+    parameters: tuple[FloatArray, ...]
+    errors: tuple[FloatArray, ...]
+    weights: tuple[FloatArray, ...]
+    covariance: FloatArray
+
+    @property
+    def deviations(self) -> FloatArray:
+        """Standard deviations of angle [rad] and shift."""
+        spread: FloatArray = np.sqrt(np.diag(self.covariance))
+        return spread
+
+    @property
+    def used(self) -> tuple[Any, ...]:
+        """Which points count: neither beyond the ends nor outliers."""
+        return tuple(weight > 0 for weight in self.weights)
+
+    def weakest(self, size: float) -> tuple[FloatArray, float]:
+        """Return the least certain motion about the centre of the points, and its standard deviation.
+
+        Parameters
+        ----------
+        size : float
+            Length at which the angle is felt, such as half the part's extent.
+
+        Returns
+        -------
+        direction : (3,) array
+            Unit vector of (size times angle, shift x, shift y) at the centre.
+        deviation : float
+            How far along it the points may have been moved wrongly.
+        """
+        x, y = np.concatenate(self.points).mean(axis=0)
+        about = np.array([[size, 0.0, 0.0], [-y, 1.0, 0.0], [x, 0.0, 1.0]])
+        values, vectors = np.linalg.eigh(about @ self.covariance @ about.T)
+        direction = vectors[:, -1] * np.sign(vectors[np.argmax(np.abs(vectors[:, -1])), -1])
+        return direction, float(np.sqrt(max(values[-1], 0.0)))
+
+
+def turned(points: FloatArray, angle: float, shift: FloatArray) -> FloatArray:
+    """Return R(angle) p + shift for points (n, 2)."""
+    c, s = math.cos(angle), math.sin(angle)
+    moved: FloatArray = points @ np.array([[c, s], [-s, c]]) + shift
+    return moved
+
+
+def feet(curve: SmoothCurve, points: FloatArray, guess: FloatArray | None = None) -> FloatArray:
+    """Return the parameters of the closest points on a curve, by Newton's method.
+
+    Parameters
+    ----------
+    curve : SmoothCurve
+        Between its ends.
+    points : (n, 2) array
+        Near it.
+    guess : (n,) array, optional
+        First estimates; default: the nearest of some samples.
+    """
+    low, high = curve.ends
+    if guess is None:
+        samples = np.linspace(low, high, _SAMPLES)
+        along = curve.frame(samples).points
+        gaps = (points[:, :1] - along[:, 0]) ** 2 + (points[:, 1:] - along[:, 1]) ** 2
+        guess = samples[np.argmin(gaps, axis=1)]
+    u = np.array(guess)
+    for _ in range(_FEET):
+        at = curve.frame(u)
+        gap = points - at.points
+        # Beyond the centre of curvature Newton's step would turn round.
+        bend = np.maximum(1.0 + at.curvature * _dot(gap, at.normals), 0.2)
+        new = np.clip(u + _dot(gap, at.tangents) / (at.speed * bend), low, high)
+        done = np.max(np.abs(new - u)) <= 1e-15 * (high - low)
+        u = new
+        if done:
+            break
+    return u
+
+
+def register(
+    points: Sequence[FloatArray], curves: Sequence[SmoothCurve], robust: bool = True, start: FloatArray | None = None
+) -> Registration:
+    """Return points registered jointly to their curves.
+
+    Parameters
+    ----------
+    points : sequence of (n, 2) array
+        Measured, one array a curve.
+    curves : sequence of SmoothCurve
+        Where they belong.
+    robust : bool
+        Whether outliers lose their weight.
+    start : (3,) array, optional
+        Angle [rad] and shift to start from; default: none.
+    """
+    state = np.zeros(3) if start is None else np.array(start, dtype=float)
+    size = float(np.sqrt(np.mean(np.concatenate([(item - item.mean(axis=0)) ** 2 for item in points]).sum(axis=1))))
+    guess: list[FloatArray | None] = [None] * len(points)
+    for weighted in (False, True) if robust else (False,):
+        for _ in range(_STEPS):
+            moved = [turned(item, state[0], state[1:]) for item in points]
+            found = [feet(curve, item, u) for curve, item, u in zip(curves, moved, guess, strict=True)]
+            guess = [*found]
+            rows, residuals, weights = _equations(curves, moved, found, weighted)
+            step = _step(rows, residuals, weights, size)
+            state = _composed(state, step)
+            if np.abs(step * [size, 1.0, 1.0]).max() <= 1e-14 * size:
+                break
+    return _registration(state, points, curves, robust)
+
+
+def _equations(
+    curves: Sequence[SmoothCurve], moved: Sequence[FloatArray], parameters: Sequence[FloatArray], weighted: bool
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the rows of the linearised problem, the normal residuals and the weights, all curves stacked."""
+    frames = [curve.frame(u) for curve, u in zip(curves, parameters, strict=True)]
+    points, normals = np.concatenate(moved), np.concatenate([item.normals for item in frames])
+    residuals = _dot(points - np.concatenate([item.points for item in frames]), normals)
+    rows = np.column_stack([normals[:, 1] * points[:, 0] - normals[:, 0] * points[:, 1], normals])
+    inside = np.concatenate([_inside(curve, u) for curve, u in zip(curves, parameters, strict=True)])
+    weights = inside.astype(float)
+    if weighted:
+        weights *= _trust(residuals, inside, [len(item) for item in moved])
+    return rows, residuals, weights
+
+
+def _trust(residuals: FloatArray, inside: Any, counts: Sequence[int]) -> FloatArray:
+    """Return Tukey's weights, each curve by its own spread: one that was made worse is no outlier as a whole."""
+    cuts = np.cumsum(counts)[:-1]
+    parts = zip(np.split(residuals, cuts), np.split(inside, cuts), strict=True)
+    return np.concatenate([tukey(part, robust_scale(part[good])) for part, good in parts])
+
+
+def _inside(curve: SmoothCurve, u: FloatArray) -> Any:
+    low, high = curve.ends
+    margin = 1e-12 * (high - low)
+    return (u > low + margin) & (u < high - margin)
+
+
+def robust_scale(values: FloatArray) -> float:
+    """Return 1.4826 times the median absolute deviation from the median: the SD of normal values."""
+    return MAD * float(np.median(np.abs(values - np.median(values)))) if len(values) else 0.0
+
+
+def tukey(values: FloatArray, scale: float) -> FloatArray:
+    """Return Tukey's weights of values with a robust standard deviation."""
+    if scale == 0:
+        return np.ones_like(values)
+    share = values / (TUKEY * scale)
+    weights: FloatArray = np.where(np.abs(share) < 1, (1 - share**2) ** 2, 0.0)
+    return weights
+
+
+def _step(rows: FloatArray, residuals: FloatArray, weights: FloatArray, size: float) -> FloatArray:
+    root = np.sqrt(weights)[:, None]
+    scale = np.array([size, 1.0, 1.0])
+    solution = np.linalg.lstsq(root * rows / scale, -root[:, 0] * residuals, rcond=None)[0]
+    step: FloatArray = solution / scale
+    return step
+
+
+def _composed(state: FloatArray, step: FloatArray) -> FloatArray:
+    """Return the motion followed by a further one."""
+    return np.array([state[0] + step[0], *turned(state[None, 1:], step[0], step[1:])[0]])
+
+
+def _registration(
+    state: FloatArray, points: Sequence[FloatArray], curves: Sequence[SmoothCurve], robust: bool
+) -> Registration:
+    moved = [turned(item, state[0], state[1:]) for item in points]
+    found = [feet(curve, item) for curve, item in zip(curves, moved, strict=True)]
+    rows, residuals, weights = _equations(curves, moved, found, robust)
+    cuts = np.cumsum([len(item) for item in points])[:-1]
+    errors, shares = np.split(residuals, cuts), np.split(weights, cuts)
+    inside = weights > 0
+    free = max(int(inside.sum()) - 3, 1)
+    variance = float((weights * residuals**2).sum() / free)
+    alike = max(correlation_time(error[share > 0]) for error, share in zip(errors, shares, strict=True))
+    normal = rows.T @ (weights[:, None] * rows)
+    covariance: FloatArray = variance * alike * np.asarray(np.linalg.pinv(normal, rcond=1e-18), dtype=float)
+    return Registration(
+        float(state[0]), state[1:], tuple(moved), tuple(found), tuple(errors), tuple(shares), covariance
+    )
+
+
+def gaps_across(curve: SmoothCurve, points: FloatArray, parameters: FloatArray, axis: int = 0) -> FloatArray:
+    """Return how far points are from a curve along one axis: point less curve, at the same other coordinate.
+
+    Parameters
+    ----------
+    curve : SmoothCurve
+        Not parallel to the axis.
+    points : (n, 2) array
+        Registered.
+    parameters : (n,) array
+        Of their feet, to start from.
+    axis : {0, 1}
+        0 for the distance in x at the same y.
+    """
+    low, high = curve.ends
+    u = np.array(parameters)
+    for _ in range(_FEET):
+        at = curve.frame(u)
+        u = np.clip(
+            u + (points[:, 1 - axis] - at.points[:, 1 - axis]) / (at.speed * at.tangents[:, 1 - axis]), low, high
+        )
+    across: FloatArray = points[:, axis] - curve.frame(u).points[:, axis]
+    return across
+
+
+def _dot(one: FloatArray, other: FloatArray) -> FloatArray:
+    return np.asarray((one * other).sum(axis=1))

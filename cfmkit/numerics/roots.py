@@ -1,0 +1,122 @@
+"""Root finding for many targets at once, safeguarded: Newton inside a shrinking bracket."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from cfmkit.curves import FloatArray
+
+Evaluate = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
+EPS = float(np.finfo(float).eps)
+
+
+def invert_increasing(
+    evaluate: Evaluate, targets: FloatArray, bracket: tuple[float, float], guess: FloatArray, iterations: int = 80
+) -> FloatArray:
+    """Return x in the bracket with value(x) = target for an increasing function, element by element.
+
+    Newton steps are taken where they stay inside the bracket of their element and
+    bisection where they do not, so that a vanishing derivative at an end does no harm.
+
+    Parameters
+    ----------
+    evaluate : callable
+        ``evaluate(x) -> (value, derivative)`` for an array x; value increasing.
+    targets : (n,) array
+        Values wanted; those outside the function's range end at the nearer bracket end, NaN stays NaN.
+    bracket : (float, float)
+        Where to look.
+    guess : (n,) array
+        First estimates; clipped to the bracket.
+    iterations : int
+        At most so many steps.
+
+    Returns
+    -------
+    (n,) array
+        Accurate to a few units in the last place of the bracket's size, or better; where the
+        derivative vanishes, as far as the value tells: to the square root of that.
+
+    Examples
+    --------
+    >>> square = lambda x: (x**2, 2 * x)
+    >>> invert_increasing(square, np.array([0.25, 2.0]), (0.0, 2.0), np.array([1.0, 1.0])).round(12)
+    array([0.5       , 1.41421356])
+    """
+    low, high = np.full(targets.shape, bracket[0]), np.full(targets.shape, bracket[1])
+    x = np.minimum(np.maximum(guess, bracket[0]), bracket[1])
+    fine = 16.0 * EPS * np.maximum(np.abs(targets), np.abs(targets).max(initial=0.0))
+    tolerance = 16.0 * EPS * max(abs(bracket[0]), abs(bracket[1]))
+    before = np.zeros(targets.shape)
+    for _ in range(iterations):
+        value, slope = evaluate(x)
+        error = value - targets
+        low, high = np.where(error <= 0, x, low), np.where(error >= 0, x, high)
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            new = np.minimum(np.maximum(x - error / slope, bracket[0]), bracket[1])
+        inside = (new >= low) & (new <= high)
+        new = np.where(inside, new, 0.5 * (low + high))
+        size = np.abs(error)
+        # Newton's errors square: the step about to be taken leaves less than size^2 / before.
+        done = (size <= fine) | (np.abs(new - x) <= tolerance) | (inside & (size * size <= fine * before))
+        x, before = np.where(error == 0, x, new), size
+        if done.all():
+            break
+    return np.where(np.isnan(targets), np.nan, x)
+
+
+def bracketed_root(evaluate: Callable[[float], float], low: float, high: float, iterations: int = 200) -> float:
+    """Return a root of a scalar function that changes sign between `low` and `high`.
+
+    Chandrupatla's method: inverse quadratic interpolation where it is safe, else bisection;
+    it stops when the bracket is down to rounding.
+
+    Raises
+    ------
+    ValueError
+        If the function has the same sign at both ends, or is NaN on the way.
+
+    References
+    ----------
+    T. R. Chandrupatla, Adv. Eng. Softw. 28 (1997) 145.
+
+    Examples
+    --------
+    >>> round(bracketed_root(lambda x: x**3 - 2.0, 0.0, 2.0), 12)
+    1.259921049895
+    """
+    a, b = high, low
+    fa, fb = float(evaluate(a)), float(evaluate(b))
+    if fa == 0 or fb == 0:
+        return a if fa == 0 else b
+    if (fa > 0) == (fb > 0) or math.isnan(fa) or math.isnan(fb):
+        raise ValueError(f"no change of sign between {low} and {high}")
+    share = 0.5
+    for _ in range(iterations):
+        x = a + share * (b - a)
+        fx = float(evaluate(x))
+        if math.isnan(fx):
+            raise ValueError(f"the function is not a number at {x}")
+        if (fx > 0) == (fa > 0):
+            c, fc = a, fa
+        else:
+            c, b, fc, fb = b, a, fb, fa
+        a, fa = x, fx
+        best = a if abs(fa) < abs(fb) else b
+        limit = 2.0 * EPS * abs(best) / abs(b - a) if b != a else 1.0
+        if limit > 0.5 or fx == 0:
+            return float(best if fx else a)
+        share = _next_share(a, b, c, fa, fb, fc)
+        share = min(max(share, limit), 1.0 - limit)
+    return best
+
+
+def _next_share(a: float, b: float, c: float, fa: float, fb: float, fc: float) -> float:
+    """Return where in [a, b] to look next: inverse quadratic if the three points allow it, else the middle."""
+    xi, phi = (a - b) / (c - b), (fa - fb) / (fc - fb)
+    if phi**2 < xi and (1.0 - phi) ** 2 < 1.0 - xi:
+        return fa / (fb - fa) * fc / (fb - fc) + (c - a) / (b - a) * fa / (fc - fa) * fb / (fc - fb)
+    return 0.5

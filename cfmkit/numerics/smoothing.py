@@ -1,0 +1,110 @@
+"""Smoothing splines whose smoothness follows from the noise that is stated, not from the eye.
+
+Discrepancy principle: of all cubic splines that minimise sum (y - s)^2 + lambda integral s''^2
+the one is taken whose residuals are as large as the noise, sum (y - s)^2 = n sigma^2.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from cfmkit.curves import FloatArray
+
+FEWEST = 5
+_STIFFEST, _SOFTEST = 6.0, -14.0
+"""Decades of lambda, for data scaled to unit spacing, between which the spline is sought."""
+
+
+@dataclass(frozen=True)
+class Smooth:
+    """A smooth function through noisy points.
+
+    Attributes
+    ----------
+    spline : BSpline
+        The function.
+    residual : float
+        Root mean square of (points - function).
+    low, high : float
+        Where the points begin and end.
+    """
+
+    spline: Any
+    residual: float
+    low: float
+    high: float
+
+    def at(self, places: FloatArray, derivative: int = 0) -> FloatArray:
+        """Return the function or one of its derivatives; constant beyond the ends."""
+        inside = np.clip(places, self.low, self.high)
+        values: FloatArray = self.spline(inside, nu=derivative)
+        return values if derivative == 0 else np.where(inside == places, values, 0.0)
+
+
+def smoothed(places: FloatArray, values: FloatArray, noise: float) -> Smooth:
+    """Return the smoothest cubic spline that is as near to the points as their noise.
+
+    Parameters
+    ----------
+    places : (n,) array
+        Strictly increasing.
+    values : (n,) array
+        Noisy.
+    noise : float
+        Standard deviation of the noise; 0 interpolates.
+
+    Raises
+    ------
+    ValueError
+        If there are too few points, or they do not increase.
+    """
+    if len(places) < FEWEST or np.diff(places).min() <= 0:
+        raise ValueError(f"at least {FEWEST} points in increasing order are needed")
+    low, high = float(places[0]), float(places[-1])
+    unit = (high - low) / (len(places) - 1)
+    spline = _chosen((places - low) / unit, values, noise)
+    moved = _in_places(spline, low, unit)
+    residual = float(np.sqrt(np.mean((moved(places) - values) ** 2)))
+    return Smooth(moved, residual, low, high)
+
+
+def _chosen(x: FloatArray, values: FloatArray, noise: float) -> Any:
+    """Return the spline in units of the spacing."""
+    from scipy.interpolate import make_interp_spline, make_smoothing_spline
+
+    if noise == 0:
+        return make_interp_spline(x, values)
+    # Values in units of the noise: the numbers that scipy works with are then of order one.
+    scaled = values / noise
+
+    def excess(decade: float) -> float:
+        return float(np.mean((make_smoothing_spline(x, scaled, lam=10.0**decade)(x) - scaled) ** 2)) - 1.0
+
+    if excess(_STIFFEST) <= 0:
+        decade = _STIFFEST
+    elif excess(_SOFTEST) >= 0:
+        return make_interp_spline(x, values)
+    else:
+        decade = _crossing(excess)
+    spline = make_smoothing_spline(x, scaled, lam=10.0**decade)
+    spline.c = spline.c * noise
+    return spline
+
+
+def _crossing(excess: Any) -> float:
+    """Return the decade at which the residuals are as large as the noise: they grow with lambda."""
+    low, high = _SOFTEST, _STIFFEST
+    while high - low > 1e-3:
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if excess(middle) > 0 else (middle, high)
+    return 0.5 * (low + high)
+
+
+def _in_places(spline: Any, low: float, unit: float) -> Any:
+    from scipy.interpolate import BSpline
+
+    return BSpline(spline.t * unit + low, spline.c, spline.k)

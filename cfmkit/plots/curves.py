@@ -1,0 +1,294 @@
+"""A force over a displacement, or a torque over an angle, on axes.
+
+Branches are drawn in the order of their path: a curve that folds back shows every
+force at one displacement, gaps stay gaps, and what is unstable is dashed. Names
+stand beside their lines; where the specification bounds the force, the band that it
+allows is shaded.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.curves import Curve
+from cfmkit.plots.bands import Band, bands_of
+from cfmkit.plots.diagram import Limit, Region, level, padded, shade
+from cfmkit.plots.place import Label, place_labels
+from cfmkit.plots.style import BAND, LINES, TROUBLE, styled
+from cfmkit.plots.text import axis_label, finite_range, shown_range, value_text
+from cfmkit.results import Result
+from cfmkit.units import to_border
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from matplotlib.axes import Axes
+    from numpy.typing import NDArray
+
+    from cfmkit.curves import FloatArray
+
+SAME = 2e-3
+"""Branches closer than this fraction of the axes' height are one line, with one name."""
+
+
+NAME_ROOM = 0.2
+"""Where several curves are named at their ends, the axes are longer by this fraction."""
+
+
+@dataclass(frozen=True)
+class Look:
+    """What `plot_curve` draws beside the lines.
+
+    Attributes
+    ----------
+    bands, names, arrows : bool
+        Requirement bands, names beside the lines, arrows along the path.
+    levels : tuple of Limit
+        Dashed lines to compare with.
+    regions : tuple of Region
+        Parts of the motion to shade and name.
+    window : ((float, float), (float, float)), optional
+        Limits of motion and effort in SI; default: everything, zero effort included.
+    """
+
+    bands: bool = True
+    names: bool = True
+    arrows: bool = True
+    levels: tuple[Limit, ...] = ()
+    regions: tuple[Region, ...] = ()
+    window: tuple[tuple[float, float], tuple[float, float]] | None = None
+
+
+@dataclass(frozen=True)
+class _Line:
+    """One branch of one curve in border units, ready to be drawn."""
+
+    points: FloatArray
+    stable: NDArray[np.bool_]
+    color: str
+    name: str
+    faint: bool = False
+
+
+@styled
+def plot_curve(source: Result | Curve | Sequence[Curve], ax: Axes, look: Look | None = None) -> Axes:
+    """Draw one or several curves on axes; return the axes.
+
+    Parameters
+    ----------
+    source : Result, Curve or sequence of Curve
+        A result also brings its requirements.
+    ax : Axes
+        To draw on.
+    look : Look, optional
+        What to draw beside the lines.
+    """
+    look = look or Look()
+    curves = _curves(source)
+    lines = _lines(curves)
+    for line in lines:
+        _draw_line(ax, line)
+    if not curves:
+        return ax
+    kind = curves[0].kind
+    bands = bands_of(source) if look.bands and isinstance(source, Result) else ()
+    _limit(ax, (lines, bands), look, kind)
+    if len(curves) > 1 and look.names and look.window is None:
+        ax.set_xlim(right=ax.get_xlim()[1] + NAME_ROOM * float(np.ptp(ax.get_xlim())))
+    region_names = [shade(ax, region, _motion(kind)) for region in look.regions]
+    level_names = [level(ax, float(to_border(item.value, kind)), item.text) for item in look.levels]
+    band_names = [_draw_band(ax, band, curves[0]) for band in bands]
+    ax.set_xlabel(axis_label(curves[0].motion_name, curves[0].motion_dimension))
+    ax.set_ylabel(axis_label(kind, kind))
+    if look.arrows and not _all_coincide(ax, lines):
+        for line in lines:
+            _draw_arrow(ax, line)
+    if look.names:
+        place_labels(ax, [*_name_lines(ax, lines), *_unstable_name(lines), *level_names, *band_names, *region_names])
+    return ax
+
+
+def _curves(source: Result | Curve | Sequence[Curve]) -> tuple[Curve, ...]:
+    if isinstance(source, Result):
+        return source.curves
+    return (source,) if isinstance(source, Curve) else tuple(source)
+
+
+def _lines(curves: tuple[Curve, ...]) -> list[_Line]:
+    """Return every branch of every curve: coloured by branch if there is one curve, else by curve."""
+    if len(curves) == 1:
+        names = curves[0].branches
+        several = len(names) > 1
+        return [_line(curves[0], name, LINES[i % len(LINES)], name if several else "") for i, name in enumerate(names)]
+    colors, named = _colors(len(curves)), _named(len(curves))
+    found = []
+    for index, curve in enumerate(curves):
+        first, *others = curve.branches
+        found.append(_line(curve, first, colors[index], _curve_name(curve, index) if index in named else ""))
+        found += [_line(curve, name, colors[index], "" if index else f"thin: {name}", faint=True) for name in others]
+    return found
+
+
+def _line(curve: Curve, branch: str, color: str, name: str, faint: bool = False) -> _Line:
+    part = curve.on(branch)
+    motion, effort = to_border(part.motion, curve.motion_dimension), to_border(part.effort, curve.kind)
+    return _Line(np.column_stack([motion, effort]), part.stable, color, name, faint)
+
+
+def _colors(count: int) -> list[str]:
+    """Return one colour a curve: the palette, or a scale of lightness where there are more curves than colours."""
+    if count <= len(LINES):
+        return list(LINES[:count])
+    from matplotlib import colormaps
+    from matplotlib.colors import to_hex
+
+    return [to_hex(colormaps["viridis"](share)) for share in np.linspace(0.0, 0.75, count)]
+
+
+def _named(count: int, most: int = 7) -> set[int]:
+    """Return which of many curves are named: the first, the last and some between."""
+    return set(np.unique(np.linspace(0, count - 1, min(count, most)).astype(int)).tolist())
+
+
+def _curve_name(curve: Curve, index: int) -> str:
+    parts = [
+        value if isinstance(value, str) else f"{name.replace('_', ' ')} {value_text(value, kind)}"
+        for name, (value, kind) in curve.label.items()
+    ]
+    return ", ".join(parts) or ("nominal" if index == 0 else f"curve {index + 1}")
+
+
+def _draw_line(ax: Axes, line: _Line) -> None:
+    """Draw a branch in runs of stable (solid) and unstable (dashed) points, each run joined to the next."""
+    for start, stop, stable in _runs(line.stable):
+        part = line.points[start:stop]
+        ax.plot(
+            part[:, 0],
+            part[:, 1],
+            color=line.color,
+            linestyle="-" if stable else "--",
+            linewidth=0.8 if line.faint else 1.4,
+            zorder=3,
+        )
+    known = np.concatenate([[False], np.isfinite(line.points).all(axis=1), [False]])
+    alone = line.points[known[1:-1] & ~known[:-2] & ~known[2:]]
+    if len(alone):
+        ax.plot(*alone.T, color=line.color, linestyle="", marker=".", zorder=3)
+
+
+def _runs(stable: NDArray[np.bool_]) -> list[tuple[int, int, bool]]:
+    """Return (start, stop, stable) of the runs; an unstable run reaches out to its stable neighbours."""
+    edges = np.flatnonzero(np.diff(stable.astype(int))) + 1
+    starts, stops = [0, *edges.tolist()], [*edges.tolist(), len(stable)]
+    runs: list[tuple[int, int, bool]] = []
+    for start, stop in zip(starts, stops, strict=True):
+        kind = bool(stable[start])
+        runs.append((start, stop, kind) if kind else (max(start - 1, 0), min(stop + 1, len(stable)), kind))
+    return runs
+
+
+def _motion(kind: str) -> str:
+    return "length" if kind == "force" else "angle"
+
+
+def _limit(ax: Axes, drawn: tuple[list[_Line], Sequence[Band]], look: Look, kind: str) -> None:
+    """Set limits that show everything from zero on, or what the look asks for."""
+    motion, (lines, bands) = _motion(kind), drawn
+    if look.window is not None:
+        ax.set_xlim(*(float(to_border(value, motion)) for value in look.window[0]))
+        ax.set_ylim(*(float(to_border(value, kind)) for value in look.window[1]))
+        return
+    points = np.concatenate([line.points for line in lines])
+    ends = [value for region in look.regions for value in (region.start, region.stop)]
+    bounds = [value for band in bands for value in (band.low, band.high) if value is not None]
+    marks = [*bounds, *(item.value for item in look.levels)]
+    across = finite_range([*points[:, 0], *to_border(np.array(ends), motion)])
+    up = finite_range([0.0, *(shown_range(points[:, 1]) or ()), *to_border(np.array(marks), kind)])
+    ax.set_xlim(*padded(across or (0.0, 1.0), 0.0, 0.02))
+    if not np.isfinite(points[:, 1]).any():
+        ax.text(0.5, 0.5, "no point has a finite value", transform=ax.transAxes, ha="center", color=TROUBLE)
+    low, high = up or (0.0, 1.0)
+    ax.set_ylim(*padded((low, high), 0.0 if low == 0 else 0.08, 0.14 if high else 0.0))
+
+
+def _draw_band(ax: Axes, band: Band, curve: Curve) -> Label:
+    """Shade a band within the limits of the axes and return its name."""
+    left, right = (float(to_border(value, curve.motion_dimension)) for value in (band.start, band.stop))
+    floor, ceiling = ax.get_ylim()
+    low, high = (None if value is None else float(to_border(value, curve.kind)) for value in (band.low, band.high))
+    bottom, top = floor if low is None else low, ceiling if high is None else high
+    color = BAND if band.met else TROUBLE
+    ax.fill_between([left, right], bottom, top, color=color, alpha=0.10, linewidth=0, zorder=1, gid="band")
+    for edge in (low, high):
+        if edge is not None:
+            ax.plot([left, right], [edge, edge], color=color, linewidth=0.7, dashes=(2, 2), zorder=1.5)
+    edges = np.array([edge for edge in (high, low) if edge is not None])
+    inside = np.linspace(max(left, ax.get_xlim()[0]), min(right, ax.get_xlim()[1]), 40)
+    points = np.column_stack([np.repeat(inside, len(edges)), np.tile(edges, len(inside))])
+    return Label(band.text, color, points, prefer=0.3)
+
+
+def _name_lines(ax: Axes, lines: list[_Line]) -> list[Label]:
+    """Return the names of the lines; lines that cannot be told apart share one."""
+    named = [line for line in lines if line.name]
+    if len(named) == len(lines) and _all_coincide(ax, lines):
+        return [Label(" and ".join(line.name for line in named), named[-1].color, named[0].points, prefer=0.6)]
+    if len({line.color for line in lines}) < len(lines) or len(named) > 2:
+        return [_name_at_end(line) for line in named]
+    return [Label(line.name, line.color, line.points, prefer=0.6 - 0.2 * i) for i, line in enumerate(named)]
+
+
+def _name_at_end(line: _Line) -> Label:
+    if line.faint:
+        return Label(line.name, line.color, line.points, prefer=0.5)
+    finite = line.points[np.isfinite(line.points).all(axis=1)]
+    return Label(line.name, line.color, finite[-max(len(finite) // 20, 1) :], prefer=1.0, toward=(1.0, 0.0))
+
+
+def _all_coincide(ax: Axes, lines: list[_Line]) -> bool:
+    return len(lines) > 1 and all(_coincide(ax, lines[0], other) for other in lines[1:])
+
+
+def _coincide(ax: Axes, one: _Line, other: _Line) -> bool:
+    if one.points.shape != other.points.shape:
+        return False
+    allowed = SAME * np.array([np.ptp(ax.get_xlim()), np.ptp(ax.get_ylim())])
+    ways = (np.abs(one.points - points) for points in (other.points, other.points[::-1]))
+    return any(bool((np.isnan(gap) | (gap < allowed)).all()) for gap in ways)
+
+
+def _draw_arrow(ax: Axes, line: _Line) -> None:
+    """Draw an arrowhead along a line, in the direction of its path."""
+    step = np.diff(line.points[:, 0])
+    if line.faint or not (line.name or (step < 0).any()) or len(step) < 8:
+        return
+    points = ax.transAxes.inverted().transform(ax.transData.transform(line.points))
+    visible = np.isfinite(points).all(axis=1) & ((points >= 0) & (points <= 1)).all(axis=1)
+    index = np.flatnonzero(visible)
+    if len(index) < 8:
+        return
+    middle = int(index[int(0.55 * len(index))])
+    ahead = [i for i in index if i > middle and np.hypot(*(points[i] - points[middle])) > 0.015]
+    if not ahead:
+        return
+    ax.annotate(
+        "",
+        xy=tuple(line.points[ahead[0]]),
+        xytext=tuple(line.points[middle]),
+        arrowprops={
+            "arrowstyle": "-|>", "color": line.color, "linewidth": 0, "mutation_scale": 11, "shrinkA": 0, "shrinkB": 0,
+        },
+        zorder=4,
+    )  # fmt: skip
+
+
+def _unstable_name(lines: list[_Line]) -> list[Label]:
+    """Return the word for dashed lines, once."""
+    for line in lines:
+        finite = ~line.stable & np.isfinite(line.points).all(axis=1)
+        if finite.sum() >= 2:
+            return [Label("unstable", line.color, line.points[finite], prefer=0.5)]
+    return []

@@ -1,0 +1,87 @@
+"""The curves of several models of one mechanism, and what lies between each and the finest one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.plots.curves import Look, plot_curve
+from cfmkit.plots.diagram import padded
+from cfmkit.plots.place import Label, place_labels
+from cfmkit.plots.style import GREY, LINES, axes_mm, new_figure, styled
+from cfmkit.plots.text import axis_label, remark, shown_range, write_heading
+from cfmkit.units import to_border
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from cfmkit.curves import Curve, FloatArray
+    from cfmkit.plots.text import Heading
+
+
+@dataclass(frozen=True, eq=False)
+class Gap:
+    """What one curve has more than the finest one.
+
+    Attributes
+    ----------
+    curve : int
+        Which of the curves it is.
+    name : str
+        To write beside the line; empty for none.
+    places, values : (n,) array
+        Motion and difference of the effort [SI].
+    """
+
+    curve: int
+    name: str
+    places: FloatArray
+    values: FloatArray
+
+
+@styled
+def fidelity_figure(heading: Heading, curves: Sequence[Curve], gaps: Sequence[Gap]) -> Figure:
+    """Return curves over each other, and the differences from the finest below.
+
+    Parameters
+    ----------
+    heading : Heading
+        To write above.
+    curves : sequence of Curve
+        One a model, labelled; at least one.
+    gaps : sequence of Gap
+        At most one for each branch of each curve but the finest.
+    """
+    figure = new_figure()
+    write_heading(figure, heading)
+    room = 96.0 - heading.height_mm
+    upper, lower = axes_mm(figure, (17, 43, 138, room - 41.0)), axes_mm(figure, (17, 12, 138, 26))
+    plot_curve(list(curves), upper, Look(arrows=False))
+    upper.set_xlabel("")
+    upper.tick_params(labelbottom=False)
+    lower.set_xlim(upper.get_xlim())
+    _draw_gaps(lower, curves, gaps)
+    return figure
+
+
+def _draw_gaps(ax: Axes, curves: Sequence[Curve], gaps: Sequence[Gap]) -> None:
+    kind, motion = curves[0].kind, curves[0].motion_dimension
+    labels, shown = [], [0.0]
+    for gap in gaps:
+        points = np.column_stack([to_border(gap.places, motion), to_border(gap.values, kind)])
+        color = LINES[gap.curve % len(LINES)]
+        ax.plot(*points.T, color=color, linewidth=1.4 if gap.name else 0.8, zorder=3)
+        shown += list(shown_range(points[:, 1]) or ())
+        labels += [Label(gap.name, color, points, prefer=0.5)] if gap.name and np.isfinite(points).any() else []
+    ax.axhline(0.0, color=GREY, linewidth=0.7, zorder=2)
+    ax.set_ylim(*padded((min(shown), max(shown)), 0.15, 0.25))
+    ax.set_xlabel(axis_label(curves[0].motion_name, motion))
+    ax.set_ylabel(axis_label("difference", kind))
+    if not labels:
+        remark(ax, (0.5, 0.6), "nothing to compare", ha="center")
+    place_labels(ax, labels)

@@ -1,0 +1,183 @@
+"""Mechanical parts to scale: plates, rollers, links, springs, sliders, forces.
+
+Positions and sizes are given in metres; the axes are in millimetres. Every artist
+that stands for a part carries its name as `gid`, so that a reader of the figure
+(or a test) finds it.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.plots.place import Label
+from cfmkit.plots.style import GREY, INK, ORANGE, SMALL, VERMILLION, axes_mm, styled
+from cfmkit.units import to_border
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from cfmkit.curves import FloatArray
+
+Point = tuple[float, float]
+Box = tuple[float, float, float, float]
+
+PLATE, STEEL, LINK = "#DADADA", "#F4F7FA", "#3D5A73"
+"""Fill of what is cut from sheet, of rollers, and colour of links."""
+
+TITLE = 10.0
+"""Room for a title of two lines above a panel [mm]."""
+
+
+def mm(values: Any) -> FloatArray:
+    """Return metres as millimetres."""
+    array: FloatArray = to_border(np.asarray(values, dtype=float), "length")
+    return array
+
+
+@styled
+def plate(ax: Axes, outlines: Iterable[FloatArray], gid: str = "plate") -> None:
+    """Draw a plate from closed outlines (n, 2); one that runs clockwise is a hole."""
+    from matplotlib.patches import PathPatch
+    from matplotlib.path import Path
+
+    paths = [Path(np.vstack([mm(points), mm(points[:1])]), closed=True) for points in outlines]
+    if paths:
+        shape = Path.make_compound_path(*paths)
+        ax.add_artist(PathPatch(shape, facecolor=PLATE, edgecolor=GREY, linewidth=0.7, zorder=1.2, gid=gid))
+
+
+@styled
+def edge(ax: Axes, points: FloatArray, gid: str, **options: Any) -> None:
+    """Draw a chain of points (n, 2) as a line: a flank, a path."""
+    look: dict[str, Any] = {"color": INK, "linewidth": 0.9, "zorder": 1.6} | options
+    ax.plot(*mm(points).T, gid=gid, **look)
+
+
+@styled
+def roller(ax: Axes, center: Point, radius: float, gid: str = "roller", ghost: bool = False) -> None:
+    """Draw a roller with its axis; a ghost is a dashed outline, for another place of the same roller."""
+    from matplotlib.patches import Circle
+
+    x, y = mm(center)
+    circle = Circle((x, y), float(mm(radius)), facecolor=STEEL, edgecolor=INK, linewidth=0.9, zorder=2.2, gid=gid)
+    if ghost:
+        circle.set(facecolor="none", edgecolor=GREY, linestyle="--")
+    ax.add_artist(circle)
+    ax.plot(x, y, marker="o", markersize=2.2, color=GREY if ghost else INK, zorder=4)
+
+
+@styled
+def link(ax: Axes, start: Point, end: Point, gid: str = "link") -> None:
+    """Draw a rigid link between two pins."""
+    ax.plot(
+        *mm([start, end]).T, color=LINK, linewidth=2.0, marker="o", markersize=3.0,
+        markerfacecolor="white", markeredgewidth=0.8, zorder=3, gid=gid,
+    )  # fmt: skip
+
+
+@styled
+def spring(ax: Axes, start: Point, end: Point, width: float, gid: str = "spring", coils: int = 12) -> None:
+    """Draw a tension spring as a zigzag of some width between two pins, straight at its ends."""
+    a, b = np.array(start, dtype=float), np.array(end, dtype=float)
+    along = b - a
+    length = float(np.hypot(*along))
+    across = np.array([-along[1], along[0]]) * (width / length if length else 0.0)
+    share = np.concatenate([[0.0, 0.12], np.linspace(0.12, 0.88, 2 * coils + 1)[1:-1], [0.88, 1.0]])
+    side = np.zeros(len(share))
+    side[2:-2] = np.where(np.arange(len(share) - 4) % 2 == 0, 0.5, -0.5)
+    points = a + np.outer(share, along) + np.outer(side, across)
+    ax.plot(*mm(points).T, color=ORANGE, linewidth=0.9, zorder=2.6, gid=gid, solid_joinstyle="round")
+
+
+@styled
+def slider(ax: Axes, center: Point, size: float, gid: str = "slider") -> None:
+    """Draw a square block that slides along a guide."""
+    from matplotlib.patches import Rectangle
+
+    (x, y), side = mm(center), float(mm(size))
+    corner = (x - side / 2, y - side / 2)
+    ax.add_artist(Rectangle(corner, side, side, facecolor=LINK, edgecolor=INK, linewidth=0.6, zorder=3.4, gid=gid))
+
+
+@styled
+def axis_of_symmetry(ax: Axes, low: float, high: float) -> None:
+    """Draw the vertical axis x = 0 as a dash-dotted line."""
+    ax.plot([0.0, 0.0], mm([low, high]), color=GREY, linewidth=0.6, dashes=(9, 2.5, 1.5, 2.5), zorder=1.1, gid="axis")
+
+
+@styled
+def force_arrow(ax: Axes, tail: Point, tip: Point, gid: str = "force") -> None:
+    """Draw a force from `tail` to `tip`."""
+    look = {"arrowstyle": "-|>", "color": VERMILLION, "linewidth": 1.4, "mutation_scale": 10}
+    arrow = ax.annotate("", mm(tip).tolist(), mm(tail).tolist(), arrowprops=look | {"shrinkA": 0, "shrinkB": 0})
+    arrow.set(zorder=3.5, gid=gid, annotation_clip=False)
+
+
+@styled
+def contact(ax: Axes, point: Point, gid: str = "contact") -> None:
+    """Mark a point of contact."""
+    x, y = mm(point)
+    ax.plot(x, y, marker="o", markersize=3.2, color=VERMILLION, markeredgewidth=0, zorder=4.5, gid=gid, linestyle="")
+
+
+@styled
+def to_scale(ax: Axes, box: Box) -> None:
+    """Show the box (left, bottom, right, top) [m] with one scale in both directions and no grid."""
+    left, bottom, right, top = mm(box)
+    ax.set_xlim(left, right)
+    ax.set_ylim(bottom, top)
+    ax.set_aspect("equal", adjustable="box")
+    ax.grid(False)
+    ax.set_xlabel("x [mm]")
+    if left == -right:
+        ax.set_xticks([-_round_below(0.75 * right), 0.0, _round_below(0.75 * right)])
+
+
+def _round_below(value: float) -> float:
+    """Return the largest 1, 2 or 5 times a power of ten that is not above the value."""
+    decade = 10.0 ** np.floor(np.log10(value))
+    return float(decade * max(step for step in (1.0, 2.0, 5.0) if step * decade <= value * (1 + 1e-12)))
+
+
+@styled
+def close_up(ax: Axes, center: Point, half_width: float) -> None:
+    """Fill the axes with what surrounds a point [m], one scale in both directions."""
+    room = ax.get_window_extent()
+    half_height = half_width * room.height / room.width
+    to_scale(ax, (center[0] - half_width, center[1] - half_height, center[0] + half_width, center[1] + half_height))
+    # long numbers need room: a place far from zero beside the width of the view has many digits
+    ax.locator_params("x", nbins=4 if abs(center[0]) < 100.0 * half_width else 2)
+
+
+@styled
+def panels(figure: Figure, size_mm: tuple[float, float], titles: Sequence[str], stacked: bool = False) -> list[Axes]:
+    """Return titled axes of equal size, spread over the width of the figure or `stacked` from top to bottom.
+
+    The lowest 12 mm stay free for the axis, and `TITLE` above every panel for its title.
+    """
+    left, bottom, free, last = 17.0, 12.0, 138.0, len(titles) - 1
+    across = 0.0 if stacked else (free - size_mm[0]) / max(last, 1)
+    up = size_mm[1] + TITLE if stacked else 0.0
+    corners = [(left + number * across, bottom + (last - number) * up) for number in range(len(titles))]
+    found = [axes_mm(figure, (*corner, *size_mm)) for corner in corners]
+    for ax, title in zip(found, titles, strict=True):
+        ax.set_title(title, fontsize=SMALL)
+        ax.locator_params("x", nbins=4)
+        ax.ticklabel_format(axis="x", style="plain")
+    return found
+
+
+def part_name(text: str, points: Any, toward: Point, color: str = INK, prefer: float = 0.5) -> Label:
+    """Return the name of a part at some points (n, 2) [m], to stand in a direction from it."""
+    return Label(text, color, mm(points).reshape(-1, 2), prefer, toward, halo=False)
+
+
+def ring(center: Point, radius: float, points: int = 73) -> FloatArray:
+    """Return a circle's points, counter-clockwise from the left, (n, 2), in the unit of its centre."""
+    turn = np.linspace(-np.pi, np.pi, points)
+    return np.array(center) + radius * np.column_stack([np.cos(turn), np.sin(turn)])

@@ -1,0 +1,252 @@
+"""Names written beside what they name, where nothing else is drawn.
+
+The axes are divided into cells of about half a millimetre. Every line, patch and
+text marks the cells it covers; a name goes to the place near its line where it
+covers fewest of them. One pass, no iteration, the same result every time.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.plots.style import SMALL, styled
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.text import Text
+    from matplotlib.transforms import Transform
+    from numpy.typing import NDArray
+
+    from cfmkit.curves import FloatArray
+
+CELL = 1.5
+"""Size of a cell [pt]."""
+
+GAPS = (2.5, 6.0, 11.0, 18.0, 28.0)
+"""Distances from the line that are tried [pt]."""
+
+MARGIN = 1.5
+"""Least distance of a name from the edge of the axes [pt]."""
+
+LEADER = 9.0
+"""From this distance on a thin line leads from the name to its line [pt]."""
+
+_SIDES = np.array([[0, 1], [0, -1], [1, 0], [-1, 0], [1, 1], [-1, 1], [1, -1], [-1, -1]], dtype=float)
+
+
+@dataclass(frozen=True)
+class Label:
+    """A name and what it belongs to.
+
+    Attributes
+    ----------
+    text, color : str
+        What to write, and how.
+    points : (n, 2) array
+        The line that is named, in data coordinates.
+    prefer : float
+        Where along the points the name should stand, 0 to 1.
+    toward : (float, float), optional
+        Direction in which the name should stand from its line.
+    halo : bool
+        Whether to clear the background behind the name.
+    """
+
+    text: str
+    color: str
+    points: FloatArray
+    prefer: float = 0.6
+    toward: tuple[float, float] | None = None
+    halo: bool = True
+
+
+@styled
+def place_labels(ax: Axes, labels: list[Label], size: float = SMALL) -> list[Text]:
+    """Write names on axes whose limits are final; return the texts.
+
+    Parameters
+    ----------
+    ax : Axes
+        With everything drawn that the names must avoid.
+    labels : list of Label
+        In order of importance: earlier ones choose first.
+    size : float
+        Font size [pt].
+    """
+    ground = _Ground(ax)
+    return [text for label in labels if (text := _write(ground, label, size)) is not None]
+
+
+def _write(ground: _Ground, label: Label, size: float) -> Text | None:
+    if not label.text:
+        return None
+    points = ground.to_points(label.points)
+    points = _thinned(points[ground.inside(points)])
+    if not len(points):
+        return None
+    text = ground.ax.text(0, 0, label.text, size=size, color=label.color, ha="center", va="center", linespacing=1.15)
+    box = ground.size_of(text)
+    center = _best(ground, label, points, box)
+    text.set_transform(ground.ax.transAxes)
+    text.set_position(tuple(center / ground.extent))
+    text.set_zorder(6)
+    if label.halo:
+        _clear(ground, center, box)
+    gap = np.hypot(*np.maximum(np.abs(points - center) - box / 2, 0.0).T)
+    anchor = points[int(np.argmin(gap))]
+    if gap.min() > LEADER:
+        _lead(ground, (center, box, anchor), label.color)
+    ground.occupy(center, box + 2.0)
+    return text
+
+
+def _thinned(points: FloatArray, most: int = 80) -> FloatArray:
+    if len(points) <= most:
+        return points
+    thinned: FloatArray = points[np.linspace(0, len(points) - 1, most).astype(int)]
+    return thinned
+
+
+def _best(ground: _Ground, label: Label, points: FloatArray, box: FloatArray) -> FloatArray:
+    """Return the cheapest centre for a box [pt] beside the points."""
+    gaps = np.array(GAPS)
+    offsets = (_SIDES[:, None, :] * (box / 2 + gaps[:, None, None].transpose(1, 0, 2))).reshape(-1, 2)
+    away = np.tile(gaps, len(_SIDES))
+    centers = (points[:, None, :] + offsets[None, :, :]).reshape(-1, 2)
+    share = np.repeat(np.linspace(0.0, 1.0, len(points)) if len(points) > 1 else [label.prefer], len(offsets))
+    slanted = np.tile(np.repeat(np.abs(_SIDES).sum(axis=1) > 1, len(gaps)), len(points))
+    covered = ground.covered(centers, box)
+    near = ground.covered(centers, box + 5.0)
+    cost = (
+        40.0 * covered + 2.0 * near + np.tile(away, len(points)) + 14.0 * np.abs(share - label.prefer) + 3.0 * slanted
+    )
+    if label.toward:
+        wanted = np.array(label.toward) / np.hypot(*label.toward)
+        sides = _SIDES / np.hypot(_SIDES[:, 0], _SIDES[:, 1])[:, None]
+        cost = cost + np.tile(np.repeat(25.0 * (1.0 - sides @ wanted), len(gaps)), len(points))
+    cost = cost + np.where(ground.holds(centers, box), 0.0, 1e6)
+    center: FloatArray = centers[int(np.argmin(cost))]
+    return center
+
+
+def _clear(ground: _Ground, center: FloatArray, box: FloatArray) -> None:
+    """Clear grid and shades behind a name; lines, which lie above, stay whole."""
+    from matplotlib.patches import Rectangle
+
+    low, size = (center - box / 2 - 0.5) / ground.extent, (box + 1.0) / ground.extent
+    back = Rectangle(
+        tuple(low), *size, transform=ground.ax.transAxes, facecolor="white", alpha=0.8, linewidth=0, zorder=2.1
+    )
+    back.set_gid("no-obstacle")
+    ground.ax.add_artist(back)
+
+
+def _lead(ground: _Ground, where: tuple[FloatArray, FloatArray, FloatArray], color: str) -> None:
+    """Draw a thin line from the edge of a name's box to its anchor."""
+    center, box, anchor = where
+    start = center + np.clip(anchor - center, -box / 2, box / 2)
+    ends = np.array([start, anchor]) / ground.extent
+    ground.ax.plot(
+        ends[:, 0], ends[:, 1], transform=ground.ax.transAxes, color=color, linewidth=0.5, zorder=5, clip_on=False
+    )
+
+
+class _Ground:
+    """The cells of some axes, and which of them are taken; lengths in points from the lower left corner."""
+
+    def __init__(self, ax: Axes) -> None:
+        """Mark what is drawn already."""
+        self.ax = ax
+        ax.apply_aspect()
+        self.scale = 72.0 / ax.figure.dpi
+        box = ax.get_window_extent()
+        self.corner = np.array([box.x0, box.y0])
+        self.extent = np.array([box.width, box.height]) * self.scale
+        self.shape = np.maximum(np.ceil(self.extent / CELL).astype(int), 1)
+        self.taken = np.zeros(self.shape, dtype=np.int64)
+        self._mark_artists()
+        self._sum()
+
+    def _mark_artists(self) -> None:
+        for line in self.ax.lines:
+            if line.get_visible() and line.get_gid() != "no-obstacle":
+                self._mark(self._points(np.asarray(line.get_xydata(), dtype=float), line.get_transform()))
+        for patch in self.ax.patches:
+            if patch.get_gid() != "no-obstacle":
+                outline = patch.get_path().to_polygons(patch.get_transform(), closed_only=False)
+                for polygon in outline:
+                    self._mark((np.asarray(polygon) - self.corner) * self.scale)
+        for text in self.ax.texts:
+            if text.get_text():
+                box = text.get_window_extent()
+                low = (np.array([box.x0, box.y0]) - self.corner) * self.scale
+                self._fill(low, low + np.array([box.width, box.height]) * self.scale)
+
+    def _points(self, values: FloatArray, transform: Transform) -> FloatArray:
+        points: FloatArray = (np.asarray(transform.transform(values)) - self.corner) * self.scale
+        return points
+
+    def to_points(self, data: FloatArray) -> FloatArray:
+        """Return data coordinates in points."""
+        return self._points(data, self.ax.transData)
+
+    def size_of(self, text: Text) -> FloatArray:
+        """Return the width and height of a text [pt]."""
+        box = text.get_window_extent()
+        return np.array([box.width, box.height]) * self.scale
+
+    def inside(self, points: FloatArray) -> NDArray[np.bool_]:
+        """Return which points lie in the axes."""
+        slack = 1e-6 * self.extent
+        inside: NDArray[np.bool_] = np.all((points >= -slack) & (points <= self.extent + slack), axis=1)
+        return inside
+
+    def _mark(self, points: FloatArray) -> None:
+        """Mark the cells along a chain of points; gaps (NaN) stay open."""
+        start, step = points[:-1], np.diff(points, axis=0)
+        keep = np.isfinite(step).all(axis=1)
+        start, step = start[keep], step[keep]
+        # clip far ends first, or one long segment would take a million cells
+        keep = ((np.maximum(start, start + step) > -50) & (np.minimum(start, start + step) < self.extent + 50)).all(
+            axis=1
+        )
+        start, step = start[keep], step[keep]
+        count = np.minimum(np.ceil(np.abs(step).max(axis=1, initial=0.0) / CELL).astype(int) + 1, 2000)
+        if not len(count):
+            return
+        which = np.repeat(np.arange(len(count)), count)
+        share = (np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)) / count[which]
+        cells = np.floor((start[which] + share[:, None] * step[which]) / CELL).astype(int)
+        cells = cells[((cells >= 0) & (cells < self.shape)).all(axis=1)]
+        self.taken[cells[:, 0], cells[:, 1]] = 1
+
+    def _fill(self, low: FloatArray, high: FloatArray) -> None:
+        a = np.clip(np.floor(low / CELL).astype(int), 0, self.shape)
+        b = np.clip(np.ceil(high / CELL).astype(int), 0, self.shape)
+        self.taken[a[0] : b[0], a[1] : b[1]] = 1
+
+    def _sum(self) -> None:
+        self.total = np.pad(self.taken.cumsum(axis=0).cumsum(axis=1), ((1, 0), (1, 0)))
+
+    def occupy(self, center: FloatArray, box: FloatArray) -> None:
+        """Mark a box as taken."""
+        self._fill(center - box / 2, center + box / 2)
+        self._sum()
+
+    def covered(self, centers: FloatArray, box: FloatArray) -> FloatArray:
+        """Return how many taken cells a box covers at each centre, in units of its own height."""
+        a = np.clip(np.floor((centers - box / 2) / CELL).astype(int), 0, self.shape)
+        b = np.clip(np.ceil((centers + box / 2) / CELL).astype(int), 0, self.shape)
+        total = self.total
+        count = total[b[:, 0], b[:, 1]] - total[a[:, 0], b[:, 1]] - total[b[:, 0], a[:, 1]] + total[a[:, 0], a[:, 1]]
+        share: FloatArray = count / max(float(box[1]) / CELL, 1.0)
+        return share
+
+    def holds(self, centers: FloatArray, box: FloatArray) -> NDArray[np.bool_]:
+        """Return at which centres the box lies wholly in the axes."""
+        low, high = centers - box / 2, centers + box / 2
+        holds: NDArray[np.bool_] = np.all((low >= MARGIN) & (high <= self.extent - MARGIN), axis=1)
+        return holds

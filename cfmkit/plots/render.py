@@ -1,0 +1,45 @@
+"""All pictures of a result as PNG, drawn by its family or, where that draws none, by the curve alone."""
+
+from __future__ import annotations
+
+from functools import partial
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from matplotlib.figure import Figure
+
+    from cfmkit.families.base import Family
+    from cfmkit.results import Result
+
+
+def figures(family: Family, result: Result) -> Mapping[str, Callable[[], Figure]]:
+    """Return what draws each picture of a result, by file stem; empty if there is nothing to draw.
+
+    Parameters
+    ----------
+    family : Family
+        Its `draw` names the module with ``figures(result)``; without one there is the curve.
+    result : Result
+        Of any status.
+    """
+    if not result.curves:
+        return {}
+    if family.draw is None:
+        from cfmkit.plots.loop import loop_figure
+
+        return {"curve": partial(loop_figure, result)}
+    makers: Mapping[str, Callable[[], Figure]] = import_module(family.draw).figures(result)
+    return makers
+
+
+def render(family: Family, result: Result) -> dict[str, bytes]:
+    """Return every picture of a result as PNG, by file name: ``loop.png`` and so on."""
+    makers = figures(family, result)
+    if not makers:
+        return {}
+    from cfmkit.plots.style import png
+
+    return {f"{stem}.png": png(draw()) for stem, draw in makers.items()}

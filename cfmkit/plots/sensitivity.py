@@ -1,0 +1,289 @@
+"""Pictures of a sensitivity study: bars with their intervals, curves, scatter of effects, convergence, histograms.
+
+Parameters stand in the order of what they do; what cannot be stated is written so, and never drawn as a short bar.
+"""
+
+from __future__ import annotations
+
+import re
+import textwrap
+from dataclasses import dataclass
+from itertools import takewhile
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.plots.histogram import draw_histogram
+from cfmkit.plots.style import BLUE, GREY, INK, LINES, SMALL, VERMILLION, axes_mm, new_figure, styled
+from cfmkit.tables import border_values
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from cfmkit.studies.sensitivity.findings import Findings, Line
+    from cfmkit.studies.study import Metric
+
+MOST_SHOWN = 12
+"""Parameters on a picture, those that do most; the tables have all."""
+
+MARKERS = "osD^v<>ph*XP"
+_LEFT, _ROW = 46.0, 8.0
+
+
+@dataclass(frozen=True)
+class Bars:
+    """One index on a picture: its name in the findings, how it is called, and its colour."""
+
+    index: str
+    words: str
+    colour: str
+
+
+BARS = {
+    "local": (Bars("normalised_slope", "relative change per relative change of the parameter", BLUE),),
+    "sobol": (
+        Bars("total_order", "total order: with all interactions", BLUE),
+        Bars("first_order", "first order: the parameter alone", VERMILLION),
+    ),
+}
+
+
+def figures(found: Findings) -> dict[str, Callable[[], Figure]]:
+    """Return what draws each picture of a study, by name."""
+    pictures: dict[str, Callable[[], Figure]] = {}
+    if found.outputs is None:
+        return pictures
+    if found.all_met is not None:
+        pictures["yield_gain"] = lambda: draw_gains(found)
+    for number, metric in enumerate(found.setup.study.metrics):
+        stem = re.sub("[^a-z0-9]+", "_", metric.label.lower()).strip("_")
+        for name, draw in _OF_METHOD[found.setup.method].items():
+            pictures[f"{stem}{name}"] = lambda number=number, draw=draw: draw(found, number)  # type: ignore[misc]
+    return pictures
+
+
+def short(path: str) -> str:
+    """Return a parameter's name for a picture, without the block it stands in.
+
+    Examples
+    --------
+    >>> short("mechanism.brace_length")
+    'brace length'
+    >>> short("mechanism.springs.stiffness.0, mechanism.springs.stiffness.1")
+    'springs stiffness (2)'
+    """
+    several = path.split(", ")
+    shared = takewhile(lambda parts: len(set(parts)) == 1, zip(*(one.split(".") for one in several), strict=False))
+    text = ".".join(parts[0] for parts in shared)
+    if len(several) > 1 and not text.partition(".")[2]:
+        return ", ".join(map(short, several))
+    plain = re.sub("[._]", " ", text.partition(".")[2] or text)
+    return f"{plain} ({len(several)})" if len(several) > 1 else plain
+
+
+def _lines(found: Findings, metric: str, index: str) -> list[Line]:
+    """Return one index of all parameters, in the order of the study."""
+    return [line for line in found.lines if (line.metric, line.index) == (metric, index)]
+
+
+def _ranked(lines: Sequence[Line]) -> list[int]:
+    """Return the numbers of the parameters to draw, those that do most first; unstated ones lead."""
+    sizes = [np.inf if line.value is None else abs(line.value) for line in lines]
+    return sorted(range(len(lines)), key=lambda k: -sizes[k])[:MOST_SHOWN]
+
+
+def _bar_axes(count: int, heading: str, legend: bool = False) -> tuple[Figure, Axes]:
+    below, above = 14.0, 9.0 + 6.0 * legend
+    figure = new_figure(150, below + above + _ROW * count + 4.0)
+    axes = axes_mm(figure, (_LEFT, below, 150 - _LEFT - 6, _ROW * count + 4.0))
+    figure.text(0.02, 1.0 - 2.0 / (below + above + _ROW * count + 4.0), heading, va="top", weight="bold")
+    axes.grid(visible=False, axis="y")
+    axes.axvline(0.0, color=GREY, linewidth=0.8)
+    return figure, axes
+
+
+def _rows(axes: Axes, names: Sequence[str]) -> None:
+    labels = ["\n".join(textwrap.wrap(short(name), 28)) for name in names]
+    axes.set_yticks(range(len(names)), labels)
+    axes.set_ylim(len(names) - 0.5, -0.5)
+    axes.tick_params(axis="y", length=0)
+
+
+def _unstated(axes: Axes, row: float) -> None:
+    axes.annotate("not stated", (0.0, row), (3, 0), textcoords="offset points", va="center", size=SMALL)
+
+
+def _draw_bars(axes: Axes, lines: Sequence[Line], order: Sequence[int], look: tuple[str, str, float, float]) -> None:
+    """Draw one index: bars with whiskers, whose colour, words, place and height `look` gives."""
+    colour, words, shift, height = look
+    for row, k in enumerate(order):
+        line = lines[k]
+        if line.value is None:
+            _unstated(axes, row + shift)
+            continue
+        axes.barh(row + shift, line.value, height, color=colour, label=words)
+        words = ""
+        if line.low is not None and line.high is not None:
+            axes.plot((line.low, line.high), (row + shift,) * 2, color=INK, linewidth=1.0, marker="|", markersize=5)
+
+
+@styled
+def draw_bars(found: Findings, number: int) -> Figure:
+    """Return the indices of one metric as bars with their intervals."""
+    metric, kinds = found.setup.study.metrics[number], BARS[found.setup.method]
+    each = [_lines(found, metric.label, kind.index) for kind in kinds]
+    order = _ranked(each[0])
+    figure, axes = _bar_axes(len(order), _title(found, metric), len(kinds) > 1)
+    height = 0.7 / len(kinds)
+    for k, (kind, lines) in enumerate(zip(kinds, each, strict=True)):
+        _draw_bars(axes, lines, order, (kind.colour, kind.words, (k - (len(kinds) - 1) / 2) * height, 0.9 * height))
+    _rows(axes, [each[0][k].parameter for k in order])
+    axes.set_xlabel("share of the variance [1]" if len(kinds) > 1 else f"{kinds[0].words} [1]")
+    if len(kinds) > 1 and axes.get_legend_handles_labels()[1]:
+        axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, frameon=False, fontsize=SMALL)
+    return figure
+
+
+@styled
+def draw_gains(found: Findings) -> Figure:
+    """Return what the yield gains if a tolerance is halved."""
+    lines = _lines(found, "yield", "yield_gain_when_halved")
+    order = _ranked(lines)
+    share = found.all_met
+    stated = share is not None and share.value == share.value
+    told = f"yield {100 * share.value:.1f} %" if share is not None and stated else "yield not stated"
+    figure, axes = _bar_axes(len(order), f"{found.setup.study.spec.name}: {told}; which tolerance to tighten first")
+    _draw_bars(axes, lines, order, (BLUE, "", 0.0, 0.6))
+    _rows(axes, [lines[k].parameter for k in order])
+    axes.set_xlabel("change of the yield when the tolerance is halved [1], with 95 % interval")
+    return figure
+
+
+def _title(found: Findings, metric: Metric) -> str:
+    return f"{found.setup.study.spec.name}: {metric.label.replace('_', ' ')}"
+
+
+@styled
+def draw_oat(found: Findings, number: int) -> Figure:
+    """Return one metric over each parameter's range, and what the ends of the range do."""
+    metric, setup = found.setup.study.metrics[number], found.setup
+    swings = _lines(found, metric.label, "swing")
+    order = _ranked(swings)
+    room = max(60.0, _ROW * len(order) + 10.0)
+    figure = new_figure(190, room + 24)
+    curves, bars = (axes_mm(figure, (left, 14, width, room)) for left, width in ((18, 72), (132, 52)))
+    figure.text(0.02, 1.0 - 2.0 / (room + 24), _title(found, metric), va="top", weight="bold")
+    nominal = float(border_values(setup.nominal.values[number], metric.dimension))
+    bars.axvline(nominal, color=GREY, linewidth=0.8)
+    for row, k in enumerate(order):
+        outputs = found.outputs[k, :, number] if found.outputs is not None else np.empty(0)
+        values = border_values(outputs, metric.dimension)
+        where = np.linspace(0.0, 1.0, len(values))
+        colour = LINES[row % len(LINES)]
+        every = max(1, len(values) // 10)
+        curves.plot(where, values, color=colour, marker=MARKERS[row], markersize=3, linewidth=1.0, markevery=every)
+        _tornado(bars, row, swings[k], (nominal, float(values[0]), float(values[-1])))
+        bars.plot(
+            -0.04, row, marker=MARKERS[row], color=colour, transform=bars.get_yaxis_transform(), clip_on=False, ms=4
+        )
+    _rows(bars, [swings[k].parameter for k in order])
+    bars.tick_params(axis="y", pad=9)
+    bars.grid(visible=False, axis="y")
+    curves.set(xlabel="place in the parameter's range, low ... high", ylabel=_unit(metric))
+    bars.set_xlabel(f"{_unit(metric)}\nat the low (blue) and high (orange) end")
+    return figure
+
+
+def _tornado(axes: Axes, row: int, swing: Line, ends: tuple[float, float, float]) -> None:
+    nominal, low, high = ends
+    if swing.value is None:
+        axes.annotate("not stated", (nominal, row), (3, 0), textcoords="offset points", va="center", size=SMALL)
+        return
+    for value, colour, shift in ((low, BLUE, -0.18), (high, VERMILLION, 0.18)):
+        if np.isfinite(value):
+            axes.barh(row + shift, value - nominal, 0.34, left=nominal, color=colour)
+        else:
+            place = (nominal, row + shift)
+            axes.annotate("no result there", place, (3, 0), textcoords="offset points", va="center", size=SMALL)
+
+
+def _unit(metric: Metric) -> str:
+    from cfmkit.plots.text import axis_label
+
+    return axis_label(metric.name.replace("[", " ").replace("]", ""), metric.dimension)
+
+
+@styled
+def draw_morris(found: Findings, number: int) -> Figure:
+    """Return mean size and scatter of the effects: far right matters, high up is curved or interacts."""
+    metric = found.setup.study.metrics[number]
+    sizes, scatters = (_lines(found, metric.label, name) for name in ("mu_star", "sigma"))
+    figure = new_figure(160, 90)
+    axes = axes_mm(figure, (20, 14, 84, 66))
+    figure.text(0.02, 0.98, _title(found, metric), va="top", weight="bold")
+    top = 0.0
+    for row, k in enumerate(_ranked(sizes)):
+        size, scatter = sizes[k], scatters[k]
+        label = "\n".join(textwrap.wrap(short(size.parameter), 26))
+        if size.value is None or scatter.value is None:
+            axes.plot([], [], linestyle="", label=f"{label}\n(not stated)")
+            continue
+        colour, ends = LINES[row % len(LINES)], _numbers(size)[2:]
+        axes.plot(size.value, scatter.value, MARKERS[row], label=label, linestyle="", color=colour, ms=5)
+        axes.plot(ends, (scatter.value,) * 2, marker="|", markersize=4, color=colour, linewidth=1.0)
+        top = max(top, size.high or 0.0, scatter.value)
+    if top:
+        look = {"textcoords": "offset points", "ha": "right", "size": SMALL, "color": GREY}
+        axes.plot((0, top), (0, top), color=GREY, linewidth=0.6, linestyle="--")
+        axes.annotate("sigma = mu*", (0.5 * top, 0.5 * top), (-4, 2), **look)  # type: ignore[arg-type]
+    axes.legend(loc="upper left", bbox_to_anchor=(1.03, 1.0), frameon=False, fontsize=SMALL)
+    unit = _unit(metric).rpartition(" ")[2]
+    axes.set(xlabel=f"mu*: mean size of the effect of the whole range {unit}", ylabel=f"sigma: its scatter {unit}")
+    axes.set(xlim=(0, None), ylim=(0, None))
+    return figure
+
+
+@styled
+def draw_convergence(found: Findings, number: int) -> Figure:
+    """Return the total order indices over the number of samples, with their intervals."""
+    metric = found.setup.study.metrics[number]
+    mine = [line for line in found.convergence if (line.metric, line.index) == (metric.label, "total_order")]
+    figure = new_figure(160, 90)
+    axes = axes_mm(figure, (18, 14, 86, 66))
+    figure.text(0.02, 0.98, f"{_title(found, metric)}, convergence", va="top", weight="bold")
+    order = [found.setup.paths[k] for k in _ranked(_lines(found, metric.label, "total_order"))]
+    for row, path in enumerate(order):
+        own = np.array([_numbers(line) for line in mine if line.parameter == path and line.value is not None])
+        if not len(own):
+            axes.plot([], [], linestyle="", label=f"{short(path)}\n(not stated)")
+            continue
+        sizes, values, low, high = own.T
+        sizes = sizes * 1.03 ** (row - len(order) / 2)
+        colour = LINES[row % len(LINES)]
+        label = "\n".join(textwrap.wrap(short(path), 26))
+        axes.plot(sizes, values, color=colour, marker=MARKERS[row], markersize=4, label=label)
+        axes.vlines(sizes, low, high, color=colour, linewidth=1.0)
+    stages = sorted({line.samples for line in mine})
+    axes.set_xscale("log", base=2)
+    axes.set_xlim(stages[0] / 1.3, stages[-1] * 1.3)
+    axes.set_xticks(stages, [str(size) for size in stages])
+    axes.minorticks_off()
+    axes.legend(loc="upper left", bbox_to_anchor=(1.03, 1.0), frameon=False, fontsize=SMALL)
+    axes.set(xlabel=f"base samples ({len(order) + 2} evaluations each)", ylabel="total order index [1]")
+    return figure
+
+
+def _numbers(line: Line) -> list[float]:
+    return [np.nan if number is None else float(number) for number in (line.samples, line.value, line.low, line.high)]
+
+
+_OF_METHOD: dict[str, dict[str, Callable[[Findings, int], Figure]]] = {
+    "oat": {"": draw_oat},
+    "local": {"": draw_bars},
+    "morris": {"": draw_morris},
+    "sobol": {"": draw_bars, "_convergence": draw_convergence},
+    "tolerance": {"": draw_histogram},
+}

@@ -1,0 +1,186 @@
+"""What is written on a picture: axis labels with units, ticks, headings that fit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.plots.style import GREY, MM, NORMAL, SMALL, TROUBLE, styled
+from cfmkit.units import border_unit, format_short
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
+    from matplotlib.figure import Figure
+
+    from cfmkit.curves import FloatArray
+    from cfmkit.results import Result
+
+POLE = 3.0
+"""Percentage of the points at each end of the values that may belong to a pole."""
+
+LEFT = 3.0
+"""Distance of headings from the edge of the print [mm]."""
+
+
+def axis_label(name: str, dimension: str) -> str:
+    """Return a label with the border unit.
+
+    Examples
+    --------
+    >>> axis_label("spring_elongation", "length")
+    'spring elongation [mm]'
+    >>> axis_label("friction", "ratio")
+    'friction [1]'
+    """
+    unit = border_unit(dimension)
+    return f"{name.replace('_', ' ')} [{unit}]" if unit else name.replace("_", " ")
+
+
+def value_text(value: float, dimension: str) -> str:
+    """Return a value with its border unit, rounded to three digits.
+
+    Examples
+    --------
+    >>> value_text(0.00113969652, "length")
+    '1.14 mm'
+    """
+    if dimension == "ratio" and 0 < abs(value) < 1e-4:
+        return "< 0.01 %"
+    return format_short(value, dimension, 3).replace("-", "\N{MINUS SIGN}")
+
+
+@dataclass(frozen=True)
+class Heading:
+    """What stands above a picture: whose it is, what it shows, and what is wrong."""
+
+    name: str
+    subject: str
+    note: str = ""
+
+    @classmethod
+    def of(cls, result: Result, subject: str) -> Heading:
+        """Return the heading of a picture of a result; the note says why the run did not complete."""
+        done = result.status.key == "complete"
+        return cls(result.spec.name, subject, "" if done else f"{result.status.key}: {result.message}")
+
+    @property
+    def height_mm(self) -> float:
+        """Room that the heading takes at the top of the figure [mm]."""
+        return 12.0 if self.note else 8.0
+
+
+@styled
+def write_heading(figure: Figure, heading: Heading) -> None:
+    """Write a heading at the top left, each part on one line: names that are too long are cut, the subject is not."""
+    _write_line(figure, 1.8, (heading.name, f": {heading.subject}"), {"size": NORMAL + 0.5, "weight": "bold"})
+    if heading.note:
+        _write_line(figure, 6.4, (heading.note, ""), {"size": SMALL, "color": TROUBLE})
+
+
+def _write_line(figure: Figure, down_mm: float, parts: tuple[str, str], look: dict[str, Any]) -> None:
+    """Write two parts on one line, the first cut with an ellipsis as far as the width demands."""
+    width, height = figure.get_size_inches() / MM
+    room = (width - 2.0 * LEFT) * MM * figure.dpi
+    text = figure.text(LEFT / width, 1.0 - down_mm / height, "", ha="left", va="top", **look)
+    first, last = (" ".join(part.split(" ")) for part in (" ".join(parts[0].split()), parts[1]))
+    text.set_text(first + last)
+    while (extent := text.get_window_extent().width) > room and len(first) > 1:
+        # by the excess at the mean width of a letter, so that two or three rounds do
+        excess = (extent - room) / extent * len(first + last)
+        first = first[: max(len(first) - 1 - max(int(0.8 * excess), 1), 1)].rstrip()
+        text.set_text(f"{first}…{last}")
+
+
+def plain_ticks(axis: Axis) -> None:
+    """Write the ticks of a logarithmic axis as plain numbers, at 1, 2 and 5 where decades are few."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    low, high = sorted(float(value) for value in axis.get_view_interval())
+    few = high < 1e3 * low
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if few else (1.0,), numticks=12))
+    axis.set_major_formatter(FuncFormatter(_plain))
+    axis.set_minor_formatter(NullFormatter())
+
+
+def _plain(value: float, _position: Any = None) -> str:
+    return f"{value:g}" if 1e-3 < abs(value) < 1e6 else f"{value:.0e}"
+
+
+@styled
+def remark(ax: Axes, place: tuple[float, float], text: str, **options: Any) -> None:
+    """Write a small grey remark at a place in fractions of the axes."""
+    look: dict[str, Any] = {"size": SMALL, "color": GREY, "transform": ax.transAxes} | options
+    ax.text(*place, text, **look)
+
+
+@styled
+def top_axis(ax: Axes, places: FloatArray, values: FloatArray, label: str) -> None:
+    """Add an axis at the top for another quantity that grows with the lower one.
+
+    Parameters
+    ----------
+    ax : Axes
+        With final limits.
+    places, values : (n,) array
+        Increasing: where on the lower axis which value of the other quantity stands, in border units.
+    label : str
+        Of the new axis.
+    """
+    low, high = ax.get_xlim()
+    chosen: list[float] = []
+    taken = -np.inf
+    for value in _round_values(float(values[0]), float(values[-1])):
+        place = float(np.interp(value, values, places))
+        if place - taken >= 0.09 * (high - low):
+            chosen.append(value)
+            taken = place
+    top = ax.twiny()
+    top.set_xlim(low, high)
+    top.set_xticks(np.interp(chosen, values, places).tolist(), [f"{value:g}" for value in chosen])
+    top.set_xlabel(label)
+    top.spines["top"].set_visible(True)
+    top.grid(False)
+
+
+@styled
+def right_axis(ax: Axes, factor: float, label: str) -> None:
+    """Add an axis at the right for a quantity that is `factor` times the left one, in border units."""
+    right = ax.twinx()
+    right.set_ylim(*(factor * value for value in ax.get_ylim()))
+    right.set_ylabel(label)
+    right.spines["right"].set_visible(True)
+    right.grid(False)
+
+
+def _round_values(low: float, high: float) -> list[float]:
+    """Return round numbers from `low` to `high`, finer towards `low`."""
+    span = high - low
+    steps = 10.0 ** np.floor(np.log10(span)) * np.array([1e-3, 2e-3, 5e-3, 1e-2, 2e-2, 5e-2, 0.1, 0.2, 0.5, 1, 2, 5])
+    found = {0.0} if low <= 0 <= high else set()
+    for step in steps:
+        near = step * np.arange(np.ceil(low / step), np.floor(min(high, low + 6 * step) / step) + 1)
+        found |= {float(f"{value:.6g}") for value in near}
+    return sorted(found)
+
+
+def finite_range(values: Any) -> tuple[float, float] | None:
+    """Return smallest and largest finite value; None if there is none."""
+    array = np.asarray(values, dtype=float)
+    array = array[np.isfinite(array)]
+    return (float(array.min()), float(array.max())) if array.size else None
+
+
+def shown_range(values: Any) -> tuple[float, float] | None:
+    """Return the range worth showing: all finite values, but not the peak of a pole that would hide the rest."""
+    whole = finite_range(values)
+    if whole is None:
+        return None
+    array = np.asarray(values, dtype=float)
+    low, high = (float(end) for end in np.percentile(array[np.isfinite(array)], (POLE, 100.0 - POLE)))
+    room = 3.0 * max(high - low, 0.2 * max(abs(low), abs(high)))
+    return (whole[0] if whole[0] >= low - room else low - 0.3 * room), (
+        whole[1] if whole[1] <= high + room else high + 0.3 * room
+    )

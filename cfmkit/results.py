@@ -1,0 +1,164 @@
+"""What an analysis or a design gives back: values, never half-finished objects.
+
+A `Status` says how far the solver came; its value is the sentence the user
+reads. Whether the mechanism is any good is not a status: that is what the
+requirements decide.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import TYPE_CHECKING, Any
+
+from cfmkit.errors import ExitCode
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from cfmkit.curves import Curve
+    from cfmkit.spec import Spec
+
+
+class Status(Enum):
+    """How a solve ended."""
+
+    COMPLETE = "solved over everything that was asked"
+    PARTIAL = "solved in part: the curve ends early, or some points failed"
+    INFEASIBLE = "no design meets the targets within the stated limits"
+    NO_EQUILIBRIUM = "no equilibrium: the mechanism cannot exist as described, or nothing holds it"
+    INVALID = "a value is invalid"
+    TIMEOUT = "the time allowed for this point ran out"
+    CRASHED = "the process that worked on this point died"
+
+    @property
+    def key(self) -> str:
+        """The short name used in metrics.json and tables: ``complete``, ``partial``, ..."""
+        return self.name.lower()
+
+    @property
+    def usable(self) -> bool:
+        """Whether there is a curve to look at."""
+        return self in (Status.COMPLETE, Status.PARTIAL)
+
+    @property
+    def exit_code(self) -> ExitCode:
+        """The exit code of a run that ended so, before requirements are looked at."""
+        codes = {Status.COMPLETE: ExitCode.OK, Status.PARTIAL: ExitCode.PARTIAL, Status.INVALID: ExitCode.INVALID}
+        return codes.get(self, ExitCode.NO_SOLUTION)
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Something about the mechanism that the user must know, by name.
+
+    `name` is stable (scripts match it); `message` holds the numbers that decide
+    and, where there is one, the cure. `cures` are changes of the specification that
+    cure it, as ``--set`` takes them: ``design.avoid_undercut=true``.
+    """
+
+    name: str
+    message: str
+    cures: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A scalar result in SI with its dimension and definition; ``None`` where undefined, with the reason."""
+
+    value: float | None
+    dimension: str
+    definition: str
+    reason: str = ""
+
+
+@dataclass(frozen=True)
+class Result:
+    """The outcome of one analysis.
+
+    Attributes
+    ----------
+    spec : Spec
+        The specification with every default and derived part written out.
+    status : Status
+        How far the solver came.
+    message : str
+        One sentence on the outcome; the status's own sentence if nothing more is known.
+    curves : tuple of Curve
+        All curves of the run, the nominal one first; empty if nothing was solved.
+    values : mapping
+        Scalar results that the family computes itself, by name.
+    warnings : tuple of Finding
+        What the user must know; warnings never change the exit code.
+    valid : tuple of (float, float)
+        Intervals of the motion [m or rad] in which the mechanism works as intended
+        (for a cam: the roller runs on the flank). ``usable_stroke`` looks there only.
+    target : float, optional
+        Force or torque that the curve should have [N or N m].
+    reference : float, optional
+        Motion of the pose that the band ranges are measured around [m or rad].
+    allowable_stress : float, optional
+        What the column ``max_stress`` is compared with [Pa].
+    state : Any
+        What the family's drawing functions need; not part of the public interface.
+    """
+
+    spec: Spec
+    status: Status
+    message: str = ""
+    curves: tuple[Curve, ...] = ()
+    values: Mapping[str, Quantity] = field(default_factory=dict)
+    warnings: tuple[Finding, ...] = ()
+    valid: tuple[tuple[float, float], ...] | None = None
+    target: float | None = None
+    reference: float | None = None
+    allowable_stress: float | None = None
+    state: Any = None
+
+    def __post_init__(self) -> None:
+        """Fall back to the status's sentence."""
+        if not self.message:
+            object.__setattr__(self, "message", self.status.value)
+
+    @property
+    def curve(self) -> Curve:
+        """The nominal curve.
+
+        Raises
+        ------
+        cfmkit.errors.SolutionError
+            If nothing was solved.
+        """
+        if not self.curves:
+            from cfmkit.errors import SolutionError
+
+            raise SolutionError(f"there is no curve: {self.message}")
+        return self.curves[0]
+
+    def to_pandas(self) -> Any:
+        """Return the curves as one tidy `pandas.DataFrame` in border units (mm, N, ...)."""
+        import pandas as pd
+
+        from cfmkit.tables import curve_table
+
+        return pd.DataFrame(dict(curve_table(self.curves).as_dict()))
+
+
+@dataclass(frozen=True)
+class Design:
+    """The outcome of a design: a complete new specification, or why there is none.
+
+    A design is never its own judge: its `spec` is analysed like any other.
+    """
+
+    spec: Spec | None
+    status: Status
+    message: str = ""
+    active_bounds: tuple[str, ...] = ()
+    nearest_feasible: Mapping[str, str] = field(default_factory=dict)
+    warnings: tuple[Finding, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Fall back to the status's sentence."""
+        if not self.message:
+            object.__setattr__(self, "message", self.status.value)

@@ -1,0 +1,258 @@
+"""The output folder of one run."""
+
+from __future__ import annotations
+
+import os
+import re
+import time
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Self
+
+from cfmkit.errors import CfmError, OutputError
+from cfmkit.store import disk, transaction
+from cfmkit.store.disk import TEMPORARY, FileRecord, reporting, shown
+from cfmkit.store.identity import file_hash
+from cfmkit.store.lock import FolderLock
+from cfmkit.store.manifest import Manifest
+from cfmkit.store.names import JOURNAL, MANIFEST, checked_name, hash_in, mode_of, refuse_in_the_way
+from cfmkit.store.transaction import NEW, RUN
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from types import TracebackType
+
+    from cfmkit.store.disk import Data
+
+_TEMPORARY = re.compile(re.escape(TEMPORARY).replace(r"\{pid\}", "([0-9]+)").replace(r"\{count\}", "[0-9]+"))
+_MOST_TRIES = 20
+
+
+class RunFolder:
+    """A context manager: enter to lock the folder, `write` files, `commit` them as a set.
+
+    Leaving without `commit` leaves the folder as it was found.
+
+    Parameters
+    ----------
+    path : path-like
+        The folder; it is created on entry, with what is missing above it.
+
+    Attributes
+    ----------
+    path : Path
+        The folder, links resolved.
+    previous : Manifest or None
+        What the run before wrote; after `commit`, what this one wrote.
+    kept : mapping of str to str
+        After `commit`: files that were edited since the run before -> the name under
+        which the edited version was kept.
+
+    Raises
+    ------
+    cfmkit.errors.FolderInUse
+        On entry, if another live run has the folder.
+    cfmkit.errors.OutputError
+        On entry, if it cannot be created, locked or repaired.
+    """
+
+    def __init__(self, path: str | os.PathLike[str]) -> None:
+        """Remember the folder; nothing is touched yet."""
+        if "\0" in os.fspath(path) or not os.fspath(path):
+            raise OutputError(f"{os.fspath(path)!a} is not a name for a folder")
+        self.path = Path(os.path.realpath(path))
+        self.previous: Manifest | None = None
+        self.kept: Mapping[str, str] = MappingProxyType({})
+        self._staged: dict[str, FileRecord] = {}
+        self._created: list[Path] = []
+        self._lock = FolderLock(self.path)
+        self._owner = 0
+        self._started = datetime.now(UTC)
+        self._clock = time.monotonic()
+
+    def __enter__(self) -> Self:
+        """Create and lock the folder, repair what a killed run left, read the last manifest."""
+        self._started = datetime.now(UTC)
+        self._clock = time.monotonic()
+        with reporting(self.path, "use the folder"):
+            self._create_and_lock()
+            try:
+                self._take_over()
+            except BaseException:
+                self._leave()
+                raise
+        self._owner = os.getpid()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        """Drop what was not committed and unlock the folder."""
+        self._leave()
+
+    def check(self, *names: str) -> None:
+        """Raise now what `write` would raise later: call it before a long computation.
+
+        Raises
+        ------
+        cfmkit.errors.OutputError
+            If a name is not allowed, or something that is not ours is in its place.
+        """
+        for name in names:
+            ours = self.previous is not None and name in self.previous.files
+            with reporting(self.path / checked_name(name), "look at"):
+                refuse_in_the_way(self.path, name, ours=ours)
+
+    def write(self, name: str, data: Data) -> FileRecord:
+        """Take a file into the set that `commit` will put in place.
+
+        Parameters
+        ----------
+        name : str
+            Path below the folder with forward slashes, e.g. ``figures/loop.png``.
+        data : bytes or iterable of bytes
+            The content, whole or in pieces.
+
+        Raises
+        ------
+        cfmkit.errors.OutputError
+            If the name is refused or the data cannot be written.
+        """
+        self._require_open()
+        self.check(name)
+        self._staged.pop(name, None)
+        self._staged[name] = self._stage(name, data)
+        return self._staged[name]
+
+    @property
+    def journal(self) -> Path:
+        """The file in which a long run may note what it has finished, for the run after it.
+
+        It is written in place, belongs to whoever holds the lock, and is listed in no
+        manifest: other runs into the folder leave it alone.
+        """
+        self._require_open()
+        return self.path / JOURNAL
+
+    def commit(self, info: Mapping[str, Any]) -> Manifest:
+        """Put the files and a manifest in place of those of the run before, all or none; once.
+
+        Parameters
+        ----------
+        info : mapping
+            What the manifest is to say about the run: arguments, seed, hash of the
+            spec, status, exit code.
+
+        Raises
+        ------
+        cfmkit.errors.OutputError
+            If anything fails; the files of the run before are still in place.
+        """
+        self._require_open()
+        self._owner = 0
+        self.check(*self._staged)
+        manifest = Manifest.of_run(info, self._staged, self._started, self._duration())
+        with reporting(self.path):
+            removed, kept = self._outdated()
+            new = {name: record.sha256 for name, record in self._staged.items()}
+            new |= {spare: self._keep(name, spare) for name, spare in kept.items()}
+            new[MANIFEST] = self._stage(MANIFEST, manifest.to_json()).sha256
+            self._lock.check()
+            transaction.execute(self.path, transaction.plan_for(self.path, new, removed))
+        self.previous, self.kept = manifest, MappingProxyType(kept)
+        return manifest
+
+    def _create_and_lock(self) -> None:
+        """Create and lock the folder; a run that ends just now may remove it in between."""
+        for attempt in range(_MOST_TRIES):
+            try:
+                self._created = disk.make_folders(self.path)
+                self._lock.acquire()
+                return
+            except FileNotFoundError:
+                if attempt == _MOST_TRIES - 1:
+                    raise
+            except BaseException:
+                disk.remove_empty(self._created)
+                raise
+
+    def _take_over(self) -> None:
+        """Repair and clear what earlier runs left, and read what the last one wrote."""
+        transaction.recover(self.path)
+        self._clear_temporaries()
+        self.previous = Manifest.read(self.path)
+
+    def _clear_temporaries(self) -> None:
+        """Remove what `atomic_write` left here in processes that have died."""
+        for entry in os.scandir(self.path):
+            match = _TEMPORARY.fullmatch(entry.name)
+            if match and not _alive(int(match[1])):
+                disk.discard(Path(entry.path))
+
+    def _stage(self, name: str, data: Data) -> FileRecord:
+        place = self.path / RUN / NEW / name
+        with reporting(self.path / name):
+            disk.make_folders(place.parent)
+            if mode_of(place) is not None:
+                disk.system.unlink(place)
+            return disk.write_new(place, data)
+
+    def _keep(self, name: str, spare: str) -> str:
+        """Stage an edited file under its spare name; return its hash."""
+        place = self.path / RUN / NEW / spare
+        disk.make_folders(place.parent)
+        disk.duplicate(self.path / name, place)
+        return file_hash(place) or ""
+
+    def _outdated(self) -> tuple[list[str], dict[str, str]]:
+        """Return the old files to remove, and the edited ones to keep under another name."""
+        removed: list[str] = []
+        kept: dict[str, str] = {}
+        for name, record in (self.previous.files if self.previous else {}).items():
+            digest = hash_in(self.path, name)
+            if digest == record.sha256 and name not in self._staged:
+                removed.append(name)
+            elif name in self._staged and digest not in (None, record.sha256, self._staged[name].sha256):
+                spare = self._spare(name, digest)
+                kept |= {name: spare} if spare else {}
+        return removed, kept
+
+    def _spare(self, name: str, digest: str | None) -> str | None:
+        """Return a free name for an edited file, or None if the same content is kept already."""
+        stem, dot, suffix = name.rpartition(".") if "." in name.rpartition("/")[2] else (name, "", "")
+        count = 1
+        while True:
+            spare = f"{stem}.edited{'' if count == 1 else f'-{count}'}{dot}{suffix}"
+            if hash_in(self.path, spare) == digest:
+                return None
+            if mode_of(self.path / spare) is None and spare not in self._staged:
+                return spare
+            count += 1
+
+    def _duration(self) -> timedelta:
+        return timedelta(seconds=time.monotonic() - self._clock)
+
+    def _require_open(self) -> None:
+        if self._owner != os.getpid():
+            state = "is not open in this process, or was committed already"
+            raise CfmError(f"cannot write to {shown(self.path)}: the run folder {state}")
+
+    def _leave(self) -> None:
+        """Drop the working folder, unlock, and remove what was created for nothing."""
+        if not self._lock.mine:
+            return
+        self._owner = 0
+        transaction.clear(self.path)
+        self._lock.release()
+        disk.remove_empty(self._created)
+
+
+def _alive(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except (OSError, OverflowError):
+        return True
+    return True

@@ -1,0 +1,231 @@
+"""Changing many files as one: all of the plan or none of it, whenever the process dies.
+
+Everything happens in a hidden folder inside the output folder, on the same file
+system, so that each step is a rename::
+
+    .cfmkit-run/new/...     the files of this run, written and on the disk
+    .cfmkit-run/old/...     second names of the files that will be replaced or removed
+    .cfmkit-run/plan.json   what is to be done, written when all of that is there
+    .cfmkit-run/undo.json   the same file, renamed: what is to be undone
+
+The moment at which ``plan.json`` takes its name is the commit: before it, the
+folder is untouched; after it, `recover` in the next run does what is left. A
+failure within the commit renames the plan to ``undo.json`` (which needs no space
+on a full disk) and puts the old files back; dying there is repaired likewise.
+The manifest is replaced last, and the plan is removed after that.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from contextlib import suppress
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING
+
+from cfmkit.errors import OutputError
+from cfmkit.store import disk
+from cfmkit.store.disk import reason, remove_empty, reporting, shown, sync_folder
+from cfmkit.store.names import CURE, MANIFEST, checked_name, hash_in, mode_of, refuse_in_the_way
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+    from pathlib import Path
+
+RUN = ".cfmkit-run"
+NEW, OLD, PLAN, UNDO = "new", "old", "plan.json", "undo.json"
+
+
+@dataclass(frozen=True)
+class Change:
+    """One file of a plan: the hash of its content after and before, None where there is no file."""
+
+    name: str
+    new: str | None
+    old: str | None
+
+
+@dataclass(frozen=True)
+class Plan:
+    """All changes of a commit in the order of execution, and the folders that it will create."""
+
+    changes: tuple[Change, ...]
+    folders: tuple[str, ...]
+
+
+def plan_for(root: Path, new: dict[str, str], removed: Iterable[str]) -> Plan:
+    """Return the plan that installs the staged files `new` (name -> hash) and removes others."""
+    changes = [Change(name, new[name], hash_in(root, name)) for name in sorted(new) if name != MANIFEST]
+    changes += [Change(name, None, hash_in(root, name)) for name in sorted(removed)]
+    changes += [Change(MANIFEST, new[MANIFEST], hash_in(root, MANIFEST))]
+    above = {parent for name in new for parent in _parents(name)}
+    return Plan(tuple(changes), tuple(sorted(name for name in above if mode_of(root / name) is None)))
+
+
+def execute(root: Path, plan: Plan) -> None:
+    """Carry out a plan whose new files are staged.
+
+    Raises
+    ------
+    OSError or cfmkit.errors.OutputError
+        If any step fails. The old files are back in place, unless the disk refused
+        that too: then the message says so, and the next run puts it right.
+    """
+    try:
+        _keep_old(root, plan)
+        disk.atomic_write(root / RUN / PLAN, _to_json(plan))
+        _roll_forward(root, plan)
+    except BaseException as error:
+        with suppress(OSError, OutputError):
+            _turn_back(root, plan)
+        if isinstance(error, OSError) and _pending(root):
+            half = f"{shown(root)} is between two runs now, and the next run into it puts it right"
+            raise OutputError(f"cannot write {shown(root)}: {reason(error)}; {half}") from error
+        raise
+
+
+def recover(root: Path) -> None:
+    """Finish or undo what a run that died left behind, and clear its working folder.
+
+    Raises
+    ------
+    cfmkit.errors.OutputError
+        If that is not possible now; nothing is lost, and the next run tries again.
+    """
+    run = root / RUN
+    if (mode := mode_of(run)) is None:
+        return
+    if not run.is_dir() or run.is_symlink():
+        raise OutputError(f"{shown(run)} is in the way: it is not a folder of cfmkit (mode {mode:o}); {CURE}")
+    with reporting(root, "repair"):
+        if mode_of(run / UNDO) is not None:
+            _roll_back(root, _read_plan(root, UNDO))
+        elif mode_of(run / PLAN) is not None:
+            _resume(root, _read_plan(root, PLAN))
+    clear(root)
+
+
+def clear(root: Path) -> None:
+    """Remove the working folder, unless it holds a plan that the next run has to finish."""
+    if mode_of(root / RUN) is not None and not _pending(root):
+        disk.clear_folder(root / RUN)
+
+
+def _pending(root: Path) -> bool:
+    return any(mode_of(root / RUN / name) is not None for name in (PLAN, UNDO))
+
+
+def _keep_old(root: Path, plan: Plan) -> None:
+    """Give every file that will go a second name, and bring all names down to the disk."""
+    for change in plan.changes:
+        if change.old is not None:
+            target = root / RUN / OLD / change.name
+            disk.make_folders(target.parent)
+            disk.duplicate(root / change.name, target)
+    for branch in (NEW, OLD):
+        for folder, _, _ in os.walk(root / RUN / branch):
+            sync_folder(type(root)(folder))
+    sync_folder(root / RUN)
+    sync_folder(root)
+
+
+def _roll_forward(root: Path, plan: Plan) -> None:
+    touched = {root}
+    for change in plan.changes:
+        if change.name == MANIFEST:
+            _sync(touched)
+        _apply(root, change)
+        touched |= {root / parent for parent in _parents(change.name)}
+    _sync(touched)
+    # Only now: undoing this would need new folders, which a full disk may refuse.
+    remove_empty(root / parent for change in plan.changes if change.new is None for parent in _parents(change.name))
+    disk.system.unlink(root / RUN / PLAN)
+
+
+def _apply(root: Path, change: Change) -> None:
+    """Put one new file in its place, or take one old file away, unless that is done already."""
+    place, staged = root / change.name, root / RUN / NEW / change.name
+    if change.new is None:
+        if mode_of(place) is not None:
+            _refuse_changed(root, change)
+            disk.system.unlink(place)
+    elif mode_of(staged) is not None:
+        _refuse_changed(root, change)
+        disk.make_folders(place.parent)
+        disk.system.replace(staged, place)
+
+
+def _refuse_changed(root: Path, change: Change) -> None:
+    """Raise if the file in place is neither the one that the plan knew nor the new one."""
+    place = root / change.name
+    if mode_of(place) is not None and hash_in(root, change.name) not in {change.old, change.new} - {None}:
+        raise OutputError(f"{shown(place)} was changed while a run was replacing it; {CURE}")
+
+
+def _resume(root: Path, plan: Plan) -> None:
+    """Roll forward if every new file is there, as it is after any kill; else roll back."""
+    found = (hash_in(root / RUN / NEW, change.name) or hash_in(root, change.name) for change in plan.changes)
+    if all(change.new in (None, there) for change, there in zip(plan.changes, found, strict=True)):
+        _roll_forward(root, plan)
+        return
+    _turn_back(root, plan)
+
+
+def _turn_back(root: Path, plan: Plan) -> None:
+    """Undo a plan, if it was ever begun."""
+    run = root / RUN
+    if mode_of(run / PLAN) is not None:
+        disk.system.replace(run / PLAN, run / UNDO)
+        _roll_back(root, plan)
+
+
+def _roll_back(root: Path, plan: Plan) -> None:
+    for change in reversed(plan.changes):
+        _restore(root, change)
+    remove_empty(root / name for name in plan.folders)
+    with suppress(OSError):
+        _sync({root, *(root / parent for change in plan.changes for parent in _parents(change.name))})
+    disk.system.unlink(root / RUN / UNDO)
+
+
+def _restore(root: Path, change: Change) -> None:
+    place, kept = root / change.name, root / RUN / OLD / change.name
+    there = hash_in(root, change.name)
+    if change.old is None:
+        if there is not None and there == change.new:
+            disk.system.unlink(place)
+    elif there != change.old and mode_of(kept) is not None:
+        disk.make_folders(place.parent)
+        disk.system.replace(kept, place)
+
+
+def _sync(folders: Iterable[Path]) -> None:
+    for folder in sorted(folders):
+        if folder.is_dir():
+            sync_folder(folder)
+
+
+def _parents(name: str) -> list[str]:
+    """Return the folders above a name, outermost first: ``a/b/c`` -> ``a``, ``a/b``."""
+    parts = name.split("/")
+    return ["/".join(parts[:count]) for count in range(1, len(parts))]
+
+
+def _to_json(plan: Plan) -> bytes:
+    return json.dumps(asdict(plan), indent=1).encode()
+
+
+def _read_plan(root: Path, name: str) -> Plan:
+    """Return a plan, checked: it decides what is replaced and removed."""
+    path = root / RUN / name
+    try:
+        data = json.loads(path.read_bytes())
+        plan = Plan(tuple(Change(**change) for change in data["changes"]), tuple(data["folders"]))
+        names = [change.name for change in plan.changes if change.name != MANIFEST]
+        for item in (*names, *plan.folders):
+            checked_name(item)
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError, OutputError):
+        raise OutputError(f"{shown(path)} is not a plan of cfmkit; remove {shown(path.parent)} to go on") from None
+    for change in plan.changes:
+        refuse_in_the_way(root, change.name, ours=True)
+    return plan

@@ -1,0 +1,262 @@
+"""Many specifications at once: which files, where each writes, and what became of them as tables."""
+
+from __future__ import annotations
+
+import glob
+import os
+from collections import Counter
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from cfmkit.errors import ExitCode, UsageError
+from cfmkit.tables import Table, TableColumn
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
+
+OUTPUTS = "cfm-out"
+"""Folders of this name hold results: a search for specifications does not look into them."""
+
+ENDINGS = (".yaml", ".yml")
+TAKEN = ("results.csv", "requirements.csv", "metrics.json", "manifest.json")
+"""Names in the output folder that no specification's folder may have."""
+
+SKIPPED, LEFT = "skipped", "not run: an earlier specification failed"
+
+
+@dataclass(frozen=True)
+class Entry:
+    """What became of one specification.
+
+    Attributes
+    ----------
+    spec : str
+        The file, as it was named or found.
+    folder : str
+        Where its files are, below the output folder.
+    verb : str
+        ``design`` or ``analyze``; empty if it came to neither.
+    family, name : str
+        As the specification says.
+    status : str
+        As in metrics.json; ``skipped`` if it was not run.
+    code : ExitCode
+        What a run of it alone would have returned.
+    message : str
+        What is wrong, in one line; empty if nothing is.
+    requirements, warnings : tuple of mapping
+        As in metrics.json.
+    errors : tuple of str
+        Every fault, with its place in the file.
+    seconds : float
+        How long it took.
+    bug : str
+        The traceback, if a bug ended it.
+    """
+
+    spec: str
+    folder: str
+    verb: str = ""
+    family: str = ""
+    name: str = ""
+    status: str = SKIPPED
+    code: ExitCode = ExitCode.OK
+    message: str = ""
+    requirements: tuple[Mapping[str, Any], ...] = ()
+    warnings: tuple[Mapping[str, Any], ...] = ()
+    errors: tuple[str, ...] = ()
+    seconds: float = field(default=0.0, compare=False)
+    bug: str = field(default="", compare=False)
+
+    @property
+    def skipped(self) -> bool:
+        """Whether it was not run."""
+        return self.status == SKIPPED
+
+    @property
+    def missed(self) -> tuple[Mapping[str, Any], ...]:
+        """The requirements that are not met."""
+        return tuple(one for one in self.requirements if not one["ok"])
+
+    def as_json(self) -> dict[str, Any]:
+        """Return its part of metrics.json: nothing that differs from run to run."""
+        return {
+            "spec": self.spec,
+            "folder": self.folder,
+            "verb": self.verb or None,
+            "family": self.family or None,
+            "name": self.name or None,
+            "status": self.status,
+            "exit_code": int(self.code),
+            "message": self.message,
+            "requirements": list(self.requirements),
+            "warnings": list(self.warnings),
+            "errors": list(self.errors),
+        }
+
+
+def sources(named: Iterable[str], out: str) -> tuple[str, ...]:
+    """Return the files that names stand for: files, folders and patterns, each file once, in order.
+
+    Parameters
+    ----------
+    named : iterable of str
+        A folder stands for all YAML files in it and below; ``*``, ``?``, ``[...]`` and
+        ``**`` are patterns unless there is a file of that very name.
+    out : str
+        The output folder, which is not searched.
+
+    Raises
+    ------
+    cfmkit.errors.UsageError
+        If a name stands for no file.
+    """
+    found: dict[str, str] = {}
+    for name in named:
+        for path in _matches(name, out):
+            found.setdefault(os.path.realpath(path), path)
+    return tuple(found.values())
+
+
+def _matches(name: str, out: str) -> list[str]:
+    if not name or name == "-" or "\0" in name:
+        raise UsageError(
+            f"{name!r} is not a file: a batch reads files, folders and patterns such as 'configs/**/*.yaml'"
+        )
+    if os.path.isdir(name):
+        found = [os.path.join(name, one) for one in _search("**/*", out, name) if one.lower().endswith(ENDINGS)]
+        hint = f"{name}: there is no YAML file in this folder or below"
+    elif os.path.exists(name):
+        return [name]
+    elif not glob.has_magic(name):
+        raise UsageError(f"{name}: there is no such file")
+    else:
+        found, hint = _search(name, out), f"{name}: no file matches this pattern"
+    if not found:
+        raise UsageError(hint)
+    return found
+
+
+def _search(pattern: str, out: str, root: str | None = None) -> list[str]:
+    """Return the files that match a pattern, but those that a run wrote."""
+    inside = os.path.realpath(out) + os.sep
+    found = []
+    for path in sorted(glob.glob(pattern, root_dir=root, recursive=True)):
+        whole = os.path.join(root, path) if root else path
+        ours = OUTPUTS in Path(path).parts[:-1] or os.path.realpath(whole).startswith(inside)
+        if os.path.isfile(whole) and not ours:
+            found.append(path)
+    return found
+
+
+def folders(files: Sequence[str]) -> tuple[str, ...]:
+    """Return a name for the output folder of each file: its stem, with folders in front where stems are equal.
+
+    Examples
+    --------
+    >>> folders(["cam.yaml", "a/beam.yaml", "b/beam.yaml"])
+    ('cam', 'a-beam', 'b-beam')
+    """
+    paths = [Path(os.path.abspath(file)).with_suffix("") for file in files]
+    depths = dict.fromkeys(paths, 1)
+    while twice := _repeated(depths):
+        depths |= {path: depths[path] + 1 for path in twice}
+    return tuple(_distinct(_tail(path, depths[path]) for path in paths))
+
+
+def _tail(path: Path, depth: int) -> str:
+    return "-".join(path.parts[1:][-depth:]) or "spec"
+
+
+def _repeated(depths: Mapping[Path, int]) -> list[Path]:
+    """Return different paths whose tails are the same, capitals apart, and could be longer."""
+    counts = Counter(_tail(path, depth).lower() for path, depth in depths.items())
+    return [
+        path for path, depth in depths.items() if counts[_tail(path, depth).lower()] > 1 and depth < len(path.parts)
+    ]
+
+
+def _distinct(names: Iterable[str]) -> Iterator[str]:
+    taken = set(TAKEN)
+    for name in names:
+        plain = "".join(char if char.isprintable() and char not in '\\/:*?"<>|' else "_" for char in name)
+        plain = plain if plain.strip(". ") and not plain.lower().startswith(".cfmkit") else f"spec{plain}"
+        free, count = plain, 1
+        while free.lower() in taken:
+            count += 1
+            free = f"{plain}-{count}"
+        taken.add(free.lower())
+        yield free
+
+
+def results_table(entries: Sequence[Entry]) -> Table:
+    """Return results.csv: one row a specification."""
+    return Table(
+        (
+            TableColumn("spec", tuple(one.spec for one in entries)),
+            TableColumn("folder", tuple(one.folder for one in entries)),
+            TableColumn("verb", tuple(one.verb for one in entries)),
+            TableColumn("family", tuple(one.family for one in entries)),
+            TableColumn("name", tuple(one.name for one in entries)),
+            TableColumn("status", tuple(one.status for one in entries)),
+            TableColumn("exit_code", tuple(None if one.skipped else int(one.code) for one in entries)),
+            TableColumn("requirements", tuple(len(one.requirements) for one in entries)),
+            TableColumn("missed", tuple(len(one.missed) for one in entries)),
+            TableColumn("warnings", tuple(len(one.warnings) for one in entries)),
+            TableColumn("message", tuple(one.message for one in entries)),
+        )
+    )
+
+
+def requirements_table(entries: Sequence[Entry]) -> Table:
+    """Return requirements.csv: one row a requirement."""
+    rows = [(entry, one) for entry in entries for one in entry.requirements]
+
+    def column(key: str) -> TableColumn:
+        return TableColumn(key, tuple(one[key] for _, one in rows))
+
+    over = [one["over"] or (None, None) for _, one in rows]
+    return Table(
+        (
+            TableColumn("spec", tuple(entry.spec for entry, _ in rows)),
+            column("metric"),
+            *(column(key) for key in ("value", "min", "max", "unit")),
+            TableColumn("over_from", tuple(ends[0] for ends in over)),
+            TableColumn("over_to", tuple(ends[1] for ends in over)),
+            column("over_unit"),
+            column("ok"),
+        )
+    )
+
+
+def message(entries: Sequence[Entry]) -> str:
+    """Return how the specifications ended, in one line.
+
+    Examples
+    --------
+    >>> message([Entry("a.yaml", "a", status="complete"), Entry("b.yaml", "b")])
+    '2 specs: 1 ok, 1 skipped'
+    """
+    counts = Counter(outcome(one) for one in entries)
+    told = ", ".join(f"{counts[word]} {word}" for word in (*OUTCOMES.values(), SKIPPED) if counts[word])
+    return f"{len(entries)} spec{'s' * (len(entries) != 1)}: {told}"
+
+
+OUTCOMES = {
+    ExitCode.OK: "ok",
+    ExitCode.REQUIREMENT_MISSED: "missed",
+    ExitCode.PARTIAL: "partial",
+    ExitCode.NO_SOLUTION: "no solution",
+    ExitCode.INVALID: "invalid",
+    ExitCode.USAGE: "unreadable",
+    ExitCode.IO: "not written",
+    ExitCode.IN_USE: "folder in use",
+    ExitCode.BUG: "bug",
+}
+"""What an exit code is called in a summary."""
+
+
+def outcome(one: Entry) -> str:
+    """Return in a word how a specification ended."""
+    return SKIPPED if one.skipped else OUTCOMES.get(one.code, "failed")

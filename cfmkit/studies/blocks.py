@@ -1,0 +1,144 @@
+"""Whole blocks of points for families whose model is vectorised."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.families import family
+from cfmkit.families.base import Block, Measure
+from cfmkit.metrics import definitions, split_name, values_of_family
+from cfmkit.metrics.requirements import ROUNDING, Limits
+from cfmkit.studies.rows import Rows, gathered
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+
+    from cfmkit.curves import FloatArray
+    from cfmkit.families.base import BlockAnswer
+    from cfmkit.metrics import Definition
+    from cfmkit.spec import Requirement
+    from cfmkit.studies.plan import Plan
+    from cfmkit.studies.study import Study
+
+BLOCK = 4096
+"""Points that are evaluated and noted together."""
+
+
+def vectorised(study: Study, plan: Plan) -> bool:
+    """Return whether the family's block model can do this study."""
+    if family(study.spec.family).analyze_block is None or study.design or study.curves or not len(plan):
+        return False
+    return _answer(study, plan, 0, 1) is not None
+
+
+def evaluate_block(study: Study, plan: Plan, start: int, stop: int) -> Rows:
+    """Return the rows of the points from `start` up to `stop`.
+
+    What the block model leaves undone is analysed point by point.
+    """
+    answer = _answer(study, plan, start, stop)
+    done = np.zeros(stop - start, dtype=bool) if answer is None else answer.done
+    singly = np.flatnonzero(~done).tolist()
+    rest = gathered(
+        [study.evaluate(plan.point(start + k)) for k in singly], len(study.metrics), len(study.spec.requirements)
+    )
+    if answer is None:
+        return rest
+    values, met = _columns(study, answer), _met(study, answer)
+    values[singly], met[singly] = rest.values, rest.met
+    odd = {singly[k]: item for k, item in rest.odd.items()}
+    return Rows(values, met, odd, {}, {singly[k]: item for k, item in rest.bugs.items()})
+
+
+def _answer(study: Study, plan: Plan, start: int, stop: int) -> BlockAnswer | None:
+    model = family(study.spec.family).analyze_block
+    if model is None:
+        return None
+    values = dict(zip(plan.paths, plan.block(start, stop), strict=True))
+    with np.errstate(all="ignore"):
+        return model(study.spec, Block(values, measures(study), stop - start))
+
+
+def measures(study: Study) -> tuple[Measure, ...]:
+    """Return what is asked of each point: the metrics, then the requirements."""
+    return (
+        *(Measure(split_name(one.name)[0], one.over or _window(study)) for one in study.metrics),
+        *map_requirements(study),
+    )
+
+
+def map_requirements(study: Study) -> tuple[Measure, ...]:
+    """Return what the requirements ask for."""
+    return tuple(Measure(split_name(one.metric)[0], _over(study, one)) for one in study.spec.requirements)
+
+
+def _window(study: Study) -> tuple[float, float] | None:
+    ends = getattr(getattr(study.spec, "analysis", None), "window", None)
+    return None if ends is None else (float(ends[0]), float(ends[1]))
+
+
+def _over(study: Study, one: Requirement) -> tuple[float, float] | None:
+    return _window(study) if one.over is None else (float(one.over[0]), float(one.over[1]))
+
+
+def _columns(study: Study, answer: BlockAnswer) -> FloatArray:
+    """Return the metrics, (n, m): of the branch that is named, or of the worst."""
+    known = _known(study)
+    columns = np.empty((len(answer.done), len(study.metrics)))
+    for k, name in enumerate(study.names):
+        plain, branch = split_name(name)
+        columns[:, k] = _one(known[plain], branch, answer.values[k], answer.target)
+    columns[~np.isfinite(columns)] = np.nan
+    return columns
+
+
+def _known(study: Study) -> dict[str, Definition]:
+    own = values_of_family(family(study.spec.family).values)
+    return {item.name: item for item in reversed(definitions(None, own))}
+
+
+def _one(
+    definition: Definition, branch: str | None, by_branch: Mapping[str, FloatArray], target: FloatArray | None
+) -> FloatArray:
+    found = list(by_branch.values())
+    if branch is not None:
+        return by_branch[branch] if branch in by_branch else np.full_like(found[0], np.nan)
+    if len(found) == 1:
+        return found[0]
+    stack = np.stack(found)
+    if definition.worst == "largest":
+        return np.asarray(stack.max(axis=0))
+    if definition.worst == "smallest" or target is None:
+        return np.asarray(stack.min(axis=0))
+    farthest = np.abs(stack - target).argmax(axis=0)
+    return np.asarray(np.take_along_axis(stack, farthest[None], axis=0)[0])
+
+
+def _keeping(limits: Limits, values: FloatArray) -> NDArray[np.bool_]:
+    """Return which values keep the bounds, as `Limits.met` says it of one; NaN does not."""
+    kept: NDArray[np.bool_] = ~np.isnan(values)
+    if limits.max is not None:
+        kept &= values <= limits.max + ROUNDING * abs(limits.max)
+    if limits.min is not None:
+        kept &= values >= limits.min - ROUNDING * abs(limits.min)
+    return kept
+
+
+def _met(study: Study, answer: BlockAnswer) -> NDArray[np.bool_]:
+    """Return whether each requirement is met, (n, r): by the branch that is named, or by all."""
+    known = _known(study)
+    met = np.ones((len(answer.done), len(study.spec.requirements)), dtype=bool)
+    for k, one in enumerate(study.spec.requirements):
+        plain, branch = split_name(one.metric)
+        limits = Limits.of(one, known[plain].dimension)
+        by_branch = answer.values[len(study.metrics) + k]
+        chosen = [values for name, values in by_branch.items() if branch in (None, name)]
+        for values in chosen:
+            met[:, k] &= _keeping(limits, values)
+        if not chosen:
+            met[:, k] = False
+    return met

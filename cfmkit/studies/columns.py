@@ -1,0 +1,83 @@
+"""Which metrics a study notes: those asked for, or all that the mechanism can have."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from cfmkit.errors import CfmError, UsageError
+from cfmkit.families import family
+from cfmkit.metrics import definitions, split_name, unknown_metric, values_of_family
+from cfmkit.studies.study import Metric, Study
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+    from cfmkit.curves import Curve
+    from cfmkit.metrics import Definition
+    from cfmkit.spec import Spec
+    from cfmkit.studies.plan import Plan
+
+NEED_STRESS = ("stress_max", "safety_factor")
+"""Metrics of curves that have stresses; others leave these columns out unless asked."""
+
+
+def metrics_of(spec: Spec, names: Iterable[str], sample: Curve | None = None) -> tuple[Metric, ...]:
+    """Return the metrics with these names; without names, every one that such a curve can have.
+
+    The default has one column a metric, over all branches, and then the family's own
+    values. A branch is had by name only: ``force_mean[load]``.
+
+    Parameters
+    ----------
+    spec : Spec
+        Its family knows more metrics.
+    names : iterable of str
+        What is asked for; none for the default.
+    sample : Curve, optional
+        A curve of the study, which says whether it is about forces or torques.
+
+    Raises
+    ------
+    cfmkit.errors.UsageError
+        If a name is not known.
+    """
+    kind = sample.kind if sample is not None else "force"
+    known = {item.name: item for item in definitions(kind, values_of_family(family(spec.family).values))}
+    asked = tuple(dict.fromkeys(names))
+    if not asked:
+        stressed = sample is None or "max_stress" in sample.extra
+        asked = tuple(name for name in known if stressed or name not in NEED_STRESS)
+    return tuple(_metric(name, known) for name in asked)
+
+
+def _metric(name: str, known: dict[str, Definition]) -> Metric:
+    plain, branch = split_name(name)
+    if plain not in known:
+        raise UsageError(unknown_metric(plain, known))
+    found = known[plain]
+    if branch is not None and not found.per_branch:
+        raise UsageError(f"{plain!r} is not a matter of one branch; write it without [{branch}]")
+    return Metric(name, found.dimension, found.definition)
+
+
+def sample_curve(spec: Spec, plan: Plan, design: bool) -> Curve | None:
+    """Return a curve of the study to see what it is about: of the specification itself, or of a point."""
+    probe = Study(spec, plan.paths, (), design)
+    for variant in _candidates(probe, plan):
+        try:
+            found = probe.solve(variant)
+        except CfmError:
+            continue
+        if found.curves:
+            return found.curves[0]
+    return None
+
+
+def _candidates(probe: Study, plan: Plan) -> Iterator[Spec]:
+    """Yield the specification as it is, then a few variants spread over the study."""
+    yield probe.spec
+    for index in dict.fromkeys((0, len(plan) - 1, len(plan) // 2)):
+        try:
+            yield probe.variant(plan.point(index))
+        except CfmError:
+            continue

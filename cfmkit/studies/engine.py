@@ -1,0 +1,288 @@
+"""The engine: from a study and a plan to rows, each computed once, whoever computes it."""
+
+from __future__ import annotations
+
+import hashlib
+from contextlib import closing
+from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import groupby
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+
+from cfmkit.errors import UsageError
+from cfmkit.families import family
+from cfmkit.studies.blocks import BLOCK, evaluate_block, vectorised
+from cfmkit.studies.executors import Lost, serial
+from cfmkit.studies.journal import Memory
+from cfmkit.studies.rows import Rows, cut, gathered, joined, recalled, recalled_row, record
+from cfmkit.studies.study import Row
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from numpy.typing import NDArray
+
+    from cfmkit.studies.executors import Executor
+    from cfmkit.studies.journal import Journal
+    from cfmkit.studies.plan import Plan
+    from cfmkit.studies.study import Study
+
+SMALLEST, JOBS = 64, 64
+"""Points in a block at least, and blocks that a study is cut into unless they become too large."""
+
+MISSING, HELD = -1, -2
+"""In place of where a row lies in the journal: it is not there yet; it is held in memory."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """The points from `start` up to `stop`, and what the journal calls them."""
+
+    start: int
+    stop: int
+    key: str = field(compare=False)
+
+
+@dataclass(frozen=True)
+class Work:
+    """What a worker needs to do any job of a study."""
+
+    study: Study
+    plan: Plan
+
+    def __call__(self, job: Job) -> Rows:
+        """Return the rows of a job."""
+        if job.stop - job.start > 1 or self.vectorised:
+            return evaluate_block(self.study, self.plan, job.start, job.stop)
+        return self.gather(self.study.evaluate(self.plan.point(job.start)))
+
+    @cached_property
+    def vectorised(self) -> bool:
+        """Whether points are done in blocks."""
+        return vectorised(self.study, self.plan)
+
+    @property
+    def step(self) -> int:
+        """Number of points in a job: of small studies few, so that every process has some."""
+        return min(BLOCK, max(SMALLEST, len(self.plan) // JOBS)) if self.vectorised else 1
+
+    def jobs(self) -> Iterator[Job]:
+        """Yield every job in the order of the points."""
+        for start in range(0, len(self.plan), self.step):
+            yield self.job(start, min(start + self.step, len(self.plan)))
+
+    def job(self, start: int, stop: int) -> Job:
+        """Return one job; a block's key counts every value in it."""
+        if stop - start == 1 and not self.vectorised:
+            return Job(start, stop, self.study.key(self.plan.point(start)))
+        digest = hashlib.sha256(b"block" + self.study.identity)
+        for column in self.plan.block(start, stop):
+            digest.update(repr(column.tolist()).encode() if column.dtype == object else column.tobytes())
+        return Job(start, stop, digest.hexdigest()[:32])
+
+    def gather(self, *rows: Row) -> Rows:
+        """Return single rows as the rows of this study."""
+        return gathered(rows, len(self.study.metrics), len(self.study.spec.requirements))
+
+    def recall(self, told: Any) -> Rows:
+        """Return the rows that a record of the journal is."""
+        return recalled(told, len(self.study.metrics), len(self.study.spec.requirements))
+
+
+class Monitor(Protocol):
+    """Who is told how far a study is, and may stop it."""
+
+    def total(self, points: int) -> None:
+        """Take how many points there are."""
+
+    def done(self, points: int, failed: int, reused: bool) -> None:
+        """Take that more points are finished."""
+
+    def stopping(self) -> bool:
+        """Return whether to finish what runs and end."""
+
+
+class Silent:
+    """A monitor that nobody looks at."""
+
+    def total(self, points: int) -> None:
+        """Ignore how many there are."""
+
+    def done(self, points: int, failed: int, reused: bool) -> None:
+        """Ignore what is finished."""
+
+    def stopping(self) -> bool:
+        """Return False: go on to the end."""
+        return False
+
+
+class Records:
+    """The rows of a study, as far as they are finished, in the order of the points.
+
+    Attributes
+    ----------
+    work : Work
+        Study and plan.
+    reused : int
+        Points whose rows were in the journal before.
+    bugs : int
+        Points that a bug ended.
+    bug : str
+        The first traceback.
+    """
+
+    def __init__(self, work: Work, journal: Journal | Memory) -> None:
+        """Start without rows."""
+        self.work, self._journal = work, journal
+        self._places = np.full(len(work.plan), MISSING, dtype=np.int64)
+        self._held: dict[int, Rows] = {}
+        self.reused = self.bugs = 0
+        self.bug = ""
+
+    def __len__(self) -> int:
+        """Return the number of points of the study."""
+        return len(self._places)
+
+    @property
+    def finished(self) -> int:
+        """Number of points that have a row."""
+        return int((self._places != MISSING).sum())
+
+    def recall(self, job: Job) -> Rows | None:
+        """Return rows that the journal had from before, and remember them; None if it had not."""
+        place = self._journal.find(job.key)
+        if place < 0:
+            return None
+        rows = self.work.recall(self._journal.read(place))
+        if len(rows) != job.stop - job.start:
+            return None
+        self._places[job.start : job.stop] = place
+        self.reused += len(rows)
+        return rows
+
+    def keep(self, job: Job, rows: Rows) -> None:
+        """Note rows: in the journal if they would be the same anywhere, else until the process ends."""
+        if rows.keepable:
+            self._places[job.start : job.stop] = self._journal.add(job.key, record(rows))
+            return
+        self._places[job.start : job.stop] = HELD
+        self._held[job.start] = rows
+        self.bugs += len(rows.bugs)
+        self.bug = self.bug or next(iter(rows.bugs.values()), "")
+
+    def batches(self, size: int = BLOCK) -> Iterator[tuple[NDArray[np.int64], Rows]]:
+        """Yield (indices of points, their rows) in order, about `size` at a time; unfinished points are left out."""
+        starts: list[NDArray[np.int64]] = []
+        parts: list[Rows | Row] = []
+        count = 0
+        for start, part in self._pieces():
+            length = 1 if isinstance(part, Row) else len(part)
+            starts.append(np.arange(start, start + length))
+            parts.append(part)
+            count += length
+            if count >= size:
+                yield np.concatenate(starts), self._together(parts)
+                starts, parts, count = [], [], 0
+        if parts:
+            yield np.concatenate(starts), self._together(parts)
+
+    def _together(self, parts: list[Rows | Row]) -> Rows:
+        """Return pieces as one; single rows that follow each other are gathered at once."""
+        runs = groupby(parts, key=lambda part: isinstance(part, Row))
+        whole: list[Rows] = []
+        for single, run_of in runs:
+            whole += [self.work.gather(*run_of)] if single else run_of  # type: ignore[arg-type]
+        return joined(whole)
+
+    def _pieces(self) -> Iterator[tuple[int, Rows | Row]]:
+        at = 0
+        while at < len(self._places):
+            place = int(self._places[at])
+            if place == MISSING:
+                at += 1
+                continue
+            part = self._held[at] if place == HELD else self._read(place)
+            yield at, part
+            at += 1 if isinstance(part, Row) else len(part)
+
+    def _read(self, place: int) -> Rows | Row:
+        told = self._journal.read(place)
+        return self.work.recall(told) if "n" in told else recalled_row(told)
+
+    def row(self, index: int) -> Rows:
+        """Return the row of one finished point."""
+        start = index - index % self.work.step if int(self._places[index]) != HELD else index
+        if int(self._places[index]) == HELD:
+            start = max(at for at in self._held if at <= index)
+            return cut(self._held[start], index - start, index - start + 1)
+        rows = self.work.recall(self._journal.read(int(self._places[index])))
+        return rows if len(rows) == 1 else cut(rows, index - start, index - start + 1)
+
+
+def run(
+    work: Work,
+    executor: Executor = serial,
+    journal: Journal | Memory | None = None,
+    monitor: Monitor | None = None,
+) -> Records:
+    """Return the rows of a study; those that the journal has are not computed again.
+
+    Parameters
+    ----------
+    work : Work
+        Study and plan.
+    executor : callable
+        How jobs get done: `serial`, a `Pool`, a `Cluster`.
+    journal : Journal, optional
+        Where rows are noted; without one they are kept in memory.
+    monitor : Monitor, optional
+        Is told how far the study is, and may stop it.
+    """
+    study = work.study
+    if study.design and family(study.spec.family).design is None:
+        raise UsageError(f"a {study.spec.family} mechanism cannot be designed, only analysed")
+    records, watch = Records(work, journal if journal is not None else Memory()), monitor or Silent()
+    watch.total(len(work.plan))
+    queue = work.jobs()
+    while True:
+        lost = _round(records, executor, queue, watch)
+        if not lost or watch.stopping():
+            return records
+        # A block that was lost costs only those of its points that are lost alone, too.
+        queue = (job for block in lost for job in _singles(work, block))
+
+
+def _round(records: Records, executor: Executor, queue: Iterator[Job], watch: Monitor) -> list[Job]:
+    """Do the jobs of a queue; return the blocks that were lost."""
+    lost: list[Job] = []
+    work = records.work
+    with closing(executor(work, _new(records, queue, watch), watch.stopping)) as outcomes:  # type: ignore[type-var]
+        for job, outcome in outcomes:
+            if isinstance(outcome, Lost):
+                if job.stop - job.start > 1:
+                    lost.append(job)
+                    continue
+                outcome = work.gather(Row(outcome.status, message=outcome.message, bug=outcome.bug))
+            records.keep(job, outcome)
+            watch.done(len(outcome), outcome.failed, False)
+    return lost
+
+
+def _new(records: Records, queue: Iterator[Job], watch: Monitor) -> Iterator[Job]:
+    """Yield the jobs that the journal does not know."""
+    for job in queue:
+        rows = records.recall(job)
+        if rows is None:
+            yield job
+        else:
+            watch.done(len(rows), rows.failed, True)
+
+
+def _singles(work: Work, block: Job) -> Iterator[Job]:
+    for start in range(block.start, block.stop):
+        yield work.job(start, start + 1)
+
+
+__all__ = ["Job", "Monitor", "Records", "Silent", "Work", "run"]

@@ -1,0 +1,296 @@
+"""One mechanism by every model that its family has: the curves, and how far each is from the finest one.
+
+The models are the choices of `analysis.fidelity`, the coarsest first and the finest
+last. A choice that the specification has no data for is left out; a curve that fails
+keeps its status.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.errors import CfmError, Problem, SpecError, UsageError
+from cfmkit.families import family
+from cfmkit.metrics import Undefined, Window, window_of
+from cfmkit.metrics.differences import Difference, counterpart, effort_at, largest, mean, overlap, rms, summarize
+from cfmkit.metrics.subjects import span_text
+from cfmkit.results import Finding, Status
+from cfmkit.studies.leaves import CannotVary, leaf
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    from cfmkit.curves import Curve, FloatArray, Kind
+    from cfmkit.families.base import Run
+    from cfmkit.metrics.differences import Measure
+    from cfmkit.results import Quantity, Result
+    from cfmkit.spec import Spec
+
+PATH = "analysis.fidelity"
+
+OPTION = "--compare-fidelity"
+
+PLACES = 1001
+"""Where curves are compared: so many places, evenly over the motion that they have in common."""
+
+
+@dataclass(frozen=True)
+class Choices:
+    """The models that a specification can be run by.
+
+    Attributes
+    ----------
+    names : tuple of str
+        All of the family, the finest last.
+    specs : mapping of str to Spec
+        The specification for each of those that can run.
+    obstacles : mapping of str to str
+        Why each of the others cannot.
+    """
+
+    names: tuple[str, ...]
+    specs: Mapping[str, Spec]
+    obstacles: Mapping[str, str]
+
+
+@dataclass(frozen=True)
+class Variant:
+    """The outcome of one model, by the name of its fidelity."""
+
+    name: str
+    result: Result
+
+    @property
+    def curves(self) -> tuple[Curve, ...]:
+        """Its curves, each labelled with the fidelity."""
+        named = {"fidelity": (self.name, "text")}
+        return tuple(replace(curve, label=named | dict(curve.label)) for curve in self.result.curves)
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """The outcomes of several models of one mechanism.
+
+    Attributes
+    ----------
+    variants : tuple of Variant
+        The nominal one first, then the others from coarse to fine.
+    finest : str
+        What the others are compared with.
+    left_out : mapping of str to str
+        Fidelities that the specification has no data for, and why.
+    """
+
+    variants: tuple[Variant, ...]
+    finest: str
+    left_out: Mapping[str, str]
+
+    @property
+    def reference(self) -> Variant:
+        """The variant that the others are compared with."""
+        return next(item for item in self.variants if item.name == self.finest)
+
+    @property
+    def compared(self) -> tuple[Variant, ...]:
+        """All others."""
+        return tuple(item for item in self.variants if item.name != self.finest)
+
+    @property
+    def curves(self) -> tuple[Curve, ...]:
+        """All curves, the nominal one first, each labelled with its fidelity."""
+        return tuple(curve for item in self.variants for curve in item.curves)
+
+    @property
+    def shortfall(self) -> str:
+        """What is missing of the curves beside the nominal one, in one sentence; empty if nothing is."""
+        failed = [item for item in self.variants[1:] if item.result.status is not Status.COMPLETE]
+        return "; ".join(f"fidelity {item.name}: {item.result.message}" for item in failed)
+
+    @property
+    def warnings(self) -> tuple[Finding, ...]:
+        """What is left out, and what the others warn of and the nominal one does not."""
+        told = {item.name for item in self.variants[0].result.warnings}
+        gone = [Finding("fidelity_left_out", f"{name!r} cannot run here: {why}") for name, why in self.left_out.items()]
+        more = [
+            replace(found, message=f"with fidelity {item.name}: {found.message}")
+            for item in self.variants[1:]
+            for found in item.result.warnings
+            if found.name not in told and found.message != item.result.message
+        ]
+        return (*gone, *more)
+
+    @cached_property
+    def windows(self) -> Mapping[str, Window]:
+        """Where each of the others can be compared: where both exist, inside `analysis.window`."""
+        found = {}
+        for item in self.compared:
+            if (window := self._window(item)) is not None:
+                found[item.name] = window
+        return found
+
+    def _window(self, item: Variant) -> Window | None:
+        if not (item.result.curves and self.reference.result.curves):
+            return None
+        fine, coarse = self.reference.result.curve, item.result.curve
+        pairs = _pairs(fine, coarse)
+        parts = [part for mine, other in pairs.items() for part in (fine.on(mine), coarse.on(other))]
+        extents = [(float(part.motion.min()), float(part.motion.max())) for part in parts]
+        return overlap(extents, window_of(self.variants[0].result))
+
+    def places(self, name: str) -> FloatArray:
+        """Return where a fidelity is compared [m or rad]; nothing where it cannot be."""
+        window = self.windows.get(name)
+        return np.linspace(window.lo, window.hi, PLACES) if window else np.empty(0)
+
+    def differences(self, item: Variant) -> Mapping[str, Difference]:
+        """Return what the nominal curve of a variant has more than that of the finest, by branch of the finest."""
+        missing = [one for one in (item, self.reference) if not one.result.curves]
+        if missing or item.name not in self.windows:
+            why = f"there is no {missing[0].name} curve" if missing else "they have no travel in common"
+            return {"": Difference(np.empty(0), why)}
+        fine, coarse, places = self.reference.result.curve, item.result.curve, self.places(item.name)
+        return {
+            mine: _difference((coarse, other), (fine, mine), places) for mine, other in _pairs(fine, coarse).items()
+        }
+
+    def metrics(self) -> dict[str, Quantity]:
+        """Return root mean square, largest and mean difference of each fidelity, by name, SI."""
+        found: dict[str, Quantity] = {}
+        for item in self.compared:
+            found |= summarize(self.differences(item), self._measures(item), self.kind, item.name)
+        return found
+
+    @property
+    def kind(self) -> Kind:
+        """What the curves are; of a mechanism without any it does not matter."""
+        return self.curves[0].kind if self.curves else "force"
+
+    def _measures(self, item: Variant) -> Mapping[str, Measure]:
+        window = self.windows.get(item.name)
+        over = f" over {span_text(window.lo, window.hi, self.kind)}" if window else ""
+        what = f"({item.name} - {self.finest}) {{}}, at {PLACES} even places{over}"
+        return {
+            "fidelity_rms": (rms, f"root mean square of {what}"),
+            "fidelity_max": (largest, f"value largest in magnitude of {what}"),
+            "fidelity_mean": (mean, f"mean of {what}"),
+        }
+
+
+def _pairs(fine: Curve, coarse: Curve) -> dict[str, str]:
+    """Return which branch of the coarser curve each branch of the finer one is compared with."""
+    found = {}
+    for name in fine.branches:
+        motion = fine.on(name).motion
+        found[name] = counterpart(coarse, name, float(motion[-1] - motion[0]))
+    return found
+
+
+def _difference(one: tuple[Curve, str], other: tuple[Curve, str], places: FloatArray) -> Difference:
+    try:
+        return Difference(
+            effort_at(*one, places) - effort_at(*other, places), "there is no equilibrium at some of the places"
+        )
+    except Undefined as problem:
+        return Difference(np.full(len(places), np.nan), problem.reason)
+
+
+def choices_of(spec: Spec) -> Choices:
+    """Return the models that a specification can be run by.
+
+    Raises
+    ------
+    cfmkit.errors.UsageError
+        If the family has one model only.
+    cfmkit.errors.SpecError
+        If the specification has data for one of them only.
+    """
+    try:
+        names = tuple(map(str, leaf(type(spec), PATH).choices))
+    except CannotVary:
+        names = ()
+    if len(names) < 2:
+        raise UsageError(f"{OPTION}: a {spec.family} mechanism has one model only, there is nothing to compare")
+    specs, obstacles = {}, {}
+    for name in names:
+        try:
+            specs[name] = spec.replace({PATH: name})
+        except SpecError as error:
+            obstacles[name] = "; ".join(problem.message for problem in error.problems)
+    if len(specs) < 2:
+        told = "; ".join(f"{name!r} cannot run here: {why}" for name, why in obstacles.items())
+        raise SpecError([Problem(OPTION, 0, 0, "", f"needs two models; {told}")])
+    return Choices(names, specs, obstacles)
+
+
+def compare(nominal: Result, choices: Choices, run: Run) -> Comparison:
+    """Return a result beside those of all other models that can run.
+
+    Parameters
+    ----------
+    nominal : Result
+        Of the specification as it is.
+    choices : Choices
+        Of the same specification.
+    run : Run
+        For the other models.
+    """
+    own = fidelity_of(nominal)
+    others = (Variant(name, _analyze(spec, run)) for name, spec in choices.specs.items() if name != own)
+    return Comparison((Variant(own, nominal), *others), list(choices.specs)[-1], choices.obstacles)
+
+
+def _analyze(spec: Spec, run: Run) -> Result:
+    found: Result = family(spec.family).analyze(spec, run)
+    return found
+
+
+def fidelity_of(result: Result) -> str:
+    """Return the fidelity of the model that a result comes from.
+
+    Raises
+    ------
+    cfmkit.errors.CfmError
+        If the family does not write it into the specification of its results.
+    """
+    # A result that failed early has the specification as it was given: there the family's own rule applies.
+    name = result.spec.at(PATH) or getattr(result.spec, "fidelity", None)
+    if not isinstance(name, str):
+        raise CfmError(f"a {result.spec.family} result does not say its {PATH}")
+    return name
+
+
+def data_of(found: Comparison) -> dict[str, object]:
+    """Return what metrics.json says besides the differences, which are metrics."""
+    return {"fidelity": {"reference": found.finest, "curves": list(_records(found))}}
+
+
+def _records(found: Comparison) -> Iterator[dict[str, object]]:
+    for item in found.variants:
+        points = sum(map(len, item.result.curves))
+        about = {"fidelity": item.name, "status": item.result.status.key, "message": item.result.message}
+        yield about | {"points": points}
+
+
+def lines_of(found: Comparison) -> tuple[tuple[str, str], ...]:
+    """Return the paragraphs that a page shows: one for each curve and branch."""
+    return tuple(("fidelity", line) for item in found.compared for line in _lines(found, item))
+
+
+def _lines(found: Comparison, item: Variant) -> Iterator[str]:
+    from cfmkit.units import format_short
+
+    metrics, window, differences = found.metrics(), found.windows.get(item.name), found.differences(item)
+    for branch in differences:
+        tag = f"[{item.name},{branch}]" if len(differences) > 1 else f"[{item.name}]"
+        values = [metrics[f"fidelity_{name}{tag}"] for name in ("rms", "mean", "max")]
+        title = f"{item.name} - {found.finest}" + (f" on {branch}" if branch else "")
+        if window is None or values[0].value is None:
+            yield f"{title}: undefined: {values[0].reason}"
+            continue
+        told = [format_short(one.value or 0.0, one.dimension) for one in values]
+        over = span_text(window.lo, window.hi, found.kind)
+        yield f"{title}: rms {told[0]}, mean {told[1]}, largest {told[2]} over {over}"

@@ -1,0 +1,165 @@
+"""Which values of a specification a study may vary: any number, word or switch, by its dotted path."""
+
+from __future__ import annotations
+
+import difflib
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal
+
+from cfmkit.errors import QuantityError
+from cfmkit.units import BareFloat, Place, Quantity
+from cfmkit.units.fields import described
+from cfmkit.yamlio.explain import not_among
+from cfmkit.yamlio.shape import Slot, expected, required
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from cfmkit.spec import Spec
+
+Value = float | int | str | bool
+Kind = Literal["quantity", "number", "whole", "word", "switch"]
+
+FIXED = ("cfmkit", "family", "name", "description", "requirements", "sweep", "sensitivity")
+"""Blocks of a specification that do not describe the mechanism or its analysis."""
+
+_DEEPEST = 8
+
+
+class CannotVary(ValueError):
+    """A path or a value that a study cannot take; the message says why and what to do."""
+
+
+@dataclass(frozen=True)
+class Leaf:
+    """One value of a specification.
+
+    Attributes
+    ----------
+    path : str
+        Dotted, with indices for the items of lists.
+    kind : str
+        "quantity" (a number with a unit), "number", "whole" number, "word" or "switch".
+    quantity : Quantity or None
+        How a quantity is read.
+    choices : tuple
+        The words of a closed choice.
+    """
+
+    path: str
+    kind: Kind
+    quantity: Quantity | None = None
+    choices: tuple[Any, ...] = ()
+
+    def read(self, given: Any) -> tuple[Value, str]:
+        """Return (value as `Spec.replace` takes it, dimension) of what a user wrote.
+
+        Raises
+        ------
+        CannotVary
+            If it is not what this leaf holds.
+        """
+        if self.kind == "quantity" and self.quantity is not None:
+            return self._quantity(given, self.quantity)
+        if self.kind == "word":
+            if self.choices and given not in self.choices:
+                raise CannotVary(not_among(given, self.choices))
+            if not isinstance(given, str | int) or isinstance(given, bool):
+                raise CannotVary(f"{described(given)} is not text")
+            return given, "text"
+        if self.kind == "switch":
+            if not isinstance(given, bool):
+                raise CannotVary(f"{described(given)} is not true or false")
+            return given, "text"
+        return self._number(given)
+
+    def _quantity(self, given: Any, quantity: Quantity) -> tuple[Value, str]:
+        marked = BareFloat(given) if isinstance(given, int | float) and not isinstance(given, bool) else given
+        try:
+            value, dimension = quantity.read(marked)
+        except QuantityError as error:
+            raise CannotVary(str(error)) from None
+        return (Place(value, dimension) if len(quantity.dimensions) > 1 else value), dimension
+
+    def _number(self, given: Any) -> tuple[Value, str]:
+        if isinstance(given, bool) or not isinstance(given, int | float):
+            raise CannotVary(f"{described(given)} is not a {'whole ' * (self.kind == 'whole')}number")
+        if self.kind == "whole":
+            if given != int(given):
+                raise CannotVary(f"{given} is not a whole number")
+            return int(given), "count"
+        return float(given), "ratio"
+
+
+def leaf(spec_type: type[Spec], path: str) -> Leaf:
+    """Return what stands at a dotted path of a specification.
+
+    Raises
+    ------
+    CannotVary
+        If there is nothing, or nothing that can be varied; a near miss is named.
+    """
+    here: tuple[Slot, ...] = (Slot(spec_type),)
+    parts = path.split(".")
+    if parts[0] in FIXED:
+        raise CannotVary(f"{parts[0]!r} is nothing to vary: it is not part of the mechanism or its analysis")
+    for depth, part in enumerate(parts):
+        key: str | int = int(part) if part.isdecimal() and part.isascii() and len(part) < 10 else part
+        below = tuple(inner for slot in here for inner in slot.child(key))
+        if not below:
+            raise CannotVary(_unknown(spec_type, path, ".".join(parts[:depth]), here))
+        here = below
+    return _of(path, here)
+
+
+def _of(path: str, slots: tuple[Slot, ...]) -> Leaf:
+    """Return the leaf that one of several allowed types is; the first that can be varied."""
+    for slot in slots:
+        if (kind := _kind(slot)) is not None:
+            return Leaf(path, kind, slot.quantity, slot.choices)
+    blocks = [slot.model for slot in slots if slot.model is not None]
+    if blocks:
+        names = ", ".join(list(blocks[0].model_fields)[:6]) or ", ".join(required(blocks[0]))
+        raise CannotVary(f"{path!r} is a block; vary one of its values: {names}")
+    raise CannotVary(f"{path!r} holds {expected(slots, plain=True)}: vary one item of it, as {path}.0")
+
+
+def _kind(slot: Slot) -> Kind | None:
+    if slot.quantity is not None:
+        return "quantity"
+    if slot.choices:
+        return "word"
+    kinds: dict[Any, Kind] = {bool: "switch", int: "whole", float: "number", str: "word"}
+    return kinds.get(slot.kind)
+
+
+def _unknown(spec_type: type[Spec], path: str, above: str, here: tuple[Slot, ...]) -> str:
+    """Say that there is nothing at a path, and which one could be meant."""
+    known = list(paths(spec_type))
+    last = path.rpartition(".")[2]
+    same = [one for one in known if one.rpartition(".")[2] == last]
+    near = same or difflib.get_close_matches(path, known, n=1, cutoff=0.6)
+    if near:
+        return f"there is no {path!r}; did you mean {near[0]!r}?"
+    names = [name for slot in here if slot.model is not None for name in slot.model.model_fields]
+    inside = [name for name in names if above or name not in FIXED]
+    where = f"below {above!r} there are" if above else "a path starts with"
+    return f"there is no {path!r}; {where} {', '.join(inside)}" if inside else f"there is nothing below {above!r}"
+
+
+def paths(spec_type: type[Spec]) -> Iterator[str]:
+    """Yield the path of every leaf that can be varied; items of lists as ``.0``."""
+    for name in spec_type.model_fields:
+        if name not in FIXED:
+            yield from _below(Slot(spec_type).child(name), name, 1)
+
+
+def _below(slots: tuple[Slot, ...], path: str, depth: int) -> Iterator[str]:
+    if any(_kind(slot) for slot in slots):
+        yield path
+    for slot in slots if depth < _DEEPEST else ():
+        if slot.model is not None:
+            for name in slot.model.model_fields:
+                yield from _below(slot.child(name), f"{path}.{name}", depth + 1)
+        elif slot.origin in (tuple, list):
+            yield from _below(slot.child(0), f"{path}.0", depth + 1)

@@ -1,0 +1,260 @@
+"""The points of a study in their order, enumerated when they are needed.
+
+Nothing of the size of a grid is ever allocated: a grid of a million points from two
+axes holds two thousand values. Only what is drawn at random is kept as drawn.
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cfmkit.decimals import even_grid, shift_decimal
+from cfmkit.errors import UsageError
+from cfmkit.studies.variation import is_place
+from cfmkit.tables import border_values
+from cfmkit.units import Place, format_quantity, from_border, to_border
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from cfmkit.curves import FloatArray
+    from cfmkit.studies.variation import Axis
+
+Combine = Literal["grid", "zip", "lhs", "sobol"]
+Levels = tuple[Any, ...] | NDArray[Any]
+
+MOST_POINTS = 1_000_000
+"""Points of a study unless the user allows more."""
+
+
+@dataclass(frozen=True)
+class Variable:
+    """One thing that varies, with every value it takes.
+
+    Attributes
+    ----------
+    path : str
+        Dotted.
+    dimension : str
+        Of `cfmkit.units`; "count" for whole numbers, "text" for words and switches.
+    values : sequence
+        SI floats, whole numbers or words, as `Spec.replace` takes them.
+    shown : sequence
+        The same in border units, for tables.
+    place : bool
+        Whether a value is a place that knows if it is a length or an angle.
+    """
+
+    path: str
+    dimension: str
+    values: Levels
+    shown: Levels
+    place: bool = False
+
+    def value(self, index: int) -> Any:
+        """Return one value as `Spec.replace` takes it."""
+        value = self.values[index]
+        plain = value.item() if isinstance(value, np.generic) else value
+        return Place(plain, self.dimension) if self.place else plain
+
+
+@dataclass(frozen=True)
+class Plan:
+    """All points of a study.
+
+    Attributes
+    ----------
+    variables : tuple of Variable
+        In order; in a grid the first varies slowest.
+    size : int
+        Number of points.
+    joint : bool
+        Whether the variables go through their values together (zip and samples)
+        rather than in every combination (grid).
+    """
+
+    variables: tuple[Variable, ...]
+    size: int
+    joint: bool = False
+
+    def __len__(self) -> int:
+        """Return the number of points."""
+        return self.size
+
+    @property
+    def paths(self) -> tuple[str, ...]:
+        """What varies."""
+        return tuple(item.path for item in self.variables)
+
+    def point(self, index: int) -> tuple[Any, ...]:
+        """Return the values of one point, as `Spec.replace` takes them."""
+        return tuple(item.value(at) for item, at in zip(self.variables, self._levels(index), strict=True))
+
+    def block(self, start: int, stop: int) -> tuple[NDArray[Any], ...]:
+        """Return the values of the points from `start` up to `stop`, one array for each variable."""
+        return self._taken([item.values for item in self.variables], start, stop)
+
+    def shown(self, start: int, stop: int) -> tuple[NDArray[Any], ...]:
+        """Return the same in border units, for tables."""
+        return self._taken([item.shown for item in self.variables], start, stop)
+
+    def part(self, start: int, stop: int) -> Plan:
+        """Return the points from `start` up to `stop` as a plan of their own."""
+        taken = zip(self.variables, self.block(start, stop), self.shown(start, stop), strict=True)
+        parts = (Variable(item.path, item.dimension, values, shown, item.place) for item, values, shown in taken)
+        return Plan(tuple(parts), stop - start, joint=True)
+
+    def _levels(self, index: int) -> list[int]:
+        if self.joint:
+            return [index] * len(self.variables)
+        levels = []
+        for item in reversed(self.variables):
+            index, level = divmod(index, len(item.values))
+            levels.append(level)
+        return levels[::-1]
+
+    def _taken(self, columns: Sequence[Levels], start: int, stop: int) -> tuple[NDArray[Any], ...]:
+        index = np.arange(start, stop)
+        if self.joint:
+            return tuple(_array(column)[index] for column in columns)
+        taken = []
+        for column in reversed(columns):
+            index, level = np.divmod(index, len(column))
+            taken.append(_array(column)[level])
+        return tuple(taken[::-1])
+
+
+def _array(values: Levels) -> NDArray[Any]:
+    if isinstance(values, np.ndarray):
+        return values
+    kinds = set(map(type, values))
+    return np.array(values, dtype=np.float64 if kinds <= {float, Place} else np.int64 if kinds == {int} else object)
+
+
+def grid(axes: Sequence[Axis], most: int = MOST_POINTS) -> Plan:
+    """Return every combination; the first axis varies slowest.
+
+    Raises
+    ------
+    cfmkit.errors.UsageError
+        If there are more points than allowed; nothing is allocated before that is known.
+    """
+    size = math.prod(item.count or 0 for item in axes)
+    refuse_too_many(size, most)
+    return Plan(tuple(map(stepped, axes)), size)
+
+
+def zipped(axes: Sequence[Axis], most: int = MOST_POINTS) -> Plan:
+    """Return the values side by side: the first of each, the second of each, ...
+
+    Raises
+    ------
+    cfmkit.errors.UsageError
+        If the axes have different numbers of values, or too many.
+    """
+    counts = {item.leaf.path: item.count or 0 for item in axes}
+    if len(set(counts.values())) > 1:
+        told = ", ".join(f"{path} has {count}" for path, count in counts.items())
+        raise UsageError(f"values side by side must be equally many: {told}")
+    size = next(iter(counts.values()))
+    refuse_too_many(size, most)
+    return Plan(tuple(map(stepped, axes)), size, joint=True)
+
+
+@dataclass(frozen=True)
+class Draw:
+    """How points are drawn: a Latin hypercube or a scrambled Sobol sequence, of how many points, from which seed."""
+
+    method: Literal["lhs", "sobol"]
+    count: int
+    seed: int = 0
+
+
+def sampled(axes: Sequence[Axis], draw: Draw, most: int = MOST_POINTS) -> Plan:
+    """Return points drawn from ranges without a number of steps, or from lists.
+
+    Lists and whole numbers get each of their values with the same probability.
+
+    Raises
+    ------
+    cfmkit.errors.UsageError
+        If there are more points than allowed.
+    """
+    refuse_too_many(draw.count, most)
+    from scipy.stats import qmc
+
+    kind = qmc.LatinHypercube if draw.method == "lhs" else qmc.Sobol
+    engine: Any = kind(len(axes), seed=np.random.default_rng(draw.seed))
+    with warnings.catch_warnings():
+        # A Sobol sequence that is no power of two long is less balanced, not wrong.
+        warnings.simplefilter("ignore", UserWarning)
+        unit = engine.random(draw.count)
+    return Plan(tuple(_drawn(item, unit[:, k]) for k, item in enumerate(axes)), draw.count, joint=True)
+
+
+def refuse_too_many(size: int, most: int) -> None:
+    """Raise if a study has more points than allowed.
+
+    Raises
+    ------
+    cfmkit.errors.UsageError
+        With both numbers and the way out.
+    """
+    if size > most:
+        raise UsageError(f"{size} points are more than {most}; vary less, or allow them with --max-points {size}")
+
+
+def stepped(axis: Axis) -> Variable:
+    """Return the variable that goes through the values of an axis."""
+    place = is_place(axis)
+    if axis.ends is None:
+        plain = tuple(float(value) if place else value for value in axis.listed)
+        return Variable(axis.leaf.path, axis.dimension, plain, tuple(_shown(v, axis.dimension) for v in plain), place)
+    count = axis.count or 0
+    if axis.leaf.kind == "whole":
+        whole = np.linspace(*axis.ends, count).round().astype(np.int64)
+        return Variable(axis.leaf.path, axis.dimension, whole, whole)
+    ends = [_shown(end, axis.dimension) for end in axis.ends]
+    shown = even_grid(ends[0], ends[1], count)
+    return Variable(axis.leaf.path, axis.dimension, _inside(shown, axis.dimension), shown, place)
+
+
+def _shown(value: Any, dimension: str) -> Any:
+    """Return a value as tables show it: in the border unit, with no more digits than it needs."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, int | str):
+        return value
+    return float(format_quantity(value, dimension).split(" ")[0])
+
+
+def _inside(shown: FloatArray, dimension: str) -> FloatArray:
+    """Return border values in SI; where the factor is a power of ten, each the float nearest to its decimal."""
+    factor = float(to_border(1.0, dimension))
+    power = round(math.log10(factor))
+    if factor == float(f"1e{power}"):
+        return shift_decimal(shown, -power)
+    values: FloatArray = from_border(shown, dimension)
+    return values
+
+
+def _drawn(axis: Axis, unit: FloatArray) -> Variable:
+    """Return the variable whose values are an axis at places in [0, 1)."""
+    path, dimension, place = axis.leaf.path, axis.dimension, is_place(axis)
+    if axis.ends is None:
+        levels = stepped(axis)
+        index = np.minimum((unit * len(levels.values)).astype(np.intp), len(levels.values) - 1)
+        return Variable(path, dimension, _array(levels.values)[index], _array(levels.shown)[index], place)
+    low, high = axis.ends
+    if axis.leaf.kind == "whole":
+        low, high = min(low, high), max(low, high)
+        whole = np.minimum(np.floor(low + unit * (high - low + 1.0)), high).astype(np.int64)
+        return Variable(path, dimension, whole, whole)
+    values = low + unit * (high - low)
+    return Variable(path, dimension, values, border_values(values, dimension), place)

@@ -1,0 +1,245 @@
+"""A pool of processes that loses nothing but what a dead process was working on.
+
+Each worker has pipes of its own, and no lock is shared: killing one at any moment
+leaves the others untouched. A worker says when it starts a job, so that its death
+is held against that job alone; jobs that were only waiting in its pipe go to others.
+A job is tried a second time on a new worker and given up after two deaths. A job that
+exceeds the time allowed is given up at once, with its worker.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import pickle
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections import Counter, deque
+from contextlib import suppress
+from dataclasses import dataclass, field
+from multiprocessing.connection import Connection, wait
+from typing import TYPE_CHECKING, Any
+
+from cfmkit.errors import CfmError, UsageError
+from cfmkit.results import Status
+from cfmkit.studies import worker
+from cfmkit.studies.executors import ONE_THREAD, Lost, never
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from typing import BinaryIO
+
+    from cfmkit.studies.executors import Stopping, Work
+
+DEATHS = 2
+"""A job is given up after so many of its workers have died."""
+
+PATIENCE = 0.1
+"""Seconds between two looks at the clock and at whether to stop."""
+
+QUICK, AHEAD = 0.02, 4
+"""Jobs that take less than so many seconds are handed out so many at a time: the pipe is never empty."""
+
+MOST_STILLBORN = {True: 60, False: 4}
+"""Workers in a row that may die before their first job: by a signal, and by themselves."""
+
+
+@dataclass
+class _Worker:
+    """A process with its pipes and the jobs it was given, the one it works on first."""
+
+    process: subprocess.Popen[bytes]
+    jobs: Connection
+    outcomes: Connection
+    life: int
+    given: deque[Any] = field(default_factory=deque)
+    ready: bool = False
+    started: float | None = None
+
+    def give(self, job: Any) -> None:
+        self.given.append(job)
+        # A broken pipe shows as the end of the other one in a moment.
+        with suppress(OSError):
+            self.jobs.send_bytes(pickle.dumps(job))
+
+    def end(self) -> None:
+        """Kill the process and close the pipes."""
+        self.process.kill()
+        self.process.wait()
+        self.jobs.close()
+        self.outcomes.close()
+        os.close(self.life)
+
+
+@dataclass(frozen=True)
+class Pool:
+    """An executor that works in several processes.
+
+    Attributes
+    ----------
+    processes : int
+        How many.
+    timeout : float or None
+        Seconds that one job may take.
+    """
+
+    processes: int
+    timeout: float | None = None
+
+    def __call__(self, work: Work, jobs: Iterator[Any], stopping: Stopping = never) -> Iterator[tuple[Any, Any]]:
+        """Yield (job, outcome) as they finish; a lost job's outcome is `Lost`.
+
+        Raises
+        ------
+        cfmkit.errors.CfmError
+            If the processes cannot be started.
+        """
+        with _Crew(self, work, jobs, stopping) as crew:
+            while crew.hire():
+                yield from crew.finished()
+
+
+class _Crew:
+    """The workers of one run and the jobs that are to be done again."""
+
+    def __init__(self, pool: Pool, work: Work, jobs: Iterator[Any], stopping: Stopping) -> None:
+        self.pool, self.jobs, self.stopping = pool, jobs, stopping
+        self.workers: list[_Worker] = []
+        self.again: deque[Any] = deque()
+        self.deaths: Counter[Any] = Counter()
+        self.stillborn = 0
+        self.pace: float | None = None
+        self.empty = False
+        self.what: BinaryIO = tempfile.TemporaryFile()  # noqa: SIM115 - closed in __exit__
+        pickle.dump(work, self.what, pickle.HIGHEST_PROTOCOL)
+        self.what.flush()
+
+    def __enter__(self) -> _Crew:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for one in self.workers:
+            one.end()
+        self.what.close()
+
+    def hire(self) -> bool:
+        """Hand out jobs, to new workers where there are too few; tell whether anything is going on."""
+        for one in self.workers:
+            while len(one.given) < self._ahead() and (job := self._next()) is not None:
+                one.give(job)
+        while len(self.workers) < self.pool.processes and (job := self._next()) is not None:
+            self.workers.append(_started(self.what))
+            self.workers[-1].give(job)
+        return any(one.given for one in self.workers)
+
+    def _ahead(self) -> int:
+        return AHEAD if self.pace is not None and self.pace < QUICK else 1
+
+    def _next(self) -> Any:
+        """Return the next job, None if there is none now."""
+        if self.stopping():
+            return None
+        if self.again:
+            return self.again.popleft()
+        job = None if self.empty else next(self.jobs, None)
+        self.empty = job is None
+        return job
+
+    def finished(self) -> Iterator[tuple[Any, Any]]:
+        """Yield what has finished since the last look, or nothing after a short while."""
+        busy = {one.outcomes: one for one in self.workers if one.given}
+        for pipe in wait(list(busy), PATIENCE):
+            one = busy[pipe]  # type: ignore[index]
+            try:
+                message = one.outcomes.recv_bytes()
+            except (EOFError, OSError):
+                yield from self._buried(one)
+                continue
+            yield from self._heard(one, message)
+        yield from self._late()
+
+    def _heard(self, one: _Worker, message: bytes) -> Iterator[tuple[Any, Any]]:
+        kind, rest = message[:1], message[1:]
+        if kind == worker.READY:
+            one.ready = True
+        elif kind == worker.STARTED:
+            one.started, self.stillborn = time.monotonic(), 0
+        else:
+            took = time.monotonic() - (one.started or 0.0)
+            self.pace = took if self.pace is None else 0.9 * self.pace + 0.1 * took
+            one.started = None
+            job, outcome = one.given.popleft(), pickle.loads(rest)
+            if kind == worker.BROKEN:
+                outcome = Lost(Status.CRASHED, f"a bug in cfmkit: {outcome[0]}", outcome[1])
+            yield job, outcome
+
+    def _buried(self, one: _Worker) -> Iterator[tuple[Any, Any]]:
+        """Yield the job that a dead worker took with it, if it was the second time; do the rest again."""
+        self.workers.remove(one)
+        one.end()
+        self._count_stillborn(one)
+        if one.started is not None:
+            job = one.given.popleft()
+            self.deaths[job] += 1
+            if self.deaths[job] < DEATHS:
+                self.again.appendleft(job)
+            else:
+                told = f"the process that worked on this point died {DEATHS} times ({_cause(one.process.returncode)})"
+                yield job, Lost(Status.CRASHED, told)
+        self.again.extend(one.given)
+
+    def _count_stillborn(self, one: _Worker) -> None:
+        if one.started is not None or one.ready:
+            return
+        self.stillborn += 1
+        if self.stillborn >= MOST_STILLBORN[one.process.returncode < 0]:
+            raise CfmError(f"worker processes end before they begin ({_cause(one.process.returncode)})")
+
+    def _late(self) -> Iterator[tuple[Any, Any]]:
+        """Yield the jobs that have used up their time, and end their workers."""
+        if self.pool.timeout is None:
+            return
+        now = time.monotonic()
+        for one in [one for one in self.workers if one.started is not None]:
+            if now - (one.started or now) > self.pool.timeout and not one.outcomes.poll():
+                self.workers.remove(one)
+                one.end()
+                job = one.given.popleft()
+                self.again.extend(one.given)
+                yield job, Lost(Status.TIMEOUT, f"not finished within {self.pool.timeout:g} s")
+
+
+def _cause(code: int) -> str:
+    import signal
+
+    if code >= 0:
+        return f"exit code {code}"
+    with suppress(ValueError):
+        return f"signal {signal.Signals(-code).name}"
+    return f"signal {-code}"
+
+
+def _started(what: BinaryIO) -> _Worker:
+    """Return a new worker that will do `what` is in a file."""
+    if not sys.executable:
+        raise UsageError("this Python cannot start processes of its own; use one job (-j 1)")
+    jobs_out, jobs_in = os.pipe()
+    outcomes_out, outcomes_in = os.pipe()
+    life_out, life_in = os.pipe()
+    theirs = [what.fileno(), jobs_out, outcomes_in, life_out]
+    parent = os.getpid() if threading.current_thread() is threading.main_thread() else 0
+    given = json.dumps({"path": sys.path, "pipes": theirs, "parent": parent})
+    try:
+        process = subprocess.Popen(
+            [sys.executable, "-P", "-c", worker.START, given],
+            stdin=subprocess.DEVNULL,
+            pass_fds=theirs,
+            env=os.environ | ONE_THREAD,
+        )
+    finally:
+        for descriptor in theirs[1:]:
+            os.close(descriptor)
+    return _Worker(process, Connection(jobs_in, readable=False), Connection(outcomes_out, writable=False), life_in)

@@ -1,0 +1,11 @@
+"""How results depend on parameters: five methods, and what becomes of samples that fail.
+
+Sampling and analysing are apart: a method draws points, somebody evaluates them, the
+method reads the outcome. The statistics work on plain arrays and know no mechanism:
+`oat`, `local`, `morris`, `sobol` and `tolerance`, with `spreads` (how parameters are
+distributed), `intervals` (confidence) and `failures` (what a sample without a value
+means for an index: never "no influence").
+
+`parameters` reads the block `sensitivity:` against a specification, `study` joins
+method, engine and specification, `findings` and `tables` say what came out.
+"""

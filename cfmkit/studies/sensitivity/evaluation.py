@@ -1,0 +1,145 @@
+"""Samples through the engine: points in, outputs out, every row kept for results.csv."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.results import Status
+from cfmkit.studies.engine import Work
+from cfmkit.studies.plan import Plan, Variable
+from cfmkit.tables import border_values
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from numpy.typing import NDArray
+
+    from cfmkit.curves import FloatArray
+    from cfmkit.studies.engine import Records
+    from cfmkit.studies.rows import Rows
+    from cfmkit.studies.sensitivity.parameters import Parameter
+    from cfmkit.studies.study import Study
+
+
+class Interrupted(Exception):
+    """The user asked to stop: some samples are missing."""
+
+
+@dataclass(frozen=True)
+class Piece:
+    """Points that were evaluated together.
+
+    Attributes
+    ----------
+    records : Records
+        Their rows.
+    blocks : (n,) array of int
+        To which block each belongs, from 1.
+    roles : (n,) array of str
+        What each is for.
+    """
+
+    records: Records
+    blocks: NDArray[np.int64]
+    roles: NDArray[np.str_]
+
+
+@dataclass
+class Evaluator:
+    """Evaluates points of a study.
+
+    Attributes
+    ----------
+    study : Study
+        What is noted.
+    parameters : tuple of Parameter
+        What varies.
+    compute : callable
+        From `Work` to `Records`.
+    by_role : bool
+        Whether all points of a role come before those of the next.
+    pieces : list of Piece
+        All that was evaluated so far.
+    ends : Counter
+        Samples by status.
+    """
+
+    study: Study
+    parameters: tuple[Parameter, ...]
+    compute: Callable[[Work], Records]
+    by_role: bool = False
+    pieces: list[Piece] = field(default_factory=list)
+    ends: Counter[Status] = field(default_factory=Counter)
+    first_failure: str = ""
+
+    def outputs(self, points: FloatArray, roles: Sequence[str] | Sequence[Sequence[str]]) -> FloatArray:
+        """Return what comes of blocks of points: the metrics, then 0 or 1 for each requirement.
+
+        Parameters
+        ----------
+        points : (b, s, d) array
+            Values of the parameters [SI].
+        roles : sequence of str, or of one such for each block
+            What the s points of a block are for.
+
+        Returns
+        -------
+        (b, s, m + r) array
+            NaN where there is no value; whatever is not complete has none.
+
+        Raises
+        ------
+        Interrupted
+            If the user asked to stop.
+        """
+        count, size = points.shape[:2]
+        done = sum(int(piece.blocks[-1]) for piece in self.pieces[-1:])
+        order = np.arange(count * size).reshape(count, size)
+        sequence = (order.T if self.by_role else order).ravel()
+        flat = points.reshape(count * size, -1)[sequence]
+        piece = Piece(
+            self.compute(Work(self.study, plan_of(self.parameters, flat))),
+            done + 1 + sequence // size,
+            np.broadcast_to(np.array(roles, dtype=np.str_), (count, size)).ravel()[sequence],
+        )
+        self.pieces.append(piece)
+        if piece.records.finished < len(piece.records):
+            raise Interrupted
+        outputs = np.empty((count * size, len(self.study.metrics) + len(self.study.spec.requirements)))
+        for indices, rows in piece.records.batches():
+            outputs[sequence[indices]] = self._numbers(rows)
+        return outputs.reshape(count, size, -1)
+
+    def _numbers(self, rows: Rows) -> FloatArray:
+        numbers = np.concatenate([rows.values, rows.met.astype(np.float64)], axis=1)
+        # A curve that ends early is measured over another travel: its metrics are no samples of these.
+        numbers[list(rows.odd)] = np.nan
+        self.ends[Status.COMPLETE] += len(rows) - len(rows.odd)
+        self.ends.update(status for status, _ in rows.odd.values())
+        if rows.odd and not self.first_failure:
+            self.first_failure = next(iter(rows.odd.values()))[1]
+        return numbers
+
+    @property
+    def count(self) -> int:
+        """Samples that were evaluated."""
+        return sum(self.ends.values())
+
+    @property
+    def failed(self) -> int:
+        """Samples without a result."""
+        return self.count - self.ends[Status.COMPLETE]
+
+
+def plan_of(parameters: Sequence[Parameter], points: FloatArray) -> Plan:
+    """Return points, (n, d), as a plan of the engine."""
+    columns = zip(parameters, points.T, strict=True)
+    return Plan(tuple(_variable(one, np.ascontiguousarray(column)) for one, column in columns), len(points), joint=True)
+
+
+def _variable(one: Parameter, values: FloatArray) -> Variable:
+    return Variable(one.path, one.dimension, values, border_values(values, one.dimension), one.place)

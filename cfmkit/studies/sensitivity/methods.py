@@ -1,0 +1,239 @@
+"""The five methods over an evaluator: draw, evaluate, analyse, state."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.families import family
+from cfmkit.studies.sensitivity import local, morris, oat, sobol, tolerance
+from cfmkit.studies.sensitivity.evaluation import Evaluator, Interrupted
+from cfmkit.studies.sensitivity.failures import evaluated, nothing, stated
+from cfmkit.studies.sensitivity.findings import Findings, Line, lines_of
+from cfmkit.studies.sensitivity.findings import stated as told
+from cfmkit.studies.sensitivity.spreads import draw, values_across, values_at
+from cfmkit.studies.study import Metric
+from cfmkit.units import border_unit, to_border
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Mapping
+
+    from numpy.typing import NDArray
+
+    from cfmkit.curves import FloatArray
+    from cfmkit.studies.engine import Records, Work
+    from cfmkit.studies.sensitivity.failures import Analysis
+    from cfmkit.studies.sensitivity.parameters import Parameter
+    from cfmkit.studies.sensitivity.setup import Setup
+DRAWN = "drawn"
+"""The role of a sample of a Monte Carlo run."""
+
+YIELD = Metric("yield", "ratio", "share of parts that meet every requirement")
+
+
+def carry_out(setup: Setup, compute: Callable[[Work], Records]) -> Findings:
+    """Return what a study finds.
+
+    Parameters
+    ----------
+    setup : Setup
+        What to do.
+    compute : callable
+        From `Work` to `Records`: serial, in processes, on a cluster.
+    """
+    evaluator = Evaluator(setup.study, setup.parameters, compute, by_role=setup.method == "tolerance")
+    try:
+        return METHODS[setup.method](setup, evaluator)
+    except Interrupted:
+        return Findings(setup, evaluator, interrupted=True)
+
+
+def _oat(setup: Setup, evaluator: Evaluator) -> Findings:
+    points = oat.sample(setup.values, setup.ends, setup.samples)
+    outputs = evaluator.outputs(points, [[path] * setup.samples for path in setup.paths])
+    found: list[Line] = []
+    for m, metric in enumerate(setup.study.metrics):
+        nominal = float(setup.nominal.values[m])
+        analysis = oat.analyze(setup.values, setup.ends, outputs[..., m], nominal, setup.policy)
+        found += lines_of(metric, setup.paths, analysis, setup.samples)
+    return Findings(setup, evaluator, tuple(found), points=points, outputs=outputs)
+
+
+def _local(setup: Setup, evaluator: Evaluator) -> Findings:
+    half = (setup.ends[:, 1] - setup.ends[:, 0]) / 2.0
+    points = local.sample(setup.values, half)
+    count = len(half)
+    exact = _exact(setup)
+    outputs = np.full((count, 2, local.LEVELS, _width(setup)), np.nan)
+    if not _all_known(setup, exact):
+        sides = [side for side in ("up", "down") for _ in range(local.LEVELS)]
+        roles = [[f"{path} {side}" for side in sides] for path in setup.paths]
+        outputs = evaluator.outputs(points.reshape(count, -1, count), roles).reshape(outputs.shape)
+    found: list[Line] = []
+    for m, metric in enumerate(setup.study.metrics):
+        for k, one in enumerate(setup.parameters):
+            known = exact.get(metric.name, {}).get(one.path) if metric.over is None else None
+            slope = _slope(outputs[k, ..., m], float(setup.nominal.values[m]), float(half[k]), known)
+            found += _gradient_lines(metric, one, slope, float(setup.nominal.values[m]))
+    return Findings(setup, evaluator, tuple(found), points=points, outputs=outputs)
+
+
+def _exact(setup: Setup) -> Mapping[str, Mapping[str, float]]:
+    """Return the derivatives that the family knows in closed form: metric -> path -> SI value."""
+    gradient = family(setup.study.spec.family).gradient
+    if gradient is None or setup.study.design:
+        return {}
+    found: Mapping[str, Mapping[str, float]] = gradient(setup.study.spec, setup.paths)
+    return found
+
+
+def _all_known(setup: Setup, exact: Mapping[str, Mapping[str, float]]) -> bool:
+    wanted = ((one, path) for one in setup.study.metrics for path in setup.paths)
+    return all(one.over is None and path in exact.get(one.name, {}) for one, path in wanted)
+
+
+def _slope(outputs: FloatArray, at_nominal: float, half: float, known: float | None) -> local.Slope:
+    return local.Slope(known, 0.0) if known is not None else local.slope(outputs[0], outputs[1], at_nominal, half)
+
+
+def _gradient_lines(metric: Metric, one: Parameter, slope: local.Slope, at_nominal: float) -> Iterator[Line]:
+    above, below = border_unit(metric.dimension), border_unit(one.dimension)
+    scale = float(to_border(1.0, metric.dimension)) / float(to_border(1.0, one.dimension))
+    unit = above if below == "1" else f"{above}/{below}" if below.isalpha() else f"{above}/({below})"
+    value, low, high = (told(end * scale, "ratio") for end in _around(slope.value, slope.error))
+    yield Line(metric.label, one.path, "gradient", value, low, high, unit, local.LEVELS)
+    relative = local.normalised(1.0, one.spread.nominal, at_nominal)
+    value, low, high = (told(end, "ratio") for end in _around(slope.value * relative, slope.error * abs(relative)))
+    yield Line(metric.label, one.path, oat.SLOPE, value, low, high, "1", local.LEVELS)
+
+
+def _around(value: float, reach: float) -> tuple[float, float, float]:
+    return value, value - reach, value + reach
+
+
+def _morris(setup: Setup, evaluator: Evaluator) -> Findings:
+    count, seed = len(setup.parameters), setup.seed
+    spreads = [one.spread for one in setup.parameters]
+
+    def drawn(start: int, number: int) -> FloatArray:
+        unit = morris.sample(start, number, count, seed)
+        return values_across(spreads, unit.reshape(-1, count)).reshape(unit.shape)
+
+    roles = [f"step {k}" for k in range(count + 1)]
+    blocks = evaluated(drawn, lambda points: evaluator.outputs(points, roles), setup.samples, setup.policy)
+    low, high = setup.ends.T
+    grid = np.rint((blocks.points - low) / (high - low) * (morris.LEVELS - 1)) / (morris.LEVELS - 1)
+    found: list[Line] = []
+    for m, metric in enumerate(setup.study.metrics):
+        analysis = _stated(
+            setup, blocks.outputs[..., m], lambda one: morris.analyze(grid, one, seed), morris.NAMES, count
+        )
+        found += lines_of(metric, setup.paths, analysis, len(grid))
+    return Findings(
+        setup,
+        evaluator,
+        tuple(found),
+        points=blocks.points,
+        outputs=blocks.outputs,
+        replaced=blocks.replaced,
+    )
+
+
+def _sobol(setup: Setup, evaluator: Evaluator) -> Findings:
+    count, seed = len(setup.parameters), setup.seed
+    spreads = [one.spread for one in setup.parameters]
+
+    def drawn(start: int, number: int) -> FloatArray:
+        unit = sobol.sample(start, number, count, seed)
+        return values_at(spreads, unit.reshape(-1, count)).reshape(unit.shape)
+
+    roles = ["A", *(f"A with {path} of B" for path in setup.paths), "B"]
+    blocks = evaluated(drawn, lambda points: evaluator.outputs(points, roles), setup.samples, setup.policy)
+    found: list[Line] = []
+    on_the_way: list[Line] = []
+    for m, metric in enumerate(setup.study.metrics):
+        outputs = blocks.outputs[..., m]
+        for size in sobol.stages(len(outputs)):
+            analysis = _stated(setup, outputs[:size], lambda one: sobol.analyze(one, seed), sobol.NAMES, count)
+            lines = list(lines_of(metric, setup.paths, analysis, size))
+            on_the_way += lines
+        found += lines
+    return Findings(
+        setup,
+        evaluator,
+        tuple(found),
+        tuple(on_the_way),
+        points=blocks.points,
+        outputs=blocks.outputs,
+        replaced=blocks.replaced,
+    )
+
+
+def _tolerance(setup: Setup, evaluator: Evaluator) -> Findings:
+    count, groups = len(setup.parameters), setup.together
+    spreads = [one.spread for one in setup.parameters]
+
+    def drawn(start: int, number: int) -> FloatArray:
+        # One stream, so that more samples leave the first ones as they are.
+        unit = draw(setup.correlation, start + number, np.random.default_rng(setup.seed))[start:]
+        return tolerance.sample(unit.reshape(number, count), spreads, groups)
+
+    names = tuple(", ".join(setup.paths[k] for k in group) for group in groups)
+    roles = [DRAWN, *(f"halved {name}" for name in names)]
+    blocks = evaluated(drawn, lambda points: evaluator.outputs(points, roles), setup.samples, setup.policy)
+    found: list[Line] = []
+    for m, metric in enumerate(setup.study.metrics):
+        analysis = _stated(
+            setup,
+            blocks.outputs[..., m],
+            lambda one: tolerance.variance_drops(one, setup.seed),
+            (tolerance.VARIANCE_DROP,),
+            len(names),
+        )
+        found += lines_of(metric, names, analysis, len(blocks.outputs))
+    plain = Findings(
+        setup, evaluator, tuple(found), points=blocks.points, outputs=blocks.outputs, replaced=blocks.replaced
+    )
+    return _with_yield(plain, names) if setup.study.spec.requirements else plain
+
+
+def _with_yield(found: Findings, names: tuple[str, ...]) -> Findings:
+    """Return findings with the share of good parts, and what it gains from tighter tolerances."""
+    setup, outputs = found.setup, found.outputs
+    if outputs is None:
+        return found
+    met = outputs[..., len(setup.study.metrics) :]
+    failed: NDArray[np.bool_] = np.asarray(np.isnan(outputs).any(axis=-1))
+    good: NDArray[np.bool_] = ~np.isnan(met) & (met > 0.5)
+    whole: NDArray[np.bool_] = np.asarray(good.all(axis=-1))
+    gains = tolerance.yield_gains(whole, failed, setup.policy)
+    each = (tolerance.yield_of(good[:, 0, k], failed[:, 0], setup.policy) for k in range(met.shape[-1]))
+    return replace(
+        found,
+        lines=(*lines_of(YIELD, names, (gains,), len(outputs)), *found.lines),
+        all_met=tolerance.yield_of(whole[:, 0], failed[:, 0], setup.policy),
+        each_met=tuple(each),
+    )
+
+
+def _stated(
+    setup: Setup, outputs: FloatArray, analyze: Callable[[FloatArray], Analysis], names: tuple[str, ...], count: int
+) -> Analysis:
+    return stated(analyze, outputs, setup.policy, nothing(names, count))
+
+
+def _width(setup: Setup) -> int:
+    return len(setup.study.metrics) + len(setup.study.spec.requirements)
+
+
+METHODS: dict[str, Callable[[Setup, Evaluator], Findings]] = {
+    "oat": _oat,
+    "local": _local,
+    "morris": _morris,
+    "sobol": _sobol,
+    "tolerance": _tolerance,
+}
+
+__all__ = ["DRAWN", "METHODS", "carry_out"]

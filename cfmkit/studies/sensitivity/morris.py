@@ -1,0 +1,82 @@
+"""Morris screening: the mean and the scatter of the effects of single steps.
+
+``mu_star`` is the mean size of the change of the output when one parameter crosses its
+whole range, ``mu`` the mean with its sign, ``sigma`` the standard deviation: large where
+the effect is curved or depends on the other parameters.
+
+Reference
+---------
+[M] M. D. Morris, Technometrics 33 (1991) 161.
+[C] F. Campolongo et al., Environ. Model. Softw. 22 (2007) 1509.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.studies.sensitivity.failures import Analysis, Index
+from cfmkit.studies.sensitivity.sobol import RESAMPLES, problem
+
+if TYPE_CHECKING:
+    from cfmkit.curves import FloatArray
+
+MU_STAR, MU, SIGMA = "mu_star", "mu", "sigma"
+NAMES = (MU_STAR, MU, SIGMA)
+LEVELS = 4
+"""Levels of the grid in each direction; an effect is that of a step over two thirds of the range."""
+
+
+def sample(start: int, count: int, parameters: int, seed: int) -> FloatArray:
+    """Return trajectories on a grid of the unit cube, (count, parameters + 1, parameters).
+
+    From one point to the next a single coordinate changes.
+
+    Parameters
+    ----------
+    start, count : int
+        Which trajectories; those of another start are drawn anew.
+    parameters : int
+        Dimension of the cube.
+    seed : int
+        Of the trajectories.
+    """
+    from SALib.sample import morris
+
+    own = np.random.default_rng([seed, start])
+    points = morris.sample(problem(parameters), count, num_levels=LEVELS, seed=own)
+    return np.asarray(points).reshape(count, parameters + 1, parameters)
+
+
+def analyze(points: FloatArray, outputs: FloatArray, seed: int) -> Analysis:
+    """Return mu*, mu and sigma, mu* with a bootstrap interval.
+
+    Parameters
+    ----------
+    points : (n, parameters + 1, parameters) array
+        Trajectories.
+    outputs : (n, parameters + 1) array
+        Complete.
+    seed : int
+        Of the bootstrap.
+    """
+    from SALib.analyze import morris
+
+    count = points.shape[2]
+    found = morris.analyze(
+        problem(count),
+        points.reshape(-1, count),
+        outputs.ravel(),
+        num_resamples=RESAMPLES,
+        num_levels=LEVELS,
+        seed=np.random.default_rng([seed, 1]),
+    )
+    reach = np.asarray(found["mu_star_conf"], dtype=np.float64)
+    gap = np.full(count, np.nan)
+    size, mean, scatter = (np.asarray(found[name], dtype=np.float64) for name in NAMES)
+    return (
+        Index(MU_STAR, size, np.maximum(size - reach, 0.0), size + reach),
+        Index(MU, mean, gap, gap),
+        Index(SIGMA, scatter, gap, gap),
+    )

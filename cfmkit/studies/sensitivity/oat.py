@@ -1,0 +1,85 @@
+"""One at a time: what happens when a single parameter goes through its range, all others staying nominal.
+
+``low`` and ``high`` are the outputs at the ends of the range, ``swing`` the largest
+difference that the range makes, ``slope`` the relative change of the output for a
+relative change of the parameter (from end to end): the bars and curves of the papers.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.studies.sensitivity.failures import Analysis, Index
+
+if TYPE_CHECKING:
+    from cfmkit.curves import FloatArray
+    from cfmkit.studies.sensitivity.failures import Policy
+
+LOW, HIGH, SWING, SLOPE = "at_low_end", "at_high_end", "swing", "normalised_slope"
+NAMES = (LOW, HIGH, SWING, SLOPE)
+
+
+def sample(nominal: FloatArray, ends: FloatArray, count: int) -> FloatArray:
+    """Return points, (parameters, count, parameters): in the k-th group the k-th parameter varies.
+
+    Parameters
+    ----------
+    nominal : (d,) array
+        Values of the parameters.
+    ends : (d, 2) array
+        Their ranges.
+    count : int
+        Points over each range, both ends included.
+    """
+    points = np.broadcast_to(nominal, (len(nominal), count, len(nominal))).copy()
+    for k, (low, high) in enumerate(ends):
+        points[k, :, k] = np.linspace(low, high, count)
+    return points
+
+
+def analyze(
+    nominal: FloatArray, ends: FloatArray, outputs: FloatArray, at_nominal: float, policy: Policy = "fail"
+) -> Analysis:
+    """Return what each parameter does to one output.
+
+    Where a point failed, the swing of that parameter is not stated; under ``bound`` it
+    is stated as "at least": its upper end is open.
+
+    Parameters
+    ----------
+    nominal : (d,) array
+        Values of the parameters.
+    ends : (d, 2) array
+        Their ranges.
+    outputs : (d, n) array
+        NaN where a point failed.
+    at_nominal : float
+        The output there.
+    policy : {"fail", "bound"}
+        What to say where a point failed.
+    """
+    missing = np.isnan(outputs)
+    low, high = outputs[:, 0], outputs[:, -1]
+    known = ~missing.any(axis=1)
+    if policy == "bound":
+        known = ~missing.all(axis=1)
+    filled = np.where(missing, at_nominal, outputs)
+    swing = np.where(known, filled.max(axis=1) - filled.min(axis=1), np.nan)
+    gap = np.full(len(low), np.nan)
+    top = np.where(known & missing.any(axis=1), np.inf, swing)
+    return (
+        Index(LOW, low, gap, gap),
+        Index(HIGH, high, gap, gap),
+        Index(SWING, swing, swing, top),
+        Index(SLOPE, _slope(nominal, ends, high - low, at_nominal), gap, gap),
+    )
+
+
+def _slope(nominal: FloatArray, ends: FloatArray, change: FloatArray, at_nominal: float) -> FloatArray:
+    """Return (dy/y)/(dx/x); NaN where the nominal value of either is zero: nothing is relative to that."""
+    with np.errstate(all="ignore"):
+        slope = change / (ends[:, 1] - ends[:, 0]) * nominal / at_nominal
+    slope[~np.isfinite(slope) | (nominal == 0.0)] = np.nan
+    return np.asarray(slope)

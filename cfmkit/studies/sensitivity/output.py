@@ -1,0 +1,221 @@
+"""The files of a sensitivity study: results.csv, indices.csv, convergence.csv, metrics.json, resolved.yaml."""
+
+from __future__ import annotations
+
+from math import isnan
+from typing import TYPE_CHECKING, Any
+
+from cfmkit.errors import ExitCode
+from cfmkit.families import family
+from cfmkit.metrics import metrics_json
+from cfmkit.results import Finding, Quantity
+from cfmkit.studies.sensitivity.intervals import LEVEL
+from cfmkit.studies.tables import results_table
+from cfmkit.studies.variation import written
+from cfmkit.tables import Table, TableColumn, csv_chunks, to_csv
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from cfmkit.store.disk import Data
+    from cfmkit.studies.sensitivity.findings import Findings, Line
+    from cfmkit.studies.sensitivity.parameters import Parameter
+    from cfmkit.studies.sensitivity.setup import Setup
+    from cfmkit.studies.sensitivity.tolerance import Yield
+
+YIELD = "share of parts that meet every requirement, of those drawn from the tolerances"
+POLICIES = {
+    "fail": "an index that needs a failed sample is not stated",
+    "resample": "blocks with failed samples were drawn again, whole: the indices are those of the part that works",
+    "bound": "failed samples taken as the smallest and as the largest value found: the intervals hold both",
+}
+
+
+def outputs(found: Findings) -> Iterator[tuple[str, Data]]:
+    """Yield every file of a study but the pictures as (name, content)."""
+    from cfmkit.jsontext import json_bytes
+    from cfmkit.yamlio import dump
+
+    spec = found.setup.study.spec
+    yield "results.csv", results_csv(found)
+    if not found.interrupted:
+        yield "indices.csv", to_csv(lines_table(found.lines))
+    if found.convergence:
+        yield "convergence.csv", to_csv(lines_table(found.convergence))
+    yield "metrics.json", json_bytes(as_json(found))
+    resolve = family(spec.family).resolve
+    yield "resolved.yaml", dump(resolve(spec) if resolve else spec, complete=True).encode()
+
+
+def results_csv(found: Findings) -> Iterator[bytes]:
+    """Yield results.csv: to which block a sample belongs and what it is for, then as in a sweep."""
+    first = True
+    for piece in found.evaluator.pieces:
+        for indices, rows in piece.records.batches():
+            leading = (
+                TableColumn("block", piece.blocks[indices]),
+                TableColumn("role", tuple(piece.roles[indices].tolist())),
+            )
+            chunks = csv_chunks(Table((*leading, *results_table(piece.records, indices, rows).columns)))
+            header = next(chunks)
+            if first:
+                yield header
+            first = False
+            yield from chunks
+
+
+def lines_table(lines: Sequence[Line]) -> Table:
+    """Return indices as a tidy table."""
+
+    def column(name: str) -> TableColumn:
+        return TableColumn(name, tuple(getattr(line, name) for line in lines))
+
+    return Table(tuple(map(column, ("metric", "parameter", "index", "value", "low", "high", "unit", "samples"))))
+
+
+def exit_code(found: Findings) -> ExitCode:
+    """Return what the process is to say: samples that failed count before requirements that are missed."""
+    if found.interrupted:
+        return ExitCode.INTERRUPTED
+    evaluator = found.evaluator
+    if evaluator.count and evaluator.failed == evaluator.count:
+        return ExitCode.NO_SOLUTION
+    stated = found.setup.method == "local" and not found.unstated
+    if (evaluator.failed and not stated) or found.unstated:
+        return ExitCode.PARTIAL
+    missed = not all(outcome.ok for outcome in found.setup.nominal.outcomes) or not yield_ok(found)
+    return ExitCode.REQUIREMENT_MISSED if missed else ExitCode.OK
+
+
+def yield_ok(found: Findings) -> bool:
+    """Return whether the yield is what was asked for; true if nothing was."""
+    wanted = found.setup.block.min_yield
+    if wanted is None or found.setup.method != "tolerance":
+        return True
+    return found.all_met is not None and found.all_met.value >= wanted
+
+
+def message(found: Findings) -> str:
+    """Return the outcome in one sentence."""
+    evaluator = found.evaluator
+    told = f"{found.setup.method}: {evaluator.count} samples"
+    if found.interrupted:
+        return f"{told}; interrupted: run the same command again to go on"
+    if evaluator.failed:
+        told += f", {evaluator.failed} without a result (the first: {evaluator.first_failure})"
+    if found.unstated:
+        told += f"; {found.unstated} of {len(found.lines)} indices are not stated"
+    return told
+
+
+def warnings(found: Findings) -> tuple[Finding, ...]:
+    """Return what the user must know beside the numbers."""
+    evaluator, setup = found.evaluator, found.setup
+    extra = []
+    if evaluator.failed:
+        told = f"{evaluator.failed} of {evaluator.count} samples have no result: {POLICIES[setup.policy]}"
+        if setup.policy == "resample":
+            told += f" ({found.replaced} blocks)"
+        extra.append(Finding("failed_samples", told))
+    elif found.unstated and not found.interrupted:
+        told = f"{found.unstated} indices are not stated: the metric does not vary, or has no value in some samples"
+        extra.append(Finding("not_stated", told))
+    return (*setup.warnings, *extra)
+
+
+def as_json(found: Findings) -> dict[str, Any]:
+    """Return what metrics.json says."""
+    setup = found.setup
+    code = exit_code(found)
+    return {
+        "status": _STATUS.get(code, "complete"),
+        "message": message(found),
+        "method": setup.method,
+        "metrics": metrics_json(_metrics(found)),
+        "requirements": _requirements(found),
+        "warnings": [{"name": item.name, "message": item.message} for item in warnings(found)],
+        "yield": _yield(found.all_met),
+        "samples": _samples(found),
+        "parameters": [_parameter(one) for one in setup.parameters],
+        "correlated": _correlated(setup),
+        "indices": [vars(line) for line in found.lines],
+    }
+
+
+_STATUS = {
+    ExitCode.INTERRUPTED: "interrupted",
+    ExitCode.NO_SOLUTION: "no_result",
+    ExitCode.PARTIAL: "partial",
+}
+
+
+def _metrics(found: Findings) -> dict[str, Quantity]:
+    """Return the metrics of the specification itself, and the yield."""
+    study, values = found.setup.study, found.setup.nominal.values.tolist()
+    noted = {
+        one.label: Quantity(value, one.dimension, one.definition)
+        for one, value in zip(study.metrics, values, strict=True)
+    }
+    if found.all_met is not None:
+        noted["yield"] = Quantity(_known(found.all_met.value), "ratio", YIELD, "samples failed")
+    return noted
+
+
+def _requirements(found: Findings) -> list[dict[str, Any]]:
+    outcomes = found.setup.nominal.outcomes
+    shares = found.each_met or (None,) * len(outcomes)
+    each = [one.as_json() | {"yield": _yield(share)} for one, share in zip(outcomes, shares, strict=True)]
+    wanted = found.setup.block.min_yield
+    if wanted is None or found.all_met is None:
+        return each
+    value, good = _known(found.all_met.value), yield_ok(found)
+    shown = "no value (samples failed)" if value is None else f"{100 * value:.4g} %"
+    sentence = f"yield {shown}, required >= {100 * wanted:.4g} %: {'ok' if good else 'missed'}"
+    bounds = {"value": value, "min": wanted, "max": None, "unit": "1", "over": None, "over_unit": None}
+    return [*each, {"metric": "yield", **bounds, "ok": good, "sentence": sentence}]
+
+
+def _yield(share: Yield | None) -> dict[str, Any] | None:
+    if share is None:
+        return None
+    return {
+        "value": _known(share.value),
+        "wilson": [_known(end) for end in share.wilson],
+        "clopper_pearson": [_known(end) for end in share.clopper_pearson],
+        "level": LEVEL,
+        "good": share.good,
+        "failed": share.failed,
+        "parts": share.count,
+    }
+
+
+def _known(value: float) -> float | None:
+    return None if isnan(value) else value
+
+
+def _samples(found: Findings) -> dict[str, Any]:
+    evaluator, setup = found.evaluator, found.setup
+    ends = {status.key: count for status, count in evaluator.ends.items() if count}
+    about = {"blocks": setup.samples, "evaluated": evaluator.count, "failed": evaluator.failed}
+    return about | {
+        "replaced_blocks": found.replaced,
+        "by_status": ends,
+        "on_failure": setup.policy,
+        "seed": setup.seed,
+    }
+
+
+def _parameter(one: Parameter) -> dict[str, Any]:
+    spread = one.spread
+    low, high = spread.ends
+    about = {"path": one.path, "distribution": spread.kind, "nominal": written(spread.nominal, one.dimension)}
+    if spread.kind == "normal":
+        about["deviation"] = written(spread.deviation, one.dimension)
+    return about | {"range": [written(low, one.dimension), written(high, one.dimension)]}
+
+
+def _correlated(setup: Setup) -> list[dict[str, Any]]:
+    from cfmkit.studies.sensitivity.parameters import groups
+
+    pairs = groups(setup.block, setup.paths) if setup.method == "tolerance" else ()
+    return [{"parameters": [setup.paths[k] for k in members], "correlation": value} for members, value in pairs]

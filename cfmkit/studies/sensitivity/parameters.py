@@ -1,0 +1,234 @@
+"""The block `sensitivity:` read against a specification: what is uncertain, by how much, and what goes together."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from cfmkit.errors import Problem, QuantityError, SpecError
+from cfmkit.spec import Tolerance
+from cfmkit.studies.leaves import CannotVary, Leaf, leaf
+from cfmkit.studies.sensitivity.spreads import Incompatible, Spread, correlation_matrix
+from cfmkit.units import read_number, read_quantity
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping, Sequence
+
+    from cfmkit.curves import FloatArray
+    from cfmkit.spec import Sensitivity, Spec
+
+Place = tuple[str | int, ...]
+
+EVERY = "*"
+"""In place of an index: all items of a list."""
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One uncertain value.
+
+    Attributes
+    ----------
+    path : str
+        Dotted.
+    dimension : str
+        Of `cfmkit.units`.
+    spread : Spread
+        How it is distributed [SI].
+    place : bool
+        Whether it is a place that knows if it is a length or an angle.
+    """
+
+    path: str
+    dimension: str
+    spread: Spread
+    place: bool = False
+
+
+def parameters_of(spec: Spec, block: Sensitivity) -> tuple[Parameter, ...]:
+    """Return the parameters of a block, lists taken apart.
+
+    Raises
+    ------
+    cfmkit.errors.SpecError
+        With every fault, at ``sensitivity.parameters`` and the path.
+    """
+    found = list(faults(spec, block))
+    if found:
+        raise SpecError([Problem("", 0, 0, ".".join(map(str, place)), message) for place, message in found])
+    return tuple(one for path, stated in block.parameters.items() for one in _expanded(spec, path, stated))
+
+
+def faults(spec: Spec, block: Sensitivity) -> Iterator[tuple[Place, str]]:
+    """Yield (path of keys, what is wrong there) for every fault that the models cannot see."""
+    seen: list[str] = []
+    spoilt = False
+    for path, stated in block.parameters.items():
+        try:
+            expanded = _expanded(spec, path, stated)
+        except CannotVary as problem:
+            yield ("sensitivity", "parameters", path), str(problem)
+            spoilt = True
+            continue
+        for one in expanded:
+            if clash := next((other for other in seen if _overlap(one.path, other)), None):
+                yield ("sensitivity", "parameters", path), f"{clash!r} is a parameter already; one of them is enough"
+            seen.append(one.path)
+    if not spoilt:
+        yield from _group_faults(block, seen)
+
+
+def _overlap(one: str, other: str) -> bool:
+    return one == other or one.startswith(f"{other}.") or other.startswith(f"{one}.")
+
+
+def _group_faults(block: Sensitivity, paths: Sequence[str]) -> Iterator[tuple[Place, str]]:
+    for index, group in enumerate(block.correlated):
+        for number, name in enumerate(group.parameters):
+            if not _members(name, paths):
+                known = ", ".join(block.parameters)
+                place = ("sensitivity", "correlated", index, "parameters", number)
+                yield place, f"{name!r} is not among the parameters: {known}"
+        if len({k for name in group.parameters for k in _members(name, paths)}) == 1:
+            yield ("sensitivity", "correlated", index), "one parameter alone is correlated with nothing"
+    try:
+        correlations(block, paths)
+    except Incompatible as problem:
+        yield ("sensitivity", "correlated"), str(problem)
+
+
+def _members(name: str, paths: Sequence[str]) -> tuple[int, ...]:
+    """Return the numbers of the parameters that a name stands for."""
+    pattern = re.escape(name).replace(re.escape(EVERY), "[0-9]+")
+    return tuple(k for k, path in enumerate(paths) if re.fullmatch(pattern, path))
+
+
+def groups(block: Sensitivity, paths: Sequence[str]) -> tuple[tuple[tuple[int, ...], float], ...]:
+    """Return (numbers of parameters, correlation) of every group."""
+    return tuple(
+        (tuple(dict.fromkeys(k for name in group.parameters for k in _members(name, paths))), group.correlation)
+        for group in block.correlated
+    )
+
+
+def correlations(block: Sensitivity, paths: Sequence[str]) -> FloatArray:
+    """Return the matrix of correlations.
+
+    Raises
+    ------
+    Incompatible
+        If no parts can be correlated so.
+    """
+    return correlation_matrix(len(paths), groups(block, paths))
+
+
+def together(block: Sensitivity, paths: Sequence[str]) -> tuple[tuple[int, ...], ...]:
+    """Return the parameters in groups that are tightened together: correlated ones, and those of one list."""
+    parts = {k: {k} for k in range(len(paths))}
+    joint = [members for members, _ in groups(block, paths)]
+    joint += [_members(name, paths) for name in block.parameters if EVERY in name.split(".")]
+    for members in joint:
+        union = set().union(*(parts[k] for k in members))
+        for k in union:
+            parts[k] = union
+    return tuple(dict.fromkeys(tuple(sorted(part)) for part in parts.values()))
+
+
+def _expanded(spec: Spec, path: str, stated: tuple[str, str] | Tolerance) -> list[Parameter]:
+    return [_parameter(spec, one, stated) for one in _items(spec, path)]
+
+
+def _items(spec: Spec, path: str) -> list[str]:
+    """Return the paths that one with a star stands for."""
+    before, star, after = path.partition(f".{EVERY}")
+    if not star:
+        return [path]
+    try:
+        values = spec.at(before)
+    except KeyError:
+        values = None
+    if not isinstance(values, tuple):
+        raise CannotVary(f"{before!r} is no list in this specification; leave the star out")
+    return [one for index in range(len(values)) for one in _items(spec, f"{before}.{index}{after}")]
+
+
+def _parameter(spec: Spec, path: str, stated: tuple[str, str] | Tolerance) -> Parameter:
+    found = leaf(type(spec), path)
+    if found.kind not in ("quantity", "number"):
+        raise CannotVary(f"{path!r} does not vary continuously; `cfmkit sweep` goes through its values")
+    nominal, dimension = _nominal(spec, found)
+    spread = _tolerance(found, stated, nominal) if isinstance(stated, Tolerance) else _range(found, stated, nominal)
+    several = found.quantity is not None and len(found.quantity.dimensions) > 1
+    return Parameter(path, dimension, spread, several)
+
+
+def _nominal(spec: Spec, found: Leaf) -> tuple[float, str]:
+    try:
+        value = spec.at(found.path)
+    except KeyError:
+        value = None
+    if isinstance(value, tuple):
+        raise CannotVary(f"{found.path!r} is a list here; write {found.path}.{EVERY} for all its items")
+    if value is None:
+        raise CannotVary(f"{found.path!r} has no value in this specification; give it one")
+    if found.kind == "number":
+        return float(value), "ratio"
+    return float(value), getattr(value, "dimension", found.quantity.dimensions[0] if found.quantity else "ratio")
+
+
+def _range(found: Leaf, stated: tuple[str, str], nominal: float) -> Spread:
+    low, high = (_read(found, text) for text in stated)
+    if not low < high:
+        raise CannotVary(f"[{stated[0]}, {stated[1]}] is not a range: the first must be smaller than the second")
+    return Spread("uniform", nominal, low, high)
+
+
+def _tolerance(found: Leaf, stated: Tolerance, nominal: float) -> Spread:
+    if stated.uniform is not None:
+        width = _width(found, "uniform", stated.uniform, nominal)
+        return Spread("uniform", nominal, nominal - width, nominal + width)
+    deviation = _width(found, "normal", stated.normal or "", nominal)
+    reach = math.inf if stated.truncate is None else _width(found, "truncate", stated.truncate, nominal)
+    return Spread("normal", nominal, nominal - reach, nominal + reach, deviation)
+
+
+def _width(found: Leaf, key: str, text: str, nominal: float) -> float:
+    """Return the size of a tolerance [SI]; a percentage is of the nominal value."""
+    if text.endswith("%"):
+        width = _percent(key, text) * abs(nominal)
+        if not nominal:
+            raise CannotVary(f"{key}: {text} of zero is zero; give it in the unit of the value")
+    else:
+        width = _read(found, text, key)
+    if not width > 0:
+        raise CannotVary(f"{key}: {text} is not allowed: must be > 0")
+    return width
+
+
+def _percent(key: str, text: str) -> float:
+    try:
+        return read_quantity(text, "ratio")
+    except QuantityError as problem:
+        raise CannotVary(f"{key}: {problem}") from None
+
+
+def _read(found: Leaf, text: str, key: str = "") -> float:
+    """Return the SI value of text in the unit of a value."""
+    try:
+        given: Any = read_number(text) if found.kind == "number" else text
+        return float(found.read(given)[0])
+    except (CannotVary, QuantityError) as problem:
+        raise CannotVary(f"{key}: {problem}" if key else str(problem)) from None
+
+
+def with_options(block: Sensitivity | None, changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what a block says once options have replaced some of it.
+
+    A number of samples is that of the block's own method: another method chooses its own.
+    """
+    told = block.model_dump(exclude_unset=True) if block else {}
+    if block is not None and changes.get("method", block.method) != block.method:
+        told.pop("samples", None)
+    return told | {key: value for key, value in changes.items() if value is not None}

@@ -1,0 +1,245 @@
+"""What a sensitivity study is to do: read off a specification, checked before anything is computed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from cfmkit.errors import Problem, SolutionError, SpecError, UsageError
+from cfmkit.families import family
+from cfmkit.metrics import check, values_of_family
+from cfmkit.metrics.requirements import Limits
+from cfmkit.results import Finding
+from cfmkit.studies.columns import metrics_of
+from cfmkit.studies.plan import MOST_POINTS, refuse_too_many
+from cfmkit.studies.sensitivity.parameters import correlations, parameters_of, together
+from cfmkit.studies.study import Study
+from cfmkit.units import border_unit, to_border
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from cfmkit.curves import FloatArray
+    from cfmkit.metrics import Outcome
+    from cfmkit.results import Result
+    from cfmkit.spec import Requirement, Sensitivity, Spec
+    from cfmkit.studies.sensitivity.failures import Policy
+    from cfmkit.studies.sensitivity.parameters import Parameter
+    from cfmkit.studies.study import Metric
+
+Method = Literal["oat", "local", "morris", "sobol", "tolerance"]
+SAMPLES = {"oat": 11, "local": 2, "morris": 20, "sobol": 256, "tolerance": 1000}
+"""How many samples a method takes unless told otherwise; `local` chooses its own steps."""
+
+NOTHING = (
+    "nothing to vary: add a block 'sensitivity: {parameters: {...}}' to the spec, "
+    "or give --vary 'mechanism.roller_radius=normal:0.05 mm'"
+)
+
+
+@dataclass(frozen=True)
+class Nominal:
+    """The specification itself: its result, and its requirements."""
+
+    result: Result
+    outcomes: tuple[Outcome, ...]
+    values: FloatArray
+
+
+@dataclass(frozen=True)
+class Setup:
+    """Everything that a sensitivity study needs.
+
+    Attributes
+    ----------
+    block : Sensitivity
+        What was asked.
+    parameters : tuple of Parameter
+        What varies.
+    study : Study
+        What is noted at each sample.
+    nominal : Nominal
+        What comes out without any deviation.
+    samples, seed : int
+        How many, and from where.
+    correlation : (d, d) array
+        Of the normal scores.
+    together : tuple of tuple of int
+        Parameters whose tolerances are tightened together.
+    warnings : tuple of Finding
+        What the user must know.
+    """
+
+    block: Sensitivity
+    parameters: tuple[Parameter, ...]
+    study: Study
+    nominal: Nominal
+    samples: int
+    seed: int
+    correlation: FloatArray
+    together: tuple[tuple[int, ...], ...]
+    warnings: tuple[Finding, ...] = ()
+
+    @property
+    def method(self) -> Method:
+        """Of the five."""
+        return self.block.method
+
+    @property
+    def policy(self) -> Policy:
+        """What becomes of failed samples."""
+        return self.block.on_failure
+
+    @property
+    def paths(self) -> tuple[str, ...]:
+        """Of the parameters."""
+        return tuple(one.path for one in self.parameters)
+
+    @property
+    def values(self) -> FloatArray:
+        """Nominal values of the parameters, (d,)."""
+        return np.array([one.spread.nominal for one in self.parameters])
+
+    @property
+    def ends(self) -> FloatArray:
+        """Ranges of the parameters, (d, 2)."""
+        return np.array([one.spread.ends for one in self.parameters])
+
+    def limits(self, metric: Metric) -> tuple[Limits, ...]:
+        """Return the requirements on a metric over its window, as bounds."""
+        mine = [one for one in self.study.spec.requirements if _noted(one) == (metric.name, metric.over)]
+        return tuple(Limits.of(one, metric.dimension) for one in mine)
+
+
+def prepare(spec: Spec, seed: int | None = None, most: int = MOST_POINTS) -> Setup:
+    """Return what a study of a specification has to do.
+
+    Parameters
+    ----------
+    spec : Spec
+        With a block `sensitivity`.
+    seed : int, optional
+        Goes before the one of the specification.
+    most : int
+        Samples that are allowed.
+
+    Raises
+    ------
+    cfmkit.errors.UsageError
+        If there is nothing to vary, too much, or a metric that does not exist.
+    cfmkit.errors.SpecError
+        If a path or value is wrong.
+    cfmkit.errors.SolutionError
+        If the specification itself has no solution.
+    """
+    block = spec.sensitivity
+    if block is None:
+        raise UsageError(NOTHING)
+    parameters = parameters_of(spec, block)
+    _suits(block, parameters)
+    chosen = seed if seed is not None else block.seed or 0
+    samples = block.samples or SAMPLES[block.method]
+    paths = tuple(one.path for one in parameters)
+    study = Study(spec, paths, _metrics(spec, block), block.design, seed=chosen)
+    groups = together(block, paths)
+    refuse_too_many(points_of(block.method, samples, len(paths), len(groups)), most)
+    study, nominal, unvalued = _with_nominal(study)
+    warnings = (*unvalued, *_cautions(spec, block, parameters, samples))
+    matrix = correlations(block, paths)
+    return Setup(block, parameters, study, nominal, samples, chosen, matrix, groups, warnings)
+
+
+def points_of(method: Method, samples: int, parameters: int, groups: int) -> int:
+    """Return how many points a method evaluates, if none has to be drawn again."""
+    from cfmkit.studies.sensitivity.local import LEVELS
+
+    counts = {
+        "oat": samples * parameters,
+        "local": 2 * LEVELS * parameters,
+        "morris": samples * (parameters + 1),
+        "sobol": samples * (parameters + 2),
+        "tolerance": samples * (groups + 1),
+    }
+    return counts[method]
+
+
+def _suits(block: Sensitivity, parameters: tuple[Parameter, ...]) -> None:
+    """Raise if method, failure policy and parameters do not go together."""
+    if block.method in ("oat", "local") and block.on_failure == "resample":
+        told = f"{block.method!r} draws no samples that could be drawn again; take 'fail' or 'bound'"
+        raise SpecError([Problem("", 0, 0, "sensitivity.on_failure", told)])
+    outside = [one for one in parameters if not one.spread.low <= one.spread.nominal <= one.spread.high]
+    if block.method == "tolerance" and outside:
+        told = "the nominal value lies outside the range; it is what a tolerance is tightened to"
+        raise SpecError([Problem("", 0, 0, f"sensitivity.parameters.{one.path}", told) for one in outside])
+
+
+def _noted(one: Requirement) -> tuple[str, tuple[float, float] | None]:
+    return one.metric, None if one.over is None else (float(one.over[0]), float(one.over[1]))
+
+
+def _metrics(spec: Spec, block: Sensitivity) -> tuple[Metric, ...]:
+    """Return the metrics that are asked for; else those of the requirements, over their windows; else all."""
+    if block.metrics or not spec.requirements:
+        return metrics_of(spec, block.metrics)
+    wanted = dict.fromkeys(map(_noted, spec.requirements))
+    plain = {one.name: one for one in metrics_of(spec, [name for name, _ in wanted])}
+    return tuple(replace(plain[name], over=over, label=_label(plain[name].label, over)) for name, over in wanted)
+
+
+def _label(name: str, over: tuple[float, float] | None) -> str:
+    if over is None:
+        return name
+    low, high = (f"{float(to_border(end, 'length')):.6g}" for end in over)
+    return f"{name} over {low} ... {high} {border_unit('length')}"
+
+
+def _with_nominal(study: Study) -> tuple[Study, Nominal, tuple[Finding, ...]]:
+    """Return the study of those metrics that have a value, and the result without deviations."""
+    result = study.solve(study.spec)
+    if not result.status.usable:
+        told = "the specification itself has no solution, so that nothing can be said about deviations from it"
+        raise SolutionError(f"{told}: {result.message}")
+    row = study.row(result)
+    valued = [k for k, value in enumerate(row.values) if value is not None]
+    if not valued:
+        raise SolutionError("none of the metrics has a value for the specification itself")
+    gone = [one.label for k, one in enumerate(study.metrics) if k not in valued]
+    without = tuple(
+        Finding("no_value", f"{label} has no value for the specification itself: left out") for label in gone
+    )
+    outcomes = check(study.spec.requirements, result, values_of_family(family(study.spec.family).values))
+    values = np.array([row.values[k] for k in valued], dtype=np.float64)
+    kept = replace(study, metrics=tuple(study.metrics[k] for k in valued))
+    return kept, Nominal(result, outcomes, values), without
+
+
+def _cautions(spec: Spec, block: Sensitivity, parameters: tuple[Parameter, ...], samples: int) -> Iterator[Finding]:
+    if block.correlated and block.method != "tolerance":
+        told = f"{block.method} varies every parameter by itself: 'correlated' is for the method tolerance"
+        yield Finding("correlation_not_used", told)
+    if block.method == "sobol" and samples & (samples - 1):
+        yield Finding("unbalanced", f"{samples} is no power of two: a Sobol sequence is balanced at 64, 128, 256, ...")
+    if block.method == "tolerance" and not spec.requirements:
+        yield Finding("no_requirements", "without requirements there is no yield, only distributions")
+    yield from _followers(spec, parameters)
+
+
+def _followers(spec: Spec, parameters: tuple[Parameter, ...]) -> Iterator[Finding]:
+    """Yield what is derived from a parameter: not a deviation of one made part, but another part each time."""
+    resolve = family(spec.family).resolve
+    if resolve is None:
+        return
+    base = dict(resolve(spec).leaves())
+    for one in parameters:
+        low, high = one.spread.ends
+        try:
+            moved = dict(resolve(spec.replace({one.path: low + 0.75 * (high - low)})).leaves())
+        except SpecError:
+            continue
+        follow = [path for path, value in moved.items() if path != one.path and base.get(path) != value]
+        if follow:
+            told = f"{', '.join(follow)} follow {one.path}: every sample is another part, made for its own value"
+            yield Finding("derived_part", f"{told}; `cfmkit design` writes a design.yaml in which they are fixed")

@@ -1,0 +1,125 @@
+"""How parameters are distributed, alone and together.
+
+A parameter is uniform or normal, perhaps truncated. Several are joined by a Gaussian
+copula: correlation is that of the normal scores, so that each parameter keeps its own
+distribution whatever it is correlated with.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from cfmkit.curves import FloatArray
+
+COVERED = 3.0
+"""Standard deviations on either side that stand for the range of a normal parameter."""
+
+
+class Incompatible(ValueError):
+    """Correlations that no set of variables can have together."""
+
+
+@dataclass(frozen=True)
+class Spread:
+    """The distribution of one parameter.
+
+    Attributes
+    ----------
+    kind : {"uniform", "normal"}
+        Its shape.
+    nominal : float
+        Where a perfect part would be.
+    low, high : float
+        Ends of a uniform distribution; truncation of a normal one, infinite for none.
+    deviation : float
+        Standard deviation of the normal distribution before truncation.
+    """
+
+    kind: Literal["uniform", "normal"]
+    nominal: float
+    low: float
+    high: float
+    deviation: float = 0.0
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """The range that it covers: three standard deviations where it has no ends."""
+        if self.kind == "uniform":
+            return self.low, self.high
+        reach = COVERED * self.deviation
+        return max(self.low, self.nominal - reach), min(self.high, self.nominal + reach)
+
+    def tightened(self, factor: float) -> Spread:
+        """Return the same distribution narrower about the nominal value."""
+        low, high = (self.nominal + factor * (end - self.nominal) for end in (self.low, self.high))
+        return replace(self, low=low, high=high, deviation=factor * self.deviation)
+
+    def at(self, unit: FloatArray) -> FloatArray:
+        """Return the values below which the shares `unit`, in (0, 1), of all parts lie."""
+        if self.kind == "uniform":
+            return self.low + unit * (self.high - self.low)
+        from scipy.special import ndtr, ndtri
+
+        below, above = (float(ndtr((end - self.nominal) / self.deviation)) for end in (self.low, self.high))
+        inside = np.clip(below + unit * (above - below), _SMALLEST, 1.0 - _EPSILON)
+        values = self.nominal + self.deviation * ndtri(inside)
+        return np.asarray(np.clip(values, self.low, self.high))
+
+
+_SMALLEST = np.finfo(np.float64).tiny
+_EPSILON = float(np.finfo(np.float64).epsneg)
+
+
+def values_at(spreads: Sequence[Spread], unit: FloatArray) -> FloatArray:
+    """Return points in the unit cube, (n, d), as values of the parameters."""
+    return np.stack([one.at(unit[:, k]) for k, one in enumerate(spreads)], axis=1)
+
+
+def values_across(spreads: Sequence[Spread], unit: FloatArray) -> FloatArray:
+    """Return points in the unit cube, (n, d), spread evenly over the ranges of the parameters."""
+    ends = np.array([one.ends for one in spreads])
+    return np.asarray(ends[:, 0] + unit * (ends[:, 1] - ends[:, 0]))
+
+
+def correlation_matrix(count: int, groups: Iterable[tuple[Sequence[int], float]]) -> FloatArray:
+    """Return the correlations of all parameters.
+
+    Parameters
+    ----------
+    count : int
+        Number of parameters.
+    groups : iterable of (sequence of int, float)
+        Parameters that belong together, and the correlation of each two of them.
+
+    Raises
+    ------
+    Incompatible
+        If no variables can be correlated so.
+    """
+    matrix = np.eye(count)
+    for members, correlation in groups:
+        for one in members:
+            for other in members:
+                if one != other:
+                    matrix[one, other] = correlation
+    if np.linalg.eigvalsh(matrix).min() < -1e-9:
+        raise Incompatible("no parts can be correlated like that: each of three cannot oppose both others")
+    return matrix
+
+
+def draw(matrix: FloatArray, count: int, generator: np.random.Generator) -> FloatArray:
+    """Return points in the unit cube, (count, d), whose normal scores have these correlations."""
+    from scipy.special import ndtr
+
+    values, vectors = np.linalg.eigh(matrix)
+    root = vectors * np.sqrt(np.clip(values, 0.0, None))
+    scores = generator.standard_normal((count, len(matrix)))
+    # Without correlations the scores stay what was drawn, to the last bit.
+    joined = scores if np.array_equal(matrix, np.eye(len(matrix))) else scores @ root.T
+    return np.asarray(ndtr(joined))

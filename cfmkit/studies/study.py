@@ -1,0 +1,216 @@
+"""What a study does at each of its points, and what it notes about it.
+
+A `Study` holds everything that decides the result of a point but the varied values.
+Whatever goes wrong at a point becomes a row with a status and without values: an
+invalid value, a mechanism that cannot exist, a design that fails, a solver that gives
+up. An exception that cfmkit does not raise on purpose is a bug; it costs its own
+point only (status ``crashed``), and the row keeps the traceback.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import traceback
+from dataclasses import dataclass
+from functools import cached_property
+from importlib.metadata import version
+from math import isfinite
+from typing import TYPE_CHECKING, Any
+
+from cfmkit._version import __version__
+from cfmkit.errors import CfmError, SpecError
+from cfmkit.families import family
+from cfmkit.families.base import Run
+from cfmkit.metrics import Window, check, evaluate, values_of_family
+from cfmkit.results import Result, Status
+from cfmkit.store import file_hash, stable_hash
+from cfmkit.tables.source import named_in
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from cfmkit.metrics import Definition
+    from cfmkit.spec import Spec
+
+NOT_DECIDING = {"name", "description", "sweep", "sensitivity"}
+"""Parts of a specification that change no result of a point."""
+
+_STATUS_OF = {3: Status.INVALID, 4: Status.NO_EQUILIBRIUM, 70: Status.CRASHED}
+
+
+@dataclass(frozen=True)
+class Metric:
+    """A column of results.
+
+    Attributes
+    ----------
+    name : str
+        With ``[branch]`` where wanted.
+    dimension : str
+        Of `cfmkit.units`.
+    definition : str
+        What it is.
+    over : tuple of (float, float), optional
+        Where it is measured [m or rad]; default: the window of the analysis.
+    label : str
+        Heads the column; default: the name, ``force_mean_load`` for ``force_mean[load]``.
+    """
+
+    name: str
+    dimension: str
+    definition: str = ""
+    over: tuple[float, float] | None = None
+    label: str = ""
+
+    def __post_init__(self) -> None:
+        """Fall back to the name."""
+        if not self.label:
+            object.__setattr__(self, "label", self.name.replace("[", "_").replace("]", ""))
+
+
+@dataclass(frozen=True)
+class Row:
+    """What became of one point.
+
+    Attributes
+    ----------
+    status : Status
+        How its analysis ended.
+    values : tuple of float or None
+        One for each metric of the study [SI]; all None where nothing was solved.
+    met : tuple of bool
+        One for each requirement; empty where nothing was solved.
+    message : str
+        What went wrong; empty for a complete point.
+    curve : bytes
+        The point's curves as CSV, if the study keeps them.
+    bug : str
+        The traceback, if a bug ended it.
+    """
+
+    status: Status
+    values: tuple[float | None, ...] = ()
+    met: tuple[bool, ...] = ()
+    message: str = ""
+    curve: bytes = b""
+    bug: str = ""
+
+
+@dataclass(frozen=True)
+class Study:
+    """Everything that decides the row of a point, but the varied values.
+
+    Attributes
+    ----------
+    spec : Spec
+        What is varied.
+    paths : tuple of str
+        What varies, in order.
+    metrics : tuple of Metric
+        What is noted.
+    design : bool
+        Whether the mechanism is designed anew at each point.
+    curves : bool
+        Whether curves are kept.
+    seed : int
+        Of everything random inside an analysis.
+    """
+
+    spec: Spec
+    paths: tuple[str, ...]
+    metrics: tuple[Metric, ...]
+    design: bool = False
+    curves: bool = False
+    seed: int = 0
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Names of the metrics."""
+        return tuple(item.name for item in self.metrics)
+
+    @cached_property
+    def identity(self) -> bytes:
+        """The hash of everything that decides a row, but the varied values; of data files the content counts."""
+        spec = self.spec.model_dump(mode="json", exclude=NOT_DECIDING)
+        versions = {name: version(name) for name in ("numpy", "scipy")} | {"cfmkit": __version__}
+        noted = [(one.name, one.over) for one in self.metrics]
+        data = [[str(source), file_hash(source.path.resolve())] for source in named_in(self.spec.model_dump())]
+        about = [self.paths, noted, self.design, self.curves, self.seed, versions, data]
+        return bytes.fromhex(stable_hash([spec, *about]))
+
+    def key(self, values: Sequence[Any]) -> str:
+        """Return the name of a point by content: the same for the same study and the same values."""
+        text = repr([(type(value).__name__, value) for value in values])
+        return hashlib.sha256(self.identity + text.encode()).hexdigest()[:32]
+
+    def variant(self, values: Sequence[Any]) -> Spec:
+        """Return the specification of one point.
+
+        Raises
+        ------
+        cfmkit.errors.SpecError
+            If it is not valid.
+        """
+        return self.spec.replace(dict(zip(self.paths, values, strict=True)))
+
+    def evaluate(self, values: Sequence[Any]) -> Row:
+        """Return what becomes of one point; nothing is raised but what ends the process."""
+        try:
+            return self.row(self.solve(self.variant(values)))
+        except CfmError as error:
+            if _STATUS_OF.get(error.exit_code) is Status.CRASHED:
+                return _bug(error)
+            return Row(_STATUS_OF.get(error.exit_code, Status.INVALID), message=_told(error))
+        except Exception as error:
+            return _bug(error)
+
+    def solve(self, spec: Spec) -> Result:
+        """Return the result of a variant, designed first if the study says so."""
+        record, run = family(spec.family), Run(self.seed)
+        if self.design and record.design is not None:
+            design = record.design(spec, run)
+            if design.spec is None:
+                return Result(spec, design.status, design.message)
+            spec = design.spec
+        return record.analyze(spec, run)
+
+    def row(self, result: Result) -> Row:
+        """Return what is noted about a result."""
+        if not result.status.usable:
+            return Row(result.status, message=result.message)
+        extra = values_of_family(family(result.spec.family).values)
+        values = self._values(result, extra)
+        met = tuple(outcome.ok for outcome in check(result.spec.requirements, result, extra))
+        message = "" if result.status is Status.COMPLETE else result.message
+        return Row(result.status, values, met, message, _curve(result) if self.curves else b"")
+
+    def _values(self, result: Result, extra: tuple[Definition, ...]) -> tuple[float | None, ...]:
+        found: dict[tuple[str, tuple[float, float] | None], float | None] = {}
+        for over in dict.fromkeys(one.over for one in self.metrics):
+            names = [one.name for one in self.metrics if one.over == over]
+            window = None if over is None else Window(*over)
+            found |= {(name, over): item.value for name, item in evaluate(result, names, window, extra).items()}
+        return tuple(_finite(found[one.name, one.over]) for one in self.metrics)
+
+
+def _finite(value: float | None) -> float | None:
+    return value if value is not None and isfinite(value) else None
+
+
+def _curve(result: Result) -> bytes:
+    from cfmkit.tables import curve_table, to_csv
+
+    return to_csv(curve_table(result.curves))
+
+
+def _told(error: CfmError) -> str:
+    """Return an error in one line; of a specification, paths and messages without the empty source."""
+    if isinstance(error, SpecError):
+        return "; ".join(": ".join(filter(None, (one.path, one.message))) for one in error.problems)
+    return " ".join(str(error).split())
+
+
+def _bug(error: Exception) -> Row:
+    told = " ".join(f"{type(error).__name__}: {error}".split())
+    trace = "".join(traceback.format_exception(error))
+    return Row(Status.CRASHED, message=f"a bug in cfmkit: {told}", bug=trace)

@@ -1,0 +1,224 @@
+"""What a study found, in one record: how many points ended how, the best of them, requirements, extremes.
+
+The best point is the one with the best value of one metric, among those that meet every
+requirement, else among all that were solved. The metric is that of the first
+requirement, and better means farther inside its bound; without requirements it is the
+ripple of the force or torque, and smaller is better.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.errors import ExitCode
+from cfmkit.results import Status
+from cfmkit.studies.variation import written
+from cfmkit.units import border_unit, to_border
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from cfmkit.curves import FloatArray
+    from cfmkit.studies.engine import Records
+    from cfmkit.studies.rows import Rows
+    from cfmkit.studies.study import Study
+
+DEFAULT_OBJECTIVES = ("force_ripple", "torque_ripple")
+MOST_SHOWN = 4
+"""Metrics that are drawn."""
+
+
+@dataclass(frozen=True)
+class Objective:
+    """What makes a point better than another: the column of a metric, and whether more is better."""
+
+    column: int
+    largest: bool
+
+
+def objective(study: Study) -> Objective | None:
+    """Return by what the best point is chosen; None where the study notes nothing of the kind."""
+    for one in study.spec.requirements:
+        if one.metric in study.names:
+            return Objective(study.names.index(one.metric), one.max is None)
+    for name in DEFAULT_OBJECTIVES:
+        if name in study.names:
+            return Objective(study.names.index(name), False)
+    return None
+
+
+def main_columns(study: Study, headline: tuple[str, ...]) -> tuple[int, ...]:
+    """Return the columns that are looked at first: the objective, the requirements, the family's headline."""
+    wanted = [*(one.metric for one in study.spec.requirements), *DEFAULT_OBJECTIVES, *headline, *study.names]
+    chosen = objective(study)
+    first = [] if chosen is None else [chosen.column]
+    found = dict.fromkeys([*first, *(study.names.index(name) for name in wanted if name in study.names)])
+    return tuple(found)[:MOST_SHOWN]
+
+
+@dataclass
+class Summary:
+    """Sums up rows as they pass by.
+
+    Attributes
+    ----------
+    study : Study
+        Whose rows they are.
+    shown : tuple of int
+        Columns whose values are kept for pictures.
+    counts : Counter
+        Points by status.
+    best, best_value, best_meets : int, float, bool
+        The best point so far, its metrics, and whether it meets every requirement.
+    """
+
+    study: Study
+    shown: tuple[int, ...] = ()
+    counts: Counter[Status] = field(default_factory=Counter)
+    met: NDArray[np.int64] = field(init=False)
+    all_met: int = 0
+    best: int | None = None
+    best_values: FloatArray | None = None
+    best_meets: bool = False
+    kept: list[tuple[NDArray[np.int64], FloatArray, NDArray[np.bool_]]] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        """Start at zero."""
+        self.met = np.zeros(len(self.study.spec.requirements), dtype=np.int64)
+        columns = len(self.study.metrics)
+        self._low, self._high = np.full(columns, np.inf), np.full(columns, -np.inf)
+        self._goal = objective(self.study)
+
+    def add(self, indices: NDArray[np.int64], rows: Rows) -> None:
+        """Take some rows."""
+        self.counts[Status.COMPLETE] += len(rows) - len(rows.odd)
+        self.counts.update(status for status, _ in rows.odd.values())
+        self.met += rows.met.sum(axis=0)
+        usable = np.ones(len(rows), dtype=bool)
+        usable[[k for k, (status, _) in rows.odd.items() if not status.usable]] = False
+        meets = usable & rows.met.all(axis=1)
+        self.all_met += int(meets.sum())
+        self._low = np.fmin(self._low, np.fmin.reduce(rows.values, axis=0, initial=np.inf))
+        self._high = np.fmax(self._high, np.fmax.reduce(rows.values, axis=0, initial=-np.inf))
+        self._look_for_the_best(indices, rows, meets)
+        if self.shown:
+            self.kept.append((indices, rows.values[:, list(self.shown)], meets))
+
+    def _look_for_the_best(self, indices: NDArray[np.int64], rows: Rows, meets: NDArray[np.bool_]) -> None:
+        if self._goal is None:
+            return
+        score = rows.values[:, self._goal.column] * (-1.0 if self._goal.largest else 1.0)
+        for group, meeting in ((meets, True), (~meets, False)):
+            inside = np.where(group, score, np.nan)
+            if np.isnan(inside).all() or (self.best_meets and not meeting):
+                continue
+            at = int(np.nanargmin(inside))
+            if self.best is None or meeting > self.best_meets or inside[at] < self._best_score():
+                self.best, self.best_meets = int(indices[at]), meeting
+                self.best_values = rows.values[at].copy()
+
+    def _best_score(self) -> float:
+        if self._goal is None or self.best_values is None:
+            return np.inf
+        return float(self.best_values[self._goal.column]) * (-1.0 if self._goal.largest else 1.0)
+
+    @property
+    def total(self) -> int:
+        """Number of rows seen."""
+        return sum(self.counts.values())
+
+    @property
+    def usable(self) -> int:
+        """Number of points that were solved, wholly or in part."""
+        return sum(count for status, count in self.counts.items() if status.usable)
+
+    def exit_code(self, bugs: int = 0) -> ExitCode:
+        """Return what the process is to say.
+
+        0 if every point is complete; 6 if some are not; with none that was solved 70 if all
+        of them hit a bug, 3 if all are invalid, else 4; 5 if all is well but the requirements,
+        which no point meets together.
+        """
+        if not self.usable:
+            if bugs and bugs == self.total:
+                return ExitCode.BUG
+            invalid = self.counts[Status.INVALID] == self.total
+            return ExitCode.INVALID if invalid else ExitCode.NO_SOLUTION
+        if self.counts[Status.COMPLETE] < self.total:
+            return ExitCode.PARTIAL
+        return ExitCode.REQUIREMENT_MISSED if len(self.met) and not self.all_met else ExitCode.OK
+
+    @property
+    def message(self) -> str:
+        """How many points ended how, in one line."""
+        ends = ", ".join(f"{count} {status.key.replace('_', ' ')}" for status, count in self._ordered() if count)
+        return f"{self.total} points: {ends}" if self.total else "no point was finished"
+
+    def _ordered(self) -> list[tuple[Status, int]]:
+        return [(status, self.counts[status]) for status in Status]
+
+    def as_json(self, records: Records) -> dict[str, Any]:
+        """Return what metrics.json says of a study: the metrics are those of the best point."""
+        counts = {"total": self.total, **{status.key: count for status, count in self._ordered() if count}}
+        best = self._best(records)
+        return {
+            "status": _status(self),
+            "message": self.message,
+            "points": counts,
+            "best": best,
+            "metrics": {} if best is None else self._metrics(),
+            "range": self._range(),
+            "requirements": self._requirements(),
+            "warnings": [],
+        }
+
+    def _best(self, records: Records) -> dict[str, Any] | None:
+        if self.best is None or self._goal is None:
+            return None
+        plan = records.work.plan
+        values = zip(plan.variables, plan.point(self.best), strict=True)
+        return {
+            "point": self.best + 1,
+            "values": {item.path: written(value, item.dimension) for item, value in values},
+            "by": self.study.names[self._goal.column],
+            "sense": "largest" if self._goal.largest else "smallest",
+            "requirements_met": self.best_meets if len(self.met) else None,
+        }
+
+    def _metrics(self) -> dict[str, Any]:
+        values = [] if self.best_values is None else self.best_values.tolist()
+        return {
+            one.name: {
+                "value": None if value != value else float(to_border(value, one.dimension)),
+                "unit": border_unit(one.dimension),
+                "definition": one.definition,
+            }
+            for one, value in zip(self.study.metrics, values, strict=False)
+        }
+
+    def _range(self) -> dict[str, Any]:
+        """Return the smallest and largest value of each metric over all points."""
+        found = {}
+        for k, one in enumerate(self.study.metrics):
+            low, high = float(self._low[k]), float(self._high[k])
+            if low <= high:
+                ends = {"min": float(to_border(low, one.dimension)), "max": float(to_border(high, one.dimension))}
+                found[one.name] = ends | {"unit": border_unit(one.dimension)}
+        return found
+
+    def _requirements(self) -> list[dict[str, Any]]:
+        listed = zip(self.study.spec.requirements, self.met.tolist(), strict=True)
+        return [
+            {"metric": one.metric, "min": one.min, "max": one.max, "met": count, "of": self.usable, "ok": count > 0}
+            for one, count in listed
+        ]
+
+
+def _status(summary: Summary) -> str:
+    if not summary.usable:
+        return "no_result"
+    return "complete" if summary.counts[Status.COMPLETE] == summary.total else "partial"

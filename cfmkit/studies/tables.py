@@ -1,0 +1,124 @@
+"""Rows of a study as tables: results.csv and curves.csv, written piece by piece in the order of the points."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.tables import Table, TableColumn, border_column, csv_chunks, read_csv
+from cfmkit.units import border_unit
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from numpy.typing import NDArray
+
+    from cfmkit.studies.engine import Records
+    from cfmkit.studies.plan import Plan, Variable
+    from cfmkit.studies.rows import Rows
+
+    Watch = Callable[[NDArray[np.int64], Rows], None]
+
+
+def results_csv(records: Records, watch: Watch | None = None) -> Iterator[bytes]:
+    """Yield results.csv: what varies, the metrics, whether the requirements are met, status, message.
+
+    Parameters
+    ----------
+    records : Records
+        Finished rows; others are left out.
+    watch : callable, optional
+        Is shown every piece, (indices, rows), on the way.
+    """
+    first = True
+    for indices, rows in records.batches():
+        if watch is not None:
+            watch(indices, rows)
+        yield from _pieces(results_table(records, indices, rows), first)
+        first = False
+    if first:
+        yield from _pieces(results_table(records, np.arange(0), records.work.gather()), first)
+
+
+def results_table(records: Records, indices: NDArray[np.int64], rows: Rows) -> Table:
+    """Return some rows as a table in border units."""
+    study = records.work.study
+    metrics = (border_column(one.label, rows.values[:, k], one.dimension) for k, one in enumerate(study.metrics))
+    met = [TableColumn("requirements_met", _met(rows))] if study.spec.requirements else []
+    told = [rows.status(k) for k in range(len(rows))] if rows.odd else None
+    status = tuple(one.key for one, _ in told) if told else ("complete",) * len(rows)
+    message = tuple(text or None for _, text in told) if told else (None,) * len(rows)
+    ends = TableColumn("status", status), TableColumn("message", message)
+    return Table((*varied(records.work.plan, indices), *metrics, *met, *ends))
+
+
+def varied(plan: Plan, indices: NDArray[np.int64]) -> Iterator[TableColumn]:
+    """Yield the columns of what varies, in border units."""
+    if not len(indices):
+        yield from (_column(item, ()) for item in plan.variables)
+        return
+    start, stop = int(indices[0]), int(indices[-1]) + 1
+    for item, shown in zip(plan.variables, plan.shown(start, stop), strict=True):
+        yield _column(item, shown if len(indices) == stop - start else shown[indices - start])
+
+
+def _column(item: Variable, shown: Any) -> TableColumn:
+    if item.dimension in ("text", "count"):
+        return TableColumn(item.path, shown)
+    return TableColumn(item.path, shown, border_unit(item.dimension))
+
+
+def _met(rows: Rows) -> tuple[str | None, ...]:
+    """Return ``true`` or ``false`` for each row; nothing where nothing was solved."""
+    words = np.where(rows.met.all(axis=1), "true", "false").tolist()
+    unsolved = {k for k, (status, _) in rows.odd.items() if not status.usable}
+    return tuple(None if k in unsolved else word for k, word in enumerate(words)) if unsolved else tuple(words)
+
+
+def _pieces(table: Table, first: bool) -> Iterator[bytes]:
+    """Yield the CSV of a table, its header only for the first one of a file."""
+    pieces = csv_chunks(table)
+    header = next(pieces)
+    if first:
+        yield header
+    yield from pieces
+
+
+def curves_csv(records: Records) -> Iterator[bytes]:
+    """Yield curves.csv: the curves of all points below each other, the varied values leading."""
+    headers = _headers(records)
+    first = True
+    for indices, rows in records.batches(1):
+        for k, text in rows.curves.items():
+            table = _with_values(records.work.plan, int(indices[k]), read_csv(text), headers)
+            yield from _pieces(table, first)
+            first = False
+    if first:
+        yield from _pieces(Table(tuple(varied(records.work.plan, np.arange(0)))), first)
+
+
+def _headers(records: Records) -> tuple[str, ...]:
+    """Return every header that occurs in a curve, in order."""
+    found: dict[str, None] = {}
+    seen: set[bytes] = set()
+    for _, rows in records.batches(1):
+        for text in rows.curves.values():
+            line = text[: text.index(b"\n") + 1]
+            if line not in seen:
+                seen.add(line)
+                found |= dict.fromkeys(read_csv(line).headers)
+    return tuple(found)
+
+
+def _with_values(plan: Plan, index: int, curve: Table, headers: tuple[str, ...]) -> Table:
+    """Return the curve of one point with the point's values in front and every column of the file."""
+    count = len(curve)
+    leading = (TableColumn(one.name, tuple(one.cells()) * count, one.unit) for one in varied(plan, np.array([index])))
+    own = {column.header: column for column in curve.columns}
+    return Table((*leading, *(own.get(header) or _empty(header, count) for header in headers)))
+
+
+def _empty(header: str, count: int) -> TableColumn:
+    name, bracket, unit = header.partition(" [")
+    return TableColumn(name, (None,) * count, unit.removesuffix("]") if bracket else None)

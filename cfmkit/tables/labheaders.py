@@ -1,0 +1,239 @@
+"""What the columns of a lab file are: names, units and roles. Units are read or told, never guessed.
+
+A unit stands in the header as ``Force [N]``, ``Kraft (N)``, ``s/mm`` or ``travel in mm``,
+in a line of its own below the names, or in ``--units``. A column's role follows from the
+dimension of its unit; where several columns qualify, from its name; where that does not
+decide either, the file is refused with the choices.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from difflib import get_close_matches
+from typing import TYPE_CHECKING
+
+from cfmkit.errors import DataError, QuantityError, UsageError
+from cfmkit.units.numbers import shown
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping, Sequence
+
+ROLES = {"time": "time", "length": "displacement", "angle": "angle", "force": "force", "torque": "torque"}
+"""What a column of a dimension can be."""
+
+_IN_HEADER = (
+    re.compile(r"(?P<name>.*?)\s*\[(?P<unit>[^\[\]]*)\]"),
+    re.compile(r"(?P<name>.*?)\s*\((?P<unit>[^()]*)\)"),
+    re.compile(r"(?P<name>.*\S)\s+in\s+(?P<unit>\S+)"),
+    re.compile(r"(?P<name>[^/]*[^/\s])\s*/\s*(?P<unit>\S+)"),
+)
+_SPELLINGS = {
+    "Nm": "N*m", "Nmm": "N*mm", "N m": "N*m", "N mm": "N*mm", "Ncm": "N*cm", "N cm": "N*cm", "°": "deg", "sec": "s",
+    "Sek": "s", "-": "1", "": "1", "mm/mm": "1", "degree": "deg", "degrees": "deg",
+}  # fmt: skip
+_WORDS = {
+    "time": ("time", "t", "zeit", "temps", "tiempo"),
+    "length": (
+        "displacement", "travel", "stroke", "position", "extension", "deflection", "crosshead", "s", "u", "x",
+        "weg", "traverse", "traversenweg", "hub", "deplacement", "desplazamiento",
+    ),
+    "angle": ("angle", "rotation", "phi", "theta", "winkel", "drehwinkel"),
+    "force": ("force", "load", "f", "kraft", "standardkraft", "load cell", "fuerza", "carga"),
+    "torque": ("torque", "moment", "m", "drehmoment", "par"),
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class ColumnInfo:
+    """One column of a lab file as its header describes it.
+
+    Attributes
+    ----------
+    index : int
+        Its place in the file, from 0.
+    name : str
+        As in the header, without the unit; ``column 1`` where there is none.
+    unit : str or None
+        As cfmkit spells it; None if nobody says.
+    dimension : str or None
+        Of the unit; None if that is of no use here.
+    told : bool
+        Whether ``--units`` names the column.
+    """
+
+    index: int
+    name: str
+    unit: str | None = None
+    dimension: str | None = None
+    told: bool = False
+
+    @property
+    def label(self) -> str:
+        """Name and unit for messages: ``'Kraft' [N]``."""
+        return f"{shown(self.name)} [{self.unit}]" if self.unit else f"{shown(self.name)} without a unit"
+
+
+def read_units(text: str | None) -> dict[str, str]:
+    """Return what ``--units`` says: ``"s=mm,F=N"`` by column.
+
+    Raises
+    ------
+    cfmkit.errors.UsageError
+        If it is malformed or names a unit that there is not.
+    """
+    found: dict[str, str] = {}
+    for part in (text or "").split(","):
+        name, equals, unit = (piece.strip() for piece in part.partition("="))
+        if not part.strip() and not (text or "").strip():
+            continue
+        if not equals or not name or not unit or name in found:
+            raise UsageError(f"--units: {shown(part)} is not 'column=unit'; write e.g. --units \"s=mm,F=N\"")
+        if _dimension(unit) is None:
+            raise UsageError(f"--units: {shown(unit)} is not a unit of a time, displacement, angle, force or torque")
+        found[name] = _spelt(unit)
+    return found
+
+
+def describe(names: Sequence[str], unit_row: Sequence[str], units: Mapping[str, str], file: str) -> list[ColumnInfo]:
+    """Return the columns that a header describes.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Cells of the line with the names; empty texts where there is none.
+    unit_row : sequence of str
+        Cells of the line with the units; empty texts where there is none.
+    units : mapping of str to str
+        What ``--units`` says, by name or by number from 1.
+    file : str
+        For messages.
+
+    Raises
+    ------
+    cfmkit.errors.DataError
+        If ``--units`` names a column that is not there, or contradicts the header.
+    """
+    pairs = zip(names, unit_row, strict=True)
+    found = [_described(index, name, unit) for index, (name, unit) in enumerate(pairs)]
+    left = dict(units)
+    chosen = [_told(column, left, file) for column in found]
+    if left:
+        there = ", ".join(shown(column.name) for column in found)
+        wrong = next(iter(left))
+        near = get_close_matches(wrong, [column.name for column in found], n=1)
+        hint = f"; did you mean {near[0]!r}?" if near else f"; there are {there}"
+        raise DataError(f"{file}: --units names a column {shown(wrong)} that is not there{hint}")
+    return chosen
+
+
+def _described(index: int, text: str, below: str) -> ColumnInfo:
+    name, unit = split_header(text)
+    unit = unit if unit is not None else _bare_unit(below)
+    name = " ".join(name.split()) or f"column {index + 1}"
+    if unit is None:
+        return ColumnInfo(index, name)
+    return ColumnInfo(index, name, _spelt(unit), _dimension(unit))
+
+
+def split_header(text: str) -> tuple[str, str | None]:
+    """Return name and unit of a header's cell; the unit is None where there is none.
+
+    Examples
+    --------
+    >>> split_header("Kraft (N)"), split_header("s/mm"), split_header("Force")
+    (('Kraft', 'N'), ('s', 'mm'), ('Force', None))
+    """
+    text = text.strip().strip('"').strip()
+    for number, pattern in enumerate(_IN_HEADER):
+        match = pattern.fullmatch(text)
+        # A word after "in" or a slash is a unit only if there is such a unit.
+        if match and (number < 2 or _size(match["unit"]) is not None):
+            return match["name"], match["unit"].strip()
+    return text, None
+
+
+def is_unit_row(cells: Iterable[str]) -> bool:
+    """Return whether a line holds nothing but units, bare or in brackets, and at least one of them."""
+    units = [_bare_unit(cell) for cell in cells]
+    bare = [cell.strip(' "') for cell in cells]
+    known = [unit is not None and _size(unit) is not None for unit in units]
+    return any(known) and all(good or not cell or _bracketed(cell) for good, cell in zip(known, bare, strict=True))
+
+
+def _bracketed(cell: str) -> bool:
+    return cell[:1] + cell[-1:] in ("[]", "()")
+
+
+def _bare_unit(cell: str) -> str | None:
+    cell = cell.strip(' "')
+    return (cell[1:-1].strip() if _bracketed(cell) else cell) or None
+
+
+def _told(column: ColumnInfo, left: dict[str, str], file: str) -> ColumnInfo:
+    """Return a column with what ``--units`` says of it; taken from `left`."""
+    for key in (column.name, str(column.index + 1)):
+        if key in left:
+            unit = left.pop(key)
+            if column.unit is not None and column.unit != unit:
+                raise DataError(
+                    f"{file}: the header gives {shown(column.name)} in {column.unit}, --units in {unit}; "
+                    "correct the one that is wrong"
+                )
+            return ColumnInfo(column.index, column.name, unit, _dimension(unit), told=True)
+    return column
+
+
+def _spelt(unit: str) -> str:
+    """Return a unit as cfmkit spells it."""
+    unit = unit.strip().replace("·", "*").replace("⋅", "*").replace("µ", "u").replace("μ", "u").replace("²", "^2")
+    return _SPELLINGS.get(unit, unit)
+
+
+def _size(unit: str) -> bool | None:
+    """Return True for a unit that there is, None otherwise."""
+    from cfmkit.units.registry import is_unit
+
+    spelt = _spelt(unit)
+    return True if spelt == "1" or is_unit(spelt) else None
+
+
+def _dimension(unit: str) -> str | None:
+    """Return which of the dimensions of interest a unit has."""
+    from cfmkit.units.registry import border_size, is_unit, unit_size
+    from cfmkit.units.table import COMMON
+
+    spelt = _spelt(unit)
+    common = next((name for name in ROLES if (name, spelt) in COMMON), None)
+    if common or not is_unit(spelt):
+        return common
+    try:
+        powers = unit_size(spelt).powers
+    except QuantityError:
+        return None
+    return next((name for name in ROLES if border_size(name).powers == powers), None)
+
+
+def column_of(columns: Sequence[ColumnInfo], dimension: str, file: str) -> ColumnInfo | None:
+    """Return the column of a dimension, None if there is none.
+
+    Raises
+    ------
+    cfmkit.errors.DataError
+        If several qualify; the message names them.
+    """
+    found = [column for column in columns if column.dimension == dimension]
+    found = [column for column in found if column.told] or found
+    named = [column for column in found if _words(column.name) in _WORDS[dimension]]
+    chosen = found if len(found) < 2 else named
+    if len(chosen) == 1 or not found:
+        return chosen[0] if chosen else None
+    options = " or ".join(f'--units "{column.name}={column.unit}"' for column in found)
+    raise DataError(
+        f"{file}: {len(found)} columns could be the {ROLES[dimension]}: "
+        f"{', '.join(column.label for column in found)}; choose with {options}"
+    )
+
+
+def _words(name: str) -> str:
+    return re.sub(r"[\W_\d]+", " ", name).strip().lower()

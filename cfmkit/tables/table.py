@@ -1,0 +1,147 @@
+"""A tidy table as a value: columns in order, read-only, each with a name and perhaps a unit."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from numbers import Integral, Real
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cfmkit.curves import read_only
+from cfmkit.errors import CfmError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+Cell = float | int | str | None
+Values = NDArray[Any] | tuple[Cell, ...]
+
+HEADER = re.compile(r"(?P<name>[^\[\] ](?:[^\[\]]*[^\[\] ])?)(?: \[(?P<unit>[^\[\]\s]+)\])?")
+_INT64 = range(-(2**63), 2**63)
+
+
+@dataclass(frozen=True, eq=False)
+class TableColumn:
+    """One column: its name, its values, and its unit if it has one.
+
+    Parameters
+    ----------
+    name : str
+        Without brackets, e.g. ``force``.
+    values : sequence
+        Floats, integers, texts and None; truth values become ``true`` and ``false``.
+        Kept as a read-only array if all are floats (None is NaN there) or all are
+        integers, else as a tuple.
+    unit : str, optional
+        Unit of the border, ``"1"`` for a ratio; None for names, states and counts.
+        A column with a unit holds no texts.
+    """
+
+    name: str
+    values: Values
+    unit: str | None = None
+
+    def __post_init__(self) -> None:
+        """Freeze the values and check them and the name."""
+        match = HEADER.fullmatch(self.header)
+        if not match or match["name"] != self.name or match["unit"] != self.unit:
+            raise CfmError(f"{self.header!r} cannot head a column: it takes a name, and a unit in brackets")
+        object.__setattr__(self, "values", _frozen(self.values, numeric=self.unit is not None))
+        if self.unit is not None and isinstance(self.values, tuple):
+            for cell in self.values:
+                if isinstance(cell, str):
+                    raise CfmError(f"{cell!r} is no number: column {self.header!r} has a unit")
+
+    @property
+    def header(self) -> str:
+        """The column's header: ``force [N]``."""
+        return self.name if self.unit is None else f"{self.name} [{self.unit}]"
+
+    def cells(self) -> list[Cell]:
+        """Return the values as Python objects, None where one is missing."""
+        if isinstance(self.values, tuple):
+            return list(self.values)
+        items: list[Cell] = self.values.tolist()
+        if self.values.dtype.kind == "f":
+            for index in np.flatnonzero(np.isnan(self.values)):
+                items[index] = None
+        return items
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """Columns of one length, in order, with different headers."""
+
+    columns: tuple[TableColumn, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Freeze the columns and check that they belong together."""
+        object.__setattr__(self, "columns", tuple(self.columns))
+        headers = self.headers
+        if twice := sorted({name for name in headers if headers.count(name) > 1}):
+            raise CfmError(f"the columns of a table need different headers, but there are two of {', '.join(twice)}")
+        if len({len(column.values) for column in self.columns}) > 1:
+            lengths = ", ".join(f"{column.header}: {len(column.values)}" for column in self.columns)
+            raise CfmError(f"the columns of a table need one length ({lengths})")
+
+    def __len__(self) -> int:
+        """Return the number of rows."""
+        return len(self.columns[0].values) if self.columns else 0
+
+    def __getitem__(self, name: str) -> Values:
+        """Return the values of a column, by name (``force``) or header (``force [N]``)."""
+        for column in self.columns:
+            if name in (column.header, column.name):
+                return column.values
+        raise KeyError(f"there is no column {name!r}; there are {', '.join(self.headers)}")
+
+    @property
+    def headers(self) -> tuple[str, ...]:
+        """The headers, in order."""
+        return tuple(column.header for column in self.columns)
+
+    def as_dict(self) -> dict[str, list[Cell]]:
+        """Return header -> values as plain Python lists, None where a value is missing."""
+        return {column.header: column.cells() for column in self.columns}
+
+
+def _frozen(values: Iterable[Any], *, numeric: bool) -> Values:
+    """Return `values` as a read-only array of floats or of integers, or else as a tuple."""
+    if isinstance(values, np.ndarray):
+        if values.ndim != 1:
+            raise CfmError(f"a column is a sequence of values, not an array of shape {values.shape}")
+        if values.dtype.kind in "fi":
+            return _array(values)
+        values = values.tolist()
+    cells = tuple(map(_cell, values))
+    kinds = set(map(type, cells))
+    if kinds in ({float}, {float, type(None)}) or (numeric and kinds <= {type(None)}):
+        return _array(np.array([math.nan if cell is None else cell for cell in cells], dtype=np.float64))
+    if kinds == {int} and all(cell in _INT64 for cell in cells):
+        return read_only(cells, np.int64)
+    return cells
+
+
+def _array(values: NDArray[Any]) -> NDArray[Any]:
+    if values.dtype.kind == "i":
+        return read_only(values, np.int64)
+    # Adding zero turns -0.0 into 0.0.
+    return read_only(values + 0.0)
+
+
+def _cell(value: Any) -> Cell:
+    """Return one value as a float, an int or a text; None if it is missing."""
+    if value is None or isinstance(value, str):
+        return str(value) if value else None
+    if isinstance(value, bool | np.bool_):
+        return "true" if value else "false"
+    if isinstance(value, Integral):
+        return int(value)
+    if isinstance(value, Real):
+        number = float(value) + 0.0
+        return None if math.isnan(number) else number
+    raise CfmError(f"a table holds numbers, texts and None, not {type(value).__name__}")

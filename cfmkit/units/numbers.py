@@ -1,0 +1,147 @@
+"""A strict reader for decimal numbers: what YAML 1.2 calls a number, and nothing else.
+
+Python's ``float()`` is too kind for a specification: it takes ``1_000``, ``nan``,
+Arabic digits and spaces. Here every text that is not plainly one finite decimal
+number is refused, with what is wrong and what to write instead.
+"""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from typing import TYPE_CHECKING
+
+from cfmkit.errors import QuantityError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+LONGEST = 40
+
+NUMBER = re.compile(r"[-+]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
+"""Sign, digits, dot, exponent; leading zeros are refused separately, with a hint."""
+
+_LEADING_ZERO = re.compile(r"([-+]?)0+([0-9].*)")
+_MINUS_SIGNS = "\u2010\u2011\u2012\u2013\u2014\u2212\ufe63\uff0d"
+_SHOWN = 50
+
+
+def shown(text: str) -> str:
+    """Return `text` quoted for a message: on one line, escaped where it cannot be seen, cut where it is long."""
+    cut = text if len(text) <= _SHOWN else text[: _SHOWN - 3] + "..."
+    return "'" + "".join(char if char == " " or char.isprintable() else _escape(char) for char in cut) + "'"
+
+
+def _escape(char: str) -> str:
+    return f"\\x{ord(char):02x}" if ord(char) < 256 else f"\\u{ord(char):04x}"
+
+
+def odd_character(text: str) -> tuple[int, str] | None:
+    """Return (index, what it is and what to use) of the first character that no specification may hold.
+
+    Those are tabs, control characters, line separators, spaces other than the ordinary
+    one, and invisible formatting characters. Line feeds and carriage returns are fine.
+    """
+    if text.isascii() and text.isprintable():
+        return None
+    for index, char in enumerate(text):
+        if complaint := _oddity(char):
+            return index, complaint
+    return None
+
+
+def _oddity(char: str) -> str | None:
+    if " " <= char <= "~" or char in "\n\r\u200c\u200d":
+        return None
+    code = f"U+{ord(char):04X}"
+    if char == "\t":
+        return "a tab; use spaces"
+    category = unicodedata.category(char)
+    if category == "Zs":
+        return f"a {unicodedata.name(char).lower()} ({code}); use an ordinary space"
+    if category in ("Cc", "Cf", "Zl", "Zp", "Cs"):
+        return f"an invisible character ({code}, {unicodedata.name(char, 'control character').lower()}); remove it"
+    return None
+
+
+def read_number(text: str) -> float:
+    """Return the number that `text` is.
+
+    Parameters
+    ----------
+    text : str
+        An optional sign, decimal digits with an optional dot, an optional exponent.
+
+    Raises
+    ------
+    cfmkit.errors.QuantityError
+        If the text is anything else, or its value overflows or underflows.
+
+    Examples
+    --------
+    >>> read_number("1e-3")
+    0.001
+    """
+    if len(text) > LONGEST:
+        raise QuantityError(f"{shown(text)} is too long for a number: at most {LONGEST} characters")
+    if not NUMBER.fullmatch(text):
+        raise QuantityError(_complaint(text))
+    if zeros := _LEADING_ZERO.fullmatch(text):
+        raise QuantityError(f"{shown(text)} has a leading zero; write {zeros[1]}{zeros[2]}")
+    return _finite(text)
+
+
+def _finite(text: str) -> float:
+    value = float(text)
+    if value in (float("inf"), float("-inf")):
+        raise QuantityError(f"{shown(text)} is too large: at most 1.8e308")
+    if value == 0 and re.search("[1-9]", re.split("[eE]", text)[0]):
+        raise QuantityError(f"{shown(text)} is too small to be told from zero; write 0 if zero is meant")
+    return value
+
+
+def _complaint(text: str) -> str:
+    if not text:
+        return "there is no number"
+    return number_complaint(text) or f"{shown(text)} is not a number; write e.g. 12, -0.5 or 1e-3"
+
+
+def number_complaint(text: str, only_traps: bool = False) -> str | None:
+    """Return what is wrong with something that was meant as a number, None if it does not look like one.
+
+    With `only_traps` text that may well be meant as text, such as a date, is left alone.
+    """
+    if odd := odd_character(text):
+        return f"{shown(text)} holds {odd[1]}"
+    for trap, pattern, explain in _REASONS:
+        if (trap or not only_traps) and pattern.fullmatch(text):
+            return f"{shown(text)} {explain(text)}"
+    return None
+
+
+def _fixed(sentence: str) -> Callable[[str], str]:
+    return lambda _text: sentence
+
+
+_PATTERNS: tuple[tuple[bool, str, Callable[[str], str]], ...] = (
+    (True, rf"[{_MINUS_SIGNS}][0-9.].*", lambda text: f"has a unicode minus (U+{ord(text[0]):04X}); write -{text[1:]}"),
+    (False, rf".*[0-9eE][{_MINUS_SIGNS}][0-9].*", _fixed("has a unicode minus or dash; write the ASCII '-'")),
+    (True, "[-+]?[1-9][0-9]{0,2}(,[0-9]{3})+", _fixed("has a comma; write decimals with a dot, thousands plainly")),
+    (True, "[-+]?[0-9]*,[0-9]+([eE][-+]?[0-9]+)?", lambda text: f"has a decimal comma; write {text.replace(',', '.')}"),
+    (True, "[-+]?[0-9.]+,[0-9.,]*", _fixed("has a comma; write digits with one dot, e.g. 1234.5")),
+    (True, "[-+]?[0-9]+(:[0-9.]+)+", _fixed("has a colon (old YAML reads it in base 60); write one decimal number")),
+    (True, "[-+]?0[xX][0-9a-fA-F_]+", _fixed("is hexadecimal; write it in decimal")),
+    (True, "[-+]?0[oO][0-7_]+", _fixed("is octal; write it in decimal")),
+    (True, "[-+]?0[bB][01_]+", _fixed("is binary; write it in decimal")),
+    (True, "[-+]?[0-9][0-9.]*_[0-9._]*", lambda text: f"has an underscore; write {text.replace('_', '')}"),
+    (True, "(?i)[-+]?\\.?(nan|inf(inity)?)", _fixed("is not a finite number")),
+    (False, "[-+]?[0-9.]+( [0-9.]+)+", lambda text: f"has a space in it; write {text.replace(' ', '')}"),
+    (False, "[-+]?[0-9.][0-9.eE]*[-+*/^(]+[-+*/^() ]*[0-9].*", _fixed("is arithmetic; write its value")),
+    (False, r"[-+]?[0-9.]*(?![0-9])\d.*", _fixed("has digits that are not 0-9; write ASCII digits")),
+    (False, r"[-+]?[0-9]*(\.[0-9]*){2,}", _fixed("has more than one dot; write e.g. 1234.5")),
+)
+_REASONS = tuple((trap, re.compile(pattern), explain) for trap, pattern, explain in _PATTERNS)
+"""What people write instead of a number, in the order in which the explanations should be tried.
+
+True marks the traps: nobody means them as text, and other YAML readers take them for a number.
+"""

@@ -1,0 +1,191 @@
+"""The closed tables: which dimensions there are, in which unit they cross the border, and which units exist.
+
+Everything here is plain data and arithmetic on it: no import of pint, numpy or
+pydantic, so that whoever only prints millimetres pays for nothing.
+An angle is a dimension: N*mm (a torque) and N*mm/rad (a stiffness) differ.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from fractions import Fraction
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+
+@dataclass(frozen=True)
+class Dimension:
+    """A kind of quantity and how it looks at the border.
+
+    A value in the border unit is ``si * up / down``: two numbers, because a
+    division by 1000 is exact where a multiplication by 0.001 is not.
+    """
+
+    name: str
+    unit: str
+    description: str
+    example: str
+    up: float = 1.0
+    down: float = 1.0
+
+    @property
+    def phrase(self) -> str:
+        """The name with its article: ``a length``, ``an angle``."""
+        words = self.name.replace("_", " ")
+        return f"{'an' if words[0] in 'aeiou' else 'a'} {words}"
+
+
+_DEGREES = 180 / math.pi
+
+_DIMENSIONS = (
+    Dimension("length", "mm", "length, displacement, elongation", "200 mm", up=1e3),
+    Dimension("angle", "deg", "plane angle, rotation", "30 deg", up=_DEGREES),
+    Dimension("ratio", "1", "ratio, fraction, coefficient", "5 %"),
+    Dimension("force", "N", "force", "50 N"),
+    Dimension("torque", "N*mm", "moment of a force", "1200 N*mm", up=1e3),
+    Dimension("energy", "N*mm", "energy, work, area of a force-displacement loop", "310 N*mm", up=1e3),
+    Dimension("stiffness", "N/mm", "force per length of stretch", "0.69 N/mm", down=1e3),
+    Dimension("rotational_stiffness", "N*mm/rad", "torque per angle", "500 N*mm/rad", up=1e3),
+    Dimension("stress", "MPa", "stress, pressure, elastic modulus", "2100 MPa", down=1e6),
+    Dimension("mass", "kg", "mass", "0.25 kg"),
+    Dimension("inertia", "kg*mm^2", "mass moment of inertia", "12 kg*mm^2", up=1e6),
+    Dimension("density", "kg/m^3", "mass per volume", "1240 kg/m^3"),
+    Dimension("time", "s", "time, duration", "0.5 s"),
+    Dimension("velocity", "mm/s", "speed", "10 mm/s", up=1e3),
+    Dimension("acceleration", "m/s^2", "acceleration", "9.81 m/s^2"),
+    Dimension("frequency", "Hz", "cycles per time", "2 Hz"),
+    Dimension("line_load", "N/mm", "force per length of a line", "0.3 N/mm", down=1e3),
+    Dimension("area", "mm^2", "area", "12 mm^2", up=1e6),
+    Dimension("volume", "mm^3", "volume", "500 mm^3", up=1e9),
+    Dimension("second_moment", "mm^4", "second moment of an area", "2.5 mm^4", up=1e12),
+    Dimension("curvature", "1/mm", "inverse of a radius", "0.05 1/mm", down=1e3),
+    Dimension("flexural_rigidity", "N*mm^2", "bending stiffness EI of a section", "800 N*mm^2", up=1e6),
+    Dimension("angular_velocity", "deg/s", "angle per time", "90 deg/s", up=_DEGREES),
+    Dimension("angular_acceleration", "deg/s^2", "angular velocity per time", "90 deg/s^2", up=_DEGREES),
+    Dimension("damping", "N*s/mm", "force per velocity", "0.01 N*s/mm", down=1e3),
+    Dimension("rotational_damping", "N*mm*s/rad", "torque per angular velocity", "2 N*mm*s/rad", up=1e3),
+    Dimension("count", "1", "a number of things", "2"),
+    Dimension("text", "", "a word, not a number", "load"),
+)
+
+DIMENSIONS: Mapping[str, Dimension] = MappingProxyType({item.name: item for item in _DIMENSIONS})
+"""Every dimension by name."""
+
+_PI = "3.14159265358979323846264338327950288419716939937510582097494459230781640629"
+
+
+def _exact(item: Dimension) -> Fraction:
+    """Return the SI size of a border unit; that of a degree to the digits of pi above."""
+    up = Fraction(180) / Fraction(_PI) if item.up == _DEGREES else Fraction(item.up)
+    return Fraction(item.down) / up
+
+
+COMMON: Mapping[tuple[str, str], Fraction] = MappingProxyType(
+    {(item.name, item.unit): _exact(item) for item in _DIMENSIONS if item.unit} | {("ratio", "%"): Fraction(1, 100)}
+)
+"""Exact SI size of what nearly every file says, by (dimension, unit): these need no look into pint's registry."""
+
+UNITLESS = ("ratio", "count")
+"""Dimensions whose numbers need no unit."""
+
+
+@dataclass(frozen=True)
+class Unit:
+    """One unit symbol of the closed list.
+
+    `definition` is its size in terms of other units, as pint reads it.
+    """
+
+    symbol: str
+    name: str
+    definition: str
+    dimension: str
+    input_only: bool = False
+    aliases: tuple[str, ...] = ()
+
+
+UNITS = (
+    Unit("m", "meter", "[length]", "length"),
+    Unit("cm", "centimeter", "0.01 * meter", "length"),
+    Unit("mm", "millimeter", "0.001 * meter", "length"),
+    Unit("um", "micrometer", "0.000001 * meter", "length"),
+    Unit("in", "inch", "0.0254 * meter", "length", input_only=True, aliases=("inch",)),
+    Unit("ft", "foot", "0.3048 * meter", "length", input_only=True),
+    Unit("rad", "radian", "[angle]", "angle"),
+    Unit("mrad", "milliradian", "0.001 * radian", "angle"),
+    Unit("deg", "degree", f"{_PI} / 180 * radian", "angle"),
+    Unit("rev", "revolution", "360 * degree", "angle"),
+    Unit("%", "percent", "0.01", "ratio", aliases=("percent",)),
+    Unit("kg", "kilogram", "[mass]", "mass"),
+    Unit("g", "gram", "0.001 * kilogram", "mass"),
+    Unit("mg", "milligram", "0.000001 * kilogram", "mass"),
+    Unit("lb", "pound", "0.45359237 * kilogram", "mass", input_only=True),
+    Unit("s", "second", "[time]", "time"),
+    Unit("ms", "millisecond", "0.001 * second", "time"),
+    Unit("min", "minute", "60 * second", "time"),
+    Unit("h", "hour", "3600 * second", "time"),
+    Unit("Hz", "hertz", "1 / second", "frequency"),
+    Unit("kHz", "kilohertz", "1000 / second", "frequency"),
+    Unit("rpm", "revolution_per_minute", "revolution / minute", "angular_velocity"),
+    Unit("N", "newton", "kilogram * meter / second ** 2", "force"),
+    Unit("mN", "millinewton", "0.001 * newton", "force"),
+    Unit("kN", "kilonewton", "1000 * newton", "force"),
+    Unit("lbf", "pound_force", "4.4482216152605 * newton", "force", input_only=True),
+    Unit("J", "joule", "newton * meter", "energy"),
+    Unit("mJ", "millijoule", "0.001 * joule", "energy"),
+    Unit("Pa", "pascal", "newton / meter ** 2", "stress"),
+    Unit("kPa", "kilopascal", "1000 * pascal", "stress"),
+    Unit("MPa", "megapascal", "1000000 * pascal", "stress"),
+    Unit("GPa", "gigapascal", "1000000000 * pascal", "stress"),
+    Unit("psi", "pound_per_square_inch", "pound_force / inch ** 2", "stress", input_only=True),
+    Unit("ksi", "kilopound_per_square_inch", "1000 * pound_per_square_inch", "stress", input_only=True),
+)
+"""The whole list; there are no prefixes beyond what it spells out."""
+
+SYMBOLS: Mapping[str, Unit] = MappingProxyType({word: unit for unit in UNITS for word in (unit.symbol, *unit.aliases)})
+"""Every accepted spelling of a unit, case-sensitive."""
+
+
+def dimension_of(name: str) -> Dimension:
+    """Return the dimension called `name`.
+
+    Raises
+    ------
+    KeyError
+        If there is none; the message lists them.
+    """
+    try:
+        return DIMENSIONS[name]
+    except KeyError:
+        raise KeyError(f"there is no dimension {name!r}; there are {', '.join(DIMENSIONS)}") from None
+
+
+def border_unit(dimension: str) -> str:
+    """Return the unit in which a dimension is written to files and screens: ``"mm"``."""
+    return dimension_of(dimension).unit
+
+
+def border_factor(dimension: str) -> float:
+    """Return how many border units one SI unit is: 1000.0 for a length.
+
+    To convert, prefer `to_border`, which is exact to the last digit also where
+    this factor is not (0.001 for N/m to N/mm).
+    """
+    item = dimension_of(dimension)
+    return item.up / item.down
+
+
+def to_border(values: Any, dimension: str) -> Any:
+    """Return SI values (a number or an array) in the border unit of `dimension`."""
+    item = dimension_of(dimension)
+    return values * item.up if item.down == 1.0 else values / item.down
+
+
+def from_border(values: Any, dimension: str) -> Any:
+    """Return values in the border unit of `dimension` as SI."""
+    item = dimension_of(dimension)
+    return values / item.up if item.down == 1.0 else values * item.down

@@ -1,0 +1,199 @@
+"""``cfmkit batch`` end to end: files, exit codes, JUnit, processes."""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+import shlex
+import signal
+import time
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+import yaml
+
+CONFIGS = Path(__file__).parents[2] / "configs"
+CAM = (CONFIGS / "cam_gravity.yaml").read_text()
+
+SPECS = {
+    "good": CAM,
+    "missed": CAM.replace("max: 3 %", "max: 0.1 %"),
+    "invalid": CAM.replace("brace_length: 200 mm", "brace_length: 200"),
+    "nothing": CAM.replace("brace_length: 200 mm", "brace_length: 60 mm").split("design:")[0],
+    "partial": CAM.replace("analysis:", "analysis:\n  travel: 400 mm").replace("design:", "sweep: null\ndesign:"),
+}
+
+
+def write(cli, *names: str, folder: str = "specs") -> None:
+    (cli.folder / folder).mkdir(exist_ok=True)
+    for name in names:
+        (cli.folder / folder / f"{name}.yaml").write_text(SPECS[name])
+
+
+def rows(cli, folder: str = "out") -> list[dict[str, str]]:
+    with open(cli.folder / folder / "results.csv", newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def batch(cli, *arguments: str, quick: bool = True):
+    return cli("batch", *arguments, "-o", "out", *(("--no-plots", "-j", "1") if quick else ()))
+
+
+def test_the_configurations_of_the_package_pass_as_a_batch(cli):
+    done = cli("batch", str(CONFIGS), "-o", "out", "--no-plots", "--junit", "reports/cfmkit.xml")
+    assert done.code == 0, done.out + done.err
+    found = rows(cli)
+    assert len(found) == len([*CONFIGS.rglob("*.yaml")])
+    assert {row["status"] for row in found} == {"complete"}
+    assert all(int(row["requirements"]) > 0 and row["missed"] == "0" for row in found)
+    root = ElementTree.parse(cli.folder / "reports" / "cfmkit.xml").getroot()
+    assert root.get("failures") == root.get("errors") == root.get("skipped") == "0"
+    for row in found:
+        assert (cli.folder / "out" / row["folder"] / "manifest.json").exists()
+        assert (cli.folder / "out" / row["folder"] / "design.yaml").exists() == (row["verb"] == "design")
+
+
+@pytest.mark.parametrize(
+    ("names", "code"),
+    [
+        (("good",), 0),
+        (("good", "missed"), 5),
+        (("missed", "partial"), 6),
+        (("missed", "partial", "nothing"), 4),
+        (("missed", "partial", "nothing", "invalid"), 3),
+    ],
+)
+def test_the_exit_code_is_the_first_of_the_contract_that_occurs(cli, names, code):
+    write(cli, *names)
+    done = batch(cli, "specs/*.yaml", "--verb", "analyze")
+    assert done.code == code, done.out + done.err
+    assert sorted(row["folder"] for row in rows(cli)) == sorted(names)
+
+
+def test_a_folder_that_cannot_be_written_counts_before_what_is_invalid(cli):
+    write(cli, "good", "invalid")
+    (cli.folder / "out").mkdir()
+    (cli.folder / "out" / "good").write_text("in the way")
+    done = batch(cli, "specs")
+    assert done.code == 7
+    assert {row["folder"]: row["status"] for row in rows(cli)} == {"good": "io", "invalid": "invalid"}
+
+
+def test_faults_are_told_with_file_line_and_column(cli):
+    write(cli, "good", "invalid")
+    done = batch(cli, "specs")
+    assert done.err.startswith("specs/invalid.yaml:7:17: mechanism.brace_length: ")
+    assert "INVALID" in done.out
+
+
+def test_one_json_document_says_everything(cli):
+    write(cli, "good", "missed")
+    done = batch(cli, "specs", "--json")
+    told = done.document
+    assert (told["exit_code"], told["message"]) == (5, "2 specs: 1 ok, 1 missed")
+    assert [one["verb"] for one in told["specs"]] == ["design", "design"]
+    assert [one["ok"] for one in told["requirements"]] == [True, False]
+    assert told["requirements"][1]["spec"] == "specs/missed.yaml"
+    assert json.loads((cli.folder / "out" / "metrics.json").read_text())["specs"] == told["specs"]
+
+
+def test_each_specification_gives_what_a_run_of_its_own_gives(cli):
+    write(cli, "good")
+    batch(cli, "specs")
+    assert cli("design", "specs/good.yaml", "-o", "alone", "--no-plots").code == 0
+    for name in ("metrics.json", "curve.csv", "design.yaml", "resolved.yaml", "geometry/cam.dxf"):
+        assert (cli.folder / "alone" / name).read_bytes() == (cli.folder / "out" / "good" / name).read_bytes(), name
+
+
+def test_several_processes_give_the_same_bytes_in_the_same_order(cli):
+    write(cli, "good", "missed", "invalid")
+    tables = []
+    for jobs in ("1", "3"):
+        assert cli("batch", "specs", "-o", "out", "--no-plots", "-j", jobs).code == 3
+        tables.append([(cli.folder / "out" / name).read_bytes() for name in ("results.csv", "metrics.json")])
+    assert tables[0] == tables[1]
+
+
+def test_after_a_failure_fail_fast_starts_nothing_more(cli):
+    write(cli, "good", "missed")
+    write(cli, "invalid", folder="first")
+    done = batch(cli, "first", "specs", "--fail-fast", "--junit", "junit.xml")
+    assert done.code == 3
+    assert [row["status"] for row in rows(cli)] == ["invalid", "skipped", "skipped"]
+    root = ElementTree.parse(cli.folder / "junit.xml").getroot()
+    assert (root.get("errors"), root.get("skipped")) == ("1", "2")
+    assert not (cli.folder / "out" / "good").exists()
+
+
+def test_equal_stems_write_to_folders_of_their_own(cli):
+    write(cli, "good", folder="a")
+    write(cli, "good", folder="b")
+    assert batch(cli, "a/good.yaml", "b/good.yaml").code == 0
+    assert [row["folder"] for row in rows(cli)] == ["a-good", "b-good"]
+
+
+def test_options_hold_for_every_specification(cli):
+    write(cli, "good")
+    assert batch(cli, "specs", "--verb", "analyze", "--set", "requirements.0.max=0.1 %").code == 5
+    assert rows(cli)[0]["verb"] == "analyze"
+    assert batch(cli, "specs", "--set", "mechanism.rollers=2").code == 3
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "words"),
+    [
+        ((), 2, "SPEC"),
+        (("nothing*.yaml",), 2, "no file matches"),
+        (("nothing.yaml",), 2, "no such file"),
+        (("-",), 2, "a batch reads files"),
+        (("specs", "--timeout-per-point", "0"), 2, "must be > 0"),
+        (("specs", "--junit", "specs"), 7, "is a folder"),
+        (("specs", "--junit", "specs/good.yaml/x.xml"), 7, "cannot write"),
+        (("specs", "--junit", ""), 2, "name a file"),
+        (("specs", "-o", ""), 2, "--out is empty"),
+    ],
+)
+def test_what_cannot_be_done_is_refused_before_anything_is_computed(cli, arguments, code, words):
+    write(cli, "good")
+    done = cli("batch", *arguments, "--no-plots")
+    assert done.code == code, done.err
+    assert words in done.err
+    assert not (cli.folder / "cfm-out").exists()
+
+
+def test_a_run_that_takes_too_long_is_given_up(cli):
+    write(cli, "good")
+    done = batch(cli, "specs", "--timeout-per-point", "0.001")
+    assert done.code == 4
+    assert rows(cli)[0]["status"] == "timeout"
+
+
+def test_ctrl_c_writes_what_there_is_and_exits_130(cli):
+    write(cli, "good")
+    for name in range(40):
+        (cli.folder / "specs" / f"n{name:02}.yaml").write_text(CAM)
+    process = cli.start("batch", "specs", "-o", "out", "-j", "1", "-q")
+    deadline = time.monotonic() + 60
+    while not (cli.folder / "out" / "good" / "manifest.json").exists():
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+    process.send_signal(signal.SIGINT)
+    assert process.wait(60) == 130
+    ends = [row["status"] for row in rows(cli)]
+    assert ends[0] == "complete"
+    assert ends[-1] == "skipped"
+    process.communicate()
+
+
+def test_the_workflows_to_copy_are_yaml_and_their_command_works(cli):
+    text = (CONFIGS.parent / "docs" / "ci.md").read_text()
+    github, gitlab = (yaml.safe_load(block) for block in re.findall("^```yaml\n(.*?)^```", text, re.M | re.S))
+    steps = [step["run"] for step in github["jobs"]["requirements"]["steps"] if "run" in step]
+    commands = [line for line in (*steps, *gitlab["mechanisms"]["script"]) if line.startswith("cfmkit")]
+    assert len(commands) == 2
+    write(cli, "good", folder="mechanisms")
+    for command in commands:
+        assert cli(*shlex.split(command)[1:], "--no-plots", "-j", "1").code == 0
+        assert (cli.folder / "results" / "junit.xml").exists()

@@ -1,0 +1,99 @@
+"""`analyze --data` and `calibrate` as a user runs them."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+import cfmkit
+from cfmkit.experiment.calibration import resolved
+
+FIT = ("--fit", "mechanism.rolling_friction,mechanism.rest_half_width")
+
+
+@pytest.fixture
+def rig(cli, cam):
+    """A recording that the model made with mu = 0.00225 and 0.5 mm more rest length, and 0.1 N of normal noise."""
+    spec = resolved(cfmkit.load(cli.folder / cam))
+    spec = spec.replace({"mechanism.rolling_friction": 0.00225, "mechanism.rest_half_width": 0.06825})
+    curve = cfmkit.analyze(spec).curve
+    good = np.isfinite(curve.force)
+    force = curve.force[good] + np.random.default_rng(0).normal(0, 0.1, good.sum())
+    lines = [f"{s * 1e3:.4f};{f:.4f}" for s, f in zip(curve.motion[good], force, strict=True)]
+    (cli.folder / "rig.csv").write_text("s [mm];F [N]\n" + "\n".join(lines) + "\n")
+    return "rig.csv"
+
+
+def metrics(cli, folder):
+    return json.loads((cli.folder / folder / "metrics.json").read_text())
+
+
+def test_analyze_with_data_adds_errors_a_figure_and_the_measured_curve(cli, cam, rig):
+    done = cli("analyze", cam, "--data", rig, "-o", "out")
+    assert (done.code, done.err) == (0, "")
+    assert "data     model - measured on load: rms " in done.out
+    document = metrics(cli, "out")
+    assert list(document)[:5] == ["status", "message", "metrics", "requirements", "warnings"]
+    assert document["metrics"]["data_offset[load]"]["unit"] == "N"
+    assert 0.2 < document["metrics"]["data_offset[load]"]["value"] < 0.4
+    assert document["data"]["window"] == {"from": 2.0, "to": pytest.approx(240.0), "unit": "mm"}
+    assert (cli.folder / "out/figures/data.png").read_bytes().startswith(b"\x89PNG")
+    assert (cli.folder / "out/data.csv").read_text().startswith("branch,displacement [mm],force [N]")
+
+
+def test_analyze_without_data_says_nothing_about_data(cli, cam):
+    cli("analyze", cam, "-o", "out", "--no-plots")
+    assert "data" not in metrics(cli, "out")
+    assert cli("analyze", cam, "--units", "s=mm").code == 2
+
+
+def test_calibrate_writes_a_complete_spec_that_analyses_to_the_fitted_errors(cli, cam, rig):
+    done = cli("calibrate", cam, rig, *FIT, "-o", "fit", "--no-plots")
+    assert done.code == 5  # the mechanism as it was built misses what the design had to keep
+    assert "fitted   mechanism.rolling_friction = 0.00225" in done.out
+    assert cli("analyze", "fit/calibrated.yaml", "--data", rig, "-o", "again", "--no-plots").code == 5
+    one, two = metrics(cli, "fit"), metrics(cli, "again")
+    assert one["metrics"]["data_rmse"]["value"] == pytest.approx(two["metrics"]["data_rmse"]["value"], rel=1e-9)
+    friction, rest = one["parameters"]
+    assert (friction["path"], friction["unit"], rest["unit"]) == ("mechanism.rolling_friction", "1", "mm")
+    for found, truth in ((friction, 0.00225), (rest, 68.25)):
+        assert found["value"] == pytest.approx(truth, abs=1.6 * (found["high_95"] - found["value"]))
+        assert found["low_95"] < found["value"] < found["high_95"]
+    assert np.array(one["correlation"]) == pytest.approx(np.array(one["correlation"]).T)
+    names = {path.name for path in (cli.folder / "fit").iterdir()}
+    assert {"calibrated.yaml", "parameters.csv", "residuals.csv", "data.csv", "metrics.json", "curve.csv"} <= names
+
+
+def test_calibrate_draws_the_fit(cli, cam, rig):
+    cli("calibrate", cam, rig, *FIT, "-o", "fit", "-q")
+    assert (cli.folder / "fit/figures/data.png").read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "complaint"),
+    [
+        (("--fit", "mechanism.springs.stiffnes"), 2, "did you mean 'mechanism.springs.stiffness'"),
+        (("--fit", "mechanism.rolling_friction", "--loss", "least"), 2, "--loss: there is no 'least'"),
+        (("--fit", "mechanism.rolling_friction", "--bounds", "x"), 2, "--bounds: 'x' is not 'a.b=low:high'"),
+        (("--fit", "mechanism.plate.top_margin"), 4, "says nothing about mechanism.plate.top_margin"),
+        (
+            ("--fit", "mechanism.springs.stiffness,mechanism.profile.force_constant",
+             "--set", "mechanism.rolling_friction=0"),
+            4, "cannot tell mechanism.springs.stiffness and mechanism.profile.force_constant apart",
+        ),
+        (("--fit", "mechanism.rolling_friction", "--units", "F=kN"), 3, "the header gives 'F' in N, --units in kN"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_fitted_is_said_in_one_line_and_nothing_is_written(cli, cam, rig, arguments, code, complaint):
+    done = cli("calibrate", cam, rig, *arguments, "-o", "out", "--no-plots")
+    assert done.code == code
+    assert complaint in done.err
+    assert done.err.count("\n") == 1
+    assert not (cli.folder / "out").exists()
+
+
+def test_json_holds_the_parameters(cli, cam, rig):
+    done = cli("calibrate", cam, rig, *FIT, "-o", "fit", "--no-plots", "--json")
+    assert [item["path"] for item in done.document["parameters"]] == FIT[1].split(",")

@@ -1,0 +1,260 @@
+"""Every exit code of the contract, reached by a user's command; and one JSON document whatever happens."""
+
+from __future__ import annotations
+
+import os
+import re
+import sys
+from pathlib import Path
+
+import pytest
+
+from cfmkit.errors import ExitCode
+from cfmkit.store import RunFolder
+
+RUN = ("analyze", "cam.yaml", "-o", "out", "--no-plots")
+ENVELOPE = ["status", "message", "exit_code", "metrics", "requirements", "warnings", "errors"]
+
+OUTCOMES = {
+    "ok": (RUN, ExitCode.OK, "complete"),
+    "unknown-option": ((*RUN, "--fast"), ExitCode.USAGE, "usage"),
+    "no-spec": (("analyze",), ExitCode.USAGE, "usage"),
+    "unknown-verb": (("analyse", "cam.yaml"), ExitCode.USAGE, "usage"),
+    "missing-file": (("analyze", "cem.yaml"), ExitCode.USAGE, "usage"),
+    "a-folder": (("analyze", "."), ExitCode.USAGE, "usage"),
+    "malformed-set": ((*RUN, "--set", "points"), ExitCode.USAGE, "usage"),
+    "negative-seed": ((*RUN, "--seed", "-1"), ExitCode.USAGE, "usage"),
+    "no-folder-for-stdin": (("analyze", "-"), ExitCode.USAGE, "usage"),
+    "empty-folder-name": (("analyze", "cam.yaml", "-o", ""), ExitCode.USAGE, "usage"),
+    "unknown-key": ((*RUN, "--set", "mechanism.roler=1 mm"), ExitCode.INVALID, "invalid"),
+    "no-unit": ((*RUN, "--set", "mechanism.roller_radius=16"), ExitCode.INVALID, "invalid"),
+    "unknown-metric": ((*RUN, "--set", "requirements.0.metric=force_riple"), ExitCode.INVALID, "invalid"),
+    "unknown-fidelity": ((*RUN, "--fidelity", "ansys"), ExitCode.INVALID, "invalid"),
+    "nothing-to-design": (
+        ("design", "cam.yaml", "-o", "out", "--no-plots", "--set", "design=null"),
+        ExitCode.INVALID,
+        "invalid",
+    ),
+    "infeasible": (
+        ("design", "cam.yaml", "-o", "out", "--no-plots", "--set", "mechanism.springs.max_elongation=120 mm"),
+        ExitCode.NO_SOLUTION,
+        "infeasible",
+    ),
+    "no-equilibrium": (
+        (*RUN, "--set", "mechanism.brace_length=60 mm"),
+        ExitCode.NO_SOLUTION,
+        "no_equilibrium",
+    ),
+    "nothing-to-cut": (
+        ("export", "cam.yaml", "-o", "out", "--set", "mechanism.brace_length=60 mm"),
+        ExitCode.NO_SOLUTION,
+        "no_solution",
+    ),
+    "missed": ((*RUN, "--set", "requirements.0.max=1 %"), ExitCode.REQUIREMENT_MISSED, "complete"),
+    "partial": ((*RUN, "--set", "analysis.travel=400 mm"), ExitCode.PARTIAL, "partial"),
+    "partial-before-missed": (
+        (*RUN, "--set", "analysis.travel=400 mm", "--set", "requirements.0.max=1 %"),
+        ExitCode.PARTIAL,
+        "partial",
+    ),
+}
+
+
+@pytest.mark.parametrize(("arguments", "code", "status"), OUTCOMES.values(), ids=OUTCOMES)
+def test_each_outcome_has_its_exit_code_and_one_json_document(cli, cam, arguments, code, status):
+    done = cli(*arguments, "--json")
+    assert done.code == code
+    assert list(done.document)[:7] == ENVELOPE
+    assert (done.document["status"], done.document["exit_code"]) == (status, code)
+    assert "Traceback" not in done.err
+    failed = code in (ExitCode.USAGE, ExitCode.INVALID) or status == "no_solution"
+    assert bool(done.document["errors"]) == failed
+    assert bool(done.document["message"])
+
+
+@pytest.mark.parametrize(("arguments", "code", "status"), OUTCOMES.values(), ids=OUTCOMES)
+def test_without_json_a_failure_is_told_on_standard_error_in_plain_lines(cli, cam, arguments, code, status):
+    done = cli(*arguments)
+    assert done.code == code
+    assert "Traceback" not in done.err + done.out
+    if code in (ExitCode.USAGE, ExitCode.INVALID):
+        assert done.out == ""
+        assert len(done.err.splitlines()) == 1
+
+
+@pytest.mark.parametrize("name", ["infeasible", "no-equilibrium"])
+def test_without_a_solution_the_reason_is_written_but_no_curve(cli, cam, name):
+    arguments, _, status = OUTCOMES[name]
+    cli(*arguments)
+    assert sorted(path.name for path in (cli.folder / "out").iterdir()) == [
+        "manifest.json",
+        "metrics.json",
+        "resolved.yaml",
+    ]
+    assert f'"status": "{status}"' in (cli.folder / "out/metrics.json").read_text()
+
+
+@pytest.mark.parametrize("name", ["unknown-key", "missing-file", "nothing-to-design", "unknown-option"])
+def test_an_invalid_request_writes_nothing(cli, cam, name):
+    cli(*OUTCOMES[name][0])
+    assert sorted(path.name for path in cli.folder.iterdir()) == ["cam.yaml"]
+
+
+def test_a_file_that_is_not_ours_in_the_way_is_exit_7_and_stays(cli, cam):
+    (cli.folder / "out").mkdir()
+    (cli.folder / "out/metrics.json").write_text("mine")
+    done = cli(*RUN)
+    assert done.code == ExitCode.IO
+    assert "metrics.json is in the way" in done.err
+    assert (cli.folder / "out/metrics.json").read_text() == "mine"
+    assert os.listdir(cli.folder / "out") == ["metrics.json"]
+
+
+def test_an_output_folder_that_is_a_file_is_exit_7(cli, cam):
+    (cli.folder / "out").write_text("mine")
+    done = cli(*RUN, "--json")
+    assert (done.code, done.document["status"]) == (ExitCode.IO, "io")
+    assert (cli.folder / "out").read_text() == "mine"
+
+
+def test_a_folder_of_a_live_run_is_exit_8(cli, cam):
+    with RunFolder(cli.folder / "out"):
+        done = cli(*RUN, "--json")
+    assert (done.code, done.document["status"]) == (ExitCode.IN_USE, "in_use")
+    assert cli(*RUN).code == ExitCode.OK
+
+
+BROKEN = """
+import cfmkit.api
+
+def broken(spec, run=None):
+    raise RuntimeError("the lever fell off")
+
+cfmkit.api.analyze = broken
+"""
+
+
+@pytest.fixture
+def broken(tmp_path: Path) -> dict[str, str]:
+    """An environment in which cfmkit has a bug."""
+    (tmp_path / "site").mkdir()
+    (tmp_path / "site/sitecustomize.py").write_text(BROKEN)
+    return {"PYTHONPATH": str(tmp_path / "site")}
+
+
+def test_a_bug_is_exit_70_in_one_line_with_the_way_to_see_more(cli, cam, broken):
+    done = cli(*RUN, **broken)
+    assert (done.code, done.out) == (ExitCode.BUG, "")
+    assert done.err == "error    this is a bug in cfmkit: RuntimeError: the lever fell off; -vv shows where\n"
+    assert not (cli.folder / "out").exists()
+
+
+def test_a_bug_under_json_is_a_document(cli, cam, broken):
+    done = cli(*RUN, "--json", **broken)
+    assert (done.code, done.document["status"]) == (ExitCode.BUG, "bug")
+
+
+@pytest.mark.parametrize("flags", [("-vv",), ("-v", "-v"), ("--verbose", "-v")])
+def test_vv_lets_the_traceback_through(cli, cam, broken, flags):
+    done = cli(*RUN, *flags, **broken)
+    assert "Traceback (most recent call last)" in done.err
+    assert 'raise RuntimeError("the lever fell off")' in done.err
+    assert done.err.splitlines()[-1].startswith("error    this is a bug")
+
+
+def test_v_alone_shows_no_traceback(cli, cam, broken):
+    assert "Traceback" not in cli(*RUN, "-v", **broken).err
+
+
+def test_every_fault_of_a_spec_is_one_line_with_its_place(cli):
+    (cli.folder / "bad.yaml").write_text(
+        "cfmkit: 1\nfamily: cam\nmechanism:\n  brace_lenght: 200 mm\n  roller_radius: 16\n"
+        "requirements:\n  - {metric: force_riple, max: 5 %}\n  - {metric: force_mean, max: 5 mm}\n"
+    )
+    done = cli("analyze", "bad.yaml")
+    assert done.code == ExitCode.INVALID
+    lines = done.err.splitlines()
+    assert all(re.match(r"bad\.yaml:\d+:\d+: [\w.]+: ", line) for line in lines)
+    assert [int(line.split(":")[1]) for line in lines] == sorted(int(line.split(":")[1]) for line in lines)
+    for part in ("did you mean 'brace_length'?", "roller_radius", "did you mean 'force_ripple'?", "requirements.1.max"):
+        assert part in done.err
+
+
+def test_the_place_of_every_fault_stands_in_the_json_document(cli):
+    (cli.folder / "bad.yaml").write_text("cfmkit: 1\nfamily: cam\nmechanism: 3\n")
+    fault = cli("analyze", "bad.yaml", "--json").document["errors"][0]
+    assert fault.keys() == {"source", "line", "column", "path", "message"}
+    assert (fault["source"], fault["line"], fault["path"]) == ("bad.yaml", 3, "mechanism")
+
+
+def test_a_fault_in_an_option_names_the_option(cli, cam):
+    assert cli(*RUN, "--fidelity", "ansys").err.startswith("--fidelity: 'ansys'")
+    assert cli(*RUN, "--set", "mechanism.roller_radius=16").err.startswith("--set mechanism.roller_radius: ")
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "code", "told"),
+    [
+        ("empty.yaml", b"", 3, "the file is empty"),
+        ("binary.yaml", bytes(range(256)), 3, "not UTF-8"),
+        ("list.yaml", b"- 1\n", 3, "a list"),
+        ("other.yaml", b"family: kam\n", 3, "'kam' is not allowed here"),
+        ("none.yaml", b"name: x\n", 3, "'family' is missing"),
+    ],
+)
+def test_a_file_that_is_no_spec_gets_one_clear_line(cli, name, content, code, told):
+    (cli.folder / name).write_bytes(content)
+    done = cli("analyze", name)
+    assert done.code == code
+    assert told in done.err
+    assert len(done.err.splitlines()) == 1
+
+
+def test_a_missing_file_is_compared_with_what_stands_there(cli, cam):
+    assert "did you mean 'cam.yaml'?" in cli("analyze", "cm.yaml").err
+    assert "nor a folder nowhere" in cli("analyze", "nowhere/cam.yaml").err
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may read everything")
+def test_an_unreadable_file_is_exit_2(cli, cam):
+    (cli.folder / cam).chmod(0)
+    done = cli("analyze", cam)
+    assert (done.code, len(done.err.splitlines())) == (ExitCode.USAGE, 1)
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
+def test_a_folder_without_write_permission_is_exit_7(cli, cam):
+    cli.folder.chmod(0o500)
+    try:
+        assert cli(*RUN).code == ExitCode.IO
+    finally:
+        cli.folder.chmod(0o700)
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a device that is always full")
+@pytest.mark.parametrize("arguments", [("show", "units"), ("--help",), (*RUN, "--json"), RUN])
+def test_a_full_disk_behind_standard_output_is_exit_7(cli, cam, arguments):
+    with open("/dev/full", "wb") as full:
+        process = cli.start(*arguments, stdout=full)
+        _, told = process.communicate(timeout=60)
+    assert process.returncode == ExitCode.IO
+    assert b"no space left" in told
+    assert b"Exception ignored" not in told
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="pipes differ")
+@pytest.mark.parametrize("arguments", [("show", "cam"), ("--help",), (*RUN, "-v"), (*RUN, "--json")])
+def test_a_reader_that_leaves_early_is_no_error(cli, cam, arguments):
+    reading, writing = os.pipe()
+    os.close(reading)
+    process = cli.start(*arguments, stdout=writing)
+    os.close(writing)
+    _, told = process.communicate(timeout=60)
+    assert (process.returncode, told) == (0, b"")
+
+
+def test_closed_streams_are_no_error(cli, cam):
+    script = f"'{cli.command}' analyze cam.yaml -o out --no-plots >&- 2>&- <&-"
+    process = cli.shell(script)
+    assert process.wait(timeout=60) == 0
+    assert (cli.folder / "out/manifest.json").exists()

@@ -1,0 +1,137 @@
+"""Random changes of valid specs: an exit code of the contract, in time, and no file elsewhere."""
+
+from __future__ import annotations
+
+import os
+import random
+import re
+import signal
+import time
+from pathlib import Path
+
+import pytest
+
+from cfmkit.cli.main import main
+
+CONFIGS = sorted((Path(__file__).parents[2] / "configs").glob("*.yaml"))
+ALLOWED = {0, 3, 4, 5, 6}
+LONGEST = 2.0
+NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?![\w.])")
+WORDS = [
+    "null",
+    "true",
+    "''",
+    "[]",
+    "{}",
+    "0",
+    "-1",
+    "1e308",
+    "1e-308",
+    "5 %",
+    "1 m",
+    "1 N/m",
+    "~",
+    "../../x",
+    "/etc/passwd",
+]
+FACTORS = [0.0, -1.0, 1e-300, 1e-9, 1e-3, 0.1, 0.5, 0.99, 1.01, 2.0, 10.0, 1e3, 1e9, 1e300]
+
+
+def scaled(text: str, chance: random.Random) -> str:
+    """Return the text with one of its numbers changed."""
+    found = list(NUMBER.finditer(text))
+    match = chance.choice(found)
+    factor = chance.choice([*FACTORS, chance.lognormvariate(0, 1)])
+    return text[: match.start()] + f"{float(match[0]) * factor:g}" + text[match.end() :]
+
+
+def reworded(text: str, chance: random.Random) -> str:
+    """Return the text with the value of one key replaced."""
+    lines = text.split("\n")
+    places = [index for index, line in enumerate(lines) if ": " in line and not line.lstrip().startswith("#")]
+    index = chance.choice(places)
+    lines[index] = lines[index].partition(": ")[0] + ": " + chance.choice(WORDS)
+    return "\n".join(lines)
+
+
+def shuffled(text: str, chance: random.Random) -> str:
+    """Return the text with a line lost, doubled, moved or cut."""
+    lines = text.split("\n")
+    one, other = chance.randrange(len(lines)), chance.randrange(len(lines))
+    kind = chance.randrange(4)
+    if kind == 0:
+        del lines[one]
+    elif kind == 1:
+        lines.insert(other, lines[one])
+    elif kind == 2:
+        lines[one], lines[other] = lines[other], lines[one]
+    else:
+        lines[one] = lines[one][: chance.randrange(len(lines[one]) + 1)]
+    return "\n".join(lines)
+
+
+def typed_over(text: str, chance: random.Random) -> str:
+    """Return the text with one character replaced."""
+    place = chance.randrange(len(text))
+    return text[:place] + chance.choice("0129.-+eE%:,#[]{}'\"\t\n \x00\u2212\u00a0é") + text[place + 1 :]
+
+
+def mutated(text: str, chance: random.Random) -> str:
+    """Return the text after one to three random changes."""
+    for _ in range(chance.choice((1, 1, 2, 3))):
+        text = chance.choice((scaled, scaled, scaled, reworded, shuffled, typed_over))(text, chance)
+    # A million points are allowed, and slow for no fault of theirs.
+    return re.sub(r"points: \d{5,}", "points: 9999", text)
+
+
+def ring(_number: int, _frame: object) -> None:
+    raise RuntimeError("still running")
+
+
+def check_mutants(folder: Path, count: int, seed: int, capsys: pytest.CaptureFixture[str]) -> None:
+    chance = random.Random(seed)
+    handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGALRM)}
+    signal.signal(signal.SIGALRM, ring)
+    spec = folder / "spec.yaml"
+    try:
+        for number in range(count):
+            text = mutated(chance.choice(CONFIGS).read_text(), chance)
+            spec.write_text(text)
+            verb = chance.choice(("design", "analyze", "analyze", "check", "export"))
+            extra = {"check": [], "export": ["-o", "out"]}.get(verb, ["-o", "out", "--no-plots"])
+            start = time.process_time()
+            signal.alarm(10)
+            code = main([verb, str(spec), "-q", *extra])
+            signal.alarm(0)
+            seconds = time.process_time() - start
+            told = capsys.readouterr()
+            case = f"case {number} of seed {seed}: {verb}\n{text}\n{told.err}"
+            assert code in ALLOWED, case
+            assert seconds < LONGEST, f"{seconds:.1f} s: {case}"
+            assert told.out == "", case
+            assert set(os.listdir(folder)) <= {"spec.yaml", "out"}, case
+            assert (
+                not [name for name in os.listdir(folder / "out") if name.startswith(".")]
+                if code in (0, 5) and extra
+                else True
+            )
+    finally:
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
+
+
+@pytest.fixture
+def quiet_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty working folder."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_mutated_specs_end_with_an_exit_code_of_the_contract(quiet_folder, capsys):
+    check_mutants(quiet_folder, 200, 1, capsys)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(10))
+def test_ten_thousand_mutated_specs_end_with_an_exit_code_of_the_contract(quiet_folder, capsys, seed):
+    check_mutants(quiet_folder, 1000, seed, capsys)

@@ -1,0 +1,68 @@
+"""What a command may import: start-up time is a promise, and imports are what it is made of."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+CONFIGS = Path(__file__).parents[2] / "configs"
+PROBE = """
+import sys
+from cfmkit.cli.main import main
+code = main(sys.argv[1:])
+print("\\n".join(sorted({name.partition(".")[0] for name in sys.modules})), file=sys.stderr)
+sys.exit(code)
+"""
+
+
+def imported(folder: Path, *arguments: str) -> set[str]:
+    """Return the top-level packages that a command has imported when it is done."""
+    done = subprocess.run(
+        [sys.executable, "-c", PROBE, *arguments], cwd=folder, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    return set(done.stderr.split())
+
+
+DRAWING = {"matplotlib", "PIL"}
+CUTTING = {"ezdxf", "shapely"}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "forbidden"),
+    [
+        (("--help",), {"numpy", "pydantic", "pint", "yaml", "scipy"} | DRAWING | CUTTING),
+        (("--version",), {"numpy", "pint", "yaml", "scipy", "rich"} | DRAWING | CUTTING),
+        (("analyze", "--help"), {"numpy", "pint", "yaml", "scipy"} | DRAWING | CUTTING),
+        (("check", str(CONFIGS / "cam.yaml")), {"scipy", "pint"} | DRAWING | CUTTING),
+        (("analyze", str(CONFIGS / "cam.yaml"), "--no-plots"), {"scipy", "pint"} | DRAWING | CUTTING),
+        (("analyze", str(CONFIGS / "cam.yaml"), "--no-plots", "-q"), {"scipy", "rich"} | DRAWING | CUTTING),
+        (("analyze", str(CONFIGS / "cam.yaml"), "--no-plots", "--json"), {"scipy", "rich"} | DRAWING | CUTTING),
+        (("design", str(CONFIGS / "cam.yaml"), "--no-plots"), {"scipy"} | DRAWING),
+        (("new", "cam", "-o", "-"), {"scipy", "pint"} | DRAWING | CUTTING),
+        (("schema",), {"scipy", "pint", "rich"} | DRAWING | CUTTING),
+        (("show", "cam"), {"scipy", "pint"} | DRAWING | CUTTING),
+        (("show", "metrics"), {"scipy", "pint"} | DRAWING | CUTTING),
+        (("show", "materials"), {"scipy", "pint"} | DRAWING | CUTTING),
+    ],
+    ids=lambda value: "-".join(map(str, value)) if isinstance(value, tuple) and len(value) < 3 else None,
+)
+def test_a_command_does_not_import_what_it_does_not_need(tmp_path, arguments, forbidden):
+    assert not imported(tmp_path, *arguments) & forbidden
+
+
+def test_import_cfmkit_imports_nothing_heavy():
+    code = "import sys, cfmkit; print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert not {"numpy", "pydantic", "typer", "yaml", "pint"} & set(done.stdout.split())
+
+
+def test_help_is_independent_of_the_folder_it_is_asked_in(tmp_path):
+    (tmp_path / "numpy.py").write_text("raise RuntimeError('imported from the working folder')")
+    command = Path(sys.executable).parent / "cfmkit"
+    done = subprocess.run([command, "--help"], cwd=tmp_path, capture_output=True, env=dict(os.environ), check=False)
+    assert done.returncode == 0

@@ -1,0 +1,137 @@
+"""`measure` as a user runs it: files, numbers, exit codes, speed."""
+
+from __future__ import annotations
+
+import csv
+import json
+import resource
+
+import numpy as np
+import pytest
+from experiment_support import csv_text, reference_case, rows
+
+
+@pytest.fixture
+def data(tmp_path):
+    """The reference case as a lab file with decimal commas."""
+    case = reference_case()
+    text = "Zeit [s];Weg [mm];Kraft [N]\n" + rows((case.time, case.motion * 1e3, case.effort), ";", ",", 9)
+    (tmp_path / "rig.csv").write_text(text)
+    return "rig.csv"
+
+
+REFERENCE = ("--filter", "2 Hz", "--window", "40 mm:210 mm")
+
+
+def test_measure_writes_curve_cycles_metrics_figure_and_manifest(cli, data):
+    done = cli("measure", data, *REFERENCE)
+    assert (done.code, done.err) == (0, "")
+    out = cli.folder / "cfm-out/rig-measure"
+    assert {str(path.relative_to(out)) for path in out.rglob("*") if path.is_file()} == {
+        "curve.csv", "cycles.csv", "metrics.json", "manifest.json", "figures/loop.png",
+    }  # fmt: skip
+
+
+def test_metrics_json_holds_raw_and_filtered_values_in_border_units(cli, data):
+    cli("measure", data, *REFERENCE, "-o", "out", "--no-plots")
+    document = json.loads((cli.folder / "out/metrics.json").read_text())
+    assert document["metrics"]["hysteresis_area"]["value"] == pytest.approx(229.53181, abs=1e-4)
+    assert document["metrics_filtered"]["hysteresis_area"]["value"] == pytest.approx(229.5, abs=1e-4)
+    assert document["metrics_filtered"]["force_mean[load]"] == {
+        "value": pytest.approx(50.658418, abs=1e-6), "unit": "N",
+        "definition": document["metrics"]["force_mean[load]"]["definition"],
+    }  # fmt: skip
+    assert (document["status"], document["cycles"]) == ("complete", 1)
+    assert document["window"] == {"from": 40.0, "to": 210.0, "unit": "mm"}
+    assert document["filter"].startswith("Butterworth of order 6 per pass, back and forth, cut-off 2 Hz")
+    assert document["reading"][0] == "utf-8, separator semicolon, decimal comma"
+
+
+def test_the_curve_has_raw_and_filtered_forces_in_the_units_of_the_border(cli, data):
+    cli("measure", data, *REFERENCE, "-o", "out", "--no-plots")
+    with (cli.folder / "out/curve.csv").open(newline="") as file:
+        head, *body = csv.reader(file)
+    assert head == ["branch", "displacement [mm]", "force [N]", "stable", "force_filtered [N]", "time [s]"]
+    assert [row[0] for row in body] == ["load"] * 1008 + ["unload"] * 1008
+
+
+def test_what_measure_wrote_can_be_measured_again(cli, data):
+    cli("measure", data, *REFERENCE, "-o", "one", "--no-plots")
+    done = cli("measure", "one/curve.csv", *REFERENCE, "--units", "force=N", "-o", "two", "--no-plots")
+    assert done.code == 0
+    one, two = (json.loads((cli.folder / name / "metrics.json").read_text())["metrics"] for name in ("one", "two"))
+    assert two["hysteresis_area"]["value"] == pytest.approx(one["hysteresis_area"]["value"], rel=1e-12)
+
+
+def test_the_page_says_how_the_file_was_read_and_both_values(cli, data):
+    page = cli("measure", data, *REFERENCE, "--no-plots").out
+    assert "rig.csv  2016 points, 1 cycle" in page
+    assert "read     utf-8, separator semicolon, decimal comma" in page
+    assert "window   40 ... 210 mm" in page
+    assert any(line.split() == ["hysteresis", "area", "229.532", "N*mm", "229.5", "N*mm"] for line in page.splitlines())
+
+
+def test_json_is_one_document_with_the_same_numbers_as_the_file(cli, data):
+    done = cli("measure", data, *REFERENCE, "-o", "out", "--no-plots", "--json")
+    document = json.loads((cli.folder / "out/metrics.json").read_text())
+    assert {key: done.document[key] for key in document} == document
+    assert done.document["out"] == "out"
+
+
+def test_the_same_command_gives_the_same_bytes(cli, data):
+    for out in ("one", "two"):
+        assert cli("measure", data, *REFERENCE, "-o", out).code == 0
+    for name in ("curve.csv", "cycles.csv", "metrics.json", "figures/loop.png"):
+        assert (cli.folder / "one" / name).read_bytes() == (cli.folder / "two" / name).read_bytes()
+
+
+def test_a_target_gives_the_deviation_from_it(cli, data):
+    done = cli("measure", data, *REFERENCE, "--target", "50 N", "--json", "--no-plots")
+    raw = done.document["metrics"]
+    assert raw["deviation_from_target"]["value"] == pytest.approx((50 - raw["force_min"]["value"]) / 50)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "complaint"),
+    [
+        (("none.csv",), 2, "none.csv: there is no such file"),
+        (("rig.csv", "--window", "40 mm"), 2, "--window: '40 mm' is not 'from:to'"),
+        (("rig.csv", "--window", "40:210"), 2, "--window: 40 has no unit"),
+        (("rig.csv", "--filter", "2"), 2, "--filter: 2 has no unit"),
+        (("rig.csv", "--units", "Weg"), 2, "--units: 'Weg' is not 'column=unit'"),
+        (("rig.csv", "--target", "50 mm"), 2, "--target: '50 mm' is a length"),
+        (("rig.csv", "--window", "40 mm:300 mm"), 3, "the window 40 ... 300 mm is not measured on every branch"),
+        (("rig.csv", "--filter", "20 Hz"), 3, "the cut-off 20 Hz is not below half the sampling rate"),
+        (("bad.csv",), 3, "bad.csv: line 7: column 'F' [N] holds 'NaN', which is no number"),
+    ],
+)
+def test_what_is_wrong_is_said_in_one_line_with_its_exit_code(cli, data, arguments, code, complaint):
+    lines = csv_text().splitlines()
+    lines[6] = lines[6].rpartition(";")[0] + ";NaN"
+    (cli.folder / "bad.csv").write_text("\n".join(lines))
+    done = cli("measure", *arguments, "--no-plots", "-o", "out")
+    assert done.code == code
+    assert complaint in done.err
+    assert done.err.count("\n") == 1
+    assert not (cli.folder / "out").exists()
+
+
+def test_one_branch_only_is_a_warning(cli):
+    (cli.folder / "up.csv").write_text("s [mm];F [N]\n" + rows((np.arange(200.0), 50 + np.arange(200.0) / 100)))
+    done = cli("measure", "up.csv", "--no-plots")
+    assert done.code == 0
+    assert "warning  one_branch" in done.out
+
+
+def test_a_file_of_100_000_rows_takes_seconds_of_processor_time(cli):
+    k = np.arange(1, 50_001) / 50_000
+    motion, way = np.concatenate([240 * k, 240 * (1 - k)]), np.repeat([1.0, -1.0], 50_000)
+    force = 50 + 0.4 * np.sin(motion / 5) + way * (0.3 + 0.003 * motion)
+    (cli.folder / "long.csv").write_text(
+        "t [s];s [mm];F [N]\n" + rows((0.001 * np.arange(100_000), motion, force), ";", ",")
+    )
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    assert cli("measure", "long.csv", "-o", "out").code == 0
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    # 1.4 s on an idle machine; a busy one inflates processor time, too.
+    assert after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime < 4.0

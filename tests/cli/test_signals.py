@@ -1,0 +1,73 @@
+"""A run that is told to stop says so, and leaves the folder as it found it."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import time
+from typing import TYPE_CHECKING
+
+import pytest
+
+if TYPE_CHECKING:
+    import subprocess
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
+
+LONG = ("analyze", "cam.yaml", "-o", "out", "--no-plots", "--set", "analysis.points=1000000")
+
+
+def started(cli, *extra: str) -> subprocess.Popen[bytes]:
+    """Start a run of many seconds and wait until it has its folder."""
+    process = cli.start(*LONG, *extra)
+    end = time.monotonic() + 60
+    while not (cli.folder / "out/.cfmkit.lock").exists():
+        assert process.poll() is None, process.communicate()
+        assert time.monotonic() < end
+        time.sleep(0.01)
+    return process
+
+
+@pytest.mark.parametrize(
+    ("number", "code", "told"),
+    [(signal.SIGINT, 130, b"error    interrupted\n"), (signal.SIGTERM, 143, b"error    terminated\n")],
+)
+def test_a_signal_ends_the_run_with_its_exit_code_and_no_trace(cli, cam, number, code, told):
+    process = started(cli)
+    process.send_signal(number)
+    out, err = process.communicate(timeout=60)
+    assert (process.returncode, out, err) == (code, b"", told)
+    assert sorted(os.listdir(cli.folder)) == ["cam.yaml"]
+
+
+def test_a_signal_leaves_the_files_of_the_run_before(cli, cam):
+    assert cli(*LONG[:5]).code == 0
+    before = {path.name: path.read_bytes() for path in (cli.folder / "out").iterdir()}
+    process = started(cli)
+    time.sleep(0.3)
+    process.send_signal(signal.SIGTERM)
+    process.communicate(timeout=60)
+    assert process.returncode == 143
+    assert {path.name: path.read_bytes() for path in (cli.folder / "out").iterdir()} == before
+
+
+def test_a_killed_run_is_cleared_away_by_the_next(cli, cam):
+    assert cli(*LONG[:5]).code == 0
+    before = {path.name: path.read_bytes() for path in (cli.folder / "out").iterdir() if path.name != "manifest.json"}
+    process = started(cli)
+    time.sleep(0.3)
+    process.kill()
+    process.communicate(timeout=60)
+    assert cli(*LONG[:5]).code == 0
+    after = {path.name: path.read_bytes() for path in (cli.folder / "out").iterdir() if path.name != "manifest.json"}
+    assert after == before
+
+
+def test_an_interrupted_run_is_a_json_document_too(cli, cam):
+    process = started(cli, "--json")
+    process.send_signal(signal.SIGINT)
+    out, _ = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert b'"status": "interrupted"' in out
+    assert b'"exit_code": 130' in out

@@ -1,0 +1,124 @@
+"""How the page looks: widths, colours, encodings, progress."""
+
+from __future__ import annotations
+
+import io
+import os
+import subprocess
+import sys
+
+import pytest
+
+from cfmkit.cli.terminal import Terminal
+
+ESCAPE = "\x1b["
+RUN = ("analyze", "cam.yaml", "-o", "out", "--no-plots", "--set", "requirements.0.max=1 %")
+
+
+@pytest.mark.parametrize("columns", [40, 60, 80, 108, 300])
+def test_a_page_keeps_to_the_width_of_the_terminal(cli, cam, columns):
+    lines = cli(*RUN, COLUMNS=str(columns)).out.splitlines()
+    commands = [line for line in lines if line.strip().startswith("cfmkit design")]
+    changed = "--set 'requirements.0.max=1 %' --set design.avoid_undercut=true"
+    assert commands == [f"         cfmkit design cam.yaml {changed}"]
+    assert max(len(line) for line in lines if line not in commands) <= min(columns, 108)
+
+
+def test_redirected_output_has_no_colour(cli, cam):
+    assert ESCAPE not in cli(*RUN).out
+
+
+def on_terminal(cli, *arguments: str, **environment: str) -> str:
+    """Return what a command writes to a terminal."""
+    import pty
+
+    ours, theirs = pty.openpty()
+    with open(theirs, "wb") as stream:
+        process = cli.start(*arguments, stdout=stream, stderr=stream, env_more=environment)
+    parts = []
+    while True:
+        try:
+            parts.append(os.read(ours, 4096))
+        except OSError:
+            break
+        if not parts[-1]:
+            break
+    os.close(ours)
+    process.wait(timeout=60)
+    return b"".join(parts).decode()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="needs a pseudo-terminal")
+class TestOnATerminal:
+    def test_colours_repeat_what_words_say(self, cli, cam):
+        page = on_terminal(cli, *RUN, TERM="xterm-256color")
+        assert f"{ESCAPE}1;33mMISSED" in page
+        assert f"{ESCAPE}36mok" in page
+
+    def test_no_color_is_honoured(self, cli, cam):
+        page = on_terminal(cli, *RUN, TERM="xterm-256color", NO_COLOR="1")
+        assert "MISSED" in page
+        assert not any(f"{ESCAPE}{code}" in page for code in ("1;33m", "33m", "36m", "31m"))
+
+    def test_json_is_never_coloured(self, cli, cam):
+        assert ESCAPE not in on_terminal(cli, *RUN, "--json", TERM="xterm-256color")
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "latin-1", "utf-8"])
+def test_a_name_that_the_encoding_cannot_say_is_escaped(cli, cam, encoding):
+    command = [cli.command, *RUN, "--set", "name=Kräfte 力"]
+    environment = cli.environment(PYTHONIOENCODING=encoding, PYTHONUTF8="0")
+    done = subprocess.run(command, cwd=cli.folder, env=environment, capture_output=True, check=False)
+    assert done.returncode == 5
+    told = done.stdout.splitlines()[0].decode(encoding)
+    assert {"ascii": r"Kr\xe4fte \u529b", "latin-1": r"Kräfte \u529b", "utf-8": "Kräfte 力"}[encoding] in told
+
+
+def test_json_is_readable_in_every_encoding(cli, cam):
+    done = cli(*RUN, "--json", "--set", "name=Kräfte 力", PYTHONIOENCODING="ascii", PYTHONUTF8="0")
+    assert done.document["name"] == "Kräfte 力"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "json", "verbose"),
+    [
+        (["analyze", "x", "--json"], True, 0),
+        (["analyze", "--", "--json"], False, 0),
+        (["-vv"], False, 2),
+        (["-v", "-qv"], False, 2),
+        (["--verbose", "--verbose"], False, 2),
+        (["-o", "v"], False, 0),
+    ],
+)
+def test_wishes_for_output_are_read_off_a_command_line_that_may_be_malformed(arguments, json, verbose):
+    wishes = Terminal.guess(arguments)
+    assert (wishes.json, wishes.verbose) == (json, verbose)
+
+
+class Watched(io.StringIO):
+    """A terminal that somebody watches."""
+
+    def isatty(self) -> bool:
+        return True
+
+
+def reported(monkeypatch: pytest.MonkeyPatch, stream: io.StringIO, terminal: Terminal) -> str:
+    monkeypatch.setattr(sys, "stderr", stream)
+    monkeypatch.setenv("TERM", "xterm")
+    with terminal.progress() as report:
+        report(0.5, "solving")
+        report(1.0, "solving")
+    return stream.getvalue()
+
+
+def test_progress_is_shown_where_somebody_watches(monkeypatch):
+    assert "solving" in reported(monkeypatch, Watched(), Terminal())
+
+
+@pytest.mark.parametrize(
+    ("stream", "terminal"),
+    [(io.StringIO(), Terminal()), (Watched(), Terminal(quiet=True)), (Watched(), Terminal(json=True))],
+    ids=["redirected", "quiet", "json"],
+)
+def test_progress_is_not_shown_elsewhere(monkeypatch, stream, terminal):
+    assert reported(monkeypatch, stream, terminal) == ""

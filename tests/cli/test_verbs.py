@@ -1,0 +1,258 @@
+"""The verbs that compute nothing: check, new, show, schema, export; and the help."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+import yaml
+
+from cfmkit import families
+from cfmkit._version import __version__
+
+CONFIGS = sorted((Path(__file__).parents[2] / "configs").glob("*.yaml"))
+VERBS = ["design", "analyze", "export", "check", "new", "show", "schema"]
+
+
+def test_version_is_printed(cli):
+    done = cli("--version")
+    assert (done.code, done.out) == (0, f"cfmkit {__version__}\n")
+
+
+def test_help_lists_the_verbs_in_the_order_of_work_and_the_exit_codes(cli):
+    page = cli("--help").out
+    places = [page.index(f"│ {verb} ") for verb in VERBS]
+    assert places == sorted(places)
+    assert "Exit codes: 0 ok, 2 usage" in " ".join(page.split())
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_every_verb_explains_itself_and_every_option(cli, verb):
+    done = cli(verb, "--help", COLUMNS="200")
+    assert done.code == 0
+    assert "Traceback" not in done.out
+    for option in ("--json", "--verbose", "--help"):
+        assert option in done.out
+
+
+@pytest.mark.parametrize("verb", ["check", "new", "show", "schema", "export"])
+@pytest.mark.parametrize("option", ["--seed=1", "--no-plots", "--fidelity=x"])
+def test_a_verb_refuses_options_that_would_do_nothing(cli, cam, verb, option):
+    assert cli(verb, "cam", option).code == 2
+
+
+def test_python_m_cfmkit_is_the_same_program(cli):
+    import subprocess
+    import sys
+
+    done = subprocess.run([sys.executable, "-m", "cfmkit", "--version"], capture_output=True, text=True, check=True)
+    assert done.stdout == cli("--version").out
+
+
+def test_check_has_one_line_for_each_file(cli):
+    done = cli("check", *map(str, CONFIGS))
+    assert (done.code, done.err) == (0, "")
+    lines = done.out.splitlines()
+    assert [line.split()[0] for line in lines] == list(map(str, CONFIGS))
+    assert all(line.split()[1] == "ok" for line in lines)
+
+
+def test_check_reports_every_fault_of_every_file(cli, cam):
+    (cli.folder / "one.yaml").write_text("family: cam\nmechanism: 1\nrequirements:\n  - {metric: riple, max: 1}\n")
+    (cli.folder / "two.yaml").write_text("family: cam\n")
+    done = cli("check", "one.yaml", cam, "two.yaml")
+    assert done.code == 3
+    assert [line.split(":")[0] for line in done.err.splitlines()] == ["one.yaml", "one.yaml", "two.yaml"]
+    assert [line.split()[:2] for line in done.out.splitlines()] == [
+        ["one.yaml", "INVALID"],
+        ["cam.yaml", "ok"],
+        ["two.yaml", "INVALID"],
+    ]
+
+
+def test_check_goes_on_after_a_missing_file(cli, cam):
+    done = cli("check", "nowhere.yaml", cam)
+    assert done.code == 2
+    assert "ok" in done.out
+    (cli.folder / "bad.yaml").write_text("family: cam\n")
+    assert cli("check", "nowhere.yaml", "bad.yaml").code == 3
+
+
+def test_check_finds_a_bound_in_the_wrong_dimension(cli, cam):
+    done = cli("check", cam, "--set", "requirements.2.max=140 N")
+    assert done.code == 3
+    assert "requirements.2.max" in done.err
+    assert "a length" in done.err
+
+
+def test_check_under_json_has_a_record_for_each_file(cli, cam):
+    done = cli("check", cam, "nowhere.yaml", "--json")
+    assert done.code == done.document["exit_code"] == 2
+    assert [(item["file"], item["ok"]) for item in done.document["files"]] == [(cam, True), ("nowhere.yaml", False)]
+    assert done.document["message"] == "1 of 2 files are not valid"
+
+
+def test_check_writes_nothing_and_quiet_says_nothing(cli, cam):
+    assert cli("check", cam, "-q").out == ""
+    assert [path.name for path in cli.folder.iterdir()] == [cam]
+
+
+@pytest.mark.parametrize("family", families.names())
+def test_new_writes_a_spec_that_passes_as_it_is(cli, family):
+    made = cli("new", family)
+    assert (made.code, made.err) == (0, "")
+    name = f"{family}.yaml"
+    assert f"written  {name}" in made.out
+    assert cli("check", name).code == 0
+    assert cli("analyze", name, "--no-plots", "-q").code == 0
+    if families.family(family).design:
+        assert cli("design", name, "--no-plots", "-q").code == 0
+
+
+def test_new_never_replaces_a_file(cli, cam):
+    (cli.folder / cam).write_text("mine")
+    for arguments in (("new", "cam"), ("new", "cam", "-o", cam)):
+        done = cli(*arguments)
+        assert done.code == 7
+        assert "a file of that name is in the way" in done.err
+    assert (cli.folder / cam).read_text() == "mine"
+
+
+def test_new_prints_the_spec_where_it_is_asked_to(cli):
+    done = cli("new", "cam", "-o", "-")
+    assert yaml.safe_load(done.out)["family"] == "cam"
+    assert list(cli.folder.iterdir()) == []
+    assert cli("new", "cam", "-o", "-", "--json").document["text"] == done.out
+
+
+def test_new_into_a_folder_that_is_not_there_is_exit_7(cli):
+    assert cli("new", "cam", "-o", "a/b.yaml").code == 7
+
+
+def test_new_names_the_family_that_was_probably_meant(cli):
+    done = cli("new", "came")
+    assert done.code == 2
+    assert "did you mean 'cam'?" in done.err
+
+
+def test_show_lists_families_and_topics(cli):
+    page = cli("show").out
+    for word in (*families.names(), "units", "metrics", "materials"):
+        assert f"  {word} " in page
+
+
+@pytest.mark.parametrize("family", families.names())
+def test_show_explains_every_key_value_and_finding_of_a_family(cli, family):
+    record = families.family(family)
+    document = cli("show", family, "--json").document
+    assert {item["name"] for item in document["findings"]} == set(record.findings)
+    assert {item["name"] for item in document["values"]} == set(record.values)
+    keys = {item["path"]: item for item in document["keys"]}
+    assert all(item["kind"] and (item["description"] or path == "family") for path, item in keys.items())
+    page = cli("show", family).out
+    for name in (*record.findings, *record.values, *(path.rpartition(".")[2] for path in keys)):
+        assert name in page
+    assert record.references[0][:20] in page
+
+
+def test_show_cam_says_kind_default_and_bounds_of_a_key(cli):
+    keys = {item["path"]: item for item in cli("show", "cam", "--json").document["keys"]}
+    assert keys["mechanism.brace_length"]["required"]
+    assert keys["mechanism.brace_length"]["kind"] == "length"
+    assert keys["mechanism.brace_length"]["allowed"] == "> 0"
+    assert keys["mechanism.plate.top_margin"]["default"] == "10 mm"
+    assert keys["mechanism.springs.stiffness"]["kind"] == "stiffness or list of stiffness"
+    assert keys["design.choose"]["kind"] == "force-constant | stiffness | catalogue"
+    assert keys["design.catalogue[].name"]["kind"] == "text"
+    assert keys["analysis.points"]["default"] == "481"
+
+
+def test_show_units_lists_the_closed_list(cli):
+    document = cli("show", "units", "--json").document
+    sizes = {item["symbol"]: item["si"] for item in document["units"]}
+    assert sizes["mm"] == 0.001
+    assert sizes["lbf"] == pytest.approx(4.4482216152605)
+    assert {item["symbol"] for item in document["units"] if item["input_only"]} >= {"in", "lbf", "lb", "psi"}
+    assert " input only" in cli("show", "units").out
+
+
+def test_show_metrics_gives_name_unit_and_definition(cli):
+    document = cli("show", "metrics", "--json").document
+    named = {item["name"]: item for item in document["metrics"]}
+    assert named["hysteresis_area"]["unit"] == "N*mm"
+    assert named["force_ripple"]["definition"].startswith("(max - min)/max")
+    assert all(f"  {name} " in cli("show", "metrics").out for name in ("force_mean", "usable_stroke"))
+
+
+def test_show_materials_gives_every_property_with_its_source(cli):
+    document = cli("show", "materials", "--json").document
+    pom = next(item for item in document["materials"] if item["name"] == "pom")
+    assert pom["youngs_modulus"] == 2.8e9
+    assert pom["source"]
+    assert "2.5 ... 3.2" in cli("show", "materials").out
+
+
+@pytest.mark.parametrize("columns", [40, 60, 80, 300])
+@pytest.mark.parametrize("topic", ["cam", "units", "metrics", "materials"])
+def test_pages_keep_to_the_width_of_the_terminal(cli, topic, columns):
+    lines = cli("show", topic, COLUMNS=str(columns)).out.splitlines()
+    assert max(map(len, lines)) <= max(min(columns, 108), 40)
+
+
+def test_schema_describes_every_config(cli):
+    schema = json.loads(cli("schema").out)
+    assert schema["$schema"].startswith("https://json-schema.org/")
+    assert json.loads(cli("schema", "cam").out)["properties"]["family"]["const"] == "cam"
+    assert cli("schema", "--json").document["schema"] == schema
+
+
+def test_schema_of_an_unknown_family_is_a_document_too(cli):
+    done = cli("schema", "kam", "--json")
+    assert (done.code, done.document["status"]) == (2, "usage")
+
+
+def test_export_writes_the_geometry_of_a_spec(cli, cam):
+    done = cli("export", cam)
+    assert (done.code, done.err) == (0, "")
+    names = {path.name for path in (cli.folder / "cfm-out/cam-export").iterdir()}
+    assert {"cam.dxf", "cam.svg", "manifest.json"} < names
+    assert "cam-kerf.dxf" not in names
+
+
+def test_export_gives_the_same_geometry_as_design(cli, cam):
+    cli("design", cam, "-o", "one", "--no-plots")
+    cli("export", "one/design.yaml", "-o", "two")
+    names = [path.name for path in (cli.folder / "one/geometry").iterdir()]
+    for name in names:
+        assert (cli.folder / "one/geometry" / name).read_bytes() == (cli.folder / "two" / name).read_bytes(), name
+
+
+def test_kerf_adds_a_second_file_and_leaves_the_first(cli, cam):
+    cli("export", cam, "-o", "one")
+    assert cli("export", cam, "-o", "two", "--kerf", "0.2 mm").code == 0
+    assert (cli.folder / "one/cam.dxf").read_bytes() == (cli.folder / "two/cam.dxf").read_bytes()
+    assert (cli.folder / "two/cam-kerf.dxf").read_bytes() != (cli.folder / "two/cam.dxf").read_bytes()
+
+
+def test_a_coarser_tolerance_gives_a_smaller_file(cli, cam):
+    cli("export", cam, "-o", "one")
+    cli("export", cam, "-o", "two", "--tolerance", "0.1 mm")
+    assert (cli.folder / "two/cam.dxf").stat().st_size < (cli.folder / "one/cam.dxf").stat().st_size
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "code"),
+    [
+        ("--kerf", "0.2", 2),
+        ("--kerf", "1 N", 2),
+        ("--kerf", "-1 mm", 2),
+        ("--tolerance", "0 mm", 2),
+        ("--kerf", "9 m", 3),
+    ],
+)
+def test_a_kerf_or_tolerance_that_makes_no_sense_is_refused(cli, cam, option, value, code):
+    done = cli("export", cam, option, value)
+    assert done.code == code
+    assert len(done.err.splitlines()) == 1
+    assert not (cli.folder / "cfm-out").exists()

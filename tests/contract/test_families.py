@@ -1,0 +1,190 @@
+"""What every family must do, over every configuration that belongs to it; a new family is picked up by itself."""
+
+from __future__ import annotations
+
+import pickle
+from importlib import import_module
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import cfmkit
+from cfmkit import api, families, report
+from cfmkit.geometry import Drawing
+from cfmkit.keys import keys
+from cfmkit.results import Status
+from cfmkit.units import DIMENSIONS
+
+CONFIGS = sorted((Path(__file__).parents[2] / "configs").glob("*.yaml"))
+BY_NAME = {path.stem: path for path in CONFIGS}
+
+every_config = pytest.mark.parametrize("path", CONFIGS, ids=BY_NAME)
+every_family = pytest.mark.parametrize("name", families.names())
+
+
+def designable(path: Path) -> bool:
+    return families.family(cfmkit.load(path).family).design is not None and cfmkit.load(path).design is not None
+
+
+every_design = pytest.mark.parametrize(
+    "path", [path for path in CONFIGS if designable(path)], ids=lambda path: path.stem
+)
+
+
+def numbers(quantities):
+    return {name: (quantity.value, quantity.dimension) for name, quantity in quantities.items()}
+
+
+@every_family
+def test_a_family_has_a_config_and_the_config_of_its_template(name):
+    record = families.family(name)
+    assert record.name == name
+    assert {cfmkit.load(path).family for path in CONFIGS} >= {name}
+    spec = cfmkit.loads(files("cfmkit").joinpath("templates", record.template).read_bytes())
+    assert spec.family == name
+
+
+@every_family
+def test_the_template_mentions_every_key_of_the_mechanism_the_design_and_the_analysis(name):
+    text = files("cfmkit").joinpath("templates", families.family(name).template).read_text()
+    paths = [key.path.split(".") for key in keys(name)]
+    named = {path[1] for path in paths if path[0] in ("mechanism", "design", "analysis") and len(path) == 2}
+    assert {word for word in named if f"{word}:" not in text} == set()
+
+
+@every_family
+def test_what_a_family_says_about_itself_is_complete(name):
+    record = families.family(name)
+    assert record.summary
+    assert record.references
+    assert all(DIMENSIONS[dimension] and definition for dimension, definition in record.values.values())
+    assert all(record.findings.values())
+    for module, function in ((record.draw, "figures"), (record.outline, "drawing")):
+        assert module is None or callable(getattr(import_module(module), function))
+
+
+@every_config
+def test_a_config_solves_and_meets_its_requirements(path):
+    found = report.report_on(api.analyze(cfmkit.load(path)))
+    assert found.result.status is Status.COMPLETE, found.result.message
+    assert found.requirements
+    assert [outcome.sentence for outcome in found.missed] == []
+
+
+@every_config
+@pytest.mark.parametrize("complete", [False, True])
+def test_a_config_round_trips_through_yaml(path, complete):
+    spec = cfmkit.load(path)
+    assert cfmkit.loads(cfmkit.dumps(spec, complete)) == spec
+    resolved = api.resolve(spec)
+    assert cfmkit.loads(cfmkit.dumps(resolved, complete)) == resolved
+    assert api.resolve(resolved) == resolved
+
+
+@every_config
+def test_the_arrays_of_a_result_are_finite_and_cannot_be_written_to(path):
+    result = api.analyze(cfmkit.load(path))
+    for curve in result.curves:
+        for name, column in curve.columns():
+            assert not column.values.flags.writeable, name
+            assert len(column.values) == len(curve)
+        assert np.isfinite(curve.motion).all()
+        assert np.isfinite(curve.effort[curve.stable]).all()
+        assert np.isnan(curve.effort).mean() < 0.01
+        with pytest.raises(ValueError, match="read-only"):
+            curve.motion[0] = 1.0
+
+
+@every_config
+def test_the_same_spec_gives_the_same_result(path):
+    one, other = (api.analyze(cfmkit.load(path)) for _ in range(2))
+    assert numbers(api.evaluate(one)) == numbers(api.evaluate(other))
+    for curve, again in zip(one.curves, other.curves, strict=True):
+        np.testing.assert_array_equal(curve.effort, again.effort)
+
+
+@every_config
+def test_the_resolved_spec_gives_the_same_result(path):
+    result = api.analyze(cfmkit.load(path))
+    again = api.analyze(cfmkit.loads(cfmkit.dumps(result.spec, complete=True)))
+    assert again.spec == result.spec
+    assert numbers(api.evaluate(again)) == numbers(api.evaluate(result))
+
+
+@every_config
+def test_every_numeric_leaf_can_be_replaced(path):
+    spec = cfmkit.load(path)
+    leaves = dict(spec.leaves())
+    assert len(leaves) > 5
+    for leaf, value in leaves.items():
+        new = value if isinstance(value, int) else value * (1 + 1e-9)
+        changed = spec.replace({leaf: new})
+        assert changed.at(leaf) == new, leaf
+        assert spec.at(leaf) == value, leaf
+        others = {other: item for other, item in changed.leaves() if other != leaf}
+        assert others == {other: item for other, item in leaves.items() if other != leaf}, leaf
+
+
+@every_config
+def test_every_value_and_finding_is_one_that_the_family_explains(path):
+    record, result = families.family(cfmkit.load(path).family), api.analyze(cfmkit.load(path))
+    assert set(result.values) <= set(record.values)
+    assert {item.name for item in result.warnings} <= set(record.findings)
+    for name, quantity in result.values.items():
+        assert (quantity.dimension, quantity.definition) == record.values[name]
+    assert set(record.headline) <= set(api.evaluate(result)), "a headline that no metric has"
+
+
+@every_config
+def test_a_cure_is_a_change_that_the_spec_takes(path):
+    spec = cfmkit.load(path)
+    for item in api.analyze(spec).warnings:
+        for cure in item.cures:
+            assert cfmkit.load(path, [cure]) != spec
+
+
+@every_config
+def test_spec_and_curves_survive_the_way_to_another_process(path):
+    result = api.analyze(cfmkit.load(path))
+    spec, curves = pickle.loads(pickle.dumps((result.spec, result.curves)))
+    assert spec == result.spec
+    np.testing.assert_array_equal(curves[0].effort, result.curve.effort)
+
+
+@every_design
+def test_a_design_is_judged_like_any_other_spec(path):
+    design = api.design(cfmkit.load(path))
+    assert design.status is Status.COMPLETE, design.message
+    written = cfmkit.loads(cfmkit.dumps(design.spec))
+    assert written == design.spec
+    direct, again = report.report_on(api.analyze(design.spec), design), report.report_on(api.analyze(written))
+    assert [outcome.sentence for outcome in direct.missed] == []
+    assert numbers(again.metrics) == numbers(direct.metrics)
+
+
+@every_design
+def test_designing_a_design_changes_nothing(path):
+    design = api.design(cfmkit.load(path))
+    assert api.design(design.spec).spec == design.spec
+
+
+@every_config
+def test_the_parts_of_a_config_can_be_drawn(path):
+    spec = cfmkit.load(path)
+    if families.family(spec.family).outline is None:
+        with pytest.raises(cfmkit.UsageError):
+            api.drawing(spec)
+        return
+    drawn = api.drawing(spec)
+    assert isinstance(drawn, Drawing)
+    assert any(contour.closed and contour.layer == "cut" for contour in drawn.contours)
+
+
+@every_config
+def test_the_files_of_a_run_are_the_same_every_time(path):
+    found = report.report_on(api.analyze(cfmkit.load(path)))
+    one, other = (dict(report.files(found, plots=False)) for _ in range(2))
+    assert {"metrics.json", "resolved.yaml", "curve.csv"} <= set(one)
+    assert one == other

@@ -1,0 +1,204 @@
+"""Cams as they were built: from a file with measured points to forces; points are made by formulas in `flanks`."""
+
+from __future__ import annotations
+
+import pickle
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from flanks import Errors, measured
+
+import cfmkit
+from cfmkit.bodies.cam_built import built_flank, built_track
+from cfmkit.errors import DataError, SpecError
+from cfmkit.families.cam.build import assemble
+from cfmkit.families.cam.built import flanks_of
+from cfmkit.studies.study import Study
+
+CONFIG = (Path(__file__).parents[2] / "configs/cam.yaml").read_text()
+
+
+def write(folder, points, head="side;x [mm];y [mm]"):
+    lines = [
+        f"{side};{x:.9f};{y:.9f}" for side, item in zip(("right", "left"), points, strict=True) for x, y in item * 1e3
+    ]
+    (folder / "measured.csv").write_text("\n".join([head, *lines]) + "\n")
+
+
+def spec_of(folder, noise="0.002 mm", window="[40 mm, 120 mm]", file="measured.csv"):
+    text = CONFIG.replace("stroke: 240 mm}", f"stroke: 240 mm, file: {file}, noise: {noise}}}", 1)
+    (folder / "cam.yaml").write_text(text.replace("window: [2 mm, 240 mm]", f"window: {window}"))
+    return cfmkit.load(folder / "cam.yaml")
+
+
+def built(folder, errors=None, noise="0.002 mm"):
+    write(folder, measured(errors))
+    return cfmkit.analyze(spec_of(folder, noise))
+
+
+def test_exact_points_give_the_forces_of_the_design(tmp_path):
+    found = built(tmp_path, Errors(), "0.000000001 mm")
+    designed = cfmkit.analyze(cfmkit.load(Path(__file__).parents[2] / "configs/cam.yaml")).curve
+    for branch in ("load", "unload"):
+        one, other = found.curve.on(branch), designed.on(branch)
+        order = np.argsort(other.motion)
+        expected = np.interp(one.motion, other.motion[order], other.effort[order])
+        assert np.abs(one.effort - expected)[one.motion > 0.005].max() < 2e-4
+    assert found.values["profile_force_share"].value < 1e-8
+    assert found.values["registration_angle"].value == pytest.approx(np.radians(-0.3), abs=1e-12)
+
+
+def test_the_parts_of_the_force_add_up_to_it(tmp_path):
+    write(tmp_path, measured(Errors(waviness=0.01e-3, noise=0.001e-3)))
+    spec = spec_of(tmp_path).replace({"mechanism.rest_half_width": 0.06825, "mechanism.profile.rest_half_width": 0.068})
+    curve = cfmkit.analyze(spec).curve
+    names = ("force_of_design", "added_by_rest_length", "added_by_profile", "added_by_friction")
+    assert sum(curve.extra[name].values for name in names) == pytest.approx(curve.effort, abs=1e-10)
+    assert curve.extra["force_of_design"].values == pytest.approx(np.full(len(curve), 4 * 1380 * 0.009058), rel=1e-9)
+    # 0.25 mm more on each side: F/F0 = 1 - d/D
+    elongation = curve.extra["spring_elongation"].values / 2 + 0.00025
+    assert curve.extra["added_by_rest_length"].values == pytest.approx(
+        -curve.extra["force_of_design"].values * 0.00025 / elongation, rel=1e-2
+    )
+
+
+def test_the_force_of_a_long_wave_is_that_of_its_slope(tmp_path):
+    """The contact's normal turns by e' = 2 pi a / L; the force by e' (1 + f^2) A / D at most: the note's eps/mu."""
+    wave = Errors(waviness=0.01e-3, length=40e-3)
+    share = built(tmp_path, wave, "0.00001 mm").curve.on("load")
+    inside = (share.motion > 0.05) & (share.motion < 0.13)
+    largest = np.abs(share.extra["added_by_profile"].values[inside]).max() / 50.0
+    slope = 2 * np.pi * 0.01e-3 / 40e-3
+    # eps/mu is 4.48 at 40 mm and 6.84 at 120 mm; the two flanks' waves are a radian apart.
+    assert 4.5 * np.cos(0.5) < largest / slope < 7.1
+
+
+def test_the_registered_errors_are_those_that_were_made(tmp_path):
+    found = built(tmp_path, Errors(waviness=0.02e-3, noise=0.002e-3)).values
+    assert found["profile_sd"].value == pytest.approx(0.02e-3 / 2**0.5, rel=0.05)
+    assert found["profile_sd_x"].value > found["profile_sd"].value
+
+
+def test_a_loop_area_gives_back_the_friction(tmp_path):
+    found = built(tmp_path, Errors(waviness=0.01e-3, noise=0.001e-3))
+    area = cfmkit.evaluate(found, ["hysteresis_area"])["hysteresis_area"].value
+    assert area / found.values["loop_area_per_friction"].value == pytest.approx(0.002, rel=5e-3)
+
+
+def test_different_flanks_give_different_contact_forces(tmp_path):
+    right, left = measured(), measured(Errors(waviness=0.02e-3))
+    write(tmp_path, [right[0], left[1]])
+    extra = cfmkit.analyze(spec_of(tmp_path)).curve.extra
+    assert np.ptp(extra["contact_force_right"].values - extra["contact_force_left"].values) > 0.5
+
+
+def test_a_roller_bridges_hollows_narrower_than_itself():
+    """Waves of 1 mm and 0.02 mm have hollows of 1.3 mm radius: the 16 mm roller runs on their crests.
+
+    Between two crests it sinks by L^2/8 (1/r + 1/rho), 8 to 10 um, far from the 40 um to the floor.
+    """
+    from cam_support import cam
+
+    assembly = assemble(cam())
+    flank = flanks_of(assembly)[0]
+    u = np.linspace(flank.ends[0], flank.ends[1], 6000)
+    along = np.cumsum(np.concatenate([[0.0], np.hypot(*np.diff(flank.frame(u).points, axis=0).T)]))
+    track = built_track(built_flank(flank, u, 0.02e-3 * np.sin(2 * np.pi * along / 1e-3), 0.0), 0.016, 0.2)
+    inside = (track.slider > track.slider[0] + 0.05) & (track.slider < track.slider[-1] - 0.01)
+    path = assembly.profile.path
+    slope = path.law.slope(track.x[inside])
+    lift = (path.height(track.x[inside]) - track.y[inside]) / np.hypot(1.0, slope)
+    assert 0.010e-3 < lift.min() < 0.0135e-3
+    assert lift.max() < 0.0205e-3
+
+
+def test_what_is_uncertain_and_what_was_not_measured_is_reported(tmp_path):
+    found = built(tmp_path, Errors(waviness=0.01e-3, noise=0.002e-3))
+    assert {item.name for item in found.warnings} >= {"registration_weak", "part_measured"}
+    assert found.status.key == "complete"
+    write(tmp_path, measured())
+    longer = cfmkit.analyze(spec_of(tmp_path).replace({"analysis.travel": 0.2}))
+    assert longer.status.key == "partial"
+    assert "measured up to 136.1 mm of travel only" in longer.message
+
+
+def test_the_spec_survives_changes_and_pickling(tmp_path):
+    write(tmp_path, measured())
+    spec = spec_of(tmp_path)
+    changed = pickle.loads(pickle.dumps(spec.replace({"mechanism.rolling_friction": 0.003})))
+    assert changed.at("mechanism.profile.file").path == tmp_path / "measured.csv"
+    assert cfmkit.analyze(changed).status.key == "complete"
+    assert "file: measured.csv" in cfmkit.dumps(spec)
+
+
+@pytest.mark.parametrize("name", ["../measured.csv", "/etc/passwd", "nothing.csv", "."])
+def test_a_file_outside_the_folder_or_missing_is_refused_with_its_place(tmp_path, name):
+    inner = tmp_path / "inner"
+    inner.mkdir()
+    write(tmp_path, measured())
+    with pytest.raises(SpecError, match=r"cam.yaml:\d+:\d+: mechanism.profile.file: "):
+        spec_of(inner, file=name)
+
+
+def test_file_and_noise_belong_together(tmp_path):
+    write(tmp_path, measured())
+    (tmp_path / "cam.yaml").write_text(CONFIG.replace("stroke: 240 mm}", "stroke: 240 mm, file: measured.csv}", 1))
+    with pytest.raises(SpecError, match="'file' and 'noise' belong together"):
+        cfmkit.load(tmp_path / "cam.yaml")
+
+
+@pytest.mark.parametrize(
+    ("text", "complaint"),
+    [
+        ("x;y\n" + "1;2\n" * 30, "the column 'x' needs a unit of length in the header: 'x [mm]'"),
+        ("a [mm];b [mm]\n" + "1;2\n" * 30, "needs a header with columns 'x [mm]' and 'y [mm]'"),
+        ("x [mm];y [mm]\n" + "60;2\n" * 30, "both flanks are needed with at least 20 points each"),
+        ("x [mm];y [N]\n" + "60;2\n" * 30, "the column 'y' needs a unit of length"),
+        ("side;x [mm];y [mm]\n" + "middle;60;2\n" * 30, "the side is 'middle'; it must be 'left' or 'right'"),
+        ("x [mm];y [mm]\n" + "60;2\n" * 9 + "60;NaN\n" + "60;3\n" * 30, "line 11: 'NaN' is no number"),
+        ("", "the file is empty"),
+    ],
+)
+def test_bad_points_are_refused_in_one_line(tmp_path, text, complaint):
+    (tmp_path / "measured.csv").write_text(text)
+    with pytest.raises(DataError, match=re.escape(complaint)) as caught:
+        cfmkit.analyze(spec_of(tmp_path))
+    assert str(caught.value).startswith("measured.csv: ")
+    assert "\n" not in str(caught.value)
+
+
+def test_without_a_side_column_the_sign_of_x_tells_the_sides(tmp_path):
+    points = measured(move=(0.0, np.zeros(2)))
+    rows = [f"{x:.9f};{y:.9f}" for item in points for x, y in item * 1e3]
+    (tmp_path / "measured.csv").write_text("x [mm];y [mm]\n" + "\n".join(rows) + "\n")
+    found = cfmkit.analyze(spec_of(tmp_path, "0.000000001 mm"))
+    assert found.values["profile_rmse"].value < 1e-11
+
+
+def test_pictures_are_drawn(tmp_path):
+    from cfmkit.api import figures
+
+    found = built(tmp_path, Errors(waviness=0.01e-3, noise=0.002e-3))
+    assert set(figures(found)) == {"loop", "profile", "shares"}
+    assert all(draw().axes for draw in figures(found).values())
+
+
+def test_the_model_for_many_variants_leaves_measured_cams_to_this_one(tmp_path):
+    from cfmkit.families.base import Block, Measure
+    from cfmkit.families.cam.block import analyze_block
+
+    write(tmp_path, measured())
+    block = Block({"mechanism.rolling_friction": np.array([0.001, 0.002])}, (Measure("force_ripple", None),), 2)
+    assert analyze_block(spec_of(tmp_path), block) is None
+
+
+def test_a_study_knows_a_data_file_by_its_content(tmp_path):
+    def key():
+        return Study(spec_of(tmp_path), ("mechanism.rolling_friction",), ()).key((0.002,))
+
+    write(tmp_path, measured())
+    first, again = key(), key()
+    write(tmp_path, measured(Errors(noise=0.001e-3)))
+    assert first == again != key()

@@ -1,0 +1,171 @@
+"""A cam model beside recordings that the model itself made, with known values and stated noise."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from cam_support import analyze, cam, fixed
+from experiment_support import triangle
+
+from cfmkit.errors import DataError, SolutionError, UsageError
+from cfmkit.experiment.calibration import calibrate, resolved
+from cfmkit.experiment.comparison import compare
+from cfmkit.experiment.measured import measured
+from cfmkit.experiment.parameters import parameters, read_bounds
+from cfmkit.experiment.reading import Recording
+from cfmkit.metrics import Window
+
+FRICTION, REST = "mechanism.rolling_friction", "mechanism.rest_half_width"
+STIFFNESS, CONSTANT = "mechanism.springs.stiffness", "mechanism.profile.force_constant"
+
+
+def built(friction=0.002, **changes):
+    """The published cam as a finished part, measured from 5 to 230 mm."""
+    return resolved(fixed(cam(analysis__window=("5 mm", "230 mm")), rolling_friction=friction, **changes))
+
+
+def recording(spec, noise=0.0, seed=0, shift=0.0):
+    """The model's own loop with normal noise of that standard deviation [N], and a constant force added."""
+    curve = analyze(spec).curve
+    good = np.isfinite(curve.force)
+    spread = np.random.default_rng(seed).normal(0.0, noise, int(good.sum())) if noise else 0.0
+    return measured(Recording("made.csv", curve.motion[good], curve.force[good] + spread + shift), None)
+
+
+def test_a_model_has_no_error_beside_its_own_curve():
+    spec = built()
+    metrics = compare(analyze(spec), recording(spec)).metrics()
+    assert all(abs(item.value) < 1e-9 for item in metrics.values())
+    assert {"data_rmse", "data_rmse[load]", "data_offset[unload]", "data_error_max[load]"} <= set(metrics)
+
+
+def test_a_constant_difference_is_the_offset_and_the_root_mean_square():
+    spec = built()
+    metrics = compare(analyze(spec), recording(spec, shift=0.3)).metrics()
+    for branch in ("load", "unload"):
+        assert metrics[f"data_offset[{branch}]"].value == pytest.approx(-0.3, abs=1e-9)
+        assert metrics[f"data_rmse[{branch}]"].value == pytest.approx(0.3, abs=1e-9)
+        assert metrics[f"data_error_max[{branch}]"].value == pytest.approx(-0.3, abs=1e-9)
+
+
+def test_model_and_measurement_are_compared_where_both_exist():
+    spec = built(analysis__travel="100 mm")
+    found = compare(analyze(spec), recording(built()), Window(0.02, 0.2))
+    assert (found.window.lo, found.window.hi) == pytest.approx((0.02, 0.1))
+
+
+def test_a_measurement_elsewhere_or_of_another_kind_is_refused():
+    spec = built()
+    motion = triangle(1) / 1e3
+    far = measured(Recording("far.csv", 1.0 + motion, 50 + motion), None)
+    with pytest.raises(DataError, match="no travel in common; is the zero of the displacement the same"):
+        compare(analyze(spec), far)
+    turned = measured(Recording("turned.csv", motion, 50 + motion, kind="torque"), None)
+    with pytest.raises(DataError, match="holds a torque curve, but the mechanism has a force curve"):
+        compare(analyze(spec), turned)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_friction_and_rest_length_are_found_within_their_intervals(seed):
+    source = recording(built(0.00225, rest_half_width="68.25 mm"), 0.1, seed)
+    start = built(0.002)
+    found = calibrate(start, source, parameters(start, [FRICTION, REST]))
+    half = found.fit.half_widths()
+    assert found.warnings == ()
+    assert (np.abs(found.fit.values - [0.00225, 0.06825]) < 1.6 * half).all()
+    assert found.fit.noise == pytest.approx(0.1, rel=0.1)
+    assert found.after.metrics()["data_rmse"].value < 0.3 * found.before.metrics()["data_rmse"].value
+
+
+def test_a_fit_from_no_friction_finds_it():
+    source, start = recording(built(0.003)), built(0.0)
+    found = calibrate(start, source, parameters(start, [FRICTION]))
+    assert found.fit.values == pytest.approx([0.003], rel=1e-6)
+
+
+def test_outliers_hardly_move_the_robust_fit():
+    source, start = recording(built(0.00225), 0.02), built(0.002)
+    effort = np.array(source.recording.effort)
+    effort[50::40] += 5.0
+    spoilt = measured(Recording("spoilt.csv", source.recording.motion, effort), None)
+    errors = {
+        loss: abs(calibrate(start, spoilt, parameters(start, [STIFFNESS]), loss).fit.values[0] - 682.5)
+        for loss in ("linear", "soft_l1")
+    }
+    assert errors["soft_l1"] < 0.2 * errors["linear"]
+
+
+def test_the_built_cam_keeps_its_shape_while_the_rest_length_is_fitted():
+    """Else the fit would cut a new cam for every trial, whose force does not depend on the rest length at all."""
+    start = resolved(cam(analysis__window=("5 mm", "230 mm")))
+    source = recording(built(rest_half_width="68.25 mm", friction=0.0))
+    found = calibrate(start, source, parameters(start, [REST]))
+    assert found.fit.values == pytest.approx([0.06825], rel=1e-7)
+    assert found.spec.at("mechanism.profile.rest_half_width") == 0.068
+
+
+def test_stiffness_and_force_constant_cannot_be_told_apart_without_friction_and_are_named():
+    start = built(0.0)
+    with pytest.raises(SolutionError) as caught:
+        calibrate(start, recording(built(0.0)), parameters(start, [STIFFNESS, FRICTION, CONSTANT]))
+    assert str(caught.value) == (
+        f"the measured curve cannot tell {STIFFNESS} and {CONSTANT} apart: one makes up for the other; "
+        "fit only one of them"
+    )
+
+
+def test_with_friction_they_are_told_apart_only_by_it_and_the_fit_says_so():
+    start = built()
+    found = calibrate(start, recording(built(), 0.1), parameters(start, [STIFFNESS, CONSTANT]))
+    assert abs(found.fit.correlation[0, 1]) > 0.999
+    assert {item.name for item in found.warnings} == {"weakly_identified"}
+
+
+def test_a_value_without_effect_is_named():
+    start = built()
+    with pytest.raises(SolutionError, match=r"says nothing about mechanism\.plate\.top_margin"):
+        calibrate(start, recording(start), parameters(start, [FRICTION, "mechanism.plate.top_margin"]))
+
+
+def test_a_fitted_value_on_its_bound_is_reported():
+    start, source = built(0.002), recording(built(0.004))
+    found = calibrate(start, source, parameters(start, [FRICTION], {FRICTION: (0.001, 0.003)}))
+    assert found.fit.values == pytest.approx([0.003], rel=1e-6)
+    assert [item.name for item in found.warnings] == ["at_bound"]
+
+
+@pytest.mark.parametrize(
+    ("paths", "complaint"),
+    [
+        (["mechanism.rolling_frictio"], "did you mean 'mechanism.rolling_friction'"),
+        (["mechanism.springs"], "is a block"),
+        (["mechanism.springs.count"], "is not a number that can change by small steps"),
+        (["mechanism.springs.max_elongation"], "has no value to start from; give one with --set"),
+        (["requirements.0.max"], "nothing to vary"),
+        ([""], "--fit is empty"),
+        ([FRICTION, FRICTION], "twice"),
+    ],
+)
+def test_what_cannot_be_fitted_is_a_usage_error(paths, complaint):
+    with pytest.raises(UsageError, match=complaint):
+        parameters(built(), paths)
+
+
+def test_the_bounds_of_the_specification_hold_besides_those_of_the_user():
+    (found,) = parameters(built(), [FRICTION], {FRICTION: (-1.0, 0.5)})
+    assert (found.low, found.high) == (0.0, 0.5)
+    (found,) = parameters(built(), [REST])
+    assert 0 < found.low < 1e-9
+    assert found.high == np.inf
+
+
+@pytest.mark.parametrize(
+    "text", ["a", "mechanism.rolling_friction=1", "mechanism.rest_half_width=1:2", f"{FRICTION}=2:1"]
+)
+def test_malformed_bounds_are_usage_errors(text):
+    with pytest.raises(UsageError, match="--bounds"):
+        read_bounds([text], built())
+
+
+def test_bounds_are_read_with_their_units():
+    assert read_bounds([f"{REST}=60 mm:7 cm"], built()) == {REST: (0.06, 0.07)}

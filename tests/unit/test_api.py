@@ -1,0 +1,186 @@
+"""The Python API: specifications in and out, results, errors; and the report that the files are made of."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import cfmkit
+from cfmkit import families, keys, report, specfile
+from cfmkit.errors import ExitCode
+from cfmkit.results import Design, Finding, Result, Status
+from cfmkit.yamlio import read_document
+
+CAM = Path(__file__).parents[2] / "configs" / "cam.yaml"
+
+
+@pytest.fixture(scope="module")
+def spec():
+    return cfmkit.load(CAM)
+
+
+@pytest.fixture(scope="module")
+def result(spec):
+    return cfmkit.analyze(spec)
+
+
+def test_the_readme_example_works():
+    spec = cfmkit.load(CAM)
+    result = cfmkit.analyze(spec)
+    assert result.curve.force.shape == (2 * 481,)
+    assert not result.curve.force.flags.writeable
+
+
+def test_load_takes_changes_as_the_option_set_does():
+    spec = cfmkit.load(CAM, ["mechanism.roller_radius=10 mm", "analysis.points=11"])
+    assert (spec.mechanism.roller_radius, spec.analysis.points) == (0.01, 11)
+
+
+def test_loads_names_its_source_in_every_fault():
+    with pytest.raises(cfmkit.SpecError) as caught:
+        cfmkit.loads("family: cam\nmechanism: 3\n", source="here")
+    assert [problem.source for problem in caught.value.problems] == ["here"]
+
+
+def test_dumps_is_short_unless_it_is_to_be_complete(spec):
+    assert "plate" not in cfmkit.dumps(spec)
+    assert "top_margin: 10 mm" in cfmkit.dumps(spec, complete=True)
+
+
+def test_a_missing_file_is_a_usage_error():
+    with pytest.raises(cfmkit.UsageError, match=r"did you mean '.*cam\.yaml'"):
+        cfmkit.load(CAM.with_name("cm.yaml"))
+
+
+def test_every_error_is_a_cfmerror_with_its_exit_code():
+    kinds = [getattr(cfmkit, name) for name in cfmkit.__all__ if name.endswith("Error") or name == "FolderInUse"]
+    assert len(kinds) >= 9
+    assert all(issubclass(kind, cfmkit.CfmError) for kind in kinds)
+    assert all(isinstance(kind.exit_code, ExitCode) for kind in kinds)
+
+
+def test_evaluate_takes_names_and_branches(result):
+    found = cfmkit.evaluate(result, ["force_mean[load]", "force_constant"])
+    assert list(found) == ["force_mean[load]", "force_constant"]
+    assert found["force_constant"].value == pytest.approx(0.009058)
+    with pytest.raises(cfmkit.UsageError, match="did you mean 'force_mean'"):
+        cfmkit.evaluate(result, ["force_men"])
+
+
+def test_check_gives_an_outcome_for_each_requirement(spec, result):
+    assert [outcome.metric for outcome in cfmkit.check(result)] == [item.metric for item in spec.requirements]
+
+
+def test_design_of_a_family_that_cannot_be_designed_is_a_usage_error(monkeypatch, spec):
+    from dataclasses import replace
+
+    record = replace(families.family("cam"), design=None, outline=None, draw=None)
+    monkeypatch.setattr("cfmkit.api.family", lambda name: record)
+    with pytest.raises(cfmkit.UsageError, match="cannot be designed"):
+        cfmkit.design(spec)
+    with pytest.raises(cfmkit.UsageError, match="no part to draw"):
+        cfmkit.drawing(spec)
+
+
+def test_progress_and_seed_reach_the_family(monkeypatch, spec):
+    from dataclasses import replace
+
+    seen = []
+    record = replace(families.family("cam"), analyze=lambda spec, run: seen.append(run))
+    monkeypatch.setattr("cfmkit.api.family", lambda name: record)
+    cfmkit.analyze(spec, cfmkit.Run(seed=3))
+    assert seen[0].seed == 3
+
+
+@pytest.mark.parametrize(
+    ("codes", "first"),
+    [
+        ([], ExitCode.OK),
+        ([ExitCode.OK, ExitCode.REQUIREMENT_MISSED], ExitCode.REQUIREMENT_MISSED),
+        ([ExitCode.REQUIREMENT_MISSED, ExitCode.PARTIAL], ExitCode.PARTIAL),
+        ([ExitCode.PARTIAL, ExitCode.NO_SOLUTION], ExitCode.NO_SOLUTION),
+        ([ExitCode.NO_SOLUTION, ExitCode.INVALID], ExitCode.INVALID),
+        ([ExitCode.INVALID, ExitCode.IO], ExitCode.IO),
+        ([ExitCode.IO, ExitCode.BUG], ExitCode.BUG),
+        ([ExitCode.OK, ExitCode.INTERRUPTED], ExitCode.INTERRUPTED),
+    ],
+)
+def test_of_several_exit_codes_the_gravest_counts(codes, first):
+    assert report.worst(codes) is first
+    assert report.worst(codes[::-1]) is first
+
+
+def test_a_report_without_a_curve_has_no_metrics_and_misses_its_requirements(spec):
+    found = report.report_on(Result(spec, Status.INFEASIBLE, "too much"))
+    assert found.metrics == {}
+    assert len(found.missed) == len(spec.requirements)
+    assert found.exit_code is ExitCode.NO_SOLUTION
+    assert found.as_json()["message"] == "too much"
+    assert [name for name, _ in report.files(found)] == ["metrics.json", "resolved.yaml"]
+
+
+def test_warnings_of_design_and_analysis_are_told_once(spec):
+    one, other = Finding("a", "first"), Finding("b", "second")
+    result = Result(spec, Status.COMPLETE, warnings=(other, one))
+    found = report.Report(result, {}, (), Design(spec, Status.COMPLETE, warnings=(one,)))
+    assert found.warnings == (one, other)
+    assert found.as_json()["warnings"] == [{"name": "a", "message": "first"}, {"name": "b", "message": "second"}]
+
+
+def test_not_a_number_never_reaches_a_file():
+    with pytest.raises(ValueError, match="Out of range float values"):
+        report.json_bytes({"value": np.nan})
+
+
+def test_the_schema_of_several_families_keeps_their_blocks_apart(monkeypatch):
+    alone = keys.schema(["cam"])
+    cam = families.family("cam")
+    monkeypatch.setattr(keys, "family", lambda name: cam)
+    both = keys.schema(["cam", "other"])
+    assert [one["properties"]["mechanism"]["$ref"] for one in both["oneOf"]] == [
+        "#/$defs/cam.Mechanism",
+        "#/$defs/other.Mechanism",
+    ]
+    names = set(alone["$defs"])
+    assert set(both["$defs"]) == {f"{family}.{name}" for family in ("cam", "other") for name in names}
+
+
+def references(node):
+    """Yield every reference in a schema."""
+    if isinstance(node, dict):
+        yield from ([node["$ref"]] if "$ref" in node else [])
+        for value in node.values():
+            yield from references(value)
+    elif isinstance(node, list):
+        for value in node:
+            yield from references(value)
+
+
+def test_every_reference_of_a_schema_leads_somewhere():
+    for names in (["cam"], list(families.names())):
+        schema = keys.schema(names)
+        assert {name.removeprefix("#/$defs/") for name in references(schema)} <= set(schema["$defs"])
+
+
+def test_faults_of_requirements_are_found_beside_others():
+    document = read_document("family: cam\nmechanism: 1\nrequirements:\n  - {metric: riple, max: 1}\n", "x")
+    with pytest.raises(cfmkit.SpecError) as caught:
+        specfile.bind(document)
+    assert [(problem.line, problem.path) for problem in caught.value.problems] == [
+        (2, "mechanism"),
+        (4, "requirements.0.metric"),
+    ]
+
+
+def test_a_requirement_that_cannot_be_read_is_complained_about_once():
+    document = read_document("family: cam\nmechanism: 1\nrequirements:\n  - {metric: riple, max: x y}\n", "x")
+    with pytest.raises(cfmkit.SpecError) as caught:
+        specfile.bind(document)
+    assert [problem.path for problem in caught.value.problems] == ["mechanism", "requirements.0.max"]
+
+
+def test_the_name_of_an_option_stands_for_the_option_that_it_is_short_for():
+    error = cfmkit.SpecError([cfmkit.Problem("--set a", 0, 0, "a", "wrong"), cfmkit.Problem("f", 1, 1, "b", "wrong")])
+    assert [one.source for one in specfile.renamed(error, "--set a", "--a").problems] == ["--a", "f"]

@@ -1,0 +1,180 @@
+"""The direction of imports, and who may import what: read off the source, nothing is run."""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2] / "cfmkit"
+
+LAYERS = (
+    ("cli", "__main__"),
+    ("report",),
+    ("api", "specfile", "keys"),
+    ("plots", "export", "studies", "experiment"),
+    ("families",),
+    ("beams", "bodies"),
+    ("numerics", "decimals"),
+    ("yamlio",),
+    ("spec", "metrics", "tables", "geometry", "store", "materials", "jsontext"),
+    ("results",),
+    ("curves",),
+    ("units",),
+    ("errors", "_version"),
+)
+"""From the top down: a module may import its own layer and those below."""
+
+# Where a lower layer may reach up, and why.
+EXCEPTIONS = {
+    ("spec", "yamlio"): "a changed spec reports its faults in the words of a file",
+    ("tables", "decimals"): "millimetres as decimals",
+    ("results", "spec"): "types only, and a doctest",
+    ("results", "tables"): "`Result.to_pandas`",
+    ("families", "plots"): "draw.py uses the style that all families share",
+}
+
+RANK = {name: len(LAYERS) - rank for rank, layer in enumerate(LAYERS) for name in layer}
+SOURCES = sorted(ROOT.rglob("*.py"))
+
+
+def unit_of(path: Path) -> str:
+    """Return the part of the package that a file belongs to."""
+    return path.relative_to(ROOT).parts[0].removesuffix(".py")
+
+
+def type_checking_lines(tree: ast.Module) -> set[int]:
+    """Return the lines below ``if TYPE_CHECKING``: they import nothing when the program runs."""
+    blocks = (node for node in ast.walk(tree) if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test))
+    return {line for block in blocks for line in range(block.lineno, (block.end_lineno or block.lineno) + 1)}
+
+
+def imports(path: Path, types: bool = False) -> list[str]:
+    """Return the dotted names that a file imports at run time (or also for types only)."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    skipped = set() if types else type_checking_lines(tree)
+    found = []
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import) and node.lineno not in skipped:
+            found += [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom) and node.lineno not in skipped:
+            assert node.level == 0, f"{path}:{node.lineno}: relative import"
+            found += [f"{node.module}.{alias.name}" for alias in node.names]
+    return found
+
+
+def top_level_imports(path: Path) -> list[str]:
+    """Return what is imported when a file is, not inside a function."""
+    body = ast.parse(path.read_text(encoding="utf-8")).body
+    found = []
+    for node in body:
+        if isinstance(node, ast.Import):
+            found += [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            found.append(node.module or "")
+    return found
+
+
+def targets(path: Path) -> set[str]:
+    """Return the parts of the package that a file imports."""
+    names = (name.split(".") for name in imports(path))
+    return {parts[1] if len(parts) > 1 else "" for parts in names if parts[0] == "cfmkit"}
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_a_module_imports_its_own_layer_and_those_below(path):
+    own = unit_of(path)
+    if own == "__init__":
+        return
+    assert own in RANK, f"{own} has no place among the layers"
+    upward = {
+        target
+        for target in targets(path) - {own, "", "__version__"}
+        if RANK.get(target, 0) > RANK[own] and (own, target) not in EXCEPTIONS
+    }
+    assert upward == set()
+
+
+def test_every_exception_is_still_needed():
+    used = {(unit_of(path), target) for path in SOURCES for target in targets(path)}
+    used |= {
+        (unit_of(path), name.split(".")[1])
+        for path in SOURCES
+        for name in imports(path, types=True)
+        if "cfmkit." in name
+    }
+    assert set(EXCEPTIONS) - used == set()
+
+
+def test_families_do_not_import_each_other():
+    families = sorted(folder for folder in (ROOT / "families").iterdir() if (folder / "__init__.py").exists())
+    for folder in families:
+        others = {f"cfmkit.families.{other.name}" for other in families if other != folder}
+        for path in folder.rglob("*.py"):
+            assert not [name for name in imports(path, types=True) for other in others if name.startswith(f"{other}.")]
+
+
+ALLOWED = {
+    "matplotlib": lambda path: unit_of(path) == "plots" or path.name == "draw.py",
+    "typer": lambda path: unit_of(path) == "cli",
+    "rich": lambda path: unit_of(path) == "cli",
+    "pydantic": lambda path: unit_of(path) in ("units", "yamlio") or path.name == "spec.py",
+    "pydantic_core": lambda path: unit_of(path) == "units",
+    "pint": lambda path: unit_of(path) == "units",
+    "yaml": lambda path: unit_of(path) == "yamlio",
+    "ezdxf": lambda path: unit_of(path) == "export",
+    "shapely": lambda path: unit_of(path) == "export",
+    "pandas": lambda path: path.name == "results.py",
+}
+
+
+@pytest.mark.parametrize("library", ALLOWED)
+def test_a_library_is_imported_only_where_it_belongs(library):
+    users = [path for path in SOURCES if any(name.split(".")[0] == library for name in imports(path))]
+    assert [str(path.relative_to(ROOT)) for path in users if not ALLOWED[library](path)] == []
+
+
+@pytest.mark.parametrize("library", ["scipy", "pint", "ezdxf", "shapely", "pandas"])
+def test_a_slow_library_is_imported_inside_the_function_that_needs_it(library):
+    eager = [path for path in SOURCES if any(name.split(".")[0] == library for name in top_level_imports(path))]
+    assert eager == []
+
+
+def test_the_command_line_starts_without_numpy_and_pydantic():
+    light = [path for path in (ROOT / "cli").rglob("*.py") if path.parent.name == "verbs"]
+    light += [ROOT / "cli" / f"{name}.py" for name in ("main", "commands", "options", "answer", "failures", "terminal")]
+    heavy = ("numpy", "pydantic", "rich", "yaml", "cfmkit.api", "cfmkit.spec", "cfmkit.metrics", "cfmkit.yamlio")
+    for path in light:
+        assert not [name for name in top_level_imports(path) if name.startswith(heavy)], path
+
+
+def test_no_one_asks_which_family_it_is():
+    for path in SOURCES:
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Compare):
+                sides = [node.left, *node.comparators]
+                named = any(
+                    isinstance(side, ast.Name | ast.Attribute) and "family" in ast.unparse(side) for side in sides
+                )
+                literal = any(isinstance(side, ast.Constant) and isinstance(side.value, str) for side in sides)
+                assert not (named and literal), f"{path}:{node.lineno}: {ast.unparse(node)}"
+
+
+def longest_function(path: Path) -> tuple[int, str]:
+    """Return (lines of code, name) of the longest function in a file, docstring left out."""
+    sizes = [(0, "")]
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.FunctionDef):
+            first = node.body[0]
+            documented = isinstance(first, ast.Expr) and isinstance(first.value, ast.Constant)
+            start = first.end_lineno if documented else node.lineno
+            sizes.append(((node.end_lineno or 0) - (start or 0), node.name))
+    return max(sizes)
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_files_and_functions_stay_small(path):
+    assert len(path.read_text(encoding="utf-8").splitlines()) <= 300
+    size, name = longest_function(path)
+    assert size <= 60, name

@@ -1,0 +1,170 @@
+"""Which files a batch takes, where they write, and the JUnit XML that comes of it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+
+from cfmkit.errors import ExitCode, UsageError
+from cfmkit.studies.batch import Entry, folders, message, requirements_table, results_table, sources
+from cfmkit.studies.junit import junit
+
+
+@pytest.fixture
+def tree(tmp_path, monkeypatch):
+    for name in ("a.yaml", "b.yml", "sub/a.yaml", "sub/deep/c.YAML", "note.txt", "cfm-out/batch/a/design.yaml"):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text("family: cam")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    ("named", "found"),
+    [
+        (["a.yaml", "b.yml"], ["a.yaml", "b.yml"]),
+        (["*.yaml"], ["a.yaml"]),
+        (["**/*.yaml"], ["a.yaml", "sub/a.yaml"]),
+        (["sub"], ["sub/a.yaml", "sub/deep/c.YAML"]),
+        (["."], ["./a.yaml", "./b.yml", "./sub/a.yaml", "./sub/deep/c.YAML"]),
+        (["sub/a.yaml", "**/a.yaml"], ["sub/a.yaml", "a.yaml"]),
+        (["a.yaml", "./a.yaml", "sub/../a.yaml"], ["a.yaml"]),
+        (["note.txt"], ["note.txt"]),
+    ],
+)
+def test_files_folders_and_patterns_give_each_file_once(tree, named, found):
+    assert list(sources(named, "cfm-out/batch")) == found
+
+
+def test_results_of_an_earlier_batch_are_no_specifications(tree):
+    (tree / "mine" / "a").mkdir(parents=True)
+    (tree / "mine" / "a" / "design.yaml").write_text("family: cam")
+    assert "mine/a/design.yaml" in sources(["**/*.yaml"], "cfm-out/batch")
+    assert "mine/a/design.yaml" not in sources(["**/*.yaml"], "mine")
+
+
+def test_a_file_whose_name_looks_like_a_pattern_is_that_file(tree):
+    (tree / "cam[1].yaml").write_text("family: cam")
+    assert sources(["cam[1].yaml"], "out") == ("cam[1].yaml",)
+
+
+@pytest.mark.parametrize(("name", "words"), [("c*.yaml", "no file matches"), ("x.yaml", "no such"), ("-", "a batch")])
+def test_what_stands_for_no_file_is_refused(tree, name, words):
+    with pytest.raises(UsageError, match=words):
+        sources([name], "out")
+
+
+def test_a_folder_without_specifications_is_refused(tree):
+    (tree / "empty").mkdir()
+    with pytest.raises(UsageError, match="no YAML file"):
+        sources(["empty"], "out")
+
+
+@pytest.mark.parametrize(
+    ("files", "names"),
+    [
+        (["x/cam.yaml", "x/beam.yaml"], ["cam", "beam"]),
+        (["x/cam.yaml", "y/cam.yaml"], ["x-cam", "y-cam"]),
+        (["x/a/cam.yaml", "y/a/cam.yaml", "z/b/cam.yaml"], ["x-a-cam", "y-a-cam", "b-cam"]),
+        (["x/cam.yaml", "x/cam.yml"], ["cam", "cam-2"]),
+        (["results.csv.yaml", "manifest.json.yaml"], ["results.csv-2", "manifest.json-2"]),
+        ([".cfmkit-run.yaml", "..yaml"], ["spec.cfmkit-run", "spec."]),
+    ],
+)
+def test_every_specification_has_a_folder_of_its_own(files, names):
+    assert list(folders(files)) == names
+
+
+def test_folders_differ_even_where_capitals_do_not_count():
+    found = folders(["Cam.yaml", "x/cam.yaml"])
+    assert len({name.lower() for name in found}) == 2
+
+
+MET = {
+    "metric": "force_ripple", "value": 0.01, "min": None, "max": 0.05, "unit": "1", "over": [2.0, 240.0],
+    "over_unit": "mm", "ok": True, "sentence": "force ripple 1 %, allowed <= 5 %: ok",
+}  # fmt: skip
+MISSED = MET | {"metric": "force_mean[load]", "min": 49.0, "max": 51.0, "unit": "N", "over": None, "ok": False}
+ENTRIES = (
+    Entry("ok.yaml", "ok", "design", "cam", "fine", "complete", ExitCode.OK, "", (MET,), seconds=1.5),
+    Entry(
+        "missed.yaml", "missed", "analyze", "cam", "weak", "complete", ExitCode.REQUIREMENT_MISSED, "x", (MET, MISSED)
+    ),
+    Entry(
+        "bad.yaml", "bad", status="invalid", code=ExitCode.INVALID, message="1 fault", errors=("bad.yaml:1:1: \x00<&",)
+    ),
+    Entry("none.yaml", "none", "design", "cam", "n", "infeasible", ExitCode.NO_SOLUTION, "too stiff", (MISSED,)),
+    Entry("part.yaml", "part", "analyze", "cam", "p", "partial", ExitCode.PARTIAL, "ends early", (MET,)),
+    Entry("bug.yaml", "bug", status="bug", code=ExitCode.BUG, message="KeyError", bug="Traceback ..."),
+    Entry("left.yaml", "left", message="not run"),
+)
+
+
+def suites():
+    return {suite.get("name"): suite for suite in ElementTree.fromstring(junit(ENTRIES))}
+
+
+def ends(suite):
+    return [next((child.tag for child in case if child.tag != "system-out"), "passed") for case in suite]
+
+
+def test_junit_has_a_suite_for_each_specification_and_a_test_for_each_requirement():
+    found = suites()
+    assert list(found) == [one.spec for one in ENTRIES]
+    assert ends(found["ok.yaml"]) == ["passed", "passed"]
+    assert ends(found["missed.yaml"]) == ["passed", "passed", "failure"]
+    assert ends(found["bad.yaml"]) == ["error"]
+    assert ends(found["none.yaml"]) == ["failure", "skipped"]
+    assert ends(found["part.yaml"]) == ["failure", "passed"]
+    assert ends(found["bug.yaml"]) == ["error"]
+    assert ends(found["left.yaml"]) == ["skipped"]
+
+
+def test_the_counts_of_junit_are_those_of_its_tests():
+    root = ElementTree.fromstring(junit(ENTRIES))
+    for element in (root, *root):
+        cases = list(element.iter("testcase"))
+        assert int(element.get("tests")) == len(cases)
+        for key, tag in (("failures", "failure"), ("errors", "error"), ("skipped", "skipped")):
+            assert int(element.get(key)) == len(list(element.iter(tag)))
+        assert float(element.get("time")) == pytest.approx(sum(float(case.get("time")) for case in cases))
+    assert float(root.get("time")) == 1.5
+
+
+def test_the_name_of_a_test_holds_the_requirement_and_never_the_value():
+    _, first, second = suites()["missed.yaml"]
+    assert first.get("name") == "force_ripple <= 0.05 over 2 ... 240 mm"
+    assert second.get("name") == "force_mean[load] >= 49 N and <= 51 N"
+    assert second.find("failure").get("message") == MISSED["sentence"]
+
+
+def test_the_same_requirement_twice_gives_two_tests():
+    entry = Entry("a.yaml", "a", "analyze", "cam", "a", "complete", ExitCode.OK, "", (MET, MET))
+    names = [case.get("name") for case in ElementTree.fromstring(junit([entry])).iter("testcase")]
+    assert len(set(names)) == 3
+
+
+def test_junit_survives_characters_that_xml_cannot_hold():
+    text = ElementTree.tostring(suites()["bad.yaml"], encoding="unicode")
+    assert "\x00" not in text
+    assert "&lt;&amp;" in text
+
+
+def test_the_tables_have_a_row_for_each_specification_and_each_requirement():
+    table = results_table(ENTRIES)
+    assert list(table["spec"]) == [one.spec for one in ENTRIES]
+    assert list(table["missed"]) == [0, 1, 0, 1, 0, 0, 0]
+    assert table["exit_code"][-1] is None
+    assert list(requirements_table(ENTRIES)["ok"]) == ["true", "true", "false", "false", "true"]
+    assert len(requirements_table(())) == 0
+
+
+def test_the_message_counts_every_end():
+    told = "7 specs: 1 ok, 1 missed, 1 partial, 1 no solution, 1 invalid, 1 bug, 1 skipped"
+    assert message(ENTRIES) == told
+
+
+def test_two_specifications_of_one_name_in_two_folders_are_told_apart():
+    assert folders([str(Path("/p/a/cam.yaml")), str(Path("/p/b/cam.yaml"))]) == ("a-cam", "b-cam")

@@ -1,0 +1,39 @@
+"""Many networks at once: the same numbers in the same order, whatever is the number of processes."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cfmkit.beams import CLAMPED, Beam, Control, Displacement, Network, Node, PathStatus, Section, arc, guided, trace
+from cfmkit.beams.batch import trace_many
+
+DRIVE = Displacement("d", -np.pi / 2, np.array([1e-3, 2e-3]))
+
+
+def bent(sweep: float, height: float = 0.03) -> Network:
+    nodes = {"a": Node(0, 0, CLAMPED), "d": Node(0.05, height, guided(np.pi / 2))}
+    return Network(nodes, {"x": Beam("a", "d", Section(2e9, 1e-2, 1e-3), arc(sweep))})
+
+
+def test_a_batch_gives_each_network_its_own_curve_in_order() -> None:
+    sweeps = [0.3, -0.5, 0.9]
+    found = list(trace_many([bent(s) for s in sweeps], DRIVE))
+    for sweep, outcome in zip(sweeps, found, strict=True):
+        path = trace(bent(sweep), DRIVE)
+        assert outcome.status == PathStatus.COMPLETE.name
+        np.testing.assert_array_equal(outcome.value.effort, path.effort[path.at_asked])
+
+
+def test_a_network_that_cannot_exist_fails_alone() -> None:
+    closed = bent(2 * np.pi)
+    found = list(trace_many([bent(0.3), closed, bent(0.5)], DRIVE, Control(tolerance=1e-6)))
+    assert [outcome.status for outcome in found] == ["COMPLETE", "INVALID", "COMPLETE"]
+    assert "returns to its start" in found[1].message
+    assert found[1].value is None
+
+
+def test_two_processes_give_the_same_as_one() -> None:
+    networks = [bent(s) for s in (0.2, 0.4, 0.6, 0.8)]
+    one, two = (list(trace_many(networks, DRIVE, workers=w)) for w in (1, 2))
+    for a, b in zip(one, two, strict=True):
+        np.testing.assert_array_equal(a.value.effort, b.value.effort)

@@ -1,0 +1,79 @@
+"""The compiled code: when it is used again and when not."""
+
+from __future__ import annotations
+
+import logging
+from pathlib import Path
+
+import numba
+import numpy as np
+import pytest
+
+from cfmkit.beams.kernels import dense, entry
+from cfmkit.beams.kernels.rk8 import COUPLING, NODES, WEIGHTS
+
+_count, _solve = dense.positive_count, dense.lu_solve
+
+
+@numba.njit
+def count_of(a):  # type: ignore[no-untyped-def]
+    return _count(a)
+
+
+@numba.njit
+def solve_with(a, b):  # type: ignore[no-untyped-def]
+    return _solve(a, b)
+
+
+def test_the_cache_is_keyed_by_the_sources_of_all_kernels() -> None:
+    """Values that a function closes over are part of numba's key: they must hold the digest of every file."""
+    for door in (entry._real, entry.states):
+        closure = door.py_func.__closure__
+        assert entry.digest() in [cell.cell_contents for cell in closure]
+
+
+def test_a_changed_kernel_file_changes_the_digest(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for path in Path(entry.__file__).parent.glob("*.py"):
+        (tmp_path / path.name).write_bytes(path.read_bytes())
+    monkeypatch.setattr(entry, "__file__", str(tmp_path / "entry.py"))
+    before = entry.digest()
+    with (tmp_path / "chain.py").open("a") as file:
+        file.write("# changed\n")
+    assert entry.digest() != before
+
+
+def test_a_first_compilation_is_announced(caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(entry, "STAMP", "never-compiled-before")
+    mark = Path(entry._real.stats.cache_path) / "beams-never-compiled-b.compiled"
+    with caplog.at_level(logging.WARNING):
+        entry.announce()
+        entry.announce()
+    mark.unlink(missing_ok=True)
+    assert [record.message for record in caplog.records] == ["compiling the beam engine: once, about half a minute"]
+
+
+def test_the_runge_kutta_method_is_of_order_eight() -> None:
+    """Conditions of quadrature up to order 8 and of the row sums."""
+    np.testing.assert_allclose(COUPLING.sum(axis=1), NODES, atol=1e-14)
+    for k in range(8):
+        assert WEIGHTS @ NODES**k == pytest.approx(1 / (k + 1), abs=1e-14)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_inertia_and_solution_of_random_symmetric_matrices(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    n = int(rng.integers(1, 14))
+    a = rng.standard_normal((n, n))
+    a = a + a.T
+    a[rng.random((n, n)) < 0.3] = 0.0
+    a = np.triu(a) + np.triu(a, 1).T
+    if seed % 2:
+        np.fill_diagonal(a, 0.0)
+    a += 1e-9 * np.eye(n)
+    expected = int((np.linalg.eigvalsh(a) > 0).sum())
+    assert count_of(a.copy()) == expected
+    b = rng.standard_normal((n, 2))
+    if np.linalg.cond(a) < 1e8:
+        x = b.copy()
+        assert solve_with(a.copy(), x)
+        np.testing.assert_allclose(a @ x, b, atol=1e-6)

@@ -1,0 +1,157 @@
+"""Many cams at once have the numbers that each has alone."""
+
+import numpy as np
+import pytest
+
+import cfmkit
+from cfmkit.families.base import Block, Measure
+from cfmkit.families.cam.block import VARIED, analyze_block
+from cfmkit.families.cam.block_forces import METRICS, SCALARS
+from cfmkit.results import Status
+from cfmkit.studies.blocks import vectorised
+from cfmkit.studies.columns import metrics_of
+from cfmkit.studies.engine import Work, run
+from cfmkit.studies.executors import Lost
+from cfmkit.studies.journal import Journal
+from cfmkit.studies.plan import Draw, sampled
+from cfmkit.studies.study import Study
+from cfmkit.studies.variation import axes, wishes
+
+SPEC = cfmkit.load("configs/cam.yaml").replace({"analysis.points": 61})
+NAMES = (*METRICS, *(f"{name}[unload]" for name in METRICS if name != "hysteresis_area"), *SCALARS)
+RATIOS = ("force_ripple", "half_band", "deviation_from_mean", "deviation_from_target", "friction_half_gap_max")
+DIFFERENCES = {"force_sd": 100.0, "hysteresis_area": 24.0} | dict.fromkeys(RATIOS, 1.0)
+"""What is a small difference of large numbers is only as exact as those: forces [N], areas [J], ratios."""
+SIZES = np.array([DIFFERENCES.get(name.partition("[")[0], 0.0) for name in NAMES])
+
+RANGES = {
+    "mechanism.brace_length": "190 mm:400 mm",
+    "mechanism.rest_half_width": "20 mm:100 mm",
+    "mechanism.roller_radius": "-1 mm:18 mm",
+    "mechanism.rolling_friction": "0:0.004",
+    "mechanism.springs.stiffness": "0.3 N/mm:1 N/mm",
+    "mechanism.springs.count": [1, 2, 4],
+    "mechanism.profile.force_constant": "5 mm:16 mm",
+    "design.force": "40 N:60 N",
+}
+
+
+def work(spec=SPEC, ranges=RANGES, count=600, names=NAMES):
+    plan = sampled(axes(spec, wishes(ranges), drawn=True), Draw("sobol", count))
+    return Work(Study(spec, plan.paths, metrics_of(spec, names)), plan)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {},
+        {"analysis.window": None},
+        {"mechanism.rolling_friction": 0.0},
+        {"analysis.window": ("3.3 mm", "151 mm")},
+        {"analysis.window": ("10 mm", "240 mm")},
+        {"design": None},
+    ],
+)
+def test_a_block_has_the_numbers_of_its_points(change):
+    spec = SPEC.replace(change)
+    ranges = {k: v for k, v in RANGES.items() if k not in change and not (spec.design is None and k == "design.force")}
+    many = work(spec, ranges)
+    assert many.vectorised
+    together = run(many)
+    done = 0
+    for k in range(0, 600, 3):
+        alone, block = many.study.evaluate(many.plan.point(k)), together.row(k)
+        assert block.status(0) == (alone.status, alone.message)
+        if alone.status is Status.COMPLETE:
+            done += 1
+            values = [np.nan if value is None else value for value in alone.values]
+            wrong = ~np.isclose(block.values[0], values, rtol=1e-12, atol=1e-12 * SIZES, equal_nan=True)
+            assert not wrong.any(), [(NAMES[m], block.values[0, m], values[m]) for m in np.flatnonzero(wrong)]
+            assert tuple(block.met[0].tolist()) == alone.met
+    assert done > 40
+
+
+def test_the_closed_form_does_most_of_what_it_is_meant_for():
+    many = work(ranges={"mechanism.roller_radius": "6 mm:10 mm", "mechanism.springs.stiffness": "0.3 N/mm:1 N/mm"})
+    values = dict(zip(many.plan.paths, many.plan.block(0, 600), strict=True))
+    answer = analyze_block(SPEC, Block(values, (Measure("force_mean"),), 600))
+    assert answer.done.all()
+
+
+def test_whoever_runs_on_a_corner_is_left_to_the_model_of_one_cam():
+    radius = np.array([0.0100, 0.0103, 0.0104, 0.0160])
+    answer = analyze_block(SPEC, Block({"mechanism.roller_radius": radius}, (Measure("force_mean"),), 4))
+    assert answer.done.tolist() == [True, True, False, False]
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"mechanism.profile.friction": 0.002},
+        {"mechanism.profile.slope_factor": 1.1},
+        {"mechanism.profile.offset": "0.1 mm"},
+        {"analysis.gravity": True},
+        {"analysis.travel": "100 mm"},
+        {"analysis.path_method": "ode"},
+        {"analysis.origin": "slider"},
+        {"mechanism.springs": ("0.6 N/mm", "0.7 N/mm")},
+        {"mechanism.contact.width": "10 mm"},
+    ],
+)
+def test_what_has_no_closed_form_here_is_refused_whole(change):
+    spec = SPEC.replace(change)
+    block = Block({"mechanism.brace_length": np.array([0.2])}, (Measure("force_mean"),), 1)
+    assert analyze_block(SPEC, block) is not None
+    assert analyze_block(spec, block) is None
+
+
+def test_unknown_metrics_and_paths_are_refused_whole():
+    brace = {"mechanism.brace_length": np.array([0.2])}
+    assert analyze_block(SPEC, Block(brace, (Measure("usable_stroke"),), 1)) is None
+    assert analyze_block(SPEC, Block({"analysis.points": np.array([11])}, (Measure("force_mean"),), 1)) is None
+
+
+def test_designing_and_keeping_curves_are_done_point_by_point():
+    many = work(count=4)
+    for more in ({"design": True}, {"curves": True}):
+        assert not vectorised(Study(SPEC, many.plan.paths, many.study.metrics, **more), many.plan)
+
+
+def test_another_brace_than_the_cam_is_cut_for_is_left_to_the_model_of_one_cam():
+    spec = SPEC.replace({"mechanism.profile.brace_length": "200 mm", "mechanism.roller_radius": "8 mm"})
+    block = Block({"mechanism.brace_length": np.array([0.19, 0.2])}, (Measure("force_mean"),), 2)
+    assert analyze_block(spec, block).done.tolist() == [False, True]
+
+
+def test_every_path_it_can_vary_exists():
+    leaves = {path for path, _ in SPEC.leaves()}
+    known = {path for path in VARIED if path in leaves or SPEC.at(path) is not None}
+    assert known == set(VARIED)
+
+
+def test_blocks_are_noted_and_reused_whole(tmp_path):
+    many = work(count=5000, names=("force_mean", "force_ripple"))
+    with Journal(tmp_path / "journal") as journal:
+        first = np.concatenate([rows.values for _, rows in run(many, journal=journal).batches()])
+    with Journal(tmp_path / "journal") as journal:
+        assert len(journal) == 65
+        again = run(many, journal=journal)
+        assert again.reused == 5000
+        assert again.work.step == 78
+        assert np.array_equal(np.concatenate([rows.values for _, rows in again.batches()]), first, equal_nan=True)
+        assert np.array_equal(again.row(4999).values[0], first[4999], equal_nan=True)
+
+
+def test_a_block_that_is_lost_costs_only_the_points_that_are_lost_alone():
+    many = work(count=40, names=("force_mean",))
+
+    def losing(work, jobs, _stopping):
+        for job in jobs:
+            lost = job.stop - job.start > 1 or job.start == 7
+            yield job, Lost(Status.CRASHED, "it died") if lost else work(job)
+
+    together, alone = run(many, losing), run(many)
+    assert together.finished == 40
+    assert together.row(7).status(0) == (Status.CRASHED, "it died")
+    for k in set(range(40)) - {7}:
+        assert np.allclose(together.row(k).values, alone.row(k).values, rtol=1e-12, equal_nan=True)

@@ -1,0 +1,346 @@
+"""The prototype in motion: two formulations that agree, balances that close, limits, symmetry, failure modes."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from cam_motion import moving, response
+from cam_support import analyze, cam
+
+from cfmkit.errors import SpecError
+from cfmkit.families.cam.build import assemble
+from cfmkit.families.cam.dynamics.build import build
+from cfmkit.families.cam.dynamics.direct import respond, statics
+from cfmkit.families.cam.dynamics.history import direct_history, multibody_history
+from cfmkit.families.cam.dynamics.motion import Cycloid, Moment
+from cfmkit.families.cam.dynamics.multibody import CornerContact, NineCoordinates, Scheme
+from cfmkit.families.cam.statics import forces
+from cfmkit.results import Status
+
+UNLIKE = {
+    "left": {
+        "brace_length": "190 mm",
+        "profile": {"force_constant": "10 mm", "friction": 0.003, "stroke": "200 mm"},
+        "masses": {"roller": "0.5 kg", "brace": "0.1 kg", "roller_inertia": "30 kg*mm^2"},
+    },
+    "errors": {"slider_deviation": "1.5 deg", "flank_angle": "-0.3 deg"},
+    "analysis__dynamics": {"slider_position": "235 mm", "stroke": "80 mm", "time": "0.15 s", "origin": "cam-start"},
+}
+CASES = {
+    "prototype": {},
+    "slow": {"analysis__dynamics__time": "10 s"},
+    "downwards": {"analysis__dynamics__slider_position": "320 mm", "analysis__dynamics__stroke": "-100 mm"},
+    "deviating": {"errors__slider_deviation": "5 deg", "analysis__dynamics__slider_position": "212 mm"},
+    "badly cut": {"errors__flank_angle": "-0.4 deg"},
+    "material left": {"profile__offset": "0.2 mm"},
+    "cut for friction": {"profile__friction": 0.004},
+    "unlike sides": UNLIKE,
+}
+
+
+def both(changes, points=101, scheme=None):
+    parts = build(moving(**changes))
+    path = NineCoordinates(parts.machine).run(parts.motion, points, scheme)
+    return path, respond(parts.machine, parts.motion.at(path.times))
+
+
+def relative(a, b):
+    return float(np.abs(a - b).max() / np.abs(b).max())
+
+
+@pytest.mark.parametrize("changes", CASES.values(), ids=CASES)
+def test_the_two_formulations_agree_in_every_force_and_speed(changes):
+    parts = build(moving(**changes))
+    scheme = Scheme(steps=8)
+    exact = direct_history(parts.machine, parts.motion, parts.motion.times(101))
+    other = multibody_history(parts.machine, parts.motion, 101, scheme)
+    for name in ("force", "contact", "spin", "brace", "pin", "elongation", "center"):
+        assert relative(getattr(other, name), getattr(exact, name)) < 1e-9, name
+    assert np.abs(other.traction - exact.traction).max() < 1e-9 * exact.contact.max()
+    if "left" in changes:
+        assert relative(exact.contact[1], exact.contact[0]) > 0.1
+
+
+def test_the_integration_converges_with_the_fourth_order():
+    errors = []
+    for steps in (1, 2, 4):
+        path, exact = both({}, 51, Scheme(steps))
+        errors.append(np.abs(path.force - exact.force).max())
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(4.0, abs=0.3)
+    assert np.log2(errors[1] / errors[2]) == pytest.approx(4.0, abs=0.3)
+
+
+def test_without_stabilisation_the_constraints_drift_no_further_than_the_step_allows():
+    path, exact = both({"analysis__dynamics__time": "10 s"}, 101, Scheme(steps=4, stabilisation=0.0))
+    assert path.residual < 1e-11
+    assert relative(path.force, exact.force) < 1e-9
+
+
+@pytest.mark.parametrize("changes", [{}, UNLIKE], ids=["prototype", "unlike sides"])
+def test_the_jacobian_of_the_constraints_matches_differences(changes):
+    model = NineCoordinates(build(moving(**changes)).machine)
+    path = model.run(build(moving(**changes)).motion, 5)
+    x, guess = path.coordinates[2], [p.flank.parameter[2] for p in path.postures]
+    jacobian = model.jacobian(model.postures(x, guess))
+    for column in range(9):
+        step = 1e-6 * np.eye(9)[column]
+        ends = [model.residual(x + sign * step, model.postures(x + sign * step, guess)) for sign in (1, -1)]
+        np.testing.assert_allclose(jacobian[:6, column], (ends[0] - ends[1])[:6] / 2e-6, rtol=0, atol=1e-8)
+
+
+@pytest.mark.parametrize("changes", [{}, UNLIKE], ids=["prototype", "unlike sides"])
+def test_the_second_time_derivative_of_the_constraints_matches_differences(changes):
+    model = NineCoordinates(build(moving(**changes)).machine)
+    path = model.run(build(moving(**changes)).motion, 5)
+    x, guess = path.coordinates[2], [p.flank.parameter[2] for p in path.postures]
+    velocity = np.array([1.3, -2.0, 40.0, -35.0, 1.1, 2.5, 30.0, -44.0, 0.9])
+    ends = []
+    for sign in (1, -1):
+        moved = x + sign * 1e-6 * velocity
+        ends.append(model.jacobian(model.postures(moved, guess)) @ velocity)
+    found = model.quadratic(model.postures(x, guess), velocity)
+    np.testing.assert_allclose(found[:8], ((ends[0] - ends[1]) / 2e-6)[:8], rtol=1e-7, atol=1e-5)
+
+
+@pytest.mark.parametrize("changes", CASES.values(), ids=CASES)
+def test_the_force_does_the_work_that_becomes_energy(changes):
+    """Between any two times; Gauss-Legendre panels integrate the power to rounding."""
+    parts = build(moving(**changes))
+    edges = parts.motion.times(41)
+    nodes, weights = np.polynomial.legendre.leggauss(8)
+    half = 0.5 * np.diff(edges)
+    found = respond(
+        parts.machine, parts.motion.at((0.5 * (edges[1:] + edges[:-1])[:, None] + half[:, None] * nodes).ravel())
+    )
+    power = (found.force * found.moment.speed).reshape(-1, 8)
+    energy = respond(parts.machine, parts.motion.at(edges)).energy
+    np.testing.assert_allclose(np.diff(energy), (power @ weights) * half, rtol=0, atol=1e-9 * np.ptp(energy))
+
+
+def test_the_power_is_the_rate_of_the_energy():
+    parts = build(moving())
+    times, step = np.linspace(0.01, 0.115, 50), 1e-4
+    stencil = {1: 4 / 5, 2: -1 / 5, 3: 4 / 105, 4: -1 / 280}
+    energy = {k: respond(parts.machine, parts.motion.at(times + k * step)).energy for k in range(-4, 5)}
+    rate = sum(weight * (energy[k] - energy[-k]) for k, weight in stencil.items()) / step
+    found = respond(parts.machine, parts.motion.at(times))
+    power = found.force * found.moment.speed
+    np.testing.assert_allclose(rate, power, rtol=0, atol=1e-9 * np.abs(power).max())
+
+
+@pytest.mark.parametrize("upward", [True, False], ids=["up", "down"])
+@pytest.mark.parametrize("changes", [{}, {"profile__friction": 0.004}, {"profile__offset": 0.0003}])
+def test_at_rest_with_rolling_resistance_it_is_the_quasi_static_model(upward, changes):
+    spec = moving(rolling_friction=0.003, **changes)
+    parts, assembly = build(spec), assemble(spec)
+    position = np.linspace(assembly.track.start, assembly.track.end, 200)[1:-1]
+    states = assembly.track.states(position)
+    expected = forces(states, assembly.loads, 0.003 if upward else -0.003)
+    found = statics(parts.machine, position, upward)
+    np.testing.assert_allclose(found.at.center[0], states.x + 1j * states.y, rtol=0, atol=1e-12)
+    np.testing.assert_array_equal(found.on_corner, states.on_corner)
+    np.testing.assert_allclose(found.force, expected.slider, rtol=1e-9)
+    np.testing.assert_allclose(found.contact[1], expected.contact, rtol=1e-9)
+
+
+def test_rolling_resistance_costs_the_power_of_force_times_speed_of_the_rollers():
+    free, held = response(moving(), 101), response(moving(rolling_friction=0.002), 101)
+    lost = 0.002 * (held.contact * held.at.way).sum(axis=0)
+    np.testing.assert_allclose(held.force - free.force, lost, rtol=1e-9)
+
+
+def test_sides_with_their_parts_exchanged_give_the_same_force():
+    parts = build(moving(**UNLIKE))
+    mirrored = replace(parts.machine, right=parts.machine.left, left=parts.machine.right)
+    moment = parts.motion.at(parts.motion.times(51))
+    one, other = respond(parts.machine, moment), respond(mirrored, moment)
+    np.testing.assert_allclose(other.force, one.force, rtol=1e-13)
+    np.testing.assert_allclose(other.contact, one.contact[::-1], rtol=1e-13)
+    np.testing.assert_allclose(other.guide, -one.guide, rtol=1e-9, atol=1e-12)
+
+
+def test_a_left_side_that_repeats_the_right_one_changes_nothing():
+    same = {"brace_length": "200 mm", "roller_radius": "16 mm", "masses": {"roller": "0.38 kg"}}
+    np.testing.assert_allclose(response(moving(left=same), 51).force, response(moving(), 51).force, rtol=1e-13)
+
+
+def test_forces_of_inertia_grow_with_the_square_of_the_speed():
+    machine = build(moving()).machine
+    position = np.linspace(0.22, 0.32, 21)
+    rest = statics(machine, position).force
+    still = np.zeros_like(position)
+    slow, fast = (respond(machine, Moment(position, still + v, still)).force - rest for v in (0.5, 1.5))
+    np.testing.assert_allclose(fast, 9 * slow, rtol=1e-9)
+
+
+def test_rollers_roll_without_slip():
+    """Their turn is the length of the centre's path over the radius."""
+    found = response(moving(), 20001)
+    times = np.linspace(0.0, 0.125, 20001)
+    length = np.abs(np.diff(found.at.center[0])).sum()
+    assert np.trapezoid(found.spin[0], times) * 0.016 == pytest.approx(length, rel=1e-7)
+
+
+def test_the_cycloid_starts_and_ends_at_rest_and_is_consistent():
+    motion = Cycloid(0.2, -0.05, 0.4)
+    times = np.linspace(0.0, 0.4, 9)
+    position, speed, acceleration = motion.at(times)
+    assert (position[0], position[-1]) == (pytest.approx(0.2), pytest.approx(0.15))
+    assert np.abs([speed[0], speed[-1], acceleration[0], acceleration[-1]]).max() < 1e-12
+    ahead, behind = motion.at(times + 1e-6), motion.at(times - 1e-6)
+    np.testing.assert_allclose((ahead.position - behind.position) / 2e-6, speed, rtol=0, atol=1e-9)
+    np.testing.assert_allclose((ahead.speed - behind.speed) / 2e-6, acceleration, rtol=0, atol=1e-7)
+
+
+def names(result):
+    return [item.name for item in result.warnings]
+
+
+def test_lift_off_and_slack_cable_are_found_with_time_and_place():
+    result = analyze(moving(analysis__dynamics__time="0.05 s", masses__roller="1 kg", masses__roller_inertia=None))
+    found = {item.name: item.message for item in result.warnings}
+    assert " s (" in found["slack_cable"]
+    assert "each roller" in found["lift_off"]
+    contact = result.curve.extra["contact_force_right"].values
+    assert not result.curve.stable[contact <= 0].any()
+    assert (contact <= 0).any()
+
+
+def test_a_motion_that_leaves_the_profile_is_partial():
+    result = analyze(moving(analysis__dynamics__slider_position="360 mm"))
+    assert result.status is Status.PARTIAL
+    assert names(result)[0] == "outside_profile"
+    assert result.curve.displacement[-1] <= 0.240
+    assert len(result.curve) < 201
+
+
+def test_a_motion_outside_the_profile_has_no_equilibrium():
+    result = analyze(moving(analysis__dynamics__slider_position="500 mm"))
+    assert result.status is Status.NO_EQUILIBRIUM
+    assert "428" in result.message
+
+
+def test_on_the_corner_the_direct_method_works_and_the_other_says_why_not():
+    low = {"analysis__dynamics__slider_position": "188.2 mm", "analysis__dynamics__stroke": "20 mm"}
+    direct = analyze(moving(**low))
+    assert direct.status is Status.COMPLETE
+    assert "undercut" in names(direct)
+    assert set(direct.curve.extra["contact"].values) == {"corner", "flank"}
+    other = analyze(moving(**low, analysis__dynamics__method="multibody"))
+    assert other.status is Status.NO_EQUILIBRIUM
+    assert "189.2 mm" in other.message
+    parts = build(moving(**low))
+    with pytest.raises(CornerContact):
+        NineCoordinates(parts.machine).run(parts.motion, 11)
+
+
+def test_the_method_is_a_value_of_the_specification():
+    direct, other = (analyze(moving(analysis__dynamics__method=name)) for name in ("direct", "multibody"))
+    np.testing.assert_allclose(other.curve.force, direct.curve.force, rtol=1e-9)
+    for name, column in direct.curve.extra.items():
+        if column.dimension != "text":
+            values = other.curve.extra[name].values
+            scale = direct.curve.extra["contact_force_right"].values if "traction" in name else column.values
+            assert np.abs(values - column.values).max() <= 1e-9 * np.abs(scale).max(), name
+
+
+def test_the_multibody_method_says_that_it_leaves_rolling_resistance_out():
+    result = analyze(moving(rolling_friction=0.002, analysis__dynamics__method="multibody"))
+    assert "friction_left_out" in names(result)
+    np.testing.assert_allclose(result.curve.force, analyze(moving()).curve.force, rtol=1e-9)
+
+
+def test_the_quasi_static_model_says_that_it_is_symmetric():
+    assert "symmetric_model" in names(analyze(cam(errors__slider_deviation="1 deg")))
+    assert "symmetric_model" in names(analyze(cam(left__roller_radius="15 mm")))
+    assert "symmetric_model" not in names(analyze(cam(errors__slider_deviation="0 deg")))
+
+
+def test_displacements_of_both_models_are_the_same():
+    dynamic = analyze(moving(analysis__dynamics__time="100 s"))
+    static = analyze(moving(analysis__fidelity="quasi-static", analysis__points=2001)).curve.on("load")
+    there = np.interp(dynamic.curve.displacement, static.displacement, static.force)
+    np.testing.assert_allclose(dynamic.curve.force, there, rtol=2e-4)
+
+
+@pytest.mark.parametrize(
+    ("changes", "found"),
+    [
+        ({"masses__roller_inertia": 0.24 * 0.38 * 0.016**2 / 2}, True),
+        ({"masses__roller_inertia": 0.26 * 0.38 * 0.016**2 / 2}, False),
+        ({"masses__roller_inertia": 1.99 * 0.38 * 0.016**2 / 2}, False),
+        ({"masses__roller_inertia": 2.01 * 0.38 * 0.016**2 / 2}, True),
+        ({"masses__roller_inertia": None}, False),
+        ({"masses__roller_inertia": None, "masses__brace_inertia": 1e-3}, True),
+        ({"masses__roller_inertia": None, "left": {"masses": {"roller_inertia": 1e-6}}}, True),
+    ],
+)
+def test_moments_of_inertia_are_compared_with_mass_and_size(changes, found):
+    assert ("inertia_mismatch" in names(analyze(moving(**changes)))) is found
+
+
+def test_the_curve_says_everything_over_time():
+    curve = analyze(moving()).curve
+    assert curve.branches == ("load",)
+    dimensions = {name: column.dimension for name, column in curve.extra.items()}
+    assert dimensions["time"] == "time"
+    assert dimensions["roller_speed_left"] == "angular_velocity"
+    assert curve.extra["time"].values[-1] == pytest.approx(0.125)
+    for name in ("contact_force", "traction", "brace_force", "slider_pin_force", "roller_speed"):
+        assert {f"{name}_right", f"{name}_left"} <= set(dimensions)
+    down = analyze(moving(analysis__dynamics__slider_position=0.32, analysis__dynamics__stroke=-0.1)).curve
+    assert down.branches == ("unload",)
+    np.testing.assert_allclose(down.displacement, 2 * 0.22 + 0.1 - 2 * brace_height() - curve.displacement, atol=1e-12)
+
+
+def brace_height():
+    return np.sqrt(0.2**2 - 0.068**2)
+
+
+def test_what_was_used_is_written_out():
+    used = analyze(moving(masses__roller_inertia=None, masses__brace_inertia=None)).spec
+    assert used.analysis.fidelity == "dynamic"
+    assert used.mechanism.masses.roller_inertia == pytest.approx(0.38 * 0.016**2 / 2, rel=1e-15)
+    assert used.mechanism.masses.brace_inertia == pytest.approx(0.077 * 0.2**2 / 12, rel=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"analysis__dynamics__stroke": 0.0}, "must not be 0"),
+        ({"analysis__dynamics": None, "analysis__fidelity": "dynamic"}, "add 'analysis.dynamics'"),
+        ({"masses": None, "analysis__gravity": False}, "add 'mechanism.masses'"),
+        ({"errors__flank_angle": "50 deg"}, "<= 45 deg"),
+    ],
+)
+def test_a_motion_that_cannot_be_is_refused_with_the_cure(changes, said):
+    with pytest.raises(SpecError, match=re.escape(said)):
+        moving(**changes)
+
+
+def test_friction_that_holds_a_roller_leaves_gaps_and_says_so():
+    """Without a corner the slider has no lever on the rollers at the start; friction holds them a little longer."""
+    low = {"slider_position": brace_height() + 1e-6, "stroke": "1 mm", "time": "10 s"}
+    result = analyze(
+        moving(profile__roller_radius="10 mm", roller_radius="10 mm", rolling_friction=0.05, analysis__dynamics=low)
+    )
+    assert result.status is Status.PARTIAL
+    assert "up_jam" in names(result)
+    held = np.isnan(result.curve.force)
+    assert held[0]
+    assert not held[-1]
+    assert np.nanmax(result.curve.displacement[held]) == pytest.approx(0.0151e-3, abs=0.002e-3)
+
+
+@pytest.mark.parametrize("changes", [{}, UNLIKE], ids=["prototype", "unlike sides"])
+def test_every_picture_is_drawn_twice_with_the_same_bytes(changes):
+    from cfmkit.families.cam.draw import figures
+    from cfmkit.plots.style import png
+
+    result = analyze(moving(**changes))
+    first = {name: png(draw()) for name, draw in figures(result).items()}
+    assert set(first) == {"motion", "motion_force", "motion_contact", "motion_rollers"}
+    assert first == {name: png(draw()) for name, draw in figures(result).items()}

@@ -1,0 +1,68 @@
+"""Every public thing says what it is, and every example in a docstring is true."""
+
+from __future__ import annotations
+
+import doctest
+import importlib
+import inspect
+import pkgutil
+from pathlib import Path
+
+import pytest
+
+import cfmkit
+
+ROOT = Path(__file__).parents[2]
+
+
+def module_names() -> list[str]:
+    found = (item.name for item in pkgutil.walk_packages(cfmkit.__path__, "cfmkit."))
+    return ["cfmkit", *(name for name in found if not name.endswith("__main__"))]
+
+
+MODULES = module_names()
+every_module = pytest.mark.parametrize("name", MODULES)
+
+
+def public(module):
+    """Yield the public functions and classes that a module defines, and the public methods of the classes."""
+    for name, item in vars(module).items():
+        if name.startswith("_") or getattr(item, "__module__", None) != module.__name__:
+            continue
+        if inspect.isclass(item):
+            yield name, item
+            yield from ((f"{name}.{key}", member) for key, member in vars(item).items() if is_method(key, member))
+        elif inspect.isfunction(item):
+            yield name, item
+
+
+def is_method(name, member):
+    return not name.startswith("_") and (inspect.isfunction(member) or isinstance(member, property | classmethod))
+
+
+@every_module
+def test_everything_public_is_documented(name):
+    module = importlib.import_module(name)
+    assert (module.__doc__ or "").strip() or not inspect.getsource(module).strip(), name
+    for label, item in public(module):
+        text = inspect.getdoc(item) if not isinstance(item, property) else inspect.getdoc(item.fget)
+        assert text, f"{name}.{label}"
+        assert text.strip().splitlines()[0].rstrip().endswith((".", "::", ":")), (
+            f"{name}.{label}: {text.splitlines()[0]}"
+        )
+
+
+@every_module
+def test_examples_in_docstrings_are_true(name, monkeypatch):
+    monkeypatch.chdir(ROOT)
+    module = importlib.import_module(name)
+    failed, _ = doctest.testmod(module, optionflags=doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE)
+    assert failed == 0
+
+
+def test_the_public_names_exist_and_are_listed():
+    assert set(cfmkit.__all__) <= set(dir(cfmkit))
+    for name in cfmkit.__all__:
+        assert getattr(cfmkit, name) is not None
+    with pytest.raises(AttributeError, match="no attribute 'simulate'"):
+        cfmkit.simulate  # noqa: B018

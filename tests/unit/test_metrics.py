@@ -1,0 +1,200 @@
+"""Each metric against numbers worked out by hand on small curves."""
+
+import math
+
+import numpy as np
+import pytest
+
+from cfmkit.curves import Column, Curve
+from cfmkit.metrics import Frame, Window, definitions, measure
+
+BARE = Frame()
+
+
+def curve(*branches, kind="force", stress=None, names=("load", "unload")):
+    """Return a curve from (motion, effort) pairs; the second pair is stored as it is given."""
+    motion = np.concatenate([np.asarray(x, float) for x, _ in branches])
+    effort = np.concatenate([np.asarray(f, float) for _, f in branches])
+    labels = np.concatenate([[name] * len(x) for name, (x, _) in zip(names, branches, strict=False)])
+    extra = {} if stress is None else {"max_stress": Column(np.asarray(stress, float), "stress")}
+    return Curve(motion, effort, labels, np.ones(len(motion), bool), extra, kind)
+
+
+def value(metric, of, frame=BARE, window=None):
+    found = measure(of, frame, Window(*window) if window else None)[metric]
+    assert found.value is not None, found.reason
+    return found.value
+
+
+def reason(metric, of, frame=BARE, window=None):
+    found = measure(of, frame, Window(*window) if window else None)[metric]
+    assert found.value is None
+    return found.reason
+
+
+SAW = curve(([0, 1, 2, 3, 4], [8, 10, 9, 11, 12]))
+LOOP = curve(([0, 1, 2], [10, 12, 14]), ([2, 1, 0], [13, 11, 9]))
+
+BY_HAND = {
+    "force_mean": 10.0,
+    "force_sd": math.sqrt(10 / 4),
+    "force_max": 12.0,
+    "force_min": 8.0,
+    "force_ripple": 4 / 12,
+    "half_band": 4 / 20,
+    "deviation_from_mean": 2 / 10,
+    "deviation_from_target": 4 / 12,
+    "range_95": 4 - (3 + 0.4),
+    "range_95_fraction": 0.6 / 4,
+    "stress_max": 50.0,
+    "safety_factor": 2.0,
+}
+
+
+@pytest.mark.parametrize("metric", BY_HAND)
+def test_metrics_of_five_points_by_hand(metric):
+    saw = curve(([0, 1, 2, 3, 4], [8, 10, 9, 11, 12]), stress=[0, 10, 20, 50, 40])
+    assert value(metric, saw, Frame(target=12.0, allowable_stress=100.0)) == pytest.approx(BY_HAND[metric], rel=1e-14)
+
+
+def test_every_metric_of_the_table_has_a_value_on_a_complete_loop():
+    loop = curve(([0, 1, 2], [10, 12, 14]), ([2, 1, 0], [13, 11, 9]), stress=[0, 1, 2, 2, 1, 0])
+    found = measure(loop, Frame(target=12.0, allowable_stress=9.0))
+    assert [name for name, item in found.items() if item.value is None] == []
+    assert {item.name for item in definitions("force")} <= set(found)
+
+
+def test_rms_to_target_is_taken_at_places_uniform_in_displacement_without_the_start():
+    ramp = curve(([0, 0.001, 1], [-1e6, 0.001, 1]))  # F = u beyond a run-in that is over before the first place
+    places = np.arange(1, 101) / 100
+    assert value("rms_to_target", ramp, Frame(target=0.25)) == pytest.approx(math.sqrt(np.mean((places - 0.25) ** 2)))
+
+
+def test_sampling_does_not_weigh_in_rms_to_target():
+    dense = np.concatenate([np.linspace(0, 0.1, 1000), np.linspace(0.11, 1, 7)])
+    target = Frame(target=3.0)
+    assert value("rms_to_target", curve((dense, 2 + dense)), target) == pytest.approx(
+        value("rms_to_target", curve(([0, 1], [2, 3])), target), rel=1e-12
+    )
+
+
+@pytest.mark.parametrize(("metric", "width"), [("05pct", 0.0025), ("1pct", 0.005), ("5pct", 0.025)])
+def test_a_linear_force_leaves_the_band_where_its_slope_says(metric, width):
+    # F = 10 (1 + 4 (u - 0.5)) about u = 0.5: |4 (u - 0.5)| <= p
+    line = curve(([0, 0.3, 1], [-10, 2, 30]))
+    assert value(f"band_range_{metric}", line) == pytest.approx(width, rel=1e-12)
+
+
+def test_a_band_ends_at_the_first_exit_although_the_force_comes_back():
+    bump = curve(([0, 1, 2, 3, 4], [10, 10, 10, 12, 10]))
+    assert value("band_range_5pct", bump, Frame(reference=1.0)) == pytest.approx(2.25)  # 10.5 at u = 2.25
+
+
+def test_a_reference_pose_on_the_last_sample_is_allowed():
+    assert value("band_range_5pct", SAW, Frame(reference=4.0)) == pytest.approx(0.6)  # 11.4 at u = 3.4
+
+
+def test_range_95_takes_the_first_place_that_reaches_the_force_at_the_end_of_the_window():
+    peak = curve(([0, 1, 2, 3, 4], [0, 20, 5, 20, 20]))
+    assert value("range_95", peak) == pytest.approx(4 - 0.95)
+    assert value("range_95", peak, window=(0.5, 3)) == pytest.approx(3 - 0.95)  # c is sought before the window too
+
+
+def test_range_95_is_the_whole_travel_where_the_force_is_there_from_the_start():
+    assert value("range_95", curve(([1, 2, 3], [5, 5, 5]))) == 2
+
+
+def test_hysteresis_is_the_area_between_the_branches_positive_where_load_lies_above():
+    assert value("hysteresis_area", LOOP) == pytest.approx(2.0)
+    swapped = curve(([0, 1, 2], [9, 11, 13]), ([2, 1, 0], [14, 12, 10]))
+    assert value("hysteresis_area", swapped) == pytest.approx(-2.0)
+
+
+def test_hysteresis_in_a_window_between_samples_uses_interpolated_ends():
+    wedge = curve(([0, 2], [10, 14]), ([2, 0], [14, 8]))  # the gap falls linearly from 2 to 0
+    assert value("hysteresis_area", wedge, window=(0.5, 1.5)) == pytest.approx((1.5 + 0.5) / 2)
+
+
+def test_hysteresis_equals_the_trapezoids_on_the_union_of_both_grids():
+    up, down = np.array([0, 0.3, 1.1, 2.0]), np.array([0, 0.7, 1.6, 2.0])
+    load, unload = np.array([3, 5, 4, 6.0]), np.array([2, 1, 3, 5.5])
+    grid = np.union1d(up, down)
+    gap = np.interp(grid, up, load) - np.interp(grid, down, unload)
+    area = np.sum(np.diff(grid) * (gap[1:] + gap[:-1]) / 2)
+    assert value("hysteresis_area", curve((up, load), (down[::-1], unload[::-1]))) == pytest.approx(area)
+
+
+def test_hysteresis_without_a_window_is_taken_where_both_branches_are():
+    partial = curve(([0, 1, 2], [10, 12, 14]), ([2, 1.5], [13, 12]))
+    assert value("hysteresis_area", partial) == pytest.approx(0.5)
+
+
+def test_noise_of_a_known_loop_as_in_the_physics_note_of_the_cam():
+    # exact area 0.2295 N m; with the sampled noise 0.22953181, both directions running in time
+    s = 500 / 60 * np.arange(1008) / 35
+    wave = 50 + 0.4 * np.sin(2 * np.pi * s / 30) + 0.25 * np.sin(2 * np.pi * 9 * np.arange(1008) / 35)
+    gap = 0.3 + 0.003 * s
+    loop = curve((s / 1000, wave + gap), (s[::-1] / 1000, (wave - gap)[::-1]))
+    assert value("hysteresis_area", loop, window=(0.040, 0.210)) == pytest.approx(0.2295, abs=1e-6)
+
+
+# -- usable stroke -----------------------------------------------------------------------------------------------
+
+
+HUMP = curve(([0, 1, 2, 3, 4], [0, 100, 104, 100, 120]))
+
+
+def usable(of, frame=BARE, window=None):
+    return tuple(value(f"usable_{end}", of, frame, window) for end in ("start", "end", "stroke"))
+
+
+def test_usable_stroke_runs_from_band_to_band():
+    # enters 95 at 0.95; leaves 105 at 3.25
+    assert usable(HUMP, Frame(target=100.0)) == pytest.approx((0.95, 3.25, 2.30))
+
+
+def test_usable_stroke_without_a_target_is_around_the_mean_in_the_window():
+    mean = (100 + 104 + 100) / 3
+    assert value("usable_end", HUMP, window=(1, 3)) == pytest.approx(3 + (1.05 * mean - 100) / 20)
+
+
+def test_the_allowable_stress_cuts_the_usable_stroke():
+    stressed = curve(([0, 1, 2, 3, 4], [100] * 5), stress=[0, 10, 20, 30, 40])
+    assert usable(stressed, Frame(target=100.0, allowable_stress=25.0)) == pytest.approx((0, 2.5, 2.5))
+
+
+def test_the_valid_intervals_cut_the_usable_stroke():
+    flat = curve(([0, 1, 2, 3, 4], [100] * 5))
+    assert usable(flat, Frame(target=100.0, valid=((0.0, 1.0), (1.5, 3.75)))) == pytest.approx((1.5, 3.75, 2.25))
+
+
+def test_every_branch_must_keep_the_band():
+    loop = curve(([0, 4], [100, 100]), ([4, 3, 0], [80, 100, 100]))
+    assert usable(loop, Frame(target=100.0)) == pytest.approx((0, 3.25, 3.25))
+
+
+def test_a_mechanism_that_is_usable_nowhere_has_stroke_zero_and_no_ends():
+    far = curve(([0, 1], [1, 2]))
+    assert value("usable_stroke", far, Frame(target=100.0)) == 0
+    assert "no part of the travel" in reason("usable_start", far, Frame(target=100.0))
+
+
+def test_a_step_right_through_the_band_between_two_samples_is_usable_there():
+    assert usable(curve(([0, 1], [0, 200])), Frame(target=100.0)) == pytest.approx((0.475, 0.525, 0.05))
+
+
+def test_a_fold_is_usable_only_where_all_its_states_are():
+    # forward to 3 at 100 N, back to 1 at 50 N, forward again at 100 N: nothing between 1 and 3 can be relied on
+    fold = curve(([0, 3, 3, 1, 1, 6], [100, 100, 50, 50, 100, 100]))
+    assert usable(fold, Frame(target=100.0)) == pytest.approx((3, 6, 3))
+
+
+def test_a_fold_is_unusable_as_far_as_its_bad_states_reach():
+    # leaves the band at 3, wanders back to 0.5 and returns into it at 2: all of 0.5 to 3 is lost
+    fold = curve(([0, 3, 3, 0.5, 2, 2, 4], [100, 100, 50, 50, 50, 100, 100]))
+    assert usable(fold, Frame(target=100.0)) == pytest.approx((3, 4, 1))
+
+
+def test_a_valid_interval_beyond_the_travel_is_cut_to_it():
+    flat = curve(([1, 2, 3], [100] * 3))
+    assert usable(flat, Frame(target=100.0, valid=((-5.0, 9.0),))) == pytest.approx((1, 3, 2))

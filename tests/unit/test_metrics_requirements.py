@@ -1,0 +1,191 @@
+"""Requirements: what is refused before a run, and what becomes of each after it."""
+
+import numpy as np
+import pytest
+
+from cfmkit.curves import Curve
+from cfmkit.errors import SpecError
+from cfmkit.metrics import check, definitions, requirement_problems, validate_requirements, values_of_family
+from cfmkit.results import Quantity, Result, Status
+from cfmkit.spec import Requirement, Spec
+
+OWN = values_of_family({"spring_elongation": ("length", "largest elongation of the springs")})
+
+
+def require(**entry):
+    return Requirement.model_validate(
+        {key: tuple(item) if isinstance(item, list) else item for key, item in entry.items()}
+    )
+
+
+def result(kind="force", **kept):
+    motion = np.array([0, 0.1, 0.2, 0.2, 0.1, 0])
+    effort = np.array([50, 51, 50.5, 50, 49.5, 49])
+    loop = Curve(motion, effort, ["load"] * 3 + ["unload"] * 3, [True] * 6, kind=kind)
+    return Result(spec=None, status=Status.COMPLETE, curves=(loop,), **kept)  # type: ignore[arg-type]
+
+
+def outcome(of=None, **entry):
+    return check([require(**entry)], of or result())[0]
+
+
+def problems(kind="force", **entry):
+    return [
+        (item.path, item.message) for item in requirement_problems([require(**entry)], definitions(kind, OWN), kind)
+    ]
+
+
+@pytest.mark.parametrize(
+    ("entry", "place", "words"),
+    [
+        ({"metric": "force_riple", "max": "5 %"}, "metric", "did you mean 'force_ripple'?"),
+        ({"metric": "spring_elongaton", "max": "5 mm"}, "metric", "did you mean 'spring_elongation'?"),
+        ({"metric": "qqq", "max": 1}, "metric", "`cfmkit show metrics` lists them"),
+        ({"metric": "torque_mean", "max": "5 N"}, "metric", "on a force curve; did you mean 'force_mean'?"),
+        ({"metric": "hysteresis_area[load]", "max": "5 N*mm"}, "metric", "not a matter of one branch"),
+        ({"metric": "spring_elongation[load]", "max": "5 mm"}, "metric", "not a matter of one branch"),
+        ({"metric": "force_ripple", "max": "5 N"}, "max", "'5 N' is a force; a ratio is needed"),
+        ({"metric": "force_mean", "min": "5"}, "min", "no unit"),
+        ({"metric": "usable_stroke", "min": "5 deg"}, "min", "a length is needed"),
+        ({"metric": "force_mean", "min": "6 N", "max": "5 N"}, "max", "'max' (5 N) is below 'min' (6 N)"),
+        ({"metric": "force_mean", "min": "6 N", "over": ["1 deg", "2 deg"]}, "over", "is a length, not an angle"),
+        ({"metric": "force_mean", "min": "6 N", "over": ["0 mm", "2 deg"]}, "over", "one end is a length"),
+        (
+            {"metric": "spring_elongation", "max": "6 mm", "over": ["1 mm", "2 mm"]},
+            "over",
+            "not measured over a window",
+        ),
+    ],
+)
+def test_a_requirement_that_cannot_be_meant_is_refused_where_it_stands(entry, place, words):
+    ((path, message),) = problems(**entry)
+    assert path == f"requirements.0.{place}"
+    assert words in message
+
+
+@pytest.mark.parametrize(
+    "entry",
+    [
+        {"metric": "force_ripple[load]", "max": "5 %", "over": ["2 mm", "0.2 m"]},
+        {"metric": "force_ripple", "max": 0.05},
+        {"metric": "usable_stroke[unload]", "min": "20 cm"},
+        {"metric": "hysteresis_area", "max": "0.3 J"},
+        {"metric": "spring_elongation", "max": "140 mm"},
+        {"metric": "force_mean", "min": "5 N", "max": "5 N"},
+    ],
+)
+def test_a_sensible_requirement_passes(entry):
+    assert problems(**entry) == []
+
+
+def test_torque_curves_have_their_own_names_and_angles():
+    assert problems("torque", metric="torque_mean", min="5 N*mm", over=["1 deg", "2 deg"]) == []
+    assert "did you mean 'torque_mean'" in problems("torque", metric="force_mean", min="5 N")[0][1]
+    assert "an angle is needed" in problems("torque", metric="usable_stroke", min="5 mm")[0][1]
+
+
+def test_before_the_kind_of_curve_is_known_either_kind_of_metric_may_be_meant():
+    assert problems(None, metric="torque_mean", min="5 N*mm") == problems(None, metric="force_mean", min="5 N") == []
+    assert problems(None, metric="range_95", min="5 deg") == problems(None, metric="range_95", min="5 mm") == []
+    assert problems(None, metric="range_95", min="5 N")
+
+
+def test_validation_reports_every_fault_of_every_requirement_at_once():
+    wrong = (
+        require(metric="force_ripple", max="5 N"),
+        require(metric="xyz", max=1),
+        require(metric="half_band", max=1),
+    )
+    with pytest.raises(SpecError) as caught:
+        validate_requirements(Spec(family="any", requirements=wrong), definitions("force"))
+    assert [problem.path for problem in caught.value.problems] == ["requirements.0.max", "requirements.1.metric"]
+
+
+def test_the_same_faults_stop_a_check_of_a_result():
+    with pytest.raises(SpecError, match="did you mean 'force_sd'"):
+        outcome(metric="force_sdd", max="1 N")
+
+
+def test_a_bound_holds_for_the_worst_branch_whichever_side_it_is_on():
+    assert outcome(metric="force_max", max="50.9 N").value == 51
+    assert outcome(metric="force_mean", min="49.6 N").value == pytest.approx(49.5)
+    assert not outcome(metric="force_mean", min="49.6 N").ok
+    assert outcome(metric="force_mean", max="50 N").value == pytest.approx(50.5)
+    assert outcome(metric="force_mean[load]", min="50 N").ok
+
+
+def test_with_two_bounds_the_branch_closest_to_one_of_them_is_reported():
+    assert outcome(metric="force_mean", min="49.4 N", max="51 N").value == pytest.approx(49.5)
+    assert outcome(metric="force_mean", min="40 N", max="50.6 N").value == pytest.approx(50.5)
+
+
+def test_a_value_on_its_bound_is_within_it():
+    assert outcome(metric="usable_stroke", min="200 mm").ok
+    assert outcome(metric="force_max", max="51 N").ok
+    assert not outcome(metric="force_max", max="50.9999999 N").ok
+    assert 0.3 - 0.1 < 0.2
+    assert outcome(result(values={"gap": Quantity(0.3 - 0.1, "length", "d")}), metric="gap", min="200 mm").ok
+
+
+def test_the_sentence_of_a_met_requirement():
+    sentence = outcome(metric="force_ripple", max="5 %", over=["20 mm", "180 mm"]).sentence
+    assert sentence == "force ripple 1.603 % over 20 ... 180 mm, allowed <= 5 %: ok"
+
+
+def test_the_sentence_of_a_missed_requirement_on_one_branch_over_everything():
+    sentence = outcome(metric="force_mean[unload]", min="50 N", max="52 N").sentence
+    assert sentence == "force mean on unload 49.5 N over the full travel, required 50 N ... 52 N: missed"
+
+
+def test_a_miss_too_small_for_four_digits_is_shown_with_more():
+    loop = result(values={"gap": Quantity(0.0500004, "length", "d")})
+    assert outcome(loop, metric="gap", max="50 mm").sentence == "gap 50.0004 mm, allowed <= 50 mm: missed"
+
+
+def test_a_ratio_is_shown_as_its_bound_is_written():
+    loop = result(values={"factor": Quantity(1.5, "ratio", "d")})
+    assert outcome(loop, metric="factor", min=1.2).sentence == "factor 1.5, required >= 1.2: ok"
+    assert outcome(loop, metric="factor", min="120 %").sentence == "factor 150 %, required >= 120 %: ok"
+
+
+@pytest.mark.parametrize(
+    ("entry", "words"),
+    [
+        ({"metric": "force_mean", "min": "1 N", "over": ["0 mm", "300 mm"]}, "branch 'load' covers 0 ... 200 mm only"),
+        ({"metric": "deviation_from_target", "max": "5 %"}, "there is no target"),
+        ({"metric": "force_mean[up]", "min": "1 N"}, "there is no branch 'up'; there are 'load', 'unload'"),
+    ],
+)
+def test_a_metric_without_a_value_misses_its_requirement_and_says_why(entry, words):
+    found = outcome(**entry)
+    assert not found.ok
+    assert found.value is None
+    assert words in found.sentence
+    assert found.sentence.endswith(": missed")
+
+
+def test_without_a_curve_every_requirement_is_missed_for_the_reason_of_the_run():
+    failed = Result(spec=None, status=Status.NO_EQUILIBRIUM, message="jammed")  # type: ignore[arg-type]
+    assert "no value (jammed)" in outcome(failed, metric="force_mean", min="1 N").sentence
+
+
+def test_a_value_that_the_family_could_not_give_misses_its_requirement():
+    loop = result(values={"gap": Quantity(None, "length", "d", "the roller fits")})
+    assert (
+        outcome(loop, metric="gap", max="1 mm").sentence == "gap: no value (the roller fits), allowed <= 1 mm: missed"
+    )
+
+
+def test_an_outcome_for_a_file_is_in_border_units():
+    record = outcome(metric="usable_stroke", min="10 cm", over=["20 mm", "180 mm"]).as_json()
+    assert record["value"] == pytest.approx(200)
+    assert (record["min"], record["max"], record["unit"]) == (pytest.approx(100), None, "mm")
+    assert (record["over"], record["over_unit"], record["ok"]) == ([20.0, 180.0], "mm", True)
+    ripple = outcome(metric="force_ripple", max="5 %").as_json()
+    assert (ripple["max"], ripple["unit"], ripple["over"], ripple["over_unit"]) == (0.05, "1", None, None)
+
+
+def test_windows_of_a_torque_curve_are_reported_in_degrees():
+    turn = outcome(result("torque"), metric="torque_mean", min="1 N*mm", over=["1 deg", "5 deg"])
+    assert turn.as_json()["over"] == [pytest.approx(1), pytest.approx(5)]
+    assert "over 1 ... 5 deg" in turn.sentence

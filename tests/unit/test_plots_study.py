@@ -1,0 +1,81 @@
+"""Pictures of studies: which there are, what they mark, and that their bytes repeat."""
+
+import numpy as np
+import pytest
+
+from cfmkit.plots.findings import Findings, Line, Scale
+from cfmkit.plots.study import figures
+from cfmkit.plots.style import png
+
+X = np.repeat(np.linspace(1.0, 3.0, 5), 4)
+Y = np.tile(np.array([4.0, 3.0, 2.0, 1.0]), 5)
+
+
+def found(count, shape=(), metric=None, words=()):
+    values = X * Y if metric is None else metric
+    varied = [
+        Scale("mechanism.brace_length", "length", X),
+        Scale("analysis.kind", "text" if words else "ratio", Y, words),
+    ]
+    varied.append(Scale("mechanism.roller_radius", "length", Y[::-1]))
+    return Findings(tuple(varied[:count]), (Scale("force_ripple", "ratio", values),), shape, values < 6, 3)
+
+
+def single():
+    x = np.array([3.0, 1.0, 2.0])
+    metric = Scale("force_mean[load]", "force", np.array([1.0, np.nan, 2.0]))
+    return Findings((Scale("a.b", "length", x),), (metric,), (3,), np.array([True, False, True]), 0)
+
+
+LINES = [Line(x, {"load": (np.arange(5.0), x + np.arange(5.0) / 5)}) for x in (3.0, 1.0, 2.0)]
+
+
+@pytest.mark.parametrize(
+    ("case", "lines", "names"),
+    [
+        (single(), LINES, ["curves", "force_mean_load"]),
+        (single(), [], ["force_mean_load"]),
+        (found(2, (5, 4)), [], ["force_ripple"]),
+        (found(2, (5, 4), words=("a", "b", "c", "d", "e")), [], ["force_ripple"]),
+        (found(2), [], ["parallel"]),
+        (found(3, (5, 2, 2)), [], ["parallel"]),
+    ],
+)
+def test_the_number_of_parameters_decides_which_pictures_there_are(case, lines, names):
+    drawn = figures(case, lines, ("displacement [mm]", "force [N]"))
+    assert list(drawn) == names
+    for draw in drawn.values():
+        assert png(draw()) == png(draw())
+
+
+def test_a_map_has_each_value_in_its_place_whichever_way_the_parameters_run():
+    (draw,) = figures(found(2, (5, 4))).values()
+    axes = draw().axes[0]
+    mesh = axes.collections[0]
+    assert np.array_equal(mesh.get_array(), np.outer(np.linspace(1, 3, 5), [1.0, 2.0, 3.0, 4.0]))
+
+
+def test_what_misses_a_requirement_is_hatched_and_the_best_point_is_marked():
+    (draw,) = figures(found(2, (5, 4))).values()
+    axes = draw().axes[0]
+    assert any(patch.get_hatch() for patch in axes.patches)
+    (star,) = [line for line in axes.lines if line.get_marker() == "*"]
+    assert (star.get_xdata()[0], star.get_ydata()[0]) == (Y[3], X[3])
+
+
+def test_nothing_is_hatched_where_everything_is_met():
+    (draw,) = figures(found(2, (5, 4), metric=np.ones(20))).values()
+    assert not any(patch.get_hatch() for patch in draw().axes[0].patches)
+
+
+def test_a_gap_stays_a_gap():
+    (draw,) = figures(single()).values()
+    assert np.isnan(draw().axes[0].lines[0].get_ydata()).tolist() == [True, False, False]
+
+
+def test_one_value_and_nothing_but_gaps_can_be_drawn():
+    lone = Findings(
+        (Scale("a.b", "length", np.array([0.0])),), (Scale("m", "ratio", np.array([np.nan])),), (1,), np.array([False])
+    )
+    for draw in figures(lone, LINES[:1], ("x", "y")).values():
+        assert png(draw())

@@ -1,0 +1,221 @@
+"""A sensitivity study in one process: setup, evaluation, statements, files and pictures."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import cfmkit
+from cfmkit import families
+from cfmkit.errors import ExitCode, SpecError, UsageError
+from cfmkit.families import family
+from cfmkit.plots.sensitivity import figures, short
+from cfmkit.plots.style import png
+from cfmkit.studies.engine import run
+from cfmkit.studies.sensitivity.evaluation import Evaluator
+from cfmkit.studies.sensitivity.methods import METHODS, carry_out
+from cfmkit.studies.sensitivity.output import as_json, exit_code, outputs
+from cfmkit.studies.sensitivity.setup import points_of, prepare
+
+CONFIG = Path(__file__).parents[2] / "configs" / "studies" / "cam_tolerance.yaml"
+PARAMETERS = {
+    "mechanism.rest_half_width": ("67.95 mm", "68.05 mm"),
+    "mechanism.springs.stiffness.*": {"uniform": "1 %"},
+}
+
+
+def spec(method="sobol", parameters=PARAMETERS, samples=4, **more):
+    block = {"method": method, "parameters": parameters, "samples": samples} | more
+    return cfmkit.load(CONFIG).replace({"sensitivity": block})
+
+
+def study(method="sobol", **more):
+    return carry_out(prepare(spec(method, **more)), run)
+
+
+BROKEN = {"mechanism.rolling_friction": ("-0.001", "0.004"), "mechanism.roller_radius": {"uniform": "0.05 mm"}}
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_method_evaluates_as_many_points_as_it_says(method):
+    found = study(method)
+    setup = found.setup
+    assert len(setup.parameters) == 3
+    groups = len(setup.together)
+    assert found.evaluator.count == points_of(method, setup.samples, 3, groups) > 0
+    assert exit_code(found) in (ExitCode.OK, ExitCode.REQUIREMENT_MISSED)
+    assert found.unstated == 0
+    with pytest.raises(UsageError, match="--max-points"):
+        prepare(spec(method), most=found.evaluator.count - 1)
+    prepare(spec(method), most=found.evaluator.count)
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("parameters", [PARAMETERS, BROKEN], ids=["complete", "with failures"])
+def test_pictures_are_drawn_whatever_failed_and_their_bytes_repeat(method, parameters):
+    found = study(method, parameters=parameters)
+    drawn = figures(found)
+    assert len(drawn) >= len(found.setup.study.metrics)
+    for name, draw in drawn.items():
+        picture = png(draw())
+        assert picture == png(draw()), name
+        assert len(picture) > 5000
+
+
+@pytest.mark.parametrize("method", ["oat", "morris", "sobol", "tolerance"])
+@pytest.mark.parametrize("policy", ["fail", "bound"])
+def test_a_study_never_states_a_zero_for_a_parameter_whose_samples_failed(method, policy):
+    found = study(method, parameters=BROKEN, on_failure=policy, samples=16)
+    assert found.evaluator.failed > 0
+    assert exit_code(found) is ExitCode.PARTIAL
+    about = [line for line in found.lines if line.parameter == "mechanism.rolling_friction"]
+    main = [line for line in about if line.index in ("swing", "mu_star", "total_order", "variance_drop_when_halved")]
+    assert main
+    for line in main:
+        assert (line.value is None) if policy == "fail" else (line.value != 0.0)
+
+
+def test_the_engine_gives_the_values_of_a_single_analysis():
+    found = study("oat", samples=3)
+    setup = found.setup
+    for k, path in enumerate(setup.paths):
+        for value, numbers in zip(found.points[k, :, k], found.outputs[k], strict=True):
+            result = cfmkit.analyze(setup.study.spec.replace({path: float(value)}))
+            met = [outcome.ok for outcome in cfmkit.check(result)]
+            assert numbers[-len(met) :].tolist() == [float(one) for one in met]
+            outcomes = [outcome.value for outcome in cfmkit.check(result)]
+            np.testing.assert_allclose(numbers[0], outcomes[0], rtol=1e-9)
+
+
+def test_metrics_are_those_of_the_requirements_over_their_windows():
+    setup = prepare(spec())
+    assert [one.label for one in setup.study.metrics] == [
+        "deviation_from_target over 5 ... 235 mm",
+        "force_mean_load over 5 ... 235 mm",
+    ]
+    nominal = [outcome.value for outcome in setup.nominal.outcomes]
+    np.testing.assert_allclose(setup.nominal.values, nominal, rtol=1e-12)
+
+
+def test_a_family_that_knows_its_gradient_is_asked_for_it(monkeypatch):
+    record = family("cam")
+    asked = []
+
+    def gradient(_spec, paths):
+        asked.append(tuple(paths))
+        return {"theoretical_force": dict.fromkeys(paths, 3.0)}
+
+    known = dataclasses.replace(record, gradient=gradient)
+    monkeypatch.setattr("cfmkit.studies.sensitivity.methods.family", lambda name: known)
+    found = study("local", metrics=("theoretical_force",))
+    assert asked == [found.setup.paths]
+    assert found.evaluator.count == 0
+    assert {line.value for line in found.lines if line.index == "gradient" and line.unit == "N/mm"} == {3.0 / 1000}
+    mixed = study("local", metrics=("theoretical_force", "force_ripple"))
+    assert mixed.evaluator.count > 0
+    assert {line.value for line in mixed.lines if line.index == "gradient" and line.unit == "N/mm"} == {3.0 / 1000}
+
+
+def test_an_interrupted_study_states_nothing_but_keeps_its_rows():
+    def stops(work):
+        records = run(work)
+        records._places[2:] = -1
+        return records
+
+    found = carry_out(prepare(spec()), stops)
+    assert found.interrupted
+    assert exit_code(found) is ExitCode.INTERRUPTED
+    written = {name: data if isinstance(data, bytes) else b"".join(data) for name, data in outputs(found)}
+    assert "indices.csv" not in written
+    assert len(written["results.csv"].splitlines()) == 3
+    assert as_json(found)["status"] == "interrupted"
+
+
+def test_the_parts_of_a_list_and_of_a_batch_are_tightened_together():
+    setup = prepare(spec("tolerance", parameters=PARAMETERS | {"mechanism.roller_radius": {"normal": "0.01 mm"}}))
+    assert [len(group) for group in setup.together] == [1, 2, 1]
+    joint = ({"parameters": ("mechanism.roller_radius", "mechanism.rest_half_width"), "correlation": 0.5},)
+    names = ("mechanism.roller_radius", "mechanism.rest_half_width")
+    setup = prepare(spec("tolerance", parameters={name: {"normal": "0.01 mm"} for name in names}, correlated=joint))
+    assert setup.together == ((0, 1),)
+    assert setup.correlation[0, 1] == 0.5
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        ({"correlated": ({"parameters": ("mechanism.rest_half_width",)},)}, "correlated with nothing"),
+        (
+            {"correlated": ({"parameters": ("mechanism.brace", "mechanism.rest_half_width")},)},
+            "not among the parameters",
+        ),
+        ({"parameters": PARAMETERS | {"mechanism.springs.stiffness.0": {"uniform": "1 %"}}}, "is a parameter already"),
+        ({"parameters": {"mechanism.brace_length.*": {"uniform": "1 %"}}}, "is no list"),
+        ({"parameters": {"mechanism.profile.offset": {"uniform": "1 %"}}}, "of zero is zero"),
+        ({"parameters": {"mechanism.brace_length": {"uniform": "0 mm"}}}, "must be > 0"),
+        ({"parameters": {"mechanism.brace_length": {"uniform": "1 mm", "normal": "1 mm"}}}, "either"),
+        ({"parameters": {"mechanism.brace_length": {"uniform": "1 mm", "truncate": "1 mm"}}}, "tails"),
+        ({"parameters": {"requirements.0.max": ("1 %", "2 %")}}, "nothing to vary"),
+    ],
+)
+def test_a_block_that_makes_no_sense_is_refused_with_the_reason(more, words):
+    with pytest.raises(SpecError, match=words):
+        prepare(spec("tolerance", **more))
+
+
+def test_three_springs_cannot_all_oppose_each_other():
+    six = cfmkit.load(CONFIG.parent.parent / "cam_six_springs.yaml")
+    block = {
+        "method": "tolerance",
+        "parameters": {"mechanism.springs.stiffness.*": {"normal": "1 %"}},
+        "correlated": ({"parameters": ("mechanism.springs.stiffness.*",), "correlation": -0.5},),
+    }
+    with pytest.raises(SpecError, match="oppose"):
+        prepare(six.replace({"sensitivity": block}))
+
+
+def test_every_family_takes_a_study_of_its_own_values():
+    for name in families.names():
+        for path in sorted(CONFIG.parent.parent.glob("*.yaml")):
+            one = cfmkit.load(path)
+            values = {leaf: value for leaf, value in one.leaves() if leaf.startswith("mechanism.")}
+            if one.family != name or not values:
+                continue
+            leaf = next(leaf for leaf, value in values.items() if isinstance(value, float) and value)
+            block = {"method": "oat", "samples": 2, "parameters": {leaf: {"uniform": "0.01 %"}}}
+            found = carry_out(prepare(one.replace({"sensitivity": block})), run)
+            assert found.evaluator.count == 2, path
+            break
+        else:
+            pytest.fail(f"no configuration of {name}")
+
+
+def test_a_new_block_changes_no_other_result():
+    setup = prepare(spec())
+    other = prepare(spec(samples=8))
+    assert setup.study.identity == other.study.identity
+
+
+@pytest.mark.parametrize(
+    ("path", "name"),
+    [
+        ("mechanism.brace_length", "brace length"),
+        ("mechanism.springs.stiffness.0, mechanism.springs.stiffness.1", "springs stiffness (2)"),
+        ("mechanism.a, mechanism.b", "a, b"),
+    ],
+)
+def test_names_on_pictures_are_short(path, name):
+    assert short(path) == name
+
+
+def test_blocks_are_numbered_on_when_more_are_drawn():
+    setup = prepare(spec("sobol", parameters=BROKEN, on_failure="resample"))
+    evaluator = Evaluator(setup.study, setup.parameters, run)
+    points = np.broadcast_to(setup.values, (2, 4, len(setup.values)))
+    for _ in range(2):
+        evaluator.outputs(points, ["a", "b", "c", "d"])
+    assert [piece.blocks.tolist() for piece in evaluator.pieces] == [[1] * 4 + [2] * 4, [3] * 4 + [4] * 4]
+    assert evaluator.pieces[0].roles.tolist() == ["a", "b", "c", "d"] * 2

@@ -1,0 +1,204 @@
+"""A study point by point: failures become rows, rows are reused by content, executors agree."""
+
+import dataclasses
+import json
+
+import numpy as np
+import pytest
+
+import cfmkit
+from cfmkit.errors import UsageError
+from cfmkit.families import family
+from cfmkit.results import Status
+from cfmkit.studies.columns import metrics_of, sample_curve
+from cfmkit.studies.engine import Work, run
+from cfmkit.studies.journal import Journal
+from cfmkit.studies.plan import grid
+from cfmkit.studies.pool import Pool
+from cfmkit.studies.study import Study
+from cfmkit.studies.variation import axes, wish
+
+SPEC = cfmkit.load("configs/cam.yaml").replace({"analysis.points": 41})
+FRICTION = "mechanism.profile.friction=[0, 0.001]"
+BRACE = "mechanism.brace_length=[60 mm, 200 mm, 100 m, -1 mm]"
+
+
+def work(*options, spec=SPEC, names=("force_mean", "force_mean[load]", "theoretical_force"), **more):
+    plan = grid(axes(spec, [wish(option) for option in options]))
+    return Work(Study(spec, plan.paths, metrics_of(spec, names), **more), plan)
+
+
+def statuses(records):
+    return [rows.status(k)[0] for _, rows in records.batches() for k in range(len(rows))]
+
+
+def values(records):
+    return np.concatenate([rows.values for _, rows in records.batches()])
+
+
+def test_whatever_fails_at_a_point_is_a_row_without_values():
+    records = run(work(BRACE))
+    assert statuses(records) == [Status.NO_EQUILIBRIUM, Status.COMPLETE, Status.COMPLETE, Status.INVALID]
+    assert np.isnan(values(records)).all(axis=1).tolist() == [True, False, False, True]
+    message = records.row(3).status(0)[1]
+    assert message == "mechanism.brace_length: -1 mm is not allowed: must be > 0"
+
+
+def test_a_bug_is_a_crashed_row_with_its_traceback_and_is_not_kept(monkeypatch, tmp_path):
+    record = family("cam")
+
+    def broken(spec, run):
+        if spec.mechanism.profile.friction:
+            raise ZeroDivisionError("oops")
+        return record.analyze(spec, run)
+
+    monkeypatch.setattr("cfmkit.studies.study.family", lambda _name: dataclasses.replace(record, analyze=broken))
+    with Journal(tmp_path / "journal") as journal:
+        records = run(work(FRICTION), journal=journal)
+        assert statuses(records) == [Status.COMPLETE, Status.CRASHED]
+        assert "a bug in cfmkit: ZeroDivisionError: oops" in records.row(1).status(0)[1]
+        assert records.bugs == 1
+        assert "in broken" in records.bug
+    with Journal(tmp_path / "journal") as journal:
+        assert len(journal) == 1
+
+
+def test_a_point_has_the_numbers_that_analyze_and_evaluate_give():
+    records = run(work("mechanism.roller_radius=[8 mm, 16 mm]"))
+    for k, radius in enumerate((0.008, 0.016)):
+        result = cfmkit.analyze(SPEC.replace({"mechanism.roller_radius": radius}))
+        expected = cfmkit.evaluate(result, ["force_mean", "force_mean[load]", "theoretical_force"])
+        assert records.row(k).values[0] == pytest.approx([one.value for one in expected.values()], rel=1e-12)
+
+
+def test_requirements_are_checked_at_every_point():
+    spec = cfmkit.load("configs/cam.yaml")
+    met = np.concatenate([rows.met for _, rows in run(work("mechanism.springs.count=[1, 2]", spec=spec)).batches()])
+    assert met.shape == (2, len(spec.requirements))
+    expected = [cfmkit.check(cfmkit.analyze(spec.replace({"mechanism.springs.count": k}))) for k in (1, 2)]
+    assert met.tolist() == [[outcome.ok for outcome in outcomes] for outcomes in expected]
+
+
+def test_designing_at_each_point_gives_the_designed_mechanism():
+    records = run(work("design.force=[40 N, 60 N]", names=("theoretical_force", "force_constant"), design=True))
+    assert values(records)[:, 0] == pytest.approx([40.0, 60.0], rel=1e-12)
+    assert values(records)[:, 1] == pytest.approx([40 / (4 * 1380), 60 / (4 * 1380)], rel=1e-12)
+
+
+def test_a_design_that_fails_is_a_row():
+    records = run(work("design.stroke=[240 mm, 2 m]", design=True))
+    assert statuses(records) == [Status.COMPLETE, Status.INFEASIBLE]
+
+
+def test_designing_needs_a_family_that_can(monkeypatch):
+    stiff = dataclasses.replace(family("cam"), design=None)
+    monkeypatch.setattr("cfmkit.studies.engine.family", lambda _name: stiff)
+    with pytest.raises(UsageError, match="cannot be designed"):
+        run(work("design.force=[40 N]", design=True))
+
+
+def test_a_pool_gives_the_rows_of_one_process(tmp_path):
+    many = work(BRACE, "mechanism.profile.friction=0:0.002:6", names=())
+    alone, together = run(many), run(many, Pool(2))
+    assert np.array_equal(values(alone), values(together), equal_nan=True)
+    assert [alone.row(k).status(0) for k in range(24)] == [together.row(k).status(0) for k in range(24)]
+
+
+def test_rows_are_reused_by_content_not_by_order(tmp_path):
+    with Journal(tmp_path / "journal") as journal:
+        first = values(run(work("mechanism.profile.friction=[0.001, 0.002, 0.003]"), journal=journal))
+    with Journal(tmp_path / "journal") as journal:
+        records = run(work("mechanism.profile.friction=[0.003, 0.004, 0.001]"), journal=journal)
+        assert records.reused == 2
+        assert values(records)[[0, 2]].tolist() == first[[2, 0]].tolist()
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"spec": SPEC.replace({"mechanism.roller_radius": 0.015})},
+        {"spec": SPEC.replace({"analysis.points": 51})},
+        {"spec": SPEC.replace({"requirements.0.max": "4 %"})},
+        {"names": ("force_mean",)},
+        {"design": True},
+        {"curves": True},
+        {"seed": 1},
+    ],
+)
+def test_whatever_decides_a_row_makes_it_new(tmp_path, change):
+    option = "mechanism.springs.max_elongation=[130 mm, 140 mm]"
+    with Journal(tmp_path / "journal") as journal:
+        run(work(option), journal=journal)
+    with Journal(tmp_path / "journal") as journal:
+        assert run(work(option), journal=journal).reused == 2
+        assert run(work(option, **change), journal=journal).reused == 0
+
+
+def test_a_new_name_changes_nothing(tmp_path):
+    with Journal(tmp_path / "journal") as journal:
+        run(work(FRICTION), journal=journal)
+    with Journal(tmp_path / "journal") as journal:
+        renamed = SPEC.replace({"name": "other", "sweep": {"vary": {"mechanism.roller_radius": "1 mm:2 mm:3"}}})
+        assert run(work(FRICTION, spec=renamed), journal=journal).reused == 2
+
+
+def test_rows_from_the_journal_are_the_rows_that_were_computed(tmp_path):
+    many = work(BRACE, FRICTION, names=(), curves=True)
+    with Journal(tmp_path / "journal") as journal:
+        fresh = run(many, journal=journal)
+        new = [fresh.row(k) for k in range(8)]
+    with Journal(tmp_path / "journal") as journal:
+        again = run(many, journal=journal)
+        for k in range(8):
+            old = again.row(k)
+            assert np.array_equal(old.values, new[k].values, equal_nan=True)
+            assert (old.met.tolist(), old.odd, old.curves) == (new[k].met.tolist(), new[k].odd, new[k].curves)
+        assert again.reused == 8
+
+
+def test_a_record_with_a_wrong_number_is_computed_again(tmp_path):
+    place = tmp_path / "journal"
+    with Journal(place) as journal:
+        first = run(work(FRICTION), journal=journal)
+        before = values(first)
+    lines = place.read_bytes().splitlines(keepends=True)
+    number = json.loads(lines[0])["r"]["v"][0]
+    place.write_bytes(lines[0].replace(repr(number)[:4].encode(), b"99.9", 1) + lines[1])
+    with Journal(place) as journal:
+        second = run(work(FRICTION), journal=journal)
+        assert (journal.damaged, second.reused) == (1, 1)
+        assert np.array_equal(values(second), before)
+
+
+def test_a_stopped_study_has_the_rows_that_were_finished():
+    class Soon:
+        count = 0
+
+        def total(self, points): ...
+
+        def done(self, points, failed, reused):
+            self.count += points
+
+        def stopping(self):
+            return self.count >= 3
+
+    records = run(work("mechanism.profile.friction=0:0.001:11"), monitor=Soon())
+    assert records.finished == 3
+    assert [index.tolist() for index, _ in records.batches()] == [[0, 1, 2]]
+
+
+def test_the_default_columns_are_every_metric_that_such_a_curve_can_have():
+    option = wish("mechanism.brace_length=[60 mm, 200 mm]")
+    lost = SPEC.replace({"mechanism.brace_length": 0.06})
+    curve = sample_curve(lost, grid(axes(lost, [option])), design=False)
+    assert curve is not None
+    names = [one.name for one in metrics_of(SPEC, (), curve)]
+    assert {"force_ripple", "hysteresis_area", "theoretical_force", "corner_force_max"} <= set(names)
+    assert not {"stress_max", "safety_factor"} & set(names)
+    assert not any("[" in name for name in names)
+
+
+@pytest.mark.parametrize("name", ["force_riple", "torque_mean", "hysteresis_area[load]"])
+def test_an_unknown_metric_is_refused(name):
+    with pytest.raises(UsageError, match=r"no metric|not a matter of one branch"):
+        metrics_of(SPEC, (name,))
