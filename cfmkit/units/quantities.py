@@ -216,6 +216,6 @@ def _fits(decimal: Decimal, factor: Fraction, value: float) -> bool:
 def _plain(decimal: Decimal) -> str:
     """Return a decimal as people write it: ``0.05``, ``1200``, ``1e-9``."""
     short = decimal.normalize()
-    if -5 <= short.adjusted() <= 15:
+    if -4 <= short.adjusted() <= 15:
         return format(short, "f")
     return format(short, "e").replace("e+", "e")
