@@ -12,7 +12,9 @@ if TYPE_CHECKING:
     from cfmkit.families.base import Family
 
 FAMILIES = {
+    "beam": "cfmkit.families.beam",
     "cam": "cfmkit.families.cam",
+    "slider-crank": "cfmkit.families.slider_crank",
 }
 
 

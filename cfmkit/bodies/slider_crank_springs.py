@@ -1,0 +1,234 @@
+"""What a unit spring at each joint of a slider-crank gives: over the crank's angle, or over the slider's travel.
+
+Torsion springs at pivot A, crank pin B and slider pin C, an extension spring at the slider, all
+relaxed in one position. Energy, effort and stiffness are linear in the four rates, so
+everything here is per unit rate. beta is the coupler's direction: the crank pin
+turns by beta - t, the slider pin by beta.
+
+Assumes: rigid massless links, no friction, linear springs.
+
+Reference
+---------
+[LH] B. Li, G. Hao, Chin. J. Mech. Eng. 32 (2019) 10.1186/s10033-019-0369-z, sec. 2.
+[B] P. Bilancia, A. Geraci, G. Berselli, SMASIS2019-5519, sec. 2.1.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from cfmkit.bodies.slider_crank import Linkage
+    from cfmkit.curves import FloatArray
+
+JOINTS = ("pivot", "crank_pin", "slider_pin", "slider")
+"""Where the springs are: A, B, C, and the slider; rows of every (4, n) array here."""
+
+
+@dataclass(frozen=True)
+class UnitCurves:
+    """What a spring of rate 1 at each joint gives along the motion, n places.
+
+    Rows are those of `JOINTS`; the last row has a length [m] in the place of an angle [rad].
+
+    Attributes
+    ----------
+    angle : (n,) array
+        Crank angle [rad].
+    position : (n,) array
+        The slider's x [m].
+    turn : (4, n) array
+        q: how far each joint has turned, or the slider moved, from the unloaded position.
+    effort : (4, n) array
+        q q', the derivative of q^2/2 by the motion.
+    stiffness : (4, n) array
+        (q q')'.
+    bend : (4, n) array or None
+        (q q')''; None where it was not asked for.
+    """
+
+    angle: FloatArray
+    position: FloatArray
+    turn: FloatArray
+    effort: FloatArray
+    stiffness: FloatArray
+    bend: FloatArray | None = None
+
+
+def along_crank(linkage: Linkage, unloaded: float, angle: FloatArray) -> UnitCurves:
+    """Return the unit curves over the crank angle: effort is a torque at the crank [LH, eq. 10].
+
+    Differences from the unloaded position are formed without cancellation. NaN where the
+    linkage does not reach; infinite where the coupler stands across the slider's way.
+
+    Parameters
+    ----------
+    linkage : Linkage
+        Must be assemblable.
+    unloaded : float
+        Crank angle at which all springs are relaxed [rad].
+    angle : (n,) array
+        Crank angles [rad], any number of turns.
+    """
+    r1, r2, way = linkage.crank, linkage.coupler, linkage.branch
+    angle = np.asarray(angle, dtype=np.float64)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        turn, position = _turns(linkage, unloaded, angle)
+        sine, cosine = np.sin(angle), np.cos(angle)
+        rise = (linkage.offset - r1 * sine) / r2  # sin beta
+        level = (position - r1 * cosine) / r2  # cos beta, with the sign of the branch
+        level = way * np.abs(level)
+        b1 = -r1 * cosine / (r2 * level)
+        b2 = (r1 * sine / r2 + rise * b1**2) / level
+        b3 = (r1 * cosine / r2 + level * b1**3 + 3.0 * rise * b1 * b2) / level
+        x1 = -r1 * sine - r2 * rise * b1
+        x2 = -r1 * cosine - r2 * (level * b1**2 + rise * b2)
+        x3 = r1 * sine + r2 * (rise * b1**3 - 3.0 * level * b1 * b2 - rise * b3)
+        one, zero = np.ones_like(angle), np.zeros_like(angle)
+        first = np.stack([one, b1 - 1.0, b1, x1])
+        second = np.stack([zero, b2, b2, x2])
+        third = np.stack([zero, b3, b3, x3])
+        effort = turn * first
+        stiffness = first**2 + turn * second
+        bend = 3.0 * first * second + turn * third
+    return UnitCurves(angle, position, turn, effort, stiffness, bend)
+
+
+def crank_torques(linkage: Linkage, unloaded: float, angle: FloatArray) -> FloatArray:
+    """Return the torque of a unit spring at each joint, (4, n): `along_crank` without anything else."""
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        turn, position = _turns(linkage, unloaded, angle)
+        sine, cosine = np.sin(angle), np.cos(angle)
+        run = linkage.branch * np.abs(position - linkage.crank * cosine)
+        slope = -linkage.crank * cosine / run
+        turn[1] *= slope - 1.0
+        turn[2] *= slope
+        turn[3] *= -linkage.crank * sine - (linkage.offset - linkage.crank * sine) * slope
+    return turn
+
+
+def _turns(linkage: Linkage, unloaded: float, angle: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return q of the four joints, (4, n), and the slider's x."""
+    r1, r2, e = linkage.crank, linkage.coupler, linkage.offset
+    half = 0.5 * (angle - unloaded)
+    middle = 0.5 * (angle + unloaded)
+    swing = 2.0 * r1 * np.sin(half)
+    lift0 = r1 * math.sin(unloaded) - e
+    rise = swing * np.cos(middle)  # u - u0
+    lift = lift0 + rise
+    run0 = math.sqrt(max((r2 - lift0) * (r2 + lift0), 0.0))
+    run = np.sqrt((r2 - lift) * (r2 + lift))
+    shorter = rise * (lift + lift0) / (run + run0)  # a0 - a
+    coupler = -linkage.branch * np.arctan2(rise * run0 + lift0 * shorter, run * run0 + lift * lift0)
+    travel = -swing * np.sin(middle) - linkage.branch * shorter
+    turn = np.empty((4, *np.shape(angle)))
+    turn[0], turn[2], turn[3] = 2.0 * half, coupler, travel
+    turn[1] = coupler - turn[0]
+    return turn, r1 * np.cos(angle) + linkage.branch * run
+
+
+def along_slider(linkage: Linkage, unloaded: float, side: int, travel: FloatArray) -> UnitCurves:
+    """Return the unit curves over the slider's travel towards the pivot: effort is a force at the slider [B, eq. 2-7].
+
+    Everything is written in the knee angle psi between crank and coupler, which the travel
+    gives without cancellation: x_s^2 - x^2 = 4 r1 r2 sin^2(psi/2), x_s the stretched position. Where the
+    springs are relaxed in the stretched position, the effort at its 0/0 is the limit; otherwise it
+    is infinite there. NaN where the linkage does not reach, and as the stiffness at the stretched position.
+
+    Parameters
+    ----------
+    linkage : Linkage
+        Must be assemblable.
+    unloaded : float
+        Crank angle at which all springs are relaxed [rad].
+    side : int
+        1: the crank is beyond the stretched position (psi > 0), -1: before it.
+    travel : (n,) array
+        From the unloaded position, positive towards the pivot [m].
+    """
+    if linkage.branch < 0:
+        mirror = along_slider(linkage.mirrored(), math.pi - unloaded, -side, travel)
+        angle, position = math.pi - mirror.angle, -mirror.position
+        return UnitCurves(angle, position, -mirror.turn, mirror.effort, mirror.stiffness)
+    travel = np.asarray(travel, dtype=np.float64)
+    path = _SliderPath(linkage, linkage.knee(unloaded), side)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        state = path.at(travel)
+        effort, stiffness = path.efforts(state)
+    far = travel > path.x0 - linkage.nearest_position + 1e-12 * path.x0
+    near = travel < -path.slack - 1e-12 * path.x0
+    effort, stiffness = (np.where(far | near, np.nan, item) for item in (effort, stiffness))
+    return UnitCurves(unloaded + state.turn[0], state.position, state.turn, effort, stiffness)
+
+
+@dataclass(frozen=True)
+class _SliderState:
+    """Places on the slider's way: knee angle, x, q and the derivatives of the crank's and the coupler's shares."""
+
+    knee: FloatArray
+    position: FloatArray
+    turn: FloatArray
+
+
+class _SliderPath:
+    """The way of the slider of a linkage on one side of the stretched position."""
+
+    def __init__(self, linkage: Linkage, start: float, side: int) -> None:
+        self.linkage, self.start, self.side = linkage, start, side
+        xs = linkage.stretched_position
+        gap = 4.0 * linkage.crank * linkage.coupler * math.sin(0.5 * start) ** 2
+        self.x0 = math.sqrt(max(xs**2 - gap, 0.0))
+        self.slack = gap / (xs + self.x0)  # x_s - x0
+        self.phi0, self.chi0 = _shares(linkage, np.asarray(start))
+
+    def at(self, travel: FloatArray) -> _SliderState:
+        """Return the state at some travels."""
+        link = self.linkage
+        position = self.x0 - travel
+        beyond = np.maximum(self.slack + travel, 0.0)
+        gap = beyond * (link.stretched_position + position)
+        share = np.sqrt(gap / (4.0 * link.crank * link.coupler))
+        knee = self.side * 2.0 * np.arcsin(np.minimum(share, 1.0))
+        return self.state(knee, position, travel)
+
+    def state(self, knee: FloatArray, position: FloatArray, travel: FloatArray) -> _SliderState:
+        """Return the state with a knee angle and the place of the slider that goes with it."""
+        e = self.linkage.offset
+        view = np.arctan2(e * travel, position * self.x0 + e * e)  # how far the direction from A to C has turned
+        phi, chi = _shares(self.linkage, knee)
+        turn = np.stack([view + phi - self.phi0, self.start - knee, view - (chi - self.chi0), -travel])
+        return _SliderState(knee, position, turn)
+
+    def efforts(self, state: _SliderState) -> tuple[FloatArray, FloatArray]:
+        """Return q q' and (q q')' by the travel, (4, n) each."""
+        link, knee, x = self.linkage, state.knee, state.position
+        r1, r2, e = link.crank, link.coupler, link.offset
+        sine, cosine = np.sin(knee), np.cos(knee)
+        d2 = r1 * r1 + r2 * r2 + 2.0 * r1 * r2 * cosine
+        by_knee = np.stack([r2 * (r2 + r1 * cosine) / d2, -np.ones_like(knee), -r1 * (r1 + r2 * cosine) / d2])
+        view1, view2 = e / d2, 2.0 * e * x / d2**2
+        views = np.array([1.0, 0.0, 1.0])[:, None]
+        lever = x / (r1 * r2)  # psi' = lever / sin psi
+        ratio = np.where(sine == 0.0, by_knee, state.turn[:3] / sine) if self.start == 0.0 else state.turn[:3] / sine
+        effort = state.turn[:3] * views * view1 + ratio * by_knee * lever
+        bend = r1 * r2 * (r2**2 - r1**2) * sine / d2**2
+        bends = np.stack([bend, np.zeros_like(knee), bend])
+        knee1 = lever / sine
+        knee2 = (-1.0 / (r1 * r2) - knee1**2 * cosine) / sine
+        first = views * view1 + by_knee * knee1
+        second = views * view2 + bends * knee1**2 + by_knee * knee2
+        stiffness = first**2 + state.turn[:3] * second
+        stiffness[:, sine == 0.0] = np.nan
+        travel = -state.turn[3]
+        return np.vstack([effort, travel[None]]), np.vstack([stiffness, np.ones_like(travel)[None]])
+
+
+def _shares(linkage: Linkage, knee: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the angles of crank and coupler from the line pivot to slider pin: they add up to the knee's."""
+    r1, r2 = linkage.crank, linkage.coupler
+    sine, cosine = np.sin(knee), np.cos(knee)
+    return np.arctan2(r2 * sine, r1 + r2 * cosine), np.arctan2(r1 * sine, r2 + r1 * cosine)

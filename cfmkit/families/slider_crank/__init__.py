@@ -1,0 +1,26 @@
+"""Slider-crank mechanisms with springs at their joints [Li, Hao 2019; Bilancia et al. 2019]."""
+
+from __future__ import annotations
+
+from cfmkit.families.base import Family
+from cfmkit.families.slider_crank.build import resolve
+from cfmkit.families.slider_crank.findings import FINDINGS
+from cfmkit.families.slider_crank.model import analyze
+from cfmkit.families.slider_crank.spec import SliderCrankSpec
+from cfmkit.families.slider_crank.values import DEFINITIONS
+
+FAMILY = Family(
+    name="slider-crank",
+    summary="a crank, a coupler and a slider with a spring at each joint: constant torque or force",
+    spec_type=SliderCrankSpec,
+    analyze=analyze,
+    values=DEFINITIONS,
+    resolve=resolve,
+    headline=("band_range_05pct", "half_band", "energy_max", "crank_pin_rotation_max"),
+    template="slider-crank.yaml",
+    findings=FINDINGS,
+    references=(
+        "B. Li, G. Hao, Chin. J. Mech. Eng. 32 (2019), doi:10.1186/s10033-019-0369-z",
+        "P. Bilancia, A. Geraci, G. Berselli, ASME SMASIS 2019, SMASIS2019-5519",
+    ),
+)

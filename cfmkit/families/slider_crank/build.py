@@ -1,0 +1,182 @@
+"""From a slider-crank specification to linkage, rates and the motion that is run through."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.bodies.slider_crank import Linkage
+from cfmkit.bodies.slider_crank_springs import UnitCurves, along_crank, along_slider
+from cfmkit.errors import SolutionError
+from cfmkit.families.slider_crank.findings import deg, finding, mm
+
+if TYPE_CHECKING:
+    from cfmkit.curves import FloatArray, Kind
+    from cfmkit.families.slider_crank.spec import Mechanism, SliderCrankSpec
+    from cfmkit.results import Finding
+
+TURN = 2.0 * math.pi
+
+SHORT_OF_END = 1e-3
+"""Share of an arc that the default motion stays away from its ends, where efforts have no bound."""
+
+
+class CannotBuild(SolutionError):
+    """The mechanism cannot exist as described; carries the finding that says why."""
+
+    def __init__(self, name: str, message: str) -> None:
+        """Keep the finding."""
+        self.finding: Finding = finding(name, message)
+        super().__init__(message)
+
+
+@dataclass(frozen=True)
+class Assembly:
+    """A slider-crank put together.
+
+    Attributes
+    ----------
+    linkage : Linkage
+        The lengths, the coupler's written out.
+    unloaded : float
+        Crank angle with all springs relaxed [rad].
+    rates : (4,) array
+        Of the springs of all legs together [N m/rad; the last N/m].
+    drive : {"torque", "force"}
+        What the motion is: the crank's angle or the slider's travel.
+    side : int
+        Of a force drive: 1 beyond, -1 before the stretched position.
+    """
+
+    linkage: Linkage
+    unloaded: float
+    rates: FloatArray
+    drive: Kind = "torque"
+    side: int = 1
+
+    def units(self, motion: FloatArray) -> UnitCurves:
+        """Return what unit springs do along the motion of the drive."""
+        if self.drive == "torque":
+            return along_crank(self.linkage, self.unloaded, motion)
+        return along_slider(self.linkage, self.unloaded, self.side, motion)
+
+    @property
+    def start(self) -> float:
+        """The motion in the unloaded position."""
+        return self.unloaded if self.drive == "torque" else 0.0
+
+    @property
+    def reach(self) -> tuple[float, float]:
+        """Ends of the motion that the linkage allows [rad or m]; infinite where the crank turns fully."""
+        if self.drive == "torque":
+            return self.linkage.arc(self.unloaded)
+        way = self.linkage.branch * float(self.linkage.slider_position(np.asarray(self.unloaded)))
+        return way - self.linkage.stretched_position, way - self.linkage.nearest_position
+
+    @property
+    def stretched(self) -> float:
+        """The motion in the stretched position nearest to the unloaded one."""
+        if self.drive == "force":
+            return self.reach[0]
+        return self.unloaded - math.remainder(self.unloaded - self.linkage.stretched_angle, TURN)
+
+
+def resolve(spec: SliderCrankSpec) -> SliderCrankSpec:
+    """Return the spec with the coupler written out: from now on it is a fixed part."""
+    mechanism = spec.mechanism
+    if mechanism.stretched_position is None:
+        return spec
+    written = {"coupler_length": coupler_length(mechanism), "stretched_position": None}
+    return spec.model_copy(update={"mechanism": mechanism.model_copy(update=written)})
+
+
+def coupler_length(mechanism: Mechanism) -> float:
+    """Return r2 [m], from the stretched position where it is not given [B, eq. 11]."""
+    if mechanism.coupler_length is not None:
+        return mechanism.coupler_length
+    reach = math.hypot(mechanism.stretched_position or 0.0, mechanism.offset)
+    if reach <= mechanism.crank_length:
+        raise CannotBuild(
+            "not_assemblable",
+            f"pivot and slider pin are {mm(reach)} apart when stretched, and the crank alone is "
+            f"{mm(mechanism.crank_length)}: nothing is left for the coupler; use a shorter crank",
+        )
+    return reach - mechanism.crank_length
+
+
+def linkage_of(mechanism: Mechanism) -> Linkage:
+    """Return the linkage of a mechanism.
+
+    Raises
+    ------
+    CannotBuild
+        If crank and coupler do not reach the slider's way.
+    """
+    branch = 1 if mechanism.branch == "right" else -1
+    linkage = Linkage(mechanism.crank_length, coupler_length(mechanism), mechanism.offset, branch)
+    if not linkage.assemblable:
+        raise CannotBuild(
+            "not_assemblable",
+            f"crank and coupler together are {mm(linkage.crank + linkage.coupler)}, but the slider's way passes the "
+            f"pivot at {mm(abs(linkage.offset))}; make the links longer or the offset smaller",
+        )
+    return linkage
+
+
+def unloaded_angle(mechanism: Mechanism, linkage: Linkage) -> float:
+    """Return the crank angle with all springs relaxed [rad].
+
+    Raises
+    ------
+    CannotBuild
+        If the linkage does not reach it.
+    """
+    given = mechanism.unloaded_angle
+    angle = given if given is not None else linkage.stretched_angle + (mechanism.unloaded_offset or 0.0)
+    if not linkage.reaches(angle):
+        low, high = linkage.arc(linkage.stretched_angle)
+        raise CannotBuild(
+            "not_assemblable",
+            f"with the crank at {deg(angle)} the coupler of {mm(linkage.coupler)} does not reach the slider's way; "
+            f"the unloaded position must be between {deg(low)} and {deg(high)}",
+        )
+    return angle
+
+
+def assemble(spec: SliderCrankSpec) -> Assembly:
+    """Return the slider-crank put together.
+
+    Raises
+    ------
+    CannotBuild
+        If it cannot exist as described; the finding says why.
+    """
+    mechanism, analysis = spec.mechanism, spec.analysis
+    linkage = linkage_of(mechanism)
+    unloaded = unloaded_angle(mechanism, linkage)
+    springs = mechanism.springs
+    rates = np.array([springs.pivot, springs.crank_pin, springs.slider_pin, springs.slider]) * mechanism.legs
+    rates.setflags(write=False)
+    return Assembly(linkage, unloaded, rates, analysis.drive, _side(spec, linkage, unloaded))
+
+
+def _side(spec: SliderCrankSpec, linkage: Linkage, unloaded: float) -> int:
+    if spec.analysis.side is not None:
+        beyond = 1 if spec.analysis.side == "beyond" else -1
+    else:
+        beyond = -1 if linkage.knee(unloaded) < 0 else 1
+    return beyond
+
+
+def default_motion(assembly: Assembly) -> tuple[float, float]:
+    """Return the motion that is run through where none is asked for: all of it, a full turn at most."""
+    low, high = assembly.reach
+    if math.isinf(low):
+        return assembly.start, assembly.start + TURN
+    room = SHORT_OF_END * (high - low)
+    if assembly.drive == "force":
+        return 0.0, high - room
+    return low + room, high - room

@@ -1,0 +1,210 @@
+"""Analysis of a slider-crank with springs: torque over the crank angle, or force over the slider's travel.
+
+The torque is the derivative of the energy by the crank angle [LH, eq. 10 and 12], the force that
+by the slider's travel: what the slider pushes back with while it is moved towards the pivot.
+
+Reference
+---------
+[LH] B. Li, G. Hao, Chin. J. Mech. Eng. 32 (2019) 10.1186/s10033-019-0369-z.
+[B] P. Bilancia, A. Geraci, G. Berselli, SMASIS2019-5519.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.bodies.slider_crank_springs import JOINTS
+from cfmkit.curves import Column, Curve, FloatArray
+from cfmkit.families.slider_crank.build import CannotBuild, assemble, default_motion, resolve
+from cfmkit.families.slider_crank.findings import deg, finding, mm
+from cfmkit.families.slider_crank.values import values_of
+from cfmkit.results import Result, Status
+
+if TYPE_CHECKING:
+    from cfmkit.bodies.slider_crank_springs import UnitCurves
+    from cfmkit.families.base import Run
+    from cfmkit.families.slider_crank.build import Assembly
+    from cfmkit.families.slider_crank.spec import SliderCrankSpec
+    from cfmkit.results import Finding
+
+
+@dataclass(frozen=True)
+class Solution:
+    """A solved mechanism, as the checks, the scalar values and the pictures need it.
+
+    Attributes
+    ----------
+    assembly : Assembly
+        The parts.
+    motion : (n,) array
+        Crank angle [rad] or slider travel [m], increasing.
+    units : UnitCurves
+        What springs of rate 1 do there.
+    """
+
+    assembly: Assembly
+    motion: FloatArray
+    units: UnitCurves
+
+    @cached_property
+    def energy(self) -> FloatArray:
+        """Energy in all springs [J]."""
+        energy: FloatArray = 0.5 * self.assembly.rates @ self.units.turn**2
+        return energy
+
+    @cached_property
+    def shares(self) -> FloatArray:
+        """Effort of each spring, (4, n) [N m or N]."""
+        return _weighed(self.assembly.rates, self.units.effort)
+
+    @cached_property
+    def effort(self) -> FloatArray:
+        """Torque [N m] or force [N]."""
+        effort: FloatArray = self.shares.sum(axis=0)
+        return effort
+
+    @cached_property
+    def stiffness(self) -> FloatArray:
+        """Derivative of the effort by the motion [N m/rad or N/m]."""
+        stiffness: FloatArray = _weighed(self.assembly.rates, self.units.stiffness).sum(axis=0)
+        return stiffness
+
+
+def _weighed(rates: FloatArray, unit: FloatArray) -> FloatArray:
+    """Return rates times unit curves; a spring that is not there does nothing, even at a pole."""
+    with np.errstate(invalid="ignore"):
+        product: FloatArray = np.where(rates[:, None] == 0.0, 0.0 * np.isnan(unit), rates[:, None] * unit)
+    return product
+
+
+def analyze(spec: SliderCrankSpec, run: Run) -> Result:
+    """Return the torque or force curve of a slider-crank, with everything that is wrong with it.
+
+    Parameters
+    ----------
+    spec : SliderCrankSpec
+        The mechanism.
+    run : Run
+        Not needed here: the model is a closed form.
+
+    Returns
+    -------
+    Result
+        One branch, ``load``. NO_EQUILIBRIUM if the mechanism cannot be built, PARTIAL if
+        the linkage does not reach all of the motion asked for.
+    """
+    try:
+        spec = resolve(spec)
+        assembly = assemble(spec)
+        solution, shortfalls = solve(spec, assembly)
+    except CannotBuild as problem:
+        return Result(spec, Status.NO_EQUILIBRIUM, problem.finding.message, warnings=(problem.finding,))
+    status = Status.PARTIAL if shortfalls else Status.COMPLETE
+    return Result(
+        spec=_as_run(spec, assembly),
+        status=status,
+        message=shortfalls[0].message if shortfalls else "",
+        curves=(_curve(solution),),
+        values=values_of(solution),
+        warnings=(*shortfalls, *_findings(solution)),
+        reference=_reference(spec, assembly),
+        state=solution,
+    )
+
+
+def asked_motion(spec: SliderCrankSpec, assembly: Assembly) -> tuple[float, float]:
+    """Return the motion that the analysis asks for [rad or m]."""
+    asked = spec.analysis.angle if assembly.drive == "torque" else spec.analysis.travel
+    return asked or default_motion(assembly)
+
+
+def solve(spec: SliderCrankSpec, assembly: Assembly) -> tuple[Solution, tuple[Finding, ...]]:
+    """Return the solution over what the linkage reaches of the motion asked for, and why that is less.
+
+    Raises
+    ------
+    CannotBuild
+        If it reaches nothing of it.
+    """
+    low, high = asked_motion(spec, assembly)
+    first, last = assembly.reach
+    short = _shortfall(assembly, (low, high), (first, last))
+    start, stop = max(low, first), min(high, last)
+    if short is not None and not start < stop:
+        raise CannotBuild(short.name, short.message)
+    motion = np.linspace(start, stop, spec.analysis.points)
+    units = assembly.units(motion)
+    finite = np.isfinite(assembly.rates @ np.where(assembly.rates[:, None] > 0, units.effort, 0.0))
+    if not finite.all():  # at an end of the motion only: the unbounded place itself is left out
+        motion = motion[finite]
+        units = assembly.units(motion)
+    return Solution(assembly, motion, units), () if short is None else (short,)
+
+
+def _shortfall(assembly: Assembly, asked: tuple[float, float], reach: tuple[float, float]) -> Finding | None:
+    """Return why the linkage does not reach all of a motion; None if it does."""
+    slack = 1e-9 * (asked[1] - asked[0])
+    if asked[0] >= reach[0] - slack and asked[1] <= reach[1] + slack:
+        return None
+    if assembly.drive == "torque":
+        text = (
+            f"the crank reaches {deg(reach[0])} to {deg(reach[1])}, and {deg(asked[0])} to {deg(asked[1])} are asked "
+            "for: at the ends the coupler stands across the slider's way; ask for less, or lengthen the coupler "
+            f"beyond {mm(assembly.linkage.crank + abs(assembly.linkage.offset))} for full turns"
+        )
+        return finding("coupler_dead_point", text)
+    text = (
+        f"from the unloaded position the slider can travel {mm(reach[0])} to {mm(reach[1])}, and {mm(asked[0])} to "
+        f"{mm(asked[1])} are asked for"
+    )
+    return finding("out_of_reach", text)
+
+
+def _findings(solution: Solution) -> tuple[Finding, ...]:
+    found = []
+    if not solution.assembly.rates.any():
+        found.append(finding("no_spring", "no spring has a rate: the mechanism moves freely; set 'mechanism.springs'"))
+    return tuple(found)
+
+
+def _reference(spec: SliderCrankSpec, assembly: Assembly) -> float | None:
+    """Return where the constant band is taken: as asked, else the stretched position if the motion passes it."""
+    low, high = asked_motion(spec, assembly)
+    if assembly.drive == "force":
+        return spec.analysis.reference_travel
+    place = spec.analysis.reference_angle
+    if place is None and low <= assembly.stretched <= high:
+        return assembly.stretched
+    return place
+
+
+def _as_run(spec: SliderCrankSpec, assembly: Assembly) -> SliderCrankSpec:
+    """Return the spec with what the analysis fell back on written out."""
+    name = "angle" if assembly.drive == "torque" else "travel"
+    written = {name: asked_motion(spec, assembly), "fidelity": "prb"}
+    return spec.model_copy(update={"analysis": spec.analysis.model_copy(update=written)})
+
+
+def _curve(solution: Solution) -> Curve:
+    drive, units = solution.assembly.drive, solution.units
+    rate = "rotational_stiffness" if drive == "torque" else "stiffness"
+    shares = {f"{drive}_{name}": Column(row, drive) for name, row in zip(JOINTS, solution.shares, strict=True)}
+    place = {"slider_position": Column(units.position, "length")}
+    if drive == "force":
+        place = {"crank_angle": Column(units.angle, "angle"), **place}
+    rows = zip(JOINTS[:3], units.turn, strict=False)
+    turns = {f"{name}_rotation": Column(row, "angle") for name, row in rows}
+    extra = {
+        "stiffness": Column(solution.stiffness, rate),
+        "energy": Column(solution.energy, "energy"),
+        **shares,
+        **place,
+        **turns,
+        "slider_travel": Column(units.turn[3], "length"),
+    }
+    points = len(solution.motion)
+    return Curve(solution.motion, solution.effort, np.repeat("load", points), np.ones(points, dtype=bool), extra, drive)
