@@ -84,6 +84,17 @@ class SlopeLaw:
         turn = 1.0 - self.friction * self.frictionless(x)
         return self._rise(x) * (1.0 + self.friction**2) / (turn * turn)
 
+    def slopes(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return dy/dx and d2y/dx2 [1/m] of the path: `slope` and `slope_derivative`, in half the time of both."""
+        across = (self.brace_length - x) * (self.brace_length + x)
+        root = across**0.5
+        p = self.slope_factor * ((x - self.rest_half_width) / self.force_constant + x / root)
+        rise = self.slope_factor * (1.0 / self.force_constant + self.brace_length**2 / (across * root))
+        if not self.friction:
+            return p, rise
+        turn = 1.0 - self.friction * p
+        return (p + self.friction) / turn, rise * (1.0 + self.friction**2) / (turn * turn)
+
     def _rise(self, x: Real) -> Real:
         """Return dp/dx [1/m]."""
         across = (self.brace_length - x) * (self.brace_length + x)

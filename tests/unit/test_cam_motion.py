@@ -249,8 +249,11 @@ def test_the_method_is_a_value_of_the_specification():
 
 def test_the_multibody_method_says_that_it_leaves_rolling_resistance_out():
     result = analyze(moving(rolling_friction=0.002, analysis__dynamics__method="multibody"))
+    smooth = analyze(moving())
     assert "friction_left_out" in names(result)
-    np.testing.assert_allclose(result.curve.force, analyze(moving()).curve.force, rtol=1e-9)
+    np.testing.assert_allclose(result.curve.force, smooth.curve.force, rtol=1e-9)
+    for name in ("force_peak_over_slow", "force_peak_over_static"):  # compared with forces without friction, too
+        assert result.values[name].value == pytest.approx(smooth.values[name].value, rel=1e-9), name
 
 
 def test_the_quasi_static_model_says_that_it_is_symmetric():

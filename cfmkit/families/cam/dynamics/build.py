@@ -75,10 +75,13 @@ def _left(spec: CamSpec) -> CamSpec:
     mechanism, left = spec.mechanism, spec.mechanism.left
     if left is None:
         return spec
+    profile = left.profile or mechanism.profile
+    if profile.stroke is None:
+        profile = profile.model_copy(update={"stroke": mechanism.profile.stroke})
     changes = {
         "brace_length": left.brace_length or mechanism.brace_length,
         "roller_radius": left.roller_radius or mechanism.roller_radius,
-        "profile": left.profile or mechanism.profile,
+        "profile": profile,
     }
     return spec.model_copy(update={"mechanism": mechanism.model_copy(update=changes)})
 
@@ -100,7 +103,7 @@ def _machine(spec: CamSpec, sides: tuple[Assembly, Assembly], lift: float) -> Ma
         stiffness=mechanism.springs.total,
         rest_length=2.0 * mechanism.rest_half_width,
         gravity=GRAVITY if spec.gravity else 0.0,
-        friction=mechanism.rolling_friction,
+        friction=mechanism.rolling_friction if stated_motion(spec).method == "direct" else 0.0,
     )
 
 

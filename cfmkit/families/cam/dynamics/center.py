@@ -65,8 +65,7 @@ class Flank:
 
     def at(self, parameter: FloatArray) -> Places:
         """Return the points for path coordinates [m]."""
-        law = self.profile.path.law
-        slope, bend = law.slope(parameter), law.slope_derivative(parameter)
+        slope, bend = self.profile.path.law.slopes(parameter)
         square = 1.0 + slope * slope
         length = np.sqrt(square)
         tangent, curvature = (1.0 + 1j * slope) / length, bend / (square * length)

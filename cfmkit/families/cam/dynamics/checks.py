@@ -143,11 +143,11 @@ def _mismatch(what: str, stated: float, expected: float, allowed: tuple[float, f
 
 def _friction(moved: Moved) -> Iterator[Finding]:
     dynamics = moved.spec.analysis.dynamics
-    if dynamics and dynamics.method == "multibody" and moved.build.machine.friction:
+    if dynamics and dynamics.method == "multibody" and moved.spec.mechanism.rolling_friction:
         yield finding(
             "friction_left_out",
             "the nine-coordinate model has no rolling resistance: 'mechanism.rolling_friction' = "
-            f"{moved.build.machine.friction:g} is left out; 'analysis.dynamics.method: direct' has it",
+            f"{moved.spec.mechanism.rolling_friction:g} is left out; 'analysis.dynamics.method: direct' has it",
         )
 
 

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     ComplexArray = NDArray[np.complex128]
 
 KNOTS = 129
-GUIDE_KNOTS = 513
+GUIDE_KNOTS = 2049
 NEWTON_STEPS = 5
 
 
