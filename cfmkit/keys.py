@@ -29,7 +29,7 @@ class Key:
     Attributes
     ----------
     path : str
-        Dotted; ``[]`` stands for the items of a list.
+        Dotted; ``[]`` stands for the items of a list, ``.NAME`` for those of a block whose names are free.
     kind : str
         What is written there: ``length``, ``text``, ``block``, or the words of a closed choice.
     example : str
@@ -111,6 +111,8 @@ def _inner_blocks(node: dict[str, Any], blocks: dict[str, Any]) -> Iterator[tupl
             yield member, ""
         elif "items" in member:
             yield from ((item, "[]") for item in _members(member["items"], blocks) if "properties" in item)
+        elif isinstance(named := member.get("additionalProperties"), dict):
+            yield from ((item, ".NAME") for item in _members(named, blocks) if "properties" in item)
 
 
 def _members(node: dict[str, Any], blocks: dict[str, Any]) -> list[dict[str, Any]]:

@@ -196,9 +196,24 @@ def readable_requirement(entry: Any) -> Requirement | None:
         return None
 
 
+def refuse(title: str, faults: Mapping[tuple[str | int, ...], str]) -> None:
+    """Raise an error that names the place of each fault: path below the block being checked -> what is wrong.
+
+    For validators of a block that find what is wrong deep inside it. Nothing is raised without faults.
+    """
+    if faults:
+        lines = [
+            {"type": "value_error", "loc": place, "input": None, "ctx": {"error": ValueError(message)}}
+            for place, message in faults.items()
+        ]
+        raise ValidationError.from_exception_data(title, lines)  # type: ignore[arg-type]
+
+
 def _child(value: Any, part: str, path: str) -> Any:
     if isinstance(value, tuple) and part.isdigit() and int(part) < len(value):
         return value[int(part)]
+    if isinstance(value, Mapping) and part in value:
+        return value[part]
     if isinstance(value, BaseModel) and part in type(value).model_fields:
         return getattr(value, part)
     raise KeyError(f"there is no {part!r} on the way to {path!r}")

@@ -23,6 +23,9 @@ Kind = Literal["quantity", "number", "whole", "word", "switch"]
 FIXED = ("cfmkit", "family", "name", "description", "requirements", "sweep", "sensitivity")
 """Blocks of a specification that do not describe the mechanism or its analysis."""
 
+NAME = "NAME"
+"""Stands for any name of a block's own choosing in a path, as the name of a beam."""
+
 _DEEPEST = 8
 
 
@@ -148,7 +151,7 @@ def _unknown(spec_type: type[Spec], path: str, above: str, here: tuple[Slot, ...
 
 
 def paths(spec_type: type[Spec]) -> Iterator[str]:
-    """Yield the path of every leaf that can be varied; items of lists as ``.0``."""
+    """Yield the path of every leaf that can be varied; items of lists as ``.0``, of named ones as ``.NAME``."""
     for name in spec_type.model_fields:
         if name not in FIXED:
             yield from _below(Slot(spec_type).child(name), name, 1)
@@ -163,3 +166,5 @@ def _below(slots: tuple[Slot, ...], path: str, depth: int) -> Iterator[str]:
                 yield from _below(slot.child(name), f"{path}.{name}", depth + 1)
         elif slot.origin in (tuple, list):
             yield from _below(slot.child(0), f"{path}.0", depth + 1)
+        elif slot.origin is dict:
+            yield from _below(slot.child(NAME), f"{path}.{NAME}", depth + 1)

@@ -1,0 +1,35 @@
+"""Mechanisms of slender beams in large deflection [Lan, Wang, Chen 2010]."""
+
+from __future__ import annotations
+
+from cfmkit.families.base import Family
+from cfmkit.families.beam.build import resolve
+from cfmkit.families.beam.findings import FINDINGS
+from cfmkit.families.beam.model import analyze
+from cfmkit.families.beam.spec import BeamSpec
+from cfmkit.families.beam.values import DEFINITIONS
+
+FAMILY = Family(
+    name="beam",
+    summary="a planar network of slender beams in large deflection",
+    spec_type=BeamSpec,
+    analyze=analyze,
+    values=DEFINITIONS,
+    resolve=resolve,
+    headline=(
+        "nominal_force",
+        "range_start",
+        "range_fraction",
+        "peak_force",
+        "usable_stroke",
+        "stress_max",
+        "stress_limit_displacement",
+    ),
+    template="beam.yaml",
+    findings=FINDINGS,
+    references=(
+        "C.-C. Lan, J.-H. Wang, Y.-H. Chen, A compliant constant-force mechanism for adaptive robot end-effector "
+        "operations, IEEE Int. Conf. Robotics and Automation (2010) 2131-2136",
+        "C.-C. Lan, K.-M. Lee, ASME J. Mech. Des. 128 (2006) 765: the generalised multiple shooting method",
+    ),
+)

@@ -1,0 +1,202 @@
+"""From a specification to the network, the drive and the controls of the beam engine."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, assert_never
+
+import numpy as np
+
+from cfmkit import beams as engine
+from cfmkit.families.beam.chain import chained
+from cfmkit.families.beam.layers import stacked
+from cfmkit.families.beam.parts.faults import HELD
+from cfmkit.materials import material
+
+if TYPE_CHECKING:
+    from cfmkit.beams.network import LoadOn, Spring
+    from cfmkit.beams.shapes import Shape
+    from cfmkit.families.beam.parts.spec import (
+        LoadSpec,
+        MaterialValues,
+        MemberSpec,
+        NodeSpec,
+        ShapeSpec,
+        SpringSpec,
+        Thickness,
+    )
+    from cfmkit.families.beam.spec import BeamSpec
+    from cfmkit.materials import Material
+
+
+@dataclass(frozen=True)
+class Assembly:
+    """A mechanism as the engine takes it.
+
+    Attributes
+    ----------
+    spec : BeamSpec
+        What it was built from.
+    network : Network
+        One half, or one leg; all stages in series.
+    driven : str
+        The node that is driven, in the last stage.
+    parallel : int
+        How many of the network act side by side: forces of the mechanism are so many times those of the network.
+    allowable_stress : float or None
+        Yield strength over safety factor, the smallest of all beams [Pa].
+    """
+
+    spec: BeamSpec
+    network: engine.Network
+    driven: str
+    parallel: int
+    allowable_stress: float | None
+
+    @property
+    def direction(self) -> float:
+        """Direction of the drive [rad], exactly that of the support where the node slides; of a rotation, none."""
+        asked = float(getattr(self.spec.mechanism.drive, "direction", 0.0))
+        support = self.network.nodes[self.driven].support
+        if not support.across:
+            return asked
+        return support.direction if math.cos(asked - support.direction) > 0 else support.direction + math.pi
+
+    def drive(self) -> engine.Displacement | engine.Rotation | engine.Loading:
+        """Return what is done to the network, from rest to the end, at even steps."""
+        spec, drive = self.spec, self.spec.mechanism.drive
+        points = np.linspace(0.0, spec.extent, spec.analysis.points)
+        if drive.kind == "displacement":
+            return engine.Displacement(self.driven, self.direction, points)
+        if drive.kind == "rotation":
+            return engine.Rotation(self.driven, points)
+        if drive.kind == "moment":
+            return engine.Loading((engine.PointLoad(self.driven, moment=1.0),), points / self.parallel)
+        x, y = math.cos(self.direction), math.sin(self.direction)
+        return engine.Loading((engine.PointLoad(self.driven, x, y, follows=drive.follows),), points / self.parallel)
+
+    def control(self) -> engine.Control:
+        """Return how the path is followed."""
+        analysis = self.spec.analysis
+        return engine.Control(
+            tolerance=analysis.tolerance,
+            through_folds=analysis.through_folds,
+            branch=analysis.branch,
+            sign=-1 if analysis.other_side else 1,
+            imperfection=analysis.imperfection,
+        )
+
+
+def assemble(spec: BeamSpec) -> Assembly:
+    """Return the mechanism that a specification describes, as the engine takes it."""
+    mechanism, copies = spec.mechanism, spec.mechanism.copies
+    network = engine.Network(
+        nodes={name: _node(node) for name, node in mechanism.nodes.items()},
+        beams={name: _beam(spec, beam) for name, beam in mechanism.beams.items()},
+        links=tuple(engine.Link(link.master, link.node) for link in mechanism.links),
+        springs=tuple(_spring(spring) for spring in mechanism.springs.values()),
+        loads=tuple(_load(load) for load in mechanism.loads),
+    )
+    if mechanism.closure == "chain":
+        network = chained(network)
+    driven = mechanism.drive.node
+    if copies is not None and copies.layers > 1:
+        network, driven = stacked(network, driven, copies.layers, copies.layer_pitch)
+    return Assembly(spec, network, driven, parallel_parts(spec), allowable_stress(spec))
+
+
+def parallel_parts(spec: BeamSpec) -> int:
+    """Return how many of the part that is described act side by side."""
+    copies = spec.mechanism.copies
+    return 1 if copies is None else copies.legs * (1 if copies.mirror is None else 2)
+
+
+def allowable_stress(spec: BeamSpec) -> float | None:
+    """Return yield strength over safety factor [Pa], of the weakest beam; None where none is known."""
+    mechanism = spec.mechanism
+    known = [values_of(beam.material or mechanism.material).yield_strength for beam in mechanism.beams.values()]
+    given = [strength for strength in known if strength is not None]
+    return min(given) / mechanism.safety_factor if given else None
+
+
+def values_of(given: str | MaterialValues) -> Material | MaterialValues:
+    """Return a material by its values."""
+    return material(given) if isinstance(given, str) else given
+
+
+def _node(node: NodeSpec) -> engine.Node:
+    moved = (0.0, 0.0, 0.0)
+    if node.moved is not None:
+        moved = (node.moved.along, node.moved.across, node.moved.rotation)
+    return engine.Node(*node.at, engine.Support(*HELD[node.support], node.direction or 0.0, moved))
+
+
+def _beam(spec: BeamSpec, beam: MemberSpec) -> engine.Beam:
+    mechanism = spec.mechanism
+    of = values_of(beam.material or mechanism.material)
+    section = engine.Section(
+        of.youngs_modulus,
+        beam.width or mechanism.width,
+        _thickness(beam.thickness or mechanism.thickness),
+        axial=spec.fidelity != "inextensible",
+        shear=spec.fidelity == "reissner",
+        poisson_ratio=of.poisson_ratio,
+    )
+    return engine.Beam(
+        beam.start,
+        beam.end,
+        section,
+        _shape(beam.shape),
+        "raw" if mechanism.closure == "raw" and getattr(beam.shape, "length", None) else "rotscale",
+        beam.start_joint,
+        beam.end_joint,
+        beam.start_offset or (0.0, 0.0),
+        beam.end_offset or (0.0, 0.0),
+    )
+
+
+def _thickness(given: Thickness) -> float | engine.Taper:
+    if isinstance(given, tuple):
+        return engine.Taper(np.array([place for place, _ in given]), np.array([value for _, value in given]))
+    return given
+
+
+def _shape(shape: ShapeSpec) -> Shape:
+    if shape.kind == "straight":
+        return engine.STRAIGHT
+    if shape.kind == "polynomial":
+        return engine.Polynomial(shape.coefficients, shape.length)
+    if shape.kind == "arc":
+        return engine.arc(shape.sweep)
+    if shape.kind == "cosine":
+        return engine.CosineArch(shape.rise, 0.5 if shape.half else 1.0)
+    if shape.kind == "polyline":
+        return engine.Polyline(np.array(shape.points))
+    if shape.kind == "spline":
+        return engine.Spline(np.array(shape.points))
+    assert_never(shape)
+
+
+def _spring(spring: SpringSpec) -> Spring:
+    if spring.kind == "line":
+        return engine.LineSpring(
+            spring.start, spring.end, spring.stiffness, spring.free_length, spring.ground or (0.0, 0.0)
+        )
+    if spring.kind == "torsion":
+        return engine.TorsionSpring(spring.start, spring.end, spring.stiffness, spring.free_angle)
+    return engine.SlideSpring(spring.node, spring.direction, spring.stiffness, spring.free_displacement)
+
+
+def _load(load: LoadSpec) -> LoadOn:
+    if load.kind == "point":
+        return engine.PointLoad(load.node, load.fx, load.fy, load.moment, load.follows)
+    return engine.LineLoad(load.beam, load.wx, load.wy)
+
+
+def resolve(spec: BeamSpec) -> BeamSpec:
+    """Return the specification with everything derived written out: the model and what counts as stress."""
+    fidelity = spec.fidelity
+    switches = {"axial": fidelity != "inextensible", "shear": fidelity == "reissner"}
+    analysis = spec.analysis.model_copy(update={"fidelity": fidelity, "stress": spec.stress})
+    return spec.model_copy(update={"mechanism": spec.mechanism.model_copy(update=switches), "analysis": analysis})

@@ -1,0 +1,147 @@
+"""What the user must know about a solved beam mechanism, each with the numbers that decide."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.beams import PathStatus
+from cfmkit.families.beam.findings import finding
+from cfmkit.families.beam.values import window_of
+from cfmkit.units import format_short
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from cfmkit.families.beam.model import Solution
+    from cfmkit.results import Finding
+
+NEGLIGIBLE = 1e-9
+THICK = 10.0
+
+
+def findings_of(solution: Solution) -> tuple[Finding, ...]:
+    """Return everything that is wrong with a solved mechanism, or that the user must know about it."""
+    return tuple(
+        one
+        for source in (_ending, _closure, _events, _stability, _accuracy, _imperfection, _stress, _slenderness)
+        for one in source(solution)
+    )
+
+
+def _ending(solution: Solution) -> Iterator[Finding]:
+    path = solution.path
+    if path.status not in (PathStatus.COMPLETE, PathStatus.INACCURATE):
+        yield finding("ends_early", path.message or path.status.value)
+
+
+def _closure(solution: Solution) -> Iterator[Finding]:
+    """Say how each beam was fitted, or what it costs to force it."""
+    beams = solution.path.layout.network.beams
+    fits = {
+        name: one
+        for name, one in solution.path.fits.items()
+        if getattr(beams[name].shape, "length", None) and one.gap > NEGLIGIBLE * float(np.real(one.length))
+    }
+    if not fits:
+        return
+    if solution.spec.mechanism.closure == "raw":
+        if not len(solution.keep):
+            return
+        gaps = ", ".join(f"{name} by {format_short(one.gap, 'length')}" for name, one in fits.items())
+        yield finding(
+            "closure_prestress",
+            f"beams miss their nodes ({gaps}) and are forced into place: at rest the drive carries "
+            f"{format_short(float(solution.effort[0]), _effort(solution))} and the stress is "
+            f"{format_short(float(solution.stress[0]), 'stress')}; closure 'rotscale' has none of this",
+            "mechanism.closure=rotscale",
+        )
+        return
+    told = ", ".join(
+        f"{name} {format_short(float(np.real(one.rotation)), 'angle')} and x {float(np.real(one.scale)):.5f} "
+        f"(it missed by {format_short(one.gap, 'length')})"
+        for name, one in fits.items()
+    )
+    yield finding("closure_adjusted", f"beams were turned and scaled to fit between their nodes: {told}")
+
+
+def _effort(solution: Solution) -> str:
+    return "torque" if solution.spec.mechanism.drive.kind in ("rotation", "moment") else "force"
+
+
+def _drive(solution: Solution, value: float) -> str:
+    """Return a value of the drive as the user reads it, of all copies together."""
+    kind = solution.spec.mechanism.drive.kind
+    dimension = {"displacement": "length", "rotation": "angle", "force": "force", "moment": "torque"}[kind]
+    unit = solution.assembly.parallel if kind in ("force", "moment") else 1
+    return format_short(unit * value, dimension)
+
+
+def _events(solution: Solution) -> Iterator[Finding]:
+    path = solution.path
+    for kind, name in (("limit point", "limit_point"), ("bifurcation", "bifurcation")):
+        places = [_drive(solution, event.drive) for event in path.events if event.kind == kind]
+        if places:
+            more = f" and {len(places) - 6} more" if len(places) > 6 else ""
+            branches = ", ".join(dict.fromkeys(path.branch[solution.keep].tolist()))
+            tail = f"; the curve is on {branches}" if kind == "bifurcation" else ""
+            yield finding(name, f"{kind}{'s' if len(places) > 1 else ''} at {', '.join(places[:6])}{more}{tail}")
+
+
+def _stability(solution: Solution) -> Iterator[Finding]:
+    bad = ~solution.path.stable[solution.keep]
+    if bad.any():
+        x = solution.motion[bad]
+        dimension = "angle" if _effort(solution) == "torque" else "length"
+        yield finding(
+            "unstable",
+            f"{int(bad.sum())} of {len(bad)} points are not stable while the drive is held, from "
+            f"{format_short(float(x.min()), dimension)} to {format_short(float(x.max()), dimension)}",
+        )
+
+
+def _accuracy(solution: Solution) -> Iterator[Finding]:
+    bad = int((~solution.accurate).sum())
+    if bad:
+        yield finding(
+            "inaccurate",
+            f"{bad} of {len(solution.accurate)} points miss the tolerance of {solution.spec.analysis.tolerance:g} and "
+            f"have no force (estimated error {solution.path.error:.2g})",
+        )
+
+
+def _imperfection(solution: Solution) -> Iterator[Finding]:
+    if solution.path.imperfection:
+        yield finding("imperfection", f"the beams were bent: {solution.path.imperfection}")
+
+
+def _stress(solution: Solution) -> Iterator[Finding]:
+    allowable = solution.assembly.allowable_stress
+    if allowable is None or len(solution.keep) < 2:
+        return
+    lo, hi = window_of(solution)
+    inside = (solution.motion >= lo * (1 - 1e-12)) & (solution.motion <= hi * (1 + 1e-12)) & solution.accurate
+    if not inside.any() or (worst := float(solution.stress[inside].max())) <= allowable:
+        return
+    index = int(np.flatnonzero(inside)[solution.stress[inside].argmax()])
+    beam, place = solution.stress_at[0][index], solution.stress_at[1][index]
+    yield finding(
+        "stress_exceeded",
+        f"the largest stress in the window is {format_short(worst, 'stress')}, at {place:.3f} of beam "
+        f"{beam}; allowable are {format_short(allowable, 'stress')}",
+    )
+
+
+def _slenderness(solution: Solution) -> Iterator[Finding]:
+    beams, fits = solution.path.layout.network.beams, solution.path.fits
+    for name, beam in beams.items():
+        section = beam.section
+        thickest = max(float(np.real(section.thickness_at(place, place))) for place in section.stations)
+        length = float(np.real(fits[name].length))
+        if length < THICK * thickest:
+            yield finding(
+                "thick_beam",
+                f"beam {name} is {format_short(length, 'length')} long and {format_short(thickest, 'length')} thick: "
+                f"below {THICK:g} times the thickness beam theory is rough",
+            )

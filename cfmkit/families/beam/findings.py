@@ -1,0 +1,29 @@
+"""Everything a beam mechanism can suffer from, by name.
+
+The names are stable; the sentences say what the name means. The message that a run reports carries the numbers.
+"""
+
+from __future__ import annotations
+
+from cfmkit.results import Finding
+
+FINDINGS = {
+    "closure_adjusted": "beams were turned and scaled to fit between rounded nodes, or nodes moved to the beams' ends",
+    "closure_prestress": "beams are forced into place between rounded nodes: the mechanism is prestressed at rest",
+    "ends_early": "the path ends before the travel or the load asked for",
+    "inaccurate": "at some points the tolerance is not reached: they have no force",
+    "limit_point": "the load has an extreme on the path: under a given load the mechanism snaps there",
+    "bifurcation": "the path splits: the mechanism leaves the symmetric or straight form",
+    "unstable": "a part of the path is not stable: the mechanism would leave it",
+    "imperfection": "the beams were bent in the first buckling mode, as asked",
+    "stress_exceeded": "the stress exceeds the allowable one within the window",
+    "thick_beam": "a beam is short for its thickness: beam theory is rough",
+    "stretching_matters": "beams that do not stretch are shallow or short: the model without stretching is rough",
+}
+
+
+def finding(name: str, message: str, *cures: str) -> Finding:
+    """Return a finding of this family; the name must be one that `FINDINGS` explains."""
+    if name not in FINDINGS:
+        raise KeyError(name)
+    return Finding(name, message, cures)

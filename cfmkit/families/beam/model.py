@@ -1,0 +1,183 @@
+"""Analysis of a beam mechanism: the path of its equilibria, stresses, and the forces of each beam.
+
+Beams bend without stretching unless the specification says otherwise [Lan]; with stretching and shear they follow
+Reissner. The force is that of all copies together; the forces of single beams are those of one copy.
+
+Reference
+---------
+[Lan] C.-C. Lan, J.-H. Wang, Y.-H. Chen, A compliant constant-force mechanism for adaptive robot end-effector
+operations (2010), sec. 2.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.beams import Path, PathStatus, trace
+from cfmkit.curves import Column, Curve, read_only
+from cfmkit.families.beam.build import Assembly, assemble, resolve
+from cfmkit.families.beam.checks import findings_of
+from cfmkit.families.beam.values import values_of
+from cfmkit.results import Result, Status
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from cfmkit.curves import FloatArray, Kind
+    from cfmkit.families.base import Run
+    from cfmkit.families.beam.spec import BeamSpec
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """A solved mechanism, as checks, scalar values and pictures need it.
+
+    Attributes
+    ----------
+    assembly : Assembly
+        The network and what is done to it.
+    path : Path
+        Its equilibria.
+    keep : (n,) int array
+        Which points of the path make the curve: those asked for, or all where the path is followed through folds.
+    """
+
+    assembly: Assembly
+    path: Path
+    keep: Any
+
+    @property
+    def spec(self) -> BeamSpec:
+        """The specification."""
+        return self.assembly.spec
+
+    @cached_property
+    def motion(self) -> FloatArray:
+        """Displacement or rotation of the driven node along the drive [m or rad]."""
+        kind = self.spec.mechanism.drive.kind
+        if kind in ("displacement", "rotation"):
+            return read_only(self.path.drive[self.keep])
+        moved = self.path.motion(self.assembly.driven)[self.keep]
+        if kind == "moment":
+            return read_only(moved[:, 2])
+        angle = self.assembly.direction
+        return read_only(moved[:, 0] * np.cos(angle) + moved[:, 1] * np.sin(angle))
+
+    @cached_property
+    def effort(self) -> FloatArray:
+        """Force [N] or torque [N m] of all copies; none where the tolerance is not reached."""
+        by_motion = self.spec.mechanism.drive.kind in ("displacement", "rotation")
+        effort = self.path.effort if by_motion else self.path.drive
+        return read_only(np.where(self.accurate, self.assembly.parallel * effort[self.keep], np.nan))
+
+    @cached_property
+    def accurate(self) -> Any:
+        """Whether each point reaches the tolerance."""
+        return read_only(np.broadcast_to(self.path.accurate, (len(self.path),))[self.keep], np.bool_)
+
+    @cached_property
+    def stresses(self) -> Mapping[str, tuple[FloatArray, FloatArray]]:
+        """Of each beam, the largest stress [Pa] and its place, at every point of the curve."""
+        axial, keep = self.spec.stress == "total", self.keep
+        found = {name: self.path.beam_stress(name, axial) for name in self.path.layout.network.beams}
+        return {name: (value[keep], place[keep]) for name, (value, place) in found.items()}
+
+    @cached_property
+    def stress(self) -> FloatArray:
+        """The largest stress at every point of the curve [Pa]."""
+        largest = np.max([value for value, _ in self.stresses.values()], axis=0)
+        return read_only(np.where(self.accurate, largest, np.nan))
+
+    @cached_property
+    def stress_at(self) -> tuple[Any, FloatArray]:
+        """The beam with the largest stress at every point of the curve, and the place on it."""
+        values, places = (np.array(rows) for rows in zip(*self.stresses.values(), strict=True))
+        best, pick = values.argmax(axis=0), np.arange(len(self.keep))
+        return read_only(np.array(list(self.stresses))[best], np.str_), read_only(places[best, pick])
+
+    @cached_property
+    def stable(self) -> Any:
+        """Whether each point is a stable equilibrium that reaches the tolerance."""
+        return read_only(self.path.stable[self.keep] & self.accurate, np.bool_)
+
+    def beam_force(self, beam: str) -> FloatArray:
+        """Return force and moment that a beam exerts on its last node, (n, 3) [N, N, N m], of one copy."""
+        return read_only(-self.path.end_force(beam, 1)[self.keep])
+
+
+def analyze(spec: BeamSpec, run: Run) -> Result:
+    """Return the force-displacement path of a beam mechanism, with everything that is wrong with it.
+
+    Parameters
+    ----------
+    spec : BeamSpec
+        The mechanism and how far its drive goes.
+    run : Run
+        Not needed here: one path is solved at once.
+
+    Returns
+    -------
+    Result
+        PARTIAL if the path ends before what was asked, NO_EQUILIBRIUM if there is none under the constant loads.
+    """
+    assembly = assemble(spec)
+    path = trace(assembly.network, assembly.drive(), assembly.control())
+    solution = Solution(assembly, path, _kept(spec, path))
+    resolved = resolve(spec)
+    if len(solution.keep) < 2:
+        message = f"no curve: {path.message or path.status.value}"
+        return Result(resolved, Status.NO_EQUILIBRIUM, message, warnings=findings_of(solution))
+    status, message = _ending(solution)
+    return Result(
+        spec=resolved,
+        status=status,
+        message=message,
+        curves=(_curve(solution),),
+        values=values_of(solution),
+        warnings=findings_of(solution),
+        target=_target(spec),
+        reference=None if spec.analysis.reference is None else float(spec.analysis.reference),
+        allowable_stress=assembly.allowable_stress,
+        state=solution,
+    )
+
+
+def _kept(spec: BeamSpec, path: Path) -> Any:
+    """Return which points make the curve: those asked for, or all where folds may make it many-valued."""
+    keep = np.arange(len(path)) if spec.analysis.through_folds else path.at_asked
+    return read_only(keep, np.int64)
+
+
+def _ending(solution: Solution) -> tuple[Status, str]:
+    path = solution.path
+    if path.status is PathStatus.COMPLETE:
+        return Status.COMPLETE, ""
+    return Status.PARTIAL, path.message or path.status.value
+
+
+def _target(spec: BeamSpec) -> float | None:
+    rescale = spec.design.rescale if spec.design else None
+    return rescale.force if rescale else None
+
+
+def _curve(solution: Solution) -> Curve:
+    """Return the curve with stresses and the forces of each beam."""
+    keep, path = solution.keep, solution.path
+    extra = {
+        "max_stress": Column(solution.stress, "stress"),
+        "stress_beam": Column(solution.stress_at[0], "text"),
+        "stress_place": Column(solution.stress_at[1], "ratio"),
+    }
+    for name in path.layout.network.beams:
+        x, y, moment = solution.beam_force(name).T
+        extra |= {
+            f"{name}_force_x": Column(x, "force"),
+            f"{name}_force_y": Column(y, "force"),
+            f"{name}_moment": Column(moment, "torque"),
+        }
+    kind: Kind = "torque" if solution.spec.mechanism.drive.kind in ("rotation", "moment") else "force"
+    return Curve(solution.motion, solution.effort, path.branch[keep], solution.stable, extra, kind)

@@ -1,0 +1,170 @@
+"""What can be wrong with a network as it is described: each fault with its place below `mechanism`."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import re
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Mapping
+
+    from cfmkit.families.beam.parts.spec import MemberSpec
+    from cfmkit.families.beam.spec import Mechanism
+
+Fault = tuple[tuple[str | int, ...], str]
+_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_-]{0,39}")
+_SAME_DIRECTION = 1e-6  # rad; the support's direction is used
+HELD = {
+    "free": (False, False, False),
+    "clamped": (True, True, True),
+    "pinned": (True, True, False),
+    "guided": (False, True, True),
+    "roller": (False, True, False),
+    "parallel": (False, False, True),
+}
+"""Which motions a support holds: along its direction, across it, the rotation."""
+
+
+def faults(mechanism: Mechanism) -> Iterator[Fault]:
+    """Yield what is wrong with a mechanism whose keys are each right by themselves."""
+    for group in ("nodes", "beams", "springs"):
+        for name in getattr(mechanism, group):
+            if not _NAME.fullmatch(name):
+                yield (group, name), "a name is a letter and then at most 39 letters, digits, '_' or '-'"
+    references = list(_unknown(mechanism))
+    yield from references
+    if references:
+        return
+    for name, beam in mechanism.beams.items():
+        yield from ((("beams", name, *place), text) for place, text in _beam_faults(mechanism, beam))
+    yield from _link_faults(mechanism)
+    yield from _loose_nodes(mechanism)
+    yield from _drive_faults(mechanism)
+    yield from _copy_faults(mechanism)
+    if mechanism.shear and not mechanism.axial:
+        yield ("shear",), "beams that shear stretch, too: add 'axial: true'"
+
+
+def _unknown(mechanism: Mechanism) -> Iterator[Fault]:
+    """Yield names of nodes and beams that do not exist."""
+    for place, kind, name in references(mechanism):
+        known: Mapping[str, object] = getattr(mechanism, f"{kind}s")
+        if name not in known:
+            yield place, f"there is no {kind} {name!r}; {kind}s are {_listed(known)}"
+
+
+def references(mechanism: Mechanism) -> Iterator[tuple[tuple[str | int, ...], str, str]]:
+    """Yield every mention of a node or a beam: its place, "node" or "beam", the name."""
+    for name, beam in mechanism.beams.items():
+        yield ("beams", name, "start"), "node", beam.start
+        yield ("beams", name, "end"), "node", beam.end
+    for index, link in enumerate(mechanism.links):
+        yield ("links", index, "master"), "node", link.master
+        yield ("links", index, "node"), "node", link.node
+    for name, spring in mechanism.springs.items():
+        for key in ("start", "end", "node"):
+            if (node := getattr(spring, key, None)) is not None:
+                yield ("springs", name, spring.kind, key), "node", node
+    for index, load in enumerate(mechanism.loads):
+        what = "node" if load.kind == "point" else "beam"
+        yield ("loads", index, load.kind, what), what, getattr(load, what)
+    yield ("drive", mechanism.drive.kind, "node"), "node", mechanism.drive.node
+
+
+def _listed(names: Iterable[str]) -> str:
+    every = list(names)
+    return ", ".join(every[:12]) + (", ..." if len(every) > 12 else "")
+
+
+def _beam_faults(mechanism: Mechanism, beam: MemberSpec) -> Iterator[Fault]:
+    if beam.start == beam.end:
+        yield ("end",), f"a beam needs two different nodes, not {beam.start!r} twice"
+        return
+    start, end = (mechanism.nodes[name] for name in (beam.start, beam.end))
+    arms = beam.start_offset or (0.0, 0.0), beam.end_offset or (0.0, 0.0)
+    x, y = (end.at[k] + arms[1][k] - start.at[k] - arms[0][k] for k in (0, 1))
+    reach = math.hypot(x, y)
+    if reach == 0:
+        yield ("end",), f"the two ends of the beam are at the same place, at {beam.start!r}"
+        return
+    shape = beam.shape
+    if shape.kind == "cosine" and shape.half and abs(shape.rise) >= reach:
+        yield ("shape", "cosine", "rise"), "half an arch rises by less than its ends are apart"
+    if shape.kind in ("polyline", "spline"):
+        points = shape.points
+        if any(one == other for one, other in itertools.pairwise(points)):
+            yield ("shape", shape.kind, "points"), "two neighbouring points are the same"
+        elif points[0] == points[-1]:
+            yield ("shape", shape.kind, "points"), "the shape returns to its start: it cannot be fitted"
+
+
+def _link_faults(mechanism: Mechanism) -> Iterator[Fault]:
+    leads: dict[str, str] = {}
+    for index, link in enumerate(mechanism.links):
+        if link.node in leads:
+            yield ("links", index, "node"), f"{link.node!r} follows {leads[link.node]!r} already"
+        elif mechanism.nodes[link.node].support != "free":
+            yield ("links", index, "node"), f"{link.node!r} has a support of its own and cannot follow another node"
+        elif link.node in _chain(leads, link.master):
+            yield ("links", index), f"the links through {link.node!r} form a loop"
+        else:
+            leads[link.node] = link.master
+
+
+def _chain(leads: Mapping[str, str], node: str) -> list[str]:
+    """Return a node and all that lead it."""
+    found = [node]
+    while found[-1] in leads:
+        found.append(leads[found[-1]])
+    return found
+
+
+def _loose_nodes(mechanism: Mechanism) -> Iterator[Fault]:
+    held = {name for place, kind, name in references(mechanism) if kind == "node" and place[0] in ("beams", "links")}
+    for name in mechanism.nodes:
+        if name not in held:
+            yield ("nodes", name), "no beam and no link holds this node"
+
+
+def _drive_faults(mechanism: Mechanism) -> Iterator[Fault]:
+    drive = mechanism.drive
+    at = ("drive", drive.kind, "node")
+    leader = next((link.master for link in mechanism.links if link.node == drive.node), None)
+    if leader is not None:
+        yield at, f"{drive.node!r} follows {leader!r}: drive that one"
+        return
+    node = mechanism.nodes[drive.node]
+    along, across, rotation = HELD[node.support]
+    if drive.kind == "rotation" or drive.kind == "moment":
+        if rotation:
+            yield at, f"{drive.node!r} cannot turn: its support is {node.support!r}"
+        return
+    if along and across:
+        yield at, f"{drive.node!r} cannot move: its support is {node.support!r}"
+    elif across and not parallel(drive.direction, node.direction or 0.0):
+        yield ("drive", drive.kind, "direction"), f"{drive.node!r} slides along another direction"
+
+
+def parallel(one: float, other: float) -> bool:
+    """Tell whether two directions [rad] are parallel, in either sense."""
+    return abs(math.sin(one - other)) < _SAME_DIRECTION
+
+
+def _copy_faults(mechanism: Mechanism) -> Iterator[Fault]:
+    copies, drive = mechanism.copies, mechanism.drive
+    if copies is None:
+        return
+    if copies.mirror is not None and drive.kind not in ("displacement", "force"):
+        yield ("copies", "mirror"), f"two halves have no common {drive.kind}: drive them by a displacement or a force"
+    if copies.layers == 1:
+        return
+    place = ("copies", "layers")
+    if drive.kind != "displacement" or mechanism.nodes[drive.node].support != "guided":
+        yield place, "stages in series need a displacement as the drive, of a node that is 'guided'"
+    if mechanism.springs or mechanism.loads:
+        yield place, "stages in series may have beams and links only: no springs and no loads"
+    for name, node in mechanism.nodes.items():
+        if name != drive.node and node.support not in ("clamped", "free"):
+            yield ("nodes", name, "support"), "in stages in series, every support but the driven one is 'clamped'"

@@ -1,0 +1,274 @@
+"""What a specification may say about the parts of a network: nodes, beams and their shapes, springs, loads, drives."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, field_validator, model_validator
+
+from cfmkit.families.beam.parts.faults import HELD
+from cfmkit.materials import material
+from cfmkit.spec import Model
+from cfmkit.units import Angle, Force, Length, LineLoad, Ratio, RotationalStiffness, Stiffness, Stress, Torque
+
+PositiveLength = Annotated[Length, Field(gt=0)]
+Point = tuple[Length, Length]
+Station = tuple[Annotated[Ratio, Field(ge=0, le=1)], PositiveLength]
+Thickness = PositiveLength | Annotated[tuple[Station, ...], Field(min_length=2)]
+
+
+class MaterialValues(Model):
+    """A material by its values."""
+
+    youngs_modulus: Annotated[Stress, Field(gt=0)] = Field(description="E")
+    poisson_ratio: Annotated[Ratio, Field(gt=-1, le=0.5)] = Field(0.3, description="for the shear stiffness")
+    yield_strength: Annotated[Stress, Field(gt=0)] | None = Field(None, description="for the allowable stress")
+
+
+def known_material(value: str | MaterialValues) -> str | MaterialValues:
+    """Return the value if it is no name, or the name of a material that is known."""
+    return material(value).name if isinstance(value, str) else value
+
+
+class Moved(Model):
+    """Where the held motions of a support are held, before anything else is done."""
+
+    along: Length = Field(0.0, description="along the support's direction")
+    across: Length = Field(0.0, description="90 deg to the left of it")
+    rotation: Angle = Field(0.0, description="counter-clockwise")
+
+
+class NodeSpec(Model):
+    """A node: its place before any load, and its support."""
+
+    at: Point = Field(description="place [x, y], to the right and upwards")
+    support: Literal["free", "clamped", "pinned", "guided", "roller", "parallel"] = Field(
+        "free",
+        description=(
+            "guided slides along its direction and does not turn, a roller does turn; parallel goes anywhere, unturned"
+        ),
+    )
+    direction: Angle | None = Field(None, description="along which a guided node or a roller slides; from the x axis")
+    moved: Moved | None = Field(None, description="a prescribed displacement of what the support holds")
+
+    @model_validator(mode="after")
+    def _direction_where_it_slides(self) -> Self:
+        slides = self.support in ("guided", "roller")
+        if slides and self.direction is None:
+            raise ValueError(f"a node that is {self.support!r} needs 'direction', along which it slides")
+        if self.direction is not None and self.support in ("free", "parallel"):
+            raise ValueError(f"'direction' means nothing for a support that is {self.support!r}")
+        return self
+
+    @model_validator(mode="after")
+    def _moves_only_what_is_held(self) -> Self:
+        if self.moved is not None:
+            for name, held in zip(("along", "across", "rotation"), HELD[self.support], strict=True):
+                if getattr(self.moved, name) != 0 and not held:
+                    raise ValueError(
+                        f"'moved.{name}' is given, but a support that is {self.support!r} leaves that free"
+                    )
+        return self
+
+
+class Straight(Model):
+    """A straight beam."""
+
+    kind: Literal["straight"] = "straight"
+
+
+class PolynomialShape(Model):
+    """The angle along the beam as a polynomial of the fraction u of its length: c0 + c1 u + c2 u^2 + ..."""
+
+    kind: Literal["polynomial"]
+    coefficients: tuple[Angle, ...] = Field(min_length=1, description="[c0, c1, ...], angles from the x axis")
+    length: PositiveLength | None = Field(None, description="nominal length, for `closure` and its report")
+
+
+class ArcShape(Model):
+    """A circular arc between the nodes."""
+
+    kind: Literal["arc"]
+    sweep: Angle = Field(description="by how much the angle grows from start to end; positive bulges to the right")
+
+
+class CosineShape(Model):
+    """A cosine arch: rise (1 - cos(2 pi x / span)) / 2, to the left of the way from start to end."""
+
+    kind: Literal["cosine"]
+    rise: Length = Field(description="height of the arch")
+    half: bool = Field(False, description="half an arch, whose ends differ in height by the rise")
+
+
+class PolylineShape(Model):
+    """Straight pieces through points; corners are rigid. Turned and scaled to fit the nodes."""
+
+    kind: Literal["polyline"]
+    points: tuple[Point, ...] = Field(min_length=2, description="[[x, y], ...] in any frame")
+
+
+class SplineShape(Model):
+    """A smooth curve through points, a cubic spline. Turned and scaled to fit the nodes."""
+
+    kind: Literal["spline"]
+    points: tuple[Point, ...] = Field(min_length=3, description="[[x, y], ...] in any frame")
+
+
+ShapeSpec = Annotated[
+    Straight | PolynomialShape | ArcShape | CosineShape | PolylineShape | SplineShape, Field(discriminator="kind")
+]
+
+
+class MemberSpec(Model):
+    """A beam between two nodes. What is left out is as for the whole mechanism."""
+
+    start: str = Field(description="node at the first end")
+    end: str = Field(description="node at the last end")
+    shape: ShapeSpec = Field(default_factory=Straight, description="reference shape, by its `kind`; default: straight")
+    thickness: Thickness | None = Field(
+        None, description="in the plane; or [[fraction, thickness], ...], linear between"
+    )
+    width: PositiveLength | None = Field(None, description="out of the plane")
+    material: str | MaterialValues | None = Field(None, description="a name from `show materials`, or its values")
+    start_joint: Literal["rigid", "pin"] = Field("rigid", description="whether the first end turns with its node")
+    end_joint: Literal["rigid", "pin"] = Field("rigid", description="whether the last end turns with its node")
+    start_offset: Point | None = Field(None, description="rigid arm from the node to the beam; turns with the node")
+    end_offset: Point | None = Field(None, description="the same at the last end")
+
+    @field_validator("material")
+    @classmethod
+    def _known(cls, value: str | MaterialValues | None) -> str | MaterialValues | None:
+        return None if value is None else known_material(value)
+
+    @field_validator("thickness")
+    @classmethod
+    def _stations(cls, value: Thickness | None) -> Thickness | None:
+        return value if value is None else checked_thickness(value)
+
+
+def checked_thickness(value: Thickness) -> Thickness:
+    """Return a thickness whose stations run from 0 to 1."""
+    if isinstance(value, tuple):
+        places = [place for place, _ in value]
+        if places[0] != 0 or places[-1] != 1 or places != sorted(places):
+            raise ValueError("the fractions of a thickness must run from 0 to 1 and never back")
+    return value
+
+
+class LinkSpec(Model):
+    """A rigid link: `node` moves and turns with `master` as one body."""
+
+    master: str = Field(description="node that leads")
+    node: str = Field(description="node that follows; free of a support of its own")
+
+
+class LineSpringSpec(Model):
+    """A spring along the line between two nodes, or a node and a fixed point."""
+
+    kind: Literal["line"]
+    start: str = Field(description="node")
+    end: str | None = Field(None, description="node at the other end; or give `ground`")
+    ground: Point | None = Field(None, description="fixed point at the other end")
+    stiffness: Annotated[Stiffness, Field(gt=0)] = Field(description="force per elongation")
+    free_length: Annotated[Length, Field(ge=0)] | None = Field(None, description="default: the length before any load")
+
+    @model_validator(mode="after")
+    def _one_other_end(self) -> Self:
+        if (self.end is None) == (self.ground is None):
+            raise ValueError("give either 'end' (a node) or 'ground' (a point)")
+        return self
+
+
+class TorsionSpringSpec(Model):
+    """A spring between the rotations of two nodes, or of a node and the ground."""
+
+    kind: Literal["torsion"]
+    end: str = Field(description="node")
+    start: str | None = Field(None, description="node it turns against; default: the ground")
+    stiffness: Annotated[RotationalStiffness, Field(gt=0)] = Field(description="moment per angle")
+    free_angle: Angle = Field(0.0, description="rotation of end less that of start at which it is relaxed")
+
+
+class SlideSpringSpec(Model):
+    """A spring from the ground that resists the motion of a node along a fixed direction."""
+
+    kind: Literal["slide"]
+    node: str = Field(description="node")
+    direction: Angle = Field(description="from the x axis")
+    stiffness: Annotated[Stiffness, Field(gt=0)] = Field(description="force per displacement")
+    free_displacement: Length = Field(0.0, description="displacement at which it is relaxed")
+
+
+SpringSpec = Annotated[LineSpringSpec | TorsionSpringSpec | SlideSpringSpec, Field(discriminator="kind")]
+
+
+class PointLoadSpec(Model):
+    """A constant force and moment at a node."""
+
+    kind: Literal["point"]
+    node: str = Field(description="node")
+    fx: Force = Field(0.0, description="to the right")
+    fy: Force = Field(0.0, description="upwards")
+    moment: Torque = Field(0.0, description="counter-clockwise")
+    follows: bool = Field(False, description="whether the force turns with the node")
+
+
+class LineLoadSpec(Model):
+    """A constant uniform load on a beam, per length before any load."""
+
+    kind: Literal["line"]
+    beam: str = Field(description="beam")
+    wx: LineLoad = Field(0.0, description="to the right")
+    wy: LineLoad = Field(0.0, description="upwards")
+
+
+LoadSpec = Annotated[PointLoadSpec | LineLoadSpec, Field(discriminator="kind")]
+
+
+class DisplacementDrive(Model):
+    """A node is moved along a direction by `analysis.travel`; the force is the one along it."""
+
+    kind: Literal["displacement"]
+    node: str = Field(description="node that is moved")
+    direction: Angle = Field(description="from the x axis; the displacement and the force count along it")
+
+
+class RotationDrive(Model):
+    """A node is turned by `analysis.travel`; the effort is the torque."""
+
+    kind: Literal["rotation"]
+    node: str = Field(description="node that is turned")
+
+
+class ForceDrive(Model):
+    """A force that grows to `analysis.force`; the displacement is the node's along the direction."""
+
+    kind: Literal["force"]
+    node: str = Field(description="node that is pushed")
+    direction: Angle = Field(description="from the x axis")
+    follows: bool = Field(False, description="whether the force turns with the node")
+
+
+class MomentDrive(Model):
+    """A moment that grows to `analysis.moment`; the angle is the node's rotation."""
+
+    kind: Literal["moment"]
+    node: str = Field(description="node that is twisted")
+
+
+DriveSpec = Annotated[DisplacementDrive | RotationDrive | ForceDrive | MomentDrive, Field(discriminator="kind")]
+
+
+class Copies(Model):
+    """How often the part that is described occurs: side by side, mirrored, or stacked."""
+
+    mirror: Point | None = Field(
+        None, description="a point of the mirror axis, which runs along the drive: two halves, twice the force"
+    )
+    legs: int = Field(1, ge=1, le=1000, description="equal parts side by side (mirrored pairs count once)")
+    layers: int = Field(
+        1, ge=1, le=20, description="equal stages in series: each stands on the moving part of the last"
+    )
+    layer_pitch: PositiveLength | None = Field(
+        None, description="distance of the stages along the drive; default: from the supports to the moving part"
+    )

@@ -1,0 +1,166 @@
+"""What a YAML specification of a beam mechanism may say."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, field_validator, model_validator
+
+from cfmkit.families.beam.parts.faults import faults
+from cfmkit.families.beam.parts.spec import (
+    Copies,
+    DriveSpec,
+    LinkSpec,
+    LoadSpec,
+    MaterialValues,
+    MemberSpec,
+    NodeSpec,
+    PositiveLength,
+    SpringSpec,
+    Thickness,
+    checked_thickness,
+    known_material,
+)
+from cfmkit.spec import Analysis, Displacement, Model, Spec, refuse
+from cfmkit.units import DIMENSIONS, Force, Length, Ratio, Torque
+
+Fidelity = Literal["inextensible", "extensible", "reissner"]
+_EXTENT = {"displacement": "travel", "rotation": "travel", "force": "force", "moment": "moment"}
+
+
+class Mechanism(Model):
+    """A planar network of slender beams, and what is done to it."""
+
+    material: str | MaterialValues = Field(description="a name from `show materials`, or {youngs_modulus, ...}")
+    safety_factor: Annotated[Ratio, Field(ge=1)] = Field(1.0, description="allowable stress: yield strength over this")
+    thickness: Thickness = Field(
+        description="in the plane of bending (w of Lan); or [[fraction, thickness], ...], linear between"
+    )
+    width: PositiveLength = Field(description="out of the plane (t of Lan)")
+    axial: bool = Field(False, description="whether beams stretch; `analysis.fidelity` goes before")
+    shear: bool = Field(False, description="whether beams shear, too")
+    closure: Literal["rotscale", "chain", "raw"] = Field(
+        "rotscale",
+        description=(
+            "how beams are fitted between rounded nodes: turned and scaled, nodes moved to the beams' ends, "
+            "or forced into place (prestressed)"
+        ),
+    )
+    nodes: dict[str, NodeSpec] = Field(min_length=2, description="by name: {n1: {at: [0 mm, 0 mm], support: clamped}}")
+    beams: dict[str, MemberSpec] = Field(min_length=1, description="by name: {b1: {start: n1, end: n2}}")
+    links: tuple[LinkSpec, ...] = Field((), description="rigid links: [{master: n1, node: n2}]")
+    springs: dict[str, SpringSpec] = Field({}, description="by name; of `kind` line, torsion or slide")
+    loads: tuple[LoadSpec, ...] = Field((), description="constant loads; of `kind` point or line")
+    drive: DriveSpec = Field(description="what is done to it; of `kind` displacement, rotation, force or moment")
+    copies: Copies | None = Field(None, description="how often what is described here occurs")
+
+    @field_validator("material")
+    @classmethod
+    def _known(cls, value: str | MaterialValues) -> str | MaterialValues:
+        return known_material(value)
+
+    @field_validator("thickness")
+    @classmethod
+    def _stations(cls, value: Thickness) -> Thickness:
+        return checked_thickness(value)
+
+    @model_validator(mode="after")
+    def _names_match(self) -> Self:
+        refuse("Mechanism", dict(faults(self)))
+        return self
+
+
+class Rescale(Model):
+    """Another size, section or material for the same force curve, by Eq. 6 of Lan."""
+
+    force: Annotated[Force, Field(gt=0)] | None = Field(None, description="force wanted at the end of the window")
+    size: Annotated[Ratio, Field(gt=0)] | None = Field(None, description="factor on all lengths in the plane")
+    material: str | MaterialValues | None = Field(None, description="another material")
+    thickness: PositiveLength | None = Field(None, description="another thickness in the plane")
+    width: PositiveLength | None = Field(None, description="another width out of the plane")
+    free: Literal["width", "thickness", "size"] = Field("width", description="what follows from the force wanted")
+
+
+class BeamDesign(Model):
+    """What `cfmkit design` is to do."""
+
+    rescale: Rescale | None = Field(None, description="another size, section or material for the same curve")
+
+
+class BeamAnalysis(Analysis):
+    """How a beam mechanism is run."""
+
+    points: int = Field(181, ge=5, le=1_000_000, description="points of the curve, even over the travel or the load")
+    travel: Displacement | None = Field(None, description="displacement or angle to go to, for drives by motion")
+    force: Force | None = Field(None, description="to go to, of all copies together, for a drive by a force")
+    moment: Torque | None = Field(None, description="to go to, for a drive by a moment")
+    reference: Displacement | None = Field(None, description="pose of the band ranges; default: centre of the window")
+    fidelity: Fidelity | None = Field(
+        None, description="model: bending only, with stretching, or with shear, too; default: as in the mechanism"
+    )
+    stress: Literal["bending", "total"] | None = Field(
+        None, description="what counts as stress; default: bending where beams do not stretch, else with the axial part"
+    )
+    tolerance: Annotated[Ratio, Field(ge=1e-12, le=0.01)] = Field(
+        1e-7, description="error of forces and positions, relative to the largest of the path"
+    )
+    through_folds: bool = Field(False, description="follow the path through limit points, by its arc length")
+    branch: Literal["stable", "primary"] = Field(
+        "stable", description="where to go at a bifurcation: a stable branch, or straight on"
+    )
+    other_side: bool = Field(False, description="take the other one of two mirror-image branches")
+    imperfection: Length = Field(
+        0.0, description="bend the unloaded beams by so much in the first buckling mode; 0: perfect"
+    )
+
+
+class BeamSpec(Spec):
+    """A mechanism of slender beams."""
+
+    family: Literal["beam"]
+    mechanism: Mechanism
+    design: BeamDesign | None = Field(None, description="what `cfmkit design` is to reach")
+    analysis: BeamAnalysis = Field(description="how it is run")
+
+    @model_validator(mode="after")
+    def _goes_as_far_as_the_drive_says(self) -> Self:
+        refuse("BeamSpec", {("analysis", *place): message for place, message in _extent_faults(self)})
+        return self
+
+    @property
+    def fidelity(self) -> Fidelity:
+        """The model that the analysis uses."""
+        if self.analysis.fidelity is not None:
+            return self.analysis.fidelity
+        if self.mechanism.shear:
+            return "reissner"
+        return "extensible" if self.mechanism.axial else "inextensible"
+
+    @property
+    def stress(self) -> Literal["bending", "total"]:
+        """What counts as stress."""
+        return self.analysis.stress or ("bending" if self.fidelity == "inextensible" else "total")
+
+    @property
+    def extent(self) -> float:
+        """How far the drive goes: the travel [m or rad], the force [N] or the moment [N m]."""
+        value: float = getattr(self.analysis, _EXTENT[self.mechanism.drive.kind])
+        return float(value)
+
+
+def _extent_faults(spec: BeamSpec) -> Iterator[tuple[tuple[str, ...], str]]:
+    """Yield what is wrong with how far the drive is to go."""
+    kind, analysis = spec.mechanism.drive.kind, spec.analysis
+    wanted = _EXTENT[kind]
+    for name in ("travel", "force", "moment"):
+        if name != wanted and getattr(analysis, name) is not None:
+            yield (name,), f"does not go with a drive of kind {kind!r}: give {wanted!r}"
+    value = getattr(analysis, wanted)
+    if value is None:
+        yield (), f"the key {wanted!r} is missing: how far a drive of kind {kind!r} goes"
+    elif value == 0:
+        yield (wanted,), "must not be 0: the drive has to do something"
+    dimension = {"displacement": "length", "rotation": "angle"}.get(kind)
+    if value is not None and dimension and value.dimension != dimension:
+        yield (wanted,), f"must be {DIMENSIONS[dimension].phrase} for a drive of kind {kind!r}"

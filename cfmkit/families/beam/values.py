@@ -1,0 +1,172 @@
+"""Scalar results of a beam mechanism, beside the constant-force metrics of every family."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.numerics.cubic import bisect, crossing, first_extreme, value_at
+from cfmkit.results import Quantity
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from cfmkit.curves import FloatArray
+    from cfmkit.families.beam.model import Solution
+
+BAND = 0.05
+
+DEFINITIONS = {
+    "nominal_force": ("force", "F_d: force at d, the end of the window or of the travel [Lan, sec. 2]"),
+    "range_start": ("length", "c: where the force first reaches 0.95 F_d [Lan, sec. 2]"),
+    "range_fraction": ("ratio", "(d - c)/d, the operational range as a share of the travel [Lan, sec. 2]"),
+    "strict_range_start": ("length", "smallest c with (max - min) <= 5 % of max of the force on c ... d"),
+    "strict_range_fraction": ("ratio", "(d - c)/d with that c"),
+    "stress_at_end": ("stress", "largest stress at d"),
+    "stress_limit_displacement": ("length", "where the stress first reaches the allowable one"),
+    "allowable_stress": ("stress", "yield strength over safety factor"),
+    "stress_total_max": ("stress", "largest stress in the window with the axial part, where the model leaves that out"),
+    "prestress_force": ("force", "force at rest: not zero where beams are forced into place"),
+    "prestress_stress": ("stress", "largest stress at rest"),
+    "closure_rotation_max": ("angle", "largest angle by which a beam was turned to fit between its nodes"),
+    "closure_scale_max": ("ratio", "largest relative change of a beam's length to fit between its nodes"),
+    "closure_gap_max": ("length", "largest distance by which a beam as given misses its node"),
+    "slenderness_min": ("count", "smallest ratio of a beam's length to its largest thickness"),
+    "peak_force": ("force", "first local maximum of the force"),
+    "peak_displacement": ("length", "where the force has its first local maximum"),
+    "valley_force": ("force", "first local minimum of the force after that"),
+    "valley_displacement": ("length", "where that is"),
+    "limit_force": ("force", "first limit point of a growing force: it snaps there"),
+    "limit_displacement": ("length", "first limit point of a growing displacement: it snaps there"),
+    "bifurcation_force": ("force", "first bifurcation under a growing force"),
+    "bifurcation_displacement": ("length", "first bifurcation under a growing displacement"),
+    "error_estimate": ("ratio", "estimated error of forces and positions, relative to the largest of the path"),
+    "strain_energy_max": ("energy", "largest strain energy on the path, of all copies"),
+}
+
+
+def values_of(solution: Solution) -> Mapping[str, Quantity]:
+    """Return the scalar results by name; None where a value does not exist."""
+    numbers: dict[str, float | None] = dict.fromkeys(DEFINITIONS) | {
+        "allowable_stress": solution.assembly.allowable_stress,
+        "error_estimate": solution.path.error,
+        "strain_energy_max": float(solution.path.energy.max()) * solution.assembly.parallel,
+        **_closure(solution),
+        **_rest(solution),
+    }
+    if solution.spec.mechanism.drive.kind in ("displacement", "force"):
+        numbers |= _ranges(solution) | _extremes(solution) | _events(solution)
+    return {name: Quantity(value, *DEFINITIONS[name]) for name, value in numbers.items()}
+
+
+def window_of(solution: Solution) -> tuple[float, float]:
+    """Return the window of the analysis, or the whole travel."""
+    window = solution.spec.analysis.window
+    if window is not None:
+        return float(window[0]), float(window[1])
+    return float(solution.motion.min()), float(solution.motion.max())
+
+
+def _ranges(solution: Solution) -> dict[str, float | None]:
+    """Return what Lan says about the range that ends at d; nothing on a curve that turns back."""
+    x, force, stress = solution.motion, solution.effort, solution.stress
+    end = window_of(solution)[1]
+    numbers: dict[str, float | None] = dict.fromkeys(
+        ("nominal_force", "range_start", "range_fraction", "strict_range_start", "strict_range_fraction"),
+    )
+    numbers |= dict.fromkeys(("stress_at_end", "stress_limit_displacement"))
+    if not (np.diff(x) > 0).all() or not x[0] <= end <= x[-1] * (1 + 1e-12) or not np.isfinite(force).all():
+        return numbers
+    nominal = value_at(x, force, end)
+    numbers |= {"nominal_force": nominal, "stress_at_end": value_at(x, stress, end)}
+    if solution.assembly.allowable_stress is not None:
+        allowable = solution.assembly.allowable_stress
+        # beam by beam: the largest of all has a kink where it passes from one beam to another
+        found = [crossing(x, value, allowable) for value, _ in solution.stresses.values()]
+        numbers["stress_limit_displacement"] = min((place for place in found if place is not None), default=None)
+    start = crossing(x, force / nominal, 1 - BAND) if nominal else None
+    if start is not None and start <= end and end > 0:
+        numbers |= {"range_start": start, "range_fraction": (end - start) / end}
+        strict = strict_start(x, force, end)
+        numbers |= {"strict_range_start": strict, "strict_range_fraction": (end - strict) / end}
+    return numbers
+
+
+def strict_start(x: FloatArray, force: FloatArray, end: float, band: float = BAND) -> float:
+    """Return the smallest c with (max - min) <= band max of the force on c ... end."""
+    before = x < end
+    values = np.append(force[before], value_at(x, force, end))
+    places = np.append(x[before], end)
+    tops = np.maximum.accumulate(values[::-1])[::-1]
+    bottoms = np.minimum.accumulate(values[::-1])[::-1]
+    bad = np.flatnonzero(tops - bottoms > band * tops)
+    if not len(bad):
+        return float(places[0])
+    last = int(bad[-1])
+    top, bottom = float(tops[last + 1]), float(bottoms[last + 1])
+
+    def inside(place: float) -> bool:
+        here = value_at(x, force, place)
+        return max(top, here) - min(bottom, here) <= band * max(top, here)
+
+    return bisect(inside, float(places[last]), float(places[last + 1]))
+
+
+def _closure(solution: Solution) -> dict[str, float | None]:
+    fits = solution.path.fits
+    own = [name for name, beam in solution.path.layout.network.beams.items() if getattr(beam.shape, "length", None)]
+    beams = solution.path.layout.network.beams
+    thickest = {
+        name: float(np.real(beam.section.thickness_at(beam.section.stations, 0.5)).max())
+        for name, beam in beams.items()
+    }
+    return {
+        "closure_rotation_max": max((abs(float(np.real(fits[name].rotation))) for name in own), default=0.0),
+        "closure_scale_max": max((abs(float(np.real(fits[name].scale)) - 1) for name in own), default=0.0),
+        "closure_gap_max": max((fits[name].gap for name in own), default=0.0),
+        "slenderness_min": min(float(np.real(fits[name].length)) / thickest[name] for name in beams),
+    }
+
+
+def _rest(solution: Solution) -> dict[str, float | None]:
+    """Return what happens at rest, and the stress with all its parts."""
+    total = solution.path.peak_stress(axial=True).value[solution.keep]
+    lo, hi = window_of(solution)
+    inside = (solution.motion >= lo) & (solution.motion <= hi) & solution.accurate
+    return {
+        "prestress_force": _significant(solution.effort, solution.path.error),
+        "prestress_stress": _significant(solution.stress, solution.path.error),
+        "stress_total_max": float(total[inside].max()) if inside.any() else None,
+    }
+
+
+def _significant(values: FloatArray, error: float) -> float:
+    """Return the first value, zero where it is within the error of the path."""
+    first = float(values[0])
+    return 0.0 if abs(first) <= 10 * error * float(np.nanmax(np.abs(values))) else first
+
+
+def _extremes(solution: Solution) -> dict[str, float | None]:
+    """Return the first local maximum of the force and the minimum after it, on a curve that does not turn back."""
+    names = ("peak_displacement", "peak_force", "valley_displacement", "valley_force")
+    x, force = solution.motion, solution.effort
+    numbers: dict[str, float | None] = dict.fromkeys(names)
+    if not (np.diff(x) > 0).all() or not np.isfinite(force).all():
+        return numbers
+    peak = first_extreme(x, force)
+    if peak is None:
+        return numbers
+    valley = first_extreme(x, force, -1, after=peak[0])
+    return dict(zip(names, (*peak, *(valley or (None, None))), strict=True))
+
+
+def _events(solution: Solution) -> dict[str, float | None]:
+    """Return where the drive has its first limit point and its first bifurcation."""
+    kind = solution.spec.mechanism.drive.kind
+    unit = solution.assembly.parallel if kind == "force" else 1
+    found: dict[str, float | None] = {}
+    for name, event in (("limit", "limit point"), ("bifurcation", "bifurcation")):
+        drive = next((one.drive for one in solution.path.events if one.kind == event), None)
+        found[f"{name}_{kind}"] = None if drive is None else unit * drive
+    return found

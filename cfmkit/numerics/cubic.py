@@ -1,0 +1,74 @@
+"""Between the samples of a smooth function: the cubic through the four nearest of them.
+
+Error: the fourth power of the spacing. The first argument increases; nothing here sorts or bridges a fold.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from cfmkit.curves import FloatArray
+
+_HALVINGS = 60
+
+
+def value_at(x: FloatArray, y: FloatArray, place: float) -> float:
+    """Return the cubic's value at one place between the first and the last sample.
+
+    Examples
+    --------
+    >>> x = np.array([0.0, 1.0, 3.0, 4.0, 6.0])
+    >>> round(value_at(x, x**3, 2.0), 12)
+    8.0
+    """
+    count = min(4, len(x))
+    first = int(np.clip(np.searchsorted(x, place) - 2, 0, len(x) - count))
+    near, values = x[first : first + count], y[first : first + count]
+    total = 0.0
+    for i in range(count):
+        others = np.delete(near, i)
+        total += float(values[i] * np.prod((place - others) / (near[i] - others)))
+    return total
+
+
+def crossing(x: FloatArray, y: FloatArray, level: float) -> float | None:
+    """Return where the function first reaches a level from below; None if it never does."""
+    reached = np.flatnonzero(y >= level)
+    if not len(reached):
+        return None
+    index = int(reached[0])
+    if index == 0:
+        return float(x[0])
+    return bisect(lambda place: value_at(x, y, place) >= level, float(x[index - 1]), float(x[index]))
+
+
+def bisect(holds: Callable[[float], bool], low: float, high: float) -> float:
+    """Return the place between `low`, where a condition fails, and `high`, where it holds, from which on it holds."""
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if holds(middle) else (middle, high)
+    return high
+
+
+def first_extreme(x: FloatArray, y: FloatArray, sign: int = 1, after: float = -np.inf) -> tuple[float, float] | None:
+    """Return place and value of the first inner maximum (sign 1) or minimum (-1) after a place; None without one."""
+    z = sign * y
+    top = (z[1:-1] > z[:-2]) & (z[1:-1] >= z[2:]) & (x[1:-1] > after)
+    if not top.any():
+        return None
+    index = int(np.argmax(top)) + 1
+    low, high = float(x[index - 1]), float(x[index + 1])
+    ratio = 0.5 * (np.sqrt(5.0) - 1)
+    for _ in range(_HALVINGS):
+        one, other = high - ratio * (high - low), low + ratio * (high - low)
+        if sign * value_at(x, y, one) > sign * value_at(x, y, other):
+            high = other
+        else:
+            low = one
+    place = 0.5 * (low + high)
+    return place, value_at(x, y, place)
