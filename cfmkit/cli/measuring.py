@@ -14,7 +14,7 @@ Units = Annotated[
     str | None,
     typer.Option(
         "--units",
-        metavar="S=MM,F=N",
+        metavar="s=mm,F=N",
         show_default=False,
         help="Units by column name or number, where the header names none; also picks columns.",
     ),

@@ -27,6 +27,9 @@ if TYPE_CHECKING:
 REVERSAL = 0.02
 """The motion has turned back when it has returned by this part of its range."""
 
+WHOLE = 0.9
+"""The second stroke of a cycle is complete when it covers this part of the first."""
+
 LOAD, UNLOAD = "load", "unload"
 
 _PAUSE = 0.02
@@ -49,11 +52,14 @@ class Stroke:
         From 1; a cycle is one way up and one way down.
     points : (n,) array of int
         Indices into the recording, in its order, pauses left out.
+    way : float
+        What it covers of the motion [m or rad].
     """
 
     branch: str
     cycle: int
     points: NDArray[np.intp]
+    way: float
 
 
 @dataclass(frozen=True)
@@ -65,13 +71,21 @@ class Strokes:
 
     @property
     def cycles(self) -> tuple[tuple[Stroke, Stroke], ...]:
-        """The complete cycles: two strokes each, in their order."""
-        found = {number: [item for item in self.strokes if item.cycle == number] for number in self._numbers}
-        return tuple((pair[0], pair[1]) for pair in found.values() if len(pair) == 2)
+        """The complete cycles, two strokes each, in their order; those that were broken off only if there is no other."""
+        found = [[item for item in self.strokes if item.cycle == number] for number in self._numbers]
+        pairs = [(pair[0], pair[1]) for pair in found if len(pair) == 2]
+        whole = [pair for pair in pairs if covered(pair) >= WHOLE]
+        return tuple(whole or pairs)
 
     @property
     def _numbers(self) -> list[int]:
         return sorted({item.cycle for item in self.strokes})
+
+
+def covered(cycle: tuple[Stroke, Stroke]) -> float:
+    """Return which part of the longer stroke of a cycle the shorter one covers."""
+    ways = sorted(stroke.way for stroke in cycle)
+    return ways[0] / ways[1]
 
 
 def turning_points(motion: FloatArray, threshold: float) -> list[int]:
@@ -160,7 +174,7 @@ def _numbered(pieces: Sequence[NDArray[np.intp]], motion: FloatArray) -> tuple[S
         up = bool(motion[piece[-1]] > motion[piece[0]])
         if up == first:
             cycle += 1
-        found.append(Stroke(LOAD if up else UNLOAD, max(cycle, 1), piece))
+        found.append(Stroke(LOAD if up else UNLOAD, max(cycle, 1), piece, float(np.ptp(motion[piece]))))
     return tuple(found)
 
 

@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 PLACES = 513
 """Places in the window at which cycles are compared."""
 
+TURNED = 1e-3
+"""A loop runs the wrong way round if its area is negative by more than this part of mean force times travel."""
+
 
 def branch_at(curve: Curve, branch: str, places: FloatArray) -> FloatArray:
     """Return the effort of one branch at some places, by linear interpolation.
@@ -52,6 +55,27 @@ def loop_area(motion: FloatArray, up: FloatArray, down: FloatArray) -> float:
     0.1
     """
     return float(np.trapezoid(up - down, motion))
+
+
+def turned_loop(curves: Sequence[Curve]) -> bool:
+    """Return whether the loops run the wrong way round, by more than rounding of the forces explains.
+
+    Parameters
+    ----------
+    curves : sequence of Curve
+        One a cycle; a cycle without a way back says nothing.
+    """
+    areas, sizes = [], []
+    for curve in curves:
+        if len(curve.branches) < 2:
+            continue
+        up, down = curve.on("load").motion, curve.on("unload").motion
+        low, high = max(up.min(), down.min()), min(up.max(), down.max())
+        if low < high:
+            places = np.linspace(low, high, PLACES)
+            areas.append(loop_area(places, branch_at(curve, "load", places), branch_at(curve, "unload", places)))
+            sizes.append(float(np.abs(curve.effort).mean() * (high - low)))
+    return sum(areas) < -TURNED * sum(sizes)
 
 
 def repeatability(curves: Sequence[Curve], window: Window) -> dict[str, Quantity]:

@@ -20,9 +20,9 @@ import numpy as np
 
 from cfmkit.curves import Column, Curve, FloatArray
 from cfmkit.errors import DataError
-from cfmkit.experiment.branches import LOAD, UNLOAD, Stroke, Strokes, split
+from cfmkit.experiment.branches import LOAD, UNLOAD, WHOLE, Stroke, Strokes, covered, split
 from cfmkit.experiment.filtering import DEFAULT_ORDER, LowPass, low_passed
-from cfmkit.experiment.hysteresis import repeatability
+from cfmkit.experiment.hysteresis import repeatability, turned_loop
 from cfmkit.metrics import Frame, Window, measure
 from cfmkit.results import Finding, Quantity
 
@@ -42,6 +42,7 @@ FINDINGS = {
     "pauses": "points at which the machine stood are left out",
     "not_filtered": "there are too few points for the filter",
     "negative_force": "the mean force is negative: the sign of the sensor may be turned",
+    "negative_loop": "the mechanism would give energy in every cycle: a sign may be turned",
 }
 
 
@@ -99,6 +100,11 @@ def measured(recording: Recording, low_pass: LowPass | str | None = "default") -
     warnings = _warnings(recording, strokes)
     chosen = _default(recording) if isinstance(low_pass, str) else low_pass
     raw = tuple(_curve(recording, cycle, recording.effort, strokes) for cycle in cycles)
+    if turned_loop(raw):
+        told = (
+            f"the {recording.kind} on the way up is smaller than on the way back, so that every cycle would give energy"
+        )
+        warnings = (*warnings, Finding("negative_loop", f"{told}: is the sign of a column turned?"))
     if chosen is None:
         return Measured(recording, strokes, raw, warnings=warnings)
     try:
@@ -123,6 +129,8 @@ def _smooth(recording: Recording, strokes: Sequence[Stroke], chosen: LowPass) ->
     if chosen.per not in ("time", "length" if recording.kind == "force" else "angle"):
         raise DataError(f"a cut-off of {chosen.told} does not fit a {recording.kind} curve")
     smooth = np.array(recording.effort)
+    if chosen.per == "time" and any(np.ptp(recording.time[stroke.points]) == 0 for stroke in strokes):
+        raise DataError("the time is the same at all points of a branch; give the cut-off in 1/mm or 1/deg instead")
     for stroke in strokes:
         points = stroke.points if chosen.per == "time" else stroke.points[_by_motion(recording, stroke)]
         over = recording.time if chosen.per == "time" else recording.motion
@@ -154,6 +162,9 @@ def _warnings(recording: Recording, strokes: Strokes) -> tuple[Finding, ...]:
         only = strokes.strokes[0].branch
         found.append(Finding("one_branch", f"there is the branch {only!r} only: no loop, and no hysteresis"))
     left = len(strokes.strokes) - 2 * len(cycles)
+    if cycles and covered(cycles[0]) < WHOLE:
+        told = f"the shorter way covers {100 * covered(cycles[0]):.0f} % of the longer one only"
+        found.append(Finding("unfinished_cycle", f"{told}: the loop is not closed"))
     if cycles and left:
         found.append(
             Finding("unfinished_cycle", f"{left} of {len(strokes.strokes)} strokes complete no cycle: left out")
@@ -204,7 +215,10 @@ def numbers_of(source: Measured, frame: Frame | None = None, window: Window | No
     cfmkit.errors.DataError
         If a branch does not cover the window.
     """
-    common = common_window(source.raw)
+    try:
+        common = common_window(source.raw)
+    except DataError as problem:
+        raise DataError(f"{source.recording.name}: {problem}") from None
     window = window or common
     slack = 1e-9 * (window.hi - window.lo)
     if window.lo < common.lo - slack or window.hi > common.hi + slack:
@@ -231,8 +245,27 @@ def common_window(curves: Sequence[Curve]) -> Window:
     parts = [curve.motion[curve.branch == name] for curve in curves for name in curve.branches]
     lo, hi = max(float(part.min()) for part in parts), min(float(part.max()) for part in parts)
     if not lo < hi:
-        raise DataError("no part of the travel is measured on every branch")
-    return Window(lo, hi)
+        one, what = (
+            ("angle", "angle and torque") if curves[0].kind == "torque" else ("travel", "displacement and force")
+        )
+        raise DataError(f"no {one} is measured on every branch; are the columns or units of {what} exchanged?")
+    return Window(lo + 0.0, hi + 0.0)  # no -0
+
+
+def require_loop(source: Measured) -> None:
+    """Refuse a recording that has no way back.
+
+    Raises
+    ------
+    cfmkit.errors.DataError
+        Naming the branch that there is.
+    """
+    if not source.strokes.cycles:
+        only = source.strokes.strokes[0].branch
+        raise DataError(
+            f"{source.recording.name}: holds the branch {only!r} only: without the way back there is no loop and no "
+            "hysteresis; if one way is all that was measured, say --one-branch"
+        )
 
 
 def _mean(each: Sequence[Mapping[str, Quantity]]) -> dict[str, Quantity]:
@@ -249,4 +282,6 @@ def _mean(each: Sequence[Mapping[str, Quantity]]) -> dict[str, Quantity]:
     return found
 
 
-__all__ = ["FINDINGS", "LOAD", "UNLOAD", "Measured", "Measurement", "common_window", "measured", "numbers_of"]
+__all__ = [
+    "FINDINGS", "LOAD", "UNLOAD", "Measured", "Measurement", "common_window", "measured", "numbers_of", "require_loop",
+]  # fmt: skip

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from cfmkit.errors import DataError
-from cfmkit.tables.labheaders import ROLES, ColumnInfo, column_of, describe, is_unit_row
+from cfmkit.tables.labheaders import ROLES, ColumnInfo, column_of, describe, is_unit_row, split_header
 from cfmkit.tables.labtext import Block, header_cells
 
 if TYPE_CHECKING:
@@ -20,6 +20,12 @@ def columns_of(lines: list[str], block: Block, told: dict[str, str], name: str) 
     above = [index for index in range(block.first) if lines[index].strip()][-HEADER_LINES:]
     rows = [(index, header_cells(lines[index], block)) for index in reversed(above)]
     fitting = [(index, cells) for index, cells in rows if len(cells) == block.width]
+    # A column of remarks that stayed empty: its title stands beyond the numbers and has no unit.
+    fitting = fitting or [
+        (index, cells[: block.width])
+        for index, cells in rows
+        if len(cells) > block.width and not any(split_header(cell)[1] for cell in cells[block.width :])
+    ]
     names, unit_row, at = [""] * block.width, [""] * block.width, None
     if fitting:
         at, names = fitting[0]

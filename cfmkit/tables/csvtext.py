@@ -56,6 +56,9 @@ def _encoded(columns: Sequence[Sequence[str]]) -> bytes:
 
 def _texts(values: Values) -> list[str]:
     if isinstance(values, tuple):
+        if set(map(type, values)) <= {str, type(None)}:  # names of branches and states: few, many times
+            known = {cell: _text(cell) for cell in set(values)}
+            return [known[cell] for cell in values]
         return list(map(_text, values))
     texts = list(map(repr, values.tolist()))
     if values.dtype.kind == "f" and np.isnan(values).any():

@@ -116,6 +116,10 @@ def _frozen(values: Iterable[Any], *, numeric: bool) -> Values:
             raise CfmError(f"a column is a sequence of values, not an array of shape {values.shape}")
         if values.dtype.kind in "fi":
             return _array(values)
+        if values.dtype.kind == "b":
+            return tuple(np.where(values, "true", "false").tolist())
+        if values.dtype.kind == "U":
+            return tuple(text or None for text in values.tolist())
         values = values.tolist()
     cells = tuple(map(_cell, values))
     kinds = set(map(type, cells))

@@ -19,7 +19,7 @@ from cfmkit.metrics import Window
 
 def recording(motion, force=None, time=None):
     motion = np.asarray(motion, dtype=float)
-    force = 50.0 + np.arange(len(motion)) / len(motion) if force is None else force
+    force = 51.0 - np.arange(len(motion)) / len(motion) if force is None else force
     return Recording("made.csv", motion * 1e-3, force, time)
 
 
@@ -165,3 +165,32 @@ def test_a_named_filter_that_cannot_be_used_is_refused_and_the_default_one_left_
     with pytest.raises(DataError, match="needs a column with the time"):
         measured(few, LowPass(1.0, "time", 1))
     assert [item.name for item in measured(few).warnings] == ["not_filtered"]
+
+
+def looped(motion, gap=1.0):
+    motion = np.asarray(motion, dtype=float)
+    way = np.sign(np.diff(motion, append=motion[-2]))
+    return recording(motion, 50.0 + 0.5 * gap * way)
+
+
+def test_a_last_cycle_that_was_broken_off_is_left_out_and_does_not_narrow_the_window():
+    motion = triangle(3)
+    source = measured(looped(motion[: len(motion) - 100]), None)
+    assert len(source.raw) == 2
+    assert [(item.name, item.message) for item in source.warnings] == [
+        ("unfinished_cycle", "2 of 6 strokes complete no cycle: left out")
+    ]
+    assert numbers_of(source).window.lo < 1e-3
+
+
+def test_a_single_cycle_that_was_broken_off_is_measured_with_a_warning():
+    motion = triangle(1)
+    source = measured(looped(motion[:300]), None)
+    assert len(source.raw) == 1
+    assert source.warnings[0].name == "unfinished_cycle"
+    assert "covers 49 % of the longer one only" in source.warnings[0].message
+
+
+@pytest.mark.parametrize(("gap", "found"), [(1.0, []), (-1.0, ["negative_loop"]), (0.01, []), (-0.01, [])])
+def test_a_loop_that_runs_the_wrong_way_round_is_reported_where_noise_cannot_explain_it(gap, found):
+    assert [item.name for item in measured(looped(triangle(2), gap), None).warnings] == found

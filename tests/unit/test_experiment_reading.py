@@ -191,3 +191,13 @@ def test_whatever_a_file_holds_it_is_read_or_refused(tmp_path_factory, data):
         complaint = str(error)
     assert "\n" not in complaint
     assert np.isfinite(effort).all()
+
+
+def test_titles_of_remarks_beyond_the_numbers_are_dropped_and_units_beyond_them_are_not(tmp_path):
+    """LabVIEW ends its header with a column for comments that stays empty."""
+    body = rows(loop_columns())
+    (tmp_path / "remark.csv").write_text("t [s];s [mm];F [N];Comment\n" + body)
+    assert read_recording(tmp_path / "remark.csv").decisions.columns["force"] == "F [N]"
+    (tmp_path / "more.csv").write_text("t [s];s [mm];F [N];T [K]\n" + body)
+    with pytest.raises(DataError, match="the header names no units"):
+        read_recording(tmp_path / "more.csv")

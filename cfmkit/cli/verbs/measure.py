@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from cfmkit.cli.answer import Answer
+from cfmkit.cli.measuring import Units
 from cfmkit.cli.options import Common, NoPlots, OutFolder, Quiet
 
 if TYPE_CHECKING:
@@ -25,13 +26,6 @@ DataFile = Annotated[
     str,
     typer.Argument(metavar="DATA.csv", help="Columns with displacement and force, perhaps time.", show_default=False),
 ]
-Units = Annotated[
-    str | None,
-    typer.Option(
-        "--units", metavar="S=MM,F=N", show_default=False,
-        help="Units by column name or number, where the header names none; also picks columns.",
-    ),
-]  # fmt: skip
 WindowOption = Annotated[
     str | None,
     typer.Option(
@@ -43,14 +37,15 @@ Filter = Annotated[
     str | None,
     typer.Option(
         "--filter", metavar="CUT-OFF", show_default=False,
-        help="Low-pass per branch: '2 Hz', '0.24 1/mm, order 3', '2 Hz, corrected', 'none' "
-        "; default: 60 cycles over the travel, order 6 per pass.",
+        help="Low-pass per branch: '2 Hz', '0.24 1/mm, order 3', '2 Hz, corrected', 'none'; "
+        "default: 60 cycles over the travel, order 6 per pass.",
     ),
 ]  # fmt: skip
 Target = Annotated[
     str | None,
     typer.Option("--target", metavar="FORCE", help="Force or torque it should have.", show_default=False),
 ]
+OneBranch = Annotated[bool, typer.Option("--one-branch", help="Accept a recording that has no way back.")]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,6 +58,7 @@ class Options(Common):
     window: WindowOption = None
     filter: Filter = None
     target: Target = None
+    one_branch: OneBranch = False
     no_plots: NoPlots = False
     quiet: Quiet = False
 
@@ -107,7 +103,7 @@ def _folder(options: Options) -> str:
 
 def _report(options: Options) -> MeasureReport:
     from cfmkit.experiment.filtering import read_filter
-    from cfmkit.experiment.measured import measured
+    from cfmkit.experiment.measured import measured, require_loop
     from cfmkit.experiment.options import read_target, read_window
     from cfmkit.experiment.reading import read_recording
     from cfmkit.experiment.report import report_on
@@ -117,7 +113,10 @@ def _report(options: Options) -> MeasureReport:
     recording = read_recording(options.data, options.units)
     window = read_window(options.window, recording.kind)
     frame = Frame(target=read_target(options.target, recording.kind))
-    return report_on(measured(recording, chosen), frame, window)
+    source = measured(recording, chosen)
+    if not options.one_branch:
+        require_loop(source)
+    return report_on(source, frame, window)
 
 
 def _page(report: MeasureReport, screen: Terminal) -> Iterator[RenderableType]:
