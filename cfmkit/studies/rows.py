@@ -20,6 +20,9 @@ if TYPE_CHECKING:
     from cfmkit.curves import FloatArray
 
 
+_STATUS = {status.key: status for status in Status}
+
+
 @dataclass(frozen=True)
 class Rows:
     """Consecutive rows of a study.
@@ -68,23 +71,30 @@ def gathered(rows: Sequence[Row], metrics: int, requirements: int) -> Rows:
     nothing, none_met = (math.nan,) * metrics, (False,) * requirements
     values = np.array([row.values or nothing for row in rows], dtype=np.float64).reshape(len(rows), metrics)
     met = np.array([row.met or none_met for row in rows], dtype=bool).reshape(len(rows), requirements)
-    odd = {k: (row.status, row.message) for k, row in enumerate(rows) if row.status is not Status.COMPLETE}
-    curves = {k: row.curve for k, row in enumerate(rows) if row.curve}
-    return Rows(values, met, odd, curves, {k: row.bug for k, row in enumerate(rows) if row.bug})
+    odd, curves, bugs = {}, {}, {}
+    for k, row in enumerate(rows):
+        if row.status is not Status.COMPLETE:
+            odd[k] = row.status, row.message
+        if row.curve:
+            curves[k] = row.curve
+        if row.bug:
+            bugs[k] = row.bug
+    return Rows(values, met, odd, curves, bugs)
 
 
 def record(rows: Rows) -> Any:
-    """Return rows as the journal keeps them: one row as plain numbers, a block as packed ones."""
+    """Return rows as the journal keeps them: numbers packed, which takes a tenth of the time of their decimals."""
     if len(rows) != 1:
         odd = {str(k): [status.key, message] for k, (status, message) in rows.odd.items()}
-        return {"n": len(rows), "v": _packed(rows.values), "q": _packed(rows.met), "o": odd}
+        told = {"n": len(rows), "v": _packed(rows.values), "q": _packed(rows.met), "o": odd}
+        return told | ({"u": {str(k): _text(curve) for k, curve in rows.curves.items()}} if rows.curves else {})
     status, message = rows.status(0)
-    told: dict[str, Any] = {"s": status.key}
+    told = {"s": status.key}
     if message:
         told["m"] = message
     if status.usable:
-        told |= {"v": [None if value != value else value for value in rows.values[0].tolist()]}
-        told |= {"q": "".join("01"[met] for met in rows.met[0].tolist())}
+        told["v"] = _packed(rows.values)
+        told["q"] = "".join("01"[met] for met in rows.met[0].tolist())
     if rows.curves:
         told["u"] = _text(rows.curves[0])
     return told
@@ -96,14 +106,15 @@ def recalled(told: Any, metrics: int, requirements: int) -> Rows:
         return gathered([recalled_row(told)], metrics, requirements)
     values = _unpacked(told["v"], np.float64).reshape(told["n"], metrics)
     met = _unpacked(told["q"], np.bool_).reshape(told["n"], requirements)
-    return Rows(values, met, {int(k): (Status[s.upper()], m) for k, (s, m) in told["o"].items()})
+    curves = {int(k): _bytes(text) for k, text in told.get("u", {}).items()}
+    return Rows(values, met, {int(k): (_STATUS[s], m) for k, (s, m) in told["o"].items()}, curves)
 
 
 def recalled_row(told: Any) -> Row:
     """Return the single row that a record is."""
     curve = _bytes(told["u"]) if "u" in told else b""
-    noted, kept = tuple(told.get("v", ())), tuple(one == "1" for one in told.get("q", ""))
-    return Row(Status[told["s"].upper()], noted, kept, told.get("m", ""), curve)
+    noted = tuple(_unpacked(told["v"], np.float64).tolist()) if "v" in told else ()
+    return Row(_STATUS[told["s"]], noted, tuple(map("1".__eq__, told.get("q", ""))), told.get("m", ""), curve)
 
 
 def joined(parts: Sequence[Rows]) -> Rows:

@@ -25,6 +25,7 @@ from cfmkit.metrics import Window, check, evaluate, values_of_family
 from cfmkit.results import Result, Status
 from cfmkit.store import file_hash, stable_hash
 from cfmkit.tables.source import named_in
+from cfmkit.units import to_border
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -34,6 +35,9 @@ if TYPE_CHECKING:
 
 NOT_DECIDING = {"name", "description", "sweep", "sensitivity"}
 """Parts of a specification that change no result of a point."""
+
+RECORDS = 2
+"""How records of the journal are written: those of another number are computed again."""
 
 _STATUS_OF = {3: Status.INVALID, 4: Status.NO_EQUILIBRIUM, 70: Status.CRASHED}
 
@@ -52,6 +56,8 @@ class Metric:
         What it is.
     over : tuple of (float, float), optional
         Where it is measured [m or rad]; default: the window of the analysis.
+    words : tuple of str
+        Those that a metric of the dimension ``text`` is an index into.
     label : str
         Heads the column; default: the name, ``force_mean_load`` for ``force_mean[load]``.
     """
@@ -61,6 +67,7 @@ class Metric:
     definition: str = ""
     over: tuple[float, float] | None = None
     label: str = ""
+    words: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         """Fall back to the name."""
@@ -128,6 +135,13 @@ class Study:
         """Names of the metrics."""
         return tuple(item.name for item in self.metrics)
 
+    def told(self, column: int, value: float) -> float | str | None:
+        """Return a metric's value as files say it: in the border unit, or a word; None where there is none."""
+        one = self.metrics[column]
+        if not isfinite(value):
+            return None
+        return one.words[int(value)] if one.words else float(to_border(value, one.dimension))
+
     @cached_property
     def identity(self) -> bytes:
         """The hash of everything that decides a row, but the varied values; of data files the content counts."""
@@ -135,7 +149,7 @@ class Study:
         versions = {name: version(name) for name in ("numpy", "scipy")} | {"cfmkit": __version__}
         noted = [(one.name, one.over) for one in self.metrics]
         data = [[str(source), file_hash(source.path.resolve())] for source in named_in(self.spec.model_dump())]
-        about = [self.paths, noted, self.design, self.curves, self.seed, versions, data]
+        about = [RECORDS, self.paths, noted, self.design, self.curves, self.seed, versions, data]
         return bytes.fromhex(stable_hash([spec, *about]))
 
     def key(self, values: Sequence[Any]) -> str:
