@@ -185,7 +185,7 @@ _LOADS = (
     Definition("stress_max", "stress", "largest stress in the window", flatness.stress_max),
     Definition(
         "safety_factor",
-        "ratio",
+        "factor",
         "allowable stress over the largest stress in the window; 1 or more is within the limit",
         flatness.safety_factor,
         "smallest",

@@ -262,6 +262,7 @@ def _number_or_text(text: str) -> str | float:
 Length = Annotated[float, quantity("length")]
 Angle = Annotated[float, quantity("angle")]
 Ratio = Annotated[float, quantity("ratio")]
+Factor = Annotated[float, quantity("factor")]
 Force = Annotated[float, quantity("force")]
 Torque = Annotated[float, quantity("torque")]
 Energy = Annotated[float, quantity("energy")]

@@ -68,6 +68,7 @@ _DIMENSIONS = (
     Dimension("angular_acceleration", "deg/s^2", "angular velocity per time", "90 deg/s^2", up=_DEGREES),
     Dimension("damping", "N*s/mm", "force per velocity", "0.01 N*s/mm", down=1e3),
     Dimension("rotational_damping", "N*mm*s/rad", "torque per angular velocity", "2 N*mm*s/rad", up=1e3),
+    Dimension("factor", "1", "how many times something is something else", "1.5"),
     Dimension("count", "1", "a number of things", "2"),
     Dimension("text", "", "a word, not a number", "load"),
 )
@@ -89,7 +90,7 @@ COMMON: Mapping[tuple[str, str], Fraction] = MappingProxyType(
 )
 """Exact SI size of what nearly every file says, by (dimension, unit): these need no look into pint's registry."""
 
-UNITLESS = ("ratio", "count")
+UNITLESS = ("ratio", "factor", "count")
 """Dimensions whose numbers need no unit."""
 
 
