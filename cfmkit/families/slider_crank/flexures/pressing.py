@@ -1,0 +1,191 @@
+"""Pressing the slider of a chain: the path that starts at rest, and the branch on the other side.
+
+A nearly straight chain yields like a column: within the first micrometres the force rises to a buckling load and
+stays there. Ordinary steps from rest jump over that corner, onto a higher mode with ten times the force, so the first
+step is a hundred-thousandth of the travel and every point must be stable. Two cases cannot be reached from rest: the
+chain that is straight, or so nearly that rounding decides, and the branch to which a kinked chain does not go by
+itself. Their equilibria are solved from those of a chain that is bowed, or kinked, to the side asked for.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.beams import Control, Displacement, Path, PathStatus, trace
+from cfmkit.beams.neighbour import neighbouring
+from cfmkit.families.slider_crank.flexures.chain import SLIDER, kink, mirrored
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from cfmkit.beams import Network
+    from cfmkit.curves import FloatArray
+
+FIRST_STEP = 1e-5
+"""Of the travel."""
+
+STRAIGHT, CLEAR = 1e-9, 2e-4
+"""Offset of the crank pin, in lengths of the chain: below the first there is no kink, above the second it decides."""
+
+BOW = 2e-3
+"""Offset that a chain is given to send it to one side, in lengths of the chain."""
+
+
+class Ending(Enum):
+    """How pressing a chain ended."""
+
+    COMPLETE = "every point asked for is a stable equilibrium on the branch asked for"
+    LIMIT_POINT = "the slider cannot be pressed further in equilibrium: a limit point of the travel"
+    UNSTABLE = "stability is lost: the chain would jump"
+    NOT_CONVERGED = "no step converged, or the tolerance was not reached"
+    WRONG_BRANCH = "the chain bends to the other side than asked for"
+    STARTS_LATE = "this branch exists only beyond some travel"
+
+
+@dataclass(frozen=True)
+class Pressed:
+    """The equilibria of a pressed chain.
+
+    Attributes
+    ----------
+    path : Path
+        Converged points only.
+    ending : Ending
+        Why it ended, or that it is complete.
+    message : str
+        One sentence with the place.
+    side : int
+        1: the crank pin has moved to the left of the line from pivot to slider pin; -1: to its right.
+    """
+
+    path: Path
+    ending: Ending
+    message: str
+    side: int = 0
+
+    @property
+    def travel(self) -> FloatArray:
+        """Slider travel at the points asked for that were reached [m]."""
+        travel: FloatArray = self.path.drive[self.path.at_asked]
+        return travel
+
+    @property
+    def force(self) -> FloatArray:
+        """Force against the travel there [N]."""
+        force: FloatArray = self.path.effort[self.path.at_asked]
+        return force
+
+
+@dataclass(frozen=True)
+class Chain:
+    """A chain ready to be pressed.
+
+    Attributes
+    ----------
+    points : (k, 2) array
+        What the network is built on, from the clamped end to the slider [m].
+    pins : (3, 2) array
+        Pivot, crank pin and slider pin [m].
+    build : callable
+        From such points to the network.
+    direction : float
+        Of the travel [rad]: pi where the slider moves towards smaller x.
+    rise : callable
+        From a path and a point of it to how far the crank pin has moved to the left [m].
+    """
+
+    points: FloatArray
+    pins: FloatArray
+    build: Callable[[FloatArray], Network]
+    direction: float
+    rise: Callable[[Path, int], float]
+
+    @property
+    def side(self) -> int:
+        """To which side the chain is kinked, +1 or -1; 0 where it is straight."""
+        off = kink(self.pins)
+        return int(np.sign(off)) if abs(off) > STRAIGHT * self.length else 0
+
+    @property
+    def length(self) -> float:
+        """Distance of pivot and slider pin [m]."""
+        return float(np.hypot(*(self.pins[2] - self.pins[0])))
+
+    def press(self, travel: FloatArray, side: int = 0, tolerance: float = 1e-7) -> Pressed:
+        """Return the equilibria at travels on one side, that of the kink unless asked otherwise.
+
+        Parameters
+        ----------
+        travel : (n,) array
+            From the unloaded position, increasing [m]; may start with 0.
+        side : int
+            1, -1, or 0 for the side of the kink (left where there is none).
+        tolerance : float
+            As in `cfmkit.beams.Control`.
+        """
+        drive = Displacement(SLIDER, self.direction, travel)
+        wanted = side or self.side or 1
+        clear = abs(kink(self.pins)) > CLEAR * self.length
+        if wanted == self.side and clear:
+            path = _trace(self.build(self.points), drive, tolerance)
+            if path.status is PathStatus.COMPLETE:
+                return self._judged(path, wanted)
+        helper = mirrored(self.points, self.pins) if clear and wanted != self.side else self._bowed(wanted)
+        return self._from(helper, drive, wanted, tolerance)
+
+    def _bowed(self, side: int) -> FloatArray:
+        """Return the points with the crank pin moved a little to one side: a chain that cannot go the wrong way."""
+        axis = (self.pins[2] - self.pins[0]) / self.length
+        along = (self.points - self.pins[0]) @ axis
+        knee = float((self.pins[1] - self.pins[0]) @ axis)
+        hat = np.interp(along, [0.0, knee, self.length], [0.0, 1.0, 0.0])
+        moved: FloatArray = self.points + np.outer(side * BOW * self.length * hat, np.array([-axis[1], axis[0]]))
+        return moved
+
+    def _from(self, helper: FloatArray, drive: Displacement, wanted: int, tolerance: float) -> Pressed:
+        """Return the equilibria nearest to those of a chain that is kinked to the side wanted."""
+        known = _trace(self.build(helper), drive, tolerance)
+        if known.status is not PathStatus.COMPLETE:
+            return self._judged(known, wanted, helped=True)
+        path = neighbouring(known, self.build(self.points), drive)
+        if 0 < len(path.drive) < len(drive.points) and path.drive[0] > drive.points[0]:
+            text = f"with its kink the other way the chain has an equilibrium from {path.drive[0] * 1e3:.4g} mm on only"
+            return Pressed(path, Ending.STARTS_LATE, text, wanted)
+        return self._judged(path, wanted)
+
+    def _judged(self, path: Path, wanted: int, helped: bool = False) -> Pressed:
+        """Return the outcome with its ending: a curve that is not the one asked for is never passed on as such."""
+        ending, message = _ENDINGS.get(path.status, Ending.NOT_CONVERGED), path.message
+        if helped or not len(path.at_asked):
+            ending = Ending.NOT_CONVERGED if ending is Ending.COMPLETE else ending
+            return Pressed(path, ending, message)
+        last = int(path.at_asked[-1])
+        side = int(np.sign(self.rise(path, last)))
+        stable = path.stable[path.at_asked]
+        if ending is Ending.COMPLETE and not stable.all():
+            first = path.drive[path.at_asked][~stable][0]
+            ending, message = Ending.UNSTABLE, f"unstable from {first * 1e3:.4g} mm on"
+        if ending is Ending.COMPLETE and side != wanted:
+            ending, message = Ending.WRONG_BRANCH, Ending.WRONG_BRANCH.value
+        return Pressed(path, ending, message, side)
+
+
+_ENDINGS = {
+    PathStatus.COMPLETE: Ending.COMPLETE,
+    PathStatus.LIMIT_POINT: Ending.LIMIT_POINT,
+    PathStatus.JUMPS: Ending.UNSTABLE,
+}
+
+
+def _trace(network: Network, drive: Displacement, tolerance: float) -> Path:
+    """Follow the path from rest; where steps of the travel do not get through, by its arc length."""
+    path = trace(network, drive, Control(first_step=FIRST_STEP, tolerance=tolerance))
+    if path.status is PathStatus.COMPLETE:
+        return path
+    arc = trace(network, drive, Control(tolerance=tolerance, through_folds=True))
+    good = arc.status is PathStatus.COMPLETE and bool(arc.stable[arc.at_asked].all())
+    return arc if good and len(arc.at_asked) == len(drive.points) else path
