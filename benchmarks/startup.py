@@ -9,6 +9,7 @@ Run: python benchmarks/startup.py
 
 from __future__ import annotations
 
+import math
 import subprocess
 import sys
 import tempfile
@@ -34,7 +35,19 @@ COMMANDS = {
     "analyze --no-plots": (["analyze", CONFIG, "--no-plots", "-q", "-o", "a"], 1.0, "import numpy"),
     "analyze": (["analyze", CONFIG, "-q", "-o", "b"], 2.5, "import numpy, matplotlib's Agg"),
     "design": (["design", CONFIG, "-q", "-o", "c"], None, "import numpy, matplotlib's Agg"),
+    "measure, 100 000 rows": (["measure", "loop.csv", "-q", "-o", "d"], 2.0, "import numpy, matplotlib's Agg"),
 }
+
+
+def write_loop(path: Path, rows: int = 100_000) -> None:
+    """Write a synthetic recording, 0 to 240 mm and back, with the German signs of a lab: time, travel, force."""
+    half = rows // 2
+    lines = ["t [s];s [mm];F [N]"]
+    for number in range(rows):
+        travel = 240.0 * (number + 1 if number < half else rows - number) / half
+        force = 50.0 + 0.4 * math.sin(travel / 5.0) + (0.3 + 0.003 * travel) * (1.0 if number < half else -1.0)
+        lines.append(f"{0.001 * number:.3f};{travel:.4f};{force:.4f}".replace(".", ","))
+    path.write_text("\n".join(lines) + "\n")
 
 
 def best_times(folder: str) -> dict[str, float]:
@@ -52,6 +65,7 @@ def best_times(folder: str) -> dict[str, float]:
 def main() -> None:
     """Print one line per command."""
     with tempfile.TemporaryDirectory() as folder:
+        write_loop(Path(folder) / "loop.csv")
         best = best_times(folder)
     for name in PEERS:
         print(f"{name:32s} {best[name]:6.2f} s")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -26,6 +26,15 @@ class Measuring:
     """What a verb takes that reads a measurement beside a spec."""
 
     units: Units = None
+
+
+def data_record(name: str) -> dict[str, Any]:
+    """Return what a manifest says about a data file: where it was, and the hash of its content."""
+    from pathlib import Path
+
+    from cfmkit.store import file_hash
+
+    return {"data": {"source": name, "sha256": file_hash(Path(name).resolve())}}
 
 
 def read_measured(name: str, units: str | None) -> Measured:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +15,7 @@ from cfmkit.specfile import STDIN, bind, placed, read_spec, renamed
 from cfmkit.store import RunFolder, stable_hash
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping
 
     from cfmkit.cli.options import Computing, OneSpec
     from cfmkit.cli.terminal import Terminal
@@ -32,12 +32,14 @@ FIRST = ("metrics.json", "resolved.yaml", "curve.csv")
 class Verb:
     """What distinguishes one computing verb from another.
 
-    `compute` returns the report on a spec; `done` is the word for it, in the header.
+    `compute` returns the report on a spec; `done` is the word for it, in the header; `inputs` is
+    what the manifest says about other files than the spec.
     """
 
     name: str
     done: str
     compute: Callable[[Spec, Run], Report]
+    inputs: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -71,7 +73,7 @@ def execute(verb: Verb, options: Computing, terminal: Terminal) -> Answer:
         for name, data in report.files(found, plots=not options.no_plots):
             folder.write(name, data)
         origin = provenance(verb.name, spec, options.spec, terminal)
-        manifest = folder.commit(origin | {"seed": options.seed} | _ending(found))
+        manifest = folder.commit(origin | dict(verb.inputs) | {"seed": options.seed} | _ending(found))
         kept = dict(folder.kept)
     seconds = time.perf_counter() - start
     return answer(Outcome(verb, found, options.spec, tuple(options.changes), out, manifest, kept, seconds))

@@ -71,7 +71,7 @@ class Strokes:
 
     @property
     def cycles(self) -> tuple[tuple[Stroke, Stroke], ...]:
-        """The complete cycles, two strokes each, in their order; those that were broken off only if there is no other."""
+        """The complete cycles, two strokes each, in their order; broken-off ones only where there is no other."""
         found = [[item for item in self.strokes if item.cycle == number] for number in self._numbers]
         pairs = [(pair[0], pair[1]) for pair in found if len(pair) == 2]
         whole = [pair for pair in pairs if covered(pair) >= WHOLE]

@@ -101,9 +101,7 @@ def measured(recording: Recording, low_pass: LowPass | str | None = "default") -
     chosen = _default(recording) if isinstance(low_pass, str) else low_pass
     raw = tuple(_curve(recording, cycle, recording.effort, strokes) for cycle in cycles)
     if turned_loop(raw):
-        told = (
-            f"the {recording.kind} on the way up is smaller than on the way back, so that every cycle would give energy"
-        )
+        told = f"the {recording.kind} on the way up is smaller than on the way back, and every cycle would give energy"
         warnings = (*warnings, Finding("negative_loop", f"{told}: is the sign of a column turned?"))
     if chosen is None:
         return Measured(recording, strokes, raw, warnings=warnings)
@@ -129,12 +127,12 @@ def _smooth(recording: Recording, strokes: Sequence[Stroke], chosen: LowPass) ->
     if chosen.per not in ("time", "length" if recording.kind == "force" else "angle"):
         raise DataError(f"a cut-off of {chosen.told} does not fit a {recording.kind} curve")
     smooth = np.array(recording.effort)
-    if chosen.per == "time" and any(np.ptp(recording.time[stroke.points]) == 0 for stroke in strokes):
+    over = recording.time if chosen.per == "time" else recording.motion
+    assert over is not None
+    if any(np.ptp(over[stroke.points]) == 0 for stroke in strokes):
         raise DataError("the time is the same at all points of a branch; give the cut-off in 1/mm or 1/deg instead")
     for stroke in strokes:
         points = stroke.points if chosen.per == "time" else stroke.points[_by_motion(recording, stroke)]
-        over = recording.time if chosen.per == "time" else recording.motion
-        assert over is not None
         smooth[points] = low_passed(recording.effort[points], over[points], chosen)
     return smooth
 

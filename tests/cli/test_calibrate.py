@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 
 import numpy as np
@@ -41,6 +42,19 @@ def test_analyze_with_data_adds_errors_a_figure_and_the_measured_curve(cli, cam,
     assert document["data"]["window"] == {"from": 2.0, "to": pytest.approx(240.0), "unit": "mm"}
     assert (cli.folder / "out/figures/data.png").read_bytes().startswith(b"\x89PNG")
     assert (cli.folder / "out/data.csv").read_text().startswith("branch,displacement [mm],force [N]")
+
+
+@pytest.mark.parametrize("link", [False, True], ids=["file", "link"])
+@pytest.mark.parametrize("verb", ["analyze", "calibrate"])
+def test_the_manifest_has_the_hash_of_the_measurement(cli, cam, rig, verb, link):
+    if link:
+        (cli.folder / "link.csv").symlink_to(cli.folder / rig)
+        rig = "link.csv"
+    options = ("--data", rig) if verb == "analyze" else (rig, "--fit", "mechanism.rolling_friction")
+    cli(verb, cam, *options, "-o", "out", "--no-plots")
+    manifest = json.loads((cli.folder / "out/manifest.json").read_text())
+    content = (cli.folder / "rig.csv").read_bytes()
+    assert manifest["data"] == {"source": rig, "sha256": hashlib.sha256(content).hexdigest()}
 
 
 def test_analyze_without_data_says_nothing_about_data(cli, cam):

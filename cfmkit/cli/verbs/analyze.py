@@ -47,10 +47,11 @@ def run(options: Options, terminal: Terminal) -> Answer:
     """Analyse a mechanism as it is: curve, metrics, requirements, figures; beside a measured curve if there is one."""
     from cfmkit.cli.runs import Verb, execute
 
-    work = compute
+    work, inputs = compute, {}
     if options.data is not None:
-        from cfmkit.cli.measuring import read_measured
+        from cfmkit.cli.measuring import data_record, read_measured
 
+        inputs = data_record(options.data)
         work = partial(compute_beside, read_measured(options.data, options.units))
     elif options.units is not None:
         from cfmkit.errors import UsageError
@@ -58,7 +59,7 @@ def run(options: Options, terminal: Terminal) -> Answer:
         raise UsageError("--units is for a measurement: name it with --data")
     if options.compare_fidelity:
         work = partial(compute_each, work)
-    return execute(Verb("analyze", "analysed", work), options, terminal)
+    return execute(Verb("analyze", "analysed", work, inputs), options, terminal)
 
 
 def compute(spec: Spec, run: Run) -> Report:

@@ -57,7 +57,7 @@ class Options(Computing, Measuring, Common):
 
 def run(options: Options, terminal: Terminal) -> Answer:
     """Fit values of a spec to a measured curve: values, intervals, correlation, and what the data cannot tell."""
-    from cfmkit.cli.measuring import read_measured
+    from cfmkit.cli.measuring import data_record, read_measured
     from cfmkit.cli.runs import Verb, execute
     from cfmkit.errors import UsageError
     from cfmkit.numerics.fit import LOSSES
@@ -65,7 +65,8 @@ def run(options: Options, terminal: Terminal) -> Answer:
     if options.loss not in LOSSES:
         raise UsageError(f"--loss: there is no {options.loss!r}; there are {', '.join(LOSSES)}")
     source = read_measured(options.data, options.units)
-    return execute(Verb("calibrate", "calibrated", partial(compute, options, source)), options, terminal)
+    verb = Verb("calibrate", "calibrated", partial(compute, options, source), data_record(options.data))
+    return execute(verb, options, terminal)
 
 
 def compute(options: Options, source: Measured, spec: Spec, run: Run) -> Report:

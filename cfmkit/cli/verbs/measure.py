@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from cfmkit.cli.answer import Answer
-from cfmkit.cli.measuring import Units
+from cfmkit.cli.measuring import Units, data_record
 from cfmkit.cli.options import Common, NoPlots, OutFolder, Quiet
 
 if TYPE_CHECKING:
@@ -66,7 +66,7 @@ class Options(Common):
 def run(options: Options, terminal: Terminal) -> Answer:
     """Measure a recorded force curve: branches, filter, metrics raw and filtered, hysteresis, repeatability."""
     from cfmkit.experiment.report import files
-    from cfmkit.store import RunFolder, file_hash
+    from cfmkit.store import RunFolder
 
     out = _folder(options)
     report = _report(options)
@@ -78,7 +78,7 @@ def run(options: Options, terminal: Terminal) -> Answer:
             {
                 "command": "measure",
                 "arguments": list(terminal.arguments),
-                "data": {"source": options.data, "sha256": file_hash(Path(options.data))},
+                **data_record(options.data),
                 "status": "complete",
                 "exit_code": 0,
             }
