@@ -64,12 +64,21 @@ class Finding:
 
 @dataclass(frozen=True)
 class Quantity:
-    """A scalar result in SI with its dimension and definition; ``None`` where undefined, with the reason."""
+    """A scalar result in SI with its dimension and definition; ``None`` where undefined, with the reason.
+
+    One of the dimension ``text`` is a word: `value` is its index in `words`.
+    """
 
     value: float | None
     dimension: str
     definition: str
     reason: str = ""
+    words: tuple[str, ...] = ()
+
+    @property
+    def word(self) -> str | None:
+        """The word that the value stands for; None where it stands for none."""
+        return None if self.value is None or not self.words else self.words[int(self.value)]
 
 
 @dataclass(frozen=True)

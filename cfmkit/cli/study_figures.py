@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from cfmkit.curves import FloatArray
     from cfmkit.studies.engine import Records
     from cfmkit.studies.plan import Plan, Variable
+    from cfmkit.studies.study import Metric
     from cfmkit.studies.summary import Summary
     from cfmkit.tables import Table
 
@@ -36,19 +37,15 @@ def findings(records: Records, summary: Summary) -> Findings:
     study, plan = records.work.study, records.work.plan
     values = np.concatenate([values for _, values, _ in summary.kept])
     meets = np.concatenate([meets for _, _, meets in summary.kept])
-    metrics = [
-        Scale(
-            study.names[column], study.metrics[column].dimension, _border(values[:, k], study.metrics[column].dimension)
-        )
-        for k, column in enumerate(summary.shown)
-    ]
+    metrics = [_drawn(study.metrics[column], values[:, k]) for k, column in enumerate(summary.shown)]
     drawn = [metric for metric in metrics if np.isfinite(metric.values).any()]
     varied = [_scale(item, shown) for item, shown in zip(plan.variables, plan.shown(0, len(plan)), strict=True)]
     return Findings(tuple(varied), tuple(drawn), _shape(plan), meets, summary.best)
 
 
-def _border(values: FloatArray, dimension: str) -> FloatArray:
-    return border_values(values, dimension)
+def _drawn(metric: Metric, values: FloatArray) -> Scale:
+    shown = values if metric.words else border_values(values, metric.dimension)
+    return Scale(metric.name, metric.dimension, shown, metric.words)
 
 
 def _scale(item: Variable, shown: np.ndarray) -> Scale:

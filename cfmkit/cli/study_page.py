@@ -91,7 +91,9 @@ def _words(name: str) -> str:
     return name.replace("_", " ")
 
 
-def _quantity(value: float, unit: str) -> str:
+def _quantity(value: float | str, unit: str) -> str:
+    if isinstance(value, str):
+        return value
     return f"{100 * value:.4g} %" if unit == "1" else f"{value:.5g} {unit}"
 
 

@@ -104,6 +104,8 @@ class Family:
     values : mapping
         The family's own scalar results beside the metrics of the contract:
         name -> (dimension, definition).
+    words : mapping
+        For values of the dimension ``text``: name -> the words that the value is an index into.
     resolve : callable, optional
         ``resolve(spec) -> spec`` with every derived part written out.
     analyze_block : callable, optional
@@ -118,6 +120,8 @@ class Family:
         ``"module"`` with ``drawing(spec)``, imported when exporting.
     headline : tuple of str
         Values and metrics that are shown first after a run, in this order.
+    branches : tuple of str
+        Every name that a branch of its curves may have; none where the curve decides.
     template : str
         File name under ``cfmkit/templates/`` that ``cfmkit new`` starts from.
     findings : mapping of str to str
@@ -132,12 +136,14 @@ class Family:
     analyze: Callable[[Any, Run], Result]
     design: Callable[[Any, Run], Design] | None = None
     values: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+    words: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     resolve: Callable[[Any], Any] | None = None
     analyze_block: Callable[[Any, Block], BlockAnswer | None] | None = None
     gradient: Callable[[Any, Sequence[str]], Any] | None = None
     draw: str | None = None
     outline: str | None = None
     headline: tuple[str, ...] = ()
+    branches: tuple[str, ...] = ()
     template: str = ""
     findings: dict[str, str] = field(default_factory=dict)
     references: tuple[str, ...] = ()

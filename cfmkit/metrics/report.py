@@ -25,7 +25,8 @@ def as_json(quantity: Quantity) -> dict[str, Any]:
     unit, definition = border_unit(quantity.dimension), quantity.definition
     if quantity.value is None:
         return {"value": None, "unit": unit, "definition": definition} | _reason(quantity)
-    return {"value": finite_border(quantity.value, quantity.dimension), "unit": unit, "definition": definition}
+    value = finite_border(quantity.value, quantity.dimension) if quantity.word is None else quantity.word
+    return {"value": value, "unit": unit, "definition": definition}
 
 
 def finite_border(value: float, dimension: str) -> float | None:

@@ -27,7 +27,7 @@ class Scale:
     values : (n,) array
         One for each point; indices into `words` where those are given.
     words : tuple of str
-        Of a parameter that is no number.
+        Of a parameter or a metric that is no number.
     """
 
     name: str

@@ -107,8 +107,12 @@ def draw_metric(found: Findings, metric: Scale) -> Figure:
     x, y = parameter.values[order], metric.values[order]
     axes.plot(x, y, color=BLUE, marker="o" if len(x) <= 60 else "", markersize=3)
     _hatch_spans(axes, x, found.meets[order])
-    axes.set(xlabel=parameter.label, ylabel=metric.label)
+    axes.set(xlabel=parameter.label, ylabel="" if metric.words else metric.label)
     _ticks(axes.xaxis, parameter)
+    _ticks(axes.yaxis, metric)
+    if metric.words:
+        axes.set_title(metric.label, fontsize=SMALL, loc="left")
+        axes.tick_params(axis="y", rotation=90)
     if found.best is not None:
         _star(axes, parameter.values[found.best], metric.values[found.best])
     return figure
@@ -142,17 +146,40 @@ def draw_map(found: Findings, metric: Scale) -> Figure:
     meets = found.meets.reshape(found.shape)[np.ix_(rows, columns)]
     axes.set_facecolor(EMPTY)
     axes.grid(False)
-    mesh = axes.pcolormesh(_edges(x), _edges(y), np.ma.masked_invalid(values), cmap=COLOURS, rasterized=True)
-    _level_lines(axes, x, y, values)
+    box = (114, 14, 4, 80)
+    if metric.words:
+        _classes(axes, (_edges(x), _edges(y), values), metric, axes_mm(figure, box))
+    else:
+        mesh = axes.pcolormesh(_edges(x), _edges(y), np.ma.masked_invalid(values), cmap=COLOURS, rasterized=True)
+        _level_lines(axes, x, y, values)
+        figure.colorbar(mesh, cax=axes_mm(figure, box)).set_label(metric.label)
     if not meets.all():
         _hatch_cells(axes, _edges(x), _edges(y), ~meets)
     axes.set(xlabel=across.label, ylabel=down.label, xlim=_edges(x)[[0, -1]], ylim=_edges(y)[[0, -1]])
     _ticks(axes.xaxis, across)
     _ticks(axes.yaxis, down)
-    figure.colorbar(mesh, cax=axes_mm(figure, (114, 14, 4, 80))).set_label(metric.label)
     if found.best is not None:
         _star(axes, across.values[found.best], down.values[found.best])
     return figure
+
+
+def _classes(axes: Axes, map_: tuple[FloatArray, FloatArray, FloatArray], metric: Scale, key: Axes) -> None:
+    """Colour a map by words; the key has those that occur, and each region its own name where it is large enough."""
+    from matplotlib import colormaps
+    from matplotlib.colors import ListedColormap
+
+    across, up, values = map_
+    there = np.unique(values[np.isfinite(values)]).astype(int)
+    index = np.full(len(metric.words), -1.0)
+    index[there] = np.arange(len(there))
+    shown = np.where(np.isfinite(values), index[np.where(np.isfinite(values), values, 0).astype(int)], np.nan)
+    colours = ListedColormap([colormaps[COLOURS](0.15 + 0.8 * k / max(len(metric.words) - 1, 1)) for k in there])
+    last = len(there) - 0.5
+    mesh = axes.pcolormesh(across, up, np.ma.masked_invalid(shown), cmap=colours, vmin=-0.5, vmax=last, rasterized=True)
+    bar = key.figure.colorbar(mesh, cax=key)
+    bar.set_ticks(range(len(there)), labels=[metric.words[k] for k in there])
+    bar.ax.tick_params(length=0)
+    axes.set_title(metric.label, fontsize=SMALL, loc="left")
 
 
 def _levels(parameter: Scale, count: int, stride: int) -> tuple[FloatArray, NDArray[np.intp]]:

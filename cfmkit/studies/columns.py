@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from cfmkit.errors import CfmError, UsageError
@@ -47,7 +48,8 @@ def metrics_of(spec: Spec, names: Iterable[str], sample: Curve | None = None) ->
     if not asked:
         stressed = sample is None or "max_stress" in sample.extra
         asked = tuple(name for name in known if stressed or name not in NEED_STRESS)
-    return tuple(_metric(name, known) for name in asked)
+    words = family(spec.family).words
+    return tuple(replace(_metric(name, known), words=words.get(name, ())) for name in asked)
 
 
 def _metric(name: str, known: dict[str, Definition]) -> Metric:

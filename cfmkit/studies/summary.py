@@ -193,19 +193,19 @@ class Summary:
         values = [] if self.best_values is None else self.best_values.tolist()
         return {
             one.name: {
-                "value": None if value != value else float(to_border(value, one.dimension)),
+                "value": self.study.told(k, value),
                 "unit": border_unit(one.dimension),
                 "definition": one.definition,
             }
-            for one, value in zip(self.study.metrics, values, strict=False)
+            for k, (one, value) in enumerate(zip(self.study.metrics, values, strict=False))
         }
 
     def _range(self) -> dict[str, Any]:
-        """Return the smallest and largest value of each metric over all points."""
+        """Return the smallest and largest value of each metric over all points; words have none."""
         found = {}
         for k, one in enumerate(self.study.metrics):
             low, high = float(self._low[k]), float(self._high[k])
-            if low <= high:
+            if low <= high and not one.words:
                 ends = {"min": float(to_border(low, one.dimension)), "max": float(to_border(high, one.dimension))}
                 found[one.name] = ends | {"unit": border_unit(one.dimension)}
         return found

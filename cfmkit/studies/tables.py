@@ -14,9 +14,11 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from cfmkit.curves import FloatArray
     from cfmkit.studies.engine import Records
     from cfmkit.studies.plan import Plan, Variable
     from cfmkit.studies.rows import Rows
+    from cfmkit.studies.study import Metric
 
     Watch = Callable[[NDArray[np.int64], Rows], None]
 
@@ -44,13 +46,21 @@ def results_csv(records: Records, watch: Watch | None = None) -> Iterator[bytes]
 def results_table(records: Records, indices: NDArray[np.int64], rows: Rows) -> Table:
     """Return some rows as a table in border units."""
     study = records.work.study
-    metrics = (border_column(one.label, rows.values[:, k], one.dimension) for k, one in enumerate(study.metrics))
+    metrics = (_noted(one, rows.values[:, k]) for k, one in enumerate(study.metrics))
     met = [TableColumn("requirements_met", _met(rows))] if study.spec.requirements else []
     told = [rows.status(k) for k in range(len(rows))] if rows.odd else None
     status = tuple(one.key for one, _ in told) if told else ("complete",) * len(rows)
     message = tuple(text or None for _, text in told) if told else (None,) * len(rows)
     ends = TableColumn("status", status), TableColumn("message", message)
     return Table((*varied(records.work.plan, indices), *metrics, *met, *ends))
+
+
+def _noted(one: Metric, values: FloatArray) -> TableColumn:
+    """Return a metric as a column: numbers in the border unit, or words."""
+    if not one.words:
+        return border_column(one.label, values, one.dimension)
+    words = np.array([*one.words, None], dtype=object)
+    return TableColumn(one.label, tuple(words[np.where(np.isfinite(values), values, -1).astype(int)].tolist()))
 
 
 def varied(plan: Plan, indices: NDArray[np.int64]) -> Iterator[TableColumn]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from cfmkit.families.base import Family
 from cfmkit.families.slider_crank.build import resolve
+from cfmkit.families.slider_crank.classes import CLASSES
 from cfmkit.families.slider_crank.findings import FINDINGS
 from cfmkit.families.slider_crank.model import analyze
 from cfmkit.families.slider_crank.spec import SliderCrankSpec
@@ -15,8 +16,9 @@ FAMILY = Family(
     spec_type=SliderCrankSpec,
     analyze=analyze,
     values=DEFINITIONS,
+    words={"stiffness_class": CLASSES},
     resolve=resolve,
-    headline=("band_range_05pct", "half_band", "energy_max", "crank_pin_rotation_max"),
+    headline=("stiffness_class", "band_range_05pct", "half_band", "energy_max", "crank_pin_rotation_max"),
     template="slider-crank.yaml",
     findings=FINDINGS,
     references=(

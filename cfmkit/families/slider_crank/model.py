@@ -20,7 +20,10 @@ import numpy as np
 from cfmkit.bodies.slider_crank_springs import JOINTS
 from cfmkit.curves import Column, Curve, FloatArray
 from cfmkit.families.slider_crank.build import CannotBuild, assemble, default_motion, resolve
+from cfmkit.families.slider_crank.character import Character, Equilibrium
+from cfmkit.families.slider_crank.checks import TURN, findings_of
 from cfmkit.families.slider_crank.findings import deg, finding, mm
+from cfmkit.families.slider_crank.reactions import reactions
 from cfmkit.families.slider_crank.values import values_of
 from cfmkit.results import Result, Status
 
@@ -44,11 +47,20 @@ class Solution:
         Crank angle [rad] or slider travel [m], increasing.
     units : UnitCurves
         What springs of rate 1 do there.
+    character : Character
+        Equilibria and class over the motion.
+    reference : float
+        Where the constant band is taken.
+    legs : int
+        How many share the efforts.
     """
 
     assembly: Assembly
     motion: FloatArray
     units: UnitCurves
+    character: Character
+    reference: float
+    legs: int = 1
 
     @cached_property
     def energy(self) -> FloatArray:
@@ -72,6 +84,24 @@ class Solution:
         """Derivative of the effort by the motion [N m/rad or N/m]."""
         stiffness: FloatArray = _weighed(self.assembly.rates, self.units.stiffness).sum(axis=0)
         return stiffness
+
+    @cached_property
+    def reactions(self) -> tuple[FloatArray, FloatArray]:
+        """Tension in the coupler of one leg, and force of its slider on the guide [N]."""
+        drive = self.effort if self.assembly.drive == "force" else np.zeros_like(self.effort)
+        coupler, guide = reactions(self.assembly, self.units, drive)
+        return coupler / self.legs, guide / self.legs
+
+    @cached_property
+    def band(self) -> tuple[float, float] | None:
+        """The interval around the reference in which the effort is constant; None where there is none."""
+        return self.character.band(self.reference, self.character.tolerance)
+
+    def nearest(self, stable: bool) -> Equilibrium | None:
+        """Return the equilibrium next to the unloaded position, of one kind; None if there is none."""
+        start = self.assembly.start
+        others = [item for item in self.character.equilibria if item.stable is stable and item.motion != start]
+        return min(others, key=lambda item: abs(item.motion - start), default=None)
 
 
 def _weighed(rates: FloatArray, unit: FloatArray) -> FloatArray:
@@ -110,8 +140,8 @@ def analyze(spec: SliderCrankSpec, run: Run) -> Result:
         message=shortfalls[0].message if shortfalls else "",
         curves=(_curve(solution),),
         values=values_of(solution),
-        warnings=(*shortfalls, *_findings(solution)),
-        reference=_reference(spec, assembly),
+        warnings=(*shortfalls, *findings_of(spec, solution)),
+        reference=solution.reference,
         state=solution,
     )
 
@@ -142,7 +172,15 @@ def solve(spec: SliderCrankSpec, assembly: Assembly) -> tuple[Solution, tuple[Fi
     if not finite.all():  # at an end of the motion only: the unbounded place itself is left out
         motion = motion[finite]
         units = assembly.units(motion)
-    return Solution(assembly, motion, units), () if short is None else (short,)
+    character = Character(assembly, start, stop, spec.analysis.tolerance, window_of(spec))
+    solution = Solution(assembly, motion, units, character, reference_motion(spec, assembly), spec.mechanism.legs)
+    return solution, () if short is None else (short,)
+
+
+def window_of(spec: SliderCrankSpec) -> tuple[float, float] | None:
+    """Return the window in which the effort is wanted constant, if the analysis states one [rad or m]."""
+    window = spec.analysis.window
+    return None if window is None else (float(window[0]), float(window[1]))
 
 
 def _shortfall(assembly: Assembly, asked: tuple[float, float], reach: tuple[float, float]) -> Finding | None:
@@ -151,12 +189,13 @@ def _shortfall(assembly: Assembly, asked: tuple[float, float], reach: tuple[floa
     if asked[0] >= reach[0] - slack and asked[1] <= reach[1] + slack:
         return None
     if assembly.drive == "torque":
+        whole = asked[1] - asked[0] >= TURN * (1 - 1e-9)
         text = (
             f"the crank reaches {deg(reach[0])} to {deg(reach[1])}, and {deg(asked[0])} to {deg(asked[1])} are asked "
             "for: at the ends the coupler stands across the slider's way; ask for less, or lengthen the coupler "
             f"beyond {mm(assembly.linkage.crank + abs(assembly.linkage.offset))} for full turns"
         )
-        return finding("coupler_dead_point", text)
+        return finding("no_full_turn" if whole else "coupler_dead_point", text)
     text = (
         f"from the unloaded position the slider can travel {mm(reach[0])} to {mm(reach[1])}, and {mm(asked[0])} to "
         f"{mm(asked[1])} are asked for"
@@ -164,22 +203,16 @@ def _shortfall(assembly: Assembly, asked: tuple[float, float], reach: tuple[floa
     return finding("out_of_reach", text)
 
 
-def _findings(solution: Solution) -> tuple[Finding, ...]:
-    found = []
-    if not solution.assembly.rates.any():
-        found.append(finding("no_spring", "no spring has a rate: the mechanism moves freely; set 'mechanism.springs'"))
-    return tuple(found)
-
-
-def _reference(spec: SliderCrankSpec, assembly: Assembly) -> float | None:
-    """Return where the constant band is taken: as asked, else the stretched position if the motion passes it."""
+def reference_motion(spec: SliderCrankSpec, assembly: Assembly) -> float:
+    """Return where the constant band is taken: as asked, else the stretched position, or half way of a force."""
     low, high = asked_motion(spec, assembly)
     if assembly.drive == "force":
-        return spec.analysis.reference_travel
-    place = spec.analysis.reference_angle
-    if place is None and low <= assembly.stretched <= high:
-        return assembly.stretched
-    return place
+        asked = spec.analysis.reference_travel
+        return 0.5 * (low + high) if asked is None else asked
+    asked = spec.analysis.reference_angle
+    if asked is not None:
+        return asked
+    return assembly.stretched if low <= assembly.stretched <= high else 0.5 * (low + high)
 
 
 def _as_run(spec: SliderCrankSpec, assembly: Assembly) -> SliderCrankSpec:
@@ -205,6 +238,8 @@ def _curve(solution: Solution) -> Curve:
         **place,
         **turns,
         "slider_travel": Column(units.turn[3], "length"),
+        "coupler_force": Column(solution.reactions[0], "force"),
+        "guide_force": Column(solution.reactions[1], "force"),
     }
     points = len(solution.motion)
     return Curve(solution.motion, solution.effort, np.repeat("load", points), np.ones(points, dtype=bool), extra, drive)

@@ -183,10 +183,19 @@ def _noted(one: Requirement) -> tuple[str, tuple[float, float] | None]:
 def _metrics(spec: Spec, block: Sensitivity) -> tuple[Metric, ...]:
     """Return the metrics that are asked for; else those of the requirements, over their windows; else all."""
     if block.metrics or not spec.requirements:
-        return metrics_of(spec, block.metrics)
+        return _numeric(metrics_of(spec, block.metrics), block)
     wanted = dict.fromkeys(map(_noted, spec.requirements))
     plain = {one.name: one for one in metrics_of(spec, [name for name, _ in wanted])}
     return tuple(replace(plain[name], over=over, label=_label(plain[name].label, over)) for name, over in wanted)
+
+
+def _numeric(metrics: tuple[Metric, ...], block: Sensitivity) -> tuple[Metric, ...]:
+    """Return the metrics that are numbers: of a word there is no derivative and no variance."""
+    words = [one.name for one in metrics if one.words]
+    if words and block.metrics:
+        told = f"{words[0]!r} is a word, and a sensitivity is about numbers; name another metric"
+        raise SpecError([Problem("", 0, 0, "sensitivity.metrics", told)])
+    return tuple(one for one in metrics if not one.words)
 
 
 def _label(name: str, over: tuple[float, float] | None) -> str:

@@ -1,0 +1,194 @@
+"""The character of one mechanism: equilibria with their stability, class, constant band, thresholds.
+
+Places are found on a fine grid of its own, cut into monotonic pieces, and sharpened on the
+closed form: nothing here depends on the points of the curve.
+
+Reference
+---------
+[LH] B. Li, G. Hao, Chin. J. Mech. Eng. 32 (2019) 10.1186/s10033-019-0369-z, sec. 3, 4.2 and 6.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.families.slider_crank.classes import CLASSES, Classified, classify, signs
+from cfmkit.numerics.extrema import Monotone, monotone
+from cfmkit.numerics.roots import bracketed_root
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from cfmkit.curves import FloatArray
+    from cfmkit.families.slider_crank.build import Assembly
+
+GRID = 1025
+"""Places of the grid. Efforts between them are cubics; classes change within 1e-9 of where they should."""
+
+
+@dataclass(frozen=True)
+class Equilibrium:
+    """A place where nothing needs to hold the mechanism.
+
+    Attributes
+    ----------
+    motion : float
+        Crank angle [rad] or slider travel [m].
+    stable : bool
+        Whether the energy has a minimum there.
+    energy : float
+        [J].
+    """
+
+    motion: float
+    stable: bool
+    energy: float
+
+
+@dataclass(frozen=True)
+class Character:
+    """What kind of mechanism it is over an interval of its motion.
+
+    Attributes
+    ----------
+    assembly : Assembly
+        The mechanism.
+    low, high : float
+        The interval [rad or m].
+    tolerance : float
+        Half width of a band that counts as constant.
+    window : tuple of (float, float) or None
+        Where the effort is wanted constant: if it is, the class is zero stiffness even without any fall.
+    """
+
+    assembly: Assembly
+    low: float
+    high: float
+    tolerance: float
+    window: tuple[float, float] | None = None
+
+    @cached_property
+    def curve(self) -> Monotone:
+        """The effort on the grid and at its turning points, as one of one curves."""
+        units = self.assembly.units(self.grid)
+        rates = self.assembly.rates
+        return monotone(self.grid, _weighed(rates, units.effort), _weighed(rates, units.stiffness))
+
+    @cached_property
+    def grid(self) -> FloatArray:
+        """Places of the motion, the last of them a little off the ends where an end is a pole."""
+        share = np.linspace(0.0, 1.0, GRID)
+        if self.assembly.drive == "force":  # the force runs like the square root of the travel from the stretched place
+            share = share**2
+        places = self.low + (self.high - self.low) * share
+        effort = _weighed(self.assembly.rates, self.assembly.units(places).effort)[0]
+        grid: FloatArray = places[np.isfinite(effort)]
+        return grid
+
+    @cached_property
+    def classified(self) -> Classified:
+        """Class, drop and number of equilibria."""
+        return classify(self.curve, self.assembly.start, self.tolerance, self.window)
+
+    @property
+    def kind(self) -> int:
+        """Index of the class in `CLASSES`."""
+        return int(self.classified.kind[0])
+
+    @property
+    def name(self) -> str:
+        """The class in words."""
+        return CLASSES[self.kind]
+
+    @property
+    def drop(self) -> float:
+        """Largest fall after a peak, as a fraction of the peak."""
+        return float(self.classified.drop[0])
+
+    def effort(self, motion: float) -> float:
+        """Return torque [N m] or force [N] at one place."""
+        return float(_weighed(self.assembly.rates, self.assembly.units(np.array([motion])).effort)[0, 0])
+
+    def stiffness(self, motion: float) -> float:
+        """Return the slope of the effort at one place [N m/rad or N/m]."""
+        return float(_weighed(self.assembly.rates, self.assembly.units(np.array([motion])).stiffness)[0, 0])
+
+    def energy(self, motion: float) -> float:
+        """Return the energy in the springs at one place [J]."""
+        turn = self.assembly.units(np.array([motion])).turn[:, 0]
+        return float(0.5 * self.assembly.rates @ turn**2)
+
+    @cached_property
+    def equilibria(self) -> tuple[Equilibrium, ...]:
+        """All equilibria in the interval, in order; those at its ends and the unloaded position included."""
+        return tuple(
+            Equilibrium(place, stable, self.energy(place)) for place, stable in self._roots() if np.isfinite(place)
+        )
+
+    def _roots(self) -> Iterator[tuple[float, bool]]:
+        place, sign = self.curve.place[0], signs(self.curve, self.assembly.start)[0]
+        known = np.flatnonzero(sign)
+        if not len(known):
+            return
+        first, last = int(known[0]), int(known[-1])
+        if first > 0:
+            yield self._end(0, first), bool(sign[first] > 0)
+        for before, after in zip(known[:-1].tolist(), known[1:].tolist(), strict=True):
+            if sign[before] != sign[after]:
+                yield self._between(before, after), bool(sign[after] > 0)
+        if last < len(place) - 1:
+            yield self._end(-1, last), bool(sign[last] < 0)
+
+    def _end(self, end: int, inner: int) -> float:
+        """Return an equilibrium at an end of the interval: the unloaded position itself where that is meant."""
+        place = self.curve.place[0]
+        close = abs(place[end] - self.assembly.start) <= abs(place[end] - place[inner])
+        return self.assembly.start if close else float(place[end])
+
+    def _between(self, before: int, after: int) -> float:
+        low, high = self.curve.place[0, before], self.curve.place[0, after]
+        if low <= self.assembly.start <= high and after - before > 1:
+            return self.assembly.start
+        return bracketed_root(self.effort, float(low), float(high))
+
+    def band(self, reference: float, tolerance: float) -> tuple[float, float] | None:
+        """Return the interval around a reference in which the effort is within a tolerance of that there.
+
+        None where the effort at the reference is zero, or the reference is outside the interval.
+        """
+        if not self.low <= reference <= self.high:
+            return None
+        level = self.effort(reference)
+        scale = float(np.abs(self.curve.value).max())
+        if not np.isfinite(level) or abs(level) <= 1e-9 * scale:
+            return None
+
+        def excess(motion: float) -> float:
+            return abs(self.effort(motion) / level - 1.0) - tolerance
+
+        place, outside = self.curve.place[0], np.abs(self.curve.value[0] / level - 1.0) > tolerance
+        left, right = np.flatnonzero(outside & (place < reference)), np.flatnonzero(outside & (place > reference))
+        low = self._edge(excess, place[left[-1]], reference) if len(left) else float(place[0])
+        high = self._edge(excess, place[right[0]], reference) if len(right) else float(place[-1])
+        return low, high
+
+    def _edge(self, excess: Callable[[float], float], outside: float, reference: float) -> float:
+        """Return where the band ends between a place outside and its neighbour inside."""
+        place = self.curve.place[0]
+        inner = place[place > outside].min() if outside < reference else place[place < outside].max()
+        inner = min(inner, reference) if outside < reference else max(inner, reference)
+        return bracketed_root(excess, float(outside), float(inner))
+
+
+def _weighed(rates: FloatArray, unit: FloatArray) -> FloatArray:
+    """Return the sum over the springs that are there, (1, n)."""
+    there = rates > 0.0
+    if not there.any():
+        return np.zeros((1, unit.shape[1]))
+    with np.errstate(invalid="ignore"):
+        total: FloatArray = rates[None, there] @ unit[there]
+    return total
