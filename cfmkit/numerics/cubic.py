@@ -26,13 +26,21 @@ def value_at(x: FloatArray, y: FloatArray, place: float) -> float:
     >>> round(value_at(x, x**3, 2.0), 12)
     8.0
     """
+    return float(values_at(x, y, np.array([place]))[0])
+
+
+def values_at(x: FloatArray, y: FloatArray, places: FloatArray) -> FloatArray:
+    """Return the cubic's values at many places, (n,)."""
     count = min(4, len(x))
-    first = int(np.clip(np.searchsorted(x, place) - 2, 0, len(x) - count))
-    near, values = x[first : first + count], y[first : first + count]
-    total = 0.0
+    first = np.clip(np.searchsorted(x, places) - 2, 0, len(x) - count)
+    near = x[first[:, None] + np.arange(count)]
+    total = np.zeros(len(places))
     for i in range(count):
-        others = np.delete(near, i)
-        total += float(values[i] * np.prod((place - others) / (near[i] - others)))
+        weight = np.ones(len(places))
+        for j in range(count):
+            if j != i:
+                weight *= (places - near[:, j]) / (near[:, i] - near[:, j])
+        total += weight * y[first + i]
     return total
 
 

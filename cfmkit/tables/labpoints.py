@@ -1,4 +1,4 @@
-"""Points of a measured outline from a lab file: columns x and y with units, and perhaps a side."""
+"""Points of a measured outline or profile from a lab file: columns x and y with units, and perhaps a side."""
 
 from __future__ import annotations
 
@@ -38,6 +38,40 @@ def read_sides(path: Path) -> tuple[FloatArray, FloatArray]:
         If there are no points, no units, or too few on a side.
     """
     name = path.name
+    points, columns, rows = _points(path)
+    if "side" in columns:
+        sides = np.array([_side(cells, int(columns["side"][0]), name, number) for number, cells in rows])
+    else:
+        sides = np.where(points[:, 0] > 0, "right", "left")
+    return _ordered(points, sides == "right", name), _ordered(points, sides == "left", name)
+
+
+def read_profile(path: Path) -> tuple[FloatArray, FloatArray]:
+    """Return a profile, heights over places that increase [m].
+
+    Parameters
+    ----------
+    path : Path
+        Columns ``x [mm]`` and ``y [mm]``, in any unit of length.
+
+    Raises
+    ------
+    cfmkit.errors.DataError
+        If there are no units, fewer than two points, or places that do not increase.
+    """
+    points, _, rows = _points(path)
+    back = np.flatnonzero(np.diff(points[:, 0]) <= 0)
+    if len(points) < 2:
+        raise DataError(f"{path.name}: a profile needs at least two points")
+    if len(back):
+        line = rows[int(back[0]) + 1][0] + 1
+        raise DataError(f"{path.name}: line {line}: x must increase from point to point; sort the file or split it")
+    return points[:, 0], points[:, 1]
+
+
+def _points(path: Path) -> tuple[FloatArray, dict[str, tuple[int, float]], list[tuple[int, list[str]]]]:
+    """Return the points of a file [m], its columns, and the line number and cells of each point."""
+    name = path.name
     try:
         text, _ = decoded(path.read_bytes(), name)
     except OSError as error:
@@ -50,11 +84,7 @@ def read_sides(path: Path) -> tuple[FloatArray, FloatArray]:
     points = np.array(
         [[_coordinate(cells, columns[axis], block, name, number) for axis in "xy"] for number, cells in rows]
     )
-    if "side" in columns:
-        sides = np.array([_side(cells, int(columns["side"][0]), name, number) for number, cells in rows])
-    else:
-        sides = np.where(points[:, 0] > 0, "right", "left")
-    return _ordered(points, sides == "right", name), _ordered(points, sides == "left", name)
+    return points, columns, rows
 
 
 def _columns(lines: list[str], block: Block, name: str) -> dict[str, tuple[int, float]]:

@@ -7,6 +7,7 @@ from cfmkit.families.beam.build import resolve
 from cfmkit.families.beam.findings import FINDINGS
 from cfmkit.families.beam.model import analyze
 from cfmkit.families.beam.spec import BeamSpec
+from cfmkit.families.beam.surface.ride import DEFINITIONS as SURFACE
 from cfmkit.families.beam.values import DEFINITIONS
 
 FAMILY = Family(
@@ -14,7 +15,7 @@ FAMILY = Family(
     summary="a planar network of slender beams in large deflection",
     spec_type=BeamSpec,
     analyze=analyze,
-    values=DEFINITIONS,
+    values=DEFINITIONS | SURFACE,
     resolve=resolve,
     headline=(
         "nominal_force",

@@ -42,7 +42,9 @@ def _closure(solution: Solution) -> Iterator[Finding]:
     fits = {
         name: one
         for name, one in solution.path.fits.items()
-        if getattr(beams[name].shape, "length", None) and one.gap > NEGLIGIBLE * float(np.real(one.length))
+        if name in solution.spec.mechanism.beams
+        and getattr(beams[name].shape, "length", None)
+        and one.gap > NEGLIGIBLE * float(np.real(one.length))
     }
     if not fits:
         return
@@ -84,9 +86,16 @@ def _events(solution: Solution) -> Iterator[Finding]:
         places = [_drive(solution, event.drive) for event in path.events if event.kind == kind]
         if places:
             more = f" and {len(places) - 6} more" if len(places) > 6 else ""
-            branches = ", ".join(dict.fromkeys(path.branch[solution.keep].tolist()))
-            tail = f"; the curve is on {branches}" if kind == "bifurcation" else ""
+            tail = _after(solution) if kind == "bifurcation" else ""
             yield finding(name, f"{kind}{'s' if len(places) > 1 else ''} at {', '.join(places[:6])}{more}{tail}")
+
+
+def _after(solution: Solution) -> str:
+    """Say where the curve goes at a bifurcation."""
+    if (solution.path.branch[solution.keep] == "primary").all():
+        return "; the curve stays on the path it came on"
+    side = "analysis.other_side=" + ("false" if solution.spec.analysis.other_side else "true")
+    return f"; from there the curve follows the stable branch (its mirror image: --set {side})"
 
 
 def _stability(solution: Solution) -> Iterator[Finding]:

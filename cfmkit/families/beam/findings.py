@@ -17,6 +17,9 @@ FINDINGS = {
     "unstable": "a part of the path is not stable: the mechanism would leave it",
     "imperfection": "the beams were bent in the first buckling mode, as asked",
     "stress_exceeded": "the stress exceeds the allowable one within the window",
+    "surface_out_of_reach": "the surface asks for more displacement than the mechanism is solved for",
+    "tip_lifts_off": "the force is not positive somewhere along the surface: the tip leaves it",
+    "tip_jams": "somewhere the surface is too steep for the friction at the tip",
     "thick_beam": "a beam is short for its thickness: beam theory is rough",
     "stretching_matters": "beams that do not stretch are shallow or short: the model without stretching is rough",
 }

@@ -21,6 +21,7 @@ from cfmkit.beams import Path, PathStatus, trace
 from cfmkit.curves import Column, Curve, read_only
 from cfmkit.families.beam.build import Assembly, assemble, resolve
 from cfmkit.families.beam.checks import findings_of
+from cfmkit.families.beam.surface.ride import curve_of, findings_along, ride, values_along
 from cfmkit.families.beam.values import values_of
 from cfmkit.results import Result, Status
 
@@ -132,13 +133,20 @@ def analyze(spec: BeamSpec, run: Run) -> Result:
         message = f"no curve: {path.message or path.status.value}"
         return Result(resolved, Status.NO_EQUILIBRIUM, message, warnings=findings_of(solution))
     status, message = _ending(solution)
+    curves: tuple[Curve, ...] = (_curve(solution),)
+    values, warnings = values_of(solution), findings_of(solution)
+    if (along := ride(solution)) is not None:
+        curves += (curve_of(along),) if len(along.place) > 1 else ()
+        values, warnings = {**values, **values_along(along)}, (*warnings, *findings_along(along))
+        if along.missing and status is Status.COMPLETE:
+            status, message = Status.PARTIAL, along.missing
     return Result(
         spec=resolved,
         status=status,
         message=message,
-        curves=(_curve(solution),),
-        values=values_of(solution),
-        warnings=findings_of(solution),
+        curves=curves,
+        values=values,
+        warnings=warnings,
         target=_target(spec),
         reference=None if spec.analysis.reference is None else float(spec.analysis.reference),
         allowable_stress=assembly.allowable_stress,
@@ -171,6 +179,7 @@ def _curve(solution: Solution) -> Curve:
         "max_stress": Column(solution.stress, "stress"),
         "stress_beam": Column(solution.stress_at[0], "text"),
         "stress_place": Column(solution.stress_at[1], "ratio"),
+        "path": Column(path.branch[keep], "text"),
     }
     for name in path.layout.network.beams:
         x, y, moment = solution.beam_force(name).T
@@ -180,4 +189,4 @@ def _curve(solution: Solution) -> Curve:
             f"{name}_moment": Column(moment, "torque"),
         }
     kind: Kind = "torque" if solution.spec.mechanism.drive.kind in ("rotation", "moment") else "force"
-    return Curve(solution.motion, solution.effort, path.branch[keep], solution.stable, extra, kind)
+    return Curve(solution.motion, solution.effort, np.repeat(["load"], len(keep)), solution.stable, extra, kind)

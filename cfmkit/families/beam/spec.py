@@ -22,6 +22,7 @@ from cfmkit.families.beam.parts.spec import (
     checked_thickness,
     known_material,
 )
+from cfmkit.families.beam.surface.spec import Surface
 from cfmkit.spec import Analysis, Displacement, Model, Spec, refuse
 from cfmkit.units import DIMENSIONS, Force, Length, Ratio, Torque
 
@@ -110,6 +111,7 @@ class BeamAnalysis(Analysis):
         "stable", description="where to go at a bifurcation: a stable branch, or straight on"
     )
     other_side: bool = Field(False, description="take the other one of two mirror-image branches")
+    surface: Surface | None = Field(None, description="a surface to follow: adds the contact force along it")
     imperfection: Length = Field(
         0.0, description="bend the unloaded beams by so much in the first buckling mode; 0: perfect"
     )
@@ -161,6 +163,8 @@ def _extent_faults(spec: BeamSpec) -> Iterator[tuple[tuple[str, ...], str]]:
         yield (), f"the key {wanted!r} is missing: how far a drive of kind {kind!r} goes"
     elif value == 0:
         yield (wanted,), "must not be 0: the drive has to do something"
+    if analysis.surface is not None and kind != "displacement":
+        yield ("surface",), "a surface needs a drive of kind 'displacement'"
     dimension = {"displacement": "length", "rotation": "angle"}.get(kind)
     if value is not None and dimension and value.dimension != dimension:
         yield (wanted,), f"must be {DIMENSIONS[dimension].phrase} for a drive of kind {kind!r}"

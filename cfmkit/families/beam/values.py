@@ -26,7 +26,7 @@ DEFINITIONS = {
     "stress_at_end": ("stress", "largest stress at d"),
     "stress_limit_displacement": ("length", "where the stress first reaches the allowable one"),
     "allowable_stress": ("stress", "yield strength over safety factor"),
-    "stress_total_max": ("stress", "largest stress in the window with the axial part, where the model leaves that out"),
+    "stress_total_max": ("stress", "largest stress in the window with the axial part, at places along each beam"),
     "prestress_force": ("force", "force at rest: not zero where beams are forced into place"),
     "prestress_stress": ("stress", "largest stress at rest"),
     "closure_rotation_max": ("angle", "largest angle by which a beam was turned to fit between its nodes"),
@@ -42,6 +42,7 @@ DEFINITIONS = {
     "bifurcation_force": ("force", "first bifurcation under a growing force"),
     "bifurcation_displacement": ("length", "first bifurcation under a growing displacement"),
     "error_estimate": ("ratio", "estimated error of forces and positions, relative to the largest of the path"),
+    "travel_end": ("length", "displacement of the driven node at the end of the path"),
     "strain_energy_max": ("energy", "largest strain energy on the path, of all copies"),
 }
 
@@ -51,11 +52,13 @@ def values_of(solution: Solution) -> Mapping[str, Quantity]:
     numbers: dict[str, float | None] = dict.fromkeys(DEFINITIONS) | {
         "allowable_stress": solution.assembly.allowable_stress,
         "error_estimate": solution.path.error,
+        "travel_end": ("length", "displacement of the driven node at the end of the path"),
         "strain_energy_max": float(solution.path.energy.max()) * solution.assembly.parallel,
         **_closure(solution),
         **_rest(solution),
     }
     if solution.spec.mechanism.drive.kind in ("displacement", "force"):
+        numbers["travel_end"] = float(solution.motion[-1])
         numbers |= _ranges(solution) | _extremes(solution) | _events(solution)
     return {name: Quantity(value, *DEFINITIONS[name]) for name, value in numbers.items()}
 
@@ -131,7 +134,8 @@ def _closure(solution: Solution) -> dict[str, float | None]:
 
 def _rest(solution: Solution) -> dict[str, float | None]:
     """Return what happens at rest, and the stress with all its parts."""
-    total = solution.path.peak_stress(axial=True).value[solution.keep]
+    path, keep = solution.path, solution.keep
+    total = np.max([path.sections(name).stress()[keep].max(axis=1) for name in path.layout.network.beams], axis=0)
     lo, hi = window_of(solution)
     inside = (solution.motion >= lo) & (solution.motion <= hi) & solution.accurate
     return {

@@ -1,0 +1,76 @@
+"""Formulas of one variable x as text, read by a closed grammar: numbers, x, pi, + - * / **, a few functions."""
+
+from __future__ import annotations
+
+import ast
+import operator
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from cfmkit.curves import FloatArray
+
+LONGEST = 500
+_TWO = {
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.Div: operator.truediv,
+    ast.Pow: operator.pow,
+}
+_ONE = {ast.UAdd: operator.pos, ast.USub: operator.neg}
+_FUNCTIONS = {name: getattr(np, name) for name in ("sin", "cos", "tan", "sqrt", "exp", "abs", "tanh", "log")} | {
+    "min": np.minimum,
+    "max": np.maximum,
+}
+
+
+def formula(text: str) -> Callable[[FloatArray], FloatArray]:
+    """Return the function of x that a text describes.
+
+    Raises
+    ------
+    ValueError
+        With what is wrong, if it is no such formula.
+
+    Examples
+    --------
+    >>> formula("1.5*(1 - cos(pi*x/12))")(np.array([0.0, 12.0])).tolist()
+    [0.0, 3.0]
+    """
+    if len(text) > LONGEST:
+        raise ValueError(f"a formula has at most {LONGEST} characters")
+    try:
+        tree = ast.parse(text.strip(), mode="eval").body
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        raise ValueError(f"{text!r} is no formula; write e.g. '1.5*(1 - cos(pi*x/12))'") from None
+    _value(tree, np.ones(1))
+
+    def function(x: FloatArray) -> FloatArray:
+        with np.errstate(all="ignore"):
+            return np.broadcast_to(np.asarray(_value(tree, x), dtype=float), np.shape(x)).copy()
+
+    return function
+
+
+def _value(node: ast.expr, x: FloatArray) -> Any:
+    if isinstance(node, ast.Constant) and type(node.value) in (int, float):
+        return float(node.value)
+    if isinstance(node, ast.Name) and node.id in ("x", "pi"):
+        return x if node.id == "x" else np.pi
+    if isinstance(node, ast.BinOp) and type(node.op) in _TWO:
+        with np.errstate(all="ignore"):
+            return np.asarray(_TWO[type(node.op)](np.asarray(_value(node.left, x)), _value(node.right, x)))
+    if isinstance(node, ast.UnaryOp) and type(node.op) in _ONE:
+        return _ONE[type(node.op)](_value(node.operand, x))
+    if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in _FUNCTIONS:
+        wanted = 2 if node.func.id in ("min", "max") else 1
+        if len(node.args) != wanted or node.keywords:
+            raise ValueError(f"{node.func.id}() takes {wanted} value{'s' if wanted > 1 else ''}")
+        with np.errstate(all="ignore"):
+            return _FUNCTIONS[node.func.id](*(_value(one, x) for one in node.args))
+    told = ast.unparse(node)
+    raise ValueError(f"{told!r} means nothing here; there are numbers, x, pi, + - * / ** and {', '.join(_FUNCTIONS)}")
