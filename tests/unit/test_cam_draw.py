@@ -29,6 +29,7 @@ VARIANTS = {
     "long springs": ["mechanism.rest_half_width=70 mm", *PART],
     "short springs": ["mechanism.rest_half_width=67.5 mm", *PART],
     "other roller": ["mechanism.roller_radius=17 mm", "mechanism.profile.offset=0.3 mm", *PART],
+    "material missing": ["mechanism.profile.offset=-1 mm"],
     "ends early": ["analysis.travel=300 mm"],
     "flat": [
         "mechanism.profile.force_constant=60 mm",
@@ -71,6 +72,25 @@ def exact_flank(solution):
     u = profile.start + (profile.end - profile.start) * np.linspace(0.0, 1.0, 4001) ** 2
     offset = solution.assembly.spec.mechanism.profile.offset - profile.roller_radius
     return np.column_stack(profile.shifted(u, offset))
+
+
+def test_with_material_missing_the_pictures_show_the_corner_and_the_plate_as_cut():
+    """The flank is the line 17 mm from the path without what lies nearer to any of its points."""
+    result = solved("material missing")
+    solution, path = result.state, result.state.assembly.profile.path
+    u = np.linspace(0.068, 0.08, 2001)
+    line = np.column_stack(solution.assembly.profile.shifted(u, -0.017))
+    centers = np.column_stack([u, path.height(u)])
+    nearest = np.array([np.hypot(*(centers - point).T).min() for point in line])
+    first = line[np.argmax(nearest > 0.017 - 1e-9)]
+    np.testing.assert_allclose(surface(solution)[0], first, atol=1e-5)
+    np.testing.assert_allclose(surface(solution)[0], swallowtail(solution)[-1], atol=1e-12)
+    plate = scene(solution).plate[0]
+    assert np.hypot(*(plate - first).T).min() < 1e-5
+    _, named = drawn(result)  # the roller stands on the corner
+    center, touch = np.array(named["roller-right"].center) / 1e3, named["contact-right"].get_xydata()[0] / 1e3
+    np.testing.assert_allclose(touch, first, atol=1e-5)
+    assert np.hypot(*(touch - center)) == pytest.approx(0.016, abs=1e-9)
 
 
 GEOMETRY = ["published", "no undercut", "long springs", "other roller", "brace too short"]

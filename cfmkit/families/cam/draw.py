@@ -268,7 +268,7 @@ def _roller_on_corner(solution: Solution, ax: Axes, view: Scene) -> None:
 
 def _cut_away(solution: Solution, ax: Axes, view: Scene) -> None:
     """Draw the part of the flank that the roller, at the start, cuts away."""
-    tail, profile = swallowtail(solution), solution.assembly.profile
+    tail, profile = swallowtail(solution), solution.assembly.track.profile
     corner = _cam_with_corner(solution, ax, view)
     rim = parts.ring((profile.path.law.rest_half_width, 0.0), profile.roller_radius, 8000)
     parts.edge(ax, tail, "cut-away", color=TROUBLE, linestyle="--", linewidth=1.0, zorder=3)
@@ -287,7 +287,7 @@ def _cut_away(solution: Solution, ax: Axes, view: Scene) -> None:
 
 def _cam_with_corner(solution: Solution, ax: Axes, view: Scene) -> FloatArray:
     """Draw the cam and mark its corner; return the corner as an array of one point [m]."""
-    profile = solution.assembly.profile
+    profile = solution.assembly.track.profile
     assert profile.corner is not None
     share = np.linspace(0.0, 1.0, 2000)
     flank = np.column_stack(profile.flank(profile.start + (profile.end - profile.start) * share**2))

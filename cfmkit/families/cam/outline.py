@@ -38,14 +38,15 @@ def drawing(spec: CamSpec) -> Drawing:
     profile, plate = assembly.profile, assembly.spec.mechanism.plate
     if crossing := flanks_crossing(profile):
         raise CannotBuild(crossing.name, crossing.message)
-    flank, path = flank_edge(profile), path_edge(profile)
-    contours = (
-        plate_contour(flank, plate, profile),
-        *holes(flank, plate, profile),
-        Contour((path,), "path"),
-        Contour((path.mirrored(),), "path"),
-    )
-    return Drawing("cam", contours, tuple(_tables(profile)))
+    path = path_edge(profile)
+    paths = Contour((path,), "path"), Contour((path.mirrored(),), "path")
+    return Drawing("cam", (*plate_contours(profile, plate), *paths), tuple(_tables(profile)))
+
+
+def plate_contours(profile: CamProfile, plate: Plate) -> tuple[Contour, ...]:
+    """Return the outline of the plate with a flank, and its holes."""
+    flank = flank_edge(profile)
+    return plate_contour(flank, plate, profile), *holes(flank, plate, profile)
 
 
 def _coordinates(profile: CamProfile, start: float) -> FloatArray:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.curves import Curve
-from cfmkit.families.cam.outline import drawing
+from cfmkit.families.cam.outline import plate_contours
 from cfmkit.families.cam.statics import forces
 from cfmkit.geometry import polygons
 from cfmkit.units import format_short
@@ -56,7 +56,7 @@ def pose(solution: Solution, index: int) -> Pose:
 
 
 def _contact(solution: Solution, index: int) -> Point:
-    states, profile = solution.states, solution.assembly.profile
+    states, profile = solution.states, solution.assembly.track.profile
     center = np.array([states.x[index], states.y[index]])
     if states.on_corner[index] and profile.corner:
         toward = center - np.array(profile.corner.point)
@@ -69,8 +69,8 @@ def _contact(solution: Solution, index: int) -> Point:
 
 def surface(solution: Solution, points: int = 400) -> FloatArray:
     """Return the right flank as the roller finds it, material left on it included, (n, 2) [m]."""
-    profile = solution.assembly.profile
-    offset = solution.assembly.spec.mechanism.profile.offset - profile.roller_radius
+    profile = solution.assembly.track.profile  # with material missing: the flank cut for a larger roller
+    offset = max(solution.assembly.spec.mechanism.profile.offset, 0.0) - profile.roller_radius
     share = np.linspace(0.0, 1.0, points)
     u = profile.start + (profile.end - profile.start) * share**2
     return np.column_stack(profile.shifted(u, offset))
@@ -93,8 +93,9 @@ class Scene:
 
 def scene(solution: Solution) -> Scene:
     """Return the parts that do not move, and what the mechanism sweeps over the whole solution."""
-    plate = polygons(drawing(solution.assembly.spec).contours, "cut")
-    path, radius = roller_path(solution), solution.assembly.spec.mechanism.roller_radius
+    assembly = solution.assembly
+    plate = polygons(plate_contours(assembly.track.profile, assembly.spec.mechanism.plate), "cut")
+    path, radius = roller_path(solution), assembly.spec.mechanism.roller_radius
     outline = np.concatenate(plate)
     across = max(float(path[:, 0].max()) + radius, float(outline[:, 0].max()))
     bottom = min(float(path[:, 1].min()) - radius, float(outline[:, 1].min()))
@@ -107,7 +108,7 @@ def scene(solution: Solution) -> Scene:
 
 def swallowtail(solution: Solution, points: int = 200) -> FloatArray:
     """Return the part of the shifted path that undercut removes, from the path's start to the corner, (n, 2) [m]."""
-    profile = solution.assembly.profile
+    profile = solution.assembly.track.profile
     u = np.linspace(profile.path.law.rest_half_width, profile.start, points)
     return np.column_stack(profile.flank(u))
 
