@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from cfmkit.families.base import Family
 from cfmkit.families.beam.build import resolve
+from cfmkit.families.beam.design import design
 from cfmkit.families.beam.findings import FINDINGS
 from cfmkit.families.beam.model import analyze
 from cfmkit.families.beam.spec import BeamSpec
@@ -15,6 +16,7 @@ FAMILY = Family(
     summary="a planar network of slender beams in large deflection",
     spec_type=BeamSpec,
     analyze=analyze,
+    design=design,
     values=DEFINITIONS | SURFACE,
     resolve=resolve,
     headline=(

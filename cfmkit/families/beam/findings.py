@@ -17,6 +17,8 @@ FINDINGS = {
     "unstable": "a part of the path is not stable: the mechanism would leave it",
     "imperfection": "the beams were bent in the first buckling mode, as asked",
     "stress_exceeded": "the stress exceeds the allowable one within the window",
+    "rescale_approximate": "the rule by which forces are scaled is exact only for beams that do not stretch",
+    "rescale_stress": "after scaling, the stress reaches the allowable one within the window",
     "surface_out_of_reach": "the surface asks for more displacement than the mechanism is solved for",
     "tip_lifts_off": "the force is not positive somewhere along the surface: the tip leaves it",
     "tip_jams": "somewhere the surface is too steep for the friction at the tip",

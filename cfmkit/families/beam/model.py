@@ -32,6 +32,8 @@ if TYPE_CHECKING:
     from cfmkit.families.base import Run
     from cfmkit.families.beam.spec import BeamSpec
 
+_NOTHING = 1e-15
+
 
 @dataclass(frozen=True, eq=False)
 class Solution:
@@ -66,7 +68,8 @@ class Solution:
         if kind == "moment":
             return read_only(moved[:, 2])
         angle = self.assembly.direction
-        return read_only(moved[:, 0] * np.cos(angle) + moved[:, 1] * np.sin(angle))
+        along = moved[:, 0] * np.cos(angle) + moved[:, 1] * np.sin(angle)
+        return read_only(np.where(np.abs(along) > _NOTHING * np.abs(along).max(), along, 0.0))
 
     @cached_property
     def effort(self) -> FloatArray:
@@ -125,12 +128,9 @@ def analyze(spec: BeamSpec, run: Run) -> Result:
     Result
         PARTIAL if the path ends before what was asked, NO_EQUILIBRIUM if there is none under the constant loads.
     """
-    assembly = assemble(spec)
-    path = trace(assembly.network, assembly.drive(), assembly.control())
-    solution = Solution(assembly, path, _kept(spec, path))
-    resolved = resolve(spec)
+    solution, resolved = solve(spec), resolve(spec)
     if len(solution.keep) < 2:
-        message = f"no curve: {path.message or path.status.value}"
+        message = f"no curve: {solution.path.message or solution.path.status.value}"
         return Result(resolved, Status.NO_EQUILIBRIUM, message, warnings=findings_of(solution))
     status, message = _ending(solution)
     curves: tuple[Curve, ...] = (_curve(solution),)
@@ -149,9 +149,16 @@ def analyze(spec: BeamSpec, run: Run) -> Result:
         warnings=warnings,
         target=_target(spec),
         reference=None if spec.analysis.reference is None else float(spec.analysis.reference),
-        allowable_stress=assembly.allowable_stress,
+        allowable_stress=solution.assembly.allowable_stress,
         state=solution,
     )
+
+
+def solve(spec: BeamSpec) -> Solution:
+    """Return the path of a mechanism as its specification asks for it."""
+    assembly = assemble(spec)
+    path = trace(assembly.network, assembly.drive(), assembly.control())
+    return Solution(assembly, path, _kept(spec, path))
 
 
 def _kept(spec: BeamSpec, path: Path) -> Any:

@@ -73,14 +73,30 @@ class Mechanism(Model):
 
 
 class Rescale(Model):
-    """Another size, section or material for the same force curve, by Eq. 6 of Lan."""
+    """Another size, section or material for a force curve of the same form, by Eq. 6 of Lan."""
 
-    force: Annotated[Force, Field(gt=0)] | None = Field(None, description="force wanted at the end of the window")
-    size: Annotated[Ratio, Field(gt=0)] | None = Field(None, description="factor on all lengths in the plane")
-    material: str | MaterialValues | None = Field(None, description="another material")
-    thickness: PositiveLength | None = Field(None, description="another thickness in the plane")
-    width: PositiveLength | None = Field(None, description="another width out of the plane")
+    force: Annotated[Force, Field(gt=0)] | None = Field(
+        None, description="force wanted at the end of the window; default: what the changes give"
+    )
     free: Literal["width", "thickness", "size"] = Field("width", description="what follows from the force wanted")
+    size: PositiveLength | None = Field(None, description="distance of the outermost nodes along x (L_x of Lan)")
+    material: str | MaterialValues | None = Field(None, description="another material")
+    thickness: PositiveLength | None = Field(None, description="another (largest) thickness in the plane")
+    width: PositiveLength | None = Field(None, description="another width out of the plane")
+    to_allowable_stress: bool = Field(
+        False, description="let travel and window end where the stress reaches the allowable one, and start at c"
+    )
+
+    @field_validator("material")
+    @classmethod
+    def _known(cls, value: str | MaterialValues | None) -> str | MaterialValues | None:
+        return None if value is None else known_material(value)
+
+    @model_validator(mode="after")
+    def _free_is_not_given(self) -> Self:
+        if self.force is not None and getattr(self, self.free) is not None:
+            raise ValueError(f"{self.free!r} is given and cannot follow from the force: change 'free'")
+        return self
 
 
 class BeamDesign(Model):
@@ -130,6 +146,11 @@ class BeamSpec(Spec):
         refuse("BeamSpec", {("analysis", *place): message for place, message in _extent_faults(self)})
         return self
 
+    @model_validator(mode="after")
+    def _can_be_rescaled(self) -> Self:
+        refuse("BeamSpec", {("design", "rescale", *place): message for place, message in _rescale_faults(self)})
+        return self
+
     @property
     def fidelity(self) -> Fidelity:
         """The model that the analysis uses."""
@@ -168,3 +189,17 @@ def _extent_faults(spec: BeamSpec) -> Iterator[tuple[tuple[str, ...], str]]:
     dimension = {"displacement": "length", "rotation": "angle"}.get(kind)
     if value is not None and dimension and value.dimension != dimension:
         yield (wanted,), f"must be {DIMENSIONS[dimension].phrase} for a drive of kind {kind!r}"
+
+
+def _rescale_faults(spec: BeamSpec) -> Iterator[tuple[tuple[str, ...], str]]:
+    """Yield why Eq. 6 does not hold for a mechanism."""
+    if spec.design is None or spec.design.rescale is None:
+        return
+    mechanism = spec.mechanism
+    if mechanism.drive.kind != "displacement":
+        yield (), "needs a drive of kind 'displacement': the force at the end of its window is what is scaled"
+    moved = any(node.moved is not None for node in mechanism.nodes.values())
+    if mechanism.springs or mechanism.loads or moved or spec.analysis.imperfection:
+        yield (), "Eq. 6 is about beams alone: springs, loads, moved supports and imperfections do not scale with them"
+    if len({beam.material for beam in mechanism.beams.values()}) > 1:
+        yield (), "Eq. 6 is about beams of one material"

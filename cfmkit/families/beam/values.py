@@ -59,7 +59,9 @@ def values_of(solution: Solution) -> Mapping[str, Quantity]:
     }
     if solution.spec.mechanism.drive.kind in ("displacement", "force"):
         numbers["travel_end"] = float(solution.motion[-1])
-        numbers |= _ranges(solution) | _extremes(solution) | _events(solution)
+        numbers |= _extremes(solution) | _events(solution)
+    if solution.spec.mechanism.drive.kind == "displacement":
+        numbers |= ranges(solution)
     return {name: Quantity(value, *DEFINITIONS[name]) for name, value in numbers.items()}
 
 
@@ -71,7 +73,7 @@ def window_of(solution: Solution) -> tuple[float, float]:
     return float(solution.motion.min()), float(solution.motion.max())
 
 
-def _ranges(solution: Solution) -> dict[str, float | None]:
+def ranges(solution: Solution) -> dict[str, float | None]:
     """Return what Lan says about the range that ends at d; nothing on a curve that turns back."""
     x, force, stress = solution.motion, solution.effort, solution.stress
     end = window_of(solution)[1]
