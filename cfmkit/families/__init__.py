@@ -15,6 +15,7 @@ FAMILIES = {
     "beam": "cfmkit.families.beam",
     "cam": "cfmkit.families.cam",
     "slider-crank": "cfmkit.families.slider_crank",
+    "vcfm": "cfmkit.families.vcfm",
 }
 
 

@@ -1,0 +1,33 @@
+"""Mechanisms of snap-through leaves and a preloaded spring [Ding, Li and Li 2022]."""
+
+from __future__ import annotations
+
+from cfmkit.families.base import Family
+from cfmkit.families.vcfm.findings import FINDINGS
+from cfmkit.families.vcfm.model import analyze
+from cfmkit.families.vcfm.spec import VcfmSpec
+from cfmkit.families.vcfm.values import DEFINITIONS
+
+FAMILY = Family(
+    name="vcfm",
+    summary="V-beams that snap through beside a diamond spring, adjustable by the spring's preload",
+    spec_type=VcfmSpec,
+    analyze=analyze,
+    values=DEFINITIONS,
+    headline=(
+        "constant_force",
+        "positive_stiffness",
+        "negative_stiffness",
+        "window_length",
+        "force_per_preload",
+        "rest_shift_max",
+        "spring_stress_max",
+        "bistable_stress_max",
+    ),
+    template="vcfm.yaml",
+    findings=FINDINGS,
+    references=(
+        "B. Ding, X. Li, Y. Li, Configuration design and experimental verification of a variable constant-force "
+        "compliant mechanism, Robotica (2022)",
+    ),
+)

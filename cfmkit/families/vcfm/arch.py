@@ -1,0 +1,153 @@
+"""The cosine arch: a leaf made as half a cosine wave, y = h (1 - cos(pi x/X))/2, between the wall and the shuttle.
+
+Shallow-arch theory in closed form. With the axial force P = z 4 E I/S^2 (S the leaf's length), the deflected line is
+that of a beam-column; what it is shortened by gives z, and the force is the constant of its equation, P times the
+slope that rides on the buckling waves. At z = pi^2 the next mode of the constrained arch appears, and from there on the
+force is the straight line P_cr (4 h/3 - d)/X: 64 pi^2 (4/3 - D) for the pair in units of E I h/(2X)^3.
+
+Reference
+---------
+[Q] J. Qiu, J. Lang, A. Slocum, J. Microelectromech. Syst. 13 (2004) 137.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from cfmkit.curves import FloatArray
+    from cfmkit.families.vcfm.strip import Strip
+
+BUCKLED = np.pi**2
+_POLE = 20.190728556426629
+_LOOSE = 1e5  # tension down to z = -1e5: strains beyond anything that bends
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
+_PLACES = np.linspace(-1.0, 1.0, 41)
+
+
+@dataclass(frozen=True)
+class CosineArch:
+    """The law of one half of a cosine arch, of the same wall, shuttle, thickness and width as the straight leaf.
+
+    Bending is scaled so that the load of the constrained mode is P_cr with stretching and shear, and lengths along the
+    arch are developed ones: at 7 deg the negative stiffness is then within 0.6 % of the exact one (2.4 % without).
+    """
+
+    strip: Strip
+
+    @cached_property
+    def developed(self) -> Any:
+        """Length of the leaf as made [m]."""
+        slope = 0.25 * np.pi * self.strip.rise / self.strip.reach
+        return self.strip.reach * (1.0 + slope**2 - 0.75 * slope**4)
+
+    @cached_property
+    def critical_force(self) -> Any:
+        """P_cr of the mode that the guided shuttle leaves [N]."""
+        euler = 4.0 * np.pi**2 * self.strip.bending / self.developed**2
+        return euler * (1.0 + euler / self.strip.axial - euler / self.strip.shear)
+
+    @property
+    def negative_stiffness(self) -> Any:
+        """Size of the negative stiffness of one leaf [N/m]."""
+        return self.critical_force / self.strip.reach
+
+    @property
+    def first_stiffness(self) -> Any:
+        """Stiffness as made [N/m], from the law at a thousandth of the rise."""
+        small = 1e-3 * self.strip.rise
+        return self.force(np.array([small]))[0] / small
+
+    @cached_property
+    def linear(self) -> tuple[Any, Any]:
+        """Where the arch is buckled, from and to [m]; NaN where it never is."""
+        places = np.linspace(0.0, 2.0, 2001) * self.strip.rise
+        above = np.flatnonzero(self._root(places) >= BUCKLED)
+        if not len(above):
+            return np.nan, np.nan
+        return tuple(
+            self._edge(float(places[i]), float(places[j]))
+            for i, j in ((above[0] - 1, above[0]), (above[-1] + 1, above[-1]))
+        )  # type: ignore[return-value]
+
+    def _edge(self, outside: float, inside: float) -> float:
+        """Return where z passes pi^2, by bisection."""
+        for _ in range(40):
+            middle = 0.5 * (outside + inside)
+            if self._root(np.array([middle]))[0] >= BUCKLED:
+                inside = middle
+            else:
+                outside = middle
+        return inside
+
+    def buckled(self, travel: Any) -> Any:
+        """Return whether the arch is buckled."""
+        first, last = self.linear
+        return (travel >= first) & (travel <= last)
+
+    def force(self, travel: Any) -> FloatArray:
+        """Return the force of one leaf along the motion [N], on the stable branch."""
+        travel = np.asarray(travel, dtype=float)
+        line = self.critical_force * (4.0 / 3.0 * self.strip.rise - travel) / self.strip.reach
+        z = self._root(travel)
+        q, _, _, g = self._waves(z, travel)
+        slope = np.real(g * np.cos(q))
+        bent = self.critical_force * z / BUCKLED * slope * self.developed / self.strip.reach
+        return np.asarray(np.where(z >= BUCKLED, line, bent))
+
+    def stress(self, travel: Any) -> FloatArray:
+        """Return the largest stress of the arch, bending and axial [Pa]."""
+        travel = np.asarray(travel, dtype=float)
+        z = self._root(travel)
+        curvature = np.where(z >= BUCKLED, self._buckled_curvature(travel), self._bent_curvature(z, travel))
+        axial = np.abs(self.critical_force * np.minimum(z, BUCKLED) / BUCKLED) / self.strip.area
+        return np.asarray(0.5 * self.strip.youngs_modulus * self.strip.thickness * curvature + axial)
+
+    def _waves(self, z: FloatArray, travel: FloatArray) -> tuple[Any, Any, Any, Any]:
+        """Return q, k, the amplitude c of the shape's own wave and that of the other, g; complex in tension."""
+        q = np.sqrt(np.asarray(z, dtype=complex))
+        q = np.where(np.abs(q - 0.5 * np.pi) < 1e-6, 0.5 * np.pi + 1e-6, np.where(np.abs(q) < 1e-4, 1e-4, q))
+        k = 2.0 * q / self.developed
+        c = 0.5 * self.strip.rise * np.pi**2 / (4.0 * q * q - np.pi**2)
+        g = 0.5 * k * (self.strip.rise - travel + 2.0 * c) / (q * np.cos(q) - np.sin(q))
+        return q, k, c, g
+
+    def _shortening(self, z: FloatArray, travel: FloatArray) -> FloatArray:
+        """Return how much shorter the arch is than as made, over its length, by Gauss's quadrature."""
+        q, _, c, g = (item[..., None] for item in self._waves(z, travel))
+        own = np.pi / self.developed * np.cos(0.5 * np.pi * _NODES)
+        slope = np.real(-c * own + g * (np.cos(q) - np.cos(q * _NODES)))
+        return np.asarray(0.25 * ((0.5 * self.strip.rise * own) ** 2 - slope**2) @ _WEIGHTS)
+
+    def _root(self, travel: FloatArray) -> FloatArray:
+        """Return z at each travel, by bisection: the shortening falls as the load grows."""
+        low, high = np.full(travel.shape, -_LOOSE), np.full(travel.shape, _POLE * (1 - 1e-12))
+        stretch = self.critical_force / (BUCKLED * self.strip.axial)
+        for _ in range(56):
+            z = 0.5 * (low + high)
+            with np.errstate(all="ignore"):
+                over = stretch * z > self._shortening(z, travel)
+            low, high = np.where(over, low, z), np.where(over, z, high)
+        return np.asarray(0.5 * (low + high))
+
+    def _bent_curvature(self, z: FloatArray, travel: FloatArray) -> FloatArray:
+        q, k, c, g = (item[..., None] for item in self._waves(np.minimum(z, _POLE - 0.1), travel))
+        wave = (np.pi / self.developed) ** 2 * np.cos(0.5 * np.pi * (1.0 + _PLACES))
+        bend = np.real(-(c + 0.5 * self.strip.rise) * wave + g * k * np.sin(q * _PLACES))
+        return np.asarray(np.abs(bend).max(axis=-1))
+
+    def _buckled_curvature(self, travel: FloatArray) -> FloatArray:
+        length, rise = self.developed, self.strip.rise
+        a, c = np.pi / length, rise / 6.0
+        slope = (4.0 / 3.0 * rise - travel) / length
+        spent = 0.125 * (a * rise) ** 2 - 2.0 * self.critical_force / self.strip.axial
+        amplitude = 2.0 * (spent - 0.5 * (a * c) ** 2 - 1.5 * slope**2 + 16.0 / 3.0 * c * slope / length)
+        phase = np.pi * (1.0 + _PLACES)
+        free = np.sqrt(np.maximum(amplitude, 0.0))[..., None] * np.cos(phase)
+        bend = -(c + 0.5 * rise) * a * a * np.cos(0.5 * phase) + 2.0 * a * (slope[..., None] * np.sin(phase) - free)
+        other = bend + 4.0 * a * free
+        return np.asarray(np.maximum(np.abs(bend).max(axis=-1), np.abs(other).max(axis=-1)))

@@ -1,0 +1,232 @@
+"""What is wrong with a solved mechanism: each failure mode, found and put into numbers."""
+
+from __future__ import annotations
+
+from math import degrees, radians
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.families.vcfm.findings import finding, mm, mpa, newton, percent, rate
+from cfmkit.families.vcfm.preload import measured_stiffness_for
+from cfmkit.families.vcfm.vbeam import (
+    BISTABLE_ABOVE,
+    FLAT_BUCKLED_ABOVE,
+    LINEAR_ABOVE,
+    NEGATIVE_ABOVE,
+    RELIABLE,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from cfmkit.families.vcfm.model import Push, Solution
+    from cfmkit.results import Finding
+
+STEEP = radians(15)
+"""Angle of the leaves beyond which the closed forms are off by more than a few percent."""
+
+WAVY = 0.02
+"""Waviness over thickness from which on the flatness suffers."""
+
+TURNING = 20.1907 / (4.0 * np.pi**2)
+"""Load at which a leaf buckles whose shuttle can turn, over that with a shuttle that cannot."""
+
+ROUNDING = 1e-9
+
+CLOSED_FORM = 0.005
+"""By so much the closed forms overrate the stress of flat leaves: a stress that is higher by less is none."""
+
+
+def findings_of(solution: Solution) -> tuple[Finding, ...]:
+    """Return every finding about a solved mechanism, the gravest first."""
+    checks = (_measured, _truss, _leaf_shape, _flatness, _returns, _preloads, _yield, _buckling, _imperfect, _range)
+    return tuple(found for check in checks for found in check(solution))
+
+
+def _leaf_shape(solution: Solution) -> Iterator[Finding]:
+    if solution.spec.mechanism.bistable.structure != "v-beam" or solution.spec.analysis.fidelity == "truss":
+        return
+    q = float(solution.parts.strip.slenderness)
+    told = f"rise over thickness is {q:.4g}"
+    if q < NEGATIVE_ABOVE:
+        yield finding(
+            "no_negative_stiffness",
+            f"{told}, below {NEGATIVE_ABOVE}: the force of the leaves only rises, nothing cancels the spring; "
+            "use thinner or steeper leaves",
+        )
+    elif q <= LINEAR_ABOVE:
+        yield finding(
+            "no_linear_region",
+            f"{told}, not above pi: the leaves do not buckle and their force is a curve; the constant-force window is "
+            "its top only. Use thinner or steeper leaves",
+        )
+
+
+def _flatness(solution: Solution) -> Iterator[Finding]:
+    push, (low, high) = solution.nominal, solution.window
+    force = push.inside((low, high))
+    if not len(force) or force.max() <= 0:
+        return
+    ripple, allowed = float((force.max() - force.min()) / force.max()), solution.spec.analysis.flatness
+    if ripple > allowed:
+        one = solution.character
+        yield finding(
+            "not_flat",
+            f"K_p = {rate(one.positive_stiffness)} and K_n = {rate(one.negative_stiffness)} do not cancel: over "
+            f"{mm(low)} ... {mm(high)} the force varies by {percent(ripple)} of its maximum, {percent(allowed)} is "
+            f"allowed; make one of the two structures {percent(abs(one.positive_stiffness / max(one.negative_stiffness, 1e-30) - 1))} "  # noqa: E501
+            "stiffer or softer by its width",
+        )
+
+
+def _returns(solution: Solution) -> Iterator[Finding]:
+    push, (low, high) = solution.nominal, solution.window
+    moving = push.travel > max(push.rest or 0.0, 0.0) + 1e-3 * solution.parts.strip.rise
+    least = int(np.argmin(np.where(moving, push.force, np.inf)))
+    force, place = float(push.force[least]), float(push.travel[least])
+    q = float(solution.parts.strip.slenderness)
+    if solution.spec.mechanism.bistable.structure == "v-beam" and q > BISTABLE_ABOVE:
+        back = (
+            f"its force stays above {newton(force)} (at {mm(place)}), so the mechanism returns by itself"
+            if force > 0
+            else f"its force falls to {newton(force)} at {mm(place)}: the mechanism stays there until it is pulled back"
+        )
+        yield finding("bistable", f"without the spring the leaves snap to a second stable pose; with it {back}")
+    inside = push.inside((low, high))
+    if len(inside) and inside.min() <= 0:
+        yield finding(
+            "force_reversal",
+            f"within {mm(low)} ... {mm(high)} the force falls to {newton(float(inside.min()))}: no outward force is "
+            f"left; a preload above {mm(-solution.parts.balance)} and K_p >= K_n keep it positive",
+        )
+    yield from _overload(solution, push)
+
+
+def _overload(solution: Solution, push: Push) -> Iterator[Finding]:
+    end = solution.character.linear[1]
+    if np.isfinite(end) and push.travel[-1] > end * (1 + 1e-9):
+        at_end, last = float(np.interp(end, push.travel, push.force)), float(push.force[-1])
+        yield finding(
+            "overload",
+            f"beyond {mm(end)} the leaves straighten and stiffen: the force goes from {newton(at_end)} to "
+            f"{newton(last)} at {mm(float(push.travel[-1]))}; a stop at {mm(end)} keeps to the linear range",
+        )
+
+
+def _preloads(solution: Solution) -> Iterator[Finding]:
+    for push in solution.pushes:
+        if push.preload >= 0:
+            continue
+        inside = push.inside(solution.window)
+        if push.rest is None or not len(inside) or inside.min() <= 0:
+            least = newton(float(inside.min())) if len(inside) else "none"
+            yield finding(
+                "preload_out_of_range",
+                f"with a preload of {mm(push.preload)} no outward force is left in the window (least: {least}): the "
+                f"force there is K_p (h + dr), which vanishes at {mm(-solution.parts.balance)}",
+            )
+            return
+
+
+def _yield(solution: Solution) -> Iterator[Finding]:
+    allowed = solution.spec.mechanism.material.allowable
+    if allowed is None:
+        return
+    slack = 1e-9 if solution.spec.analysis.fidelity == "exact" else CLOSED_FORM
+    for push in solution.pushes:
+        for name, stress in (("spring", push.spring_stress), ("leaves", push.leaves.stress)):
+            over = np.flatnonzero(stress > allowed * (1 + slack))
+            if len(over):
+                first, top = int(over[0]), int(stress.argmax())
+                yield finding(
+                    "yield",
+                    f"in the {name} the stress passes {mpa(allowed)} at {mm(float(push.travel[first]))} with a preload "
+                    f"of {mm(push.preload)} and reaches {mpa(float(stress[top]))} at {mm(float(push.travel[top]))}; "
+                    "use longer or thinner leaves, or less preload",
+                )
+                return
+
+
+def _buckling(solution: Solution) -> Iterator[Finding]:
+    about = solution.spec.mechanism.bistable
+    if not about.guided:
+        hint = "" if solution.spec.analysis.fidelity == "exact" else "; only 'analysis.fidelity: exact' shows it"
+        yield finding(
+            "asymmetric_buckling",
+            f"the shuttle can turn, so the leaves buckle at {percent(TURNING)} of the load and lose their straight "
+            f"line{hint}. Use two Vs at a distance, or a guide",
+            "mechanism.bistable.guided=true",
+        )
+    if about.width < 2.0 * about.thickness:
+        yield finding(
+            "out_of_plane_buckling",
+            f"the leaves are {mm(about.width)} wide and {mm(about.thickness)} thick: below twice the thickness they "
+            "buckle out of the plane; use wider (and longer) leaves",
+        )
+
+
+def _imperfect(solution: Solution) -> Iterator[Finding]:
+    about, exact = solution.spec.mechanism.bistable, solution.spec.analysis.fidelity == "exact"
+    share = about.waviness / about.thickness
+    if share > WAVY or (about.waviness and not exact):
+        told = "counts in" if exact else "is left out here: only 'analysis.fidelity: exact' has"
+        effect = ", which lowers the negative stiffness" if share > WAVY else ""
+        yield finding(
+            "imperfection", f"waviness of {mm(about.waviness)}, {percent(share)} of the thickness, {told} it{effect}"
+        )
+    push = solution.nominal
+    if not push.leaves.stable.all():
+        lost = push.travel[~push.leaves.stable]
+        yield finding(
+            "unstable_branch",
+            f"from {mm(float(lost[0]))} to {mm(float(lost[-1]))} the leaves are in a form that they leave for another: "
+            "analysis.branch: stable follows them",
+            "analysis.branch=stable",
+        )
+
+
+def _range(solution: Solution) -> Iterator[Finding]:
+    if solution.spec.analysis.fidelity != "analytic":
+        return
+    strip = solution.parts.strip
+    angle, reach = float(strip.angle), RELIABLE * float(strip.rise)
+    if angle > STEEP:
+        yield finding(
+            "theory_range",
+            f"leaves at {degrees(angle):.3g} deg: beyond 15 deg the closed forms are for small angles no more; "
+            "verify with 'analysis.fidelity: exact'",
+            "analysis.fidelity=exact",
+        )
+    elif float(solution.nominal.travel[-1]) > reach * (1 + ROUNDING):
+        yield finding(
+            "theory_range",
+            f"the travel goes to {mm(float(solution.nominal.travel[-1]))}, beyond {RELIABLE} times the rise "
+            f"({mm(reach)}): the force there is off by percents; verify with 'analysis.fidelity: exact'",
+            "analysis.fidelity=exact",
+        )
+
+
+def _truss(solution: Solution) -> Iterator[Finding]:
+    if solution.spec.analysis.fidelity == "truss":
+        yield finding(
+            "truss_law",
+            "the paper's laws know no buckling and no clamping: against the exact leaves the peak is 36 % too high at "
+            "twice the travel, the steepest slope 2.8 times too steep, and the sum with a spring never flat",
+            "analysis.fidelity=analytic",
+        )
+
+
+def _measured(solution: Solution) -> Iterator[Finding]:
+    told = solution.spec.analysis.measured
+    if told is None or float(solution.parts.strip.slenderness) < FLAT_BUCKLED_ABOVE:
+        return
+    balance = float(solution.parts.balance)
+    there, needed = told.positive_stiffness * balance, measured_stiffness_for(told.force, balance)
+    if abs(there / told.force - 1.0) > solution.spec.analysis.flatness:
+        yield finding(
+            "measured_contradiction",
+            f"the reported {newton(told.force)} and K_p = {rate(told.positive_stiffness)} contradict each other: at "
+            f"{mm(balance)} the leaves carry nothing, whatever their number, width or modulus, and the force is "
+            f"K_p h = {newton(there)}; {newton(told.force)} needs {rate(needed)}",
+        )

@@ -1,0 +1,166 @@
+"""The leaves as beams in large deflection: bending, stretching and shear, with the branch that they really take.
+
+One half-beam is traced and counted `half_beams` times; a shuttle that can turn needs both leaves of a V. Of the spring
+one leaf or one chain is traced, by symmetry. How that is interpolated, `traced` says.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.families.vcfm.parts import share_of, strip_of
+from cfmkit.families.vcfm.samples import Character, Samples
+from cfmkit.families.vcfm.traced import traced
+
+if TYPE_CHECKING:
+    from cfmkit.beams import Network
+    from cfmkit.curves import FloatArray
+    from cfmkit.families.vcfm.spec import VcfmSpec
+    from cfmkit.families.vcfm.strip import Strip
+
+DOWN = -0.5 * np.pi
+
+
+def section(strip: Strip, thickness: Any = None) -> Any:
+    """Return the engine's section of a leaf."""
+    from cfmkit.beams import Section
+
+    return Section(
+        strip.youngs_modulus,
+        strip.width,
+        strip.thickness if thickness is None else thickness,
+        shear=True,
+        poisson_ratio=strip.poisson_ratio,
+    )
+
+
+def leaf_network(spec: VcfmSpec) -> Network:
+    """Return one leaf between wall and shuttle, or both leaves of a V whose shuttle can turn."""
+    from cfmkit.beams import CLAMPED, STRAIGHT, Beam, CosineArch, Network, Node, Taper, guided
+
+    about = spec.mechanism.bistable
+    strip = strip_of(about, spec.mechanism.material)
+    x, h = strip.reach, strip.rise
+    nodes = {"wall": Node(0, 0, CLAMPED), "shuttle": Node(x, h, guided(0.5 * np.pi, rotates=not about.guided))}
+    thickness, shape, mirrored = strip.thickness, STRAIGHT, STRAIGHT
+    if about.structure == "cosine":
+        shape, mirrored = CosineArch(h, 0.5), CosineArch(-h, 0.5)  # type: ignore[assignment]
+    if about.structure == "hybrid":
+        end, stiff = float(about.flexure_length or 0.0) / strip.length, (about.stiffening or 4.0) * strip.thickness
+        stations = np.array([0.0, end, end, 1.0 - end, 1.0 - end, 1.0])
+        thickness = Taper(stations, np.array([thickness, thickness, stiff, stiff, thickness, thickness]))
+    beams = {"leaf": Beam("wall", "shuttle", section(strip, thickness), shape)}
+    if not about.guided:
+        nodes["far wall"] = Node(2.0 * x, 0, CLAMPED)
+        beams["mirrored leaf"] = Beam("far wall", "shuttle", section(strip, thickness), mirrored)
+    return Network(nodes, beams)
+
+
+@dataclass(frozen=True)
+class Chain:
+    """A part of the spring that is traced: its network, the node that moves, and how it counts.
+
+    `travel` is the node's share of the compression, `count` the number of such parts in parallel.
+    """
+
+    network: Network
+    node: str
+    travel: float
+    count: float
+
+
+def spring_chain(spec: VcfmSpec) -> Chain:
+    """Return what is traced of the spring."""
+    from cfmkit.beams import CLAMPED, Beam, Network, Node, Support, arc, guided
+
+    about = spec.mechanism.positive
+    strip, share = strip_of(about, spec.mechanism.material), share_of(about)
+    made, wall = section(strip), Node(0, 0, CLAMPED)
+    if about.structure == "u-shape":
+        radius = float(about.radius or 0.0)
+        nodes = {
+            "wall": wall,
+            "low": Node(strip.length, 0),
+            "high": Node(strip.length, 2.0 * radius),
+            "end": Node(0, 2.0 * radius, guided(0.5 * np.pi)),
+        }
+        beams = {
+            "lower": Beam("wall", "low", made),
+            "bend": Beam("low", "high", made, arc(np.pi)),
+            "upper": Beam("high", "end", made),
+        }
+        return Chain(Network(nodes, beams), "end", 1.0, 2.0 * share)
+    # the corner of a diamond or the joint of folded beams moves across as it likes; a straight beam is held
+    support = guided(0.5 * np.pi) if about.structure == "straight" else Support(rotation=True)
+    network = Network(
+        {"wall": wall, "end": Node(strip.reach, strip.rise, support)}, {"leaf": Beam("wall", "end", made)}
+    )
+    travel, count = {"diamond": (0.5, 2.0), "folded": (0.5, 4.0), "straight": (1.0, 2.0)}[about.structure]
+    return Chain(network, "end", travel, count * share)
+
+
+class ExactSampler:
+    """Samples of a mechanism's leaves and spring, traced over what an analysis needs.
+
+    Parameters
+    ----------
+    spec : VcfmSpec
+        What is analysed.
+    end : float
+        How far the shuttle goes [m].
+    back : float
+        How far it is pulled back at most, positive [m].
+    """
+
+    def __init__(self, spec: VcfmSpec, end: float, back: float) -> None:
+        """Trace leaf and spring."""
+        about, preloads = spec.mechanism.bistable, spec.analysis.preloads
+        network, back = leaf_network(spec), max(back, 0.02 * end)
+        self.each = about.half_beams * (1.0 if about.guided else 0.5)
+        self.pushed = traced(network, "shuttle", end, branch=spec.analysis.branch, imperfection=about.waviness)
+        self.pulled = traced(network, "shuttle", -back)
+        self.chain = spring_chain(spec)
+        ends = (max(preloads) + end, min(min(preloads) - back, -0.02 * end))
+        self.sides = [traced(self.chain.network, self.chain.node, self.chain.travel * side) for side in ends]
+        problems = [one.problem for one in (self.pushed, self.pulled, *self.sides)]
+        self.problem = next((text for text in problems if text), "")
+
+    def leaves(self, travel: FloatArray) -> Samples:
+        """Return what all leaves do at some travels [m]; NaN beyond what was reached."""
+        ahead, behind = self.pushed.at(np.maximum(travel, 0.0)), self.pulled.at(np.minimum(travel, 0.0))
+        back = travel < 0
+        force, stress, stable, buckled = (np.where(back, one, other) for one, other in zip(behind, ahead, strict=True))
+        return Samples(self.each * force, stress, stable, buckled)
+
+    def spring(self, compression: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return force [N] and largest stress [Pa] of the spring at some compressions [m]."""
+        place = self.chain.travel * np.asarray(compression, dtype=float)
+        pressed, stretched = self.sides[0].at(np.maximum(place, 0.0)), self.sides[1].at(np.minimum(place, 0.0))
+        force, stress = (np.where(place < 0, stretched[k], pressed[k]) for k in (0, 1))
+        return self.chain.count * force, stress
+
+    @cached_property
+    def character(self) -> Character:
+        """Stiffnesses and linear range as traced."""
+        push = self.pushed
+        first, last = (push.edges[1], push.edges[2]) if len(push.edges) > 2 else (np.nan, np.nan)
+        places = np.linspace(first + 0.1 * (last - first), last - 0.1 * (last - first), 41)
+        if np.isfinite(first):
+            steepest = -float(np.polyfit(places, push.at(places)[0], 1)[0])
+        else:
+            places = np.linspace(0.0, push.edges[-1], 801)
+            steepest = max(0.0, -float(np.gradient(push.at(places)[0], places).min()))
+        tiny = 1e-4 * push.edges[-1]
+        first_stiffness = float((push.at(np.array([tiny]))[0] - self.pulled.at(np.array([-tiny]))[0])[0] / (2.0 * tiny))
+        ends = np.array([-tiny, tiny])
+        forces = self.spring(ends)[0]
+        return Character(
+            float((forces[1] - forces[0]) / (2.0 * tiny)),
+            self.each * steepest,
+            self.each * first_stiffness,
+            (first, last),
+        )

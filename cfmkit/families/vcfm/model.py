@@ -1,0 +1,219 @@
+"""Analysis: the force of leaves and spring over the shuttle's travel, for each preload.
+
+F(x) = F_b(x) + F_p(x + dr), x from the as-made pose, dr the preload of the spring's far end. Each curve begins where
+the shuttle rests under its preload: pulled back by it, with the leaves in tension. Where the leaves are flat they
+carry nothing and the spring alone decides: F = K_p (h + dr), whatever their number, width or modulus.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.curves import Column, Curve
+from cfmkit.families.vcfm.checks import findings_of
+from cfmkit.families.vcfm.parts import parts
+from cfmkit.families.vcfm.samples import LawSampler
+from cfmkit.families.vcfm.values import values_of
+from cfmkit.families.vcfm.windows import longest_window
+from cfmkit.results import Result, Status
+
+if TYPE_CHECKING:
+    from cfmkit.curves import FloatArray
+    from cfmkit.families.base import Run
+    from cfmkit.families.vcfm.parts import Parts
+    from cfmkit.families.vcfm.samples import Character, Sampler, Samples
+    from cfmkit.families.vcfm.spec import VcfmSpec
+
+
+@dataclass(frozen=True)
+class Push:
+    """One curve: the mechanism at one preload.
+
+    Attributes
+    ----------
+    preload : float
+        Of the spring's far end [m].
+    travel : (n,) array
+        Of the shuttle from the as-made pose, increasing [m].
+    leaves : Samples
+        All leaves.
+    spring_force, spring_stress : (n,) array
+        Of the spring [N, Pa].
+    rest : float or None
+        Where the shuttle rests [m]; None where nothing holds it short of the end.
+    """
+
+    preload: float
+    travel: FloatArray
+    leaves: Samples
+    spring_force: FloatArray
+    spring_stress: FloatArray
+    rest: float | None
+
+    @cached_property
+    def force(self) -> FloatArray:
+        """Force on the shuttle [N]."""
+        total: FloatArray = np.add(self.leaves.force, self.spring_force)
+        return total
+
+    def window(self, flatness: float) -> tuple[float, float] | None:
+        """Return the longest stretch on which (max - min)/max of the force is within `flatness` [m]; None if none."""
+        first, last = longest_window(self.force[None, :], flatness)
+        if first[0] == last[0]:
+            return None
+        return float(self.travel[first[0]]), float(self.travel[last[0]])
+
+    def inside(self, window: tuple[float, float]) -> FloatArray:
+        """Return the forces at the samples in a window, its interpolated ends included [N]."""
+        low, high = window
+        own = self.force[(self.travel > low) & (self.travel < high)]
+        ends = np.interp([low, high], self.travel, self.force, left=np.nan, right=np.nan)
+        found = np.concatenate([ends[:1], own, ends[1:]])
+        return found[np.isfinite(found)]
+
+
+@dataclass(frozen=True)
+class Solution:
+    """A solved mechanism: its parts, the model used, what characterises it, and one curve a preload."""
+
+    spec: VcfmSpec
+    parts: Parts
+    sampler: Sampler
+    character: Character
+    pushes: tuple[Push, ...]
+
+    @property
+    def nominal(self) -> Push:
+        """The curve of the first preload."""
+        return self.pushes[0]
+
+    @cached_property
+    def windows(self) -> tuple[tuple[float, float] | None, ...]:
+        """Constant-force window of each curve [m]."""
+        return tuple(push.window(self.spec.analysis.flatness) for push in self.pushes)
+
+    @property
+    def window(self) -> tuple[float, float]:
+        """Where forces are compared [m]: the analysis' window, else the linear range, else the longest flat stretch."""
+        if self.spec.analysis.window is not None:
+            ends = self.spec.analysis.window
+            return float(ends[0]), float(ends[1])
+        low, high = self.character.linear
+        if np.isfinite(low) and low < self.spec.travel:
+            return low, min(high, self.spec.travel)
+        return self.windows[0] or (0.0, self.spec.travel)
+
+
+def analyze(spec: VcfmSpec, run: Run) -> Result:
+    """Return the force-displacement curves of a mechanism at its preloads, with everything that is wrong with it.
+
+    Parameters
+    ----------
+    spec : VcfmSpec
+        The mechanism.
+    run : Run
+        Not needed here: nothing is random.
+
+    Returns
+    -------
+    Result
+        One curve a preload, the nominal one first. PARTIAL if a beam cannot be followed to the end of the travel.
+    """
+    solution = solve(spec)
+    short = solution.nominal.travel[-1] < spec.travel * (1 - 1e-9) or bool(solution.sampler.problem)
+    status = Status.PARTIAL if short else Status.COMPLETE
+    if not len(solution.nominal.travel) or np.isnan(solution.nominal.force).all():
+        return Result(spec, Status.NO_EQUILIBRIUM, solution.sampler.problem)
+    return Result(
+        spec=_as_run(spec),
+        status=status,
+        message=solution.sampler.problem if short else "",
+        curves=tuple(_curve(push) for push in solution.pushes),
+        values=values_of(solution),
+        warnings=findings_of(solution),
+        valid=_valid(solution),
+        target=spec.design.force if spec.design else None,
+        allowable_stress=spec.mechanism.material.allowable,
+        state=solution,
+    )
+
+
+def solve(spec: VcfmSpec) -> Solution:
+    """Return the curves at all preloads by the model that the analysis asks for."""
+    made = parts(spec)
+    grid = spec.travel * (np.arange(spec.analysis.points) / (spec.analysis.points - 1.0))
+    sampler: Sampler = LawSampler(made)
+    if spec.analysis.fidelity == "exact":
+        from cfmkit.families.vcfm.exact import ExactSampler
+
+        # the closed form says how far back the shuttle goes; the real one is within a few percent of it
+        rests = [rest_of(sampler, preload, grid) for preload in spec.analysis.preloads]
+        sampler = ExactSampler(spec, spec.travel, 1.2 * max([-(rest or 0.0) for rest in rests] + [0.0]))
+    pushes = tuple(_push(sampler, preload, grid) for preload in spec.analysis.preloads)
+    return Solution(spec, made, sampler, sampler.character, pushes)
+
+
+def rest_of(sampler: Sampler, preload: float, grid: FloatArray) -> float | None:
+    """Return where the shuttle rests at a preload [m]: the first place without force, from the as-made pose on."""
+    if preload == 0:
+        return 0.0
+    if preload > 0:
+        return _bisected(sampler, preload, -preload, 0.0)
+    force = sampler.leaves(grid).force + sampler.spring(grid + preload)[0]
+    beyond = np.flatnonzero(force >= 0)
+    return _bisected(sampler, preload, grid[beyond[0] - 1], grid[beyond[0]]) if len(beyond) else None
+
+
+def _bisected(sampler: Sampler, preload: float, low: float, high: float) -> float:
+    """Return where the force vanishes between a place where it is negative and one where it is not."""
+    for _ in range(52):
+        middle = np.array([0.5 * (low + high)])
+        force = sampler.leaves(middle).force + sampler.spring(middle + preload)[0]
+        low, high = (float(middle[0]), high) if force[0] < 0 else (low, float(middle[0]))
+    return 0.5 * (low + high)
+
+
+def _push(sampler: Sampler, preload: float, grid: FloatArray) -> Push:
+    rest = rest_of(sampler, preload, grid)
+    start = rest or 0.0
+    if start < 0:
+        step = grid[1]
+        back = -step * np.arange(int(-start / step), 0, -1)
+        grid = np.concatenate([back[back > start + 1e-9 * step], grid])
+    travel = np.concatenate([[start], grid[grid > start + 1e-12]])
+    leaves = sampler.leaves(travel)
+    force, stress = sampler.spring(travel + preload)
+    known = np.isfinite(leaves.force + force)
+    if not known.all():
+        travel, force, stress = travel[known], force[known], stress[known]
+        leaves = type(leaves)(leaves.force[known], leaves.stress[known], leaves.stable[known], leaves.buckled[known])
+    return Push(preload, travel, leaves, force, stress, rest)
+
+
+def _as_run(spec: VcfmSpec) -> VcfmSpec:
+    """Return the spec with what the analysis fell back on written out."""
+    analysis = spec.analysis.model_copy(update={"travel": spec.travel})
+    return spec.model_copy(update={"analysis": analysis})
+
+
+def _valid(solution: Solution) -> tuple[tuple[float, float], ...] | None:
+    low, high = solution.character.linear
+    return ((low, min(high, solution.spec.travel)),) if np.isfinite(low) and low < solution.spec.travel else None
+
+
+def _curve(push: Push) -> Curve:
+    leaves = push.leaves
+    extra = {
+        "bistable_force": Column(leaves.force, "force"),
+        "spring_force": Column(push.spring_force, "force"),
+        "bistable_stress": Column(leaves.stress, "stress"),
+        "spring_stress": Column(push.spring_stress, "stress"),
+        "max_stress": Column(np.maximum(leaves.stress, push.spring_stress), "stress"),
+        "leaf_form": Column(np.where(leaves.buckled, "buckled", "bent"), "text"),
+    }
+    branch = np.full(len(push.travel), "load")
+    return Curve(push.travel, push.force, branch, leaves.stable, extra, label={"preload": (push.preload, "length")})

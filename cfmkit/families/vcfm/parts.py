@@ -1,0 +1,110 @@
+"""From a specification to its leaves and their laws."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+from cfmkit.families.vcfm.arch import CosineArch
+from cfmkit.families.vcfm.hybrid import HybridLeaf
+from cfmkit.families.vcfm.springs import Diamond, Straight, UShape, folded
+from cfmkit.families.vcfm.strip import Strip
+from cfmkit.families.vcfm.truss import TrussDiamond, TrussLeaf
+from cfmkit.families.vcfm.vbeam import VBeam
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from cfmkit.families.vcfm.spec import Bistable, Material, Positive, VcfmSpec
+    from cfmkit.families.vcfm.springs import Spring
+
+Leaf = VBeam | CosineArch | HybridLeaf | TrussLeaf
+
+
+@dataclass(frozen=True)
+class Parts:
+    """A mechanism's leaves, their laws and how many there are.
+
+    Attributes
+    ----------
+    leaf : Leaf
+        Law of one half-beam of the snap-through structure.
+    spring : Spring or TrussDiamond
+        Law of the spring, as much of it as is loaded.
+    half_beams : int
+        Leaves that carry the shuttle.
+    """
+
+    leaf: Leaf
+    spring: Spring | TrussDiamond
+    half_beams: int
+
+    @property
+    def strip(self) -> Strip:
+        """One leaf of the snap-through structure."""
+        return self.leaf.strip
+
+    @property
+    def positive_stiffness(self) -> float:
+        """K_p as made [N/m]."""
+        return float(self.spring.stiffness)
+
+    @property
+    def negative_stiffness(self) -> float:
+        """K_n, the size of the negative stiffness of all leaves [N/m]; zero where there is none."""
+        return max(float(self.half_beams * self.leaf.negative_stiffness), 0.0)
+
+    @property
+    def first_stiffness(self) -> float:
+        """K_b1, the stiffness of all leaves as made [N/m]."""
+        return float(self.half_beams * self.leaf.first_stiffness)
+
+    @cached_property
+    def linear(self) -> tuple[float, float]:
+        """Where the negative stiffness is constant, from and to [m]; NaN where it nowhere is."""
+        first, last = self.leaf.linear
+        return float(first), float(last)
+
+    @property
+    def balance(self) -> float:
+        """Travel at which the leaves carry nothing, and the spring alone decides the force [m]."""
+        return float(self.strip.rise) * (4.0 / 3.0 if isinstance(self.leaf, CosineArch) else 1.0)
+
+
+def strip_of(leaf: Positive | Bistable, made_of: Material) -> Strip:
+    """Return a leaf of a specification."""
+    return Strip(leaf.length, leaf.angle, leaf.thickness, leaf.width, made_of.modulus, made_of.poisson)
+
+
+def share_of(positive: Positive) -> float:
+    """Return the loaded part of the spring."""
+    return 0.5 if positive.loaded == "half" else 1.0
+
+
+def parts(spec: VcfmSpec) -> Parts:
+    """Return the leaves of a specification with the laws that its fidelity asks for; those of `exact` are analytic."""
+    mechanism = spec.mechanism
+    positive, bistable = mechanism.positive, mechanism.bistable
+    one, other = strip_of(positive, mechanism.material), strip_of(bistable, mechanism.material)
+    share = share_of(positive)
+    if spec.analysis.fidelity == "truss":
+        return Parts(TrussLeaf(other), TrussDiamond(one, share), bistable.half_beams)
+    return Parts(_LEAVES[bistable.structure](other, bistable), _springs(one, positive, share), bistable.half_beams)
+
+
+def _springs(strip: Strip, positive: Positive, share: float) -> Spring:
+    kinds: dict[str, Callable[[], Spring]] = {
+        "diamond": lambda: Diamond(strip, share),
+        "folded": lambda: folded(strip, share),
+        "straight": lambda: Straight(strip, share),
+        "u-shape": lambda: UShape(strip, positive.radius, share),
+    }
+    return kinds[positive.structure]()
+
+
+_LEAVES: dict[str, Callable[[Strip, Any], Leaf]] = {
+    "v-beam": lambda strip, _about: VBeam(strip),
+    "cosine": lambda strip, _about: CosineArch(strip),
+    "hybrid": lambda strip, about: HybridLeaf(strip, about.flexure_length, about.stiffening or 4.0),
+}

@@ -1,0 +1,233 @@
+"""What a YAML specification of a V-beam and diamond mechanism may say."""
+
+from __future__ import annotations
+
+from math import radians
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, field_validator, model_validator
+
+from cfmkit.materials import material
+from cfmkit.spec import Analysis, Model, Spec
+from cfmkit.units import Angle, Force, Length, Ratio, Stiffness, Stress
+
+PositiveLength = Annotated[Length, Field(gt=0)]
+NonNegativeLength = Annotated[Length, Field(ge=0)]
+LeafAngle = Annotated[Angle, Field(ge=0, le=radians(40))]
+SteepAngle = Annotated[Angle, Field(gt=0, le=radians(40))]
+PositiveStress = Annotated[Stress, Field(gt=0)]
+
+
+class Material(Model):
+    """What the leaves are made of: a name from `show materials`, own values, or a name with some values changed."""
+
+    name: str | None = Field(None, description="a name from `show materials`")
+    youngs_modulus: PositiveStress | None = Field(None, description="E; default: the named material's")
+    poisson_ratio: Annotated[Ratio, Field(ge=0, lt=0.5)] | None = Field(
+        None, description="default: the named material's, else 0.3"
+    )
+    allowable_stress: PositiveStress | None = Field(
+        None, description="stress that must not be passed; default: the named material's yield strength, if known"
+    )
+
+    @field_validator("name")
+    @classmethod
+    def _known(cls, name: str | None) -> str | None:
+        return None if name is None else material(name).name
+
+    @model_validator(mode="after")
+    def _stiff(self) -> Self:
+        if self.name is None and self.youngs_modulus is None:
+            raise ValueError("needs 'name' or 'youngs_modulus'")
+        return self
+
+    @property
+    def modulus(self) -> float:
+        """E [Pa]."""
+        return self.youngs_modulus or material(str(self.name)).youngs_modulus
+
+    @property
+    def poisson(self) -> float:
+        """Poisson's ratio."""
+        if self.poisson_ratio is not None:
+            return self.poisson_ratio
+        return material(self.name).poisson_ratio if self.name else 0.3
+
+    @property
+    def allowable(self) -> float | None:
+        """Stress that must not be passed [Pa]; None where nothing is known."""
+        return self.allowable_stress or (material(self.name).yield_strength if self.name else None)
+
+
+class Positive(Model):
+    """The spring: the structure with a positive stiffness, whose far end the preload moves."""
+
+    structure: Literal["diamond", "folded", "straight", "u-shape"] = Field(
+        "diamond", description="two chains of inclined leaves, eight folded ones, one straight beam, or two U-shapes"
+    )
+    loaded: Literal["whole", "half"] = Field("whole", description="all of the structure, or one side of it only")
+    length: PositiveLength = Field(description="of one flexible leaf, L1")
+    angle: LeafAngle = Field(0.0, description="of the diamond's leaves from the direction across the motion, theta1")
+    thickness: PositiveLength = Field(description="in the plane, t1")
+    width: PositiveLength = Field(description="out of the plane, b1")
+    radius: PositiveLength | None = Field(None, description="of the flexible semicircle of a u-shape")
+
+    @model_validator(mode="after")
+    def _radius_and_angle_fit(self) -> Self:
+        if (self.structure == "u-shape") != (self.radius is not None):
+            raise ValueError("'radius' and 'structure: u-shape' belong together: give both or neither")
+        if self.angle and self.structure != "diamond":
+            raise ValueError(f"the leaves of 'structure: {self.structure}' have no angle; remove 'angle'")
+        return self
+
+
+class Bistable(Model):
+    """The leaves between wall and shuttle that snap through, and so have a negative stiffness."""
+
+    structure: Literal["v-beam", "cosine", "hybrid"] = Field(
+        "v-beam", description="straight inclined leaves, half cosine arches, or flexures with a stiff middle"
+    )
+    half_beams: int = Field(
+        ge=1, le=1000, description="leaves between wall and shuttle, all together: one V has two, two Vs have four"
+    )
+    guided: bool = Field(True, description="whether the shuttle cannot turn: two Vs at a distance, or a guide")
+    length: PositiveLength = Field(description="between the ends of a leaf, L2")
+    angle: SteepAngle = Field(description="of that line from the direction across the motion, theta2")
+    thickness: PositiveLength = Field(description="in the plane, t2")
+    width: PositiveLength = Field(description="out of the plane, b2")
+    flexure_length: PositiveLength | None = Field(None, description="of each of a hybrid leaf's two flexures")
+    stiffening: Annotated[Ratio, Field(ge=1.5, le=100)] | None = Field(
+        None, description="thickness of a hybrid leaf's middle over that of its flexures; default 4"
+    )
+    waviness: NonNegativeLength = Field(
+        0.0, description="how far a leaf as made is off its shape, in the form in which it buckles; exact model only"
+    )
+
+    @model_validator(mode="after")
+    def _flexures_fit(self) -> Self:
+        hybrid = self.structure == "hybrid"
+        if hybrid != (self.flexure_length is not None) or (self.stiffening is not None and not hybrid):
+            raise ValueError("'flexure_length' (and 'stiffening') belong to 'structure: hybrid', which needs the first")
+        if self.flexure_length and 2.0 * self.flexure_length >= self.length:
+            raise ValueError("two flexures of 'flexure_length' must be shorter than 'length'")
+        return self
+
+
+class Frame(Model):
+    """The rigid parts, for the drawings only: they do not bend."""
+
+    shuttle_width: PositiveLength = Field(0.008, description="of the shuttle between the leaves")
+    spacing: PositiveLength = Field(0.020, description="between the two Vs on the shuttle")
+    block: PositiveLength = Field(0.006, description="size of the diamond's rigid corners, and width of the frame")
+    clearance: NonNegativeLength = Field(0.008, description="between the last V and the diamond")
+
+
+class Mechanism(Model):
+    """A shuttle between snap-through leaves and a spring whose other end the preload moves."""
+
+    material: Material
+    positive: Positive
+    bistable: Bistable
+    frame: Frame = Field(default_factory=lambda: Frame(), description="rigid parts, for drawings")
+
+
+class VcfmDesign(Model):
+    """What `cfmkit design` is to reach. Angle and thickness of the spring, and the number of leaves, stay."""
+
+    force: Annotated[Force, Field(gt=0)] = Field(description="constant force without preload")
+    adjustment: Annotated[Force, Field(gt=0)] = Field(description="by how much the preload raises it")
+    stroke: PositiveLength = Field(description="travel over which it is constant")
+    preload: PositiveLength | None = Field(None, description="preload that raises it so far")
+    rise: PositiveLength | None = Field(None, description="of the leaves, h; instead of 'preload'")
+    leaf_length: PositiveLength | None = Field(None, description="L2 to take; default: the shortest within the stress")
+    min_thickness: PositiveLength | None = Field(None, description="thinnest leaf that can be made")
+    max_span: PositiveLength | None = Field(
+        None, description="room across the motion between the walls, 2 L cos(theta)"
+    )
+    max_width: PositiveLength | None = Field(None, description="room out of the plane")
+    refine: bool = Field(True, description="correct both widths by one pass of the exact model")
+
+    @model_validator(mode="after")
+    def _one_length(self) -> Self:
+        if (self.preload is None) == (self.rise is None):
+            raise ValueError(
+                "give either 'preload' or 'rise': one follows from the other, rise = force/adjustment preload"
+            )
+        return self
+
+    @property
+    def height(self) -> float:
+        """Rise of the leaves [m]."""
+        return self.rise or (self.preload or 0.0) * self.force / self.adjustment
+
+    @property
+    def preload_stroke(self) -> float:
+        """Preload for the whole adjustment [m]."""
+        return self.preload or (self.rise or 0.0) * self.adjustment / self.force
+
+
+class Measured(Model):
+    """What is reported of a built mechanism, to be checked against itself."""
+
+    force: Annotated[Force, Field(gt=0)] = Field(description="constant force without preload")
+    positive_stiffness: Annotated[Stiffness, Field(gt=0)] = Field(description="K_p of the spring")
+
+
+class VcfmAnalysis(Analysis):
+    """How the mechanism is run. Displacements are the shuttle's from the as-made pose."""
+
+    preloads: tuple[Length, ...] = Field(
+        (0.0,),
+        min_length=1,
+        max_length=50,
+        description="of the spring's far end, the nominal one first; pull: negative",
+    )
+    travel: PositiveLength | None = Field(None, description="how far the shuttle goes; default: 1.4 times the rise")
+    fidelity: Literal["truss", "analytic", "exact"] = Field(
+        "analytic", description="the paper's eq. 18 and 19, the corrected closed forms, or beams in large deflection"
+    )
+    branch: Literal["stable", "primary"] = Field(
+        "stable", description="where a leaf buckles: leave for the stable form, or stay on the S form; exact model only"
+    )
+    flatness: Annotated[Ratio, Field(gt=0, lt=1)] = Field(
+        0.05, description="(max - min)/max of the force in what counts as the constant-force window"
+    )
+    measured: Measured | None = Field(None, description="reported values to compare with")
+
+    @field_validator("preloads")
+    @classmethod
+    def _lengths(cls, values: tuple[float, ...]) -> tuple[float, ...]:
+        if len(set(values)) < len(values):
+            raise ValueError("lists a preload twice")
+        return values
+
+
+class VcfmSpec(Spec):
+    """A constant-force mechanism of snap-through leaves and a preloaded spring."""
+
+    family: Literal["vcfm"]
+    mechanism: Mechanism
+    design: VcfmDesign | None = Field(None, description="what `cfmkit design` is to reach")
+    analysis: VcfmAnalysis = Field(default_factory=lambda: VcfmAnalysis(), description="how it is run")
+
+    @model_validator(mode="after")
+    def _truss_has_two_laws(self) -> Self:
+        kinds = self.mechanism.positive.structure, self.mechanism.bistable.structure
+        if self.analysis.fidelity == "truss" and kinds != ("diamond", "v-beam"):
+            raise ValueError("the truss laws are for 'diamond' and 'v-beam'; choose another 'analysis.fidelity'")
+        return self
+
+    @model_validator(mode="after")
+    def _design_has_laws(self) -> Self:
+        kinds = self.mechanism.positive.structure, self.mechanism.bistable.structure
+        if self.design is not None and kinds != ("diamond", "v-beam"):
+            raise ValueError("only 'diamond' and 'v-beam' can be designed; remove 'design'")
+        return self
+
+    @property
+    def travel(self) -> float:
+        """How far the shuttle goes [m]."""
+        from math import sin
+
+        leaf = self.mechanism.bistable
+        return self.analysis.travel or 1.4 * leaf.length * sin(leaf.angle)

@@ -1,0 +1,102 @@
+"""The paper's own laws as intended: a bar that only compresses, and a diamond that only bends. For comparison.
+
+The bar ignores buckling and clamping: its peak is 36 % too high and at twice the travel, its steepest slope is 2.8
+times that of the real leaf, and it is nowhere straight.
+
+Reference
+---------
+[D] B. Ding, X. Li, Y. Li, Robotica (2022), eq. 17-19. The formulas of eq. 15 and 19 are for one chain of the diamond,
+eq. 18 for one V: here they count the chains and leaves that are there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from cfmkit.families.vcfm.strip import Strip
+
+
+@dataclass(frozen=True)
+class TrussLeaf:
+    """One leaf as a bar on two pins [D, eq. 18]: half of E S u (u - s)(u - 2 s), u = d/L, s = sin(theta)."""
+
+    strip: Strip
+
+    def force(self, travel: Any) -> Any:
+        """Return the force of one leaf along the motion [N].
+
+        Examples
+        --------
+        >>> from cfmkit.families.vcfm.strip import Strip
+        >>> leaf = TrussLeaf(Strip(35e-3, np.radians(7), 1e-3, 6e-3, 1477e6, 0.3))
+        >>> float(leaf.force(1e-3).round(6))
+        2.541452
+        """
+        u, s = np.asarray(travel) / self.strip.length, np.sin(self.strip.angle)
+        return 0.5 * self.strip.axial * u * (u - s) * (u - 2.0 * s)
+
+    def stress(self, travel: Any) -> Any:
+        """Return the axial stress [Pa]: the law has no bending."""
+        u, s = np.asarray(travel) / self.strip.length, np.sin(self.strip.angle)
+        return self.strip.youngs_modulus * np.abs(s * u - 0.5 * u * u)
+
+    @property
+    def first_stiffness(self) -> Any:
+        """Stiffness as made [N/m]."""
+        return self.strip.axial * np.sin(self.strip.angle) ** 2 / self.strip.length
+
+    @property
+    def negative_stiffness(self) -> Any:
+        """Size of the largest negative stiffness [N/m]: where the bar is flat."""
+        return 0.5 * self.first_stiffness
+
+    @property
+    def linear(self) -> tuple[Any, Any]:
+        """NaN: the law is nowhere straight."""
+        return np.nan, np.nan
+
+    def buckled(self, travel: Any) -> Any:
+        """Return False everywhere: the law does not know buckling."""
+        return np.zeros(np.shape(travel), dtype=bool)
+
+
+@dataclass(frozen=True)
+class TrussDiamond:
+    """The diamond by bending alone [D, eq. 19]: E b t^3/(2 (L cos)^3) for each chain."""
+
+    strip: Strip
+    share: Any = 1.0
+
+    @property
+    def stiffness(self) -> Any:
+        """K_p [N/m]."""
+        return 2.0 * self.share * 6.0 * self.strip.bending / self.strip.reach**3
+
+    def force(self, compression: Any) -> Any:
+        """Return the force [N] at a compression [m]."""
+        return self.stiffness * compression
+
+    def stress(self, compression: Any) -> Any:
+        """Return the largest bending stress [Pa]."""
+        from cfmkit.families.vcfm.springs import leaf_stress
+
+        return leaf_stress(self.strip, 0.5 * compression)
+
+
+def printed_diamond_stiffness(strip: Strip) -> Any:
+    """Return the stiffness that eq. 15 gives as printed, without the F_1 inside its bracket [N/m].
+
+    One chain, with half of the shear term: neither the right chain nor the right diamond.
+    """
+    bent = 2.0 * strip.reach**3 / (12.0 * strip.bending)
+    shear = 12.0 * (1.0 + strip.poisson_ratio) * strip.reach / (5.0 * strip.axial)
+    return 1.0 / (bent + shear)
+
+
+def printed_negative_stiffness(strip: Strip) -> Any:
+    """Return 33 E I/L^3 of one leaf [D, eq. 17], in N/m."""
+    return 33.0 * strip.bending / strip.length**3

@@ -1,0 +1,192 @@
+"""The V-beam: an inclined leaf that first bends into an S and then buckles, and in between is a linear negative spring.
+
+Where the axial force reaches the load of the form 1 - cos(2 pi s/L) it stays there. Both end slopes are then equal over
+one full wave, so the end moments are equal, and the force acts exactly along the chord: F = P_cr sin(beta), zero where
+the leaf is flat. For small angles that is a straight line with the slope -P_cr/X. The paper's truss law [D, eq. 18] has
+none of this, and its K_n = 33 E I/L^3 [D, eq. 17] is 17 % low: the factor is 4 pi^2/cos(theta).
+
+Reference
+---------
+[D] B. Ding, X. Li, Y. Li, Robotica (2022), variable constant-force compliant mechanism.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.families.vcfm.sbranch import pose, s_force
+
+if TYPE_CHECKING:
+    from cfmkit.curves import FloatArray
+    from cfmkit.families.vcfm.strip import Strip
+
+NEGATIVE_ABOVE = 1.4246
+"""Rise over thickness above which a V-beam has a negative stiffness anywhere."""
+
+LINEAR_ABOVE = np.pi
+"""Rise over thickness above which it buckles, and so has a linear negative stiffness."""
+
+BISTABLE_ABOVE = 3.195
+"""Rise over thickness above which a bare V-beam has a second stable pose."""
+
+FLAT_BUCKLED_ABOVE = 2.0 * np.pi / 3.0**0.5
+"""Rise over thickness above which it is still buckled when flat, so that its force is zero there."""
+
+RELIABLE = 1.6
+"""Travel over rise beyond which the S form is no longer to be trusted (0.07 N of 2.3 at 1.9 of [D], Table I)."""
+
+
+def critical_force(strip: Strip) -> Any:
+    """Return P_cr of the form 1 - cos(2 pi s/L) with stretching and shear [N].
+
+    P_e (1 + P_e/EA - P_e/(5/6 GA)), P_e = 4 pi^2 EI/L^2: within 0.2 % of the exact slope for t/L up to 1/29.
+    """
+    euler = 4.0 * np.pi**2 * strip.bending / strip.length**2
+    return euler * (1.0 + euler / strip.axial - euler / strip.shear)
+
+
+def onset_and_exit(strip: Strip) -> tuple[Any, Any]:
+    """Return where the leaf buckles and where it straightens again, d1 and d2 [m]; NaN where it does not buckle.
+
+    u - 3 u^2/4 = pi^2/(3 Q^2), u = d/h: good to a percent; the curve joins its branches where the two laws cross.
+    """
+    rise, root = strip.rise, np.pi / strip.slenderness
+    with np.errstate(invalid="ignore"):
+        half = np.sqrt(1.0 - root * root)
+    return 2.0 / 3.0 * rise * (1.0 - half), 2.0 / 3.0 * rise * (1.0 + half)
+
+
+def negative_stiffness(strip: Strip) -> Any:
+    """Return P_cr/X, the size of the negative stiffness of one leaf [N/m].
+
+    Examples
+    --------
+    >>> from cfmkit.families.vcfm.strip import Strip
+    >>> leaf = Strip(35e-3, np.radians(7), 1e-3, 6e-3, 1477e6, 0.3)
+    >>> float(negative_stiffness(leaf).round(3))
+    681.202
+    """
+    return critical_force(strip) / strip.reach
+
+
+def first_stiffness(strip: Strip) -> Any:
+    """Return the stiffness of one leaf as made, K_b1 [N/m]: EA sin^2/L + 12 EI cos^2/L^3."""
+    s, c = np.sin(strip.angle), np.cos(strip.angle)
+    return strip.axial * s * s / strip.length + 12.0 * strip.bending * c * c / strip.length**3
+
+
+def stress_when_flat(strip: Strip) -> Any:
+    """Return the largest stress of the buckled leaf when flat, where it is highest [Pa]."""
+    t, length, rise = strip.thickness, strip.length, strip.rise
+    bend = np.sqrt(2.0 - 4.0 * np.pi**2 / (3.0 * strip.slenderness**2))
+    pressed = np.pi**2 * strip.youngs_modulus * t * t / (3.0 * length**2)
+    return np.pi * strip.youngs_modulus * rise * t / length**2 * bend + pressed
+
+
+@dataclass(frozen=True)
+class VBeam:
+    """The law of one leaf: force and stress over the travel, and where it is buckled."""
+
+    strip: Strip
+
+    @property
+    def first_stiffness(self) -> Any:
+        """Stiffness as made [N/m]."""
+        return first_stiffness(self.strip)
+
+    @property
+    def negative_stiffness(self) -> Any:
+        """Size of the negative stiffness [N/m]: of the buckled form, else of the steepest fall; zero if none.
+
+        The S form has its steepest fall near 2/3 of the rise.
+        """
+        line, strip = negative_stiffness(self.strip), self.strip
+        places = np.linspace(0.3, 1.1, 161) * strip.rise
+        if np.ndim(strip.slenderness) or strip.slenderness > LINEAR_ABOVE:
+            return line
+        return max(0.0, -float(np.gradient(self.s_force(places), places).min()))
+
+    def s_force(self, travel: Any) -> FloatArray:
+        """Return the force of the S form, stable or not [N]."""
+        strip = self.strip
+        unit = strip.bending / strip.length**2
+        return np.asarray(
+            unit * s_force(strip.angle, strip.thickness / strip.length, travel / strip.length).along, dtype=float
+        )
+
+    def buckled_force(self, travel: Any) -> FloatArray:
+        """Return the force of the buckled form [N]: P_cr sin(beta)."""
+        drop = self.strip.rise - travel
+        return np.asarray(critical_force(self.strip) * drop / np.hypot(self.strip.reach, drop), dtype=float)
+
+    @cached_property
+    def linear(self) -> tuple[Any, Any]:
+        """Where the leaf is buckled, from and to [m]: where the two laws cross; NaN where it never is."""
+        first, last = onset_and_exit(self.strip)
+        span = last - first
+        return self._crossing(first, -0.1 * span), self._crossing(last, 0.1 * span)
+
+    def _crossing(self, guess: Any, outward: Any) -> Any:
+        """Return where both laws give one force, by secants; where there is no such place near, the closed form."""
+        before, here = guess + outward, np.asarray(guess, dtype=float)
+        gap = self.s_force(before) - self.buckled_force(before)
+        for _ in range(12):
+            gap_here = self.s_force(here) - self.buckled_force(here)
+            with np.errstate(all="ignore"):
+                step = gap_here * (here - before) / (gap_here - gap)
+            step = np.where(np.isfinite(step), step, 0.0)
+            before, gap, here = here, gap_here, here - step
+        near = np.abs(here - guess) <= 2.0 * np.abs(outward)
+        return np.where(near, here, guess)
+
+    def buckled(self, travel: Any) -> Any:
+        """Return whether the leaf is buckled."""
+        first, last = self.linear
+        return (travel >= first) & (travel <= last)
+
+    def force(self, travel: Any) -> FloatArray:
+        """Return the force of one leaf along the motion [N], on the stable branch.
+
+        Parameters
+        ----------
+        travel : array
+            Of the shuttle from the as-made pose, positive towards the flat pose [m].
+        """
+        return self._joined(travel, 0)
+
+    def stress(self, travel: Any) -> FloatArray:
+        """Return the largest stress of the leaf, bending and axial [Pa]."""
+        return self._joined(travel, 1)
+
+    def _joined(self, travel: Any, what: int) -> FloatArray:
+        buckled = self.buckled(travel)
+        fields = (self.strip.length, self.strip.angle, self.strip.thickness, self.strip.width,
+                  self.strip.youngs_modulus, self.strip.poisson_ratio, travel)  # fmt: skip
+        wide = [np.broadcast_to(np.asarray(item, dtype=float), buckled.shape) for item in fields]
+        out = np.empty(buckled.shape)
+        for chosen, law in ((buckled, _buckled), (~buckled, _bent)):
+            *about, here = (item[chosen] for item in wide)
+            out[chosen] = law(type(self.strip)(*about), here)[what]
+        return out
+
+
+def _buckled(strip: Strip, travel: FloatArray) -> tuple[Any, Any]:
+    drop, force = strip.rise - travel, critical_force(strip)
+    sine = drop / np.hypot(strip.reach, drop)
+    at = pose(strip.angle, travel / strip.length)
+    # (2 pi/L) sqrt(alpha^2 + 4 r) with r = shortening - P/EA - alpha^2/4: the tilt drops out
+    curvature = 4.0 * np.pi / strip.length * np.sqrt(np.maximum(at.shortening - force / strip.axial, 0.0))
+    stress = 0.5 * strip.youngs_modulus * strip.thickness * curvature + force / strip.area
+    return force * sine, stress
+
+
+def _bent(strip: Strip, travel: FloatArray) -> tuple[Any, Any]:
+    unit = strip.bending / strip.length**2
+    found = s_force(strip.angle, strip.thickness / strip.length, travel / strip.length)
+    axial = np.abs(4.0 * found.z * unit) / strip.area
+    bending = 0.5 * strip.youngs_modulus * strip.thickness * found.curvature / strip.length
+    return unit * found.along, bending + axial
