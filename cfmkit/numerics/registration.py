@@ -18,14 +18,13 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from cfmkit.numerics.fit import correlation_time
+from cfmkit.numerics.robust import robust_scale, tukey
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from cfmkit.curves import FloatArray
 
-TUKEY = 4.685
-MAD = 1.4826
 _STEPS = 60
 _SAMPLES = 257
 _FEET = 12
@@ -83,6 +82,9 @@ class Registration:
         Last weights; 0 for outliers and for points beyond the ends of their curve.
     covariance : (3, 3) array
         Of angle and shift, inflated where successive residuals are alike.
+    growth : (2,) array
+        Shift, at the centre of the points, by which the registration would answer a part that is
+        larger by one along all normals: an error of width that it takes for a place.
     """
 
     angle: float
@@ -92,6 +94,7 @@ class Registration:
     errors: tuple[FloatArray, ...]
     weights: tuple[FloatArray, ...]
     covariance: FloatArray
+    growth: FloatArray
 
     @property
     def deviations(self) -> FloatArray:
@@ -225,20 +228,6 @@ def _inside(curve: SmoothCurve, u: FloatArray) -> Any:
     return (u > low + margin) & (u < high - margin)
 
 
-def robust_scale(values: FloatArray) -> float:
-    """Return 1.4826 times the median absolute deviation from the median: the SD of normal values."""
-    return MAD * float(np.median(np.abs(values - np.median(values)))) if len(values) else 0.0
-
-
-def tukey(values: FloatArray, scale: float) -> FloatArray:
-    """Return Tukey's weights of values with a robust standard deviation."""
-    if scale == 0:
-        return np.ones_like(values)
-    share = values / (TUKEY * scale)
-    weights: FloatArray = np.where(np.abs(share) < 1, (1 - share**2) ** 2, 0.0)
-    return weights
-
-
 def _step(rows: FloatArray, residuals: FloatArray, weights: FloatArray, size: float) -> FloatArray:
     root = np.sqrt(weights)[:, None]
     scale = np.array([size, 1.0, 1.0])
@@ -263,11 +252,16 @@ def _registration(
     inside = weights > 0
     free = max(int(inside.sum()) - 3, 1)
     variance = float((weights * residuals**2).sum() / free)
-    alike = max(correlation_time(error[share > 0]) for error, share in zip(errors, shares, strict=True))
+    seen = [error[share > 0] for error, share in zip(errors, shares, strict=True)]
+    alike = max([correlation_time(error) for error in seen if len(error)], default=1.0)
     normal = rows.T @ (weights[:, None] * rows)
     covariance: FloatArray = variance * alike * np.asarray(np.linalg.pinv(normal, rcond=1e-18), dtype=float)
+    size = float(np.ptp(np.concatenate(moved), axis=0).max())
+    answer = _step(rows, np.ones_like(residuals), weights, size)
+    x, y = np.concatenate(moved).mean(axis=0)
+    growth = answer[1:] + answer[0] * np.array([-y, x])
     return Registration(
-        float(state[0]), state[1:], tuple(moved), tuple(found), tuple(errors), tuple(shares), covariance
+        float(state[0]), state[1:], tuple(moved), tuple(found), tuple(errors), tuple(shares), covariance, growth
     )
 
 

@@ -43,7 +43,13 @@ def read_sides(path: Path) -> tuple[FloatArray, FloatArray]:
         sides = np.array([_side(cells, int(columns["side"][0]), name, number) for number, cells in rows])
     else:
         sides = np.where(points[:, 0] > 0, "right", "left")
-    return _ordered(points, sides == "right", name), _ordered(points, sides == "left", name)
+    right, left = _ordered(points, sides == "right", name), _ordered(points, sides == "left", name)
+    if right[:, 0].mean() < left[:, 0].mean():
+        raise DataError(
+            f"{name}: the points of the right flank have smaller x than those of the left one; is the sign of x, or "
+            "are the sides, exchanged?"
+        )
+    return right, left
 
 
 def read_profile(path: Path) -> tuple[FloatArray, FloatArray]:

@@ -169,6 +169,59 @@ def test_bad_points_are_refused_in_one_line(tmp_path, text, complaint):
     assert "\n" not in str(caught.value)
 
 
+SIDES = "the points of the right flank have smaller x than those of the left one"
+NOT_HERE = "points of a flank lie on the design; is it the same cam, with x across, y upwards and the right units?"
+
+
+@pytest.mark.parametrize(
+    ("change", "complaint"),
+    [
+        (lambda right, left: (left, right), SIDES),
+        (lambda right, left: (-right, -left), SIDES),
+        (lambda right, left: (right * [1, -1], left * [1, -1]), NOT_HERE),
+        (lambda right, left: (1e-3 * right, 1e-3 * left), NOT_HERE),
+        (lambda right, left: (right, left[:0]), "both flanks are needed with at least 20 points each"),
+        (lambda right, left: (1.3 * right, 1.3 * left), "the points are still"),
+    ],
+    ids=["sides exchanged", "half a turn", "upside down", "wrong unit", "one flank missing", "another cam"],
+)
+def test_points_that_are_not_this_cam_are_refused_with_what_to_look_at(tmp_path, change, complaint):
+    write(tmp_path, change(*measured(Errors(noise=0.002e-3))))
+    with pytest.raises(DataError, match=re.escape(complaint)):
+        cfmkit.analyze(spec_of(tmp_path))
+
+
+@pytest.mark.parametrize(
+    ("noise", "stated", "found"),
+    [
+        (0.002e-3, "0.002 mm", None),
+        (0.02e-3, "0.002 mm", "noise_understated"),
+        (0.002e-3, "0.1 mm", "noise_overstated"),
+    ],
+)
+def test_a_stated_noise_that_the_points_contradict_is_reported(tmp_path, noise, stated, found):
+    names = {item.name for item in built(tmp_path, Errors(waviness=0.01e-3, noise=noise), stated).warnings}
+    assert names & {"noise_understated", "noise_overstated"} == ({found} if found else set())
+
+
+def test_points_far_off_are_left_out_and_counted(tmp_path):
+    points = measured(Errors(waviness=0.01e-3, noise=0.002e-3))
+    for item in points:
+        item[7::50, 0] += 0.5e-3
+    write(tmp_path, points)
+    warnings = {item.name: item.message for item in cfmkit.analyze(spec_of(tmp_path)).warnings}
+    assert warnings["profile_outliers"].startswith("12 of 600 points lie far off")
+
+
+def test_what_a_width_error_is_taken_for_is_told_with_the_weak_direction(tmp_path):
+    found = built(tmp_path, Errors(waviness=0.01e-3, noise=0.002e-3))
+    lifted = found.values["registration_y_per_width"].value
+    assert 3 < lifted < 4
+    (message,) = [item.message for item in found.warnings if item.name == "registration_weak"]
+    assert "% the shift in y; " in message
+    assert f"a cam that lies {0.01 * lifted:.4g} mm lower" in message
+
+
 def test_without_a_side_column_the_sign_of_x_tells_the_sides(tmp_path):
     points = measured(move=(0.0, np.zeros(2)))
     rows = [f"{x:.9f};{y:.9f}" for item in points for x, y in item * 1e3]

@@ -7,6 +7,7 @@ import pytest
 from flanks import Errors, flanks, measured, parameters, profile
 
 from cfmkit.numerics.registration import feet, gaps_across, register, turned
+from cfmkit.numerics.robust import neighbour_noise
 from cfmkit.numerics.smoothing import smoothed
 
 ANGLE, SHIFT = -0.3, (-1.49579067, 0.80784298)
@@ -53,6 +54,27 @@ def test_most_of_a_width_error_is_taken_for_a_shift_along_the_steep_flanks():
     found = register(measured(Errors(offset=-0.01e-3)), flanks(), robust=False)
     assert found.shift[1] * 1e3 == pytest.approx(SHIFT[1] - 0.035, abs=0.001)
     assert found.shift[0] * 1e3 == pytest.approx(SHIFT[0], abs=1e-8)
+
+
+def test_the_shift_that_a_width_error_is_taken_for_is_told_beforehand():
+    """0.01 mm of width, plain least squares: the registration moves as `growth` of the exact profile says."""
+    told = register(measured(), flanks(), robust=False).growth
+    exact, wide = (register(measured(Errors(offset=size)), flanks(), robust=False) for size in (0.0, 0.01e-3))
+    centre = np.concatenate(exact.points).mean(axis=0)
+    turn = np.array([-centre[1], centre[0]]) * (wide.angle - exact.angle)
+    moved = turned(np.zeros((1, 2)), wide.angle - exact.angle, np.zeros(2))[0]
+    assert wide.shift - exact.shift + turn - moved == pytest.approx(0.01e-3 * told, rel=1e-3, abs=1e-9)
+    assert told[1] > 3
+
+
+@pytest.mark.parametrize("spacing", ["even", "uneven"])
+def test_the_noise_of_points_is_seen_through_their_waves_and_past_outliers(spacing):
+    rng = np.random.default_rng(1)
+    places = np.linspace(0, 0.15, 400) if spacing == "even" else np.sort(rng.uniform(0, 0.15, 400))
+    values = 0.02e-3 * np.sin(2 * np.pi * places / 0.03) + rng.normal(0, 0.002e-3, 400)
+    values[::40] += 1e-3
+    order = rng.permutation(400)
+    assert neighbour_noise(places[order], values[order]) == pytest.approx(0.002e-3, rel=0.25)
 
 
 def test_the_height_is_the_weakly_observed_shift_on_steep_flanks():

@@ -37,6 +37,10 @@ if TYPE_CHECKING:
     from cfmkit.families.cam.statics import Loads
 
 
+STRANGE = 0.01
+"""Points are those of another part if they are off the design by this part of their height."""
+
+
 @dataclass(frozen=True)
 class Sides:
     """Right and left roller at some slider positions: x [m] and slope of the track, each (n,)."""
@@ -141,7 +145,23 @@ def registered(assembly: Assembly) -> Registration:
     source = assembly.spec.mechanism.profile.file
     if not isinstance(source, DataSource):
         raise DataError("the specification names no file with measured points")
-    return register(read_sides(source.path), flanks_of(assembly))
+    found = register(read_sides(source.path), flanks_of(assembly))
+    _check_fit(found, source)
+    return found
+
+
+def _check_fit(found: Registration, name: str) -> None:
+    """Refuse points that are not those of the design's flanks."""
+    for use in found.used:
+        if int(use.sum()) < 20:
+            raise DataError(
+                f"{name}: only {int(use.sum())} points of a flank lie on the design; is it the same cam, with x "
+                "across, y upwards and the right units?"
+            )
+    errors = np.concatenate([error[use] for error, use in zip(found.errors, found.used, strict=True)])
+    height = max(float(np.ptp(points[:, 1])) for points in found.points)
+    if (rms := float(np.sqrt(np.mean(errors**2)))) > STRANGE * height:
+        raise DataError(f"{name}: laid on the design, the points are still {mm(rms)} (rms) off it; is it the same cam?")
 
 
 def flanks_of(assembly: Assembly) -> tuple[DesignFlank, DesignFlank]:
@@ -155,11 +175,6 @@ def _tracks(assembly: Assembly, registration: Registration) -> tuple[BuiltTrack,
     # The left flank's feet and errors are those of its mirror image.
     found = []
     for u, error, used in zip(registration.parameters, registration.errors, registration.used, strict=True):
-        if int(used.sum()) < 20:
-            raise DataError(
-                f"{mechanism.profile.file}: only {int(used.sum())} points of a flank lie on the design; is it the same "
-                "cam?"
-            )
         flank = built_flank(design, u[used], error[used], noise)
         found.append(built_track(flank, mechanism.roller_radius, mechanism.brace_length))
     return found[0], found[1]

@@ -7,16 +7,20 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.families.cam.findings import finding, mm
+from cfmkit.numerics.robust import neighbour_noise
 from cfmkit.results import Quantity
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterator, Mapping
 
     from numpy.typing import NDArray
 
     from cfmkit.curves import FloatArray
     from cfmkit.families.cam.built import Built
     from cfmkit.results import Finding
+
+TOO_NOISY = 2.0
+"""Points are noisier than stated if their neighbours say so by this factor."""
 
 BUILT_DEFINITIONS = {
     "profile_rmse": ("length", "root mean square distance of the measured points from the design, along its normal"),
@@ -29,6 +33,10 @@ BUILT_DEFINITIONS = {
     "registration_x": ("length", "shift in x after that turn"),
     "registration_y": ("length", "shift in y after that turn"),
     "registration_uncertainty": ("length", "standard deviation of the least certain motion of the registration"),
+    "registration_y_per_width": (
+        "ratio",
+        "shift in y with which the registration answers a cam that is wider on both flanks, per width along its normal",
+    ),
     "profile_force_sd": ("force", "standard deviation (n - 1) of what the profile's errors add to the force"),
     "profile_force_share": ("ratio", "that, over the mean force of the design [SS, fig. 13: 0.8 %]"),
     "rest_force_mean": ("force", "mean of what the springs' rest length adds to the force of the design"),
@@ -48,7 +56,7 @@ BUILT_DEFINITIONS = {
 def values_of_built(built: Built) -> Mapping[str, Quantity]:
     """Return the scalar results by name."""
     found, used = built.registration, built.registration.used
-    errors = np.concatenate([item[keep] for item, keep in zip(found.errors, used, strict=True)])
+    errors = _used(built)
     across = np.concatenate([item[keep] for item, keep in zip(built.across, used, strict=True)])
     inside = window_mask(built)
     share = built.shares["profile"][inside]
@@ -63,6 +71,7 @@ def values_of_built(built: Built) -> Mapping[str, Quantity]:
         "registration_x": float(found.shift[0]),
         "registration_y": float(found.shift[1]),
         "registration_uncertainty": found.weakest(half_extent(built))[1],
+        "registration_y_per_width": float(found.growth[1]),
         "profile_force_sd": float(np.nanstd(share, ddof=1)),
         "profile_force_share": float(np.nanstd(share, ddof=1) / np.nanmean(built.shares["design"][inside])),
         "rest_force_mean": float(np.nanmean(built.shares["rest"][inside])),
@@ -96,24 +105,62 @@ def half_extent(built: Built) -> float:
 
 def findings_of_built(built: Built) -> list[Finding]:
     """Return what the user must know about the measured profile."""
-    found = []
-    direction, deviation = built.registration.weakest(half_extent(built))
-    rmse = _rms(np.concatenate(built.registration.errors))
-    if deviation > 0.1 * rmse and rmse > 0:
-        names = ("the angle", "the shift in x", "the shift in y")
-        parts = [f"{100 * part**2:.0f} % {name}" for part, name in zip(direction, names, strict=True) if part**2 > 0.05]
-        found.append(
-            finding(
-                "registration_weak",
-                f"where the cam lies is known to ± {mm(deviation)} (one standard deviation) along its weakest "
-                f"direction: {', '.join(parts)}; a width error looks much like a shift along the steep flanks",
-            )
-        )
+    found = [*_weak(built), *_doubtful_points(built)]
     last = built.assembly.stroke
     if built.travel[-1] < last * (1 - 1e-9) or built.travel[0] > 0:
         span = f"{mm(float(built.travel[0]))} to {mm(float(built.travel[-1]))}"
         found.append(finding("part_measured", f"the flanks were measured for {span} of travel only, of {mm(last)}"))
     return found
+
+
+def _weak(built: Built) -> Iterator[Finding]:
+    """Yield how uncertain the place of the cam is along the direction that the points tell least of."""
+    direction, deviation = built.registration.weakest(half_extent(built))
+    rmse, lifted = _rms(_used(built)), float(built.registration.growth[1])
+    if deviation > 0.1 * rmse and rmse > 0:
+        names = ("the angle", "the shift in x", "the shift in y")
+        parts = [f"{100 * part**2:.0f} % {name}" for part, name in zip(direction, names, strict=True) if part**2 > 0.05]
+        yield finding(
+            "registration_weak",
+            f"where the cam lies is known to ± {mm(deviation)} (one standard deviation) along its weakest "
+            f"direction: {', '.join(parts)}; and 0.01 mm more on both flanks would be taken for a cam that lies "
+            f"{mm(1e-5 * abs(lifted))} {'lower' if lifted > 0 else 'higher'}: the flanks are steep",
+        )
+
+
+def _doubtful_points(built: Built) -> Iterator[Finding]:
+    """Yield what speaks against the measured points, or against what is said of their noise."""
+    outliers = sum(int((~keep).sum()) for keep in built.registration.used)
+    if outliers:
+        count = sum(len(keep) for keep in built.registration.used)
+        yield finding("profile_outliers", f"{outliers} of {count} points lie far off or beyond the flank: left out")
+    stated = float(built.assembly.spec.mechanism.profile.noise or 0.0)
+    seen = max(neighbour_noise(one, use) for one, use in _along(built))
+    if seen > TOO_NOISY * stated:
+        yield finding(
+            "noise_understated",
+            f"neighbouring points differ as with a noise of {mm(seen)}, but 'mechanism.profile.noise' is {mm(stated)}: "
+            "the difference is taken for waves of the flank, and the force follows their slope",
+        )
+    elif _rms(_used(built)) < 0.8 * stated:
+        yield finding(
+            "noise_overstated",
+            f"the points are {mm(_rms(_used(built)))} (rms) off the design, less than the stated noise of "
+            f"{mm(stated)}: nothing of the profile's errors is left to be seen",
+        )
+
+
+def _used(built: Built) -> FloatArray:
+    """Return the errors of the points that count, both flanks [m]."""
+    registration = built.registration
+    return np.concatenate([error[keep] for error, keep in zip(registration.errors, registration.used, strict=True)])
+
+
+def _along(built: Built) -> Iterator[tuple[FloatArray, FloatArray]]:
+    """Yield path coordinates and errors of the points that count, one flank after the other [m]."""
+    registration = built.registration
+    for place, error, keep in zip(registration.parameters, registration.errors, registration.used, strict=True):
+        yield place[keep], error[keep]
 
 
 def _rms(values: FloatArray) -> float:

@@ -38,6 +38,9 @@ FINDINGS = {
     "weight_too_large": "the force wanted does not even carry the weight of the moving parts",
     "force_constant_too_small": "the force constant needed is below the one that avoids undercut",
     "registration_weak": "measured points do not say well where the cam lies",
+    "profile_outliers": "measured points lie so far off that the registration gave them no weight",
+    "noise_understated": "neighbouring points differ by more than the stated noise of the measurement explains",
+    "noise_overstated": "the stated noise of the measurement is larger than all errors of the profile",
     "part_measured": "the flanks were measured over a part of the travel only",
     "no_spring_fits": "no spring of the catalogue meets the limits",
 }
