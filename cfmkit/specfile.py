@@ -117,11 +117,11 @@ def _requirement_faults(
     document: Document, family: Family, requirements: Iterable[tuple[int, Requirement]]
 ) -> Iterator[Problem]:
     """Yield what is wrong with metric names, bounds and windows, each with its place in the file."""
-    from cfmkit.metrics import definitions, requirement_problems, values_of_family
+    from cfmkit.metrics import known_metrics, requirement_problems, values_of_family
 
-    known = definitions(None, values_of_family(family.values))
+    known = known_metrics(None, values_of_family(family.values))
     for index, requirement in requirements:
-        for problem in requirement_problems((requirement,), known):
+        for problem in requirement_problems((requirement,), known, branches=family.branches):
             key = problem.path.rpartition(".")[2]
             yield placed(document, f"requirements.{index}.{key}", problem.message)
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from cfmkit import api
 from cfmkit.families import family
-from cfmkit.metrics import Window, definitions, split_name, window_of
+from cfmkit.metrics import Window, known_metrics, split_name, window_of
 from cfmkit.units import border_unit, format_short, to_border
 
 if TYPE_CHECKING:
@@ -123,7 +123,7 @@ def _short(quantity: Quantity, digits: int = 4) -> str:
 def _over(report: Report, name: str, window: Window | None) -> str:
     """Return the window, if there is one and the metric looks only inside."""
     curve = report.result.curve
-    windowed = {item.name for item in definitions(curve.kind) if item.windowed}
+    windowed = {item.name for item in known_metrics(curve.kind) if item.windowed}
     if window is None or split_name(name)[0] not in windowed:
         return ""
     return f" over {span(window.lo, window.hi, curve.motion_dimension)}"

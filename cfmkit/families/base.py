@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.curves import FloatArray, Kind
     from cfmkit.results import Design, Result
     from cfmkit.spec import Spec
 
@@ -80,11 +80,14 @@ class BlockAnswer:
         is no matter of one branch stands under the name "" alone.
     target : (n,) array, optional
         Force or torque that each curve should have [N or N m].
+    kind : {"force", "torque"}
+        What the effort of the curves is.
     """
 
     done: NDArray[Any]
     values: tuple[Mapping[str, FloatArray], ...]
     target: FloatArray | None = None
+    kind: Kind = "force"
 
 
 @dataclass(frozen=True)

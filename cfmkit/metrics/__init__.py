@@ -1,11 +1,12 @@
 """Constant-force metrics by name, over a stated window, per branch; and requirements on them.
 
-`table` lists what there is, `flatness` and `ranges` compute it, `traces` cuts
+`table` lists what there is, `known` what a name may mean, `flatness` and `ranges` compute it, `traces` cuts
 windows, `subjects` is what a metric looks at, `evaluation` runs the table over a
 curve, `requirements` compares with bounds, `report` writes border units.
 """
 
 from cfmkit.metrics.evaluation import Survey, evaluate, frame_of, measure, survey, window_of
+from cfmkit.metrics.known import definition_of, known_metrics, metrics_by_name, other_name
 from cfmkit.metrics.report import as_json, metrics_json
 from cfmkit.metrics.requirements import Outcome, check, requirement_problems, validate_requirements
 from cfmkit.metrics.subjects import Branch, Cycle, Frame
@@ -25,11 +26,15 @@ __all__ = [
     "Window",
     "as_json",
     "check",
+    "definition_of",
     "definitions",
     "evaluate",
     "frame_of",
+    "known_metrics",
     "measure",
+    "metrics_by_name",
     "metrics_json",
+    "other_name",
     "requirement_problems",
     "restrict",
     "split_name",

@@ -9,13 +9,14 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from cfmkit.errors import UsageError
+from cfmkit.metrics.known import metrics_by_name
 from cfmkit.metrics.subjects import Cycle, Frame, cycle
 from cfmkit.metrics.table import Definition, definitions, split_name, unknown_metric
 from cfmkit.metrics.traces import Undefined, Window
 from cfmkit.results import Quantity
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator
+    from collections.abc import Callable, Iterable, Iterator, Mapping
 
     from cfmkit.curves import Curve, Kind
     from cfmkit.results import Result
@@ -188,15 +189,15 @@ def evaluate(
         If one of `names` exists neither as a metric nor as a value of the family.
     """
     view = survey_of(result, window or window_of(result))
-    table = definitions(kind_of(result), extra_definitions)
+    kind, extra = kind_of(result), tuple(extra_definitions)
     if names is not None:
-        known = {item.name: item for item in table}
+        known = metrics_by_name(kind, extra)
         return {name: result.values.get(name) or _named(view, name, known, result) for name in names}
-    return ({} if view is None else _all(view, table)) | dict(result.values)
+    return ({} if view is None else _all(view, definitions(kind, extra))) | dict(result.values)
 
 
 @np.errstate(all="ignore")
-def _named(view: Survey | None, name: str, known: dict[str, Definition], result: Result) -> Quantity:
+def _named(view: Survey | None, name: str, known: Mapping[str, Definition], result: Result) -> Quantity:
     metric, branch = split_name(name)
     if metric not in known:
         raise UsageError(unknown_metric(metric, [*known, *result.values]))

@@ -10,9 +10,10 @@ import numpy as np
 
 from cfmkit.errors import Problem, QuantityError, SpecError
 from cfmkit.metrics.evaluation import Survey, Value, kind_of, survey_of, window_of
+from cfmkit.metrics.known import branch_fault, known_metrics
 from cfmkit.metrics.report import finite_border
 from cfmkit.metrics.subjects import span_text
-from cfmkit.metrics.table import Definition, definitions, split_name, unknown_metric
+from cfmkit.metrics.table import Definition, split_name, unknown_metric
 from cfmkit.metrics.traces import Window
 from cfmkit.units import DIMENSIONS, border_unit, format_short, read_one_of, to_border
 
@@ -89,7 +90,7 @@ def validate_requirements(spec: Spec, known: Iterable[Definition], kind: Kind | 
     spec : Spec
         Its ``requirements``.
     known : iterable of Definition
-        Every metric there is: ``definitions(kind, family's)``.
+        Every metric there is: ``known_metrics(kind, family's)``.
     kind : {"force", "torque"} or None
         Of the curve, if it is known: then windows in the wrong dimension are found too.
 
@@ -104,19 +105,25 @@ def validate_requirements(spec: Spec, known: Iterable[Definition], kind: Kind | 
 
 
 def requirement_problems(
-    requirements: Sequence[Requirement], known: Iterable[Definition], kind: Kind | None = None
+    requirements: Sequence[Requirement],
+    known: Iterable[Definition],
+    kind: Kind | None = None,
+    branches: Sequence[str] = (),
 ) -> Iterator[Problem]:
-    """Yield what is wrong with requirements: unknown metrics, bounds and windows of the wrong dimension."""
+    """Yield what is wrong with requirements: unknown metrics or branches, bounds and windows of the wrong dimension."""
     table: dict[str, list[Definition]] = {}
     for item in known:
         table.setdefault(item.name, []).append(item)
     for index, requirement in enumerate(requirements):
-        for key, message in _faults(requirement, table, kind):
+        for key, message in _faults(requirement, table, kind, branches):
             yield Problem("", 0, 0, f"requirements.{index}.{key}", message)
 
 
 def _faults(
-    requirement: Requirement, table: Mapping[str, Sequence[Definition]], kind: Kind | None
+    requirement: Requirement,
+    table: Mapping[str, Sequence[Definition]],
+    kind: Kind | None,
+    branches: Sequence[str],
 ) -> Iterator[tuple[str, str]]:
     """Yield (key, what is wrong) for one requirement."""
     name, branch = split_name(requirement.metric)
@@ -124,8 +131,8 @@ def _faults(
         yield "metric", unknown_metric(name, table)
         return
     meant = table[name]
-    if branch is not None and not meant[0].per_branch:
-        yield "metric", f"{name!r} is not a matter of one branch; write it without [{branch}]"
+    if branch is not None and (told := branch_fault(meant[0], branch, branches)):
+        yield "metric", told
     yield from _bound_faults(requirement, tuple(dict.fromkeys(item.dimension for item in meant)))
     if requirement.over is not None:
         yield from _window_faults(requirement.over, meant[0], kind)
@@ -175,7 +182,7 @@ def check(
         If a requirement is not well put: see `validate_requirements`.
     """
     kind = kind_of(result)
-    known = [*definitions(kind, extra_definitions), *_own(result)]
+    known = [*known_metrics(kind, tuple(extra_definitions)), *_own(result)]
     problems = tuple(requirement_problems(requirements, known, kind))
     if problems:
         raise SpecError(problems)

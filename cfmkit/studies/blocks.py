@@ -8,7 +8,7 @@ import numpy as np
 
 from cfmkit.families import family
 from cfmkit.families.base import Block, Measure
-from cfmkit.metrics import definitions, split_name, values_of_family
+from cfmkit.metrics import metrics_by_name, other_name, split_name, values_of_family
 from cfmkit.metrics.requirements import ROUNDING, Limits
 from cfmkit.studies.rows import Rows, gathered
 
@@ -58,9 +58,13 @@ def _answer(study: Study, plan: Plan, start: int, stop: int) -> BlockAnswer | No
     model = family(study.spec.family).analyze_block
     if model is None:
         return None
-    values = dict(zip(plan.paths, plan.block(start, stop), strict=True))
+    values, asked = dict(zip(plan.paths, plan.block(start, stop), strict=True)), measures(study)
+    renamed = tuple(Measure(other_name(one.name), one.window) for one in asked)
     with np.errstate(all="ignore"):
-        return model(study.spec, Block(values, measures(study), stop - start))
+        found = model(study.spec, Block(values, asked, stop - start))
+        if found is None and renamed != asked:
+            found = model(study.spec, Block(values, renamed, stop - start))
+    return found
 
 
 def measures(study: Study) -> tuple[Measure, ...]:
@@ -87,7 +91,7 @@ def _over(study: Study, one: Requirement) -> tuple[float, float] | None:
 
 def _columns(study: Study, answer: BlockAnswer) -> FloatArray:
     """Return the metrics, (n, m): of the branch that is named, or of the worst."""
-    known = _known(study)
+    known = _known(study, answer)
     columns = np.empty((len(answer.done), len(study.metrics)))
     for k, name in enumerate(study.names):
         plain, branch = split_name(name)
@@ -96,9 +100,8 @@ def _columns(study: Study, answer: BlockAnswer) -> FloatArray:
     return columns
 
 
-def _known(study: Study) -> dict[str, Definition]:
-    own = values_of_family(family(study.spec.family).values)
-    return {item.name: item for item in reversed(definitions(None, own))}
+def _known(study: Study, answer: BlockAnswer) -> Mapping[str, Definition]:
+    return metrics_by_name(answer.kind, values_of_family(family(study.spec.family).values))
 
 
 def _one(
@@ -130,7 +133,7 @@ def _keeping(limits: Limits, values: FloatArray) -> NDArray[np.bool_]:
 
 def _met(study: Study, answer: BlockAnswer) -> NDArray[np.bool_]:
     """Return whether each requirement is met, (n, r): by the branch that is named, or by all."""
-    known = _known(study)
+    known = _known(study, answer)
     met = np.ones((len(answer.done), len(study.spec.requirements)), dtype=bool)
     for k, one in enumerate(study.spec.requirements):
         plain, branch = split_name(one.metric)

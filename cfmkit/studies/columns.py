@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from cfmkit.errors import CfmError, UsageError
+from cfmkit.errors import CfmError
 from cfmkit.families import family
-from cfmkit.metrics import definitions, split_name, unknown_metric, values_of_family
+from cfmkit.metrics import definition_of, definitions, metrics_by_name, values_of_family
 from cfmkit.studies.study import Metric, Study
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
     from cfmkit.curves import Curve
-    from cfmkit.metrics import Definition
     from cfmkit.spec import Spec
     from cfmkit.studies.plan import Plan
 
@@ -40,26 +38,18 @@ def metrics_of(spec: Spec, names: Iterable[str], sample: Curve | None = None) ->
     Raises
     ------
     cfmkit.errors.UsageError
-        If a name is not known.
+        If a metric or its branch is not known.
     """
-    kind = sample.kind if sample is not None else "force"
-    known = {item.name: item for item in definitions(kind, values_of_family(family(spec.family).values))}
+    record, kind = family(spec.family), sample.kind if sample is not None else "force"
+    own = values_of_family(record.values)
     asked = tuple(dict.fromkeys(names))
     if not asked:
         stressed = sample is None or "max_stress" in sample.extra
-        asked = tuple(name for name in known if stressed or name not in NEED_STRESS)
-    words = family(spec.family).words
-    return tuple(replace(_metric(name, known), words=words.get(name, ())) for name in asked)
-
-
-def _metric(name: str, known: dict[str, Definition]) -> Metric:
-    plain, branch = split_name(name)
-    if plain not in known:
-        raise UsageError(unknown_metric(plain, known))
-    found = known[plain]
-    if branch is not None and not found.per_branch:
-        raise UsageError(f"{plain!r} is not a matter of one branch; write it without [{branch}]")
-    return Metric(name, found.dimension, found.definition)
+        listed = (item.name for item in definitions(kind, own))
+        asked = tuple(name for name in dict.fromkeys(listed) if stressed or name not in NEED_STRESS)
+    known = metrics_by_name(kind, own)
+    meant = [(name, definition_of(name, known, record.branches)) for name in asked]
+    return tuple(Metric(name, one.dimension, one.definition, words=record.words.get(name, ())) for name, one in meant)
 
 
 def sample_curve(spec: Spec, plan: Plan, design: bool) -> Curve | None:

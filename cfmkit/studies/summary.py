@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.errors import ExitCode
+from cfmkit.metrics import other_name
 from cfmkit.results import Status
 from cfmkit.studies.variation import written
 from cfmkit.units import border_unit, to_border
@@ -43,8 +44,9 @@ class Objective:
 def objective(study: Study) -> Objective | None:
     """Return by what the best point is chosen; None where the study notes nothing of the kind."""
     for one in study.spec.requirements:
-        if one.metric in study.names:
-            return Objective(study.names.index(one.metric), one.max is None)
+        for name in (one.metric, other_name(one.metric)):
+            if name in study.names:
+                return Objective(study.names.index(name), one.max is None)
     for name in DEFAULT_OBJECTIVES:
         if name in study.names:
             return Objective(study.names.index(name), False)
@@ -53,7 +55,8 @@ def objective(study: Study) -> Objective | None:
 
 def main_columns(study: Study, headline: tuple[str, ...]) -> tuple[int, ...]:
     """Return the columns that are looked at first: the objective, the requirements, the family's headline."""
-    wanted = [*(one.metric for one in study.spec.requirements), *DEFAULT_OBJECTIVES, *headline, *study.names]
+    required = [name for one in study.spec.requirements for name in (one.metric, other_name(one.metric))]
+    wanted = [*required, *DEFAULT_OBJECTIVES, *headline, *study.names]
     chosen = objective(study)
     first = [] if chosen is None else [chosen.column]
     found = dict.fromkeys([*first, *(study.names.index(name) for name in wanted if name in study.names)])

@@ -30,6 +30,7 @@ FAMILY = Family(
         "spring_elongation_max",
         "contact_force_max",
     ),
+    branches=("load", "unload"),
     template="cam.yaml",
     findings=FINDINGS,
     references=(

@@ -21,7 +21,7 @@ from cfmkit.units import border_unit, to_border
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.curves import Curve, FloatArray
     from cfmkit.metrics import Outcome
     from cfmkit.results import Result
     from cfmkit.spec import Requirement, Sensitivity, Spec
@@ -142,10 +142,12 @@ def prepare(spec: Spec, seed: int | None = None, most: int = MOST_POINTS) -> Set
     chosen = seed if seed is not None else block.seed or 0
     samples = block.samples or SAMPLES[block.method]
     paths = tuple(one.path for one in parameters)
-    study = Study(spec, paths, _metrics(spec, block), block.design, seed=chosen)
     groups = together(block, paths)
     refuse_too_many(points_of(block.method, samples, len(paths), len(groups)), most)
-    study, nominal, unvalued = _with_nominal(study)
+    study = Study(spec, paths, (), block.design, seed=chosen)
+    result = _solved(study)
+    study = replace(study, metrics=_metrics(spec, block, result.curves[0] if result.curves else None))
+    study, nominal, unvalued = _with_nominal(study, result)
     warnings = (*unvalued, *_cautions(spec, block, parameters, samples))
     matrix = correlations(block, paths)
     return Setup(block, parameters, study, nominal, samples, chosen, matrix, groups, warnings)
@@ -180,13 +182,15 @@ def _noted(one: Requirement) -> tuple[str, tuple[float, float] | None]:
     return one.metric, None if one.over is None else (float(one.over[0]), float(one.over[1]))
 
 
-def _metrics(spec: Spec, block: Sensitivity) -> tuple[Metric, ...]:
+def _metrics(spec: Spec, block: Sensitivity, sample: Curve | None) -> tuple[Metric, ...]:
     """Return the metrics that are asked for; else those of the requirements, over their windows; else all."""
     if block.metrics or not spec.requirements:
-        return _numeric(metrics_of(spec, block.metrics), block)
+        return _numeric(metrics_of(spec, block.metrics, sample), block)
     wanted = dict.fromkeys(map(_noted, spec.requirements))
-    plain = {one.name: one for one in metrics_of(spec, [name for name, _ in wanted])}
-    return tuple(replace(plain[name], over=over, label=_label(plain[name].label, over)) for name, over in wanted)
+    plain = {one.name: one for one in metrics_of(spec, [name for name, _ in wanted], sample)}
+    motion = sample.motion_dimension if sample is not None else "length"
+    labels = {one: _label(plain[one[0]].label, one[1], motion) for one in wanted}
+    return tuple(replace(plain[one[0]], over=one[1], label=labels[one]) for one in wanted)
 
 
 def _numeric(metrics: tuple[Metric, ...], block: Sensitivity) -> tuple[Metric, ...]:
@@ -198,19 +202,24 @@ def _numeric(metrics: tuple[Metric, ...], block: Sensitivity) -> tuple[Metric, .
     return tuple(one for one in metrics if not one.words)
 
 
-def _label(name: str, over: tuple[float, float] | None) -> str:
+def _label(name: str, over: tuple[float, float] | None, motion: str) -> str:
     if over is None:
         return name
-    low, high = (f"{float(to_border(end, 'length')):.6g}" for end in over)
-    return f"{name} over {low} ... {high} {border_unit('length')}"
+    low, high = (f"{float(to_border(end, motion)):.6g}" for end in over)
+    return f"{name} over {low} ... {high} {border_unit(motion)}"
 
 
-def _with_nominal(study: Study) -> tuple[Study, Nominal, tuple[Finding, ...]]:
-    """Return the study of those metrics that have a value, and the result without deviations."""
+def _solved(study: Study) -> Result:
+    """Return the result without any deviation."""
     result = study.solve(study.spec)
     if not result.status.usable:
         told = "the specification itself has no solution, so that nothing can be said about deviations from it"
         raise SolutionError(f"{told}: {result.message}")
+    return result
+
+
+def _with_nominal(study: Study, result: Result) -> tuple[Study, Nominal, tuple[Finding, ...]]:
+    """Return the study of those metrics that have a value, and the result without deviations as it sees it."""
     row = study.row(result)
     valued = [k for k, value in enumerate(row.values) if value is not None]
     if not valued:

@@ -1,0 +1,130 @@
+"""Names of metrics: on a torque curve those of forces are accepted; branches that a family cannot have are refused."""
+
+import json
+
+import numpy as np
+import pytest
+
+import cfmkit
+from cfmkit.errors import SpecError, UsageError
+from cfmkit.families import family
+from cfmkit.metrics import check, definitions, known_metrics, metrics_by_name, other_name, values_of_family
+from cfmkit.metrics.table import Definition
+from cfmkit.studies.columns import metrics_of, sample_curve
+from cfmkit.studies.engine import run
+from cfmkit.studies.sensitivity.setup import prepare as prepare_sensitivity
+from cfmkit.studies.summary import Summary, main_columns
+from cfmkit.studies.sweep import Request, prepare
+from cfmkit.studies.variation import wish
+
+TORQUE = cfmkit.load("configs/slider_crank_li2019.yaml")
+CAM = cfmkit.load("configs/cam.yaml").replace({"analysis.points": 41})
+STIFFNESS = "mechanism.springs.slider"
+
+
+def with_requirements(*entries):
+    return TORQUE.replace({"requirements": entries})
+
+
+def test_every_force_metric_has_its_torque_metric():
+    torque = {item.name for item in definitions("torque")}
+    renamed = {other_name(item.name) for item in definitions("force")}
+    assert renamed == torque
+
+
+@pytest.mark.parametrize("name", ["force_mean", "force_ripple", "force_max", "force_min", "force_sd"])
+def test_a_force_name_on_a_torque_curve_means_the_torque(name):
+    result = cfmkit.analyze(TORQUE)
+    other = cfmkit.evaluate(result, [name, other_name(name)])
+    assert result.curve.kind == "torque"
+    assert other[name] == other[other_name(name)]
+    assert other[name].value is not None
+
+
+def test_other_names_are_not_listed_twice():
+    assert not [name for name in cfmkit.evaluate(cfmkit.analyze(TORQUE)) if name.startswith("force_")]
+    assert "force_mean" not in {item.name for item in definitions("torque")}
+    assert {item.name for item in known_metrics("force")} == {item.name for item in definitions("force")}
+
+
+def test_a_torque_name_on_a_force_curve_is_refused():
+    with pytest.raises(UsageError, match="did you mean 'force_ripple'"):
+        cfmkit.evaluate(cfmkit.analyze(CAM), ["torque_ripple"])
+
+
+def test_a_value_of_the_family_goes_before_another_name():
+    own = Definition("force_mean", "force", "of its own", scope="value")
+    assert metrics_by_name("torque", (own,))["force_mean"] is not own
+    assert metrics_by_name("torque", (own,))["force_mean"].definition == own.definition
+
+
+def test_requirements_take_either_name_with_bounds_of_a_torque():
+    spec = with_requirements(
+        {"metric": "force_mean", "min": "1 N*mm"},
+        {"metric": "torque_mean", "min": "1 N*mm"},
+        {"metric": "force_ripple", "max": "500 %", "over": ("1 deg", "10 deg")},
+    )
+    text = cfmkit.dumps(spec)
+    outcomes = check(cfmkit.loads(text).requirements, cfmkit.analyze(spec))
+    assert outcomes[0].value == outcomes[1].value
+    assert outcomes[2].value is not None
+    assert json.loads(json.dumps(outcomes[0].as_json()))["unit"] == "N*mm"
+
+
+def test_a_bound_of_a_force_on_a_torque_is_refused_once_the_curve_is_known():
+    spec = with_requirements({"metric": "force_mean", "min": "1 N"})
+    with pytest.raises(SpecError, match="is a force"):
+        cfmkit.check(cfmkit.analyze(spec))
+
+
+def test_a_sweep_over_torques_notes_either_name_in_the_same_bytes():
+    from cfmkit.studies.tables import results_csv
+
+    options = wish(f"{STIFFNESS}=[1 N/cm, 1.1 N/cm]")
+    written = []
+    for name in ("force_ripple", "torque_ripple"):
+        work = prepare(TORQUE, Request(vary=(options,), metrics=(name, "torque_mean")))
+        written.append(b"".join(results_csv(run(work))))
+    assert written[0].replace(b"force_ripple", b"torque_ripple") == written[1]
+    assert b"torque_mean [N*mm]" in written[0]
+
+
+def test_the_best_point_follows_a_requirement_under_its_other_name():
+    spec = with_requirements({"metric": "force_max", "max": "1 N*m"})
+    work = prepare(spec, Request(vary=(wish(f"{STIFFNESS}=[1.1 N/cm, 1 N/cm]"),)))
+    names = work.study.names
+    found = Summary(work.study, main_columns(work.study, ()))
+    for indices, rows in run(work).batches():
+        found.add(indices, rows)
+    assert names[found.shown[0]] == "torque_max"
+    assert found.best == 1
+    assert "torque_mean" in names
+    assert "force_mean" not in names
+
+
+def test_a_sensitivity_over_torques_takes_requirements_and_their_windows_in_degrees():
+    spec = with_requirements({"metric": "force_max", "max": "1 N*m", "over": ("1 deg", "10 deg")})
+    block = {"method": "oat", "parameters": {STIFFNESS: ("1 N/cm", "1.1 N/cm")}}
+    setup = prepare_sensitivity(spec.replace({"sensitivity": block}))
+    (metric,) = setup.study.metrics
+    assert (metric.label, metric.dimension) == ("force_max over 1 ... 10 deg", "torque")
+    assert np.isfinite(setup.nominal.values).all()
+
+
+def test_a_branch_that_a_family_cannot_have_is_refused_with_those_it_has(tmp_path):
+    assert set(cfmkit.analyze(CAM).curve.branches) == set(family("cam").branches)
+    told = "there is no branch 'lod'; there are 'load', 'unload'"
+    with pytest.raises(UsageError, match=told):
+        metrics_of(CAM, ["force_ripple[lod]"])
+    text = cfmkit.dumps(CAM).replace("metric: force_ripple", 'metric: "force_ripple[lod]"')
+    assert "[lod]" in text
+    with pytest.raises(SpecError, match=told):
+        cfmkit.loads(text)
+
+
+def test_default_columns_of_a_torque_are_torques():
+    work = prepare(TORQUE, Request(vary=(wish(f"{STIFFNESS}=[1 N/cm, 1.1 N/cm]"),)))
+    sample = sample_curve(TORQUE, work.plan, False)
+    assert sample.kind == "torque"
+    own = values_of_family(family("slider-crank").values)
+    assert {*work.study.names} <= {item.name for item in definitions("torque", own)}
