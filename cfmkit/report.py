@@ -181,6 +181,8 @@ def files(report: Report, plots: bool = True) -> Iterator[tuple[str, bytes]]:
         from cfmkit.tables import curve_table, to_csv
 
         yield "curve.csv", to_csv(curve_table(curves))
+        for stem, table in result.tables.items():
+            yield f"{stem}.csv", to_csv(table())
     yield "metrics.json", json_bytes(report.as_json())
     yield "resolved.yaml", api.dumps(api.resolve(result.spec), complete=True).encode()
     yield from sources(result.spec)

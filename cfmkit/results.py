@@ -14,10 +14,11 @@ from typing import TYPE_CHECKING, Any
 from cfmkit.errors import ExitCode
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
 
     from cfmkit.curves import Curve
     from cfmkit.spec import Spec
+    from cfmkit.tables import Table
 
 
 class Status(Enum):
@@ -108,6 +109,8 @@ class Result:
         Motion of the pose that the band ranges are measured around [m or rad].
     allowable_stress : float, optional
         What the column ``max_stress`` is compared with [Pa].
+    tables : mapping
+        More files of a run, by stem: what makes the table of each, ``adjustability`` for adjustability.csv.
     state : Any
         What the family's drawing functions need; not part of the public interface.
     """
@@ -122,6 +125,7 @@ class Result:
     target: float | None = None
     reference: float | None = None
     allowable_stress: float | None = None
+    tables: Mapping[str, Callable[[], Table]] = field(default_factory=dict)
     state: Any = None
 
     def __post_init__(self) -> None:

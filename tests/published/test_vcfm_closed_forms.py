@@ -18,7 +18,7 @@ from cfmkit.families.vcfm.strip import Strip
 
 
 def test_diamond_is_twice_as_stiff_as_the_paper_counts():
-    """Eq. 15 as printed gives 1.622122 and eq. 19 1.631369, one chain of the right diamond 1.601138, the whole 3.2023."""
+    """Eq. 15 as printed gives 1.622122, eq. 19 gives 1.631369, one chain has 1.601138 and the whole diamond 3.2023."""
     assert truss.printed_diamond_stiffness(side()) == pytest.approx(1.622122, abs=5e-7)
     assert truss.TrussDiamond(side(), 0.5).stiffness == pytest.approx(1.631369, abs=5e-7)
     assert springs.Diamond(side(), 0.5).stiffness == pytest.approx(1.601138, abs=5e-7)
@@ -92,7 +92,7 @@ def test_force_of_a_leaf_in_tension():
 
 
 def test_stress_of_a_buckled_leaf():
-    """The exact column (17.584, 20.888, 22.138, 22.19 MPa) is up to 0.5 % lower; flat, the closed form gives 22.2225."""
+    """The exact values (17.584, 20.888, 22.138, 22.19 MPa) are up to 0.5 % lower."""
     strip = leaf()
     found = vbeam.VBeam(strip).stress(np.array([2.0, 3.0, 4.0, strip.rise]))
     assert found == pytest.approx([17.66, 20.97, 22.23, 22.28], abs=6e-3)
@@ -101,7 +101,7 @@ def test_stress_of_a_buckled_leaf():
 
 
 def test_truss_law_of_a_leaf_and_its_error():
-    """The bar's peak is 36 % above that of the leaf and at twice the travel; its steepest slope is 2.76 times as steep."""
+    """The bar's peak is 36 % above that of the leaf, at twice the travel; its steepest slope is 2.76 times as steep."""
     bar, travel = truss.TrussLeaf(leaf()), np.linspace(0, 4.3, 430001)
     force = bar.force(travel)
     assert bar.force(1.80) == pytest.approx(3.086970, abs=6e-7)

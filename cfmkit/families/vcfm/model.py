@@ -8,7 +8,7 @@ carry nothing and the spring alone decides: F = K_p (h + dr), whatever their num
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,6 +17,7 @@ from cfmkit.curves import Column, Curve
 from cfmkit.families.vcfm.checks import findings_of
 from cfmkit.families.vcfm.parts import parts
 from cfmkit.families.vcfm.samples import LawSampler
+from cfmkit.families.vcfm.tables import adjustability, readings
 from cfmkit.families.vcfm.values import values_of
 from cfmkit.families.vcfm.windows import longest_window
 from cfmkit.results import Result, Status
@@ -73,7 +74,8 @@ class Push:
         own = self.force[(self.travel > low) & (self.travel < high)]
         ends = np.interp([low, high], self.travel, self.force, left=np.nan, right=np.nan)
         found = np.concatenate([ends[:1], own, ends[1:]])
-        return found[np.isfinite(found)]
+        known: FloatArray = found[np.isfinite(found)]
+        return known
 
 
 @dataclass(frozen=True)
@@ -138,6 +140,7 @@ def analyze(spec: VcfmSpec, run: Run) -> Result:
         valid=_valid(solution),
         target=spec.design.force if spec.design else None,
         allowable_stress=spec.mechanism.material.allowable,
+        tables={"adjustability": partial(adjustability, solution), "readings": partial(readings, solution)},
         state=solution,
     )
 
@@ -173,7 +176,8 @@ def _bisected(sampler: Sampler, preload: float, low: float, high: float) -> floa
     for _ in range(52):
         middle = np.array([0.5 * (low + high)])
         force = sampler.leaves(middle).force + sampler.spring(middle + preload)[0]
-        low, high = (float(middle[0]), high) if force[0] < 0 else (low, float(middle[0]))
+        # no value: farther back than the leaves were followed, where they pull still harder
+        low, high = (low, float(middle[0])) if force[0] >= 0 else (float(middle[0]), high)
     return 0.5 * (low + high)
 
 
