@@ -75,7 +75,8 @@ def test_a_config_solves_and_meets_its_requirements(path):
 
 @every_config
 @pytest.mark.parametrize("complete", [False, True])
-def test_a_config_round_trips_through_yaml(path, complete):
+def test_a_config_round_trips_through_yaml(path, complete, monkeypatch):
+    monkeypatch.chdir(path.parent)  # data files that a text names are sought here
     spec = cfmkit.load(path)
     assert cfmkit.loads(cfmkit.dumps(spec, complete)) == spec
     resolved = api.resolve(spec)
@@ -106,7 +107,8 @@ def test_the_same_spec_gives_the_same_result(path):
 
 
 @every_config
-def test_the_resolved_spec_gives_the_same_result(path):
+def test_the_resolved_spec_gives_the_same_result(path, monkeypatch):
+    monkeypatch.chdir(path.parent)
     result = api.analyze(cfmkit.load(path))
     again = api.analyze(cfmkit.loads(cfmkit.dumps(result.spec, complete=True)))
     assert again.spec == result.spec

@@ -50,6 +50,27 @@ def test_exact_points_give_the_forces_of_the_design(tmp_path):
     assert found.values["registration_angle"].value == pytest.approx(np.radians(-0.3), abs=1e-12)
 
 
+def test_a_measured_cam_has_the_values_of_any_cam_and_says_when_springs_and_friction_do_not_allow_it(tmp_path):
+    exact, designed = built(tmp_path, Errors(), "0.000000001 mm"), cfmkit.load(tmp_path / "cam.yaml")
+    designed = cfmkit.analyze(designed.replace({"mechanism.profile.file": None, "mechanism.profile.noise": None}))
+    for name in ("force_constant", "spring_stiffness", "theoretical_force"):
+        assert exact.values[name].value == pytest.approx(designed.values[name].value, rel=1e-12), name
+    stretched = np.interp(exact.curve.motion[:481], designed.curve.motion[:481],
+                          designed.curve.extra["spring_elongation"].values[:481]).max()  # fmt: skip
+    assert exact.values["spring_elongation_max"].value == pytest.approx(stretched, rel=1e-5)
+    assert exact.values["contact_force_max"].value == pytest.approx(
+        max(exact.curve.extra["contact_force_right"].values), rel=1e-9
+    )
+    spec = spec_of(tmp_path).replace({"mechanism.springs.max_elongation": 0.09, "mechanism.rolling_friction": 0.6})
+    found = {item.name: item.message for item in cfmkit.analyze(spec).warnings}
+    assert found["spring_overstretched"].startswith(
+        "the springs are stretched by 99.31 mm"
+    )
+    assert "friction (0.6) holds a roller at" in found["up_jam"]
+    long = spec_of(tmp_path).replace({"mechanism.rest_half_width": 0.08, "mechanism.profile.rest_half_width": 0.068})
+    assert "spring_slack" in {item.name for item in cfmkit.analyze(long).warnings}
+
+
 def test_the_parts_of_the_force_add_up_to_it(tmp_path):
     write(tmp_path, measured(Errors(waviness=0.01e-3, noise=0.001e-3)))
     spec = spec_of(tmp_path).replace({"mechanism.rest_half_width": 0.06825, "mechanism.profile.rest_half_width": 0.068})

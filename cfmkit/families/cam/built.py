@@ -26,12 +26,15 @@ from cfmkit.errors import DataError
 from cfmkit.families.cam.build import Assembly, CannotBuild, assemble, displacement_origin
 from cfmkit.families.cam.built_values import findings_of_built, values_of_built
 from cfmkit.families.cam.findings import finding, mm
+from cfmkit.families.cam.values import DEFINITIONS, design_values, largest
 from cfmkit.numerics.registration import Registration, gaps_across, register
-from cfmkit.results import Result, Status
+from cfmkit.results import Quantity, Result, Status
 from cfmkit.tables.labpoints import read_sides
 from cfmkit.tables.source import DataSource
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from cfmkit.curves import FloatArray
     from cfmkit.families.cam.spec import CamSpec
     from cfmkit.families.cam.statics import Loads
@@ -106,6 +109,16 @@ class Built:
     shares: dict[str, FloatArray]
     origin: float
 
+    @property
+    def elongation(self) -> FloatArray:
+        """Elongation of the springs, (n,) [m]."""
+        return self.sides.x[0] + self.sides.x[1] - 2.0 * self.assembly.loads.rest_half_width
+
+    def forces(self, way: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return the force on the slider and at both contacts on the way up (1) or down (-1), each (n,) [N]."""
+        loads, friction = self.assembly.loads, self.assembly.spec.mechanism.rolling_friction
+        return self.sides.forces(loads, way * friction, loads.rest_half_width)
+
 
 def analyze_built(spec: CamSpec) -> Result:
     """Return the loop of a cam whose flanks were measured.
@@ -132,7 +145,7 @@ def analyze_built(spec: CamSpec) -> Result:
         status=Status.PARTIAL if short else Status.COMPLETE,
         message=short,
         curves=(_curve(built),),
-        values=values_of_built(built),
+        values=_values(built),
         warnings=tuple(found),
         valid=((float(travel[0]) + built.origin, float(travel[-1]) + built.origin),),
         target=spec.design.force if spec.design else float(built.shares["design"][-1]),
@@ -239,20 +252,31 @@ def shares_of(assembly: Assembly, designed: Sides, sides: Sides) -> dict[str, Fl
     }
 
 
+def _values(built: Built) -> Mapping[str, Quantity]:
+    """Return the scalar results: those of any cam, and those of a measured one."""
+    (up, *pressed_up), (down, *pressed_down) = built.forces(1.0), built.forces(-1.0)
+    known = np.isfinite(up) & np.isfinite(down) & (up + down > 0)
+    numbers = design_values(built.assembly) | {
+        "spring_elongation_max": float(built.elongation.max()),
+        "contact_force_max": largest(*pressed_up, *pressed_down),
+        "friction_half_gap_max": largest(((up - down) / (up + down))[known]),
+    }
+    shared = {name: Quantity(value, *DEFINITIONS[name]) for name, value in numbers.items()}
+    return shared | dict(values_of_built(built))
+
+
 def _curve(built: Built) -> Curve:
     """Return the closed loop with the parts of the force."""
-    loads, friction = built.assembly.loads, built.assembly.spec.mechanism.rolling_friction
-    up, down = (built.sides.forces(loads, mu, loads.rest_half_width) for mu in (friction, -friction))
+    up, down = built.forces(1.0), built.forces(-1.0)
 
     def loop(one: FloatArray, other: FloatArray | None = None) -> FloatArray:
         return np.concatenate([one, (one if other is None else other)[::-1]])
 
     shares = built.shares
-    elongation = built.sides.x[0] + built.sides.x[1] - 2.0 * loads.rest_half_width
     extra = {
         "contact_force_right": Column(loop(up[1], down[1]), "force"),
         "contact_force_left": Column(loop(up[2], down[2]), "force"),
-        "spring_elongation": Column(loop(elongation), "length"),
+        "spring_elongation": Column(loop(built.elongation), "length"),
         "roller_x_right": Column(loop(built.sides.x[0]), "length"),
         "roller_x_left": Column(loop(built.sides.x[1]), "length"),
         "force_of_design": Column(loop(shares["design"]), "force"),

@@ -105,12 +105,34 @@ def half_extent(built: Built) -> float:
 
 def findings_of_built(built: Built) -> list[Finding]:
     """Return what the user must know about the measured profile."""
-    found = [*_weak(built), *_doubtful_points(built)]
+    found = [*_mechanics(built), *_weak(built), *_doubtful_points(built)]
     last = built.assembly.stroke
     if built.travel[-1] < last * (1 - 1e-9) or built.travel[0] > 0:
         span = f"{mm(float(built.travel[0]))} to {mm(float(built.travel[-1]))}"
         found.append(finding("part_measured", f"the flanks were measured for {span} of travel only, of {mm(last)}"))
     return found
+
+
+def _mechanics(built: Built) -> Iterator[Finding]:
+    """Yield what is wrong with the mechanism that the measured cam is built into."""
+    limit, longest = built.assembly.spec.mechanism.springs.max_elongation, float(built.elongation.max())
+    if limit and longest > limit * (1 + 1e-9):
+        past = float(built.travel[np.argmax(built.elongation > limit)])
+        yield finding(
+            "spring_overstretched",
+            f"the springs are stretched by {mm(longest)}, their limit is {mm(limit)}, reached at {mm(past)} of travel",
+        )
+    if (slack := built.elongation < 0).any():
+        last = float(built.travel[slack][-1])
+        yield finding("spring_slack", f"the springs carry nothing up to {mm(last)} of travel: they are too long")
+    held = ~np.isfinite(built.forces(1.0)[0])
+    if held.any():
+        friction, places = built.assembly.spec.mechanism.rolling_friction, built.travel[held]
+        yield finding(
+            "up_jam",
+            f"on the way up friction ({friction:g}) holds a roller at {int(held.sum())} of {len(held)} points, from "
+            f"{mm(float(places[0]))} to {mm(float(places[-1]))} of travel: no force moves the slider there",
+        )
 
 
 def _weak(built: Built) -> Iterator[Finding]:

@@ -65,28 +65,35 @@ def values_of(solution: Solution) -> Mapping[str, Quantity]:
     assembly = solution.assembly
     law = assembly.profile.path.law
     flank = ~solution.states.on_corner
-    numbers = {
-        "force_constant": law.force_constant,
-        "spring_stiffness": assembly.loads.stiffness,
-        "theoretical_force": theoretical_force(solution),
+    numbers: dict[str, float | None] = {
+        **design_values(assembly),
         "undercut_travel": solution.corner_travel,
         "roller_radius_max": float(law.curvature_radius(law.rest_half_width)),
         "force_constant_min": law.smallest_force_constant(assembly.profile.roller_radius),
         "corner_force_max": _corner_peak(solution),
         "jam_travel": next((high for low, high in solution.jams if low == 0), 0.0),
         "spring_elongation_max": float(solution.elongation.max()),
-        "contact_force_max": _largest(solution.up.contact, solution.down.contact),
-        "pressure_angle_max": _largest(solution.pressure_angle[flank]),
+        "contact_force_max": largest(solution.up.contact, solution.down.contact),
+        "pressure_angle_max": largest(solution.pressure_angle[flank]),
         "brace_angle_max": float(np.arcsin(solution.states.x.max() / assembly.track.brace_length)),
         "friction_half_gap_max": _half_gap(solution, flank),
     }
     if assembly.spec.mechanism.contact:
-        numbers["contact_pressure_max"] = _largest(contact_pressure(solution)[flank])
+        numbers["contact_pressure_max"] = largest(contact_pressure(solution)[flank])
     if solution.band is not None:
         shares = solution.band.deviations()
         numbers["manufacturing_force_share"] = float(np.median(shares))
         numbers["manufacturing_force_share_95"] = float(np.quantile(shares, 0.95))
     return {name: Quantity(value, *DEFINITIONS[name]) for name, value in numbers.items()}
+
+
+def design_values(assembly: Assembly) -> dict[str, float]:
+    """Return what the profile and the springs say by themselves, by name."""
+    return {
+        "force_constant": assembly.profile.path.law.force_constant,
+        "spring_stiffness": assembly.loads.stiffness,
+        "theoretical_force": constant_force(assembly),
+    }
 
 
 def theoretical_force(solution: Solution) -> float:
@@ -121,7 +128,8 @@ def contact_pressure(solution: Solution) -> FloatArray:
     return np.where(solution.states.on_corner, np.nan, pressure)
 
 
-def _largest(*arrays: FloatArray) -> float | None:
+def largest(*arrays: FloatArray) -> float | None:
+    """Return the largest finite value of all arrays; None if there is none."""
     finite = [array[np.isfinite(array)] for array in arrays]
     return max((float(array.max()) for array in finite if array.size), default=None)
 
@@ -129,7 +137,7 @@ def _largest(*arrays: FloatArray) -> float | None:
 def _half_gap(solution: Solution, flank: NDArray[np.bool_]) -> float | None:
     up, down = solution.up.slider, solution.down.slider
     usable = flank & np.isfinite(up) & np.isfinite(down) & (up + down > 0)
-    return _largest(((up - down) / np.where(usable, up + down, 1.0))[usable])
+    return largest(((up - down) / np.where(usable, up + down, 1.0))[usable])
 
 
 def _corner_peak(solution: Solution) -> float | None:
