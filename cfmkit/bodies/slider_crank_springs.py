@@ -59,7 +59,7 @@ class UnitCurves:
     bend: FloatArray | None = None
 
 
-def along_crank(linkage: Linkage, unloaded: float, angle: FloatArray) -> UnitCurves:
+def along_crank(linkage: Linkage, unloaded: float, angle: FloatArray, bend: bool = False) -> UnitCurves:
     """Return the unit curves over the crank angle: effort is a torque at the crank [LH, eq. 10].
 
     Differences from the unloaded position are formed without cancellation. NaN where the
@@ -73,6 +73,8 @@ def along_crank(linkage: Linkage, unloaded: float, angle: FloatArray) -> UnitCur
         Crank angle at which all springs are relaxed [rad].
     angle : (n,) array
         Crank angles [rad], any number of turns.
+    bend : bool
+        Whether the second derivative of the effort is wanted, too.
     """
     r1, r2, way = linkage.crank, linkage.coupler, linkage.branch
     angle = np.asarray(angle, dtype=np.float64)
@@ -84,18 +86,19 @@ def along_crank(linkage: Linkage, unloaded: float, angle: FloatArray) -> UnitCur
         level = way * np.abs(level)
         b1 = -r1 * cosine / (r2 * level)
         b2 = (r1 * sine / r2 + rise * b1**2) / level
-        b3 = (r1 * cosine / r2 + level * b1**3 + 3.0 * rise * b1 * b2) / level
         x1 = -r1 * sine - r2 * rise * b1
         x2 = -r1 * cosine - r2 * (level * b1**2 + rise * b2)
-        x3 = r1 * sine + r2 * (rise * b1**3 - 3.0 * level * b1 * b2 - rise * b3)
         one, zero = np.ones_like(angle), np.zeros_like(angle)
         first = np.stack([one, b1 - 1.0, b1, x1])
         second = np.stack([zero, b2, b2, x2])
-        third = np.stack([zero, b3, b3, x3])
         effort = turn * first
         stiffness = first**2 + turn * second
-        bend = 3.0 * first * second + turn * third
-    return UnitCurves(angle, position, turn, effort, stiffness, bend)
+        if not bend:
+            return UnitCurves(angle, position, turn, effort, stiffness)
+        b3 = (r1 * cosine / r2 + level * b1**3 + 3.0 * rise * b1 * b2) / level
+        x3 = r1 * sine + r2 * (rise * b1**3 - 3.0 * level * b1 * b2 - rise * b3)
+        third = np.stack([zero, b3, b3, x3])
+        return UnitCurves(angle, position, turn, effort, stiffness, 3.0 * first * second + turn * third)
 
 
 def crank_torques(linkage: Linkage, unloaded: float, angle: FloatArray) -> FloatArray:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from cfmkit.families.base import Family
 from cfmkit.families.slider_crank.build import resolve
 from cfmkit.families.slider_crank.classes import CLASSES
+from cfmkit.families.slider_crank.design import design
 from cfmkit.families.slider_crank.findings import FINDINGS
 from cfmkit.families.slider_crank.model import analyze
 from cfmkit.families.slider_crank.spec import SliderCrankSpec
@@ -15,6 +16,7 @@ FAMILY = Family(
     summary="a crank, a coupler and a slider with a spring at each joint: constant torque or force",
     spec_type=SliderCrankSpec,
     analyze=analyze,
+    design=design,
     values=DEFINITIONS,
     words={"stiffness_class": CLASSES},
     resolve=resolve,

@@ -160,10 +160,11 @@ def assemble(spec: SliderCrankSpec) -> Assembly:
     springs = mechanism.springs
     rates = np.array([springs.pivot, springs.crank_pin, springs.slider_pin, springs.slider]) * mechanism.legs
     rates.setflags(write=False)
-    return Assembly(linkage, unloaded, rates, analysis.drive, _side(spec, linkage, unloaded))
+    return Assembly(linkage, unloaded, rates, analysis.drive, side_of(spec, linkage, unloaded))
 
 
-def _side(spec: SliderCrankSpec, linkage: Linkage, unloaded: float) -> int:
+def side_of(spec: SliderCrankSpec, linkage: Linkage, unloaded: float) -> int:
+    """Return 1 for a crank that is beyond the stretched position when a force drives, -1 for one before it."""
     if spec.analysis.side is not None:
         beyond = 1 if spec.analysis.side == "beyond" else -1
     else:

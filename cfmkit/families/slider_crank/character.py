@@ -30,6 +30,10 @@ GRID = 1025
 """Places of the grid. Efforts between them are cubics; classes change within 1e-9 of where they should."""
 
 
+EDGE = 1.0 + 1e-9
+"""An effort on the edge of a band is inside it, whatever the last bits say."""
+
+
 @dataclass(frozen=True)
 class Equilibrium:
     """A place where nothing needs to hold the mechanism.
@@ -76,7 +80,9 @@ class Character:
         """The effort on the grid and at its turning points, as one of one curves."""
         units = self.assembly.units(self.grid)
         rates = self.assembly.rates
-        return monotone(self.grid, _weighed(rates, units.effort), _weighed(rates, units.stiffness))
+        cut = monotone(self.grid, _weighed(rates, units.effort), _weighed(rates, units.stiffness))
+        # The cubics say where to look; the values are those of the closed form.
+        return Monotone(cut.place, _weighed(rates, self.assembly.units(cut.place[0]).effort))
 
     @cached_property
     def grid(self) -> FloatArray:
@@ -168,9 +174,9 @@ class Character:
             return None
 
         def excess(motion: float) -> float:
-            return abs(self.effort(motion) / level - 1.0) - tolerance
+            return abs(self.effort(motion) / level - 1.0) - tolerance * EDGE
 
-        place, outside = self.curve.place[0], np.abs(self.curve.value[0] / level - 1.0) > tolerance
+        place, outside = self.curve.place[0], np.abs(self.curve.value[0] / level - 1.0) > tolerance * EDGE
         left, right = np.flatnonzero(outside & (place < reference)), np.flatnonzero(outside & (place > reference))
         low = self._edge(excess, place[left[-1]], reference) if len(left) else float(place[0])
         high = self._edge(excess, place[right[0]], reference) if len(right) else float(place[-1])

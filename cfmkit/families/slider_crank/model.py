@@ -141,9 +141,17 @@ def analyze(spec: SliderCrankSpec, run: Run) -> Result:
         curves=(_curve(solution),),
         values=values_of(solution),
         warnings=(*shortfalls, *findings_of(spec, solution)),
+        target=target_of(spec),
         reference=solution.reference,
         state=solution,
     )
+
+
+def target_of(spec: SliderCrankSpec) -> float | None:
+    """Return what the effort is to be [N m or N]; None where the design says nothing about this drive."""
+    if spec.design is None:
+        return None
+    return spec.design.torque if spec.analysis.drive == "torque" else spec.design.force
 
 
 def asked_motion(spec: SliderCrankSpec, assembly: Assembly) -> tuple[float, float]:

@@ -21,7 +21,8 @@ if TYPE_CHECKING:
     from cfmkit.curves import FloatArray
     from cfmkit.families.slider_crank.build import Assembly
 
-SAMPLES = 2001
+SAMPLES, AROUND = 1001, 101
+"""Places of the first look, and of each closer one around the highest of them."""
 
 
 def scale_factors(assembly: Assembly, low: float, high: float) -> tuple[float, float] | None:
@@ -63,8 +64,8 @@ def _needed(torsion: FloatArray, slider: FloatArray, sign: FloatArray) -> FloatA
 
 def _highest(function: Callable[[FloatArray], FloatArray], low: float, high: float) -> float:
     """Return the largest value in an interval: on a grid, then on ever finer ones around its highest place."""
-    for _ in range(5):
-        places = np.linspace(low, high, SAMPLES)
+    for count in (SAMPLES, AROUND, AROUND, AROUND):
+        places = np.linspace(low, high, count)
         values = function(places)
         top = int(np.argmax(values))
         best, step = float(values[top]), places[1] - places[0]

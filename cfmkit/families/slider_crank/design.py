@@ -1,0 +1,196 @@
+"""From targets to springs, and to lengths where the design may choose them.
+
+The effort is linear in the springs' rates: with the lengths given, the best rates are the solution of a linear
+programme or of a least-squares problem. Lengths are searched outside of that, on a grid
+and then inside its best cell, the unloaded position's lead on a logarithmic scale.
+
+Reference
+---------
+[LH] B. Li, G. Hao, Chin. J. Mech. Eng. 32 (2019) 10.1186/s10033-019-0369-z, sec. 6.
+[B] P. Bilancia, A. Geraci, G. Berselli, SMASIS2019-5519, sec. 2.1.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.bodies.slider_crank_springs import JOINTS
+from cfmkit.families.slider_crank.build import CannotBuild, resolve
+from cfmkit.families.slider_crank.family_of_optima import alternatives, chosen_rates, even_best
+from cfmkit.families.slider_crank.findings import finding
+from cfmkit.families.slider_crank.rates import least_squares, minimax
+from cfmkit.families.slider_crank.solved import (
+    Infeasible,
+    Solved,
+    about_springs,
+    active_bounds,
+    cannot_hold,
+    check_reach,
+    message,
+    not_proven,
+    nowhere,
+    too_far,
+)
+from cfmkit.families.slider_crank.targets import DENSE, FREE, Task, plain_assembly, with_lengths
+from cfmkit.families.slider_crank.windows import widest
+from cfmkit.numerics.boxes import Axis, Lowest, lowest
+from cfmkit.results import Design, Status
+
+if TYPE_CHECKING:
+    from cfmkit.families.base import Run
+    from cfmkit.families.slider_crank.spec import CrankDesign, SliderCrankSpec
+
+
+EFFORT = {"least-squares": (15, 30), "minimax": (11, 14), "widest": (5, 10)}
+"""Values of each free length on the grid, and around its best: a least-squares problem costs the least."""
+
+
+def design(spec: SliderCrankSpec, run: Run) -> Design:
+    """Return a complete specification with the springs, and the lengths left free, that meet the `design` block best.
+
+    Parameters
+    ----------
+    spec : SliderCrankSpec
+        With a `design` block.
+    run : Run
+        Only its progress is used: the search is deterministic.
+
+    Returns
+    -------
+    Design
+        INFEASIBLE, with the reason and what would be feasible, if nothing keeps the tolerance.
+    """
+    wanted = spec.design
+    if wanted is None:
+        return Design(None, Status.INVALID, "this spec has no 'design' block: add 'torque' or 'force', and a window")
+    try:
+        solved, search = _searched(spec, wanted, run)
+    except (Infeasible, CannotBuild) as problem:
+        nearest = problem.nearest if isinstance(problem, Infeasible) else {}
+        told = problem.finding
+        return Design(None, Status.INFEASIBLE, told.message, nearest_feasible=nearest, warnings=(told,))
+    warnings = (*about_springs(solved), *alternatives(solved, search))
+    if wanted.window is None:
+        warnings = (*warnings, not_proven(solved))
+    return Design(_written(solved), Status.COMPLETE, message(solved), active_bounds(solved, wanted), warnings=warnings)
+
+
+def _searched(spec: SliderCrankSpec, wanted: CrankDesign, run: Run) -> tuple[Solved, Lowest | None]:
+    """Return the best design, and the search that led to its lengths."""
+    axes = {name: _axis(name, getattr(wanted, name)) for name in FREE if getattr(wanted, name) is not None}
+    if not axes:
+        task = Task(spec, plain_assembly(spec.mechanism, spec))
+        return solve(task), None
+
+    count = 0
+
+    def height(place: tuple[float, ...]) -> float:
+        nonlocal count
+        count += 1
+        run.progress(1.0 - 1.0 / (1.0 + count / 200.0), f"{count} choices of lengths")
+        return _height(spec, dict(zip(axes, place, strict=True)))
+
+    grid, fine = EFFORT["widest" if wanted.window is None else wanted.objective]
+    found = lowest(height, tuple(axes.values()), grid if len(axes) < 3 else min(grid, 7), fine)
+    if not math.isfinite(found.value):
+        text = "no lengths in the ranges given reach the window within the limits of the joints; widen the ranges"
+        raise Infeasible(finding("infeasible_targets", text))
+    place = even_best(spec, tuple(axes), found) if wanted.slack else found.place
+    lengths = dict(zip(axes, place, strict=True))
+    changed = with_lengths(spec, lengths)
+    return solve(Task(changed, plain_assembly(changed.mechanism, changed))), found
+
+
+def _axis(name: str, ends: tuple[float, float]) -> Axis:
+    return Axis(*ends, log=name != "offset")
+
+
+def _height(spec: SliderCrankSpec, lengths: dict[str, float]) -> float:
+    """Return what a choice of lengths is judged by: the deviation, or the width of the window with a minus."""
+    changed = with_lengths(spec, lengths)
+    try:
+        task = Task(changed, plain_assembly(changed.mechanism, changed))
+    except CannotBuild:
+        return math.inf
+    wanted = task.wanted
+    if wanted.window is None:
+        found = widest(task, wanted.tolerance or 0.0)
+        return math.inf if found is None else -found.width
+    first, last = task.allowed
+    if wanted.window[0] < first - 1e-9 or wanted.window[1] > last + 1e-9:
+        return math.inf
+    goal = task.goal(wanted.window)
+    if goal is None:
+        return math.inf
+    if wanted.objective == "least-squares":
+        return goal.rms(least_squares(goal))
+    rates = minimax(goal)
+    return math.inf if rates is None else goal.deviation(rates)
+
+
+def solve(task: Task) -> Solved:
+    """Return the best springs for given lengths.
+
+    Raises
+    ------
+    Infeasible
+        If nothing keeps the tolerance, or the window cannot be reached.
+    """
+    wanted = task.wanted
+    if wanted.window is None:
+        found = widest(task, wanted.tolerance or 0.0)
+        if found is None:
+            raise Infeasible(nowhere(task))
+        window = found.low, found.high
+    else:
+        window = wanted.window
+        check_reach(task, window)
+    goal = task.goal(window, None if wanted.objective == "least-squares" else DENSE)
+    if goal is None:
+        text = "in the window the effort has no bound: a dead point, or the stretched position, lies in it"
+        raise Infeasible(finding("infeasible_targets", text))
+    rates = least_squares(goal) if wanted.objective == "least-squares" else minimax(goal)
+    if rates is None:
+        raise Infeasible(cannot_hold(task))
+    if wanted.slack:
+        rates = chosen_rates(goal, rates, wanted)
+    deviation = goal.deviation(rates)
+    if wanted.window is not None and wanted.tolerance is not None and deviation > wanted.tolerance:
+        raise Infeasible(*too_far(task, deviation))
+    return Solved(task, window, rates, deviation, goal.rms(rates))
+
+
+def _written(solved: Solved) -> SliderCrankSpec:
+    """Return the spec with springs and lengths written in, and an analysis that looks where the design did."""
+    spec, wanted = resolve(solved.task.spec), solved.task.wanted
+    springs = spec.mechanism.springs.model_copy(update=dict(zip(JOINTS, solved.rates.tolist(), strict=True)))
+    mechanism = spec.mechanism.model_copy(update={"springs": springs})
+    if any(getattr(wanted, name) is not None for name in ("crank_length", "offset")):
+        mechanism = solved.task.spec.mechanism.model_copy(update={"springs": springs})
+    drive = "torque" if wanted.torque is not None else "force"
+    name = "reference_angle" if drive == "torque" else "reference_travel"
+    analysis = spec.analysis.model_copy(update={"drive": drive, name: _reference(solved)})
+    return spec.model_copy(update={"mechanism": mechanism, "analysis": analysis})
+
+
+def _reference(solved: Solved) -> float:
+    """Return the place nearest to the middle of the window at which the effort is exactly the target."""
+    from cfmkit.numerics.roots import bracketed_root
+
+    low, high = solved.window
+    places = np.linspace(low, high, DENSE)
+    legs, target = solved.task.spec.mechanism.legs, solved.task.wanted.target
+    unit = solved.task.assembly
+    offset = solved.rates @ unit.units(places).effort * legs - target
+    change = np.flatnonzero(np.isfinite(offset[:-1]) & (offset[:-1] * offset[1:] <= 0.0))
+    if not len(change):
+        return 0.5 * (low + high)
+    at = int(change[np.argmin(np.abs(places[change] - 0.5 * (low + high)))])
+
+    def off(motion: float) -> float:
+        return float(solved.rates @ unit.units(np.array([motion])).effort[:, 0]) * legs - target
+
+    return bracketed_root(off, float(places[at]), float(places[at + 1]))

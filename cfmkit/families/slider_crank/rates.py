@@ -1,0 +1,208 @@
+"""Rates of springs, none negative, that make a sum of unit curves follow a goal: the problem is linear in them.
+
+Smallest largest deviation is a linear programme (solved by HiGHS), smallest root mean square is a
+least-squares problem with bounds. Which other rates are as good is one more linear programme a spring.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from cfmkit.curves import FloatArray
+
+
+@dataclass(frozen=True)
+class Goal:
+    """What the springs are to add up to, in units of the target.
+
+    Attributes
+    ----------
+    matrix : (n, m) array
+        What a rate of 1 gives at each of n places, over the target.
+    wanted : (n,) array
+        1 for a constant; something sloping for a stiffness.
+    upper : (m,) array
+        Largest rates, perhaps infinite; zero for a spring that may not be used.
+    held : tuple of (m,) array and float, or None
+        A row and what it must give exactly.
+    """
+
+    matrix: FloatArray
+    wanted: FloatArray
+    upper: FloatArray
+    held: tuple[FloatArray, float] | None = None
+
+    def residual(self, rates: FloatArray) -> FloatArray:
+        """Return the deviations from the goal, as fractions of the target."""
+        residual: FloatArray = self.matrix @ rates - self.wanted
+        return residual
+
+    def deviation(self, rates: FloatArray) -> float:
+        """Return the largest deviation."""
+        return float(np.abs(self.residual(rates)).max())
+
+    def rms(self, rates: FloatArray) -> float:
+        """Return the root mean square of the deviations."""
+        return float(np.sqrt(np.mean(self.residual(rates) ** 2)))
+
+    def scales(self) -> FloatArray:
+        """Return what makes the columns equally large; 1 for one that is zero."""
+        size = np.abs(self.matrix).max(axis=0)
+        scales: FloatArray = np.where(size > 0.0, size, 1.0)
+        return scales
+
+    def at(self, rows: Sequence[int] | FloatArray) -> Goal:
+        """Return the goal at some of the places."""
+        index = np.asarray(rows)
+        return replace(self, matrix=self.matrix[index], wanted=self.wanted[index])
+
+
+ALL, FEW = 128, 25
+"""So many places the linear programme takes at once; of more it starts with few, and adds those where it fails."""
+
+
+def minimax(goal: Goal) -> FloatArray | None:
+    """Return the rates with the smallest largest deviation; None if `held` cannot be met.
+
+    Solved on a few places, to which the worst of the others are added until none is worse.
+    """
+    count = len(goal.wanted)
+    rows = np.unique(np.linspace(0, count - 1, count if count <= ALL else FEW).round().astype(int))
+    while True:
+        found = _minimax(goal.at(rows))
+        if found is None:
+            return None
+        rates, deviation = found
+        residual = np.abs(goal.residual(rates))
+        worse = _peaks(residual, deviation * (1 + 1e-9) + 1e-15)
+        more = np.union1d(rows, worse)
+        if len(more) == len(rows):
+            return rates
+        rows = more
+
+
+def _peaks(residual: FloatArray, level: float) -> Any:
+    """Return where deviations above a level are largest among their neighbours."""
+    padded = np.concatenate([[-1.0], residual, [-1.0]])
+    top = (padded[1:-1] >= padded[:-2]) & (padded[1:-1] >= padded[2:]) & (residual > level)
+    return np.flatnonzero(top)
+
+
+def _minimax(goal: Goal) -> tuple[FloatArray, float] | None:
+    count = goal.matrix.shape[1]
+    cost = np.zeros(count + 1)
+    cost[-1] = 1.0
+    solved = _solved(goal, cost, None)
+    return None if solved is None else (solved[:-1] / goal.scales(), float(solved[-1]))
+
+
+def _solved(goal: Goal, cost: FloatArray, worst: float | None) -> FloatArray | None:
+    """Return scaled rates, then the deviation, that minimise a cost; None if there are none.
+
+    Parameters
+    ----------
+    goal : Goal
+        m springs.
+    cost : (m + 1,) array
+        Of scaled rates and of the deviation.
+    worst : float or None
+        Largest deviation allowed.
+    """
+    from scipy.optimize import linprog
+
+    scales = goal.scales()
+    matrix = goal.matrix / scales
+    one = np.ones((len(goal.wanted), 1))
+    rows = np.vstack([np.hstack([matrix, -one]), np.hstack([-matrix, -one])])
+    bounds = [(0.0, None if np.isinf(top) else top) for top in goal.upper * scales]
+    equal: dict[str, Any] = {}
+    if goal.held is not None:
+        size = float(np.abs(goal.held[0] / scales).max()) or 1.0
+        equal = {"A_eq": np.append(goal.held[0] / scales, 0.0)[None] / size, "b_eq": [goal.held[1] / size]}
+    found = linprog(
+        cost,
+        A_ub=rows,
+        b_ub=np.concatenate([goal.wanted, -goal.wanted]),
+        bounds=[*bounds, (0.0, worst)],
+        method="highs",
+        **equal,
+    )
+    return None if found.status != 0 or found.x is None else np.maximum(found.x, 0.0)
+
+
+def least_squares(goal: Goal) -> FloatArray:
+    """Return the rates with the smallest root mean square of the deviations; `held` is not looked at."""
+    from scipy.optimize import lsq_linear, nnls
+
+    scales = goal.scales()
+    matrix = goal.matrix / scales
+    if np.isinf(goal.upper).all():
+        scaled, _ = nnls(matrix, goal.wanted)
+    else:
+        there = goal.upper > 0.0
+        scaled = np.zeros(len(scales))
+        found = lsq_linear(matrix[:, there], goal.wanted, (0.0, (goal.upper * scales)[there]), method="bvls", tol=1e-14)
+        scaled[there] = found.x
+    rates: FloatArray = scaled / scales
+    return rates
+
+
+def ranges(goal: Goal, worst: float) -> FloatArray:
+    """Return the smallest and the largest rate of each spring, (m, 2), with no deviation above `worst`."""
+    count = goal.matrix.shape[1]
+    found = np.full((count, 2), np.nan)
+    for k in range(count):
+        for end, sign in enumerate((1.0, -1.0)):
+            cost = np.zeros(count + 1)
+            cost[k] = sign
+            solved = _solved(goal, cost, worst)
+            if solved is not None:
+                found[k, end] = solved[k] / goal.scales()[k]
+    return found
+
+
+def preferred(goal: Goal, worst: float, rule: str) -> FloatArray | None:
+    """Return one of the rates with no deviation above `worst`: the softest, or the most even ones.
+
+    Parameters
+    ----------
+    goal : Goal
+        m springs, the last of them the slider's if there are four.
+    worst : float
+        Largest deviation allowed.
+    rule : {"soft-springs", "even-rates"}
+        Smallest sum of the springs' largest efforts; or the smallest sum of the differences of
+        the torsion rates from the largest of them.
+    """
+    count = goal.matrix.shape[1]
+    if rule == "soft-springs":
+        solved = _solved(goal, np.append(np.ones(count), 0.0), worst)
+        return None if solved is None else solved[:-1] / goal.scales()
+    return _most_even(goal, worst)
+
+
+def _most_even(goal: Goal, worst: float) -> FloatArray | None:
+    """Return the rates whose torsion springs differ least: one more unknown above all, one below all."""
+    from scipy.optimize import linprog
+
+    scales, torsion = goal.scales(), min(3, goal.matrix.shape[1])
+    usable = [k for k in range(torsion) if goal.upper[k] > 0.0]
+    unit = float(1.0 / scales[usable].max()) if usable else 1.0
+    count = goal.matrix.shape[1]
+    matrix = np.hstack([goal.matrix * unit, np.zeros((len(goal.wanted), 2))])
+    rows, right = [*matrix, *-matrix], [*(goal.wanted + worst), *(worst - goal.wanted)]
+    for k in usable:
+        above, below = np.zeros(count + 2), np.zeros(count + 2)
+        above[[k, count]], below[[k, count + 1]] = (1.0, -1.0), (-1.0, 1.0)
+        rows += [above, below]
+        right += [0.0, 0.0]
+    cost = np.concatenate([np.zeros(count), [1.0, -1.0]])
+    bounds = [*((0.0, None if np.isinf(top) else top / unit) for top in goal.upper), (0.0, None), (0.0, None)]
+    found = linprog(cost, A_ub=np.array(rows), b_ub=right, bounds=bounds, method="highs")
+    return None if found.status != 0 or found.x is None else np.maximum(found.x[:count], 0.0) * unit

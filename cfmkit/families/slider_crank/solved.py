@@ -1,0 +1,148 @@
+"""A design that was found, or why there is none, in the user's words."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from cfmkit.bodies.slider_crank_springs import JOINTS
+from cfmkit.families.slider_crank.findings import finding
+from cfmkit.families.slider_crank.targets import FREE
+from cfmkit.families.slider_crank.windows import widest
+from cfmkit.units import format_short
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from cfmkit.curves import FloatArray
+    from cfmkit.families.slider_crank.spec import CrankDesign
+    from cfmkit.families.slider_crank.targets import Task
+    from cfmkit.results import Finding
+
+
+@dataclass(frozen=True)
+class Solved:
+    """A design that was found.
+
+    Attributes
+    ----------
+    task : Task
+        With the lengths chosen.
+    window : tuple of (float, float)
+        Where the target is kept [rad or m].
+    rates : (4,) array
+        Of the springs of one leg [N m/rad; the last N/m].
+    deviation, rms : float
+        Largest and root mean square deviation, as fractions of the target.
+    """
+
+    task: Task
+    window: tuple[float, float]
+    rates: FloatArray
+    deviation: float
+    rms: float
+
+
+class Infeasible(Exception):
+    """Nothing meets the targets; carries the finding and what would be feasible."""
+
+    def __init__(self, found: Finding, nearest: Mapping[str, str] | None = None) -> None:
+        """Keep the reason and the nearest feasible values by path."""
+        self.finding, self.nearest = found, dict(nearest or {})
+        super().__init__(found.message)
+
+
+def check_reach(task: Task, window: tuple[float, float]) -> None:
+    """Refuse a window that linkage or joint limits do not allow."""
+    first, last = task.allowed
+    slack = 1e-9 * (window[1] - window[0])
+    if window[0] >= first - slack and window[1] <= last + slack:
+        return
+    dimension = "angle" if task.assembly.drive == "torque" else "length"
+    ends = [format_short(end, dimension) for end in (*window, first, last)]
+    text = (
+        f"the window {ends[0]} to {ends[1]} is not reached: linkage and limits of the joints allow {ends[2]} to "
+        f"{ends[3]}; ask for less, or change the lengths"
+    )
+    raise Infeasible(finding("infeasible_targets", text))
+
+
+def cannot_hold(task: Task) -> Finding:
+    """Return why a slope in the stretched position cannot be had."""
+    text = "no springs, none of them negative, have that slope in the stretched position within their largest rates"
+    if task.assembly.stretched <= task.assembly.start:
+        text += ": the unloaded position is not before it, where only positive slopes exist"
+    elif task.goal((task.assembly.start, task.assembly.stretched)) is not None and "slider" not in task.wanted.springs:
+        text += ": torsion springs alone have positive slopes; use the spring at the slider"
+    return finding("no_zero_stiffness", text)
+
+
+def nowhere(task: Task) -> Finding:
+    """Return why no window keeps the tolerance."""
+    if "slider" not in task.wanted.springs and task.assembly.drive == "torque":
+        text = "torsion springs alone give no constant torque next to the stretched position; use the slider's, too"
+        return finding("no_zero_stiffness", text)
+    return finding("infeasible_targets", "no window keeps the tolerance; allow more, or change the lengths")
+
+
+def too_far(task: Task, deviation: float) -> tuple[Finding, dict[str, str]]:
+    """Return that a window is too wide for its tolerance, and what would be feasible."""
+    wanted = task.wanted
+    nearest = {"design.tolerance": f"{100 * deviation:.4g} %"}
+    text = f"the best springs are off by {100 * deviation:.3g} %, and {100 * (wanted.tolerance or 0):.3g} % are allowed"
+    found = widest(task, wanted.tolerance or 0.0)
+    if found is not None:
+        name = "angle" if task.assembly.drive == "torque" else "travel"
+        dimension = "angle" if name == "angle" else "length"
+        low, high = (format_short(end, dimension) for end in (found.low, found.high))
+        nearest[f"design.{name}"] = f"[{low}, {high}]"
+        text += f"; a window that keeps it is {low} to {high}"
+    return finding("infeasible_targets", text), nearest
+
+
+def active_bounds(solved: Solved, wanted: CrankDesign) -> tuple[str, ...]:
+    """Return the paths of the design whose limit is reached."""
+    active = []
+    for name in FREE:
+        ends = getattr(wanted, name)
+        if ends is not None and getattr(solved.task.spec.mechanism, name) in ends:
+            active.append(f"design.{name}")
+    for name, rate in zip(JOINTS, solved.rates.tolist(), strict=True):
+        cap = None if wanted.max_rates is None else getattr(wanted.max_rates, name)
+        if cap and rate >= cap * (1 - 1e-9):
+            active.append(f"design.max_rates.{name}")
+    return tuple(active)
+
+
+def about_springs(solved: Solved) -> tuple[Finding, ...]:
+    """Return what to say about springs that are not needed, and about those that would like to be stiffer."""
+    found, wanted = [], solved.task.wanted
+    gone = [name for name, rate in zip(JOINTS, solved.rates, strict=True) if rate == 0.0 and name in wanted.springs]
+    if gone:
+        names = " and ".join(name.replace("_", " ") for name in gone)
+        found.append(finding("spring_dropped", f"the best rate at {names} is zero: no spring is needed there"))
+    at_cap = [path for path in active_bounds(solved, wanted) if "max_rates" in path]
+    if at_cap:
+        found.append(finding("spring_at_bound", f"{' and '.join(at_cap)} limits the design: more would be better"))
+    return tuple(found)
+
+
+def not_proven(solved: Solved) -> Finding:
+    """Return what to say about a widest window."""
+    low, high = (_place(solved, end) for end in solved.window)
+    return finding(
+        "window_not_proven",
+        f"{low} to {high} is the widest window that a local search from the stretched position found; wider ones may "
+        "exist",
+    )
+
+
+def _place(solved: Solved, motion: float) -> str:
+    return format_short(motion, "angle" if solved.task.assembly.drive == "torque" else "length")
+
+
+def message(solved: Solved) -> str:
+    """Return the outcome in one sentence."""
+    low, high = (_place(solved, end) for end in solved.window)
+    rms = f"rms {100 * solved.rms:.3g} %"
+    return f"off by at most {100 * solved.deviation:.3g} % ({rms}) over {low} to {high}"

@@ -1,0 +1,157 @@
+"""What a design asks of the springs, for one choice of lengths: places, goal and where it may lie."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.bodies.slider_crank_springs import JOINTS
+from cfmkit.families.slider_crank.build import Assembly, coupler_length
+from cfmkit.families.slider_crank.rates import Goal
+
+if TYPE_CHECKING:
+    from cfmkit.curves import FloatArray
+    from cfmkit.families.slider_crank.spec import CrankDesign, Mechanism, SliderCrankSpec
+
+FREE = ("crank_length", "offset", "unloaded_offset")
+"""Lengths that a design may choose."""
+
+PROBES = 721
+"""Places at which the limits of the joints are looked at."""
+
+DENSE = 1001
+"""Places of a window over which the largest deviation is kept."""
+
+
+@dataclass(frozen=True)
+class Task:
+    """A design that is wanted of a mechanism with certain lengths.
+
+    Attributes
+    ----------
+    spec : SliderCrankSpec
+        With the lengths; its springs do not matter.
+    assembly : Assembly
+        The same put together.
+    """
+
+    spec: SliderCrankSpec
+    assembly: Assembly
+
+    @property
+    def wanted(self) -> CrankDesign:
+        """The block `design`."""
+        design = self.spec.design
+        assert design is not None
+        return design
+
+    @cached_property
+    def allowed(self) -> tuple[float, float]:
+        """Ends of the motion that linkage and joint limits allow around the unloaded position [rad or m]."""
+        low, high = self.assembly.reach
+        start = self.assembly.start
+        if self.assembly.drive == "torque":
+            low, high = max(low, start - math.pi), min(high, start + math.pi)
+        else:
+            low = max(low, 0.0)
+        limits = self.spec.mechanism.limits
+        if limits is None:
+            return low, high
+        most = np.array([getattr(limits, name) or math.inf for name in JOINTS])
+        return self._kept((low, start), most)[0], self._kept((start, high), most)[1]
+
+    def _kept(self, ends: tuple[float, float], most: FloatArray) -> tuple[float, float]:
+        """Return the part of an interval next to the unloaded position in which no joint is moved too far."""
+        places = np.linspace(*ends, PROBES)
+        turn = self.assembly.units(places).turn
+        bad = np.flatnonzero(~(np.abs(turn) <= most[:, None] * (1 + 1e-12)).all(axis=0))
+        if not len(bad):
+            return ends
+        if ends[1] == self.assembly.start:
+            return float(places[min(bad[-1] + 1, PROBES - 1)]), ends[1]
+        return ends[0], float(places[max(bad[0] - 1, 0)])
+
+    def places(self, window: tuple[float, float], count: int | None = None) -> FloatArray:
+        """Return where the goal is looked at: at the `points` of the design, or on more places.
+
+        Where the force has to begin at zero, the first of the design's intervals is left out.
+        """
+        low, high = window
+        points, start = self.wanted.points, self.assembly.start
+        runs_in = self.assembly.drive == "force" and low <= start and self.assembly.reach[0] < -1e-15
+        share = np.linspace(1.0 / points if runs_in else 0.0, 1.0, count or points + (not runs_in))
+        if self.wanted.spacing == "even" or self.assembly.drive == "torque":
+            return low + (high - low) * share
+        ends = self.assembly.units(np.array([low, high])).angle
+        angle = ends[0] + (ends[1] - ends[0]) * share
+        link = self.assembly.linkage
+        away: FloatArray = link.branch * (
+            link.slider_position(np.asarray(self.assembly.unloaded)) - link.slider_position(angle)
+        )
+        return away
+
+    def goal(self, window: tuple[float, float], count: int | None = None) -> Goal | None:
+        """Return the goal over a window; None where the linkage does not get there with finite efforts."""
+        places = self.places(window, count)
+        effort = self.assembly.units(places).effort
+        if not np.isfinite(effort).all():
+            return None
+        legs, target = self.spec.mechanism.legs, self.wanted.target
+        goal = Goal(effort.T * (legs / target), np.ones(len(places)), self._upper())
+        return goal if self.wanted.stiffness is None else self._sloping(goal, places)
+
+    def _sloping(self, goal: Goal, places: FloatArray) -> Goal:
+        """Return a goal that is a line through the stretched position."""
+        wanted, at = self.wanted, self.assembly.stretched
+        slope = (wanted.stiffness or 0.0) / wanted.target
+        line = 1.0 + slope * (places - at)
+        if not wanted.hold_stiffness:
+            return replace(goal, wanted=line)
+        row = self.assembly.units(np.array([at])).stiffness[:, 0] * (self.spec.mechanism.legs / wanted.target)
+        return replace(goal, wanted=line, held=(row, slope))
+
+    def _upper(self) -> FloatArray:
+        most, used = self.wanted.max_rates, self.wanted.springs
+        caps = [None if most is None else getattr(most, name) for name in JOINTS]
+        limits = [math.inf if cap is None else cap for cap in caps]
+        return np.array([limit if name in used else 0.0 for name, limit in zip(JOINTS, limits, strict=True)])
+
+    def rotation(self, window: tuple[float, float]) -> float:
+        """Return the largest rotation of a joint that may have a spring, up to the end of the window [rad]."""
+        ends = min(self.assembly.start, window[0]), max(self.assembly.start, window[1])
+        turn = np.abs(self.assembly.units(np.linspace(*ends, PROBES)).turn[:3])
+        used = [k for k, name in enumerate(JOINTS[:3]) if name in self.wanted.springs]
+        return float(turn[used].max()) if used else 0.0
+
+
+def with_lengths(spec: SliderCrankSpec, lengths: dict[str, float]) -> SliderCrankSpec:
+    """Return the spec with lengths chosen by the design written into the mechanism."""
+    if not lengths:
+        return spec
+    written: dict[str, float | None] = dict(lengths)
+    if "unloaded_offset" in lengths:
+        written["unloaded_angle"] = None
+    return spec.model_copy(update={"mechanism": spec.mechanism.model_copy(update=written)})
+
+
+def plain_assembly(mechanism: Mechanism, spec: SliderCrankSpec) -> Assembly:
+    """Return the mechanism put together for the drive of the design, whatever the analysis says.
+
+    Raises
+    ------
+    CannotBuild
+        If it cannot exist.
+    """
+    from cfmkit.families.slider_crank.build import linkage_of, side_of, unloaded_angle
+
+    design = spec.design
+    assert design is not None
+    coupler_length(mechanism)
+    linkage = linkage_of(mechanism)
+    unloaded = unloaded_angle(mechanism, linkage)
+    drive = "torque" if design.torque is not None else "force"
+    return Assembly(linkage, unloaded, np.zeros(4), drive, side_of(spec, linkage, unloaded))  # type: ignore[arg-type]
