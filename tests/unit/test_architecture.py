@@ -33,6 +33,7 @@ EXCEPTIONS = {
     ("results", "spec"): "types only, and a doctest",
     ("results", "tables"): "`Result.to_pandas`",
     ("families", "plots"): "draw.py uses the style that all families share",
+    ("families", "export"): "outline.py merges overlapping pieces into one part",
 }
 
 RANK = {name: len(LAYERS) - rank for rank, layer in enumerate(LAYERS) for name in layer}

@@ -19,6 +19,7 @@ FAMILY = Family(
     design=design,
     values=DEFINITIONS | SURFACE,
     resolve=resolve,
+    outline="cfmkit.families.beam.outline",
     headline=(
         "nominal_force",
         "range_start",

@@ -112,6 +112,14 @@ def parallel_parts(spec: BeamSpec) -> int:
     return 1 if copies is None else copies.legs * (1 if copies.mirror is None else 2)
 
 
+def mirror_axis(assembly: Assembly) -> tuple[complex, float] | None:
+    """Return a point [m] and the direction [rad] of the mirror axis; None where nothing is mirrored."""
+    copies = assembly.spec.mechanism.copies
+    if copies is None or copies.mirror is None:
+        return None
+    return complex(*copies.mirror), assembly.direction
+
+
 def allowable_stress(spec: BeamSpec) -> float | None:
     """Return yield strength over safety factor [Pa], of the weakest beam; None where none is known."""
     mechanism = spec.mechanism
@@ -123,6 +131,16 @@ def allowable_stress(spec: BeamSpec) -> float | None:
 def values_of(given: str | MaterialValues) -> Material | MaterialValues:
     """Return a material by its values."""
     return material(given) if isinstance(given, str) else given
+
+
+def thickest(thickness: Thickness) -> float:
+    """Return the largest of a thickness along a beam [m]."""
+    return max(value for _, value in thickness) if isinstance(thickness, tuple) else thickness
+
+
+def thickest_of(section: engine.Section) -> float:
+    """Return the largest thickness of a section as the engine has it [m]."""
+    return max(float(np.real(section.thickness_at(place, place))) for place in section.stations)
 
 
 def _node(node: NodeSpec) -> engine.Node:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.beams import PathStatus
+from cfmkit.families.beam.build import thickest_of
 from cfmkit.families.beam.findings import finding
 from cfmkit.families.beam.values import window_of
 from cfmkit.units import format_short
@@ -25,7 +26,7 @@ def findings_of(solution: Solution) -> tuple[Finding, ...]:
     """Return everything that is wrong with a solved mechanism, or that the user must know about it."""
     return tuple(
         one
-        for source in (_ending, _closure, _events, _stability, _accuracy, _imperfection, _stress, _slenderness)
+        for source in (_ending, _closure, _events, _stability, _accuracy, _imperfection, _stress, _slenderness, _gaps)
         for one in source(solution)
     )
 
@@ -145,12 +146,39 @@ def _stress(solution: Solution) -> Iterator[Finding]:
 def _slenderness(solution: Solution) -> Iterator[Finding]:
     beams, fits = solution.path.layout.network.beams, solution.path.fits
     for name, beam in beams.items():
-        section = beam.section
-        thickest = max(float(np.real(section.thickness_at(place, place))) for place in section.stations)
+        thickest = thickest_of(beam.section)
         length = float(np.real(fits[name].length))
         if length < THICK * thickest:
             yield finding(
                 "thick_beam",
                 f"beam {name} is {format_short(length, 'length')} long and {format_short(thickest, 'length')} thick: "
                 f"below {THICK:g} times the thickness beam theory is rough",
+            )
+
+
+def _gaps(solution: Solution) -> Iterator[Finding]:
+    """Say where beams touch, and what cannot be cut."""
+    if len(solution.keep) < 2:
+        return
+    still, moving = solution.gaps
+    part = solution.spec.mechanism.part
+    if moving is not None and moving.size <= 0:
+        when = "before any load" if still is not None and still.size <= 0 else "on the way"
+        yield finding("beams_touch", f"beams {moving.one} and {moving.other} touch {when}: contact is not modelled")
+    if part is None:
+        return
+    least = max(part.min_gap, 2 * part.fillet)
+    if still is not None and still.size < least:
+        yield finding(
+            "gap_small",
+            f"the gap between beams {still.one} and {still.other} is {format_short(still.size, 'length')}: smaller "
+            f"than can be cut ({format_short(least, 'length')})",
+        )
+    for name, beam in solution.path.layout.network.beams.items():
+        thinnest = min(float(np.real(beam.section.thickness_at(place, place))) for place in beam.section.stations)
+        if thinnest < part.min_feature:
+            yield finding(
+                "feature_small",
+                f"beam {name} is {format_short(thinnest, 'length')} thick: less than can be made "
+                f"({format_short(part.min_feature, 'length')})",
             )

@@ -23,7 +23,9 @@ FINDINGS = {
     "tip_lifts_off": "the force is not positive somewhere along the surface: the tip leaves it",
     "tip_jams": "somewhere the surface is too steep for the friction at the tip",
     "thick_beam": "a beam is short for its thickness: beam theory is rough",
-    "stretching_matters": "beams that do not stretch are shallow or short: the model without stretching is rough",
+    "beams_touch": "two beams touch, or cross: contact is not modelled",
+    "gap_small": "two beams are closer than can be cut",
+    "feature_small": "a beam is thinner than can be made",
 }
 
 

@@ -19,6 +19,8 @@ from cfmkit.beams.network import FREE, Link, Network, Node
 if TYPE_CHECKING:
     from cfmkit.beams.beam import Beam
 
+_ROOM = 1.15  # of the pitch that is chosen, for what joins the stages
+
 
 def stacked(network: Network, driven: str, count: int, pitch: float | None = None) -> tuple[Network, str]:
     """Return `count` equal stages in series, and the moving part of the last.
@@ -65,5 +67,5 @@ def _step(network: Network, driven: str, pitch: float | None) -> tuple[float, fl
     grounds = [node for name, node in network.nodes.items() if node.support.along and name != driven]
     ahead = [(top.x - node.x) * c + (top.y - node.y) * s for node in grounds]
     mean = sum(ahead) / len(ahead) if ahead else 0.0
-    size = math.copysign(max(map(abs, ahead), default=0.0) if pitch is None else pitch, mean)
+    size = math.copysign(_ROOM * max(map(abs, ahead), default=0.0) if pitch is None else pitch, mean)
     return size * c, size * s

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.families.beam.build import values_of
+from cfmkit.families.beam.build import thickest, values_of
 from cfmkit.families.beam.findings import finding
 from cfmkit.families.beam.model import solve
 from cfmkit.families.beam.values import ranges, window_of
@@ -117,11 +117,6 @@ def size_of(mechanism: Mechanism) -> float:
         if (size := max(places) - min(places)) > 0:
             return size
     raise ValueError("all nodes are at one place")
-
-
-def thickest(thickness: Thickness) -> float:
-    """Return the largest of a thickness along a beam [m]."""
-    return max(value for _, value in thickness) if isinstance(thickness, tuple) else thickness
 
 
 def _scaled(spec: BeamSpec, name: str, factor: float) -> BeamSpec:

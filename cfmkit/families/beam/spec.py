@@ -16,6 +16,7 @@ from cfmkit.families.beam.parts.spec import (
     MaterialValues,
     MemberSpec,
     NodeSpec,
+    PartSpec,
     PositiveLength,
     SpringSpec,
     Thickness,
@@ -55,6 +56,7 @@ class Mechanism(Model):
     loads: tuple[LoadSpec, ...] = Field((), description="constant loads; of `kind` point or line")
     drive: DriveSpec = Field(description="what is done to it; of `kind` displacement, rotation, force or moment")
     copies: Copies | None = Field(None, description="how often what is described here occurs")
+    part: PartSpec | None = Field(None, description="how it is cut: fillets, smallest gap and feature")
 
     @field_validator("material")
     @classmethod

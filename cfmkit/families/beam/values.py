@@ -42,6 +42,8 @@ DEFINITIONS = {
     "bifurcation_force": ("force", "first bifurcation under a growing force"),
     "bifurcation_displacement": ("length", "first bifurcation under a growing displacement"),
     "error_estimate": ("ratio", "estimated error of forces and positions, relative to the largest of the path"),
+    "gap_min": ("length", "smallest gap between two beams before any load, beside common nodes"),
+    "gap_min_moving": ("length", "smallest gap between two beams at some places of the travel"),
     "travel_end": ("length", "displacement of the driven node at the end of the path"),
     "strain_energy_max": ("energy", "largest strain energy on the path, of all copies"),
 }
@@ -52,8 +54,9 @@ def values_of(solution: Solution) -> Mapping[str, Quantity]:
     numbers: dict[str, float | None] = dict.fromkeys(DEFINITIONS) | {
         "allowable_stress": solution.assembly.allowable_stress,
         "error_estimate": solution.path.error,
-        "travel_end": ("length", "displacement of the driven node at the end of the path"),
         "strain_energy_max": float(solution.path.energy.max()) * solution.assembly.parallel,
+        "gap_min": None if solution.gaps[0] is None else solution.gaps[0].size,
+        "gap_min_moving": None if solution.gaps[1] is None else solution.gaps[1].size,
         **_closure(solution),
         **_rest(solution),
     }

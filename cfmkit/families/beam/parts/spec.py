@@ -270,5 +270,14 @@ class Copies(Model):
         1, ge=1, le=20, description="equal stages in series: each stands on the moving part of the last"
     )
     layer_pitch: PositiveLength | None = Field(
-        None, description="distance of the stages along the drive; default: from the supports to the moving part"
+        None,
+        description="distance of the stages along the drive; default: 1.15 times the height of one",
     )
+
+
+class PartSpec(Model):
+    """How the part is cut, and what can be cut."""
+
+    fillet: Annotated[Length, Field(ge=0)] = Field(0.0005, description="radius of inside corners: that of the cutter")
+    min_gap: Annotated[Length, Field(ge=0)] = Field(0.0, description="smallest gap that can be cut")
+    min_feature: Annotated[Length, Field(ge=0)] = Field(0.0, description="smallest thickness that can be made")

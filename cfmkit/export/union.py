@@ -1,0 +1,76 @@
+"""One part from overlapping pieces: merged, inside corners rounded by the cutter, checked for being one piece.
+
+The boundary is a chain of short lines no farther than `ROUGH` from the true one.
+"""
+
+from __future__ import annotations
+
+import itertools
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.errors import GeometryError
+from cfmkit.geometry import Contour, Line
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from cfmkit.curves import FloatArray
+
+ROUGH = 1e-6
+_QUARTER = 32  # pieces of a quarter circle
+_SPECK = 1e-12  # holes smaller than this are rounding [m2]
+
+
+def merged(
+    pieces: Sequence[FloatArray], fillet: float = 0.0, holes: Sequence[FloatArray] = (), layer: str = "cut"
+) -> tuple[Contour, ...]:
+    """Return the contours of the union of closed polygons, each (n, 2) [m].
+
+    Parameters
+    ----------
+    pieces : sequence of (n, 2) array
+        Corners of each, in order; they may overlap, and touch themselves.
+    fillet : float
+        Radius of inside corners [m]: that of the cutter. Gaps narrower than twice of it are filled.
+    holes : sequence of (n, 2) array
+        Polygons that are cut out in the end.
+    layer : str
+        Of the contours.
+
+    Raises
+    ------
+    cfmkit.errors.GeometryError
+        If nothing is left.
+    """
+    from shapely import Polygon, union_all
+
+    # what overlaps by rounding only must still become one piece
+    whole = union_all([Polygon(piece).buffer(ROUGH / 4, join_style="mitre") for piece in pieces])
+    if fillet > 0:
+        whole = whole.buffer(fillet, quad_segs=_QUARTER).buffer(-fillet, quad_segs=_QUARTER)
+    if holes:
+        whole = whole.difference(union_all([Polygon(hole) for hole in holes]))
+    whole = whole.simplify(ROUGH / 2)
+    parts = [part for part in getattr(whole, "geoms", [whole]) if part.area > _SPECK]
+    if not parts:
+        raise GeometryError("the pieces of the part leave nothing to cut")
+    return tuple(contour for part in parts for contour in _contours(part, layer))
+
+
+def _contours(part: Any, layer: str) -> list[Contour]:
+    rings = [(part.exterior, False), *((ring, True) for ring in part.interiors)]
+    return [_contour(np.asarray(ring.coords), layer, hole) for ring, hole in rings if _area(ring) > _SPECK]
+
+
+def _area(ring: Any) -> float:
+    from shapely import Polygon
+
+    return float(Polygon(ring).area)
+
+
+def _contour(points: FloatArray, layer: str, hole: bool) -> Contour:
+    ends = [(float(x), float(y)) for x, y in points]
+    edges = tuple(Line(a, b) for a, b in itertools.pairwise(ends) if a != b)
+    return Contour(edges, layer, closed=True, hole=hole)

@@ -1,0 +1,180 @@
+"""The mechanism as a part that can be cut: beams with their true thickness, joints merged, inside corners rounded.
+
+At clamps and at the part that is guided the beams end in pads, at pinned supports in eyes with a hole; rigid links and
+what joins two mirrored halves are bars. Stages in series are drawn above each other, legs side by side once.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.beams.layout import Layout
+from cfmkit.families.beam.build import assemble, mirror_axis, thickest
+from cfmkit.families.beam.parts.spec import PartSpec
+from cfmkit.families.beam.strips import Strip, mirrored, strips
+from cfmkit.geometry import Contour, Curve2D, Drawing, Smooth
+
+if TYPE_CHECKING:
+    from cfmkit.curves import FloatArray
+    from cfmkit.families.beam.build import Assembly
+    from cfmkit.families.beam.spec import BeamSpec
+
+PAD = 4.0
+"""Depth of a pad behind the end of a beam, in thicknesses."""
+
+EYE, HOLE = 2.5, 1.2
+"""Radii of the eye and of the hole at a pinned support, in thicknesses."""
+
+_CORNERS = 64
+_ON_AXIS = 0.5
+
+
+def drawing(spec: BeamSpec) -> Drawing:
+    """Return the part, its centre lines, and the point table of every beam."""
+    from cfmkit.export.union import merged
+
+    assembly = assemble(spec)
+    network = assembly.network
+    fits = Layout(network, assembly.drive()).fits
+    beams = {name: strips(network, fits, name) for name in network.beams}
+    pieces, holes = _pieces(assembly, beams)
+    lines = [_line(strip) for found in beams.values() for strip in found]
+    if (axis := mirror_axis(assembly)) is not None:
+        pieces = [*pieces, *(mirrored(piece, *axis)[::-1] for piece in pieces), *_bars(assembly, beams, *axis)]
+        holes = [*holes, *(mirrored(hole, *axis)[::-1] for hole in holes)]
+        lines = [*lines, *(_mirrored_line(line, *axis) for line in lines)]
+    fillet = (spec.mechanism.part or PartSpec()).fillet
+    contours = merged(pieces, fillet, holes)
+    paths = tuple(Contour((line,), "path") for line in lines)
+    tables = tuple(_table(f"beam-{name}", found) for name, found in beams.items())
+    return Drawing("beams", (*contours, *paths), tables)
+
+
+def _mirrored_line(line: Smooth, at: complex, direction: float) -> Smooth:
+    return Smooth(mirrored(line.points, at, direction), mirrored(line.tangents, 0j, direction))
+
+
+def _pieces(assembly: Assembly, beams: dict[str, list[Strip]]) -> tuple[list[FloatArray], list[FloatArray]]:
+    """Return the polygons of one half: strips, joints, pads, eyes, bars; and the holes in eyes."""
+    network = assembly.network
+    pieces = [strip.polygon for found in beams.values() for strip in found]
+    holes = []
+    for name, found in beams.items():
+        beam = network.beams[name]
+        pieces += [_disc(one.points[-1], 0.5 * min(one.thickness[-1], two.thickness[0])) for one, two in _joints(found)]
+        for node, strip, last in ((beam.start, found[0], False), (beam.end, found[-1], True)):
+            size = float(strip.thickness[-1 if last else 0])
+            at = strip.points[-1 if last else 0]
+            pieces.append(_disc(at, 0.5 * size))
+            if _padded(assembly, node):
+                pieces.append(_pad(strip, last))
+            elif network.nodes[node].support.across:
+                pieces.append(_disc(at, EYE * size))
+                holes.append(_disc(at, HOLE * size))
+    thick = max(float(strip.thickness.max()) for found in beams.values() for strip in found)
+    for link in network.links:
+        a, b = (_anchor(assembly, beams, one) for one in (link.master, link.node))
+        if np.hypot(*(b - a)) > 0:
+            pieces.append(_bar(a, b, PAD * thick))
+    return pieces, holes
+
+
+def _padded(assembly: Assembly, node: str) -> bool:
+    """Tell whether the beams at a node end in a pad: at a clamp, at a guide, at what moves as one with another node.
+
+    Not on the mirror axis: there the beams of the two halves meet.
+    """
+    network, axis = assembly.network, mirror_axis(assembly)
+    found = network.nodes[node]
+    if axis is not None:
+        away = ((complex(found.x, found.y) - axis[0]) / np.exp(1j * axis[1])).imag
+        if abs(away) < _ON_AXIS * thickest(assembly.spec.mechanism.thickness):
+            return False
+    linked = {link.node for link in network.links}
+    return (found.support.rotation and found.support.across) or node in linked
+
+
+def _anchor(assembly: Assembly, beams: dict[str, list[Strip]], node: str) -> FloatArray:
+    """Return where bars to a node end [m]: in the middle of a pad there, else at the node."""
+    ends = _ends(assembly, beams, node)
+    if ends and _padded(assembly, node):
+        middle: FloatArray = _pad(*ends[0]).mean(axis=0)
+        return middle
+    found = assembly.network.nodes[node]
+    return np.array([found.x, found.y])
+
+
+def _ends(assembly: Assembly, beams: dict[str, list[Strip]], node: str) -> list[tuple[Strip, bool]]:
+    """Return the strips that end at a node, and whether with their last point."""
+    network = assembly.network
+    firsts = [(found[0], False) for name, found in beams.items() if network.beams[name].start == node]
+    return firsts + [(found[-1], True) for name, found in beams.items() if network.beams[name].end == node]
+
+
+def _joints(found: list[Strip]) -> list[tuple[Strip, Strip]]:
+    return list(itertools.pairwise(found))
+
+
+def _disc(center: FloatArray, radius: float) -> FloatArray:
+    turn = np.linspace(0.0, 2 * math.pi, _CORNERS, endpoint=False)
+    return center + radius * np.column_stack([np.cos(turn), np.sin(turn)])
+
+
+def _pad(strip: Strip, last: bool) -> FloatArray:
+    """Return a rectangle behind the end of a beam, square to it: the beam keeps its free length."""
+    index = -1 if last else 0
+    at, angle, size = strip.points[index], float(strip.angle[index]), float(strip.thickness[index])
+    out = np.array([math.cos(angle), math.sin(angle)]) * (1 if last else -1)
+    side = np.array([-out[1], out[0]])
+    depth, half = PAD * size, 0.5 * PAD * size
+    return np.array(
+        [at + half * side, at - half * side, at - half * side + depth * out, at + half * side + depth * out]
+    )
+
+
+def _bar(a: FloatArray, b: FloatArray, width: float) -> FloatArray:
+    """Return a bar around the line between two places, with square ends half a width beyond them."""
+    along = (b - a) / np.hypot(*(b - a))
+    side, over = 0.5 * width * np.array([-along[1], along[0]]), 0.25 * width * along
+    return np.array([a - over - side, b + over - side, b + over + side, a - over + side])
+
+
+def _bars(assembly: Assembly, beams: dict[str, list[Strip]], at: complex, direction: float) -> list[FloatArray]:
+    """Return the bars that join the moving parts of two halves, behind the pads."""
+    thick = max(float(strip.thickness.max()) for found in beams.values() for strip in found)
+    found = []
+    moving = {assembly.driven, assembly.spec.mechanism.drive.node}
+    for node in sorted(moving):
+        ends = _ends(assembly, beams, node)
+        if not ends:
+            continue
+        middle = _pad(*ends[0])[2:].mean(axis=0)
+        other = mirrored(middle[None], at, direction)[0]
+        if np.hypot(*(other - middle)) > 0:
+            found.append(_bar(middle, other, PAD * thick))
+    return found
+
+
+def _line(strip: Strip) -> Smooth:
+    return Smooth(strip.points, np.column_stack([np.cos(strip.angle), np.sin(strip.angle)]))
+
+
+def _table(name: str, found: list[Strip]) -> Curve2D:
+    """Return the exact points of a beam: centre line, angle, thickness, both edges."""
+    points = np.concatenate([strip.points for strip in found])
+    left, right = (np.concatenate([strip.sides[k] for strip in found]) for k in (0, 1))
+    columns = {
+        "x": (points[:, 0], "length"),
+        "y": (points[:, 1], "length"),
+        "angle": (np.concatenate([strip.angle for strip in found]), "angle"),
+        "thickness": (np.concatenate([strip.thickness for strip in found]), "length"),
+        "left_x": (left[:, 0], "length"),
+        "left_y": (left[:, 1], "length"),
+        "right_x": (right[:, 0], "length"),
+        "right_y": (right[:, 1], "length"),
+    }
+    return Curve2D(name, columns)

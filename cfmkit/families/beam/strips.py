@@ -1,0 +1,142 @@
+"""Beams as strips of their true thickness before any load, and the gaps between them before and during the motion."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.curves import read_only
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    from cfmkit.beams.beam import Fit
+    from cfmkit.beams.network import Network
+    from cfmkit.curves import FloatArray
+
+STEPS = 160
+_GAUSS, _WEIGHTS = np.polynomial.legendre.leggauss(4)
+NEAR = 3.0  # thicknesses beside a common end that are no gap
+TOGETHER = 0.25  # of the thickness: ends closer than this are one
+
+
+@dataclass(frozen=True)
+class Strip:
+    """A smooth piece of a beam: centre line (n, 2) [m], its angle [rad] and the thickness [m] there."""
+
+    points: FloatArray
+    angle: FloatArray
+    thickness: FloatArray
+
+    @property
+    def sides(self) -> tuple[FloatArray, FloatArray]:
+        """The left and the right edge, (n, 2) [m]."""
+        normal = np.column_stack([-np.sin(self.angle), np.cos(self.angle)])
+        half = 0.5 * self.thickness[:, None] * normal
+        return self.points + half, self.points - half
+
+    @property
+    def polygon(self) -> FloatArray:
+        """The outline, (2n, 2) [m]."""
+        left, right = self.sides
+        return np.concatenate([left, right[::-1]])
+
+
+def strips(network: Network, fits: Mapping[str, Fit], name: str, steps: int = STEPS) -> list[Strip]:
+    """Return a beam in smooth pieces, from its first end to its last.
+
+    It is cut where its shape has a corner and where its thickness has a kink or a step.
+    """
+    beam, fit = network.beams[name], fits[name]
+    start = network.nodes[beam.start]
+    at = np.array([start.x + beam.start_offset[0], start.y + beam.start_offset[1]])
+    cuts = {*fit.course.breaks.tolist(), *(fit.parameter(float(place)) for place in beam.section.stations)}
+    found = []
+    for low, high in itertools.pairwise(sorted(cuts)):
+        count = max(4, int(np.ceil(steps * (high - low))))
+        t, inside = np.linspace(low, high, count + 1), 0.5 * (low + high)
+        half = 0.5 * (t[1] - t[0])
+        nodes = (t[:-1] + half)[:, None] + half * _GAUSS
+        speed, angle = np.real(fit.speed(nodes, inside)), np.real(fit.angle(nodes, inside))
+        step = half * np.stack([speed * np.cos(angle), speed * np.sin(angle)]) @ _WEIGHTS
+        points = at + np.concatenate([np.zeros((1, 2)), np.cumsum(step.T, axis=0)])
+        place = t if fit.course.uniform else np.array([float(np.real(fit.arc(float(one)))) for one in t])
+        middle = float(place[len(place) // 2])
+        thickness = np.real(beam.section.thickness_at(place, middle)) + np.zeros(len(t))
+        found.append(Strip(read_only(points), read_only(np.real(fit.angle(t, inside))), read_only(thickness)))
+        at = points[-1]
+    return found
+
+
+def mirrored(points: FloatArray, at: complex, direction: float) -> FloatArray:
+    """Return the mirror image of points (n, 2) about the line through a point [m] along a direction [rad]."""
+    turn = np.exp(1j * direction)
+    z = at + turn * np.conj((points @ np.array([1, 1j]) - at) / turn)
+    return np.column_stack([z.real, z.imag])
+
+
+@dataclass(frozen=True, order=True)
+class Gap:
+    """A distance between the surfaces of two beams [m], negative where they overlap, and which they are."""
+
+    size: float
+    one: str
+    other: str
+
+
+def gaps(lines: Mapping[str, FloatArray], halves: Mapping[str, float]) -> Iterator[Gap]:
+    """Yield the smallest gap between every two beams; near an end that they have in common there is none.
+
+    Parameters
+    ----------
+    lines : mapping
+        Centre lines (n, 2) [m] by beam; those of a mirrored half have the same name with a prime.
+    halves : mapping
+        Half thickness by beam [m].
+    """
+    for one, other in itertools.combinations(lines, 2):
+        if one.endswith("'"):
+            continue
+        a, b, half = lines[one], lines[other], halves[other.rstrip("'")]
+        for i, j in itertools.product((0, -1), repeat=2):
+            if np.hypot(*(lines[one][i] - lines[other][j])) < TOGETHER * (halves[one] + half):
+                a, b = _away(a, i, 2 * NEAR * halves[one]), _away(b, j, 2 * NEAR * half)
+        if len(a) > 1 and len(b) > 1:
+            yield Gap(_distance(a, b) - halves[one] - half, one, other)
+
+
+def _away(line: FloatArray, end: int, length: float) -> FloatArray:
+    """Return a line without some length at one end."""
+    ordered = line if end == 0 else line[::-1]
+    way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(ordered, axis=0).T))])
+    kept = ordered[way >= length]
+    return kept if end == 0 else kept[::-1]
+
+
+def _distance(a: FloatArray, b: FloatArray) -> float:
+    """Return the smallest distance of the points of `a` from the chords of `b`; zero where the lines cross."""
+    if _cross(a, b):
+        return 0.0
+    return min(_to_chords(a, b), _to_chords(b, a))
+
+
+def _to_chords(points: FloatArray, line: FloatArray) -> float:
+    start, along = line[:-1], np.diff(line, axis=0)
+    rise = points[:, None] - start
+    share = np.clip((rise * along).sum(-1) / np.maximum((along**2).sum(-1), 1e-300), 0.0, 1.0)
+    return float(np.sqrt(((rise - share[..., None] * along) ** 2).sum(-1).min()))
+
+
+def _cross(a: FloatArray, b: FloatArray) -> bool:
+    """Tell whether two chains of points cross."""
+    p, r = a[:-1, None], np.diff(a, axis=0)[:, None]
+    q, s = b[None, :-1], np.diff(b, axis=0)[None]
+    cross = r[..., 0] * s[..., 1] - r[..., 1] * s[..., 0]
+    d = q - p
+    with np.errstate(divide="ignore", invalid="ignore"):
+        t = (d[..., 0] * s[..., 1] - d[..., 1] * s[..., 0]) / cross
+        u = (d[..., 0] * r[..., 1] - d[..., 1] * r[..., 0]) / cross
+    return bool(((t > 0) & (t < 1) & (u > 0) & (u < 1)).any())
