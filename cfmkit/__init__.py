@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 from cfmkit._version import __version__
 
 if TYPE_CHECKING:
-    from cfmkit.api import analyze, check, design, drawing, dumps, evaluate, load, loads
+    from cfmkit.api import analyze, check, design, drawing, dumps, evaluate, load, loads, sensitivity, sweep
     from cfmkit.curves import Curve
     from cfmkit.errors import (
         CfmError,
@@ -37,9 +37,21 @@ if TYPE_CHECKING:
     from cfmkit.families.base import Run
     from cfmkit.results import Design, Finding, Quantity, Result, Status
     from cfmkit.spec import Spec
+    from cfmkit.studies.outcome import StudyResult
 
 _HOMES = {
-    "cfmkit.api": ("analyze", "check", "design", "drawing", "dumps", "evaluate", "load", "loads"),
+    "cfmkit.api": (
+        "analyze",
+        "check",
+        "design",
+        "drawing",
+        "dumps",
+        "evaluate",
+        "load",
+        "loads",
+        "sensitivity",
+        "sweep",
+    ),
     "cfmkit.curves": ("Curve",),
     "cfmkit.errors": (
         "CfmError",
@@ -58,6 +70,7 @@ _HOMES = {
     "cfmkit.families.base": ("Run",),
     "cfmkit.results": ("Design", "Finding", "Quantity", "Result", "Status"),
     "cfmkit.spec": ("Spec",),
+    "cfmkit.studies.outcome": ("StudyResult",),
 }
 _HOME = {name: module for module, names in _HOMES.items() for name in names}
 
@@ -81,6 +94,7 @@ __all__ = [
     "Spec",
     "SpecError",
     "Status",
+    "StudyResult",
     "UsageError",
     "__version__",
     "analyze",
@@ -91,6 +105,8 @@ __all__ = [
     "evaluate",
     "load",
     "loads",
+    "sensitivity",
+    "sweep",
 ]
 
 

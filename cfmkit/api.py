@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import os
 from importlib import import_module
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from cfmkit.errors import UsageError
 from cfmkit.families import family
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from cfmkit.metrics import Outcome, Window
     from cfmkit.results import Design, Quantity, Result
     from cfmkit.spec import Spec
+    from cfmkit.studies.outcome import StudyResult
 
 
 def load(path: str | os.PathLike[str], changes: Iterable[str] = ()) -> Spec:
@@ -146,6 +147,75 @@ def check(result: Result) -> tuple[Outcome, ...]:
 
     values = values_of_family(family(result.spec.family).values)
     return checked(result.spec.requirements, result, values)
+
+
+def sweep(spec: Spec, jobs: int = 1, **block: Any) -> StudyResult:
+    """Return a mechanism in many variants: one row a point, whatever becomes of it.
+
+    Parameters
+    ----------
+    spec : Spec
+        What is varied.
+    jobs : int
+        Processes.
+    **block
+        As in the specification's block `sweep`, which they replace: `vary` (path -> ``"start:stop:n"`` or a
+        list), `combine`, `samples`, `metrics`, `design`, `curves`; and `seed`. Without them the block counts.
+
+    Raises
+    ------
+    cfmkit.errors.UsageError
+        If there is nothing to vary, too much, or a metric that does not exist.
+    cfmkit.errors.SpecError
+        If a path or value is wrong.
+
+    Examples
+    --------
+    >>> import cfmkit
+    >>> spec = cfmkit.load("configs/cam.yaml")
+    >>> vary = {"mechanism.springs.stiffness": ["0.5 N/mm", "1 N/mm"]}
+    >>> cfmkit.sweep(spec, vary=vary, metrics=["theoretical_force"]).table["theoretical_force"].tolist()
+    [36.232, 72.464]
+    """
+    from cfmkit.studies.outcome import swept
+
+    return swept(spec, jobs, block)
+
+
+def sensitivity(spec: Spec, jobs: int = 1, **block: Any) -> StudyResult:
+    """Return which value matters most, or how many made parts will meet the requirements.
+
+    Parameters
+    ----------
+    spec : Spec
+        What is varied.
+    jobs : int
+        Processes.
+    **block
+        As in the specification's block `sensitivity`, whose values they replace: `method`, `parameters`,
+        `samples`, `metrics`, `on_failure`, `seed`, ...
+
+    Raises
+    ------
+    cfmkit.errors.UsageError
+        If there is nothing to vary, too much, or a metric that does not exist.
+    cfmkit.errors.SpecError
+        If a path or value is wrong.
+    cfmkit.errors.SolutionError
+        If the specification itself has no solution.
+
+    Examples
+    --------
+    >>> import cfmkit
+    >>> spec = cfmkit.load("configs/cam.yaml")
+    >>> parameters = {"mechanism.springs.stiffness": {"normal": "1 %"}}
+    >>> found = cfmkit.sensitivity(spec, method="tolerance", samples=20, parameters=parameters)
+    >>> found.summary["yield"]["value"]
+    1.0
+    """
+    from cfmkit.studies.outcome import examined
+
+    return examined(spec, jobs, block)
 
 
 def resolve(spec: Spec) -> Spec:

@@ -229,7 +229,7 @@ def _with(data: Any, parts: list[str], value: Any, path: str) -> Any:
         items[int(head)] = _with(items[int(head)], rest, value, path) if rest else frozen(value)
         return tuple(items)
     if data is not None and not isinstance(data, Mapping):
-        raise KeyError(f"{head!r} on the way to {path!r} is below a value, not a block")
+        raise KeyError(f"{head!r} of {path!r} is below a value; only blocks and lists have something below them")
     block = dict(data or {})
     block[head] = _with(block.get(head), rest, value, path) if rest else frozen(value)
     return block

@@ -40,8 +40,9 @@ class StudyProgress:
         Whether the user asked to stop.
     """
 
-    def __init__(self, terminal: Terminal) -> None:
-        """Know whom to tell."""
+    def __init__(self, terminal: Terminal, things: str = "points") -> None:
+        """Know whom to tell, and what is counted."""
+        self._things = things
         self._tells = not (terminal.json or terminal.quiet)
         self._bar = _StudyBar() if self._tells and sys.stderr is not None and sys.stderr.isatty() else None
         self.stopped = False
@@ -71,7 +72,7 @@ class StudyProgress:
         if self._bar is not None:
             self._bar.show(self._done, self._all, self._sentence(now))
         else:
-            streams.complain(f"{self._done} of {self._all} points, {self._sentence(now)}\n")
+            streams.complain(f"{self._done} of {self._all} {self._things}, {self._sentence(now)}\n")
 
     def _sentence(self, now: float) -> str:
         rate = self._rate(now)
@@ -96,7 +97,7 @@ class StudyProgress:
         if self._bar is not None:
             self._bar.close()
             self._bar = None
-        streams.complain("stopping after the points that run now; press Ctrl-C again to end at once\n")
+        streams.complain(f"stopping after the {self._things} that run now; press Ctrl-C again to end at once\n")
 
     def close(self) -> None:
         """Remove the bar."""
@@ -112,9 +113,9 @@ def duration(seconds: float) -> str:
 
 
 @contextmanager
-def watching(terminal: Terminal) -> Iterator[StudyProgress]:
+def watching(terminal: Terminal, things: str = "points") -> Iterator[StudyProgress]:
     """Yield a monitor that tells the user and listens to Ctrl-C; both end with the block."""
-    monitor = StudyProgress(terminal)
+    monitor = StudyProgress(terminal, things)
     before = signal.signal(signal.SIGINT, monitor.interrupt)
     try:
         yield monitor

@@ -19,7 +19,8 @@ if TYPE_CHECKING:
 
     from cfmkit.cli.progress import StudyProgress
     from cfmkit.cli.terminal import Terminal
-    from cfmkit.store import RunFolder
+    from cfmkit.spec import Spec
+    from cfmkit.store import Manifest, RunFolder
     from cfmkit.studies.engine import Records, Work
     from cfmkit.studies.executors import Executor
     from cfmkit.studies.journal import Journal
@@ -61,6 +62,48 @@ class Desk:
     folder: RunFolder
     journal: Journal
     progress: StudyProgress
+
+
+@dataclass(frozen=True)
+class Made:
+    """What a study was made from, for its manifest.
+
+    Attributes
+    ----------
+    command, source : str
+        The verb, and the specification as it was named.
+    spec : Spec
+        What it said.
+    seed, points : int
+        Of everything random, and how many points there are.
+    """
+
+    command: str
+    source: str
+    spec: Spec
+    seed: int
+    points: int
+
+
+def commit(place: Desk, made: Made, terminal: Terminal, code: ExitCode) -> Manifest:
+    """Put the files in place with a manifest that says what was run."""
+    from cfmkit.store import stable_hash
+
+    about = {
+        "command": made.command,
+        "arguments": list(terminal.arguments),
+        "seed": made.seed,
+        "spec": {"source": made.source, "sha256": stable_hash(made.spec.model_dump(mode="json"))},
+        "points": made.points,
+        "status": code.name.lower(),
+        "exit_code": int(code),
+    }
+    return place.folder.commit(about)
+
+
+def names(text: str | None) -> tuple[str, ...]:
+    """Return what an option lists with commas."""
+    return tuple(name.strip() for name in (text or "").split(",") if name.strip())
 
 
 def prepare_process() -> None:

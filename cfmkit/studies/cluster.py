@@ -8,6 +8,7 @@ job, so that workers may come and go. A single point cannot be ended from outsid
 from __future__ import annotations
 
 import pickle
+import re
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from cfmkit.studies.executors import Stopping, Work
 
 LOCAL = "local"
+ADDRESS = re.compile(r"([a-z]+://)?[^\s/]+:[0-9]{1,5}")
 RETRIES = 1
 """Other workers that get a job after its worker has died."""
 
@@ -60,8 +62,15 @@ class Cluster:
         cfmkit.errors.UsageError
             If Dask is not installed, or the scheduler does not answer.
         """
+        _refuse_odd(self.address)
         with _client(self.address, self.workers) as client:
             yield from _worked(client, work, jobs, stopping)
+
+
+def _refuse_odd(address: str) -> None:
+    """Raise if an address cannot be one: Dask would try, and print its own errors."""
+    if address != LOCAL and not ADDRESS.fullmatch(address):
+        raise UsageError(f"--cluster {address!r} is no address; write e.g. tcp://host:8786, or local")
 
 
 @contextmanager

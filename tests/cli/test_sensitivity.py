@@ -240,3 +240,21 @@ def test_an_interrupted_study_exits_130_and_goes_on_where_it_stopped(cli, study)
     assert again.code in (0, 5)
     assert again.document["reused"] == len(rows)
     assert again.document["samples"]["evaluated"] == 200
+
+
+def test_a_seed_of_zero_goes_before_that_of_the_spec(cli, study):
+    def seed(*options):
+        command = ("sensitivity", study, "--method", "morris", "--samples", "2", "--no-plots", "-o", "o", *options)
+        assert cli(*command).code == 0
+        return json.loads((cli.folder / "o" / "manifest.json").read_text())["seed"]
+
+    assert seed() == 0
+    assert seed("--set", "sensitivity.seed=7") == 7
+    assert seed("--set", "sensitivity.seed=7", "--seed", "0") == 0
+    assert seed("--set", "sensitivity.seed=7", "--seed", "3") == 3
+
+
+def test_a_metric_that_does_not_vary_is_told_and_changes_no_exit_code(cli, study):
+    told = cli("sensitivity", study, "--method", "sobol", "--samples", "4", "--no-plots", "--metrics", "force_constant")
+    assert told.code == 0
+    assert "force_constant does not vary" in " ".join(told.out.split())

@@ -111,6 +111,21 @@ def reported(monkeypatch: pytest.MonkeyPatch, stream: io.StringIO, terminal: Ter
     return stream.getvalue()
 
 
+@pytest.mark.parametrize("things", ["points", "specs"])
+def test_a_study_says_what_it_counts(monkeypatch, capsys, things):
+    from cfmkit.cli import progress
+
+    monkeypatch.setattr(progress, "LINE_EVERY", 0.0)
+    quiet = type("Screen", (), {"json": False, "quiet": False})()
+    with progress.watching(quiet, things) as monitor:
+        monitor.total(4)
+        monitor.done(1, 0, False)
+        monitor.interrupt(2, None)
+    told = capsys.readouterr().err
+    assert f"1 of 4 {things}, " in told
+    assert f"stopping after the {things} that run now" in told
+
+
 def test_progress_is_shown_where_somebody_watches(monkeypatch):
     assert "solving" in reported(monkeypatch, Watched(), Terminal())
 

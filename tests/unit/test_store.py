@@ -8,30 +8,10 @@ from datetime import datetime
 
 import numpy as np
 import pytest
+from store_support import INFO, listing, one_line, run
 
 from cfmkit.errors import CfmError, OutputError
 from cfmkit.store import Manifest, RunFolder, file_hash
-
-INFO = {"arguments": ["design", "cam.yaml"], "seed": 0, "status": "complete", "exit_code": 0}
-
-
-def run(path, **files):
-    """Do a whole run; names with `__` stand for a slash, `_` for the dot."""
-    with RunFolder(path) as folder:
-        for name, data in files.items():
-            folder.write(name.replace("__", "/").replace("_", "."), data)
-        folder.commit(INFO)
-    return folder
-
-
-def listing(path):
-    return sorted(str(item.relative_to(path)) for item in path.rglob("*"))
-
-
-def one_line(error):
-    text = str(error.value)
-    return "\n" not in text and len(text) < 700
-
 
 # ---- a run
 

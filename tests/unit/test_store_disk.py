@@ -11,19 +11,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from store_support import listing, one_line
 
 from cfmkit.errors import CfmError, OutputError
 from cfmkit.store import atomic_write, disk, file_hash, stable_hash
-
-
-def listing(path):
-    return sorted(str(item.relative_to(path)) for item in path.rglob("*"))
-
-
-def one_line(error):
-    text = str(error.value)
-    return "\n" not in text and len(text) < 700
-
 
 # ---- atomic_write
 

@@ -16,7 +16,9 @@ from cfmkit.studies.cluster import Cluster
 from cfmkit.studies.columns import metrics_of
 from cfmkit.studies.engine import Work, run
 from cfmkit.studies.plan import grid
+from cfmkit.studies.pool import Pool
 from cfmkit.studies.study import Study
+from cfmkit.studies.sweep import outputs, summary_of
 from cfmkit.studies.variation import axes, wish
 
 distributed = pytest.importorskip("distributed", reason="Dask is not installed: pip install 'cfmkit[cluster]'")
@@ -61,33 +63,73 @@ def test_a_cluster_gives_the_rows_of_one_process_though_a_worker_is_killed(sched
     address, workers = scheduler
     many = work(300)
 
-    class Killer:
-        count = 0
-
-        def total(self, points): ...
-
-        def done(self, points, failed, reused):
-            self.count += points
-            if self.count == 30:
-                os.kill(workers[0].pid, signal.SIGKILL)
-
-        def stopping(self):
-            return False
-
-    records = run(many, Cluster(address), monitor=Killer())
+    records = run(many, Cluster(address), monitor=Killer(lambda: [workers[0].pid], 30))
     assert workers[0].poll() == -signal.SIGKILL
     assert np.array_equal(values(records), values(run(many)))
 
 
-def test_a_local_cluster_gives_the_same_rows():
-    many = work(20)
-    assert np.array_equal(values(run(many, Cluster("local", 2))), values(run(many)))
+def written(records):
+    """Return every file of the sweep but its pictures."""
+    files = outputs(records, summary_of(records), curves=True)
+    return {name: data if isinstance(data, bytes) else b"".join(data) for name, data in files}
+
+
+@pytest.mark.parametrize("block", [False, True])
+def test_a_local_cluster_gives_the_same_bytes_though_a_worker_of_it_is_killed(block):
+    """Points one by one with failures, a choice and curves among them; or whole blocks of the vectorised model."""
+    if block:
+        spec = SPEC.replace({"analysis.points": 101, "mechanism.roller_radius": "8 mm"})
+        asked = ("mechanism.springs.stiffness=0.4 N/mm:1 N/mm:60", "mechanism.brace_length=180 mm:240 mm:100")
+    else:
+        spec = SPEC
+        asked = ("mechanism.brace_length=[60 mm, 200 mm, -1 mm]", "mechanism.rolling_friction=0:0.01:20")
+        asked = (*asked, "analysis.gravity=[true, false]")
+    names = ("force_mean", "force_ripple", "theoretical_force")
+    plan = grid(axes(spec, [wish(option) for option in asked]))
+    many = Work(Study(spec, plan.paths, metrics_of(spec, names), curves=not block), plan)
+    assert many.vectorised is block
+    killer = Killer(workers_of_this_process, len(plan) // 10)
+    assert written(run(many, Cluster("local", 2), monitor=killer)) == written(run(many)) == written(run(many, Pool(2)))
+    assert killer.killed
+
+
+def workers_of_this_process():
+    """Return the processes of a local cluster's workers: the helpers that multiprocessing keeps are not among them."""
+    import psutil
+
+    below = psutil.Process().children(recursive=True)
+    return [one.pid for one in below if "spawn_main" in " ".join(one.cmdline())]
+
+
+class Killer:
+    """A monitor that kills the first worker once so many points are done."""
+
+    def __init__(self, workers, after):
+        self.workers, self.after, self.count, self.killed = workers, after, 0, 0
+
+    def total(self, points): ...
+
+    def done(self, points, failed, reused):
+        self.count += points
+        if self.count >= self.after and not self.killed:
+            self.killed = self.workers()[0]
+            os.kill(self.killed, signal.SIGKILL)
+
+    def stopping(self):
+        return False
 
 
 def test_a_scheduler_that_is_not_there_is_told(monkeypatch):
     monkeypatch.setattr("cfmkit.studies.cluster.CONNECT_WITHIN", 1)
     with pytest.raises(UsageError, match="no Dask scheduler answers"):
         run(work(2), Cluster("tcp://127.0.0.1:9"))
+
+
+@pytest.mark.parametrize("address", ["nonsense", "tcp://", "tcp://host", "", "local:", "a b:1"])
+def test_what_is_no_address_is_refused_before_dask_tries(address, monkeypatch):
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(UsageError, match=r"is no address; write e\.g\. tcp://host:8786, or local"):
+        run(work(2), Cluster(address))
 
 
 def test_without_dask_the_cure_is_named(monkeypatch):

@@ -79,7 +79,7 @@ def run(options: Options, terminal: Terminal) -> Answer:
     jobs = [batch.Job(k, *pair) for k, pair in enumerate(zip(files, folders(files), strict=True))]
     executor = batch.executor_for(options.jobs, len(jobs), options.timeout_per_point)
     report = None if options.junit is None else batch.prepared(options.junit)
-    with RunFolder(out) as folder, watching(terminal) as progress:
+    with RunFolder(out) as folder, watching(terminal, "specs") as progress:
         folder.check("results.csv", "requirements.csv", "metrics.json")
         crew = batch.Crew(executor, options.fail_fast, progress)
         entries = batch.carry_out(_work(options, out, terminal), jobs, crew)

@@ -15,10 +15,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from cfmkit.cli.answer import Answer
-    from cfmkit.cli.studies import Desk
     from cfmkit.cli.terminal import Terminal
     from cfmkit.spec import Spec
-    from cfmkit.store import Manifest
     from cfmkit.store.disk import Data
     from cfmkit.studies.sensitivity.findings import Findings
 
@@ -70,6 +68,17 @@ Metrics = Annotated[
         show_default=False,
     ),
 ]
+StatedSeed = Annotated[
+    int | None,
+    typer.Option(
+        "--seed",
+        metavar="N",
+        min=0,
+        max=2**63 - 1,
+        help="Seed of everything random; default: the spec's, else 0.",
+        show_default=False,
+    ),
+]
 Design = Annotated[bool, typer.Option("--design", help="Design the mechanism anew at each sample.")]
 
 
@@ -79,6 +88,7 @@ class Options(Studying, Common):
 
     method: Method = None
     samples: Samples = None
+    seed: StatedSeed = None  # type: ignore[assignment]
     vary: Vary = None
     on_failure: OnFailure = None
     metrics: Metrics = None
@@ -97,11 +107,12 @@ def run(options: Options, terminal: Terminal) -> Answer:
     from cfmkit.cli.runs import folder_of
     from cfmkit.cli.sensitivity_page import answer
     from cfmkit.studies.sensitivity.methods import carry_out
+    from cfmkit.studies.sensitivity.output import exit_code
     from cfmkit.studies.sensitivity.setup import prepare
 
     start = studies.now()
     out = folder_of(options, "sensitivity")
-    setup = prepare(spec_of(options), options.seed or None, options.max_points)
+    setup = prepare(spec_of(options), options.seed, options.max_points)
     with studies.desk(out, terminal) as place:
         place.folder.check("results.csv", "indices.csv", "metrics.json", "resolved.yaml")
         found = carry_out(setup, lambda work: studies.compute(work, options, place))
@@ -109,7 +120,8 @@ def run(options: Options, terminal: Terminal) -> Answer:
             studies.tracebacks(piece.records, terminal)
         for name, data in files(found, not options.no_plots):
             place.folder.write(name, data)
-        manifest = commit(place, options, terminal, found)
+        made = studies.Made("sensitivity", options.spec, setup.study.spec, setup.seed, found.evaluator.count)
+        manifest = studies.commit(place, made, terminal, exit_code(found))
     return answer(found, out, (*manifest.files, "manifest.json"), studies.now() - start)
 
 
@@ -148,7 +160,8 @@ def spec_of(options: Options) -> Spec:
 
 def changes_of(options: Options) -> dict[str, Any]:
     """Return what the options say, by key of the block."""
-    metrics = tuple(name.strip() for name in (options.metrics or "").split(",") if name.strip())
+    from cfmkit.cli.studies import names
+
     said = {
         "method": options.method,
         "samples": options.samples,
@@ -156,7 +169,7 @@ def changes_of(options: Options) -> dict[str, Any]:
         "parameters": dict(map(spread, options.vary)) if options.vary else None,
         # What the spec says goes together names parameters that may not be there any more.
         "correlated": () if options.vary else None,
-        "metrics": metrics or None,
+        "metrics": names(options.metrics) or None,
         "design": options.design or None,
     }
     return {key: value for key, value in said.items() if value is not None}
@@ -176,21 +189,3 @@ def spread(option: str) -> tuple[str, Any]:
         told = "write PATH=low:high, PATH=normal:DEVIATION or PATH=uniform:HALF-WIDTH, with units"
         raise UsageError(f"--vary {option!r}: {told}")
     return path, {first: second} if first in ("normal", "uniform") else (first, second)
-
-
-def commit(place: Desk, options: Options, terminal: Terminal, found: Findings) -> Manifest:
-    """Put the files in place with a manifest that says what was run."""
-    from cfmkit.store import stable_hash
-    from cfmkit.studies.sensitivity.output import exit_code
-
-    code = exit_code(found)
-    about = {
-        "command": "sensitivity",
-        "arguments": list(terminal.arguments),
-        "seed": found.setup.seed,
-        "spec": {"source": options.spec, "sha256": stable_hash(found.setup.study.spec.model_dump(mode="json"))},
-        "points": found.evaluator.count,
-        "status": code.name.lower(),
-        "exit_code": int(code),
-    }
-    return place.folder.commit(about)

@@ -15,11 +15,9 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from cfmkit.cli.answer import Answer
-    from cfmkit.cli.studies import Desk
     from cfmkit.cli.terminal import Terminal
-    from cfmkit.store import Manifest
     from cfmkit.store.disk import Data
-    from cfmkit.studies.engine import Records, Work
+    from cfmkit.studies.engine import Records
     from cfmkit.studies.summary import Summary
     from cfmkit.studies.sweep import Request
 
@@ -88,7 +86,8 @@ def run(options: Options, terminal: Terminal) -> Answer:
         for name, data in files(records, summary, writes_curves(spec, asked), not options.no_plots):
             place.folder.write(name, data)
         code = exit_code(records, summary)
-        manifest = commit(place, options, terminal, work, code)
+        made = studies.Made("sweep", options.spec, work.study.spec, options.seed, len(work.plan))
+        manifest = studies.commit(place, made, terminal, code)
         told = summary.as_json(records)
     written = (*manifest.files, "manifest.json")
     return studies.answer(studies.Ending(records, code, told, out, written, studies.now() - start), options.spec)
@@ -102,6 +101,7 @@ def request(options: Options) -> Request:
     cfmkit.errors.UsageError
         If one is malformed, or two contradict each other.
     """
+    from cfmkit.cli.studies import names
     from cfmkit.studies.sweep import Request
     from cfmkit.studies.variation import wish
 
@@ -114,7 +114,7 @@ def request(options: Options) -> Request:
         samples=samples,
         design=options.design or None,
         curves=options.curves or None,
-        metrics=tuple(name.strip() for name in (options.metrics or "").split(",") if name.strip()),
+        metrics=names(options.metrics),
         seed=options.seed,
         most=options.max_points,
         pictures=not options.no_plots,
@@ -146,20 +146,3 @@ def exit_code(records: Records, summary: Summary) -> ExitCode:
     if records.finished < len(records):
         return ExitCode.INTERRUPTED
     return summary.exit_code(records.bugs)
-
-
-def commit(place: Desk, options: Options, terminal: Terminal, work: Work, code: ExitCode) -> Manifest:
-    """Put the files in place with a manifest that says what was run."""
-    from cfmkit.store import stable_hash
-
-    spec = work.study.spec
-    about = {
-        "command": "sweep",
-        "arguments": list(terminal.arguments),
-        "seed": options.seed,
-        "spec": {"source": options.spec, "sha256": stable_hash(spec.model_dump(mode="json"))},
-        "points": len(work.plan),
-        "status": code.name.lower(),
-        "exit_code": int(code),
-    }
-    return place.folder.commit(about)

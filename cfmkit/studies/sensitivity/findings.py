@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from math import isfinite
 from typing import TYPE_CHECKING
 
+from cfmkit.studies.sensitivity.sobol import varies_not
 from cfmkit.units import border_unit, to_border
 
 if TYPE_CHECKING:
@@ -93,6 +95,21 @@ class Findings:
     def unstated(self) -> int:
         """How many indices need a value that is missing."""
         return sum(line.value is None for line in self.lines if line.index not in OPTIONAL)
+
+    @cached_property
+    def constant(self) -> tuple[str, ...]:
+        """Metrics that have the same value in every sample: no share of a variance belongs to any parameter."""
+        if self.outputs is None:
+            return ()
+        columns = self.outputs.reshape(-1, self.outputs.shape[-1]).T
+        pairs = zip(self.setup.study.metrics, columns, strict=False)
+        return tuple(one.label for one, column in pairs if varies_not(column))
+
+    @property
+    def lacking(self) -> int:
+        """How many indices are not stated because samples have no value, not because nothing varies."""
+        gone = (line for line in self.lines if line.value is None and line.index not in OPTIONAL)
+        return sum(line.metric not in self.constant for line in gone)
 
 
 OPTIONAL = ("normalised_slope",)

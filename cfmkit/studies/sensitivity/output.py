@@ -80,8 +80,8 @@ def exit_code(found: Findings) -> ExitCode:
     evaluator = found.evaluator
     if evaluator.count and evaluator.failed == evaluator.count:
         return ExitCode.NO_SOLUTION
-    stated = found.setup.method == "local" and not found.unstated
-    if (evaluator.failed and not stated) or found.unstated:
+    stated = found.setup.method == "local" and not found.lacking
+    if (evaluator.failed and not stated) or found.lacking:
         return ExitCode.PARTIAL
     missed = not all(outcome.ok for outcome in found.setup.nominal.outcomes) or not yield_ok(found)
     return ExitCode.REQUIREMENT_MISSED if missed else ExitCode.OK
@@ -118,7 +118,8 @@ def warnings(found: Findings) -> tuple[Finding, ...]:
             told += f" ({found.replaced} blocks)"
         extra.append(Finding("failed_samples", told))
     elif found.unstated and not found.interrupted:
-        told = f"{found.unstated} indices are not stated: the metric does not vary, or has no value in some samples"
+        told = f"{found.unstated} indices are not stated: "
+        told += "samples have no value" if found.lacking else f"{', '.join(found.constant)} does not vary"
         extra.append(Finding("not_stated", told))
     return (*setup.warnings, *extra)
 

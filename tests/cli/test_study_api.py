@@ -1,0 +1,67 @@
+"""`cfmkit.sweep` and `cfmkit.sensitivity` say what the files of a study say."""
+
+import json
+
+import pytest
+
+import cfmkit
+from cfmkit.tables import to_csv
+
+CAM = cfmkit.load("configs/cam.yaml", ["analysis.points=121"])
+RADIUS = "mechanism.roller_radius"
+TOLERANCES = {RADIUS: {"uniform": "0.05 mm"}, "mechanism.springs.stiffness": {"normal": "1 %"}}
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_a_sweep_gives_the_rows_of_results_csv(cli, tmp_path, jobs):
+    found = cfmkit.sweep(CAM, jobs, vary={RADIUS: "8 mm:16 mm:5"}, metrics=("force_ripple", "force_mean"))
+    (tmp_path / "cam.yaml").write_text(cfmkit.dumps(CAM))
+    options = ["--vary", f"{RADIUS}=8 mm:16 mm:5", "--metrics", "force_ripple,force_mean", "--no-plots"]
+    assert cli("sweep", str(tmp_path / "cam.yaml"), *options, "-o", str(tmp_path / "out")).code == 0
+    assert to_csv(found.table) == (tmp_path / "out" / "results.csv").read_bytes()
+    assert found.summary == json.loads((tmp_path / "out" / "metrics.json").read_text())
+    assert found.table["status"] == ("complete",) * 5
+    assert (found.curves, found.indices) == (None, None)
+
+
+def test_without_arguments_the_block_of_the_specification_counts():
+    spec = CAM.replace({"sweep": {"vary": {RADIUS: ("8 mm", "9 mm")}, "metrics": ("force_mean",), "curves": True}})
+    found = cfmkit.sweep(spec)
+    assert len(found.table) == 2
+    assert len(found.curves) == 2 * 2 * 121
+    assert len(cfmkit.sweep(spec, vary={RADIUS: "8 mm:10 mm:3"}).table) == 3
+
+
+def test_a_failed_point_is_a_row_without_values():
+    found = cfmkit.sweep(CAM, vary={RADIUS: ["8 mm", "-1 mm"]}, metrics=["force_mean"])
+    assert found.table["status"] == ("complete", "invalid")
+    assert found.summary["status"] == "partial"
+
+
+@pytest.mark.parametrize(
+    ("call", "error", "words"),
+    [
+        (lambda: cfmkit.sweep(CAM), cfmkit.UsageError, "nothing to vary"),
+        (lambda: cfmkit.sweep(CAM, vary={RADIUS: [8.0]}), cfmkit.SpecError, "has no unit"),
+        (lambda: cfmkit.sweep(CAM, vary={RADIUS: "8 mm:9 mm:3"}, points=3), cfmkit.SpecError, "points"),
+        (lambda: cfmkit.sweep(CAM, seed=-1), cfmkit.UsageError, "seed"),
+        (lambda: cfmkit.sweep(CAM, jobs=0, vary={RADIUS: "8 mm:9 mm:3"}), cfmkit.UsageError, "jobs"),
+        (lambda: cfmkit.sensitivity(CAM), cfmkit.UsageError, "nothing to vary"),
+        (lambda: cfmkit.sensitivity(CAM, parameters=TOLERANCES, method="guess"), cfmkit.SpecError, "guess"),
+    ],
+)
+def test_what_makes_no_sense_is_refused_as_on_the_command_line(call, error, words):
+    with pytest.raises(error, match=words):
+        call()
+
+
+def test_a_sensitivity_gives_samples_indices_and_summary():
+    found = cfmkit.sensitivity(CAM, method="tolerance", samples=8, parameters=TOLERANCES, seed=3)
+    again = cfmkit.sensitivity(CAM, 2, method="tolerance", samples=8, parameters=TOLERANCES, seed=3)
+    other = cfmkit.sensitivity(CAM, method="tolerance", samples=8, parameters=TOLERANCES, seed=4)
+    assert len(found.table) == 8 * 3
+    assert set(found.indices["index"]) == {"yield_gain_when_halved", "variance_drop_when_halved"}
+    assert found.summary["samples"]["seed"] == 3
+    assert to_csv(found.table) == to_csv(again.table) != to_csv(other.table)
+    assert to_csv(found.indices) == to_csv(again.indices)
+    assert found.convergence is None
