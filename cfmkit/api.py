@@ -211,7 +211,7 @@ def sensitivity(spec: Spec, jobs: int = 1, **block: Any) -> StudyResult:
     >>> parameters = {"mechanism.springs.stiffness": {"normal": "1 %"}}
     >>> found = cfmkit.sensitivity(spec, method="tolerance", samples=20, parameters=parameters)
     >>> found.summary["yield"]["value"]
-    1.0
+    0.8
     """
     from cfmkit.studies.outcome import examined
 

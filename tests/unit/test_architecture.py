@@ -126,7 +126,7 @@ ALLOWED = {
     "yaml": lambda path: unit_of(path) == "yamlio",
     "ezdxf": lambda path: unit_of(path) == "export",
     "shapely": lambda path: unit_of(path) == "export",
-    "pandas": lambda path: path.name == "results.py",
+    "pandas": lambda path: path.name in ("results.py", "outcome.py"),
 }
 
 
