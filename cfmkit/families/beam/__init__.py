@@ -19,6 +19,7 @@ FAMILY = Family(
     design=design,
     values=DEFINITIONS | SURFACE,
     resolve=resolve,
+    draw="cfmkit.families.beam.draw",
     outline="cfmkit.families.beam.outline",
     headline=(
         "nominal_force",

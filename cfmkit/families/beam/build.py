@@ -29,6 +29,9 @@ if TYPE_CHECKING:
     from cfmkit.families.beam.spec import BeamSpec
     from cfmkit.materials import Material
 
+_LARGEST_TURN = 0.35  # of a rotation in one step [rad]
+_SMOOTH = 0.12  # the same where every step is a point of the curve
+
 
 @dataclass(frozen=True)
 class Assembly:
@@ -82,6 +85,7 @@ class Assembly:
         return engine.Control(
             tolerance=analysis.tolerance,
             through_folds=analysis.through_folds,
+            largest_turn=_SMOOTH if analysis.through_folds else _LARGEST_TURN,
             branch=analysis.branch,
             sign=-1 if analysis.other_side else 1,
             imperfection=analysis.imperfection,

@@ -1,0 +1,247 @@
+"""Pictures of a beam mechanism: curve, shapes to scale, forces of each beam, stresses, a surface that is followed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.families.beam.build import mirror_axis
+from cfmkit.families.beam.strips import mirrored, strips
+from cfmkit.families.beam.surface.ride import ride
+from cfmkit.families.beam.values import window_of
+from cfmkit.plots import parts
+from cfmkit.plots.bands import limits_on
+from cfmkit.plots.curves import Look
+from cfmkit.plots.diagram import Diagram, Limit, Region, Scale, Series, diagram_figure
+from cfmkit.plots.loop import loop_figure
+from cfmkit.plots.place import place_labels
+from cfmkit.plots.style import GREY, INK, LINES, TROUBLE, VERMILLION, axes_mm, new_figure, styled
+from cfmkit.plots.text import Heading, value_text, write_heading
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from cfmkit.curves import FloatArray
+    from cfmkit.families.beam.model import Solution
+    from cfmkit.plots.place import Label
+    from cfmkit.results import Result
+
+POSES = 5
+MOST_BEAMS = 6
+"""So many beams have lines of their own: those with the largest force or stress."""
+
+SAME = 1e-4
+"""Lines closer than this share of their size are one."""
+
+
+def figures(result: Result) -> dict[str, Callable[[], Figure]]:
+    """Return what draws each picture of a result of the beam family, by file stem; empty if nothing was solved."""
+    if result.state is None or not result.curves:
+        return {}
+    makers = [curve, shapes, reactions, stress]
+    if result.spec.at("analysis.surface") is not None:
+        makers.append(surface)
+    return {maker.__name__: partial(maker, result) for maker in makers}
+
+
+def _motion(result: Result) -> Scale:
+    return Scale(result.curve.motion_name, result.curve.motion_dimension)
+
+
+def curve(result: Result) -> Figure:
+    """Return the force over the displacement, with c ... d of the paper and the requirement bands."""
+    solution: Solution = result.state
+    regions, levels = [], []
+    limit, start = (result.values[name].value for name in ("stress_limit_displacement", "range_start"))
+    end = window_of(solution)[1]
+    reached = float(solution.motion.max())
+    if limit is not None and limit < reached:
+        regions.append(Region(limit, reached, f"allowable stress reached at {value_text(limit, 'length')}"))
+    nominal = result.values["nominal_force"].value
+    if nominal is not None and start is not None and result.spec.analysis.window is not None:  # type: ignore[attr-defined]
+        levels.append(Limit(0.95 * nominal, f"0.95 F_d: from {value_text(start, 'length')}"))
+        levels.append(Limit(nominal, f"F_d = {value_text(nominal, 'force')} at {value_text(end, 'length')}"))
+    look = Look(levels=tuple(levels), regions=tuple(regions))
+    only = replace(result, curves=result.curves[:1])
+    return loop_figure(only, look, f"{result.curve.kind} over {result.curve.motion_name}")
+
+
+@styled
+def shapes(result: Result) -> Figure:
+    """Return the mechanism to scale: as cut, and bent at several places of the travel."""
+    solution: Solution = result.state
+    poses = np.unique(np.linspace(0, len(solution.keep) - 1, POSES).astype(int))[1:]
+    drawn = {int(pose): _lines(solution, int(solution.keep[pose])) for pose in poses}
+    plates = _plates(solution)
+    box = _box([*plates, *(line for lines in drawn.values() for line in lines)])
+    width, height = box[2] - box[0], box[3] - box[1]
+    scale = min(138.0 / width, 110.0 / height)
+    heading = Heading.of(result, "shapes to scale, as cut and on the way")
+    figure = new_figure(160.0, height * scale + 16.0 + heading.height_mm)
+    write_heading(figure, heading)
+    room = (17.0 + 0.5 * (138.0 - width * scale), 12.0, width * scale, height * scale)
+    ax = axes_mm(figure, room)
+    for plate in plates:
+        parts.plate(ax, [_counter_clockwise(plate)])
+    labels = _poses(solution, ax, drawn)
+    _supports(solution, ax)
+    parts.to_scale(ax, box)
+    ax.set_ylabel("y [mm]")
+    place_labels(ax, [*labels, *_names(solution)])
+    return figure
+
+
+def _poses(solution: Solution, ax: Axes, drawn: dict[int, list[FloatArray]]) -> list[Label]:
+    """Draw the bent beams of each pose; return their names, to stand at the driven node."""
+    from matplotlib import colormaps
+    from matplotlib.colors import to_hex
+
+    kind = "angle" if solution.spec.mechanism.drive.kind in ("rotation", "moment") else "length"
+    at, found = solution.path.layout.position(solution.assembly.driven), []
+    for share, (pose, lines) in zip(np.linspace(0.8, 0.0, len(drawn)), drawn.items(), strict=True):
+        color = to_hex(colormaps["viridis"](share))
+        for number, line in enumerate(lines):
+            parts.edge(ax, line, f"pose-{pose}-{number}", color=color, linewidth=1.2, zorder=2.5)
+        moved = np.real(np.array(at)) + solution.path.motion(solution.assembly.driven)[solution.keep[pose], :2]
+        text = value_text(float(solution.motion[pose]), kind)
+        found.append(parts.part_name(text, [tuple(moved)], (-1.0, 0.3), color))
+    index = int(np.argmax(np.where(np.isfinite(solution.stress), solution.stress, -np.inf)))
+    return [*found, _peak(solution, ax, index)]
+
+
+def _peak(solution: Solution, ax: Axes, index: int) -> Label:
+    """Mark where the stress is largest, on the unbent beam: there a reader finds the place on the part."""
+    name, place = str(solution.stress_at[0][index]), float(solution.stress_at[1][index])
+    layout = solution.path.layout
+    found = np.concatenate([strip.points for strip in strips(layout.network, layout.fits, name)])
+    way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(found, axis=0).T))])
+    x, y = (float(np.interp(place * way[-1], way, found[:, k])) for k in (0, 1))
+    ax.plot(*parts.mm((x, y)), marker="o", markersize=8, markerfacecolor="none", color=TROUBLE, zorder=5, gid="peak")
+    return parts.part_name(value_text(float(solution.stress[index]), "stress"), [(x, y)], (1.0, 0.6), TROUBLE)
+
+
+def _names(solution: Solution) -> list[Label]:
+    """Return the names of the beams as cut."""
+    layout, found = solution.path.layout, []
+    for name in list(layout.network.beams)[: 2 * MOST_BEAMS]:
+        points = np.concatenate([strip.points for strip in strips(layout.network, layout.fits, name)])
+        found.append(parts.part_name(name, points[len(points) // 4 : 3 * len(points) // 4], (0.3, 1.0), INK))
+    return found
+
+
+def _lines(solution: Solution, point: int) -> list[FloatArray]:
+    """Return the bent centre lines at a point of the path, those of a mirrored half included [m]."""
+    lines = [solution.path.shape(name, point) for name in solution.path.layout.network.beams]
+    axis = mirror_axis(solution.assembly)
+    return lines if axis is None else [*lines, *(mirrored(line, *axis) for line in lines)]
+
+
+def _plates(solution: Solution) -> list[FloatArray]:
+    layout, axis = solution.path.layout, mirror_axis(solution.assembly)
+    found = [strip.polygon for name in layout.network.beams for strip in strips(layout.network, layout.fits, name)]
+    return found if axis is None else [*found, *(mirrored(polygon, *axis) for polygon in found)]
+
+
+def _counter_clockwise(points: FloatArray) -> FloatArray:
+    x, y = points.T
+    return points if x @ np.roll(y, -1) > np.roll(x, -1) @ y else points[::-1]
+
+
+def _box(outlines: list[FloatArray]) -> tuple[float, float, float, float]:
+    points = np.concatenate(outlines)
+    low, high = points.min(axis=0), points.max(axis=0)
+    margin = 0.08 * float(np.max(high - low))
+    low, high = low - margin, high + margin
+    return float(low[0]), float(low[1]), float(high[0]), float(high[1])
+
+
+def _supports(solution: Solution, ax: Axes) -> None:
+    """Mark the nodes by their support: squares where the rotation is held, circles where it is not."""
+    axis, layout = mirror_axis(solution.assembly), solution.path.layout
+    for name, node in layout.network.nodes.items():
+        support = node.support
+        if not (support.along or support.across or support.rotation) and name != solution.assembly.driven:
+            continue
+        here = np.array([[float(np.real(node.x)), float(np.real(node.y))]])
+        for place in [here] if axis is None else [here, mirrored(here, *axis)]:
+            ax.plot(
+                *parts.mm(place[0]), marker="s" if support.rotation else "o", markersize=4.5,
+                color=VERMILLION if name == solution.assembly.driven else INK, zorder=4, linestyle="", gid=f"at-{name}",
+            )  # fmt: skip
+
+
+def reactions(result: Result) -> Figure:
+    """Return the force that each beam exerts on its last node, along the drive and across it [Lan, Fig. 8]."""
+    solution: Solution = result.state
+    angle = solution.assembly.direction
+    if solution.spec.mechanism.drive.kind in ("rotation", "moment"):
+        angle = 0.0
+    c, s = np.cos(angle), np.sin(angle)
+    forces = {name: solution.beam_force(name) for name in solution.path.layout.network.beams}
+    # against the drive: what holds the load counts as positive
+    along = {name: -(force[:, 0] * c + force[:, 1] * s) for name, force in forces.items()}
+    across = {name: force[:, 1] * c - force[:, 0] * s for name, force in forces.items()}
+    one = ", one copy" if solution.assembly.parallel > 1 else ""
+    heading = Heading.of(result, f"force of each beam on its last node{one}")
+    diagrams = [
+        Diagram(solution.motion, _motion(result), Scale("against the drive", "force"), _series(along)),
+        Diagram(solution.motion, _motion(result), Scale("across", "force"), _series(across)),
+    ]
+    return diagram_figure(heading, diagrams)
+
+
+def _series(values: dict[str, FloatArray]) -> list[Series]:
+    """Return named lines of those with the largest values; beams with the same line share it."""
+    size = {name: float(np.nanmax(np.abs(value))) for name, value in values.items()}
+    lines: dict[str, tuple[str, FloatArray]] = {}
+    for name in sorted(size, key=lambda name: -size[name])[:MOST_BEAMS]:
+        same = next((key for key, (_, other) in lines.items() if _alike(values[name], other)), None)
+        names = name if same is None else f"{lines[same][0]}, {name}"
+        lines[same or name] = (names, values[name])
+    chosen = sorted(lines, key=list(values).index)
+    return [
+        Series(lines[name][1], lines[name][0], LINES[number % len(LINES)], prefer=0.25 + 0.5 * number / len(chosen))
+        for number, name in enumerate(chosen)
+    ]
+
+
+def _alike(one: FloatArray, other: FloatArray) -> bool:
+    largest = float(np.nanmax(np.abs(one)))
+    return bool(np.nanmax(np.abs(one - other)) <= SAME * largest)
+
+
+def stress(result: Result) -> Figure:
+    """Return the largest stress of each beam over the motion, with the allowable one."""
+    solution: Solution = result.state
+    allowable = solution.assembly.allowable_stress
+    limits = [*limits_on(result, "stress_max")]
+    if allowable is not None:
+        over = bool(np.nanmax(solution.stress) > allowable)
+        limits.append(Limit(allowable, f"allowable {value_text(allowable, 'stress')}", trouble=over))
+    series = _series({name: value for name, (value, _) in solution.stresses.items()})
+    part = "bending and axial" if solution.spec.stress == "total" else "bending"
+    diagram = Diagram(solution.motion, _motion(result), Scale("largest stress", "stress"), series, limits)
+    return diagram_figure(Heading.of(result, f"largest stress of each beam ({part})"), [diagram])
+
+
+def surface(result: Result) -> Figure:
+    """Return the contact along the surface: its height, and the forces at the tip [Lan, Fig. 14]."""
+    found = ride(result.state)
+    if found is None:
+        raise ValueError("there is no surface")
+    way = Scale("along the surface", "length")
+    low, high = (result.values[name].value for name in ("tip_force_min", "tip_force_max"))
+    limits = [*limits_on(result, "tip_force_min"), *limits_on(result, "tip_force_max")]
+    if low is not None and high is not None:
+        limits += [Limit(value, value_text(value, "force")) for value in (low, high)]
+    diagrams = [
+        Diagram(found.place, way, Scale("height", "length"), [Series(found.height, "surface", GREY)]),
+        Diagram(found.place, way, Scale("tip force", "force", zero=False), [Series(found.force, "", LINES[0])], limits),
+    ]
+    return diagram_figure(Heading.of(result, "contact force along the surface"), diagrams)
