@@ -3,23 +3,29 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from importlib import import_module
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cfmkit.errors import DataError
-from cfmkit.experiment.branches import LOAD
+from cfmkit.experiment.branches import LOAD, UNLOAD
+from cfmkit.families import family
+from cfmkit.families.base import MeasuredLoop
 from cfmkit.metrics import Undefined, Window, window_of
 from cfmkit.metrics.differences import Difference, counterpart, effort_at, largest, mean, overlap, rms, summarize
 from cfmkit.metrics.subjects import span_text
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from cfmkit.curves import Curve, FloatArray
     from cfmkit.experiment.measured import Measured
     from cfmkit.metrics.differences import Measure
     from cfmkit.results import Quantity, Result
+
+PLACES = 257
+"""Places of a window at which the branches of a loop are laid beside each other."""
 
 MOST = 2000
 """Points of a branch that are compared; more are averaged in groups."""
@@ -66,6 +72,25 @@ class Comparison:
     samples: tuple[Samples, ...]
     window: Window
     curve: Curve
+
+    @property
+    def loop(self) -> MeasuredLoop | None:
+        """Both measured branches at even places of the window; None where one way only was measured."""
+        found = {item.branch: item for item in self.samples}
+        if set(found) != {LOAD, UNLOAD}:
+            return None
+        places = np.linspace(self.window.lo, self.window.hi, PLACES)
+        up, down = (_averaged(found[branch], places) for branch in (LOAD, UNLOAD))
+        return MeasuredLoop(places, up, down)
+
+    def causes(self, result: Result) -> Mapping[str, Quantity]:
+        """Return what the loop says about the causes of its departure from the model, where the family can tell."""
+        module = family(result.spec.family).attribution
+        loop = self.loop
+        if module is None or loop is None:
+            return {}
+        causes: Mapping[str, Quantity] = import_module(module).attribute(result, loop)
+        return causes
 
     def metrics(self) -> dict[str, Quantity]:
         """Return root mean square, largest and mean error per branch, and over all, by name, SI."""
@@ -129,6 +154,19 @@ def model_at(curve: Curve, branch: str, motion: FloatArray) -> FloatArray:
         raise DataError(
             f"branch {branch!r} of the model turns back: it cannot be compared with a measurement"
         ) from None
+
+
+def _averaged(samples: Samples, places: FloatArray) -> FloatArray:
+    """Return the effort at even places: the mean of the samples around each, interpolated where there are none."""
+    step = places[1] - places[0]
+    index = np.clip(np.rint((samples.motion - places[0]) / step).astype(int), 0, len(places) - 1)
+    count = np.bincount(index, minlength=len(places))
+    seen = count > 0
+    motion, effort = (
+        np.bincount(index, values, len(places))[seen] / count[seen] for values in (samples.motion, samples.effort)
+    )
+    averaged: FloatArray = np.interp(places, motion, effort)
+    return averaged
 
 
 def _common(curve: Curve, source: Measured, wanted: Window | None, branches: set[str]) -> Window:

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from cfmkit.experiment.calibration import Calibration
     from cfmkit.experiment.comparison import Comparison
     from cfmkit.experiment.measured import Measured
+    from cfmkit.results import Quantity
 
 
 def comparison_data(comparison: Comparison, source: Measured) -> dict[str, Any]:
@@ -51,6 +52,16 @@ def comparison_lines(comparison: Comparison, source: Measured) -> tuple[tuple[st
         where = f" on {item.branch}" if several else ""
         lines.append(("data", f"model - measured{where}: rms {told[0]}, mean {told[1]}, largest {told[2]} over {over}"))
     return tuple(lines)
+
+
+def causes_lines(causes: Mapping[str, Quantity]) -> tuple[tuple[str, str], ...]:
+    """Return the paragraph that a page shows about the causes of a departure: every number with its name."""
+    told = [
+        f"{name.removeprefix('data_').replace('_', ' ')} {_exact(item.value, item.dimension, 4)}"
+        for name, item in causes.items()
+        if item.value is not None
+    ]
+    return (("causes", ", ".join(told)),) if told else ()
 
 
 def comparison_files(

@@ -91,6 +91,23 @@ class BlockAnswer:
 
 
 @dataclass(frozen=True)
+class MeasuredLoop:
+    """Both branches of a measured loop at the same places.
+
+    Attributes
+    ----------
+    places : (n,) array
+        Displacement [m] or angle [rad], increasing, where the model exists.
+    up, down : (n,) array
+        Force [N] or torque [N m] on the way up and on the way back, mean of all cycles.
+    """
+
+    places: FloatArray
+    up: FloatArray
+    down: FloatArray
+
+
+@dataclass(frozen=True)
 class Family:
     """One family of mechanisms, as the registry knows it.
 
@@ -117,6 +134,9 @@ class Family:
     gradient : callable, optional
         ``gradient(spec, paths) -> {metric: {path: derivative}}``: exact derivatives [SI] of those
         metrics (over the window of the analysis) and paths that the family knows; `local` asks for it.
+    attribution : str, optional
+        ``"module"`` with ``attribute(result, loop) -> quantities``: what a measured loop says about the causes
+        of its departure from the model, by name, and their `DEFINITIONS`; imported when there is a measurement.
     draw : str, optional
         ``"module"`` with ``figures(result)``, imported when drawing.
     outline : str, optional
@@ -143,6 +163,7 @@ class Family:
     resolve: Callable[[Any], Any] | None = None
     analyze_block: Callable[[Any, Block], BlockAnswer | None] | None = None
     gradient: Callable[[Any, Sequence[str]], Any] | None = None
+    attribution: str | None = None
     draw: str | None = None
     outline: str | None = None
     headline: tuple[str, ...] = ()

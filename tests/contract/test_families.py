@@ -61,7 +61,8 @@ def test_what_a_family_says_about_itself_is_complete(name):
     assert record.references
     assert all(DIMENSIONS[dimension] and definition for dimension, definition in record.values.values())
     assert all(record.findings.values())
-    for module, function in ((record.draw, "figures"), (record.outline, "drawing")):
+    named = ((record.draw, "figures"), (record.outline, "drawing"), (record.attribution, "attribute"))
+    for module, function in named:
         assert module is None or callable(getattr(import_module(module), function))
 
 

@@ -73,19 +73,20 @@ def compute(spec: Spec, run: Run) -> Report:
 def compute_beside(source: Measured, spec: Spec, run: Run) -> Report:
     """Return the report on a mechanism beside its measured curve."""
     from cfmkit.experiment.comparison import compare
-    from cfmkit.experiment.supplements import comparison_data, comparison_files, comparison_lines
+    from cfmkit.experiment.supplements import causes_lines, comparison_data, comparison_files, comparison_lines
     from cfmkit.report import Supplement
 
     found = compute(spec, run)
     if not found.result.curves:
         return found
     comparison = compare(found.result, source)
+    causes = comparison.causes(found.result)
     return found.beside(
-        comparison.metrics(),
+        comparison.metrics() | dict(causes),
         Supplement(
             comparison_data(comparison, source),
             comparison_files(comparison, source, spec.name),
-            comparison_lines(comparison, source),
+            comparison_lines(comparison, source) + causes_lines(causes),
             source.warnings,
         ),
     )

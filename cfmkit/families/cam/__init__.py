@@ -19,6 +19,7 @@ FAMILY = Family(
     design=design,
     values=DEFINITIONS,
     resolve=resolve,
+    attribution="cfmkit.families.cam.attribution",
     draw="cfmkit.families.cam.draw",
     analyze_block=analyze_block,
     outline="cfmkit.families.cam.outline",

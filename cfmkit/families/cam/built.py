@@ -259,7 +259,7 @@ def _values(built: Built) -> Mapping[str, Quantity]:
     numbers = design_values(built.assembly) | {
         "spring_elongation_max": float(built.elongation.max()),
         "contact_force_max": largest(*pressed_up, *pressed_down),
-        "friction_half_gap_max": largest(((up - down) / (up + down))[known]),
+        "friction_half_gap_max": largest((up - down)[known] / (up + down)[known]),
     }
     shared = {name: Quantity(value, *DEFINITIONS[name]) for name, value in numbers.items()}
     return shared | dict(values_of_built(built))

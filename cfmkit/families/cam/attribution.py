@@ -1,0 +1,126 @@
+"""Where a measured loop departs from the constant force: profile, friction, rest length of the springs.
+
+The area between the branches is proportional to the rolling friction, whatever moves both of them
+together; the line midway between them is not moved by friction, but by springs that are longer or
+shorter than stated, -d/D of the force for d on either side. So the loop gives the friction and
+the midline the rest length, one after the other until neither changes. The errors of a measured
+profile need no fit: the model has them. What is left is unexplained.
+
+`calibrate` fits the same values with intervals, and others.
+
+Reference
+---------
+[SS] S. Sanchez-Salinas et al., Mech. Mach. Theory 173 (2022) 104819, sec. 3.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.families.cam.built import Built, Sides
+from cfmkit.families.cam.model import Solution
+from cfmkit.results import Quantity
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from cfmkit.curves import FloatArray
+    from cfmkit.families.base import MeasuredLoop
+    from cfmkit.families.cam.statics import Loads
+    from cfmkit.results import Result
+
+DEFINITIONS = {
+    "data_friction": ("ratio", "rolling friction whose loop has the measured area, over the places that are compared"),
+    "data_rest_error": (
+        "length",
+        "how much longer than stated springs at rest are that explain the measured midline, stiffness as stated",
+    ),
+    "data_off_design": ("force", "root mean square of measured force less that of the design without friction"),
+    "data_by_profile": ("force", "root mean square of what the measured errors of the profile add"),
+    "data_by_friction": ("force", "root mean square of what the friction adds that has the measured loop area"),
+    "data_by_rest_length": ("force", "root mean square of what the springs' rest length adds, its error included"),
+    "data_unexplained": ("force", "root mean square of what is left"),
+}
+
+_ROUNDS = 12
+_STEP = 1e-6
+"""Of friction, and of the rest half width [m], for derivatives."""
+
+
+def attribute(result: Result, loop: MeasuredLoop) -> Mapping[str, Quantity]:
+    """Return what explains a measured loop of a mechanism at rest, by name; nothing for a motion.
+
+    Parameters
+    ----------
+    result : Result
+        With its state.
+    loop : MeasuredLoop
+        Inside what the model covers.
+    """
+    state = result.state
+    if not isinstance(state, Built | Solution):
+        return {}
+    sides, designed = _sides(state, loop.places - state.origin)
+    loads, mechanism = state.assembly.loads, state.assembly.spec.mechanism
+    drawn = float(mechanism.profile.rest_half_width or loads.rest_half_width)
+    friction, rest = _explained(sides, loads, loop)
+    design = designed.forces(loads, 0.0, drawn)[0]
+    on_track = sides.forces(loads, 0.0, drawn)[0]
+    smooth = sides.forces(loads, 0.0, rest)[0]
+    up, down = (sides.forces(loads, way * friction, rest)[0] for way in (1.0, -1.0))
+    numbers = {
+        "data_friction": friction,
+        "data_rest_error": 2.0 * (rest - loads.rest_half_width),
+        "data_off_design": _rms(loop.up - design, loop.down - design),
+        "data_by_profile": _rms(on_track - design),
+        "data_by_friction": _rms(up - smooth, down - smooth),
+        "data_by_rest_length": _rms(smooth - on_track),
+        "data_unexplained": _rms(loop.up - up, loop.down - down),
+    }
+    if not np.isfinite(list(numbers.values())).all():
+        why = "no friction and rest length of this model give the measured loop"
+        return {name: Quantity(None, *DEFINITIONS[name], why) for name in DEFINITIONS}
+    return {name: Quantity(value, *DEFINITIONS[name]) for name, value in numbers.items()}
+
+
+def _sides(state: Built | Solution, travel: FloatArray) -> tuple[Sides, Sides]:
+    """Return both sides at some travels: as built, and as designed."""
+    track = state.assembly.track
+    states = track.states(track.start + travel)
+    designed = Sides((states.x, states.x), (states.slope, states.slope))
+    if isinstance(state, Solution):
+        return designed, designed
+    x, slope = (
+        tuple(np.interp(travel, state.travel, side) for side in pair) for pair in (state.sides.x, state.sides.slope)
+    )
+    return Sides((x[0], x[1]), (slope[0], slope[1])), designed
+
+
+def _explained(sides: Sides, loads: Loads, loop: MeasuredLoop) -> tuple[float, float]:
+    """Return the friction that has the measured area, and the rest half width [m] that has the measured midline."""
+    friction, rest = 0.0, loads.rest_half_width
+    area, middle = np.trapezoid(loop.up - loop.down, loop.places), 0.5 * (loop.up + loop.down)
+    for _ in range(_ROUNDS):
+        size = friction or _STEP
+        up, down = (sides.forces(loads, way * size, rest)[0] for way in (1.0, -1.0))
+        new = float(size * area / np.trapezoid(up - down, loop.places))
+        slope = (_middle(sides, loads, new, rest + _STEP) - _middle(sides, loads, new, rest)) / _STEP
+        step = float(slope @ (middle - _middle(sides, loads, new, rest)) / (slope @ slope))
+        done = abs(new - friction) <= 1e-12 and abs(step) <= 1e-12
+        friction, rest = new, rest + step
+        if done or not np.isfinite(friction + rest):
+            break
+    return friction, rest
+
+
+def _middle(sides: Sides, loads: Loads, friction: float, rest: float) -> FloatArray:
+    """Return the line midway between the branches [N]."""
+    up, down = (sides.forces(loads, way * friction, rest)[0] for way in (1.0, -1.0))
+    middle: FloatArray = 0.5 * (up + down)
+    return middle
+
+
+def _rms(*parts: FloatArray) -> float:
+    return float(np.sqrt(np.mean(np.square(np.concatenate(parts)))))
