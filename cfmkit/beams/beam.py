@@ -8,11 +8,13 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass, fields, is_dataclass
+from functools import cached_property
+from numbers import Number
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from cfmkit.beams.shapes import STRAIGHT, Course, Shape
+from cfmkit.beams.shapes import STRAIGHT, Course, Shape, direction
 from cfmkit.errors import InputError
 
 if TYPE_CHECKING:
@@ -96,11 +98,34 @@ class Fit:
         """Return ds/dt [m] as used."""
         return self.course.speed(t, inside) * self.scale
 
-    def arc(self, t: float) -> Any:
-        """Return the fraction of the arc length at t."""
+    def arc(self, t: Any) -> Any:
+        """Return the fractions of the arc length at parameters of any shape."""
         if self.course.uniform:
             return t
-        return _integral(self.course, 0.0, t)[1] / _integral(self.course, 0.0, 1.0)[1]
+        edges, lengths = self._arcs
+        values = np.atleast_1d(np.asarray(t, dtype=float))
+        panel = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, len(edges) - 2)
+        half = 0.5 * (values - edges[panel])
+        places = edges[panel][..., None] + half[..., None] * (1 + _NODES)
+        piece = np.searchsorted(self.course.breaks, edges[panel], side="right") - 1
+        middles = 0.5 * (self.course.breaks[1:] + self.course.breaks[:-1])
+        found = lengths[panel]
+        for one in np.unique(piece):
+            own = piece == one
+            found[own] += (self.course.speed(places[own], middles[one]) * _WEIGHTS).sum(axis=-1) * half[own]
+        return (found / lengths[-1]).reshape(np.shape(t))[()]
+
+    @cached_property
+    def _arcs(self) -> tuple[Any, Any]:
+        """Edges of panels over the parameter, and the arc lengths there before scaling."""
+        edges, steps = [np.zeros(1)], [np.zeros(1)]
+        for left, right in itertools.pairwise(self.course.breaks.tolist()):
+            marks = np.linspace(left, right, _PANELS + 1)
+            half = 0.5 * (marks[1] - marks[0])
+            t = (marks[:-1] + half)[:, None] + half * _NODES
+            edges.append(marks[1:])
+            steps.append((self.course.speed(t, 0.5 * (left + right)) * _WEIGHTS).sum(axis=1) * half)
+        return np.concatenate(edges), np.cumsum(np.concatenate(steps))
 
     def parameter(self, fraction: float) -> float:
         """Return t at a fraction of the arc length."""
@@ -131,7 +156,7 @@ def fit(beam: Beam, reach: Any) -> Fit:
     gap = float(np.hypot(np.real(dx - cx), np.real(dy - cy)))
     if beam.closure == "raw":
         return Fit(0.0, 1.0, gap, length, course)
-    rotation = _angle(dx * cx + dy * cy, dy * cx - dx * cy)
+    rotation = direction(dx * cx + dy * cy, dy * cx - dx * cy)
     scale = distance / own
     return Fit(rotation, scale, gap, length * scale, course)
 
@@ -140,10 +165,14 @@ def same_value(one: Any, other: Any) -> bool:
     """Tell whether two values are equal to the last bit; records by their fields, arrays by their entries."""
     if one is other:
         return True
+    if isinstance(one, Number) and isinstance(other, Number):
+        return bool(one == other)
     if type(one) is not type(other):
         return False
     if is_dataclass(one):
         return all(same_value(getattr(one, f.name), getattr(other, f.name)) for f in fields(one))
+    if isinstance(one, tuple):
+        return len(one) == len(other) and all(map(same_value, one, other))
     return bool(np.array_equal(one, other)) if isinstance(one, np.ndarray) else bool(one == other)
 
 
@@ -165,10 +194,3 @@ def _integral(course: Course, start: float, stop: float) -> tuple[tuple[Any, Any
         y = y + (speed * np.sin(angle)).sum()
         length = length + speed.sum()
     return (x, y), length
-
-
-def _angle(x: Any, y: Any) -> Any:
-    """Return the angle of (x, y), for complex values too: real quadrant, analytic remainder."""
-    rough = float(np.arctan2(np.real(y), np.real(x)))
-    c, s = np.cos(rough), np.sin(rough)
-    return rough + np.arctan((y * c - x * s) / (x * c + y * s))

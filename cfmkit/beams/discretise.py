@@ -10,9 +10,9 @@ import numpy as np
 
 from cfmkit.beams.kernels.model import Model
 from cfmkit.beams.kernels.rk8 import NODES
+from cfmkit.beams.section import Taper
 
 if TYPE_CHECKING:
-    from cfmkit.beams.beam import Fit
     from cfmkit.beams.layout import Layout
     from cfmkit.curves import FloatArray
 
@@ -84,14 +84,18 @@ def grid(layout: Layout, mesh: Mesh) -> Grid:
     array = np.array(edges)
     middle = array.mean(axis=1)
     names = list(layout.network.beams)
-    inside = [float(np.real(layout.fits[names[b]].arc(m))) for b, m in zip(beam_of_step, middle.tolist(), strict=True)]
+    owner = np.array(beam_of_step, dtype=np.int64)
+    inside = middle.copy()
+    for number, name in enumerate(names):
+        if not layout.fits[name].course.uniform:
+            inside[owner == number] = np.real(layout.fits[name].arc(middle[owner == number]))
     return Grid(
         array,
-        np.array(inside),
+        inside,
         middle,
         np.array(segment_step, dtype=np.int64),
         np.array(beam_segment, dtype=np.int64),
-        np.array(beam_of_step, dtype=np.int64),
+        owner,
         np.array(piece, dtype=np.int64),
     )
 
@@ -105,20 +109,20 @@ def table(layout: Layout, cut: Grid, known: Any = None) -> Any:
     for number, name in enumerate(layout.network.beams):
         steps = np.flatnonzero(cut.beam_of_step == number)
         kept = layout.known is not None and layout.fits[name] is layout.known.fits[name]
-        blocks.append(known[steps] if known is not None and kept else _scaled(layout, name, cut, steps))
+        blocks.append(known[steps] if known is not None and kept else beam_table(layout, name, cut, steps))
     return np.ascontiguousarray(np.concatenate(blocks))
 
 
-def _scaled(layout: Layout, name: str, cut: Grid, steps: Any) -> Any:
+def beam_table(layout: Layout, name: str, cut: Grid, steps: Any) -> Any:
     """Return the table of one beam, dimensionless."""
-    block, scales = _beam_table(layout, name, cut, steps), layout.scales
+    block, scales = _si_table(layout, name, cut, steps), layout.scales
     block[..., 1:] /= scales.length
     block[..., 2] *= scales.rigidity
     block[..., 3:] *= scales.force
     return block
 
 
-def _beam_table(layout: Layout, name: str, cut: Grid, steps: Any) -> Any:
+def _si_table(layout: Layout, name: str, cut: Grid, steps: Any) -> Any:
     """Return the table of one beam in SI: angle, g, g L0/EI-like compliances before scaling."""
     fitted, section = layout.fits[name], layout.network.beams[name].section
     blocks = []
@@ -129,16 +133,12 @@ def _beam_table(layout: Layout, name: str, cut: Grid, steps: Any) -> Any:
         t = left + (right - left) * NODES
         middle, inside = cut.middle[own[0]], cut.inside[own[0]]
         angle, speed = fitted.angle(t, middle), fitted.speed(t, middle)
-        place = t if fitted.course.uniform else _places(fitted, t)
+        place = fitted.arc(t) if isinstance(section.thickness, Taper) else t
         bending, axial, shear = section.rigidities(place, inside)
-        blocks.append(np.stack([angle, speed, speed / bending, speed * axial, speed * shear], axis=-1))
+        blocks.append(
+            np.stack(np.broadcast_arrays(angle, speed, speed / bending, speed * axial, speed * shear), axis=-1)
+        )
     return np.concatenate(blocks)
-
-
-def _places(fitted: Fit, t: Any) -> Any:
-    """Return the fractions of the arc length at parameters."""
-    flat = [np.real(fitted.arc(float(x))) for x in t.ravel()]
-    return np.array(flat).reshape(t.shape)
 
 
 def model(layout: Layout, mesh: Mesh, ramp: bool = False) -> Model:
@@ -158,7 +158,6 @@ def assemble_model(layout: Layout, cut: Grid, values: Any, ramp: bool = False) -
     base, rate = _held(layout)
     load_place, load_value, load_follows = _loads(layout)
     line = layout.line_load / scales.force * scales.length
-    line = line.copy()
     line[:, 1] *= scales.drive
     if ramp:
         base, rate = np.zeros_like(base), base
@@ -167,14 +166,13 @@ def assemble_model(layout: Layout, cut: Grid, values: Any, ramp: bool = False) -
     slot = np.full(layout.dof_count, -1, dtype=np.int64)
     slot[layout.free] = np.arange(int(layout.free.sum()))
     spring_place, spring_kind, spring_value = _springs(layout)
-    dtype = values.dtype
     return Model(
         table=values,
         width=np.ascontiguousarray(cut.edges[:, 1] - cut.edges[:, 0]),
         segment_step=cut.segment_step,
         beam_segment=cut.beam_segment,
         beam_end=layout.beam_end,
-        line_load=line.astype(dtype) if dtype.kind == "c" else line,
+        line_load=line,
         place_dof=np.array(places.dof, dtype=np.int64),
         place_frame=np.array(places.frame),
         place_origin=np.array(places.origin) / scales.length,
@@ -206,22 +204,23 @@ def _held(layout: Layout) -> tuple[Any, Any]:
 def _loads(layout: Layout) -> tuple[Any, Any, Any]:
     scales = layout.scales
     count = len(layout.load_rows)
-    place, value, follows = np.zeros(count, np.int64), np.zeros((count, 2, 3)), np.zeros(count, np.int64)
+    place, follows = np.zeros(count, np.int64), np.zeros(count, np.int64)
+    value: list[list[tuple[Any, ...]]] = [[(0.0, 0.0, 0.0), (0.0, 0.0, 0.0)] for _ in range(count)]
     for k, (at, when, (fx, fy, moment), turns, _) in enumerate(layout.load_rows):
         unit = scales.drive if when == 1 else 1.0
         place[k], follows[k] = at, int(turns)
-        value[k, when] = np.array([fx / scales.force, fy / scales.force, moment / scales.moment]) * unit
-    return place, value, follows
+        value[k][when] = (fx / scales.force * unit, fy / scales.force * unit, moment / scales.moment * unit)
+    return place, np.array(value).reshape(count, 2, 3), follows
 
 
 def _springs(layout: Layout) -> tuple[Any, Any, Any]:
     """Return the springs' attachments, kinds and dimensionless values."""
     scales = layout.scales
     count = len(layout.spring_rows)
-    place, kind, value = np.zeros((count, 2), np.int64), np.zeros(count, np.int64), np.zeros((count, 4))
+    place, kind, value = np.zeros((count, 2), np.int64), np.zeros(count, np.int64), []
     line, turn, length = scales.force / scales.length, scales.moment, scales.length
     units = {0: (line, length, 1.0, 1.0), 1: (turn, 1.0, 1.0, 1.0), 2: (line, 1.0, 1.0, length)}
     for k, (what, start, end, values) in enumerate(layout.spring_rows):
         place[k], kind[k] = (start, end), what
-        value[k] = np.real(np.array(values) / np.array(units[what]))
-    return place, kind, value
+        value.append([own / unit for own, unit in zip(values, units[what], strict=True)])
+    return place, kind, np.array(value).reshape(count, 4)

@@ -124,9 +124,10 @@ class Layout:
         for load in self.drive.loads:
             self.network.check_load(load)
             if isinstance(load, PointLoad):
-                sizes.append(max(np.hypot(load.fx, load.fy) / force, abs(load.moment) / (force * length)))
+                fx, fy, moment = np.real([load.fx, load.fy, load.moment])
+                sizes.append(max(np.hypot(fx, fy) / force, abs(moment) / (force * length)))
             else:
-                sizes.append(float(np.hypot(load.wx, load.wy)) * length / force)
+                sizes.append(float(np.hypot(np.real(load.wx), np.real(load.wy))) * length / force)
         if not max(sizes) > 0:
             raise InputError("the loads of the drive are all zero")
         return 1.0 / float(max(sizes))
@@ -152,7 +153,7 @@ class Layout:
             (support.across, support.along, 1, np.pi / 2),
         ):
             if not held and other and same_direction(drive.direction, support.direction + turn):
-                sense = float(np.sign(np.cos(drive.direction - support.direction - turn)))
+                sense = float(np.sign(np.cos(drive.direction - np.real(support.direction) - turn)))
                 return self.first[drive.node] + offset, sense
         raise InputError(f"node {drive.node!r} cannot be moved along {np.degrees(drive.direction):.6g} deg: it is held")
 
@@ -164,7 +165,7 @@ class Layout:
         c, s = np.cos(self.direction[master]), np.sin(self.direction[master])
         own = first + 2 if pose_dof is None else pose_dof
         self.places.dof.append((first, first + 1, first + 2, own))
-        self.places.frame.append((float(c), float(s)))
+        self.places.frame.append((c, s))
         self.places.origin.append((mx, my))
         self.places.arm.append((x - mx + offset[0], y - my + offset[1]))
         return len(self.places.dof) - 1
@@ -201,25 +202,28 @@ class Layout:
     def _collect_loads(self) -> None:
         """Sort the loads: constant ones and those of the drive, at points and along beams (SI)."""
         names = list(self.network.beams)
-        self.line_load = np.zeros((len(names), 2, 2))
-        self.load_rows: list[tuple[int, int, tuple[float, float, float], bool, str]] = []
+        line_load: list[list[list[Any]]] = [[[0.0, 0.0], [0.0, 0.0]] for _ in names]
+        self.load_rows: list[tuple[int, int, tuple[Any, Any, Any], bool, str]] = []
         driven: tuple[LoadOn, ...] = self.drive.loads if isinstance(self.drive, Loading) else ()
         for when, loads in enumerate((self.network.loads, driven)):
             for load in loads:
                 if isinstance(load, LineLoad):
-                    self.line_load[names.index(load.beam), when] += (load.wx, load.wy)
+                    row = line_load[names.index(load.beam)][when]
+                    row[0], row[1] = row[0] + load.wx, row[1] + load.wy
                 else:
                     values = (load.fx, load.fy, load.moment)
                     self.load_rows.append((self._place(load.node), when, values, load.follows, load.node))
+        self.line_load = np.array(line_load)
 
     def _release(self) -> None:
         """Decide which degrees of freedom are free; a rotation that nothing resists or uses is held at zero."""
         free = np.zeros(self.dof_count, dtype=bool)
-        self.base = np.zeros(self.dof_count)
+        base: list[Any] = [0.0] * self.dof_count
         for name in self.masters:
             support, first = self.network.nodes[name].support, self.first[name]
             free[first : first + 3] = (not support.along, not support.across, not support.rotation)
-            self.base[first : first + 3] = support.displacement
+            base[first : first + 3] = support.displacement
+        self.base = np.array(base)
         used = {place[3] for place in self.places.dof}
         used |= {d[2] for d, a in zip(self.places.dof, self.places.arm, strict=True) if np.any(np.real(a))}
         for place, _, values, follows, _ in self.load_rows:

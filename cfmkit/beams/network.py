@@ -224,4 +224,4 @@ def _ends(spring: Spring) -> list[str]:
 
 def same_direction(one: float, other: float) -> bool:
     """Tell whether two directions [rad] are parallel, in either sense."""
-    return bool(abs(np.sin(one - other)) < 1e-12)
+    return bool(abs(np.sin(np.real(one) - np.real(other))) < 1e-12)

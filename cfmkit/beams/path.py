@@ -11,7 +11,8 @@ import numpy as np
 
 from cfmkit.beams.drive import Loading
 from cfmkit.beams.network import LineLoad
-from cfmkit.beams.recover import Sampler, Sections, extremes, sections
+from cfmkit.beams.recover import Sampler, Sections, along_beam
+from cfmkit.beams.stress import StressExtremes, extremes, signed_extremes
 from cfmkit.curves import read_only
 
 if TYPE_CHECKING:
@@ -135,6 +136,11 @@ class Path:
             entry.forces(s.model, s.n_free, np.ascontiguousarray(self.points.y), self.points.drive, out, s.scratch)
         return out[:, :dofs], out[:, dofs : 2 * dofs], out[:, -1]
 
+    @property
+    def residual(self) -> FloatArray:
+        """Forces of loads, springs and beams on every degree of freedom at every point, dimensionless."""
+        return self._observed[1]
+
     def motion(self, node: str) -> FloatArray:
         """Return displacement and rotation of a node, (n, 3) [m, m, rad]."""
         values, scales = self._observed[0], self.layout.scales
@@ -181,25 +187,16 @@ class Path:
         return total
 
     def _line_work(self, load: LineLoad) -> FloatArray:
-        """Return the line load's work-conjugate displacement [J] by Simpson's rule over the samples."""
-        from scipy.integrate import simpson
+        """Return the line load's work-conjugate displacement [J]."""
+        index = list(self.layout.network.beams).index(load.beam)
+        moved = self.line_motion(load.beam) @ np.array([load.wx, load.wy])
+        return np.asarray(moved @ self.sampler.weights(self.layout, index))
 
-        sampler, scales = self.sampler, self.layout.scales
-        beam = list(self.layout.network.beams).index(load.beam)
-        rows = sampler.rows(beam)
-        rest = self.solver.unstressed()
-        from cfmkit.beams.kernels import entry
-
-        still = np.empty(sampler.states.shape[1:])
-        entry.states(sampler.model, self.solver.n_free, rest, 0.0, still)
-        moved = (sampler.states[:, rows.index, :2] - still[rows.index, :2]) * scales.length
-        length = float(np.real(self.fits[load.beam].length)) * sampler.place(beam, rows.t)
-        density = load.wx * moved[..., 0] + load.wy * moved[..., 1]
-        total = np.zeros(len(self))
-        for first in range(0, len(rows.t), sampler.per_segment):
-            part = slice(first, first + sampler.per_segment)
-            total += simpson(density[:, part], x=length[part], axis=1)
-        return total
+    def line_motion(self, beam: str) -> FloatArray:
+        """Return the displacements of the sampled places of a beam, (n, k, 2) [m]."""
+        rows = self.sampler.rows(list(self.layout.network.beams).index(beam)).index
+        moved = self.sampler.states[:, rows, :2] - self.sampler.rest(self.sampler.model)[rows]
+        return read_only(moved * self.layout.scales.length)
 
     def end_force(self, beam: str, end: int) -> FloatArray:
         """Return (h, v, m) on the first (0) or last (1) section of a beam, (n, 3) [N, N, N m].
@@ -228,15 +225,15 @@ class Path:
 
     def sections(self, beam: str) -> Sections:
         """Return section forces and stresses along a beam at all points; arrays (n, k)."""
-        index = list(self.layout.network.beams).index(beam)
-        rows = self.sampler.rows(index)
-        states = self.sampler.states[:, rows.index]
-        t = np.broadcast_to(rows.t, states.shape[:2])
-        return sections(self.sampler, index, states, t, np.broadcast_to(rows.step, t.shape))
+        return along_beam(self.sampler, list(self.layout.network.beams).index(beam))
 
     def beam_stress(self, beam: str, axial: bool = True) -> tuple[FloatArray, FloatArray]:
         """Return the largest stress of a beam at every point [Pa] and its place (fraction of the length)."""
         return extremes(self.sampler, list(self.layout.network.beams).index(beam), axial)
+
+    def stress_extremes(self, beam: str, axial: bool = True) -> StressExtremes:
+        """Return the highest and lowest stress on both sides of a beam at every point, signed, with their places."""
+        return signed_extremes(self.sampler, list(self.layout.network.beams).index(beam), axial)
 
     def peak_stress(self, axial: bool = True) -> StressPeak:
         """Return the largest stress of the network at every point, with its place."""

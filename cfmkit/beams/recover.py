@@ -1,7 +1,6 @@
-"""States along the beams at solved points, and where the stress is largest.
+"""States, section forces and stresses along the beams at solved points.
 
-Between the rows of a fine sampling the state is integrated, not interpolated, so that an extreme inside a beam is
-found to rounding and not to the spacing of samples.
+Between the rows of a fine sampling the state is integrated, not interpolated.
 """
 
 from __future__ import annotations
@@ -12,14 +11,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.beams.discretise import Mesh, assemble_model, grid, table
-from cfmkit.beams.kernels.rk8 import COUPLING, NODES, STAGES, WEIGHTS
+from cfmkit.beams.kernels.rk8 import NODES, WEIGHTS
 
 if TYPE_CHECKING:
+    from cfmkit.beams.layout import Layout
     from cfmkit.beams.solver import Points, Solver
     from cfmkit.curves import FloatArray
 
 _ROWS = 8  # samples of a segment
-_ZOOMS, _PER_ZOOM = 3, 9
+_CLOSED = np.array([989, 5888, -928, 10496, -4540, 10496, -928, 5888, 989]) / 28350  # Newton-Cotes on nine rows
+
+_STEP = 1e-30
 
 X, Y, TURN, MOMENT, H, V, ENERGY = range(7)
 
@@ -49,11 +51,17 @@ class Sampler:
         count = len(self.cut.edges) + segments
         self.states = np.empty((len(points), count, 7))
         self.drive = points.drive
+        self._rows: dict[int, Rows] = {}
         for k in range(len(points)):
             entry.states(self.model, solver.n_free, points.y[k], points.drive[k], self.states[k])
 
     def rows(self, beam: int) -> Rows:
         """Return the rows of a beam in order; segment boundaries occur twice."""
+        if beam not in self._rows:
+            self._rows[beam] = self._rows_of(beam)
+        return self._rows[beam]
+
+    def _rows_of(self, beam: int) -> Rows:
         cut = self.cut
         index, t, step = [], [], []
         for segment in range(cut.beam_segment[beam], cut.beam_segment[beam + 1]):
@@ -70,65 +78,82 @@ class Sampler:
         total: FloatArray = self.states[:, ends, ENERGY].sum(axis=1)
         return total
 
-    def at(self, beam: int, rows: Rows, start: Any, t: FloatArray, points: Any) -> FloatArray:
-        """Return states (k, 7) at parameters t (k,) of a beam, each integrated from the row number `start` (k,)."""
-        out: FloatArray = self.states[points, rows.index[start]].copy()
-        for row in np.unique(start):
-            chosen = np.flatnonzero(start == row)
-            out[chosen] = self._advance(beam, out[chosen], rows, int(row), t[chosen], self.drive[points[chosen]])
+    def rest(self, m: Any) -> Any:
+        """Return the rows' places before any load, (rows, 2), dimensionless; for tilted models too."""
+        turn, speed = m.table[:, :, 0], m.table[:, :, 1]
+        runs = np.stack([(f(turn) * speed) @ WEIGHTS for f in (np.cos, np.sin)], axis=1)
+        runs *= (self.cut.edges[:, 1] - self.cut.edges[:, 0])[:, None]
+        whole = np.result_type(runs, m.place_origin)
+        out = np.empty((len(runs) + len(m.segment_step) - 1, 2), dtype=whole)
+        for beam, place in enumerate(m.beam_end[:, 0]):
+            at = m.place_origin[place] + m.place_arm[place]
+            for segment in range(m.beam_segment[beam], m.beam_segment[beam + 1]):
+                first, last = m.segment_step[segment], m.segment_step[segment + 1]
+                part = out[first + segment : last + segment + 1]
+                part[0], part[1:] = at, at + np.cumsum(runs[first:last], axis=0)
+                at = part[-1]
         return out
 
-    def _advance(self, beam: int, state: FloatArray, rows: Rows, row: int, t: FloatArray, drive: FloatArray) -> Any:
-        """Return states one Runge-Kutta step further."""
-        step = int(rows.step[row])
-        width = t - rows.t[row]
-        values = self.stage_table(beam, step, rows.t[row] + np.outer(width, NODES))
-        load = self.model.line_load[beam, 0] + np.outer(drive, self.model.line_load[beam, 1])
-        slopes = np.zeros((STAGES, *state.shape))
-        for i in range(STAGES):
-            now = state + width[:, None] * np.tensordot(COUPLING[i, :i], slopes[:i], axes=1)
-            slopes[i] = _slope(values[:, i], now, load)
-        return state + width[:, None] * np.tensordot(WEIGHTS, slopes, axes=1)
-
-    def stage_table(self, beam: int, step: int, t: FloatArray) -> Any:
-        """Return the table of `cfmkit.beams.kernels.model.Model` at any parameters on a step."""
-        layout, cut = self.layout, self.cut
-        name = list(layout.network.beams)[beam]
-        fitted, section, scales = layout.fits[name], layout.network.beams[name].section, layout.scales
-        angle = fitted.angle(t, cut.middle[step])
-        speed = fitted.speed(t, cut.middle[step]) / scales.length
-        bending, axial, shear = section.rigidities(self.place(beam, t), cut.inside[step])
-        return np.stack(
-            [
-                angle,
-                speed,
-                speed / bending * scales.rigidity,
-                speed * axial * scales.force,
-                speed * shear * scales.force,
-            ],
-            axis=-1,
+    def weights(self, layout: Layout, beam: int) -> Any:
+        """Return the weights [m] that integrate along a beam of a layout what is given at its rows."""
+        rows, fitted = self.rows(beam), layout.fits[list(layout.network.beams)[beam]]
+        speed = np.array(
+            [fitted.speed(t, self.cut.middle[step]) for t, step in zip(rows.t.tolist(), rows.step, strict=True)]
         )
+        panel = len(_CLOSED) - 1
+        own = np.zeros(len(rows.t))
+        for first in range(0, len(rows.t), self.per_segment):
+            for start in range(first, first + self.per_segment - 1, panel):
+                own[start : start + panel + 1] += _CLOSED * (rows.t[start + panel] - rows.t[start])
+        return own * speed
+
+    def at(self, beam: int, rows: Rows, start: Any, t: FloatArray, points: Any) -> FloatArray:
+        """Return states (k, 7) at parameters t (k,) of a beam, each integrated from the row number `start` (k,)."""
+        from cfmkit.beams.kernels import entry
+
+        count, m = len(t), self.model
+        width = t - rows.t[start]
+        values = self.stage_table(beam, rows.step[start], rows.t[start][:, None] + np.outer(width, NODES))
+        load = self.load(beam, points)
+        single = m._replace(
+            table=values,
+            width=width,
+            segment_step=np.arange(count + 1),
+            beam_segment=np.arange(count + 1),
+            beam_end=np.zeros((count, 2), np.int64),
+            line_load=np.stack([load, np.zeros_like(load)], axis=1),
+        )
+        old = self.states[points, rows.index[start]]
+        y = np.concatenate([np.zeros(3 * count), old[:, [X, Y, TURN, H, V, MOMENT]].ravel()])
+        out = np.empty((2 * count, 7))
+        entry.states(single, 0, y, 0.0, out)
+        return out[1::2]
+
+    def load(self, beam: int, points: Any) -> Any:
+        """Return the line load on a beam at points (k,), (k, 2), dimensionless."""
+        own = self.model.line_load[beam]
+        return own[0] + np.outer(self.drive[points], own[1])
+
+    def stage_table(self, beam: int, step: Any, t: FloatArray) -> Any:
+        """Return the table of `cfmkit.beams.kernels.model.Model` at parameters t (k, stages) on steps (k,)."""
+        layout, cut, scales = self.layout, self.cut, self.layout.scales
+        name = list(layout.network.beams)[beam]
+        fitted, section = layout.fits[name], layout.network.beams[name].section
+        place, out, pieces = self.place(beam, t), np.empty((*t.shape, 5)), cut.piece[step]
+        for piece in np.unique(pieces):
+            own = pieces == piece
+            first = int(step[own][0])
+            speed = fitted.speed(t[own], cut.middle[first]) / scales.length
+            bending, axial, shear = section.rigidities(place[own], cut.inside[first])
+            out[own, :, 0], out[own, :, 1] = fitted.angle(t[own], cut.middle[first]), speed
+            out[own, :, 2] = speed / bending * scales.rigidity
+            out[own, :, 3], out[own, :, 4] = speed * axial * scales.force, speed * shear * scales.force
+        return out
 
     def place(self, beam: int, t: FloatArray) -> FloatArray:
         """Return the fractions of the arc length at parameters."""
-        fitted = self.layout.fits[list(self.layout.network.beams)[beam]]
-        if fitted.course.uniform:
-            return t
-        flat = np.array([float(np.real(fitted.arc(float(x)))) for x in np.ravel(t)])
-        return flat.reshape(np.shape(t))
-
-
-def _slope(values: FloatArray, state: FloatArray, load: FloatArray) -> FloatArray:
-    """Return the slopes of the states (k, 7) for table values (k, 5)."""
-    psi = values[:, 0] + state[:, TURN]
-    c, s, h, v = np.cos(psi), np.sin(psi), state[:, H], state[:, V]
-    normal, shear = h * c + v * s, v * c - h * s
-    stretch, slip = values[:, 1] + values[:, 3] * normal, values[:, 4] * shear
-    x, y = stretch * c - slip * s, stretch * s + slip * c
-    moment = state[:, MOMENT]
-    energy = 0.5 * (values[:, 2] * moment**2 + values[:, 3] * normal**2 + values[:, 4] * shear**2)
-    w = values[:, 1]
-    return np.stack([x, y, values[:, 2] * moment, y * h - x * v, -w * load[:, 0], -w * load[:, 1], energy], axis=-1)
+        arcs: FloatArray = np.real(self.layout.fits[list(self.layout.network.beams)[beam]].arc(t))
+        return arcs
 
 
 @dataclass(frozen=True)
@@ -161,67 +186,62 @@ class Sections:
 
 
 def sections(sampler: Sampler, beam: int, states: FloatArray, t: FloatArray, step: Any) -> Sections:
-    """Return section forces and stresses (SI) for states (..., 7) at parameters t on given steps."""
+    """Return section forces and stresses (SI) for states (..., n, 7) at parameters t (n,) on given steps (n,)."""
     layout, cut = sampler.layout, sampler.cut
     name = list(layout.network.beams)[beam]
     section, scales = layout.network.beams[name].section, layout.scales
     angle, thickness = np.empty(t.shape), np.empty(t.shape)
-    place = sampler.place(beam, t)
-    for one in np.unique(step):
-        here = step == one
-        angle[here] = layout.fits[name].angle(t[here], cut.middle[one])
-        thickness[here] = section.thickness_at(place[here], cut.inside[one])
+    place, pieces = sampler.place(beam, t), cut.piece[step]
+    for piece in np.unique(pieces):
+        here = pieces == piece
+        first = int(step[here][0])
+        angle[here] = layout.fits[name].angle(t[here], cut.middle[first])
+        thickness[here] = section.thickness_at(place[here], cut.inside[first])
     psi = angle + states[..., TURN]
+    c, s = np.cos(psi), np.sin(psi)
     h, v = states[..., H] * scales.force, states[..., V] * scales.force
-    normal, shear = h * np.cos(psi) + v * np.sin(psi), v * np.cos(psi) - h * np.sin(psi)
+    normal, shear = h * c + v * s, v * c - h * s
     moment = states[..., MOMENT] * scales.moment
     area = section.width * thickness
+    place = np.broadcast_to(place, moment.shape)
     return Sections(place, moment, normal, shear, 6 * moment / (area * thickness), normal / area)
 
 
-def extremes(sampler: Sampler, beam: int, axial: bool) -> tuple[FloatArray, FloatArray]:
-    """Return the largest stress of a beam [Pa] at every point, and its place as a fraction of the arc length."""
+def stress_slopes(
+    sampler: Sampler, beam: int, states: FloatArray, where: tuple[FloatArray, Any, Any], found: Sections
+) -> tuple[FloatArray, FloatArray]:
+    """Return the derivatives of bending and axial stress by the parameter of the shape, at places (n,): two (n,).
+
+    where: parameters, steps and points; found: `sections` there.
+    """
+    (t, step, points), layout, cut = where, sampler.layout, sampler.cut
+    name = list(layout.network.beams)[beam]
+    section, scales, fitted = layout.network.beams[name].section, layout.scales, layout.fits[name]
+    angle, thick, speed = (np.empty(t.shape, complex) for _ in range(3))
+    bending, axial, shear = (np.empty(t.shape) for _ in range(3))
+    pieces, length = cut.piece[step], np.real(fitted.length)
+    for piece in np.unique(pieces):
+        here = pieces == piece
+        first = int(step[here][0])
+        inside, ahead = cut.inside[first], 1j * _STEP
+        angle[here] = fitted.angle(t[here] + ahead, cut.middle[first])
+        speed[here] = fitted.speed(t[here], cut.middle[first])
+        place = found.place[here]
+        thick[here] = section.thickness_at(place + ahead * speed[here] / length, inside)
+        bending[here], axial[here], shear[here] = section.rigidities(place, inside)
+    psi, g = angle.real + states[:, TURN], speed.real
+    c, s = np.cos(psi), np.sin(psi)
+    along, across = g * (1 + found.normal * axial), g * found.shear * shear
+    load = sampler.load(beam, points) * scales.force / scales.length
+    moment = across * found.normal - along * found.shear
+    turn = angle.imag / _STEP + g * found.moment / bending
+    normal = found.shear * turn - g * (load[:, 0] * c + load[:, 1] * s)
+    t0, grow = thick.real, thick.imag / _STEP / thick.real
+    area = section.width * t0
+    return 6 * moment / (area * t0) - 2 * found.bending_stress * grow, normal / area - found.axial_stress * grow
+
+
+def along_beam(sampler: Sampler, beam: int) -> Sections:
+    """Return section forces and stresses at the rows of a beam at all points, (n, rows)."""
     rows = sampler.rows(beam)
-    states = sampler.states[:, rows.index]
-    count = len(states)
-    t = np.broadcast_to(rows.t, states.shape[:2])
-    coarse = sections(sampler, beam, states, t, np.broadcast_to(rows.step, t.shape)).stress(axial)
-    best = coarse.argmax(axis=1)
-    low, high = rows.t[np.maximum(best - 1, 0)], rows.t[np.minimum(best + 1, len(rows.t) - 1)]
-    value, where = coarse[np.arange(count), best], rows.t[best]
-    points = np.repeat(np.arange(count), _PER_ZOOM)
-    for _ in range(_ZOOMS):
-        tries = low[:, None] + (high - low)[:, None] * np.linspace(0, 1, _PER_ZOOM)
-        stress = _stress_at(sampler, beam, rows, tries.ravel(), points, axial).reshape(tries.shape)
-        top = stress.argmax(axis=1)
-        pick = np.arange(count)
-        better = stress[pick, top] >= value
-        value, where = np.where(better, stress[pick, top], value), np.where(better, tries[pick, top], where)
-        spacing = (high - low) / (_PER_ZOOM - 1)
-        low, high = np.maximum(low, where - spacing), np.minimum(high, where + spacing)
-    vertex = _vertex(low, where, high, sampler, beam, rows, axial)
-    final = _stress_at(sampler, beam, rows, vertex, np.arange(count), axial)
-    better = final >= value
-    place = sampler.place(beam, np.where(better, vertex, where))
-    return np.where(better, final, value), place
-
-
-def _stress_at(sampler: Sampler, beam: int, rows: Rows, t: FloatArray, points: Any, axial: bool) -> FloatArray:
-    """Return the stress at parameters t (k,) for the points (k,)."""
-    start = np.clip(np.searchsorted(rows.t, t, side="right") - 1, 0, len(rows.t) - 2)
-    states = sampler.at(beam, rows, start, t, points)
-    return sections(sampler, beam, states, t, rows.step[start]).stress(axial)
-
-
-def _vertex(
-    low: FloatArray, middle: FloatArray, high: FloatArray, sampler: Sampler, beam: int, rows: Rows, axial: bool
-) -> FloatArray:
-    """Return the vertex of the parabola through three places, the middle where there is none."""
-    points = np.arange(len(middle))
-    a, b, c = (_stress_at(sampler, beam, rows, t, points, axial) for t in (low, middle, high))
-    left, right = middle - low, middle - high
-    below = left * (b - c) - right * (b - a)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        vertex = middle - 0.5 * (left**2 * (b - c) - right**2 * (b - a)) / below
-    usable = np.isfinite(vertex) & (vertex > low) & (vertex < high) & (left > 0) & (right < 0)
-    return np.where(usable, vertex, middle)
+    return sections(sampler, beam, sampler.states[:, rows.index], rows.t, rows.step)

@@ -18,6 +18,8 @@ from cfmkit.errors import InputError
 if TYPE_CHECKING:
     from cfmkit.curves import FloatArray
 
+_NEAR = 1e-12  # of the parameter: counts as on a piece
+
 AngleLaw = Callable[[Any, float], Any]  # (t, a place inside the piece) -> angle [rad] or speed
 
 
@@ -109,16 +111,22 @@ class Polyline:
     def course(self, chord: Any) -> Course:
         """Return the course; t is the fraction of the arc length."""
         steps = np.diff(self.points, axis=0)
-        lengths = np.hypot(steps[:, 0], steps[:, 1])
-        angles = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
-        total = float(lengths.sum())
-        breaks = np.concatenate([[0.0], np.cumsum(lengths) / total])
+        lengths = (steps[:, 0] ** 2 + steps[:, 1] ** 2) ** 0.5
+        angles = direction(steps[:, 0], steps[:, 1])
+        angles += np.unwrap(angles.real) - angles.real
+        breaks = np.concatenate([[0.0], np.cumsum(lengths.real) / lengths.real.sum()])
         breaks[-1] = 1.0
+        speeds = lengths / np.diff(breaks)  # one number, but for complex steps: there the corners keep their t
 
-        def angle(t: Any, inside: float) -> Any:
-            return angles[min(int(np.searchsorted(breaks, inside, side="right")) - 1, len(angles) - 1)] + 0.0 * t
+        def piece(inside: float) -> int:
+            return min(int(np.searchsorted(breaks, inside, side="right")) - 1, len(angles) - 1)
 
-        return Course(angle, lambda t, inside: total + 0.0 * t, read_only(breaks), True)
+        return Course(
+            lambda t, inside: angles[piece(inside)] + 0.0 * t,
+            lambda t, inside: speeds[piece(inside)] + 0.0 * t,
+            read_only(breaks),
+            speeds.dtype.kind != "c",
+        )
 
 
 @dataclass(frozen=True)
@@ -133,28 +141,70 @@ class Spline:
 
     def course(self, chord: Any) -> Course:
         """Return the course; t is the fraction of the chord polygon's length."""
-        from scipy.interpolate import CubicSpline
-
         steps = np.diff(self.points, axis=0)
-        knots = np.concatenate([[0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))])
-        knots /= knots[-1]
-        curve = CubicSpline(knots, self.points)
-        velocity = curve.derivative()
-        fine = velocity(np.linspace(0, 1, 32 * len(knots)))
-        turns = np.unwrap(np.arctan2(fine[:, 1], fine[:, 0]))
+        knots = np.concatenate([[0.0], np.cumsum((steps[:, 0] ** 2 + steps[:, 1] ** 2) ** 0.5)])
+        knots = knots / knots[-1]
+        velocity = _spline_velocity(knots, self.points)
         places = np.linspace(0, 1, 32 * len(knots))
+        fine = velocity(places, 0.0).real
+        turns = np.unwrap(np.arctan2(fine[:, 1], fine[:, 0]))
 
         def angle(t: Any, inside: float) -> Any:
-            v = velocity(t)
-            near = np.interp(t, places, turns)
-            raw = np.arctan2(v[..., 1], v[..., 0])
-            return raw + 2 * np.pi * np.round((near - raw) / (2 * np.pi))
+            v = velocity(t, inside)
+            near = np.interp(np.real(t), places, turns)
+            raw = direction(v[..., 0], v[..., 1])
+            return raw + 2 * np.pi * np.round((near - raw.real) / (2 * np.pi))
 
         def speed(t: Any, inside: float) -> Any:
-            v = velocity(t)
-            return np.hypot(v[..., 0], v[..., 1])
+            v = velocity(t, inside)
+            return (v[..., 0] ** 2 + v[..., 1] ** 2) ** 0.5
 
-        return Course(angle, speed, read_only(knots), False)
+        return Course(angle, speed, read_only(knots.real), False)
+
+
+def _spline_velocity(knots: Any, points: Any) -> AngleLaw:
+    """Return the derivative of the cubic spline through points (n, 2), by "not a knot" at its ends.
+
+    Reference: C. de Boor, A Practical Guide to Splines, 1978, ch. IV.
+    """
+    gap, n = np.diff(knots), len(knots)
+    slope = np.diff(points, axis=0) / gap[:, None]
+    if n == 2:
+        return lambda t, inside: slope[0] * (gap[0] / gap[0].real) + 0.0 * np.asarray(t)[..., None]
+    a, b = np.zeros((n, n), dtype=slope.dtype), np.zeros((n, 2), dtype=slope.dtype)
+    for i in range(1, n - 1):
+        a[i, i - 1 : i + 2] = gap[i], 2 * (gap[i - 1] + gap[i]), gap[i - 1]
+        b[i] = 3 * (gap[i] * slope[i - 1] + gap[i - 1] * slope[i])
+    for row, one, two, s1, s2 in (
+        (0, gap[0], gap[1], slope[0], slope[1]),
+        (-1, gap[-1], gap[-2], slope[-1], slope[-2]),
+    ):
+        inner = 1 if row == 0 else -2
+        if n == 3:
+            a[row, row], a[row, inner], b[row] = 1.0, 1.0, 2 * s1
+            continue
+        both = one + two
+        a[row, row], a[row, inner] = two, both
+        b[row] = ((one + 2 * both) * two * s1 + one**2 * s2) / both
+    ends = np.linalg.solve(a, b)
+
+    def velocity(t: Any, inside: float) -> Any:
+        own = min(int(np.searchsorted(knots.real, inside, side="right")) - 1, n - 2)
+        at = np.real(t)
+        i = np.clip(np.searchsorted(knots.real, at, side="right") - 1, 0, n - 2)
+        i = np.where((at >= knots.real[own] - _NEAR) & (at <= knots.real[own + 1] + _NEAR), own, i)
+        u = ((t - knots.real[i]) / gap.real[i])[..., None]  # of the piece: for complex steps too
+        found = 6 * u * (1 - u) * slope[i] + (1 - u) * (1 - 3 * u) * ends[i] + u * (3 * u - 2) * ends[i + 1]
+        return found * (gap[i] / gap.real[i])[..., None]
+
+    return velocity
+
+
+def direction(x: Any, y: Any) -> Any:
+    """Return the angles of vectors [rad], also where complex steps make them complex."""
+    rough = np.arctan2(np.real(y), np.real(x))
+    c, s = np.cos(rough), np.sin(rough)
+    return rough + np.arctan((y * c - x * s) / (x * c + y * s))
 
 
 @dataclass(frozen=True)
@@ -174,10 +224,11 @@ class Bent:
 Shape = Polynomial | CosineArch | Polyline | Spline | Bent
 
 
-def _points(points: Any) -> FloatArray:
-    array = read_only(points)
+def _points(points: Any) -> Any:
+    array = np.asarray(points)
+    array = read_only(array, complex if array.dtype.kind == "c" else float)
     if array.ndim != 2 or array.shape[1] != 2 or len(array) < 2:
         raise InputError(f"a shape by points needs at least two (x, y) pairs, got an array of shape {array.shape}")
-    if not np.isfinite(array).all() or (np.hypot(*np.diff(array, axis=0).T) == 0).any():
+    if not np.isfinite(array).all() or (np.hypot(*np.diff(array.real, axis=0).T) == 0).any():
         raise InputError("the points of a shape must be finite, and neighbours must differ")
     return array

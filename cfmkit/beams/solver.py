@@ -93,7 +93,7 @@ class Solver:
             np.zeros(dofs),
             np.zeros((2, 3)),
             np.zeros((self.n_beams, 6, 3, 3)),
-            np.zeros((self.n_segments, 6, 3, 3)),
+            np.zeros((self.n_segments, 7, 3, 3)),
             np.zeros((8, 12, 20)),
             np.zeros(self.size),
         )

@@ -9,6 +9,7 @@ import numba
 import numpy as np
 import pytest
 
+from cfmkit.beams import CLAMPED, Beam, Displacement, Network, Node, Section, trace
 from cfmkit.beams.kernels import dense, entry
 from cfmkit.beams.kernels.rk8 import COUPLING, NODES, WEIGHTS
 
@@ -25,11 +26,17 @@ def solve_with(a, b):  # type: ignore[no-untyped-def]
     return _solve(a, b)
 
 
-def test_the_cache_is_keyed_by_the_sources_of_all_kernels() -> None:
-    """Values that a function closes over are part of numba's key: they must hold the digest of every file."""
-    for door in (entry._real, entry.states):
-        closure = door.py_func.__closure__
-        assert entry.digest() in [cell.cell_contents for cell in closure]
+def test_compiled_code_is_kept_under_the_digest_of_all_kernels() -> None:
+    trace(*_pulled_beam())
+    for door in (entry._real, entry.states, entry.slopes, entry.row_slopes):
+        assert entry.digest()[:16] in door.py_func.__qualname__
+    assert list(Path(entry._real.stats.cache_path).glob(f"*{entry.digest()[:16]}*.nbi"))
+
+
+def _pulled_beam() -> tuple[Network, Displacement]:
+    beam = Beam("a", "b", Section(2e9, 1e-2, 1e-3))
+    nodes = {"a": Node(0.0, 0.0, CLAMPED), "b": Node(0.1, 0.0)}
+    return Network(nodes, {"x": beam}), Displacement("b", 0.0, np.array([1e-4]))
 
 
 def test_a_changed_kernel_file_changes_the_digest(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

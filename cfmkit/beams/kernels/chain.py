@@ -18,6 +18,7 @@ from cfmkit.beams.kernels.dense import clear, copy_matrix
 from cfmkit.beams.kernels.flow import flow, plain_flow
 
 E, F, E2, G, C_D, SMALL = 0, 1, 2, 3, 4, 5  # blocks of a relation; C_D: c in columns 0, 1
+BEFORE = 6  # of what is kept of a segment: E2 before it; its SMALL[2, 0] and E2[:, 2] hold the segment's own turns
 
 
 @kernel
@@ -107,12 +108,14 @@ def _append(rel, keep, out, rq, rp, drv):
     copy_matrix(keep[E], rel[E])
     copy_matrix(keep[F], rel[F])
     copy_matrix(keep[C_D], rel[C_D])
+    copy_matrix(keep[BEFORE], rel[E2])
     turn = out[6]  # dM1 by the start's rotation: the only entry of dp1/dq0
     g0, g1 = out[7] + turn * rel[F, 2, 0], out[8] + turn * rel[F, 2, 1]
     pivot = out[9] + turn * rel[F, 2, 2]
     if pivot == 0.0:
         return pivot
     k = keep[SMALL]
+    k[2, 0] = turn
     # dp_j = W dp_{j+1} + e3 (hq . dq_a) + hb; W differs from 1 in its last row only
     k[0, 0], k[0, 1], k[0, 2] = -g0 / pivot, -g1 / pivot, 1.0 / pivot
     for i in range(3):
@@ -136,6 +139,7 @@ def _propagate(rel, keep, out, rq, drv):
     e, f, e2, g, c = rel[E], rel[F], rel[E2], rel[G], rel[C_D]
     olde, oldf, oldc = keep[E], keep[F], keep[C_D]
     ax, ay, ar = out[11], out[16], out[1]  # dX, dY, dphi by the start's rotation
+    keep[E2, 0, 2], keep[E2, 1, 2], keep[E2, 2, 2] = ax, ay, ar
     p = keep[G]  # scratch: P = A F + B
     for i in range(3):
         p[0, i] = oldf[0, i] + ax * oldf[2, i] + out[12 + i]
@@ -191,4 +195,4 @@ def unfold(m, e, first_slot, store, dqa, dpb, ddrive, dy):
         dy[at + 3], dy[at + 4], dy[at + 5] = n0, n1, n2
 
 
-__all__ = ["C_D", "E2", "SMALL", "E", "F", "G", "np", "pose_of", "sweep", "unfold"]
+__all__ = ["BEFORE", "C_D", "E2", "SMALL", "E", "F", "G", "np", "pose_of", "sweep", "unfold"]

@@ -15,5 +15,16 @@ kernel: Any = numba.njit(**_INNER)
 They have no way in from Python (that halves the time to compile): calling one from Python ends the process.
 """
 
-door: Any = numba.njit(**_DOOR)
-"""For functions called from Python: kept on disk."""
+
+def door(stamp: str) -> Any:
+    """Return a decorator for functions called from Python: kept on disk, in files named after the stamp.
+
+    The compiler's own check looks at the time stamp of the file that a function stands in, which says nothing of the
+    functions that it calls, and what was kept by older sources cannot always be read.
+    """
+
+    def decorate(function: Any) -> Any:
+        function.__qualname__ = f"{function.__name__}_{stamp[:16]}"
+        return numba.njit(**_DOOR)(function)
+
+    return decorate

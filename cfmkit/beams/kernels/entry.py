@@ -1,8 +1,7 @@
 """The doors to the compiled code, cached on disk.
 
-The compiler's cache looks at the time stamp of the file that a function stands in and at the values it closes
-over. The kernels stand in several files, so the doors close over a digest of all of them: change any, and nothing
-old is used.
+The kernels stand in several files: the kept code is named after a digest of all of them. Change any, and nothing old
+is used.
 """
 
 from __future__ import annotations
@@ -15,12 +14,14 @@ from typing import Any
 
 import numpy as np
 
+from cfmkit.beams.kernels import columns as _columns
 from cfmkit.beams.kernels import march as _march
 from cfmkit.beams.kernels import newton as _newton
 from cfmkit.beams.kernels import observe as _observe
 from cfmkit.beams.kernels.compiler import door
 
 _follow, _solve, _forces, _states = _march.march, _newton.solve, _observe.forces, _observe.states
+_slopes, _row_slopes = _columns.slopes, _columns.row_slopes
 
 
 def digest() -> str:
@@ -32,9 +33,8 @@ def digest() -> str:
 
 
 def _doors(stamp: str) -> tuple[Any, ...]:
-    @door
+    @door(stamp)
     def real(task, m, n_free, one, options, arrays, scratch):
-        _ = stamp
         a, b, c, d, e, f = arrays
         if task == SOLVE:
             return _solve(m, n_free, a[0], d, b, one, (options[0], options[1]), c, scratch)
@@ -43,17 +43,25 @@ def _doors(stamp: str) -> tuple[Any, ...]:
         _forces(m, n_free, a, d, e, scratch)
         return 0, 0
 
-    @door
+    @door(stamp)
     def states(m, n_free, y, drive, out):
-        _ = stamp
         return _states(m, n_free, y, drive, out)
 
-    return real, states
+    @door(stamp)
+    def slopes(m, tilt, n_free, ys, drives, outs, scratch):
+        return _slopes(m, tilt, n_free, ys, drives, outs[0], outs[1], scratch)
+
+    @door(stamp)
+    def row_slopes(m, tilt, n_free, ys, drives, dys, out):
+        for p in range(ys.shape[0]):
+            _row_slopes(m, tilt, n_free, ys[p], drives[p], dys[p], out[p])
+
+    return real, states, slopes, row_slopes
 
 
 SOLVE, MARCH, FORCES = 0, 1, 2
 STAMP = digest()
-_real, states = _doors(STAMP)
+_real, states, slopes, row_slopes = _doors(STAMP)
 
 
 def announce() -> None:

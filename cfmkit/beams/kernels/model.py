@@ -75,3 +75,40 @@ class Model(NamedTuple):
     spring_place: IntArray
     spring_kind: IntArray
     spring_value: FloatArray
+
+
+class Tilt(NamedTuple):
+    """Derivatives of a model's arrays by k design variables.
+
+    Attributes
+    ----------
+    variable : (pairs,) int array
+        The variables that the beams' tables depend on, beam after beam.
+    first : (beams + 1,) int array
+        Where each beam begins in `variable`.
+    table : (n,) array
+        Per beam its steps x stages x 5 table columns x its variables, flattened.
+    begin : (beams,) int array
+        Where each beam begins in `table`.
+    moves : (k,) bool array
+        Whether a variable changes anything but the tables.
+    origin, arm, frame : (k, places, 2) arrays
+    base, rate : (k, dofs) arrays
+    spring : (k, springs, 4) array
+    load : (k, loads, 2, 3) array
+    line : (k, beams, 2, 2) array
+    """
+
+    variable: IntArray
+    first: IntArray
+    table: FloatArray
+    begin: IntArray
+    moves: Any
+    origin: FloatArray
+    arm: FloatArray
+    frame: FloatArray
+    base: FloatArray
+    rate: FloatArray
+    spring: FloatArray
+    load: FloatArray
+    line: FloatArray

@@ -92,7 +92,7 @@ def _turn(force, angle):
 
 
 @kernel
-def _spring_law(kind, value, pa, pb, force, block):
+def spring_law(kind, value, pa, pb, force, block):
     """Set the force on place b and its derivative by the pose of b (that by a is opposite); return the energy."""
     clear(block)
     force[0] = force[1] = force[2] = 0.0
@@ -134,7 +134,7 @@ def add_springs(m, values, h, residual, work):
         arm_a, arm_b = pose_of(m, values, i, pa), pose_of(m, values, j, pb)
         jacobian(m, i, arm_a, ja)
         jacobian(m, j, arm_b, jb)
-        energy += _spring_law(m.spring_kind[k], m.spring_value[k], pa, pb, force, block)
+        energy += spring_law(m.spring_kind[k], m.spring_value[k], pa, pb, force, block)
         add_force(m, h, residual, j, arm_b, jb, force)
         for r in range(3):
             force[r] = -force[r]

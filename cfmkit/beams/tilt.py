@@ -1,0 +1,142 @@
+"""How a network's arrays change with design variables: complex steps of the function that builds the network.
+
+A variable moved by an imaginary step of 1e-30 gives derivatives that are exact to rounding, through any function
+that accepts complex numbers. Only what depends on the variable is computed again.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.beams.discretise import assemble_model, beam_table
+from cfmkit.beams.kernels.model import TABLE_COLUMNS, Tilt
+from cfmkit.beams.kernels.rk8 import STAGES
+from cfmkit.beams.layout import Layout
+from cfmkit.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+
+    from cfmkit.beams.discretise import Grid
+    from cfmkit.beams.kernels.model import Model
+    from cfmkit.curves import FloatArray
+
+STEP = 1e-30
+_WHOLE = ("place_dof", "slot", "load_place", "load_follows", "spring_place", "spring_kind", "beam_end")
+_MOVING = {
+    "origin": "place_origin",
+    "arm": "place_arm",
+    "frame": "place_frame",
+    "base": "base",
+    "rate": "rate",
+    "spring": "spring_value",
+    "load": "load_value",
+    "line": "line_load",
+}
+
+
+def slope(value: Any) -> Any:
+    """Return the derivative that the imaginary part of a complex step holds."""
+    return np.imag(value) / STEP
+
+
+def tilted_layouts(layout: Layout, build: Callable[[Any], Any], variables: Any) -> list[Layout]:
+    """Return the layouts with each variable in turn moved by an imaginary step.
+
+    `build` returns a network, or a network and its drive where variables change the drive's loads or direction.
+    """
+    x = np.asarray(variables, dtype=float)
+    found = []
+    for k in range(len(x)):
+        moved = x.astype(complex)
+        moved[k] += 1j * STEP
+        built = build(moved)
+        network, drive = built if isinstance(built, tuple) else (built, layout.drive)
+        tilted = Layout(network, drive, layout)
+        tilted.scales = layout.scales
+        found.append(tilted)
+    return found
+
+
+@dataclass(frozen=True)
+class Tilts:
+    """A layout and what it becomes with each design variable."""
+
+    layout: Layout
+    tilted: list[Layout]
+
+    def __len__(self) -> int:
+        """Return the number of variables."""
+        return len(self.tilted)
+
+    def depends(self, name: str) -> list[int]:
+        """Return the variables that a beam's shape, section or length depends on."""
+        own = self.layout.fits[name]
+        return [k for k, layout in enumerate(self.tilted) if layout.fits[name] is not own]
+
+    def arrays(self, model: Model, cut: Grid, every: bool = False) -> Tilt:
+        """Return the derivatives of a model's arrays; with `every` each beam is paired with every variable.
+
+        Raises
+        ------
+        cfmkit.errors.InputError
+            If a variable changes how the network is made up, not only its values.
+        """
+        tilted = [self._model(k, layout, model, cut) for k, layout in enumerate(self.tilted)]
+        variable, first, begin, blocks = [], [0], [], []
+        size = 0
+        for number, name in enumerate(self.layout.network.beams):
+            steps = np.flatnonzero(cut.beam_of_step == number)
+            loaded = [k for k, one in enumerate(tilted) if np.any(np.imag(one.line_load[number]))]
+            block, own = self._beam(name, cut, steps, range(len(self)) if every else loaded)
+            variable += own
+            first.append(len(variable))
+            begin.append(size)
+            size += block.size
+            blocks.append(block.ravel())
+        parts = {short: _stack(tilted, long, model) for short, long in _MOVING.items()}
+        moves = np.zeros(len(self), dtype=np.bool_)
+        for values in parts.values():
+            moves |= values.reshape(len(self), -1).any(axis=1)
+        return Tilt(
+            variable=np.array(variable, dtype=np.int64),
+            first=np.array(first, dtype=np.int64),
+            table=np.ascontiguousarray(np.concatenate(blocks)),
+            begin=np.array(begin, dtype=np.int64),
+            moves=moves,
+            **parts,
+        )
+
+    def _model(self, k: int, layout: Layout, model: Model, cut: Grid) -> Model:
+        """Return the arrays for variable k, except the table."""
+        tilted = assemble_model(layout, cut, model.table)
+        for name in _WHOLE:
+            now, was = getattr(tilted, name), getattr(model, name)
+            if now.shape != was.shape or np.any(now != was):
+                raise InputError(f"design variable {k} changes how the network is made up: no derivative by it")
+        return tilted
+
+    def _beam(self, name: str, cut: Grid, steps: Any, others: Iterable[int]) -> tuple[FloatArray, list[int]]:
+        """Return the derivatives of one beam's table, (steps, stages, 5, variables), and the variables.
+
+        `others` are variables to be listed whether the table depends on them or not.
+        """
+        slopes = {}
+        for k in self.depends(name):
+            change = slope(beam_table(self.tilted[k], name, cut, steps))
+            if change.any():
+                slopes[k] = change
+        own = sorted({*slopes, *others})
+        none = np.zeros((len(steps), STAGES, TABLE_COLUMNS))
+        return np.stack([slopes.get(k, none) for k in own], axis=-1) if own else none[..., None][..., :0], own
+
+
+def _stack(tilted: list[Model], name: str, model: Model) -> FloatArray:
+    """Return the derivatives of one array by all variables."""
+    own = np.asarray(getattr(model, name))
+    return np.ascontiguousarray(
+        np.array([slope(getattr(one, name)) for one in tilted]).reshape(len(tilted), *own.shape)
+    )
