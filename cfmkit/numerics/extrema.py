@@ -77,3 +77,42 @@ def _woven(samples: FloatArray, between: FloatArray) -> FloatArray:
     woven[:, ::3] = samples
     woven[:, 1::3], woven[:, 2::3] = between
     return woven
+
+
+def sharpened(place: FloatArray, value: FloatArray, slope: FloatArray, twice: bool = True) -> FloatArray:
+    """Return curves at their samples, with the sample next to each turning point replaced by the value there.
+
+    A tenth of the work of `monotone`, and enough where heights count and places do not.
+
+    Parameters
+    ----------
+    place : (n,) array
+        Increasing.
+    value, slope : (m, n) array
+        Curves and their derivatives.
+    twice : bool
+        Whether to look for curves that turn twice between two samples, too: not where they are
+        so steep that a cubic would overshoot.
+    """
+    step = np.diff(place)
+    rise = value[:, 1:] - value[:, :-1]
+    left, right = slope[:, :-1] * step, slope[:, 1:] * step
+    turns = (left > 0.0) != (right > 0.0)
+    # With like slopes at its ends a cubic turns twice, or not at all: only if it goes the other way in its middle.
+    if twice:
+        turns |= (6.0 * rise - left - right) * left < 0.0
+    row, cell = np.nonzero(turns)
+    if not len(row):
+        return value
+    low, up, first, last = value[row, cell], rise[row, cell], left[row, cell], right[row, cell]
+    a, b = first + last - 2.0 * up, 3.0 * up - 2.0 * first - last
+    found = value.copy()
+    with np.errstate(invalid="ignore", divide="ignore"):
+        root = np.sqrt(b * b - 3.0 * a * first)
+        big = -(b + np.copysign(root, b))
+        for share in np.sort(np.stack([big / (3.0 * a), first / big]), axis=0):
+            inside = (share > 0.0) & (share < 1.0)
+            height = low + share * (first + share * (b + share * a))
+            at = cell + (share > 0.5)
+            found[row[inside], at[inside]] = height[inside]
+    return found

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from cfmkit.families.base import Family
+from cfmkit.families.slider_crank.block import analyze_block
 from cfmkit.families.slider_crank.build import resolve
 from cfmkit.families.slider_crank.classes import CLASSES
 from cfmkit.families.slider_crank.design import design
@@ -16,6 +17,7 @@ FAMILY = Family(
     summary="a crank, a coupler and a slider with a spring at each joint: constant torque or force",
     spec_type=SliderCrankSpec,
     analyze=analyze,
+    analyze_block=analyze_block,
     design=design,
     values=DEFINITIONS,
     words={"stiffness_class": CLASSES},

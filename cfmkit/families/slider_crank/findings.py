@@ -6,6 +6,7 @@ run reports carries the numbers that decide and the cure.
 
 from __future__ import annotations
 
+from cfmkit.families.slider_crank.flexures.findings import FINDINGS as OF_PARTS
 from cfmkit.results import Finding
 from cfmkit.units import format_short
 
@@ -35,6 +36,7 @@ FINDINGS = {
     "spring_dropped": "the best rate of a spring is zero: the design does without it",
     "near_optima": "many designs are as good: which one is chosen was decided by something else",
     "window_not_proven": "the widest window found by a local search: a wider one may exist",
+    **OF_PARTS,
 }
 
 

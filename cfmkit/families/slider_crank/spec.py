@@ -6,7 +6,8 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from cfmkit.spec import Analysis, Model, Spec
+from cfmkit.families.slider_crank.flexures.spec import Printed, PrintedAnalysis, PrintedDesign
+from cfmkit.spec import Model, Spec
 from cfmkit.units import Angle, Force, Length, Ratio, RotationalStiffness, Stiffness, Torque
 
 PositiveLength = Annotated[Length, Field(gt=0)]
@@ -33,7 +34,7 @@ class Limits(Model):
     slider: PositiveLength | None = Field(None, description="travel of the slider")
 
 
-class Mechanism(Model):
+class Mechanism(Printed):
     """A crank about a fixed pivot, a coupler, a slider on a straight way; a spring at each joint."""
 
     crank_length: PositiveLength = Field(description="r1, pivot to crank pin")
@@ -80,7 +81,7 @@ class MaxRates(Model):
     slider: ExtensionRate | None = Field(None, description="extension at the slider")
 
 
-class CrankDesign(Model):
+class CrankDesign(PrintedDesign):
     """What `cfmkit design` is to reach: rates of the springs, and lengths where a range is given."""
 
     torque: PositiveTorque | None = Field(None, description="wanted at the crank, all legs together")
@@ -164,7 +165,7 @@ class CrankDesign(Model):
         return self.torque or self.force or 0.0
 
 
-class CrankAnalysis(Analysis):
+class CrankAnalysis(PrintedAnalysis):
     """How a slider-crank is run."""
 
     drive: Literal["torque", "force"] = Field(
@@ -186,7 +187,9 @@ class CrankAnalysis(Analysis):
     reference_travel: Length | None = Field(
         None, description="where the constant band is taken when a force drives; default: half way"
     )
-    fidelity: Literal["prb"] | None = Field(None, description="model: rigid links with springs")
+    fidelity: Literal["prb", "lumped", "beam"] | None = Field(
+        None, description="rigid links with springs, flexures, or a strip; default: the last that the mechanism has"
+    )
 
     @model_validator(mode="after")
     def _ranges_increase(self) -> Self:
@@ -204,3 +207,20 @@ class SliderCrankSpec(Spec):
     mechanism: Mechanism
     design: CrankDesign | None = Field(None, description="what `cfmkit design` is to reach")
     analysis: CrankAnalysis = Field(default_factory=CrankAnalysis, description="how it is run")
+
+    @property
+    def fidelity(self) -> Literal["prb", "lumped", "beam"]:
+        """The model that the analysis uses."""
+        return self.analysis.fidelity or self.mechanism.finest
+
+    @model_validator(mode="after")
+    def _fidelity_has_its_part(self) -> Self:
+        part, asked = self.mechanism, self.analysis.fidelity
+        if (asked == "lumped" and part.flexures is None) or (asked == "beam" and part.beam is None):
+            block = "flexures" if asked == "lumped" else "beam"
+            raise ValueError(f"fidelity {asked!r} needs 'mechanism.{block}'")
+        if asked == "prb" and part.finest != "prb" and not any(self.mechanism.springs.model_dump().values()):
+            raise ValueError("fidelity 'prb' needs the rates of 'mechanism.springs'")
+        if self.fidelity != "prb" and self.analysis.drive != "force":
+            raise ValueError("flexures and strips are pressed at the slider: set 'analysis.drive: force'")
+        return self

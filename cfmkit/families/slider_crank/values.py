@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.families.slider_crank.classes import CLASSES
+from cfmkit.families.slider_crank.flexures.values import DEFINITIONS as OF_PARTS
 from cfmkit.families.slider_crank.thresholds import scale_factors, small_angle_number
 from cfmkit.results import Quantity
 
@@ -67,6 +68,7 @@ DEFINITIONS = {
     "slider_travel_max": ("length", "largest travel of the slider from the unloaded position"),
     "coupler_compression_max": ("force", "largest compression of the coupler of one leg; negative: only tension"),
     "guide_force_max": ("force", "largest force of the slider of one leg on its guide, across its way"),
+    **OF_PARTS,
 }
 
 
