@@ -6,10 +6,12 @@ where nothing was solved it stays grey.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.plots.maps import draw_map
+from cfmkit.plots.marks import COLOURS, EMPTY, HATCH, edges, star, ticks
 from cfmkit.plots.style import BLUE, GREY, INK, SMALL, VERMILLION, axes_mm, new_figure, styled
 
 if TYPE_CHECKING:
@@ -22,12 +24,8 @@ if TYPE_CHECKING:
     from cfmkit.curves import FloatArray
     from cfmkit.plots.findings import Findings, Line, Scale
 
-COLOURS = "viridis"
 MOST_LINES = 1500
 """Lines of a picture with parallel axes; more are thinned out evenly."""
-
-EMPTY = "#EFEFEF"
-_HATCH = "////"
 
 
 def figures(
@@ -108,108 +106,21 @@ def draw_metric(found: Findings, metric: Scale) -> Figure:
     axes.plot(x, y, color=BLUE, marker="o" if len(x) <= 60 else "", markersize=3)
     _hatch_spans(axes, x, found.meets[order])
     axes.set(xlabel=parameter.label, ylabel="" if metric.words else metric.label)
-    _ticks(axes.xaxis, parameter)
-    _ticks(axes.yaxis, metric)
+    ticks(axes.xaxis, parameter)
+    ticks(axes.yaxis, metric)
     if metric.words:
         axes.set_title(metric.label, fontsize=SMALL, loc="left")
         axes.tick_params(axis="y", rotation=90)
     if found.best is not None:
-        _star(axes, parameter.values[found.best], metric.values[found.best])
+        star(axes, parameter.values[found.best], metric.values[found.best])
     return figure
 
 
 def _hatch_spans(axes: Axes, x: FloatArray, meets: NDArray[np.bool_]) -> None:
-    edges = _edges(x)
+    ends = edges(x)
     for k in np.flatnonzero(~meets):
-        axes.axvspan(edges[k], edges[k + 1], facecolor=EMPTY, edgecolor=GREY, hatch=_HATCH, linewidth=0, zorder=0)
-    axes.set_xlim(edges[0], edges[-1])
-
-
-def _edges(centers: FloatArray) -> FloatArray:
-    """Return the borders between neighbours, and as far beyond the first and the last."""
-    if len(centers) == 1:
-        half = 0.05 * abs(float(centers[0])) or 0.5
-        return np.array([centers[0] - half, centers[0] + half])
-    middle = 0.5 * (centers[1:] + centers[:-1])
-    return np.concatenate([[2 * centers[0] - middle[0]], middle, [2 * centers[-1] - middle[-1]]])
-
-
-@styled
-def draw_map(found: Findings, metric: Scale) -> Figure:
-    """Return one metric over two parameters: colours and level lines."""
-    figure = new_figure(140, 100)
-    axes = axes_mm(figure, (18, 14, 92, 80))
-    down, across = found.varied
-    y, rows = _levels(down, found.shape[0], found.shape[1])
-    x, columns = _levels(across, found.shape[1], 1)
-    values = metric.values.reshape(found.shape)[np.ix_(rows, columns)]
-    meets = found.meets.reshape(found.shape)[np.ix_(rows, columns)]
-    axes.set_facecolor(EMPTY)
-    axes.grid(False)
-    box = (114, 14, 4, 80)
-    if metric.words:
-        _classes(axes, (_edges(x), _edges(y), values), metric, axes_mm(figure, box))
-    else:
-        mesh = axes.pcolormesh(_edges(x), _edges(y), np.ma.masked_invalid(values), cmap=COLOURS, rasterized=True)
-        _level_lines(axes, x, y, values)
-        figure.colorbar(mesh, cax=axes_mm(figure, box)).set_label(metric.label)
-    if not meets.all():
-        _hatch_cells(axes, _edges(x), _edges(y), ~meets)
-    axes.set(xlabel=across.label, ylabel=down.label, xlim=_edges(x)[[0, -1]], ylim=_edges(y)[[0, -1]])
-    _ticks(axes.xaxis, across)
-    _ticks(axes.yaxis, down)
-    if found.best is not None:
-        _star(axes, across.values[found.best], down.values[found.best])
-    return figure
-
-
-def _classes(axes: Axes, map_: tuple[FloatArray, FloatArray, FloatArray], metric: Scale, key: Axes) -> None:
-    """Colour a map by words; the key has those that occur, and each region its own name where it is large enough."""
-    from matplotlib import colormaps
-    from matplotlib.colors import ListedColormap
-
-    across, up, values = map_
-    there = np.unique(values[np.isfinite(values)]).astype(int)
-    index = np.full(len(metric.words), -1.0)
-    index[there] = np.arange(len(there))
-    shown = np.where(np.isfinite(values), index[np.where(np.isfinite(values), values, 0).astype(int)], np.nan)
-    colours = ListedColormap([colormaps[COLOURS](0.15 + 0.8 * k / max(len(metric.words) - 1, 1)) for k in there])
-    last = len(there) - 0.5
-    mesh = axes.pcolormesh(across, up, np.ma.masked_invalid(shown), cmap=colours, vmin=-0.5, vmax=last, rasterized=True)
-    bar = key.figure.colorbar(mesh, cax=key)
-    bar.set_ticks(range(len(there)), labels=[metric.words[k] for k in there])
-    bar.ax.tick_params(length=0)
-    axes.set_title(metric.label, fontsize=SMALL, loc="left")
-
-
-def _levels(parameter: Scale, count: int, stride: int) -> tuple[FloatArray, NDArray[np.intp]]:
-    """Return the values of one parameter of a grid, increasing, and which of its levels they are."""
-    levels = parameter.values[: count * stride : stride]
-    order = np.argsort(levels, kind="stable")
-    return levels[order], order
-
-
-def _level_lines(axes: Axes, x: FloatArray, y: FloatArray, values: FloatArray) -> None:
-    known = values[np.isfinite(values)]
-    if min(values.shape) < 3 or not len(known) or known.max() - known.min() <= 1e-9 * abs(known).max():
-        return
-    lines = axes.contour(x, y, np.ma.masked_invalid(values), levels=6, colors="white", linewidths=0.7)
-    axes.clabel(lines, fontsize=SMALL, fmt="%.4g")
-
-
-def _hatch_cells(axes: Axes, x: FloatArray, y: FloatArray, cells: NDArray[np.bool_]) -> None:
-    """Hatch cells of a map, all with one pattern: one path along their borders."""
-    from matplotlib.patches import PathPatch
-    from matplotlib.path import Path
-
-    corners: list[Any] = []
-    for row in range(len(cells)):
-        ends = np.flatnonzero(np.diff(np.concatenate([[0], cells[row].view(np.int8), [0]])))
-        for start, stop in zip(ends[::2], ends[1::2], strict=True):
-            left, right, low, high = x[start], x[stop], y[row], y[row + 1]
-            corners += [(left, low), (right, low), (right, high), (left, high), (left, low)]
-    codes = [Path.MOVETO, Path.LINETO, Path.LINETO, Path.LINETO, Path.CLOSEPOLY] * (len(corners) // 5)
-    axes.add_patch(PathPatch(Path(corners, codes), facecolor="none", edgecolor="#A8A8A8", hatch=_HATCH, linewidth=0))
+        axes.axvspan(ends[k], ends[k + 1], facecolor=EMPTY, edgecolor=GREY, hatch=HATCH, linewidth=0, zorder=0)
+    axes.set_xlim(ends[0], ends[-1])
 
 
 @styled
@@ -236,9 +147,9 @@ def draw_parallel(found: Findings) -> Figure:
 
 
 def _share(scale: Scale) -> FloatArray:
-    """Return where the values lie between the smallest and the largest of them."""
+    """Return where the values lie between the smallest and the largest of them; in the middle if they are the same."""
     known = scale.values[np.isfinite(scale.values)]
-    if not len(known) or known.max() == known.min():
+    if not len(known) or known.max() - known.min() <= 1e-9 * np.abs(known).max():
         return np.where(np.isfinite(scale.values), 0.5, np.nan)
     share: FloatArray = (scale.values - known.min()) / (known.max() - known.min())
     return share
@@ -250,7 +161,8 @@ def _parallel_axes(axes: Axes, scales: Sequence[Scale]) -> None:
         known = scale.values[np.isfinite(scale.values)]
         if not len(known):
             continue
-        for height, value in ((0.0, known.min()), (1.0, known.max())):
+        ends = ((0.0, known.min()), (1.0, known.max()))
+        for height, value in ends if np.ptp(known) > 1e-9 * np.abs(known).max() else ends[1:]:
             text = scale.words[int(value)] if scale.words else f"{value:.4g}"
             below = height == 0.0
             place = (k, -0.02 if below else 1.02)
@@ -262,15 +174,3 @@ def _parallel_axes(axes: Axes, scales: Sequence[Scale]) -> None:
     axes.set(ylim=(0, 1), xlim=(-0.05, len(scales) - 0.95), yticks=[])
     axes.grid(False)
     axes.spines[["left", "bottom"]].set_visible(False)
-
-
-def _ticks(axis: Any, parameter: Scale) -> None:
-    if parameter.words:
-        axis.set_ticks(range(len(parameter.words)), labels=list(parameter.words))
-
-
-def _star(axes: Axes, x: float, y: float) -> None:
-    if np.isfinite([x, y]).all():
-        axes.plot(
-            [x], [y], marker="*", markersize=12, color=VERMILLION, markeredgecolor="white", clip_on=False, zorder=5
-        )

@@ -79,3 +79,59 @@ def test_one_value_and_nothing_but_gaps_can_be_drawn():
     )
     for draw in figures(lone, LINES[:1], ("x", "y")).values():
         assert png(draw())
+
+
+def level_lines(values, across=(1.0, 2.0, 4.0, 8.0), down=(1.0, 2.0, 3.0)):
+    """Return axes, the heights of the level lines of a map, and their points."""
+    x, y = np.tile(across, len(down)), np.repeat(down, len(across))
+    varied = (Scale("a.down", "length", y), Scale("a.across", "time", x))
+    shape = (len(down), len(across))
+    case = Findings(varied, (Scale("m", "ratio", np.asarray(values, float).ravel()),), shape, np.ones(x.size, bool))
+    (draw,) = figures(case).values()
+    axes = draw().axes[0]
+    sets = [item for item in axes.collections if hasattr(item, "levels")]
+    return axes, [] if not sets else sets[0].levels, [] if not sets else sets[0].allsegs
+
+
+def test_values_that_double_have_a_logarithmic_axis_and_a_tick_each():
+    axes, _, _ = level_lines(np.arange(12.0))
+    assert (axes.get_xscale(), axes.get_yscale()) == ("log", "linear")
+    assert axes.get_xticks().tolist() == [1.0, 2.0, 4.0, 8.0]
+    even, _, _ = level_lines(np.arange(12.0), across=(1.0, 2.0, 3.0, 4.0))
+    assert even.get_xscale() == "linear"
+
+
+def test_no_level_line_follows_the_lowest_or_highest_value():
+    """A plateau at zero has no edge worth a line: where it ends depends on rounding."""
+    _, levels, _ = level_lines([[0, 0, 0, 1.0], [0, 0, 0, 2.0], [0, 0, 0, 6.0]])
+    assert len(levels) >= 3
+    assert min(levels) > 0.1
+    assert max(levels) < 5.9
+
+
+def test_level_lines_on_a_coarse_grid_are_smooth_and_keep_its_values():
+    across = np.array([1.0, 2.0, 4.0, 8.0])
+    down = np.array([1.0, 2.0, 3.0])
+    _, levels, lines = level_lines(np.outer(down, np.log2(across)) + 1.0)
+    points = np.concatenate([line for segments in lines for line in segments])
+    heights = np.concatenate([np.full(len(line), at) for at, segs in zip(levels, lines, strict=True) for line in segs])
+    assert len(points) > 200
+    assert np.abs(points[:, 1] * np.log2(points[:, 0]) + 1.0 - heights).max() < 0.05
+
+
+def test_words_and_gaps_have_no_lines_between_them():
+    gap = np.arange(12.0)
+    gap[5] = np.nan
+    _, levels, lines = level_lines(gap)
+    assert len(levels)
+    assert any(len(line) for segments in lines for line in segments)
+    (draw,) = figures(found(2, (5, 4), words=("a", "b", "c", "d", "e"))).values()
+    assert not [item for item in draw().axes[0].collections if hasattr(item, "levels")]
+
+
+def test_what_is_constant_but_for_rounding_is_one_place_on_its_axis():
+    almost = Scale("m", "length", 0.13 * (1 + 1e-15 * np.arange(20)))
+    varied = found(3).varied
+    (draw,) = figures(Findings(varied, (almost,), (), np.ones(20, bool))).values()
+    axes = draw().axes[0]
+    assert {line.get_ydata()[3] for line in axes.lines if len(line.get_ydata()) == 4} == {0.5}
