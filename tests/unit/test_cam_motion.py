@@ -294,6 +294,8 @@ def test_the_curve_says_everything_over_time():
     assert curve.extra["time"].values[-1] == pytest.approx(0.125)
     for name in ("contact_force", "traction", "brace_force", "slider_pin_force", "roller_speed"):
         assert {f"{name}_right", f"{name}_left"} <= set(dimensions)
+    slow = response(moving(analysis__dynamics__time="1 s"), len(curve)).force
+    np.testing.assert_allclose(curve.extra["force_over_slow"].values, curve.force / slow, rtol=1e-12)
     down = analyze(moving(analysis__dynamics__slider_position=0.32, analysis__dynamics__stroke=-0.1)).curve
     assert down.branches == ("unload",)
     np.testing.assert_allclose(down.displacement, 2 * 0.22 + 0.1 - 2 * brace_height() - curve.displacement, atol=1e-12)

@@ -23,7 +23,7 @@ from cfmkit.families.cam.dynamics.checks import findings_of, outside, runs_on_co
 from cfmkit.families.cam.dynamics.direct import statics
 from cfmkit.families.cam.dynamics.history import History, direct_history, multibody_history
 from cfmkit.families.cam.dynamics.multibody import CornerContact
-from cfmkit.families.cam.dynamics.values import values_of
+from cfmkit.families.cam.dynamics.values import slow_force, values_of
 from cfmkit.families.cam.values import constant_force
 from cfmkit.results import Result, Status
 
@@ -147,6 +147,13 @@ def _as_run(spec: CamSpec, parts: Build) -> CamSpec:
     return resolved.model_copy(update=changes)
 
 
+def _over_slow(moved: Moved) -> FloatArray:
+    """Return the force over that of the same motion within one second [SS, Fig. 14]; NaN where that is zero."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = moved.history.force / slow_force(moved)
+    return np.where(np.isfinite(ratio), ratio, np.nan)
+
+
 def _curve(moved: Moved) -> Curve:
     history, moment = moved.history, moved.history.moment
     extra = {
@@ -154,6 +161,7 @@ def _curve(moved: Moved) -> Curve:
         "speed": Column(moment.speed, "velocity"),
         "acceleration": Column(moment.acceleration, "acceleration"),
         "static_force": Column(moved.static, "force"),
+        "force_over_slow": Column(_over_slow(moved), "ratio"),
     }
     sides = (
         ("contact_force", history.contact, "force"),

@@ -56,12 +56,12 @@ def _own(moved: Moved) -> dict[str, float]:
         "moving_mass_max": _largest(moving.mass),
         "force_peak_over_static": _largest(ratio) - 1.0,
         "force_dip_under_static": 1.0 + _largest(-ratio),
-        "force_peak_over_slow": _largest(history.force / _slow(moved)) - 1.0,
+        "force_peak_over_slow": _largest(history.force / slow_force(moved)) - 1.0,
         "angle_error_effect": _angle_effect(moved),
     }
 
 
-def _slow(moved: Moved) -> FloatArray:
+def slow_force(moved: Moved) -> FloatArray:
     """Return the force of the same motion within one second, at the same places [N]."""
     scale = moved.build.motion.time / SLOW
     position, speed, acceleration = moved.history.moment
