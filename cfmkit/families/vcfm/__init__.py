@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from cfmkit.families.base import Family
+from cfmkit.families.vcfm.design import design
 from cfmkit.families.vcfm.findings import FINDINGS
 from cfmkit.families.vcfm.model import analyze
 from cfmkit.families.vcfm.spec import VcfmSpec
@@ -13,6 +14,7 @@ FAMILY = Family(
     summary="V-beams that snap through beside a diamond spring, adjustable by the spring's preload",
     spec_type=VcfmSpec,
     analyze=analyze,
+    design=design,
     values=DEFINITIONS,
     headline=(
         "constant_force",

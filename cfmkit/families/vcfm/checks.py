@@ -190,7 +190,7 @@ def _range(solution: Solution) -> Iterator[Finding]:
     if solution.spec.analysis.fidelity != "analytic":
         return
     strip = solution.parts.strip
-    angle, reach = float(strip.angle), RELIABLE * float(strip.rise)
+    angle, reach = float(strip.angle), RELIABLE * solution.parts.balance
     if angle > STEEP:
         yield finding(
             "theory_range",

@@ -147,7 +147,7 @@ class ExactSampler:
     def character(self) -> Character:
         """Stiffnesses and linear range as traced."""
         push = self.pushed
-        first, last = (push.edges[1], push.edges[2]) if len(push.edges) > 2 else (np.nan, np.nan)
+        first, last = push.buckled_range
         places = np.linspace(first + 0.1 * (last - first), last - 0.1 * (last - first), 41)
         if np.isfinite(first):
             steepest = -float(np.polyfit(places, push.at(places)[0], 1)[0])

@@ -73,8 +73,9 @@ class Parts:
 
 
 def strip_of(leaf: Positive | Bistable, made_of: Material) -> Strip:
-    """Return a leaf of a specification."""
-    return Strip(leaf.length, leaf.angle, leaf.thickness, leaf.width, made_of.modulus, made_of.poisson)
+    """Return a leaf of a specification; of the springs only the diamond's are inclined."""
+    angle = 0.0 if leaf.structure in ("folded", "straight", "u-shape") else leaf.angle
+    return Strip(leaf.length, angle, leaf.thickness, leaf.width, made_of.modulus, made_of.poisson)
 
 
 def share_of(positive: Positive) -> float:

@@ -67,17 +67,17 @@ class Positive(Model):
     )
     loaded: Literal["whole", "half"] = Field("whole", description="all of the structure, or one side of it only")
     length: PositiveLength = Field(description="of one flexible leaf, L1")
-    angle: LeafAngle = Field(0.0, description="of the diamond's leaves from the direction across the motion, theta1")
+    angle: LeafAngle = Field(0.0, description="of a diamond's leaves from the direction across the motion, theta1")
     thickness: PositiveLength = Field(description="in the plane, t1")
     width: PositiveLength = Field(description="out of the plane, b1")
-    radius: PositiveLength | None = Field(None, description="of the flexible semicircle of a u-shape")
+    radius: PositiveLength | None = Field(
+        None, description="of the flexible semicircle of a u-shape; the others have none"
+    )
 
     @model_validator(mode="after")
-    def _radius_and_angle_fit(self) -> Self:
-        if (self.structure == "u-shape") != (self.radius is not None):
-            raise ValueError("'radius' and 'structure: u-shape' belong together: give both or neither")
-        if self.angle and self.structure != "diamond":
-            raise ValueError(f"the leaves of 'structure: {self.structure}' have no angle; remove 'angle'")
+    def _bend_has_a_radius(self) -> Self:
+        if self.structure == "u-shape" and self.radius is None:
+            raise ValueError("'structure: u-shape' needs 'radius', of its flexible semicircle")
         return self
 
 
@@ -105,9 +105,8 @@ class Bistable(Model):
 
     @model_validator(mode="after")
     def _flexures_fit(self) -> Self:
-        hybrid = self.structure == "hybrid"
-        if hybrid != (self.flexure_length is not None) or (self.stiffening is not None and not hybrid):
-            raise ValueError("'flexure_length' (and 'stiffening') belong to 'structure: hybrid', which needs the first")
+        if self.structure == "hybrid" and self.flexure_length is None:
+            raise ValueError("'structure: hybrid' needs 'flexure_length', of each of its two flexures")
         if self.flexure_length and 2.0 * self.flexure_length >= self.length:
             raise ValueError("two flexures of 'flexure_length' must be shorter than 'length'")
         return self

@@ -24,6 +24,9 @@ DOWN = -0.5 * np.pi
 GRIDS = (127, 113, 149, 101)
 """Points asked for along a path; the others are tried where a point next to a bifurcation is not reached."""
 
+CLOSE = 0.02
+"""Bifurcations closer than this share of the travel are looked at again with other points."""
+
 DENSE = 600
 """Points asked for of a path with corners."""
 
@@ -98,6 +101,12 @@ class Traced:
         force[beyond], stress[beyond] = np.nan, np.nan
         return force, stress, self.stable[near], self._buckled[pieces]
 
+    @property
+    def buckled_range(self) -> tuple[float, float]:
+        """Where another form than as made is taken, from and to [m]; NaN where none is."""
+        found = np.flatnonzero(self._buckled)
+        return (self.edges[found[0]], self.edges[found[-1] + 1]) if len(found) else (np.nan, np.nan)
+
     @cached_property
     def _buckled(self) -> Any:
         """Whether most of the points of each piece are on a branch that was not there as made."""
@@ -112,12 +121,18 @@ class Traced:
 
 def traced(network: Network, node: str, end: float, **control: Any) -> Traced:
     """Return what a network does while a node moves down by up to `end` [m], or up where that is negative."""
-    smooth = not control.get("imperfection")
+    smooth, found = not control.get("imperfection"), []
     for count in GRIDS if smooth else (DENSE,):
-        found = _once(network, node, end * np.arange(1, count + 1) / count, control)
-        if not found.problem:
+        found.append(_once(network, node, end * np.arange(1, count + 1) / count, control))
+        if not _doubtful(found[-1]):
             break
-    return found
+    return min(found, key=_doubtful)
+
+
+def _doubtful(found: Traced) -> float:
+    """Return how little a trace is to be trusted: a point asked for next to a bifurcation shows it twice."""
+    gaps = np.abs(np.diff(found.edges[1:-1]))
+    return 10.0 * bool(found.problem) + float((gaps < CLOSE * abs(found.edges[-1])).sum())
 
 
 def _once(network: Network, node: str, places: FloatArray, control: dict[str, Any]) -> Traced:
@@ -130,7 +145,7 @@ def _once(network: Network, node: str, places: FloatArray, control: dict[str, An
     reached = float(path.drive[kept[-1]]) if len(kept) else 0.0
     whole = abs(reached - places[-1]) <= 1e-9 * abs(places[-1])
     events = [event.drive for event in path.events if event.kind == "bifurcation"]
-    problem = "" if path.status is PathStatus.COMPLETE and whole and len(events) < 8 else _words(path.message, reached)
+    problem = "" if path.status is PathStatus.COMPLETE and whole else _words(path.message, reached)
     inner = tuple(sorted({round(event, 10) for event in events if 0 < sense * event < sense * reached}, key=abs))
     names = np.asarray(path.branch)[kept]
     first = 0 if len(kept) and path.drive[kept[0]] == 0 else 1  # the pose as made, where the path does not list it

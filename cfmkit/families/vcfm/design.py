@@ -1,0 +1,148 @@
+"""From targets to sizes: closed forms, then one pass of the exact model, then the stress.
+
+With F_c = K h and dF = K dr the rise is h = F_c dr/dF. The stroke gives the thickness, since the linear region is
+(4 h/3) sqrt(1 - (pi/Q)^2) long; the stress gives the shortest leaf; K_n = K its width. The spring is as long as its
+stress at full travel and preload allows. Forces are exactly linear in the widths, so that the two factors that make the
+exact force flattest at F_c are those of a linear least-squares fit: one pass is all there is to do.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import asin, cos, sqrt
+from typing import TYPE_CHECKING
+
+from cfmkit.families.vcfm.findings import finding, mm, mpa
+from cfmkit.families.vcfm.limits import MARGIN, Infeasible, Sizes, at_least, check_room, thickness_for
+from cfmkit.families.vcfm.springs import Diamond
+from cfmkit.families.vcfm.strip import Strip
+from cfmkit.families.vcfm.vbeam import critical_force, onset_and_exit
+from cfmkit.results import Design, Status
+
+if TYPE_CHECKING:
+    from cfmkit.families.base import Run
+    from cfmkit.families.vcfm.spec import VcfmDesign, VcfmSpec
+
+SQUAT = 2.0
+"""Least width of a leaf over its thickness: narrower ones buckle out of the plane."""
+
+
+def design(spec: VcfmSpec, run: Run) -> Design:
+    """Return a complete specification that meets the targets of the `design` block.
+
+    Parameters
+    ----------
+    spec : VcfmSpec
+        With a `design` block and an allowable stress.
+    run : Run
+        Not needed here: nothing is random.
+
+    Returns
+    -------
+    Design
+        INFEASIBLE, with the reason and the nearest feasible values, if there is none.
+    """
+    target, allowable = spec.design, spec.mechanism.material.allowable
+    if target is None:
+        return Design(None, Status.INVALID, "this spec has no 'design' block: add the targets 'force', 'stroke', ...")
+    if allowable is None:
+        message = "a design needs the stress that is allowed: add 'mechanism.material.allowable_stress'"
+        return Design(None, Status.INVALID, message)
+    try:
+        sizes = closed_form(spec, target)
+        active = ["mechanism.material.allowable_stress"] if target.leaf_length is None else []
+        if target.refine:
+            from cfmkit.families.vcfm.refine import refined
+
+            sizes = refined(spec, sizes)
+            check_width(spec, target, sizes.leaf)
+            check_room(target, sizes)
+    except Infeasible as problem:
+        return Design(
+            None,
+            Status.INFEASIBLE,
+            problem.finding.message,
+            nearest_feasible=problem.nearest,
+            warnings=(problem.finding,),
+        )
+    return Design(written(spec, sizes), Status.COMPLETE, active_bounds=tuple(active))
+
+
+def closed_form(spec: VcfmSpec, target: VcfmDesign) -> Sizes:
+    """Return all sizes by closed forms.
+
+    Raises
+    ------
+    Infeasible
+        With the constraint that cannot be met, and the nearest value that can.
+    """
+    about, rise = spec.mechanism.material, target.height
+    thickness = thickness_for(target)
+    shortest = shortest_leaf(spec, target, thickness)
+    length = target.leaf_length or shortest
+    if length < shortest * (1 - 1e-9):
+        raise Infeasible(
+            finding(
+                "yield",
+                f"leaves of {mm(length)} would be stressed beyond {mpa(about.allowable or 0.0)}, or be steeper than "
+                f"15 deg: the shortest allowed is {mm(shortest)}",
+            ),
+            {"design.leaf_length": at_least(shortest)},
+        )
+    leaf = sized_leaf(spec, rise, thickness, length)
+    sizes = Sizes(leaf, spring_side(spec, target, leaf), onset_and_exit(leaf))
+    check_width(spec, target, leaf)
+    check_room(target, sizes)
+    return sizes
+
+
+def sized_leaf(spec: VcfmSpec, rise: float, thickness: float, length: float) -> Strip:
+    """Return a leaf as wide as the stiffness wants, F_c/h = n P_cr/X."""
+    made, target = spec.mechanism.material, spec.design
+    leaf = Strip(length, asin(rise / length), thickness, 1.0, made.modulus, made.poisson)
+    stiffness = target.force / rise if target else 0.0
+    width = stiffness * leaf.reach / (spec.mechanism.bistable.half_beams * float(critical_force(leaf)))
+    return replace(leaf, width=float(width))
+
+
+def spring_side(spec: VcfmSpec, target: VcfmDesign, leaf: Strip) -> Strip:
+    """Return a leaf of the diamond: as long as its stress at the end of the linear region and full preload allows."""
+    made, positive = spec.mechanism.material, spec.mechanism.positive
+    deflection = 0.5 * (float(onset_and_exit(leaf)[1]) + target.preload_stroke)
+    e, t, tilt = made.modulus, positive.thickness, positive.angle
+    length = sqrt(3.0 * e * t * deflection * cos(tilt) / (made.allowable or 1.0))
+    side = Strip(length, tilt, t, 1.0, e, made.poisson)
+    share = 0.5 if positive.loaded == "half" else 1.0
+    return replace(side, width=float(target.force / target.height / Diamond(side, share).stiffness))
+
+
+def check_width(spec: VcfmSpec, target: VcfmDesign, leaf: Strip) -> None:
+    """Raise if the leaves would rather buckle out of the plane."""
+    if leaf.width >= SQUAT * leaf.thickness:
+        return
+    longer = leaf.length
+    while sized_leaf(spec, target.height, leaf.thickness, longer).width < MARGIN * SQUAT * leaf.thickness:
+        longer *= 1.002
+    raise Infeasible(
+        finding(
+            "out_of_plane_buckling",
+            f"leaves of {mm(leaf.length)} would be {mm(leaf.width)} wide and {mm(leaf.thickness)} thick: below "
+            f"twice the thickness they buckle out of the plane; leaves of {at_least(longer)} are wide enough",
+        ),
+        {"design.leaf_length": at_least(longer)},
+    )
+
+
+def written(spec: VcfmSpec, sizes: Sizes) -> VcfmSpec:
+    """Return the spec with the sizes written into its mechanism."""
+    leaf, side = sizes.leaf, sizes.side
+    return spec.replace(
+        {
+            "mechanism.bistable.length": float(leaf.length),
+            "mechanism.bistable.angle": float(leaf.angle),
+            "mechanism.bistable.thickness": float(leaf.thickness),
+            "mechanism.bistable.width": float(leaf.width),
+            "mechanism.positive.length": float(side.length),
+            "mechanism.positive.width": float(side.width),
+        }
+    )

@@ -1,0 +1,136 @@
+"""What a design may be: the limits of sizes, why a target cannot be met, and the nearest that can."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import ceil, floor, log10, pi, radians, sin, sqrt
+from typing import TYPE_CHECKING
+
+from cfmkit.families.vcfm.findings import finding, mm
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from cfmkit.families.vcfm.spec import VcfmDesign, VcfmSpec
+    from cfmkit.families.vcfm.strip import Strip
+    from cfmkit.results import Finding
+
+STEEPEST = radians(15)
+"""Largest angle of the leaves that the closed forms are designed with."""
+
+MARGIN = 1.01
+"""On that where a leaf length is proposed: the exact model changes widths by less than a percent."""
+
+
+class Infeasible(Exception):
+    """No mechanism meets the targets; carries the finding and what would be feasible."""
+
+    def __init__(self, found: Finding, nearest: Mapping[str, str] | None = None) -> None:
+        """Keep the reason and the nearest feasible values by path."""
+        self.finding, self.nearest = found, dict(nearest or {})
+        super().__init__(found.message)
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """The leaves of a design, and the end of the linear region [m]."""
+
+    leaf: Strip
+    side: Strip
+    linear: tuple[float, float]
+
+
+def thickness_for(target: VcfmDesign) -> float:
+    """Return the thickness of leaves whose linear region is as long as the stroke [m].
+
+    Raises
+    ------
+    Infeasible
+        If the rise is too small for the stroke, or the leaf thinner than can be made.
+    """
+    rise, stroke, least = target.height, target.stroke, target.min_thickness or 0.0
+    free = 1.0 - (0.75 * stroke / rise) ** 2
+    if free <= 0:
+        # at 98 % of its limit a leaf is a fifth of the rise over pi: thin, but a leaf
+        longest = 0.98 * 4.0 * rise / 3.0
+        raise Infeasible(
+            finding(
+                "stroke_unreachable",
+                f"a stroke of {mm(stroke)} needs leaves with a rise above {mm(0.75 * stroke)}; force, adjustment and "
+                f"preload give {mm(rise)}: with that no stroke reaches {mm(4.0 * rise / 3.0)}",
+            ),
+            {"design.stroke": at_most(longest)} if not least else {"design.stroke": at_most(_stroke_for(rise, least))},
+        )
+    thickness = rise * sqrt(free) / pi
+    if thickness < least:
+        raise Infeasible(
+            finding(
+                "too_thin",
+                f"a stroke of {mm(stroke)} from a rise of {mm(rise)} needs leaves of {mm(thickness)}, thinner than "
+                f"{mm(least)}",
+            ),
+            {"design.stroke": at_most(_stroke_for(rise, least))},
+        )
+    return thickness
+
+
+def _stroke_for(rise: float, thickness: float) -> float:
+    """Return the linear region of leaves of this thickness [m]; an eighth of the rise's limit where they have none."""
+    free = 1.0 - (pi * thickness / rise) ** 2
+    if free <= 0:
+        raise Infeasible(
+            finding(
+                "too_thin",
+                f"leaves of {mm(thickness)} with a rise of {mm(rise)} do not buckle at all: ask for more force per "
+                f"adjustment, or a longer preload, for a rise above {mm(pi * thickness)}",
+            )
+        )
+    return 4.0 * rise / 3.0 * sqrt(free)
+
+
+def shortest_leaf(spec: VcfmSpec, target: VcfmDesign, thickness: float) -> float:
+    """Return the shortest leaf within the allowable stress and 15 deg [m]."""
+    made, rise = spec.mechanism.material, target.height
+    root = pi * thickness / rise
+    u = min(1.0, 2.0 / 3.0 * (1.0 + sqrt(1.0 - root * root)))
+    bend = sqrt(4.0 * u - 2.0 * u * u - 4.0 / 3.0 * root * root)
+    stressed = pi * rise * thickness * bend + pi**2 * thickness**2 / 3.0
+    return max(sqrt(made.modulus / (made.allowable or 1.0) * stressed), rise / sin(STEEPEST))
+
+
+def check_room(target: VcfmDesign, sizes: Sizes) -> None:
+    """Raise if the design needs more room than there is."""
+    spans = {"leaves": 2.0 * float(sizes.leaf.reach), "spring": 2.0 * float(sizes.side.reach)}
+    widths = {"leaves": sizes.leaf.width, "spring": sizes.side.width}
+    for path, limit, found in (("max_span", target.max_span, spans), ("max_width", target.max_width, widths)):
+        name = max(found, key=lambda key: found[key])
+        if limit is not None and found[name] > limit * (1 + 1e-9):
+            words = "across the motion" if path == "max_span" else "out of the plane"
+            raise Infeasible(
+                finding("envelope", f"the {name} need {mm(found[name])} {words}, there are {mm(limit)}"),
+                {f"design.{path}": at_least(MARGIN * found[name])},
+            )
+
+
+def at_least(length: float) -> str:
+    """Return a length [m] rounded up to four digits: as good as feasible, and feasible.
+
+    Examples
+    --------
+    >>> at_least(0.0144645), at_most(0.1693794)
+    ('14.47 mm', '169.3 mm')
+    """
+    return _rounded(length, ceil(length * 1e3 * 10.0 ** _digits(length)))
+
+
+def at_most(length: float) -> str:
+    """Return a length [m] rounded down to four digits."""
+    return _rounded(length, floor(length * 1e3 * 10.0 ** _digits(length)))
+
+
+def _digits(length: float) -> int:
+    return 3 - floor(log10(length * 1e3))
+
+
+def _rounded(length: float, number: int) -> str:
+    return f"{number / 10.0 ** _digits(length):.4g} mm"

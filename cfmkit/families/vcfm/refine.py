@@ -1,0 +1,79 @@
+"""One pass of the exact model over a design: widths by linear least squares, then the stress."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import sqrt
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.families.vcfm.design import sized_leaf, written
+from cfmkit.families.vcfm.exact import ExactSampler
+from cfmkit.families.vcfm.findings import finding, mpa
+from cfmkit.families.vcfm.limits import Infeasible, Sizes, at_least
+
+if TYPE_CHECKING:
+    from cfmkit.families.vcfm.spec import VcfmSpec
+
+MIDDLE = 0.84
+"""Part of the linear region over which the widths are fitted to the force."""
+
+RESCALES = 4
+
+
+def refined(spec: VcfmSpec, sizes: Sizes) -> Sizes:
+    """Return the sizes with both widths corrected by the exact model, and leaves long enough for its stress.
+
+    Raises
+    ------
+    Infeasible
+        If the exact stress stays above the allowable one.
+    """
+    made, target = spec.mechanism.material, spec.design
+    allowable = made.allowable or 0.0
+    for _ in range(RESCALES):
+        sizes, stresses = fit_widths(spec, sizes)
+        over = [stress / allowable for stress in stresses]
+        if max(over) <= 1.0 + 1e-4 or target is None:
+            return sizes
+        # stress falls with the square of a length; a leaf that was given stays
+        leaf, side = sizes.leaf, sizes.side
+        if over[0] > 1.0 + 1e-4:
+            if target.leaf_length is not None:
+                break
+            leaf = sized_leaf(spec, target.height, leaf.thickness, float(leaf.length) * sqrt(1.0005 * over[0]))
+        if over[1] > 1.0 + 1e-4:
+            longer = float(side.length) * sqrt(1.0005 * over[1])
+            side = replace(side, length=longer, width=side.width * (longer / side.length) ** 3)
+        sizes = Sizes(leaf, side, sizes.linear)
+    worst = max(stresses)
+    raise Infeasible(
+        finding("stress_unreachable", f"the exact stress is {mpa(worst)}, {mpa(allowable)} is allowed"),
+        {"design.leaf_length": at_least(float(sizes.leaf.length) * sqrt(1.001 * max(over)))},
+    )
+
+
+def fit_widths(spec: VcfmSpec, sizes: Sizes) -> tuple[Sizes, tuple[float, float]]:
+    """Return the sizes with widths that make the exact force flattest, and the exact stress of leaves and spring [Pa].
+
+    The fit is over the middle 84 % of the linear region, without preload; the stress of the leaves is the largest up
+    to its end, that of the spring the one there with the whole preload.
+    """
+    target = spec.design
+    first, last = sizes.linear
+    middle, half = 0.5 * (first + last), 0.5 * MIDDLE * (last - first)
+    places = np.linspace(middle - half, middle + half, 101)
+    spec_of_pass = written(spec, sizes)
+    full = target.preload_stroke if target else 0.0
+    sampler = ExactSampler(spec_of_pass.replace({"analysis.preloads": (0.0, full)}), last, 0.02 * last)
+    leaves, spring = sampler.leaves(places).force, sampler.spring(places)[0]
+    wanted = np.full(len(places), target.force if target else 0.0)
+    (wide, stiff), *_ = np.linalg.lstsq(np.column_stack([leaves, spring]), wanted, rcond=None)
+    leaf, side = sizes.leaf, sizes.side
+    fitted = Sizes(
+        replace(leaf, width=float(leaf.width * wide)), replace(side, width=float(side.width * stiff)), sizes.linear
+    )
+    end = np.linspace(0.0, last, 201)
+    stresses = float(sampler.leaves(end).stress.max()), float(sampler.spring(np.array([last + full]))[1].max())
+    return fitted, stresses
