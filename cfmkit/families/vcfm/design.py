@@ -13,7 +13,15 @@ from math import asin, cos, sqrt
 from typing import TYPE_CHECKING
 
 from cfmkit.families.vcfm.findings import finding, mm, mpa
-from cfmkit.families.vcfm.limits import MARGIN, Infeasible, Sizes, at_least, check_room, thickness_for
+from cfmkit.families.vcfm.limits import (
+    MARGIN,
+    Infeasible,
+    Sizes,
+    at_least,
+    check_room,
+    shortest_leaf,
+    thickness_for,
+)
 from cfmkit.families.vcfm.springs import Diamond
 from cfmkit.families.vcfm.strip import Strip
 from cfmkit.families.vcfm.vbeam import critical_force, onset_and_exit
