@@ -22,6 +22,7 @@ FAMILY = Family(
     values=DEFINITIONS,
     words={"stiffness_class": CLASSES},
     resolve=resolve,
+    draw="cfmkit.families.slider_crank.draw",
     headline=("stiffness_class", "band_range_05pct", "half_band", "energy_max", "crank_pin_rotation_max"),
     template="slider-crank.yaml",
     findings=FINDINGS,
