@@ -3,7 +3,7 @@
 The engine integrates Reissner's theory along the beams; here a beam is a chain of straight elements that are linear
 in a frame which moves with them (Timoshenko, section constant in the element). Equilibrium is a stationary point of
 the total energy, its gradient written out, its Hessian by complex steps. The error falls with the square of the
-element length: two meshes and Richardson's extrapolation remove it. The path that is checked gives the first guess, no more.
+element length: two meshes and Richardson's extrapolation remove it. The path checked gives a first guess, no more.
 
 Reference
 ---------

@@ -1,0 +1,136 @@
+"""From a specification to the chain that is pressed: lumped flexures or a strip, on the linkage's joints."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.errors import InputError
+from cfmkit.families.slider_crank.flexures.chain import (
+    STRIP,
+    Elasticity,
+    Strip,
+    flexure_ends,
+    joints,
+    lumped,
+    spread,
+)
+from cfmkit.families.slider_crank.flexures.pressing import Chain
+from cfmkit.families.slider_crank.flexures.sizing import Flexure
+from cfmkit.materials import material
+
+if TYPE_CHECKING:
+    from cfmkit.beams import Network, Path
+    from cfmkit.bodies.slider_crank import Linkage
+    from cfmkit.curves import FloatArray
+    from cfmkit.families.slider_crank.flexures.spec import Printed, StripSpec
+
+FLEXURE_SHARE = 0.2
+"""Length of a flexure where none is given, in crank lengths: that of [B, Table 2]."""
+
+
+def elasticity(printed: Printed) -> Elasticity:
+    """Return what the part is made of.
+
+    Raises
+    ------
+    cfmkit.errors.InputError
+        If no material is given.
+    """
+    given = printed.material
+    if given is None:
+        raise InputError("a part of flexures or a strip needs 'mechanism.material'")
+    one = material(given) if isinstance(given, str) else given
+    limit = None if one.yield_strength is None else one.yield_strength / printed.safety_factor
+    return Elasticity(one.youngs_modulus, one.poisson_ratio, limit)
+
+
+def flexures_of(printed: Printed) -> tuple[Flexure, ...]:
+    """Return the flexures from the ground to the slider."""
+    if printed.flexures is None:
+        return ()
+    return tuple(Flexure(one.length, one.thickness, one.width, one.before) for one in printed.flexures.all)
+
+
+def corners(printed: Printed, beam: StripSpec | None, linkage: Linkage, unloaded: float) -> FloatArray:
+    """Return the centre line of a strip: through the ends of the flexures unless it is given [m]."""
+    if beam is not None and beam.centreline is not None:
+        return np.array(beam.centreline)
+    own = flexures_of(printed)
+    if beam is not None and beam.flexure_length is not None:
+        own = ()
+        length = beam.flexure_length
+    else:
+        length = FLEXURE_SHARE * linkage.crank
+    lengths = [one.length for one in own] or [length] * 3
+    before = [one.before for one in own] or [0.5] * 3
+    return flexure_ends(joints(linkage, unloaded), lengths, before)
+
+
+def strip_of(printed: Printed, linkage: Linkage, unloaded: float) -> Strip:
+    """Return the strip as it is printed.
+
+    Raises
+    ------
+    cfmkit.errors.InputError
+        If 'shares' does not fit the pieces of the centre line.
+    """
+    beam = printed.beam
+    if beam is None:
+        raise InputError("there is no 'mechanism.beam'")
+    line = corners(printed, beam, linkage, unloaded)
+    if beam.shares is None:
+        places = np.linspace(0.0, 1.0, len(beam.values))
+    elif len(beam.shares) != len(line) - 1:
+        raise InputError(
+            f"mechanism.beam.shares lists {len(beam.shares)} pieces, the centre line has {len(line) - 1}; "
+            "give [] for a piece without stations"
+        )
+    else:
+        places = spread(line, beam.shares)
+    return Strip(line, beam.width, np.array(beam.values) + beam.offset, places)
+
+
+def lumped_chain(printed: Printed, linkage: Linkage, unloaded: float) -> Chain:
+    """Return flexures and rigid links as a chain to press."""
+    parts, made_of, pins = flexures_of(printed), elasticity(printed), joints(linkage, unloaded)
+    ends = flexure_ends(pins, [one.length for one in parts], [one.before for one in parts])
+
+    def rise(path: Path, index: int) -> float:
+        return _sideways(pins, path.motion("crank")[index, :2])
+
+    return Chain(ends, pins, lambda points: lumped(points, parts, made_of), travel_direction(linkage), rise)
+
+
+def strip_chain(strip: Strip, made_of: Elasticity, linkage: Linkage, unloaded: float) -> Chain:
+    """Return a strip as a chain to press."""
+    pins = joints(linkage, unloaded)
+
+    def build(points: FloatArray) -> Network:
+        return Strip(points, strip.width, strip.thickness, strip.places).network(made_of)
+
+    def rise(path: Path, index: int) -> float:
+        return _sideways(pins, path.shape(STRIP, index)[_crank_row(path, pins)] - pins[1])
+
+    return Chain(strip.corners, pins, build, travel_direction(linkage), rise)
+
+
+def travel_direction(linkage: Linkage) -> float:
+    """Return the direction in which the slider moves towards the pivot [rad]."""
+    return float(np.pi) if linkage.branch > 0 else 0.0
+
+
+def _sideways(pins: FloatArray, moved: FloatArray) -> float:
+    """Return the part of a motion to the left of the line from pivot to slider pin [m]."""
+    axis = (pins[2] - pins[0]) / np.hypot(*(pins[2] - pins[0]))
+    return float(axis[0] * moved[1] - axis[1] * moved[0])
+
+
+def _crank_row(path: Path, pins: FloatArray) -> int:
+    """Return the sample of a strip that lies nearest to the crank pin before any load."""
+    fitted = path.fits[STRIP]
+    strip = path.layout.network.beams[STRIP]
+    line = np.asarray(strip.shape.points)  # type: ignore[union-attr]
+    share = float(np.hypot(*(pins[1] - line[0]))) / float(np.real(fitted.length))
+    return int(np.abs(path.sections(STRIP).place[0] - share).argmin())

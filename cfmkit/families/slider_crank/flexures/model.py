@@ -1,0 +1,151 @@
+"""Analysis of a printed slider-crank: the force of flexures or of a strip over the slider's travel.
+
+Reference
+---------
+[B] P. Bilancia, A. Geraci, G. Berselli, SMASIS2019-5519, sec. 2.2 and 3.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.curves import Column, Curve
+from cfmkit.errors import InputError
+from cfmkit.families.slider_crank.build import CannotBuild, linkage_of, resolve, side_of, unloaded_angle
+from cfmkit.families.slider_crank.findings import finding
+from cfmkit.families.slider_crank.flexures.assembly import elasticity, lumped_chain, strip_chain, strip_of
+from cfmkit.families.slider_crank.flexures.checks import findings_of
+from cfmkit.families.slider_crank.flexures.pressing import Ending
+from cfmkit.families.slider_crank.flexures.solution import Printed
+from cfmkit.families.slider_crank.flexures.values import DEFINITIONS, numbers
+from cfmkit.families.slider_crank.values import DEFINITIONS as ALL
+from cfmkit.results import Quantity, Result, Status
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from cfmkit.bodies.slider_crank import Linkage
+    from cfmkit.curves import FloatArray
+    from cfmkit.families.base import Run
+    from cfmkit.families.slider_crank.flexures.pressing import Chain
+    from cfmkit.families.slider_crank.spec import SliderCrankSpec
+
+DEFAULT_SHARE = 0.35
+"""Travel where none is asked for, in lengths of the slider's way from the pivot: that of [B, sec. 2.1]."""
+
+_NAMES = {
+    Ending.LIMIT_POINT: "limit_point",
+    Ending.UNSTABLE: "unstable",
+    Ending.NOT_CONVERGED: "not_converged",
+    Ending.WRONG_BRANCH: "wrong_branch",
+    Ending.STARTS_LATE: "branch_begins_late",
+}
+
+
+def analyze(spec: SliderCrankSpec, run: Run) -> Result:
+    """Return the force of a printed slider-crank over its slider's travel, with everything that is wrong with it.
+
+    Parameters
+    ----------
+    spec : SliderCrankSpec
+        With `mechanism.flexures` or `mechanism.beam`.
+    run : Run
+        Not needed here: nothing is random.
+
+    Returns
+    -------
+    Result
+        One branch, ``load``. PARTIAL if equilibrium ends within the travel, NO_EQUILIBRIUM if
+        nothing was found that is on the branch asked for.
+    """
+    try:
+        spec = resolve(spec)
+        linkage = linkage_of(spec.mechanism)
+        unloaded = unloaded_angle(spec.mechanism, linkage)
+        spec = _as_run(spec, linkage, unloaded)
+        chain = chain_of(spec, linkage, unloaded)
+    except CannotBuild as problem:
+        return Result(spec, Status.NO_EQUILIBRIUM, problem.finding.message, warnings=(problem.finding,))
+    except InputError as problem:
+        return Result(spec, Status.INVALID, str(problem))
+    low, high = spec.analysis.travel or (0.0, 0.0)
+    if low < 0:
+        pulled = finding("pulled", "a printed chain is pressed, not pulled: 'analysis.travel' must not begin below 0")
+        return Result(spec, Status.NO_EQUILIBRIUM, pulled.message, warnings=(pulled,))
+    side = side_of(spec, linkage, unloaded) * linkage.branch if spec.analysis.side is not None else 0
+    pressed = chain.press(np.linspace(low, high, spec.analysis.points), side, spec.analysis.accuracy)
+    usable = len(pressed.travel) > 1 and pressed.ending is not Ending.WRONG_BRANCH
+    told = () if pressed.ending is Ending.COMPLETE else (finding(_NAMES[pressed.ending], pressed.message),)
+    if not usable:
+        return Result(spec, Status.NO_EQUILIBRIUM, pressed.message, warnings=told)
+    window = spec.analysis.window or (float(pressed.travel[0]), float(pressed.travel[-1]))
+    solution = Printed(
+        "lumped" if spec.fidelity == "lumped" else "beam",
+        chain,
+        pressed,
+        elasticity(spec.mechanism),
+        spec.mechanism.legs,
+        (float(window[0]), float(window[1])),
+        spec.analysis.recheck,
+    )
+    return Result(
+        spec=spec,
+        status=Status.PARTIAL if told else Status.COMPLETE,
+        message=told[0].message if told else "",
+        curves=(_curve(solution),),
+        values=_values(solution),
+        warnings=(*told, *findings_of(spec, solution)),
+        target=spec.design.force if spec.design else None,
+        reference=spec.analysis.reference_travel,
+        allowable_stress=solution.material.allowable_stress,
+        state=solution,
+    )
+
+
+def chain_of(spec: SliderCrankSpec, linkage: Linkage, unloaded: float) -> Chain:
+    """Return the chain that a specification's fidelity asks for."""
+    if spec.fidelity == "lumped":
+        return lumped_chain(spec.mechanism, linkage, unloaded)
+    strip = strip_of(spec.mechanism, linkage, unloaded)
+    return strip_chain(strip, elasticity(spec.mechanism), linkage, unloaded)
+
+
+def slider_reach(linkage: Linkage, unloaded: float) -> float:
+    """Return the slider's distance from the pivot along its way, unloaded [m]."""
+    return abs(float(linkage.slider_position(np.array(unloaded))))
+
+
+def _as_run(spec: SliderCrankSpec, linkage: Linkage, unloaded: float) -> SliderCrankSpec:
+    """Return the spec with what the analysis fell back on written out."""
+    travel = spec.analysis.travel or (0.0, DEFAULT_SHARE * slider_reach(linkage, unloaded))
+    written = {"travel": travel, "fidelity": spec.fidelity}
+    return spec.model_copy(update={"analysis": spec.analysis.model_copy(update=written)})
+
+
+def _curve(solution: Printed) -> Curve:
+    stress: FloatArray = solution.stress
+    extra = {
+        "max_stress": Column(stress, "stress"),
+        "stress_place": Column(solution.place, "length"),
+        "side_force": Column(solution.side_force, "force"),
+        "guide_moment": Column(solution.guide_moment, "torque"),
+        "energy": Column(solution.energy, "energy"),
+    }
+    points = len(solution.travel)
+    return Curve(solution.travel, solution.force, np.repeat("load", points), solution.stable, extra)
+
+
+def _values(solution: Printed) -> Mapping[str, Quantity]:
+    """Return the scalar results; those of springs and pins are there without a value."""
+    found = {
+        name: Quantity(value, *_about(name), why if value is None else "") for name, value, why in numbers(solution)
+    }
+    for name in ("stiffness_class", "crank_pin_rotation_max"):
+        found[name] = Quantity(None, *ALL[name], "it belongs to springs at pins: see fidelity 'prb'")
+    return found
+
+
+def _about(name: str) -> tuple[str, str]:
+    return DEFINITIONS[name] if name in DEFINITIONS else ALL[name]

@@ -1,0 +1,246 @@
+"""What is optimised: a strip that holds a force over the longest travel, or the flattest force over a given one.
+
+The force is computed at Chebyshev points of the root of the travel, where it is smooth down to the steep start, and
+interpolated between them, so that the band is kept everywhere and not at a few points. The stress is looked at along
+the whole strip at the end of the travel, where it is largest. Derivatives by the thicknesses are exact (implicit
+differentiation); those of the force by the stroke too. The force is proportional to the width, the stress does not
+depend on it. Places of stations are differentiated by central differences.
+"""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.beams import Control, Displacement, PathStatus, gradient, trace
+from cfmkit.beams.neighbour import drive_slope, neighbouring
+from cfmkit.errors import InputError
+from cfmkit.families.slider_crank.flexures.chain import SLIDER, STRIP
+from cfmkit.families.slider_crank.flexures.pressing import FIRST_STEP
+from cfmkit.numerics.barycentric import differentiation, interpolation
+
+if TYPE_CHECKING:
+    from cfmkit.beams import Network, Path
+    from cfmkit.curves import FloatArray
+    from cfmkit.families.slider_crank.flexures.task import Form, Task
+
+POINTS, DENSE, SAMPLES = 12, 33, 8
+"""Where the force is computed, where its band is kept, and samples of the stress in each linear piece."""
+
+RMS_POINTS = 10
+"""Points of the root mean square, even in the travel, its start left out [B, eq. 14]."""
+
+TOLERANCE = 1e-6
+_NUDGE = 1e-5  # of a share, for its central difference
+
+
+@dataclass(frozen=True)
+class State:
+    """A strip pressed to the points of a task.
+
+    Attributes
+    ----------
+    path : Path
+        Its equilibria.
+    force : (p,) array
+        [N].
+    stress : (r,) array
+        Along the strip at the end [Pa].
+    """
+
+    path: Path
+    force: FloatArray
+    stress: FloatArray
+
+
+@dataclass
+class StripProgram:
+    """Objective and constraints of a task over a form; a `cfmkit.numerics.sqp.Program`.
+
+    The variables are those of the form, then the stroke [cm] or the ripple [%] where that is the goal.
+    """
+
+    task: Task
+    form: Form
+    known: Path | None = None
+    solved: int = 0
+    _last: tuple[FloatArray, State] | None = field(default=None, repr=False)
+
+    def __post_init__(self) -> None:
+        """Set the fixed places and the matrices that go with them."""
+        if self.task.goal == "rms":
+            self.spots = np.arange(1, RMS_POINTS + 1) / RMS_POINTS
+            self.between = np.eye(RMS_POINTS)
+            return
+        self.spots = 0.5 * (1.0 - np.cos(np.pi * np.arange(POINTS) / (POINTS - 1)))
+        dense = 0.5 * (1.0 - np.cos(np.pi * np.linspace(0.0, 1.0, DENSE)))
+        self.between = interpolation(self.spots, dense)
+        self.slope = differentiation(self.spots)
+
+    @property
+    def extra(self) -> int:
+        """Number of variables beside the form's."""
+        return 0 if self.task.goal == "rms" else 1
+
+    def travel(self, z: FloatArray) -> FloatArray:
+        """Return the travels at which the force is computed [m]."""
+        if self.task.goal == "rms":
+            return np.asarray(self.task.start + (self.task.stroke - self.task.start) * self.spots)
+        first, last = np.sqrt(self.task.start), np.sqrt(self.stroke(z))
+        travel: FloatArray = (first + (last - first) * self.spots) ** 2
+        return travel
+
+    def stroke(self, z: FloatArray) -> float:
+        """Return the end of the travel [m]."""
+        return 0.01 * float(z[-1]) if self.task.goal == "stroke" else self.task.stroke
+
+    def ripple(self, z: FloatArray) -> float:
+        """Return the deviation allowed, as a share."""
+        return 0.01 * float(z[-1]) if self.task.goal == "ripple" else self.task.ripple
+
+    def network(self, x: Any) -> Network:
+        """Return the network of a form's variables."""
+        return self.form.strip(x, self.task.corners).network(self.task.material)
+
+    def state(self, z: FloatArray) -> State | None:
+        """Return the pressed strip; None where it has no stable equilibrium at all points."""
+        if self._last is not None and np.array_equal(self._last[0], z):
+            return self._last[1]
+        path = self._path(self.network(z[: self.form.size]), self.travel(z))
+        if path is None:
+            return None
+        at = path.at_asked
+        stress = self._sampled(path) @ path.sections(STRIP).stress()[at[-1]]
+        found = State(path, path.effort[at], stress)
+        self.known, self._last = path, (z.copy(), found)
+        return found
+
+    def _sampled(self, path: Path) -> FloatArray:
+        """Return the matrix from the samples along a strip to those looked at: so many in every linear piece.
+
+        How finely a path is sampled depends on its mesh; how many constraints there are must not.
+        """
+        beam = path.layout.network.beams[STRIP]
+        breaks = np.unique(np.concatenate([beam.shape.course(1.0).breaks, beam.section.stations]))
+        breaks = breaks[np.append(True, np.diff(breaks) > 1e-12)]
+        place = np.interp(path.sections(STRIP).place[0], breaks, np.arange(len(breaks)))
+        wanted = np.linspace(0.0, len(breaks) - 1, SAMPLES * (len(breaks) - 1) + 1)
+        after = np.clip(np.searchsorted(place, wanted - 1e-9), 1, len(place) - 1)
+        gap = np.maximum(place[after] - place[after - 1], 1e-300)
+        share = np.clip((wanted - place[after - 1]) / gap, 0.0, 1.0)
+        matrix = np.zeros((len(wanted), len(place)))
+        rows = np.arange(len(wanted))
+        matrix[rows, after - 1], matrix[rows, after] = 1.0 - share, share
+        return matrix
+
+    def _path(self, network: Network, travel: FloatArray) -> Path | None:
+        """Return the equilibria near the last ones, else from rest."""
+        self.solved += 1
+        drive = Displacement(SLIDER, self.task.direction, travel)
+        if self.known is not None:
+            with suppress(InputError):  # stations that move can change how finely the strip is cut
+                near = neighbouring(self.known, network, drive)
+                if near.status is PathStatus.COMPLETE:
+                    return near
+        path = trace(network, drive, Control(first_step=FIRST_STEP, tolerance=TOLERANCE))
+        good = path.status is PathStatus.COMPLETE and bool(path.stable[path.at_asked].all())
+        return path if good else None
+
+    def values(self, z: FloatArray) -> tuple[float, FloatArray] | None:
+        """Return the objective and the constraints, at least zero where they hold."""
+        state = self.state(z)
+        if state is None:
+            return None
+        ratio = state.force / self.task.force - 1.0
+        return self._objective(z, ratio), np.concatenate([self._band(z, ratio), self._strength(state)])
+
+    def _objective(self, z: FloatArray, ratio: FloatArray) -> float:
+        if self.task.goal == "rms":
+            return 1e4 * float(np.mean((self.between @ ratio) ** 2))
+        return -float(z[-1]) if self.task.goal == "stroke" else float(z[-1])
+
+    def _band(self, z: FloatArray, ratio: FloatArray) -> FloatArray:
+        if self.task.goal == "rms":
+            return np.zeros(0)
+        off = 100.0 * (self.between @ ratio)
+        return np.concatenate([100.0 * self.ripple(z) - off, 100.0 * self.ripple(z) + off])
+
+    def _strength(self, state: State) -> FloatArray:
+        limit = self.task.material.allowable_stress
+        return np.zeros(0) if limit is None else np.asarray(10.0 * (1.0 - state.stress / limit))
+
+    def slopes(self, z: FloatArray) -> tuple[FloatArray, FloatArray] | None:
+        """Return the derivatives of objective and constraints."""
+        state = self.state(z)
+        if state is None:
+            return None
+        force, stress = self._by_form(z, state)
+        if self.extra:
+            by_last = (
+                self._by_stroke(z, state) if self.task.goal == "stroke" else (0.0 * state.force, 0.0 * state.stress)
+            )
+            force, stress = np.column_stack([force, by_last[0]]), np.column_stack([stress, by_last[1]])
+        ratio, by = state.force / self.task.force - 1.0, force / self.task.force
+        off, limit = 100.0 * self.between @ by, self.task.material.allowable_stress
+        rows = [] if limit is None else [-10.0 * stress / limit]
+        if self.task.goal == "rms":
+            objective = 2e4 / len(self.between) * (self.between @ ratio) @ (self.between @ by)
+            return objective, np.concatenate(rows) if rows else np.zeros((0, len(z)))
+        objective = np.zeros(len(z))
+        objective[-1] = -1.0 if self.task.goal == "stroke" else 1.0
+        if self.task.goal == "ripple":
+            upper, lower = -off, off.copy()
+            upper[:, -1], lower[:, -1] = 1.0, 1.0
+            return objective, np.concatenate([upper, lower, *rows])
+        return objective, np.concatenate([-off, off, *rows])
+
+    def _by_form(self, z: FloatArray, state: State) -> tuple[FloatArray, FloatArray]:
+        """Return the derivatives of force (p, k) and stress (r, k) by the form's variables."""
+        form, path, x = self.form, state.path, z[: self.form.size]
+
+        def build(values: Any) -> Network:
+            return self.network(np.concatenate([values, x[form.count :]]))
+
+        inner = x[: form.count]
+        force = [gradient(path, build, inner).effort]
+        last = gradient(path, build, inner, points=path.at_asked[-1:]).sections(STRIP)
+        sections = path.sections(STRIP)
+        end = path.at_asked[-1]
+        bend, pull = np.sign(sections.bending_stress[end])[:, None], np.sign(sections.axial_stress[end])[:, None]
+        stress = [self._sampled(path) @ (bend * last.bending_stress[0] + pull * last.axial_stress[0])]
+        for k in range(form.count, form.count + form.placed):
+            by = self._by_difference(z, k, state)
+            force.append(by[0][:, None])
+            stress.append(by[1][:, None])
+        if form.width is None:
+            force.append((state.force / x[-1])[:, None])
+            stress.append(np.zeros((len(state.stress), 1)))
+        return np.concatenate(force, axis=1), np.concatenate(stress, axis=1)
+
+    def _by_difference(self, z: FloatArray, k: int, state: State) -> tuple[FloatArray, FloatArray]:
+        """Return the derivatives by one variable by a central difference of neighbouring equilibria."""
+        drive = Displacement(SLIDER, self.task.direction, self.travel(z))
+        sides = []
+        for step in (-_NUDGE, _NUDGE):
+            moved = z[: self.form.size].copy()
+            moved[k] += step
+            path = neighbouring(state.path, self.network(moved), drive)
+            if path.status is not PathStatus.COMPLETE:
+                return 0.0 * state.force, 0.0 * state.stress
+            sides.append((path.effort, self._sampled(path) @ path.sections(STRIP).stress()[-1]))
+        (low, weak), (high, strong) = sides
+        return (high - low) / (2 * _NUDGE), (strong - weak) / (2 * _NUDGE)
+
+    def _by_stroke(self, z: FloatArray, state: State) -> tuple[FloatArray, FloatArray]:
+        """Return the derivatives by the stroke in cm: all points move with it, the stress is that at the last."""
+        travel, at = self.travel(z), state.path.at_asked
+        stroke = self.stroke(z)
+        moves = np.sqrt(travel / stroke) * self.spots
+        sections, end = state.path.sections(STRIP), at[-1]
+        parts = (sections.bending_stress, sections.axial_stress)
+        by_spot = self._sampled(state.path) @ sum(np.sign(part[end]) * (self.slope[-1] @ part[at]) for part in parts)
+        by_travel = by_spot / (2.0 * np.sqrt(stroke) * (np.sqrt(stroke) - np.sqrt(self.task.start)))
+        return 0.01 * drive_slope(state.path) * moves, 0.01 * by_travel
