@@ -26,6 +26,9 @@ if TYPE_CHECKING:
     from cfmkit.experiment.comparison import Comparison, Samples
     from cfmkit.experiment.report import MeasureReport
 
+LITTLE_MORE = 2.0
+"""Forces outside the window are shown as well if the range grows by no more than this factor."""
+
 BINS = 1200
 """Columns of points that a picture can show: more samples are drawn as their extremes."""
 
@@ -75,11 +78,14 @@ def _draw_faint(curve: Curve, ax: Axes) -> None:
 
 
 def _range_in(curves: tuple[Curve, ...], window: tuple[float, float]) -> tuple[float, float]:
-    """Return limits of the effort that show what is in a window, with room around it."""
+    """Return limits of the effort that show what is in a window, with room around it; all where that is little more."""
     inside = np.concatenate(
         [curve.effort[(curve.motion >= window[0]) & (curve.motion <= window[1])] for curve in curves]
     )
     low, high = float(inside.min()), float(inside.max())
+    lowest, highest = (float(way([way(curve.effort) for curve in curves])) for way in (np.min, np.max))
+    if highest - lowest <= LITTLE_MORE * (high - low):
+        low, high = lowest, highest
     room = 0.18 * (high - low) or 1e-3 * (abs(high) or 1.0)
     return low - room, high + room
 
@@ -189,4 +195,4 @@ def _draw_errors(comparison: Comparison, ax: Axes) -> None:
     ax.axhline(0.0, color=GREY, linewidth=0.7, zorder=2)
     curve = comparison.curve
     ax.set_xlabel(axis_label(curve.motion_name, curve.motion_dimension))
-    ax.set_ylabel(axis_label("model \N{MINUS SIGN} measured", curve.kind))
+    ax.set_ylabel(axis_label("model \N{MINUS SIGN}\nmeasured", curve.kind))

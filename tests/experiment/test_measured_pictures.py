@@ -1,0 +1,34 @@
+"""The picture of a measured loop: what it shows, and that it is the same every time."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from experiment_support import triangle
+
+from cfmkit.experiment.draw import figures
+from cfmkit.experiment.measured import measured
+from cfmkit.experiment.reading import Recording
+from cfmkit.experiment.report import report_on
+from cfmkit.metrics import Window
+from cfmkit.plots.style import png
+
+
+def report(rise):
+    motion = triangle(2)
+    way = np.sign(np.diff(motion, append=motion[-2]))
+    return report_on(
+        measured(Recording("made.csv", motion * 1e-3, 50 + 0.5 * way + rise * motion)), window=Window(0.01, 0.03)
+    )
+
+
+@pytest.mark.parametrize(("rise", "shown"), [(0.01, True), (0.4, False)])
+def test_forces_outside_the_window_are_shown_where_they_do_not_flatten_the_loop(rise, shown):
+    found = report(rise)
+    low, high = figures(found)["loop"]().axes[1].get_ylim()
+    efforts = np.concatenate([curve.effort for curve in found.source.raw])
+    assert bool(low < efforts.min() and efforts.max() < high) is shown
+
+
+def test_a_picture_has_the_same_bytes_every_time():
+    assert png(figures(report(0.01))["loop"]()) == png(figures(report(0.01))["loop"]())
