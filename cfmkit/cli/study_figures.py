@@ -9,7 +9,7 @@ import numpy as np
 from cfmkit.plots.findings import Findings, Line, Scale
 from cfmkit.plots.study import figures
 from cfmkit.plots.style import png
-from cfmkit.tables import border_values, read_csv
+from cfmkit.tables import Table, TableColumn, border_values, read_csv
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from cfmkit.studies.plan import Plan, Variable
     from cfmkit.studies.study import Metric
     from cfmkit.studies.summary import Summary
-    from cfmkit.tables import Table
 
 
 def pictures(records: Records, summary: Summary) -> Iterator[tuple[str, bytes]]:
@@ -65,11 +64,20 @@ def curves(records: Records, found: Findings) -> tuple[list[Line], tuple[str, st
     labels = ("", "")
     for indices, rows in records.batches():
         for k, text in rows.curves.items():
-            table = read_csv(text)
+            table = _nominal(read_csv(text))
             motion, effort = table.columns[1], table.columns[2]
             labels = (motion.header.replace("_", " "), effort.header.replace("_", " "))
             lines.append(Line(float(found.varied[0].values[int(indices[k])]), _branches(table)))
     return lines, labels
+
+
+def _nominal(table: Table) -> Table:
+    """Return the rows of the first curve, without the columns that tell curves of one point apart (a preload)."""
+    labels = [column.name for column in table.columns].index("branch")
+    rows = list(zip(*(column.cells() for column in table.columns[:labels]), strict=True)) or [()] * len(table)
+    first = [number for number, row in enumerate(rows) if row == rows[0]]
+    kept = (TableColumn(one.name, tuple(one.cells()[k] for k in first), one.unit) for one in table.columns[labels:])
+    return Table(tuple(kept))
 
 
 def _branches(table: Table) -> dict[str, tuple[FloatArray, FloatArray]]:

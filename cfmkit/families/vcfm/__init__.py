@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from cfmkit.families.base import Family
+from cfmkit.families.vcfm.block import analyze_block
 from cfmkit.families.vcfm.design import design
 from cfmkit.families.vcfm.findings import FINDINGS
 from cfmkit.families.vcfm.model import analyze
@@ -16,6 +17,7 @@ FAMILY = Family(
     analyze=analyze,
     design=design,
     values=DEFINITIONS,
+    analyze_block=analyze_block,
     headline=(
         "constant_force",
         "positive_stiffness",

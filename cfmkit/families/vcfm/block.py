@@ -1,0 +1,254 @@
+"""Many mechanisms at once: V-beams and a diamond without preload, by the analytic laws or the paper's.
+
+The laws broadcast over designs and travels, so that a block is the same formulas on a (designs, points) array. What is
+not asked is not computed: where all measures have a window, only the samples in it are.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.families.base import BlockAnswer
+from cfmkit.families.vcfm.parts import share_of
+from cfmkit.families.vcfm.springs import Diamond
+from cfmkit.families.vcfm.strip import Strip
+from cfmkit.families.vcfm.truss import TrussDiamond, TrussLeaf
+from cfmkit.families.vcfm.vbeam import LINEAR_ABOVE, VBeam
+from cfmkit.families.vcfm.windows import longest_window
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from numpy.typing import NDArray
+
+    from cfmkit.curves import FloatArray
+    from cfmkit.families.base import Block, Measure
+    from cfmkit.families.vcfm.spec import VcfmSpec
+
+SLAB = 60_000
+"""Samples that are worked on together: few enough to stay in a processor's cache."""
+
+_SIZES = ("length", "angle", "thickness", "width")
+VARIED = {
+    **{f"mechanism.positive.{name}": f"spring.{name}" for name in _SIZES},
+    **{f"mechanism.bistable.{name}": f"leaf.{name}" for name in _SIZES},
+    "mechanism.bistable.half_beams": "half_beams",
+    "mechanism.material.youngs_modulus": "modulus",
+}
+"""What this model can vary, and what it is called here."""
+
+
+def analyze_block(spec: VcfmSpec, block: Block) -> BlockAnswer | None:
+    """Return what is asked about many variants of a mechanism; None where this model does not apply.
+
+    Parameters
+    ----------
+    spec : VcfmSpec
+        What is varied.
+    block : Block
+        The variants and the measures.
+    """
+    names = {measure.name for measure in block.measures}
+    if not _applies(spec, block) or not names <= set(SCALARS) | set(METRICS):
+        return None
+    values = [np.full(block.size, np.nan) for _ in block.measures]
+    done = _sound(spec, block, names)
+    for chosen in _slabs(np.flatnonzero(done), spec.analysis.points):
+        slab = Slab.of(spec, {path: np.asarray(item)[chosen] for path, item in block.values.items()}, len(chosen))
+        for measure, found in zip(block.measures, values, strict=True):
+            found[chosen] = _measured(slab, measure)
+            if measure.name in METRICS:
+                done[chosen] &= slab.spread(measure.window).mean > 0
+    named = [{"load" if one.name in METRICS else "": found} for one, found in zip(block.measures, values, strict=True)]
+    target = None if spec.design is None else np.full(block.size, spec.design.force)
+    return BlockAnswer(done, tuple(named), target)
+
+
+def _applies(spec: VcfmSpec, block: Block) -> bool:
+    mechanism, analysis = spec.mechanism, spec.analysis
+    plain = (
+        analysis.fidelity in ("truss", "analytic")
+        and (mechanism.positive.structure, mechanism.bistable.structure) == ("diamond", "v-beam")
+        and analysis.preloads[0] == 0
+        and analysis.travel is not None
+    )
+    ends = [measure.window for measure in block.measures if measure.window and measure.name in METRICS]
+    inside = all(low >= 0 and high <= spec.travel for low, high in ends)
+    return plain and inside and set(block.values) <= set(VARIED)
+
+
+def _sound(spec: VcfmSpec, block: Block, names: set[str]) -> NDArray[np.bool_]:
+    """Return which variants are valid and of the kind whose asked values have closed forms."""
+    done = np.ones(block.size, dtype=bool)
+    for path, item in block.values.items():
+        given = np.asarray(item, dtype=float)
+        done &= (given >= 1) & (given <= 1000) if path.endswith("half_beams") else given > 0
+        if path.endswith("angle"):
+            done &= given <= np.radians(40)
+    if "negative_stiffness" in names and spec.analysis.fidelity == "analytic":
+        whole = Slab.of(spec, block.values, block.size)
+        done &= np.ravel(whole.leaf.strip.slenderness > LINEAR_ABOVE)
+    return done
+
+
+def _slabs(chosen: NDArray[np.intp], points: int) -> list[NDArray[np.intp]]:
+    size = max(1, SLAB // points)
+    return [chosen[start : start + size] for start in range(0, len(chosen), size)]
+
+
+@dataclass(frozen=True)
+class Slab:
+    """Some designs over one grid of travels; every quantity is a column (k, 1) or an array (k, points)."""
+
+    leaf: VBeam | TrussLeaf
+    spring: Diamond | TrussDiamond
+    half_beams: Any
+    grid: FloatArray
+    flatness: float
+    target: float | None = None
+
+    @classmethod
+    def of(cls, spec: VcfmSpec, values: Mapping[str, Any], size: int) -> Slab:
+        """Return the designs with these values."""
+        mechanism, given = spec.mechanism, {VARIED[path]: np.asarray(item, float) for path, item in values.items()}
+
+        def column(name: str, base: float) -> FloatArray:
+            return np.broadcast_to(given.get(name, np.float64(base)), size)[:, None]
+
+        modulus = column("modulus", mechanism.material.modulus)
+
+        def strip(kind: str, part: Any) -> Strip:
+            sizes = {name: column(f"{kind}.{name}", getattr(part, name)) for name in _SIZES}
+            return Strip(**sizes, youngs_modulus=modulus, poisson_ratio=mechanism.material.poisson)
+
+        modulus = column("modulus", mechanism.material.modulus)
+        side, leaf_strip = strip("spring", mechanism.positive), strip("leaf", mechanism.bistable)
+        share, points = share_of(mechanism.positive), spec.analysis.points
+        grid = spec.travel * (np.arange(points) / (points - 1.0))
+        paper = spec.analysis.fidelity == "truss"
+        leaf: Any = TrussLeaf(leaf_strip) if paper else VBeam(leaf_strip)
+        spring: Any = TrussDiamond(side, share) if paper else Diamond(side, share)
+        target = spec.design.force if spec.design else None
+        leaves = column("half_beams", mechanism.bistable.half_beams)
+        return cls(leaf, spring, leaves, grid, spec.analysis.flatness, target)
+
+    def force_at(self, travel: FloatArray) -> FloatArray:
+        """Return the forces at some travels, (k, n) [N]."""
+        place = travel[None, :]
+        return np.asarray(self.half_beams * self.leaf.force(place) + self.spring.force(place))
+
+    @cached_property
+    def force(self) -> FloatArray:
+        """The forces at all travels [N]."""
+        return self.force_at(self.grid)
+
+    @cached_property
+    def _spreads(self) -> dict[Any, Spread]:
+        return {}
+
+    def spread(self, window: tuple[float, float] | None) -> Spread:
+        """Return the forces inside a window."""
+        if window not in self._spreads:
+            self._spreads[window] = Spread(self._inside(window))
+        return self._spreads[window]
+
+    def _inside(self, window: tuple[float, float] | None) -> FloatArray:
+        """Return the samples in a window with its interpolated ends, as the metrics of one curve take them."""
+        if window is None:
+            return self.force
+        (low, high), grid = window, self.grid
+        slack = 1e-9 * (high - low)
+        start, stop = int(np.searchsorted(grid, low - slack)), int(np.searchsorted(grid, high + slack, side="right"))
+        head, tail = grid[start] > low + slack, grid[stop - 1] < high - slack
+        first, last = start - int(head), stop + int(tail)
+        force = self.force_at(grid[first:last]) if "force" not in self.__dict__ else self.force[:, first:last]
+        parts = [force[:, start - first : stop - first]]
+        if head:
+            parts.insert(0, _between(grid[first : first + 2], force[:, :2], low))
+        if tail:
+            parts.append(_between(grid[last - 2 : last], force[:, -2:], high))
+        return np.hstack(parts)
+
+    @cached_property
+    def window(self) -> tuple[Any, Any]:
+        """First and last sample of each longest flat stretch."""
+        return longest_window(self.force, self.flatness)
+
+
+def _between(motion: FloatArray, force: FloatArray, place: float) -> FloatArray:
+    share = (place - motion[0]) / (motion[1] - motion[0])
+    found: FloatArray = force[:, :1] + share * (force[:, 1:] - force[:, :1])
+    return found
+
+
+class Spread:
+    """Mean and extremes of forces, (k, n), in a window."""
+
+    def __init__(self, force: FloatArray) -> None:
+        """Keep the forces."""
+        self.force = force
+        self.mean, self.max, self.min = force.mean(axis=1), force.max(axis=1), force.min(axis=1)
+
+    @property
+    def deviation(self) -> FloatArray:
+        """Standard deviation (n - 1) [N]."""
+        return np.asarray(self.force.std(axis=1, ddof=1))
+
+
+def _measured(slab: Slab, measure: Measure) -> FloatArray:
+    if measure.name in SCALARS:
+        return np.ravel(np.broadcast_to(SCALARS[measure.name](slab), (len(slab.half_beams), 1)))
+    return np.asarray(METRICS[measure.name](slab.spread(measure.window), slab))
+
+
+def _from_target(one: Spread, slab: Slab) -> FloatArray:
+    if slab.target is None:
+        return np.full(len(one.mean), np.nan)
+    return np.asarray(np.maximum(np.abs(one.max - slab.target), np.abs(one.min - slab.target)) / slab.target)
+
+
+METRICS: dict[str, Callable[[Spread, Slab], FloatArray]] = {
+    "force_mean": lambda one, _slab: one.mean,
+    "force_sd": lambda one, _slab: one.deviation,
+    "force_max": lambda one, _slab: one.max,
+    "force_min": lambda one, _slab: one.min,
+    "force_ripple": lambda one, _slab: (one.max - one.min) / one.max,
+    "half_band": lambda one, _slab: (one.max - one.min) / (one.max + one.min),
+    "deviation_from_mean": lambda one, _slab: np.maximum(one.max - one.mean, one.mean - one.min) / one.mean,
+    "deviation_from_target": _from_target,
+}
+
+
+def _window_end(slab: Slab, which: int) -> FloatArray:
+    first, last = slab.window
+    return np.where(last > first, slab.grid[slab.window[which]], np.nan)[:, None]
+
+
+def _window_length(slab: Slab) -> FloatArray:
+    first, last = slab.window
+    return np.asarray(slab.grid[last] - slab.grid[first])[:, None]
+
+
+def _stroke(slab: Slab) -> Any:
+    first, last = slab.leaf.linear
+    return np.nan_to_num(last - first)
+
+
+SCALARS: dict[str, Callable[[Slab], Any]] = {
+    "positive_stiffness": lambda slab: slab.spring.stiffness,
+    "negative_stiffness": lambda slab: slab.half_beams * slab.leaf.negative_stiffness,
+    "first_stiffness": lambda slab: slab.half_beams * slab.leaf.first_stiffness,
+    "rise": lambda slab: slab.leaf.strip.rise,
+    "slenderness": lambda slab: slab.leaf.strip.slenderness,
+    "linear_start": lambda slab: slab.leaf.linear[0],
+    "linear_end": lambda slab: slab.leaf.linear[1],
+    "linear_stroke": _stroke,
+    "constant_force": lambda slab: slab.spring.force(slab.leaf.strip.rise),
+    "window_start": lambda slab: _window_end(slab, 0),
+    "window_end": lambda slab: _window_end(slab, 1),
+    "window_length": _window_length,
+}
