@@ -31,12 +31,17 @@ def columns_of(lines: list[str], block: Block, told: dict[str, str], name: str) 
         at, names = fitting[0]
         if len(fitting) > 1 and is_unit_row(names):
             unit_row, (at, names) = names, fitting[1]
-    elif rows and block.dialect.separator == "," and block.width == 2 * len(rows[0][1]) > 2:
+    elif rows and block.dialect.separator == "," and _halved(rows[0][1], block.width):
         raise DataError(
             f"{name}: line {block.first + 1} has {block.width} cells but the header {len(rows[0][1])}: comma seems to "
             "be both separator and decimal sign; export with another separator"
         )
     return describe(names, unit_row, told, name), None if at is None else at + 1
+
+
+def _halved(header: Sequence[str], width: int) -> bool:
+    """Return whether a header has half the cells of the numbers below it, and is not just a title."""
+    return width == 2 * len(header) and (len(header) > 1 or bool(split_header(header[0])[1]))
 
 
 def roles_of(numeric: Sequence[ColumnInfo], columns: Sequence[ColumnInfo], name: str) -> dict[str, ColumnInfo]:

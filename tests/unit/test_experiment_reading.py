@@ -201,3 +201,11 @@ def test_titles_of_remarks_beyond_the_numbers_are_dropped_and_units_beyond_them_
     (tmp_path / "more.csv").write_text("t [s];s [mm];F [N];T [K]\n" + body)
     with pytest.raises(DataError, match="the header names no units"):
         read_recording(tmp_path / "more.csv")
+
+
+def test_a_single_column_with_decimal_commas_is_not_taken_for_two(tmp_path):
+    (tmp_path / "one.csv").write_text("F [N]\n" + "50,25\n" * 20)
+    with pytest.raises(DataError, match="comma seems to be both separator and decimal sign"):
+        read_recording(tmp_path / "one.csv")
+    (tmp_path / "title.csv").write_text("rig seven\n" + rows((MOTION, FORCE), ","))
+    assert len(read_recording(tmp_path / "title.csv", "1=mm,2=N")) == len(MOTION)
