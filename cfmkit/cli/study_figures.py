@@ -26,7 +26,7 @@ def pictures(records: Records, summary: Summary) -> Iterator[tuple[str, bytes]]:
     if records.finished < len(records) or not summary.usable:
         return
     found = findings(records, summary)
-    lines, labels = curves(records, found) if len(found.varied) == 1 else ([], ("", ""))
+    lines, labels = curves(records, found) if len(found.varied) <= 2 else ([], ("", ""))
     for stem, draw in figures(found, lines, labels).items():
         yield f"figures/{stem}.png", png(draw())
 
@@ -67,7 +67,8 @@ def curves(records: Records, found: Findings) -> tuple[list[Line], tuple[str, st
             table = _nominal(read_csv(text))
             motion, effort = table.columns[1], table.columns[2]
             labels = (motion.header.replace("_", " "), effort.header.replace("_", " "))
-            lines.append(Line(float(found.varied[0].values[int(indices[k])]), _branches(table)))
+            *panel, parameter = (float(one.values[int(indices[k])]) for one in found.varied)
+            lines.append(Line(parameter, _branches(table), *panel))
     return lines, labels
 
 

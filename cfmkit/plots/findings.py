@@ -68,7 +68,11 @@ class Findings:
 
 @dataclass(frozen=True)
 class Line:
-    """One curve of a study: branch name -> (motion, effort) in border units, and its parameter."""
+    """One curve of a study: branch name -> (motion, effort) in border units, and its parameter.
+
+    Of two parameters that vary, `parameter` is the second and `panel` the first.
+    """
 
     parameter: float
     branches: Mapping[str, tuple[FloatArray, FloatArray]]
+    panel: float | None = None

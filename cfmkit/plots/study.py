@@ -12,6 +12,7 @@ import numpy as np
 
 from cfmkit.plots.maps import draw_map
 from cfmkit.plots.marks import COLOURS, EMPTY, HATCH, edges, star, ticks
+from cfmkit.plots.panels import draw_panels, fit_panels
 from cfmkit.plots.style import BLUE, GREY, INK, SMALL, VERMILLION, axes_mm, new_figure, styled
 
 if TYPE_CHECKING:
@@ -38,7 +39,7 @@ def figures(
     found : Findings
         The points.
     lines : sequence of Line
-        Curves, for a study of one parameter.
+        Curves, for a study of one or two parameters.
     labels : (str, str)
         Of the curves' axes.
     """
@@ -49,6 +50,8 @@ def figures(
         for metric in found.metrics:
             pictures[_stem(metric)] = lambda metric=metric: draw_metric(found, metric)  # type: ignore[misc]
     elif len(found.shape) == 2:
+        if lines and fit_panels(found, lines):
+            pictures["curves"] = lambda: draw_panels(found, lines, labels)
         for metric in found.metrics:
             pictures[_stem(metric)] = lambda metric=metric: draw_map(found, metric)  # type: ignore[misc]
     elif found.metrics:

@@ -1,0 +1,36 @@
+"""Curves of two parameters: a panel for each value of the first, a named line for each of the second."""
+
+import numpy as np
+import pytest
+
+from cfmkit.plots.findings import Findings, Line, Scale
+from cfmkit.plots.panels import MOST_PANELS, draw_panels, fit_panels
+from cfmkit.plots.study import figures
+
+
+def study(first, second):
+    points = [(i, k) for i in range(first) for k in range(second)]
+    x = np.arange(5.0)
+    lines = [Line(float(k), {"load": (x, (i + 1) * x + k)}, float(i)) for i, k in points]
+    words = tuple(f"kind {k}" for k in range(second))
+    varied = (
+        Scale("a.b", "length", np.array([float(i) for i, _ in points])),
+        Scale("a.c", "text", np.array([float(k) for _, k in points]), words),
+    )
+    metric = Scale("force_mean", "force", np.ones(len(points)))
+    return Findings(varied, (metric,), (first, second), np.ones(len(points), bool)), lines
+
+
+def test_every_value_of_the_first_parameter_has_a_panel_with_a_line_for_each_of_the_second():
+    found, lines = study(3, 2)
+    figure = draw_panels(found, lines, ("displacement [mm]", "force [N]"))
+    assert [len(ax.lines) for ax in figure.axes] == [2, 2, 2]
+    assert [ax.get_title(loc="left") for ax in figure.axes] == ["b: 0", "b: 1", "b: 2"]
+    assert all({"kind 0", "kind 1"} <= {text.get_text() for text in ax.texts} for ax in figure.axes)
+
+
+@pytest.mark.parametrize(("first", "second", "fit"), [(2, 3, True), (MOST_PANELS + 1, 2, False), (2, 9, False)])
+def test_what_cannot_be_told_apart_is_left_to_the_maps(first, second, fit):
+    found, lines = study(first, second)
+    assert fit_panels(found, lines) is fit
+    assert ("curves" in figures(found, lines)) is fit
