@@ -132,8 +132,8 @@ def _sweep_faults(document: Document, spec: Spec) -> Iterator[Problem]:
         return
     from cfmkit.studies.variation import faults, wishes
 
-    drawn = spec.sweep.combine in ("lhs", "sobol")
-    for wish, message in faults(spec, wishes(spec.sweep.vary), drawn):
+    drawn, joint = spec.sweep.combine in ("lhs", "sobol"), spec.sweep.combine == "zip"
+    for wish, message in faults(spec, wishes(spec.sweep.vary), drawn, joint):
         yield document.problem(("sweep", "vary", wish.path), message)
 
 

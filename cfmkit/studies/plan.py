@@ -164,7 +164,12 @@ def zipped(axes: Sequence[Axis], most: int = MOST_POINTS) -> Plan:
         raise UsageError(f"values side by side must be equally many: {told}")
     size = next(iter(counts.values()))
     refuse_too_many(size, most)
-    return Plan(tuple(map(stepped, axes)), size, joint=True)
+    plan = Plan(tuple(map(stepped, axes)), size, joint=True)
+    seen: dict[tuple[Any, ...], int] = {}
+    for index in range(size):
+        if (first := seen.setdefault(plan.point(index), index)) != index:
+            raise UsageError(f"values side by side: the set number {index + 1} is that of number {first + 1} again")
+    return plan
 
 
 @dataclass(frozen=True)

@@ -110,7 +110,7 @@ def _plan(spec: Spec, request: Request, asked: tuple[Wish, ...]) -> Plan:
     if combine == "grid":
         return grid(axes(spec, asked), request.most)
     if combine == "zip":
-        return zipped(axes(spec, asked), request.most)
+        return zipped(axes(spec, asked, joint=True), request.most)
     return sampled(axes(spec, asked, drawn=True), _draw(combine, samples, request.seed), request.most)
 
 

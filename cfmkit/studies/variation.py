@@ -104,7 +104,7 @@ def wishes(vary: Mapping[str, Any]) -> tuple[Wish, ...]:
     return tuple(found)
 
 
-def axes(spec: Spec, wanted: Iterable[Wish], drawn: bool = False) -> tuple[Axis, ...]:
+def axes(spec: Spec, wanted: Iterable[Wish], drawn: bool = False, joint: bool = False) -> tuple[Axis, ...]:
     """Return what varies, checked against a specification.
 
     Parameters
@@ -115,6 +115,8 @@ def axes(spec: Spec, wanted: Iterable[Wish], drawn: bool = False) -> tuple[Axis,
         In order; the first varies slowest.
     drawn : bool
         Whether values are drawn from ranges (``start:stop``) rather than stepped through.
+    joint : bool
+        Whether the lists are gone through side by side, so that one of them may repeat a value.
 
     Raises
     ------
@@ -122,20 +124,22 @@ def axes(spec: Spec, wanted: Iterable[Wish], drawn: bool = False) -> tuple[Axis,
         With every fault of every wish.
     """
     asked = tuple(wanted)
-    problems = [Problem(one.source, 0, 0, "", message) for one, message in faults(spec, asked, drawn)]
+    problems = [Problem(one.source, 0, 0, "", message) for one, message in faults(spec, asked, drawn, joint)]
     if problems:
         raise SpecError(problems)
     return tuple(axis(spec, one, drawn) for one in asked)
 
 
-def faults(spec: Spec, asked: tuple[Wish, ...], drawn: bool) -> Iterator[tuple[Wish, str]]:
+def faults(spec: Spec, asked: tuple[Wish, ...], drawn: bool, joint: bool = False) -> Iterator[tuple[Wish, str]]:
     """Yield (wish, what is wrong with it)."""
     for index, one in enumerate(asked):
         try:
-            axis(spec, one, drawn)
+            found = axis(spec, one, drawn)
         except CannotVary as problem:
             yield one, str(problem)
             continue
+        if not joint and (twice := [value for k, value in enumerate(found.listed) if value in found.listed[:k]]):
+            yield one, f"{written(twice[0], found.dimension)} stands twice in the list"
         for other in asked[:index]:
             if one.path == other.path or f"{one.path}.".startswith(f"{other.path}."):
                 yield one, f"{other.path!r} is varied already; one of them is enough"
@@ -175,8 +179,6 @@ def _listed(found: Leaf, items: tuple[Any, ...]) -> Axis:
     if len(dimensions) > 1:
         raise CannotVary(f"the values are of several kinds: {', '.join(sorted(dimensions))}")
     values = tuple(value for value, _ in read)
-    if twice := [value for index, value in enumerate(values) if value in values[:index]]:
-        raise CannotVary(f"{written(twice[0], read[0][1])} stands twice in the list")
     return Axis(found, read[0][1], values, count=len(values))
 
 

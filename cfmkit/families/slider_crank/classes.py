@@ -72,7 +72,7 @@ def classify(curves: Monotone, start: float, tolerance: float, window: tuple[flo
     before, after = place <= start, place >= start
     drop = np.maximum(_drop(np.where(after, value, np.nan)), _drop(np.where(before, -value, np.nan)[:, ::-1]))
     stable, unstable = _equilibria(curves, start)
-    falls = drop > ROUNDING
+    falls = drop > 0.0
     if window is not None:
         falls = falls | _constant(curves, window, tolerance)
     kind = np.where(drop > 2.0 * tolerance, NEGATIVE, np.where(falls, ZERO, POSITIVE))
@@ -95,8 +95,8 @@ def _drop(walk: FloatArray) -> FloatArray:
     with np.errstate(invalid="ignore", divide="ignore"):
         peak = np.fmax.accumulate(walk, axis=1)
         fall = np.where(peak > 0.0, 1.0 - walk / peak, 0.0)
-    drop: FloatArray = np.fmax.reduce(fall, axis=1, initial=0.0)
-    return drop
+    drop = np.fmax.reduce(fall, axis=1, initial=0.0)
+    return np.where(drop > ROUNDING, drop, 0.0)
 
 
 def signs(curves: Monotone, start: float) -> NDArray[np.int8]:
