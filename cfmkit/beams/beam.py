@@ -25,6 +25,11 @@ Closure = Literal["rotscale", "raw"]
 
 _PANELS = 8
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(12)
+GAUSS = (
+    ((np.arange(_PANELS)[:, None] + 0.5 * (1 + _NODES)) / _PANELS).ravel(),
+    np.tile(0.5 * _WEIGHTS / _PANELS, _PANELS),
+)
+"""Places and weights of the quadrature over a whole smooth beam, parameter from 0 to 1."""
 
 
 @dataclass(frozen=True)

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.beams.kernels.model import Model
-from cfmkit.beams.kernels.rk8 import NODES
+from cfmkit.beams.kernels.model import TABLE_COLUMNS, Model
+from cfmkit.beams.kernels.rk8 import NODES, STAGES
+from cfmkit.beams.plan import LINE, SLIDE, TURN
 from cfmkit.beams.section import Taper
 
 if TYPE_CHECKING:
@@ -59,43 +61,63 @@ class Grid:
     beam_of_step: Any
     piece: Any
 
+    @cached_property
+    def width(self) -> FloatArray:
+        """Widths of the steps in the parameter."""
+        return np.ascontiguousarray(self.edges[:, 1] - self.edges[:, 0])
+
 
 def grid(layout: Layout, mesh: Mesh) -> Grid:
     """Cut every beam at its corners and stations, then evenly."""
+    if not layout.bundle.others:
+        return _even(len(layout.network.beams), mesh)
+    breaks = []
+    for name, beam in layout.network.beams.items():
+        fitted = layout.fits[name]
+        stations = [fitted.parameter(float(u)) for u in beam.section.stations[1:-1]]
+        marks = np.unique(np.concatenate([fitted.course.breaks, stations]))
+        marks = marks[np.concatenate([[True], np.diff(marks) > 1e-12])]
+        breaks.append((marks, np.real(fitted.arc(marks))))
+    cut = _cut(breaks, mesh)
+    inside = cut.middle.copy()
+    for number, name in enumerate(layout.network.beams):
+        if not layout.fits[name].course.uniform:
+            own = cut.beam_of_step == number
+            inside[own] = np.real(layout.fits[name].arc(cut.middle[own]))
+    return replace(cut, inside=inside)
+
+
+@lru_cache(maxsize=64)
+def _even(beams: int, mesh: Mesh) -> Grid:
+    """Return the grid of beams without corners or stations whose parameter is the fraction of the arc length."""
+    whole = np.array([0.0, 1.0])
+    return _cut([(whole, whole)] * beams, mesh)
+
+
+def _cut(breaks: list[tuple[FloatArray, FloatArray]], mesh: Mesh) -> Grid:
+    """Cut beams given the parameters of their smooth pieces' ends and the fractions of the arc length there."""
     edges: list[tuple[float, float]] = []
     segment_step, beam_segment, beam_of_step = [0], [0], []
     piece: list[int] = []
-    for number, (name, beam) in enumerate(layout.network.beams.items()):
-        fitted = layout.fits[name]
-        stations = [fitted.parameter(float(u)) for u in beam.section.stations[1:-1]]
-        breaks = np.unique(np.concatenate([fitted.course.breaks, stations]))
-        breaks = breaks[np.concatenate([[True], np.diff(breaks) > 1e-12])]
+    for number, (marks, arcs) in enumerate(breaks):
         count = len(segment_step) - 1
-        for left, right in itertools.pairwise(breaks):
-            share = float(np.real(fitted.arc(float(right)) - fitted.arc(float(left))))
+        for (left, right), share in zip(itertools.pairwise(marks.tolist()), np.diff(arcs).tolist(), strict=True):
             pieces = max(1, int(np.ceil(mesh.segments * share - 1e-9)))
-            marks = np.linspace(left, right, pieces * mesh.steps + 1)
-            edges += list(zip(marks[:-1].tolist(), marks[1:].tolist(), strict=True))
+            steps = np.linspace(left, right, pieces * mesh.steps + 1)
+            edges += list(zip(steps[:-1].tolist(), steps[1:].tolist(), strict=True))
             beam_of_step += [number] * (pieces * mesh.steps)
             piece += [piece[-1] + 1 if piece else 0] * (pieces * mesh.steps)
             segment_step += [segment_step[-1] + mesh.steps * (k + 1) for k in range(pieces)]
             count += pieces
         beam_segment.append(count)
     array = np.array(edges)
-    middle = array.mean(axis=1)
-    names = list(layout.network.beams)
-    owner = np.array(beam_of_step, dtype=np.int64)
-    inside = middle.copy()
-    for number, name in enumerate(names):
-        if not layout.fits[name].course.uniform:
-            inside[owner == number] = np.real(layout.fits[name].arc(middle[owner == number]))
     return Grid(
         array,
-        inside,
-        middle,
+        array.mean(axis=1),
+        array.mean(axis=1),
         np.array(segment_step, dtype=np.int64),
         np.array(beam_segment, dtype=np.int64),
-        owner,
+        np.array(beam_of_step, dtype=np.int64),
         np.array(piece, dtype=np.int64),
     )
 
@@ -103,23 +125,42 @@ def grid(layout: Layout, mesh: Mesh) -> Grid:
 def table(layout: Layout, cut: Grid, known: Any = None) -> Any:
     """Return the reference angle, speed and compliances at the stages of all steps, dimensionless.
 
-    `known` is the table of the layout that this one took fits over from: those beams' rows are taken over too.
+    `known` is the table of the layout that this one took fits over from: the rows of beams that are neither plain nor
+    changed are taken over too.
     """
-    blocks = []
-    for number, name in enumerate(layout.network.beams):
-        steps = np.flatnonzero(cut.beam_of_step == number)
-        kept = layout.known is not None and layout.fits[name] is layout.known.fits[name]
-        blocks.append(known[steps] if known is not None and kept else beam_table(layout, name, cut, steps))
-    return np.ascontiguousarray(np.concatenate(blocks))
+    bundle, scales = layout.bundle, layout.scales
+    if not bundle.others:
+        first = cut.edges[: len(cut.edges) // len(bundle.plain)]
+        out = bundle.table(_stages(first)).reshape(len(cut.edges), STAGES, -1)
+    else:
+        blocks: list[Any] = [None] * len(bundle.beams)
+        if bundle.plain:
+            steps = cut.beam_of_step == bundle.plain[0]
+            plain = bundle.table(_stages(cut.edges[steps])).reshape(len(bundle.plain), -1, STAGES, TABLE_COLUMNS)
+            for number, block in zip(bundle.plain, plain, strict=True):
+                blocks[number] = block
+        for number in bundle.others:
+            blocks[number] = _other(
+                layout, bundle.names[number], cut, np.flatnonzero(cut.beam_of_step == number), known
+            )
+        out = np.ascontiguousarray(np.concatenate(blocks))
+    out *= np.array([1.0, 1 / scales.length, scales.rigidity / scales.length, *[scales.force / scales.length] * 2])
+    return out
 
 
-def beam_table(layout: Layout, name: str, cut: Grid, steps: Any) -> Any:
-    """Return the table of one beam, dimensionless."""
-    block, scales = _si_table(layout, name, cut, steps), layout.scales
-    block[..., 1:] /= scales.length
-    block[..., 2] *= scales.rigidity
-    block[..., 3:] *= scales.force
-    return block
+def _stages(edges: FloatArray) -> FloatArray:
+    """Return the parameters of all stages of some steps, one after the other."""
+    places: FloatArray = (edges[:, :1] + (edges[:, 1:] - edges[:, :1]) * NODES).ravel()
+    return places
+
+
+def _other(layout: Layout, name: str, cut: Grid, steps: Any, known: Any) -> Any:
+    """Return the table of one beam in SI; what is known of it is not computed again."""
+    if known is None or layout.known is None or layout.fits[name] is not layout.known.fits[name]:
+        return _si_table(layout, name, cut, steps)
+    scales = layout.scales
+    units = np.array([1.0, scales.length, scales.length / scales.rigidity, *[scales.length / scales.force] * 2])
+    return known[steps] * units
 
 
 def _si_table(layout: Layout, name: str, cut: Grid, steps: Any) -> Any:
@@ -153,74 +194,67 @@ def model(layout: Layout, mesh: Mesh, ramp: bool = False) -> Model:
 
 def assemble_model(layout: Layout, cut: Grid, values: Any, ramp: bool = False) -> Model:
     """Return the network's arrays for given tables."""
-    scales = layout.scales
-    places = layout.places
+    scales, plan, places = layout.scales, layout.plan, layout.places
     base, rate = _held(layout)
-    load_place, load_value, load_follows = _loads(layout)
-    line = layout.line_load / scales.force * scales.length
+    load_value, line = _loads(layout), layout.line_load / scales.force * scales.length
     line[:, 1] *= scales.drive
     if ramp:
         base, rate = np.zeros_like(base), base
         load_value[:, 1], load_value[:, 0] = load_value[:, 0], 0.0
         line[:, 1], line[:, 0] = line[:, 0], 0.0
-    slot = np.full(layout.dof_count, -1, dtype=np.int64)
-    slot[layout.free] = np.arange(int(layout.free.sum()))
-    spring_place, spring_kind, spring_value = _springs(layout)
     return Model(
         table=values,
-        width=np.ascontiguousarray(cut.edges[:, 1] - cut.edges[:, 0]),
+        width=cut.width,
         segment_step=cut.segment_step,
         beam_segment=cut.beam_segment,
-        beam_end=layout.beam_end,
+        beam_end=plan.beam_end,
         line_load=line,
-        place_dof=np.array(places.dof, dtype=np.int64),
-        place_frame=np.array(places.frame),
-        place_origin=np.array(places.origin) / scales.length,
-        place_arm=np.array(places.arm) / scales.length,
+        place_dof=plan.place_dof,
+        place_frame=places.frame,
+        place_origin=places.origin / scales.length,
+        place_arm=places.arm / scales.length,
         base=base,
         rate=rate,
-        slot=slot,
-        load_place=load_place,
+        slot=plan.slot,
+        load_place=plan.load_place,
         load_value=load_value,
-        load_follows=load_follows,
-        spring_place=spring_place,
-        spring_kind=spring_kind,
-        spring_value=spring_value,
+        load_follows=plan.load_follows,
+        spring_place=plan.spring_place,
+        spring_kind=plan.spring_kind,
+        spring_value=_springs(layout),
     )
 
 
 def _held(layout: Layout) -> tuple[Any, Any]:
     """Return the held values and those that the drive moves, dimensionless."""
-    base, rate = layout.base.copy(), np.zeros(layout.dof_count)
-    for name in layout.masters:
-        first = layout.first[name]
-        base[first : first + 2] /= layout.scales.length
+    base, rate = layout.base, np.zeros(layout.dof_count)
+    if base.any():
+        base = base.copy()
+        for first in layout.first.values():
+            base[first : first + 2] /= layout.scales.length
     if layout.driven is not None:
         dof, sense = layout.driven
         rate[dof] = sense
     return base, rate
 
 
-def _loads(layout: Layout) -> tuple[Any, Any, Any]:
-    scales = layout.scales
-    count = len(layout.load_rows)
-    place, follows = np.zeros(count, np.int64), np.zeros(count, np.int64)
-    value: list[list[tuple[Any, ...]]] = [[(0.0, 0.0, 0.0), (0.0, 0.0, 0.0)] for _ in range(count)]
-    for k, (at, when, (fx, fy, moment), turns, _) in enumerate(layout.load_rows):
+def _loads(layout: Layout) -> Any:
+    """Return the point loads, dimensionless: constant and per unit of the drive."""
+    scales, rows = layout.scales, layout.load_values
+    value: list[list[tuple[Any, ...]]] = [[(0.0, 0.0, 0.0), (0.0, 0.0, 0.0)] for _ in rows]
+    for k, (when, (fx, fy, moment)) in enumerate(rows):
         unit = scales.drive if when == 1 else 1.0
-        place[k], follows[k] = at, int(turns)
         value[k][when] = (fx / scales.force * unit, fy / scales.force * unit, moment / scales.moment * unit)
-    return place, np.array(value).reshape(count, 2, 3), follows
+    return np.array(value).reshape(len(rows), 2, 3)
 
 
-def _springs(layout: Layout) -> tuple[Any, Any, Any]:
-    """Return the springs' attachments, kinds and dimensionless values."""
-    scales = layout.scales
-    count = len(layout.spring_rows)
-    place, kind, value = np.zeros((count, 2), np.int64), np.zeros(count, np.int64), []
+def _springs(layout: Layout) -> Any:
+    """Return the springs' dimensionless values."""
+    scales, rows = layout.scales, layout.spring_values
     line, turn, length = scales.force / scales.length, scales.moment, scales.length
-    units = {0: (line, length, 1.0, 1.0), 1: (turn, 1.0, 1.0, 1.0), 2: (line, 1.0, 1.0, length)}
-    for k, (what, start, end, values) in enumerate(layout.spring_rows):
-        place[k], kind[k] = (start, end), what
-        value.append([own / unit for own, unit in zip(values, units[what], strict=True)])
-    return place, kind, np.array(value).reshape(count, 4)
+    units = {LINE: (line, length, 1.0, 1.0), TURN: (turn, 1.0, 1.0, 1.0), SLIDE: (line, 1.0, 1.0, length)}
+    kinds = layout.plan.spring_kind.tolist()
+    value = [
+        [own / unit for own, unit in zip(row, units[kind], strict=True)] for row, kind in zip(rows, kinds, strict=True)
+    ]
+    return np.array(value).reshape(len(rows), 4)

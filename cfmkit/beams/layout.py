@@ -1,27 +1,21 @@
-"""The index map: from a network and a drive to the arrays of the compiled code, and the units between the two."""
+"""The index map and the values of a network under a drive: what the compiled code's arrays are made from, and units."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cfmkit.beams.beam import Fit, fit, same_value
-from cfmkit.beams.drive import Displacement, Drive, Loading, Rotation
-from cfmkit.beams.network import (
-    LineLoad,
-    LoadOn,
-    Network,
-    PointLoad,
-    SlideSpring,
-    Spring,
-    TorsionSpring,
-    same_direction,
-)
+from cfmkit.beams.bundle import Bundle
+from cfmkit.beams.drive import Displacement, Drive, Rotation
+from cfmkit.beams.network import LineSpring, Network, PointLoad, SlideSpring, Spring, TorsionSpring
+from cfmkit.beams.plan import GROUND, NOWHERE, driven, plan_of
 from cfmkit.errors import InputError
 
-_LINE, _TURN, _SLIDE = 0, 1, 2  # as in cfmkit.beams.kernels.springs
+if TYPE_CHECKING:
+    from cfmkit.beams.network import LoadOn
 
 
 @dataclass(frozen=True)
@@ -43,18 +37,18 @@ class Scales:
         return self.rigidity / self.length
 
 
-@dataclass
-class _Places:
-    """Attachments as they are collected."""
+@dataclass(frozen=True)
+class Places:
+    """Attachments: degrees of freedom (n, 4), cos and sin of their frames (n, 2), places and arms (n, 2) [m]."""
 
-    dof: list[tuple[int, int, int, int]] = field(default_factory=list)
-    frame: list[tuple[float, float]] = field(default_factory=list)
-    origin: list[tuple[Any, Any]] = field(default_factory=list)
-    arm: list[tuple[Any, Any]] = field(default_factory=list)
+    dof: Any
+    frame: Any
+    origin: Any
+    arm: Any
 
 
 class Layout:
-    """Degrees of freedom of a network under a drive, in the order that the compiled code uses."""
+    """Degrees of freedom of a network under a drive, in the order that the compiled code uses, and its values."""
 
     def __init__(self, network: Network, drive: Drive, known: Layout | None = None) -> None:
         """Number the degrees of freedom and collect the attachments.
@@ -62,28 +56,20 @@ class Layout:
         From a `known` layout of a similar network the fits of beams that are the same are taken over, as objects.
         """
         self.network, self.drive, self.known = network, drive, known
-        self.masters = [name for name in network.nodes if network.master_of(name) == name]
-        self.first = {name: 3 * i for i, name in enumerate(self.masters)}
-        self.direction = {name: network.nodes[name].support.direction for name in self.masters}
-        self.dof_count = 3 * len(self.masters)
-        self.pin_dof: dict[tuple[str, int], int] = {}
-        for name, beam in network.beams.items():
-            for side, joint in enumerate((beam.start_joint, beam.end_joint)):
-                if joint == "pin":
-                    self.pin_dof[name, side] = self.dof_count
-                    self.dof_count += 1
-        self.ground = self.dof_count
-        self.dof_count += 3
-        self.fits = {name: self._fit(name) for name in network.beams}
+        moved = driven(network, drive)
+        self.plan = plan = plan_of(network, drive, moved)
+        self.masters, self.first, self.dof_count, self.free = plan.masters, plan.first, plan.dof_count, plan.free
+        self.pin_dof, self.beam_end = plan.pins, plan.beam_end
+        self.driven = None if moved is None else (self.first[moved[0]] + moved[1] % 3, moved[2])
+        self.direction: dict[str, Any] = {name: network.nodes[name].support.direction for name in self.masters}
+        if moved is not None and moved[1] == 3:
+            self.direction[moved[0]] = drive.direction  # type: ignore[union-attr]
+        self.places = self._places()
+        self.bundle = Bundle(network, self.places.origin + self.places.arm, self.beam_end)
+        self._fits: dict[str, Fit] = {}
         self.scales = self._scales()
-        self.driven: tuple[int, float] | None = self._driven()
-        self.places = _Places()
-        self.beam_end = np.array(
-            [[self._beam_place(name, 0), self._beam_place(name, 1)] for name in network.beams], dtype=np.int64
-        )
-        self.spring_rows = [self._spring(spring) for spring in network.springs]
-        self._collect_loads()
-        self._release()
+        self.base = self._base()
+        self.spring_values = [self._spring(spring) for spring in network.springs]
 
     def position(self, node: str) -> tuple[Any, Any]:
         """Return the reference position of a node [m]."""
@@ -96,21 +82,58 @@ class Layout:
         offset = (beam.start_offset, beam.end_offset)[side]
         return x + offset[0], y + offset[1]
 
+    @property
+    def fits(self) -> dict[str, Fit]:
+        """How each beam is fitted between its nodes."""
+        if not self._fits:
+            self._fits = {name: self._fit(name) for name in self.network.beams}
+        return self._fits
+
     def _fit(self, name: str) -> Fit:
-        ends, known, beam = self._ends(name), self.known, self.network.beams[name]
-        if known is not None and ends == known._ends(name) and same_value(beam, known.network.beams[name]):
+        known, beam = self.known, self.network.beams[name]
+        if known is not None and self._ends(name) == known._ends(name) and same_value(beam, known.network.beams[name]):
             return known.fits[name]
-        (xa, ya), (xb, yb) = ends
+        own = self.bundle.fit_of(name)
+        if own is not None:
+            return own
+        (xa, ya), (xb, yb) = self._ends(name)
         return fit(beam, (xb - xa, yb - ya))
 
     def _ends(self, name: str) -> Any:
         return self.beam_end_at(name, 0), self.beam_end_at(name, 1)
 
+    @property
+    def line_load(self) -> Any:
+        """Dead loads along the beams [N/m], (beams, 2, 2): the constant ones, those of the drive."""
+        rows: list[list[list[Any]]] = [[[0.0, 0.0], [0.0, 0.0]] for _ in self.network.beams]
+        for (when, which), beam in zip(self.plan.line_load_of, self.plan.line_beam, strict=True):
+            load: Any = self._given(when)[which]
+            row = rows[beam][when]
+            row[0], row[1] = row[0] + load.wx, row[1] + load.wy
+        return np.array(rows)
+
+    @property
+    def load_values(self) -> list[tuple[int, tuple[Any, Any, Any]]]:
+        """Point loads: 0 if constant, 1 if the drive's, and (fx, fy, moment) in SI."""
+        loads: list[tuple[int, Any]] = [(when, self._given(when)[which]) for when, which in self.plan.load_of]
+        return [(when, (load.fx, load.fy, load.moment)) for when, load in loads]
+
+    @property
+    def spring_rows(self) -> list[Any]:
+        """Springs, as many as there are."""
+        return self.spring_values
+
+    @property
+    def load_rows(self) -> list[Any]:
+        """Point loads, as many as there are."""
+        return self.load_values
+
+    def _given(self, when: int) -> tuple[LoadOn, ...]:
+        return self.network.loads if when == 0 else self.drive.loads  # type: ignore[union-attr]
+
     def _scales(self) -> Scales:
-        lengths = [float(np.real(f.length)) for f in self.fits.values()]
-        middles = [beam.section.rigidities(np.array([0.5]), 0.5)[0] for beam in self.network.beams.values()]
-        length = float(np.mean(lengths))
-        rigidity = float(np.exp(np.mean([np.log(np.real(m[0])) for m in middles])))
+        lengths, middles = self.bundle.sizes(self.fits if self.bundle.others else None)
+        length, rigidity = float(np.mean(lengths)), float(np.exp(np.mean(np.log(middles))))
         return Scales(length, rigidity, self._drive_unit(length, rigidity))
 
     def _drive_unit(self, length: float, rigidity: float) -> float:
@@ -124,123 +147,67 @@ class Layout:
         for load in self.drive.loads:
             self.network.check_load(load)
             if isinstance(load, PointLoad):
-                fx, fy, moment = np.real([load.fx, load.fy, load.moment])
-                sizes.append(max(np.hypot(fx, fy) / force, abs(moment) / (force * length)))
+                fx, fy, moment = float(np.real(load.fx)), float(np.real(load.fy)), float(np.real(load.moment))
+                sizes.append(max((fx * fx + fy * fy) ** 0.5 / force, abs(moment) / (force * length)))
             else:
                 sizes.append(float(np.hypot(np.real(load.wx), np.real(load.wy))) * length / force)
         if not max(sizes) > 0:
             raise InputError("the loads of the drive are all zero")
-        return 1.0 / float(max(sizes))
+        return float(1.0 / max(sizes))
 
-    def _driven(self) -> tuple[int, float] | None:
-        """Return the driven degree of freedom and its sense; turn the frame of a free node along the drive."""
-        drive = self.drive
-        if isinstance(drive, Loading):
-            return None
-        if drive.node not in self.first:
-            known = ", ".join(self.masters)
-            raise InputError(f"{drive.node!r} cannot be driven: nodes that are not moved by a link are {known}")
-        support = self.network.nodes[drive.node].support
-        if isinstance(drive, Rotation):
-            if support.rotation:
-                raise InputError(f"node {drive.node!r} cannot be turned: its rotation is held")
-            return self.first[drive.node] + 2, 1.0
-        if not support.along and not support.across:
-            self.direction[drive.node] = drive.direction
-            return self.first[drive.node], 1.0
-        for held, other, offset, turn in (
-            (support.along, support.across, 0, 0.0),
-            (support.across, support.along, 1, np.pi / 2),
-        ):
-            if not held and other and same_direction(drive.direction, support.direction + turn):
-                sense = float(np.sign(np.cos(drive.direction - np.real(support.direction) - turn)))
-                return self.first[drive.node] + offset, sense
-        raise InputError(f"node {drive.node!r} cannot be moved along {np.degrees(drive.direction):.6g} deg: it is held")
+    def _places(self) -> Places:
+        """Return the attachments in SI."""
+        plan, nodes = self.plan, self.network.nodes
+        where = np.array([(node.x, node.y) for node in nodes.values()])
+        origin = where[plan.place_master]
+        arm = where[plan.place_node] - origin
+        for k in np.flatnonzero(plan.place_offset != NOWHERE).tolist() if plan.offsets else ():
+            beam = self.beams[plan.place_offset[k] // 2]
+            offset = (beam.start_offset, beam.end_offset)[plan.place_offset[k] % 2]
+            arm = arm + np.eye(len(arm))[:, k : k + 1] * np.array(offset)
+        for k, number in plan.ground_of.items():
+            origin = origin + np.eye(len(arm))[:, k : k + 1] * (np.array(self._ground(number)) - origin[k])
+        return Places(plan.place_dof, self._frames(), origin, arm)
 
-    def _place(self, node: str, offset: tuple[Any, Any] = (0.0, 0.0), pose_dof: int | None = None) -> int:
-        """Add an attachment to a node (or to its master, with an arm); return its index."""
-        master = self.network.master_of(node)
-        first = self.first[master]
-        (x, y), (mx, my) = self.position(node), self.position(master)
-        c, s = np.cos(self.direction[master]), np.sin(self.direction[master])
-        own = first + 2 if pose_dof is None else pose_dof
-        self.places.dof.append((first, first + 1, first + 2, own))
-        self.places.frame.append((c, s))
-        self.places.origin.append((mx, my))
-        self.places.arm.append((x - mx + offset[0], y - my + offset[1]))
-        return len(self.places.dof) - 1
+    @property
+    def beams(self) -> list[Any]:
+        """The beams in order."""
+        return list(self.network.beams.values())
 
-    def _ground_place(self, x: float, y: float) -> int:
-        self.places.dof.append((self.ground, self.ground + 1, self.ground + 2, self.ground + 2))
-        self.places.frame.append((1.0, 0.0))
-        self.places.origin.append((x, y))
-        self.places.arm.append((0.0, 0.0))
-        return len(self.places.dof) - 1
+    def _frames(self) -> Any:
+        """Return cos and sin of the frames of the attachments' masters."""
+        names = list(self.network.nodes)
+        if not any(self.direction.values()):
+            return np.tile([1.0, 0.0], (len(self.plan.place_master), 1))
+        turns = np.array([self.direction.get(name, 0.0) for name in names])[self.plan.place_master]
+        turns = np.where(self.plan.place_master == GROUND, 0.0, turns)
+        return np.stack([np.cos(turns), np.sin(turns)], axis=1)
 
-    def _beam_place(self, name: str, side: int) -> int:
-        beam = self.network.beams[name]
-        node = (beam.start, beam.end)[side]
-        return self._place(node, (beam.start_offset, beam.end_offset)[side], self.pin_dof.get((name, side)))
-
-    def _spring(self, spring: Spring) -> tuple[int, int, int, tuple[Any, ...]]:
-        """Return kind, the two attachments and the values of a spring in SI."""
-        if isinstance(spring, TorsionSpring):
-            start = self._ground_place(0.0, 0.0) if spring.start is None else self._place(spring.start)
-            return _TURN, start, self._place(spring.end), (spring.stiffness, spring.free_angle, 0.0, 0.0)
+    def _ground(self, number: int) -> tuple[Any, Any]:
+        """Return where a spring is held [m]."""
+        spring = self.network.springs[number]
         if isinstance(spring, SlideSpring):
-            x, y = self.position(spring.node)
-            values = (spring.stiffness, np.cos(spring.direction), np.sin(spring.direction), spring.free_displacement)
-            return _SLIDE, self._ground_place(x, y), self._place(spring.node), values
-        far = spring.ground if spring.end is None else self.position(spring.end)
-        near = self.position(spring.start)
-        free = spring.free_length
-        if free is None:
-            free = ((far[0] - near[0]) ** 2 + (far[1] - near[1]) ** 2) ** 0.5
-        other = self._ground_place(*far) if spring.end is None else self._place(spring.end)
-        return _LINE, self._place(spring.start), other, (spring.stiffness, free, 0.0, 0.0)
+            return self.position(spring.node)
+        return spring.ground if isinstance(spring, LineSpring) else (0.0, 0.0)
 
-    def _collect_loads(self) -> None:
-        """Sort the loads: constant ones and those of the drive, at points and along beams (SI)."""
-        names = list(self.network.beams)
-        line_load: list[list[list[Any]]] = [[[0.0, 0.0], [0.0, 0.0]] for _ in names]
-        self.load_rows: list[tuple[int, int, tuple[Any, Any, Any], bool, str]] = []
-        driven: tuple[LoadOn, ...] = self.drive.loads if isinstance(self.drive, Loading) else ()
-        for when, loads in enumerate((self.network.loads, driven)):
-            for load in loads:
-                if isinstance(load, LineLoad):
-                    row = line_load[names.index(load.beam)][when]
-                    row[0], row[1] = row[0] + load.wx, row[1] + load.wy
-                else:
-                    values = (load.fx, load.fy, load.moment)
-                    self.load_rows.append((self._place(load.node), when, values, load.follows, load.node))
-        self.line_load = np.array(line_load)
-
-    def _release(self) -> None:
-        """Decide which degrees of freedom are free; a rotation that nothing resists or uses is held at zero."""
-        free = np.zeros(self.dof_count, dtype=bool)
+    def _base(self) -> Any:
+        """Return the values at which degrees of freedom are held, [m] and [rad]."""
         base: list[Any] = [0.0] * self.dof_count
         for name in self.masters:
-            support, first = self.network.nodes[name].support, self.first[name]
-            free[first : first + 3] = (not support.along, not support.across, not support.rotation)
-            base[first : first + 3] = support.displacement
-        self.base = np.array(base)
-        used = {place[3] for place in self.places.dof}
-        used |= {d[2] for d, a in zip(self.places.dof, self.places.arm, strict=True) if np.any(np.real(a))}
-        for place, _, values, follows, _ in self.load_rows:
-            dofs = self.places.dof[place]
-            if not follows and values[2] == 0 and self._only_load(dofs[3]):
-                used.discard(dofs[3])
-        for name in self.masters:
-            rotation = self.first[name] + 2
-            free[rotation] &= rotation in used
-        for pin in self.pin_dof.values():
-            free[pin] = True
-        if self.driven is not None:
-            free[self.driven[0]] = False
-        self.free = free
+            first = self.first[name]
+            base[first : first + 3] = self.network.nodes[name].support.displacement
+        return np.array(base)
 
-    def _only_load(self, rotation: int) -> bool:
-        """Tell whether no beam end or spring turns with this rotation."""
-        places = set(self.beam_end.ravel().tolist()) | {p for row in self.spring_rows for p in row[1:3]}
-        dofs, arms = self.places.dof, self.places.arm
-        return not any(dofs[p][3] == rotation or (dofs[p][2] == rotation and np.any(np.real(arms[p]))) for p in places)
+    def _spring(self, spring: Spring) -> tuple[Any, Any, Any, Any]:
+        """Return the values of a spring in SI."""
+        if isinstance(spring, TorsionSpring):
+            return spring.stiffness, spring.free_angle, 0.0, 0.0
+        if isinstance(spring, SlideSpring):
+            c, s = np.cos(spring.direction), np.sin(spring.direction)
+            return spring.stiffness, c, s, spring.free_displacement
+        free = spring.free_length
+        if free is None:
+            far = spring.ground if spring.end is None else self.position(spring.end)
+            near = self.position(spring.start)
+            free = ((far[0] - near[0]) ** 2 + (far[1] - near[1]) ** 2) ** 0.5
+        return spring.stiffness, free, 0.0, 0.0

@@ -71,10 +71,15 @@ class Node:
 
 @dataclass(frozen=True)
 class Link:
-    """A rigid link: `node` moves and turns with `master` as one body."""
+    """A rigid link: `node` moves and turns with `master` as one body; a pin where it does not turn with it.
+
+    A pin lets beams, links and springs at `node` turn against those at `master` without a moment; a torsion spring
+    between the two makes it a sprung hinge.
+    """
 
     master: str
     node: str
+    turns: bool = True
 
 
 @dataclass(frozen=True)
@@ -188,6 +193,17 @@ class Network:
         for link in self.links:
             if link.node == node:
                 return self.master_of(link.master)
+        return node
+
+    def moved(self, node: str) -> bool:
+        """Tell whether a link moves a node."""
+        return any(link.node == node for link in self.links)
+
+    def body_of(self, node: str) -> str:
+        """Return the node whose rotation is that of `node`: up the links as far as the first pin."""
+        for link in self.links:
+            if link.node == node and link.turns:
+                return self.body_of(link.master)
         return node
 
     def _known(self, node: str, what: str) -> None:

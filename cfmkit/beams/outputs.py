@@ -46,7 +46,8 @@ def motion(g: Gradient, node: str) -> FloatArray:
     """Return the derivatives of a node's displacement and rotation, (p, 3, k) [m, m, rad]."""
     layout = g.path.layout
     master, length = layout.network.master_of(node), layout.scales.length
-    along, across, (turn, dturn) = (_values(g, layout.first[master] + k) for k in range(3))
+    along, across = (_values(g, layout.first[master] + k) for k in range(2))
+    turn, dturn = _values(g, layout.plan.swing[node])
     dx, dy = _turned(*_frame(g, master), along, across)
     arms = [np.subtract(one.position(node), one.position(master)) for one in (layout, *g.tilts.tilted)]
     ax, ay = np.real(arms[0])
@@ -54,7 +55,7 @@ def motion(g: Gradient, node: str) -> FloatArray:
     c, s = np.cos(turn)[:, None], np.sin(turn)[:, None]
     dx = dx * length + (c - 1) * px - s * py - (s * ax + c * ay) * dturn
     dy = dy * length + s * px + (c - 1) * py + (c * ax - s * ay) * dturn
-    return np.stack([dx, dy, dturn], axis=1)
+    return np.stack([dx, dy, _values(g, layout.plan.turn[node])[1]], axis=1)
 
 
 def reaction(g: Gradient, node: str) -> FloatArray:

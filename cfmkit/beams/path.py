@@ -148,12 +148,13 @@ class Path:
         first = self.layout.first[master]
         frame = self.layout.direction[master]
         c, s = np.cos(frame), np.sin(frame)
-        a, b, turn = (values[:, first + k] for k in range(3))
+        a, b = values[:, first], values[:, first + 1]
+        own, turn = values[:, self.layout.plan.turn[node]], values[:, self.layout.plan.swing[node]]
         (x, y), (mx, my) = self.layout.position(node), self.layout.position(master)
         ax, ay = x - mx, y - my
         dx = (c * a - s * b) * scales.length + np.cos(turn) * ax - np.sin(turn) * ay - ax
         dy = (s * a + c * b) * scales.length + np.sin(turn) * ax + np.cos(turn) * ay - ay
-        return read_only(np.stack([dx, dy, turn], axis=-1))
+        return read_only(np.stack([dx, dy, own], axis=-1))
 
     def reaction(self, node: str) -> FloatArray:
         """Return force and moment that support and drive exert on a node, (n, 3) [N, N, N m]."""

@@ -11,14 +11,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.beams.discretise import assemble_model, beam_table
-from cfmkit.beams.kernels.model import TABLE_COLUMNS, Tilt
-from cfmkit.beams.kernels.rk8 import STAGES
+from cfmkit.beams.discretise import assemble_model, table
+from cfmkit.beams.kernels.model import Tilt
 from cfmkit.beams.layout import Layout
 from cfmkit.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable
 
     from cfmkit.beams.discretise import Grid
     from cfmkit.beams.kernels.model import Model
@@ -72,11 +71,6 @@ class Tilts:
         """Return the number of variables."""
         return len(self.tilted)
 
-    def depends(self, name: str) -> list[int]:
-        """Return the variables that a beam's shape, section or length depends on."""
-        own = self.layout.fits[name]
-        return [k for k, layout in enumerate(self.tilted) if layout.fits[name] is not own]
-
     def arrays(self, model: Model, cut: Grid, every: bool = False) -> Tilt:
         """Return the derivatives of a model's arrays; with `every` each beam is paired with every variable.
 
@@ -86,12 +80,14 @@ class Tilts:
             If a variable changes how the network is made up, not only its values.
         """
         tilted = [self._model(k, layout, model, cut) for k, layout in enumerate(self.tilted)]
+        tables = np.stack([slope(table(layout, cut, model.table)) for layout in self.tilted], axis=-1)
         variable, first, begin, blocks = [], [0], [], []
         size = 0
-        for number, name in enumerate(self.layout.network.beams):
-            steps = np.flatnonzero(cut.beam_of_step == number)
-            loaded = [k for k, one in enumerate(tilted) if np.any(np.imag(one.line_load[number]))]
-            block, own = self._beam(name, cut, steps, range(len(self)) if every else loaded)
+        for number in range(len(self.layout.network.beams)):
+            changes = tables[cut.beam_of_step == number]
+            touched = changes.any(axis=(0, 1, 2)) | [bool(np.any(np.imag(one.line_load[number]))) for one in tilted]
+            own = list(range(len(self))) if every else np.flatnonzero(touched).tolist()
+            block = changes[..., own]
             variable += own
             first.append(len(variable))
             begin.append(size)
@@ -118,20 +114,6 @@ class Tilts:
             if now.shape != was.shape or np.any(now != was):
                 raise InputError(f"design variable {k} changes how the network is made up: no derivative by it")
         return tilted
-
-    def _beam(self, name: str, cut: Grid, steps: Any, others: Iterable[int]) -> tuple[FloatArray, list[int]]:
-        """Return the derivatives of one beam's table, (steps, stages, 5, variables), and the variables.
-
-        `others` are variables to be listed whether the table depends on them or not.
-        """
-        slopes = {}
-        for k in self.depends(name):
-            change = slope(beam_table(self.tilted[k], name, cut, steps))
-            if change.any():
-                slopes[k] = change
-        own = sorted({*slopes, *others})
-        none = np.zeros((len(steps), STAGES, TABLE_COLUMNS))
-        return np.stack([slopes.get(k, none) for k in own], axis=-1) if own else none[..., None][..., :0], own
 
 
 def _stack(tilted: list[Model], name: str, model: Model) -> FloatArray:

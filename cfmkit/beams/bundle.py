@@ -1,0 +1,141 @@
+"""All beams of a network at once: shapes fitted between their ends, tables of the compiled code.
+
+Most beams have a polynomial angle and one thickness: those are computed together, as arrays over the beams. The
+others are fitted and tabulated one by one (`cfmkit.beams.beam`, `cfmkit.beams.discretise`).
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.beams.beam import GAUSS, Fit
+from cfmkit.beams.section import Taper
+from cfmkit.beams.shapes import Polynomial, direction
+from cfmkit.errors import InputError
+
+if TYPE_CHECKING:
+    from cfmkit.beams.beam import Beam
+    from cfmkit.beams.network import Network
+    from cfmkit.beams.section import Section
+
+
+class Bundle:
+    """The beams of a network between given ends.
+
+    Attributes
+    ----------
+    plain : list of int
+        Beams with a polynomial angle and one thickness; `others` has the rest.
+    coefficients : (plain, m) array
+        Of the angle, rotation of the fit included in the first.
+    length : (plain,) array
+        Arc length as used [m].
+    """
+
+    def __init__(self, network: Network, ends: Any, beam_end: Any) -> None:
+        """Fit the plain beams; `ends` (places, 2) [m] has the attachments, `beam_end` those of each beam."""
+        self.names, self.beams = list(network.beams), list(network.beams.values())
+        plain = [k for k, beam in enumerate(self.beams) if _is_plain(beam)]
+        self.plain = plain
+        self.others = [] if len(plain) == len(self.beams) else [k for k in range(len(self.beams)) if k not in plain]
+        if plain:
+            self._fit_plain(ends, beam_end if not self.others else beam_end[plain])
+
+    def _fit_plain(self, ends: Any, beam_end: Any) -> None:
+        beams = [self.beams[k] for k in self.plain]
+        shapes: list[Any] = [beam.shape for beam in beams]
+        given = [shape.coefficients or (0.0,) for shape in shapes]
+        most = max(map(len, given))
+        c = np.array([(*own, *(0.0,) * (most - len(own))) for own in given]) + 0.0
+        reach = ends[beam_end[:, 1]] - ends[beam_end[:, 0]]
+        dx, dy = reach[:, 0], reach[:, 1]
+        distance = (dx * dx + dy * dy) ** 0.5
+        angle = c @ _powers(most)
+        weights = GAUSS[1]
+        cx, cy = np.cos(angle) @ weights, np.sin(angle) @ weights
+        own = (cx * cx + cy * cy) ** 0.5
+        self._check(distance, own)
+        nominal = [shape.length for shape in shapes]
+        first = distance
+        if any(nominal):
+            first = np.array([d if one is None else one for d, one in zip(distance, nominal, strict=True)])
+        self.rotation = direction(dx * cx + dy * cy, dy * cx - dx * cy)
+        self.length, self.scale = distance / own, distance / (own * first)
+        self.gap = np.hypot(np.real(dx - first * cx), np.real(dy - first * cy))
+        raw = np.array([beam.closure == "raw" for beam in beams])
+        if raw.any():
+            self.rotation, self.scale = np.where(raw, 0.0, self.rotation), np.where(raw, 1.0, self.scale)
+            self.length = np.where(raw, first, self.length)
+        self.coefficients = c.astype(np.result_type(c, self.rotation))
+        self.coefficients[:, 0] += self.rotation
+        self._set_rigidities([beam.section for beam in beams])
+
+    def _set_rigidities(self, sections: list[Section]) -> None:
+        """Set bending rigidities and the compliances of stretching and shearing, as `Section.rigidities` has them."""
+        values = [
+            (s.youngs_modulus, s.width, s.thickness, s.axial, s.shear, s.poisson_ratio, s.shear_factor)
+            for s in sections
+        ]
+        young, width, thickness, axial, shear, poisson, factor = np.array(values).T
+        area = width * thickness
+        self.bending = young * area * thickness * thickness / 12
+        self.stretch = axial / (young * area)
+        self.slip = shear * 2 * (1 + poisson) / (factor * young * area)
+
+    def _check(self, distance: Any, own: Any) -> None:
+        """Refuse beams without length, and shapes that return to their start."""
+        if (np.real(distance) > 0).all() and (np.real(own) > 1e-9).all():
+            return
+        for k, far, reach in zip(self.plain, np.real(distance), np.real(own), strict=True):
+            beam = self.beams[k]
+            if not far > 0:
+                raise InputError(f"the ends of the beam {beam.start}-{beam.end} coincide")
+            if not reach > 1e-9:
+                raise InputError(
+                    f"the shape of the beam {beam.start}-{beam.end} returns to its start: it cannot be fitted"
+                )
+
+    def fit_of(self, name: str) -> Fit | None:
+        """Return the fit of a plain beam, None of another."""
+        number = self.names.index(name)
+        if number not in self.plain:
+            return None
+        k = self.plain.index(number)
+        shape: Any = self.beams[number].shape
+        chord = self.length[k] / self.scale[k]
+        return Fit(self.rotation[k], self.scale[k], float(self.gap[k]), self.length[k], shape.course(chord))
+
+    def sizes(self, fits: dict[str, Fit] | None) -> tuple[Any, Any]:
+        """Return the lengths of all beams and the bending rigidities at their middles, real."""
+        none = np.empty(0)
+        lengths, middles = (np.real(self.length), np.real(self.bending)) if self.plain else (none, none)
+        if fits is None:
+            return lengths, middles
+        others = [self.beams[k] for k in self.others]
+        far = [float(np.real(fits[self.names[k]].length)) for k in self.others]
+        stiff = [float(np.real(beam.section.rigidities(np.array([0.5]), 0.5)[0][0])) for beam in others]
+        return np.append(lengths, far), np.append(middles, stiff)
+
+    def table(self, places: Any) -> Any:
+        """Return angle, speed and compliances (SI) of the plain beams at places (n,) of the arc, (plain, n, 5)."""
+        kind = np.result_type(self.coefficients, self.bending)
+        out = np.empty((len(self.plain), len(places), 5), dtype=kind)
+        out[:, :, 0] = self.coefficients @ np.vander(places, self.coefficients.shape[1], increasing=True).T
+        g = self.length
+        out[:, :, 1:] = np.stack([g, g / self.bending, g * self.stretch, g * self.slip], axis=1)[:, None]
+        return out
+
+
+def _is_plain(beam: Beam) -> bool:
+    return isinstance(beam.shape, Polynomial) and not isinstance(beam.section.thickness, Taper)
+
+
+@lru_cache(maxsize=32)
+def _powers(count: int) -> Any:
+    """Return the powers (count, n) of the Gauss nodes of the whole beam."""
+    powers = np.vander(GAUSS[0], count, increasing=True).T.copy()
+    powers.setflags(write=False)
+    return powers
