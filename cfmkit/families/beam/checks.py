@@ -122,8 +122,11 @@ def _accuracy(solution: Solution) -> Iterator[Finding]:
 
 
 def _imperfection(solution: Solution) -> Iterator[Finding]:
-    if solution.path.imperfection:
-        yield finding("imperfection", f"the beams were bent: {solution.path.imperfection}")
+    told = solution.path.imperfection
+    if told.startswith("none: "):
+        yield finding("imperfection", f"the beams were not bent: {told.removeprefix('none: ')}")
+    elif told:
+        yield finding("imperfection", f"the beams were bent by {told}")
 
 
 def _stress(solution: Solution) -> Iterator[Finding]:

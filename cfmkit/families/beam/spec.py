@@ -178,13 +178,13 @@ def _extent_faults(spec: BeamSpec) -> Iterator[tuple[tuple[str, ...], str]]:
     """Yield what is wrong with how far the drive is to go."""
     kind, analysis = spec.mechanism.drive.kind, spec.analysis
     wanted = _EXTENT[kind]
-    for name in ("travel", "force", "moment"):
-        if name != wanted and getattr(analysis, name) is not None:
-            yield (name,), f"does not go with a drive of kind {kind!r}: give {wanted!r}"
+    others = [name for name in _EXTENT.values() if name != wanted and getattr(analysis, name) is not None]
+    for name in dict.fromkeys(others):
+        yield (name,), f"does not go with a drive of kind {kind!r}: give {wanted!r}"
     value = getattr(analysis, wanted)
-    if value is None:
+    if value is None and not others:
         yield (), f"the key {wanted!r} is missing: how far a drive of kind {kind!r} goes"
-    elif value == 0:
+    if value == 0:
         yield (wanted,), "must not be 0: the drive has to do something"
     if analysis.surface is not None and kind != "displacement":
         yield ("surface",), "a surface needs a drive of kind 'displacement'"

@@ -37,10 +37,14 @@ def faults(mechanism: Mechanism) -> Iterator[Fault]:
     yield from references
     if references:
         return
-    for name, beam in mechanism.beams.items():
-        yield from ((("beams", name, *place), text) for place, text in _beam_faults(mechanism, beam))
+    beams = [
+        (("beams", name, *place), text)
+        for name, beam in mechanism.beams.items()
+        for place, text in _beam_faults(mechanism, beam)
+    ]
+    yield from beams
     yield from _link_faults(mechanism)
-    yield from _loose_nodes(mechanism)
+    yield from () if beams else _loose_nodes(mechanism)
     yield from _drive_faults(mechanism)
     yield from _copy_faults(mechanism)
     if mechanism.shear and not mechanism.axial:

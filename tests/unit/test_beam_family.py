@@ -1,0 +1,306 @@
+"""The beam family: closures, copies, surfaces, rescaling, findings; limits, symmetries and other networks than Lan's."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from beam_support import MM, at, cantilever, config, solved, value
+
+import cfmkit
+from cfmkit.errors import DataError
+from cfmkit.results import Status
+
+GUIDED = ("tip: {at: [400 mm, 0 mm]}", "tip: {at: [400 mm, 0 mm], support: parallel}")
+
+
+def warned(result):
+    return {item.name: item.message for item in result.warnings}
+
+
+# --- what the general mode can describe -------------------------------------------------------------------
+
+
+def test_a_small_displacement_needs_three_ei_over_l_cubed():
+    result = cfmkit.analyze(cantilever(("travel: 100 mm", "travel: 0.01 mm")))
+    assert result.curve.force[-1] == pytest.approx(3 * 0.02 / 0.4**3 * 1e-5, rel=1e-6)
+
+
+def test_a_parallel_guide_is_four_times_as_stiff():
+    result = cfmkit.analyze(cantilever(("travel: 100 mm", "travel: 0.01 mm"), GUIDED))
+    assert result.curve.force[-1] == pytest.approx(12 * 0.02 / 0.4**3 * 1e-5, rel=1e-6)
+
+
+def test_springs_add_their_stiffness():
+    spring = ("end: tip}", "end: tip}\n  springs: {s: {kind: slide, node: tip, direction: 90 deg, stiffness: 2 N/m}}")
+    plain, sprung = (cfmkit.analyze(cantilever(("travel: 100 mm", "travel: 10 mm"), *more)) for more in ((), (spring,)))
+    np.testing.assert_allclose(sprung.curve.force - plain.curve.force, 2 * plain.curve.motion, atol=1e-9)
+
+
+def test_a_constant_load_shifts_the_force():
+    """A dead force along the drive is one that the drive need not exert."""
+    load = ("end: tip}", "end: tip}\n  loads: [{kind: point, node: tip, fy: -0.05 N}]")
+    plain, loaded = (cfmkit.analyze(cantilever(*more)) for more in ((), (load,)))
+    np.testing.assert_allclose(plain.curve.force - loaded.curve.force, 0.05, atol=1e-8)
+
+
+def test_a_link_moves_its_node_with_the_master():
+    """A rigid arm of 50 mm beyond the tip: its end goes down by more than the tip."""
+    arm = ("tip: {at: [400 mm, 0 mm]}", "tip: {at: [400 mm, 0 mm]}\n    arm: {at: [450 mm, 0 mm]}")
+    link = ("end: tip}", "end: tip}\n  links: [{master: tip, node: arm}]")
+    path = cfmkit.analyze(cantilever(arm, link)).state.path
+    turn = path.motion("tip")[-1, 2]
+    assert path.motion("arm")[-1, 1] == pytest.approx(path.motion("tip")[-1, 1] + 0.05 * np.sin(turn), rel=1e-9)
+
+
+def test_a_beam_split_by_a_node_is_the_same_beam():
+    halves = ("beam: {start: root, end: tip}", "one: {start: root, end: mid}\n    two: {start: mid, end: tip}")
+    node = ("tip: {at: [400 mm, 0 mm]}", "tip: {at: [400 mm, 0 mm]}\n    mid: {at: [130 mm, 0 mm]}")
+    whole, split = cfmkit.analyze(cantilever()), cfmkit.analyze(cantilever(halves, node))
+    np.testing.assert_allclose(split.curve.force, whole.curve.force, rtol=1e-6, atol=1e-9)
+
+
+def test_pins_hang_a_beam_between_two_hinges():
+    """A strut between two pins carries no moment at its ends."""
+    pins = ("end: tip}", "end: tip, end_joint: pin, shape: {kind: arc, sweep: 90 deg}}")
+    held = ("tip: {at: [400 mm, 0 mm]}", "tip: {at: [400 mm, 0 mm], support: roller, direction: 0 deg}")
+    drive = ("direction: -90 deg", "direction: 180 deg")
+    result = cfmkit.analyze(
+        cantilever(
+            pins,
+            held,
+            drive,
+            ("root: {at: [0 mm, 0 mm], support: clamped}", "root: {at: [0 mm, 0 mm], support: pinned}"),
+        )
+    )
+    assert np.abs(result.curve.extra["beam_moment"].values).max() < 1e-9
+    assert result.curve.force[-1] > 0
+
+
+@pytest.mark.parametrize(
+    "shape",
+    [
+        "{kind: arc, sweep: 60 deg}",
+        "{kind: cosine, rise: 30 mm}",
+        "{kind: cosine, rise: 30 mm, half: true}",
+        "{kind: polyline, points: [[0 mm, 0 mm], [1 mm, 0.4 mm], [2 mm, 0 mm]]}",
+        "{kind: spline, points: [[0 mm, 0 mm], [1 mm, 0.4 mm], [2 mm, 0 mm]]}",
+        "{kind: polynomial, coefficients: [0.5 rad, -1 rad]}",
+    ],
+)
+def test_shapes_start_and_end_at_their_nodes(shape):
+    result = cfmkit.analyze(cantilever(("end: tip}", f"end: tip, shape: {shape}}}"), ("points: 21", "points: 5")))
+    assert result.status is Status.COMPLETE
+    line = result.state.path.shape("beam", 0)
+    np.testing.assert_allclose(line[[0, -1]], [[0, 0], [0.4, 0]], atol=1e-8)
+    drawn = cfmkit.drawing(result.spec)
+    table = next(item for item in drawn.tables if item.name == "beam-beam")
+    ends = [[table.columns[axis][0][k] for axis in ("x", "y")] for k in (0, -1)]
+    np.testing.assert_allclose(ends, [[0, 0], [0.4, 0]], atol=1e-9)
+
+
+def test_a_prescribed_displacement_of_a_support_comes_first():
+    """The clamp is turned by 2 deg before anything else: the tip stands 2 deg higher, and 400 mm sin(2 deg)."""
+    moved = ("support: clamped}", "support: clamped, moved: {rotation: 2 deg}}")
+    path = cfmkit.analyze(
+        cantilever(moved, ("kind: displacement", "kind: force"), ("travel: 100 mm", "force: 1e-9 N"))
+    ).state.path
+    assert path.motion("tip")[0, 1] == pytest.approx(0.4 * np.sin(np.radians(2)), rel=1e-9)
+
+
+def test_rotating_and_mirroring_the_whole_mechanism_changes_nothing():
+    turned = cantilever(("[400 mm, 0 mm]", "[0 mm, 400 mm]"), ("direction: -90 deg", "direction: 0 deg"))
+    np.testing.assert_allclose(
+        cfmkit.analyze(turned).curve.force, cfmkit.analyze(cantilever()).curve.force, rtol=1e-6, atol=1e-9
+    )
+
+
+# --- closures and copies ----------------------------------------------------------------------------------
+
+
+def test_chain_closure_keeps_shapes_and_lengths_of_the_beams_that_carry_nodes():
+    fits = solved("beam_lan2010", "mechanism.closure=chain").state.path.fits
+    for name in ("b1", "b3", "b4"):
+        assert abs(fits[name].rotation) < 1e-12
+        assert fits[name].scale == pytest.approx(1, abs=1e-12)
+    assert abs(fits["b2"].rotation) > 1e-5
+
+
+def test_legs_and_mirrored_halves_multiply_the_force_and_nothing_else():
+    one, many = solved("beam_lan2010"), solved("beam_lan2010", "mechanism.copies.legs=3")
+    np.testing.assert_allclose(many.curve.force, 3 * one.curve.force, rtol=1e-12)
+    np.testing.assert_array_equal(many.curve.extra["max_stress"].values, one.curve.extra["max_stress"].values)
+
+
+def test_a_force_drive_shares_its_load_among_the_copies():
+    """The same curve by force as by displacement, where that rises."""
+    text = config("beam_lan2010")
+    by_force = cfmkit.dumps(text).replace("kind: displacement", "kind: force").replace("travel: 18 mm", "force: 9 N")
+    result = cfmkit.analyze(cfmkit.loads(by_force.split("requirements:")[0].replace("  window: [7 mm, 13.6 mm]\n", "")))
+    one = solved("beam_lan2010").curve
+    low = result.curve.motion < 6 * MM
+    np.testing.assert_allclose(
+        np.interp(result.curve.motion[low], one.motion, one.force), result.curve.force[low], atol=2e-3
+    )
+
+
+def test_the_mirror_image_of_a_stack_that_bifurcates_has_its_layers_swapped():
+    one, other = solved("beam_two_layers"), solved("beam_two_layers", "analysis.other_side=true")
+    np.testing.assert_allclose(one.curve.force, other.curve.force, atol=1e-5)
+    first, second = (item.state.path.motion("n5")[item.state.keep, 1][-1] for item in (one, other))
+    assert abs(first - second) > 1 * MM
+
+
+# --- what is reported -------------------------------------------------------------------------------------
+
+
+def test_a_path_that_ends_early_is_partial_and_says_where():
+    result = cfmkit.analyze(
+        cantilever(("travel: 100 mm", "travel: 401 mm"), ("direction: -90 deg", "direction: 0 deg"))
+    )
+    assert result.status in (Status.PARTIAL, Status.NO_EQUILIBRIUM)
+    assert warned(result)["ends_early"]
+
+
+def test_shallow_beams_without_stretching_have_no_path_and_no_number_is_invented():
+    result = solved("beam_williams_toggle", "analysis.fidelity=inextensible")
+    assert result.status is not Status.COMPLETE
+    assert all(np.isfinite(curve.effort).all() for curve in result.curves)
+
+
+def test_stress_above_the_allowable_one_is_told_with_its_place():
+    told = warned(solved("beam_lan2010"))["stress_exceeded"]
+    assert told == "the largest stress in the window is 48.22 MPa, at 0.260 of beam b4; allowable are 48.1 MPa"
+
+
+def test_the_axial_part_is_left_out_where_beams_do_not_stretch_and_reported_beside():
+    plain, total = solved("beam_lan2010"), solved("beam_lan2010", "analysis.stress=total")
+    assert value(total, "stress_max") > value(plain, "stress_max")
+    assert value(plain, "stress_total_max") == pytest.approx(value(total, "stress_max"), rel=2e-2)
+
+
+def test_gaps_are_between_surfaces_and_shrink_on_the_way():
+    result = solved("beam_lan2010")
+    thin = solved("beam_lan2010_thin")
+    assert value(thin, "gap_min_moving") - value(result, "gap_min_moving") == pytest.approx(0.15 * MM, abs=1e-9)
+    assert value(result, "gap_min_moving") < value(result, "gap_min")
+
+
+def test_what_cannot_be_cut_is_told():
+    changes = ("mechanism.part.min_gap=5 mm", "mechanism.part.min_feature=1.2 mm")
+    told = warned(solved("beam_lan2010", *changes))
+    assert {"gap_small", "feature_small"} <= set(told)
+    assert not {"gap_small", "feature_small"} & set(warned(solved("beam_lan2010")))
+
+
+def test_an_imperfection_is_named_and_opens_the_bifurcation():
+    column = cantilever(
+        ("direction: -90 deg", "direction: 180 deg"),
+        ("travel: 100 mm", "travel: 4 mm"),
+        ("thickness: 1 mm", "thickness: 10 mm"),
+        ("tip: {at: [400 mm, 0 mm]}", "tip: {at: [400 mm, 0 mm], support: guided, direction: 0 deg}"),
+        ("width: 100 mm", "width: 100 mm\n  axial: true"),
+        ("points: 21", "points: 21\n  imperfection: 0.1 mm"),
+    )
+    bent, perfect = cfmkit.analyze(column), cfmkit.analyze(column.replace({"analysis.imperfection": 0}))
+    assert "the beams were bent by 0.0001 m of the buckling mode" in warned(bent)["imperfection"]
+    assert value(bent, "bifurcation_displacement") is None
+    assert value(perfect, "bifurcation_displacement") > 0
+
+
+# --- a surface --------------------------------------------------------------------------------------------
+
+
+def test_the_force_along_a_surface_is_that_at_preload_plus_height():
+    result = solved("beam_end_effector")
+    nominal, along = result.curves
+    height = along.extra["surface_height"].values
+    np.testing.assert_allclose(height, 1.75 * MM * (1 - np.cos(np.pi * along.motion / (12.3 * MM))), atol=1e-12)
+    force = np.interp(1.76 * MM + height, nominal.motion, nominal.force)
+    np.testing.assert_allclose(along.effort, force, atol=2e-3)
+
+
+def test_normal_and_lateral_force_balance_the_axial_one():
+    along = solved("beam_end_effector", "analysis.surface.friction=0.3").curves[1]
+    height, way = along.extra["surface_height"].values, along.motion
+    angle = np.arctan(np.gradient(height, way))
+    normal, lateral = along.extra["contact_force"].values, along.extra["lateral_force"].values
+    np.testing.assert_allclose(normal * (np.cos(angle) - 0.3 * np.sin(angle)), along.effort, rtol=1e-12)
+    np.testing.assert_allclose(normal * (np.sin(angle) + 0.3 * np.cos(angle)), lateral, rtol=1e-12)
+
+
+def test_a_surface_that_rises_too_far_is_partial():
+    result = solved("beam_end_effector", "analysis.surface.preload=3 mm")
+    assert result.status is Status.PARTIAL
+    assert "the surface asks for a displacement of" in result.message
+    assert value(result, "surface_reach") < 12.3 * MM
+
+
+def test_a_steep_surface_jams():
+    told = warned(
+        solved("beam_end_effector", "analysis.surface.friction=1.99", "analysis.surface.profile.length=12.3 mm")
+    )
+    assert "tip_jams" not in told
+    changes = (
+        "analysis.surface.friction=1.99",
+        "analysis.surface.profile.length=3 mm",
+        "analysis.surface.profile.height=1.75*(1 - cos(pi*x/3))",
+    )
+    assert "tip_jams" in warned(solved("beam_end_effector", *changes))
+
+
+def test_a_surface_from_a_file(tmp_path):
+    heights = np.linspace(0, 12.3, 50)
+    rows = [f"{x:.9f},{1.75 * (1 - np.cos(np.pi * x / 12.3)):.9f}" for x in heights]
+    (tmp_path / "heights.csv").write_text("x [mm],y [mm]\n" + "\n".join(rows) + "\n")
+    text = cfmkit.dumps(config("beam_end_effector"))
+    start = text.index("    profile:")
+    end = text.index("    preload:")
+    (tmp_path / "spec.yaml").write_text(text[:start] + "    profile: {kind: file, file: heights.csv}\n" + text[end:])
+    found = cfmkit.analyze(cfmkit.load(tmp_path / "spec.yaml"))
+    for name in ("tip_force_min", "tip_force_max"):
+        assert value(found, name) == pytest.approx(value(solved("beam_end_effector"), name), rel=1e-4)
+    (tmp_path / "heights.csv").write_text("x [mm],y [mm]\n0,0\n2,1\n1,2\n")
+    with pytest.raises(DataError, match="line 4: x must increase"):
+        cfmkit.analyze(cfmkit.load(tmp_path / "spec.yaml"))
+
+
+# --- rescaling --------------------------------------------------------------------------------------------
+
+
+def test_thinner_beams_for_the_same_force_reach_further_at_the_same_stress():
+    """Section 2.3: the travel goes to where the stress reaches the allowable one, c follows."""
+    changes = (
+        "design.rescale.thickness=0.85 mm",
+        "design.rescale.width=16.28 mm",
+        "design.rescale.to_allowable_stress=true",
+    )
+    design = cfmkit.design(config("beam_lan2010", *changes))
+    assert design.spec.analysis.travel == pytest.approx(16.82 * MM, abs=1e-9)
+    result = cfmkit.analyze(design.spec)
+    assert value(result, "safety_factor") == pytest.approx(1, abs=1e-4)
+    assert value(result, "safety_factor") >= 1
+
+
+def test_the_force_wanted_is_reached_with_stretching_too_and_the_error_of_equation_6_is_told():
+    changes = ("mechanism.axial=true", "design.rescale.force=12 N", "design.rescale.free=thickness")
+    design = cfmkit.design(config("beam_lan2010", *changes))
+    assert value(cfmkit.analyze(design.spec), "nominal_force") == pytest.approx(12, rel=1e-8)
+    assert "off by" in {item.name: item.message for item in design.warnings}["rescale_approximate"]
+
+
+def test_a_size_scales_every_length_in_the_plane():
+    spec = config("beam_lan2010", "design.rescale.size=64 mm")
+    scaled = cfmkit.design(spec).spec
+    for node in spec.mechanism.nodes:
+        np.testing.assert_allclose(scaled.mechanism.nodes[node].at, 2 * np.array(spec.mechanism.nodes[node].at))
+    assert scaled.mechanism.beams["b1"].shape.length == pytest.approx(2 * spec.mechanism.beams["b1"].shape.length)
+    assert scaled.mechanism.thickness == spec.mechanism.thickness
+    assert scaled.requirements[0].over == pytest.approx((14 * MM, 27.2 * MM))
+    big, small = cfmkit.analyze(scaled), solved("beam_lan2010")
+    np.testing.assert_allclose(4 * at(big, 2 * small.curve.motion), small.curve.force, rtol=1e-6, atol=1e-6)
+
+
+def test_a_design_without_a_task_says_what_to_add():
+    design = cfmkit.design(config("beam_lan2010"))
+    assert design.status is Status.INVALID
+    assert "rescale" in design.message

@@ -1,0 +1,95 @@
+"""The part that is cut: strips of true thickness, merged, rounded, mirrored."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from beam_support import MM, cantilever, config
+
+import cfmkit
+from cfmkit.export import files
+from cfmkit.export.union import merged
+from cfmkit.families.beam.strips import gaps, mirrored
+
+SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]) * 10 * MM
+
+
+def area(contours):
+    total = 0.0
+    for contour in contours:
+        z = np.array([edge.ends[0] for edge in contour.edges])
+        size = 0.5 * abs((np.conj(z) * np.roll(z, -1)).imag.sum())
+        total += -size if contour.hole else size
+    return total
+
+
+def test_overlapping_squares_become_one_contour():
+    (one,) = merged([SQUARE, SQUARE + 5 * MM])
+    assert one.closed
+    assert area([one]) == pytest.approx(175e-6, rel=1e-3)
+
+
+def test_fillets_fill_inside_corners_and_leave_outside_ones():
+    """Two inside corners of 90 deg, each filled by r^2 (1 - pi/4); shapely rounds by 1 % of the radius less."""
+    plain, rounded = area(merged([SQUARE, SQUARE + 5 * MM])), area(merged([SQUARE, SQUARE + 5 * MM], fillet=1 * MM))
+    assert rounded - plain == pytest.approx(2 * (1 - np.pi / 4) * 1e-6, rel=0.05)
+
+
+def test_holes_stay_holes():
+    contours = merged([SQUARE], holes=[0.2 * SQUARE + 4 * MM])
+    assert [contour.hole for contour in contours] == [False, True]
+    assert area(contours) == pytest.approx(96e-6, rel=1e-3)
+
+
+def test_a_straight_cantilever_has_the_area_of_its_strip_and_its_pad():
+    spec = cantilever(("width: 100 mm", "width: 100 mm\n  part: {fillet: 0 mm}"))
+    contours = [one for one in cfmkit.drawing(spec).contours if one.layer == "cut"]
+    end = 0.5 * np.pi * 0.25  # a half disc closes the free end
+    assert area(contours) == pytest.approx((400 + 16 + end) * 1e-6, rel=1e-3)
+
+
+def test_a_tapered_strip_has_its_thickness_everywhere():
+    spec = cantilever(("thickness: 1 mm", "thickness: [[0, 2 mm], [1, 1 mm]]"))
+    table = next(item for item in cfmkit.drawing(spec).tables if item.name == "beam-beam")
+    column = {name: values for name, (values, _) in table.columns.items()}
+    np.testing.assert_allclose(column["thickness"], 2 * MM - 1 * MM * column["x"] / 0.4, atol=1e-12)
+    across = np.hypot(column["left_x"] - column["right_x"], column["left_y"] - column["right_y"])
+    np.testing.assert_allclose(across, column["thickness"], atol=1e-12)
+
+
+def test_two_halves_are_one_piece_at_the_top_and_symmetric():
+    drawn = cfmkit.drawing(config("beam_lan2010"))
+    cuts = [one for one in drawn.contours if one.layer == "cut" and not one.hole]
+    assert len(cuts) == 1
+    x0, _, x1, _ = cuts[0].extents
+    assert x0 == pytest.approx(-x1, abs=2e-6)
+
+
+def test_every_file_is_written_with_kerf_too():
+    names = set(files(cfmkit.drawing(config("beam_lan2010")), kerf=0.1 * MM))
+    assert {"beams.dxf", "beams-kerf.dxf", "beams.svg", "beam-b1.csv", "beam-b4.csv"} <= names
+
+
+def test_pinned_supports_become_eyes_with_holes():
+    cuts = [one for one in cfmkit.drawing(config("beam_lee_frame")).contours if one.layer == "cut"]
+    assert sum(one.hole for one in cuts) == 2
+
+
+def test_gaps_of_two_parallel_lines():
+    line = np.column_stack([np.linspace(0, 1, 30), np.zeros(30)])
+    (found,) = gaps({"a": line, "b": line + np.array([0.0, 0.3])}, {"a": 0.05, "b": 0.1})
+    assert found.size == pytest.approx(0.15)
+    (crossing,) = gaps({"a": line, "b": line[:, ::-1] + np.array([0.5, -0.5])}, {"a": 0.05, "b": 0.1})
+    assert crossing.size == pytest.approx(-0.15)
+
+
+def test_near_a_common_end_there_is_no_gap():
+    line = np.column_stack([np.linspace(0, 1, 200), np.zeros(200)])
+    (found,) = gaps({"a": line, "b": line[:, ::-1]}, {"a": 0.01, "b": 0.01})
+    assert found.size == pytest.approx(np.hypot(0.06, 0.06) - 0.02, abs=0.01)
+
+
+def test_mirroring_twice_is_nothing():
+    points = np.random.default_rng(1).normal(size=(7, 2))
+    again = mirrored(mirrored(points, 0.3 + 0.1j, 0.7), 0.3 + 0.1j, 0.7)
+    np.testing.assert_allclose(again, points, atol=1e-14)

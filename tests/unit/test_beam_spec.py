@@ -1,0 +1,146 @@
+"""What a specification of beams may say, and how nonsense is refused: file, line, key and a remedy."""
+
+from __future__ import annotations
+
+import pytest
+from beam_support import CANTILEVER, CONFIGS, cantilever, config
+
+import cfmkit
+from cfmkit.errors import SpecError
+from cfmkit.keys import keys
+from cfmkit.studies.leaves import leaf, paths
+
+
+def faults(*pairs, text=CANTILEVER):
+    with pytest.raises(SpecError) as error:
+        cantilever(*pairs, text=text)
+    return [(problem.line, problem.path, problem.message) for problem in error.value.problems]
+
+
+def only(*pairs, text=CANTILEVER):
+    (found,) = faults(*pairs, text=text)
+    return found
+
+
+SLIDE = (
+    "beams:\n    beam: {start: root, end: tip}\n"
+    "  springs: {s: {kind: slide, node: to, direction: 0 deg, stiffness: 1 N/mm}}"
+)
+LOOSE = "beams:\n    beam: {start: root, end: tip}\n  springs: {s: {kind: line, start: tip, stiffness: 1 N/mm}}"
+FORMULA = "points: 21\n  surface: {profile: {kind: formula, height: x+, length: 1 mm}, preload: 0 mm}"
+FILE = "points: 21\n  surface: {profile: {kind: file, file: no.csv}, preload: 0 mm}"
+RESCALE = "design: {rescale: {force: 1 N, free: width, width: 2 mm}}\nanalysis:"
+MORE = "beams:\n    beam: {start: root, end: tip}"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "path", "words"),
+    [
+        ("end: tip", "end: top", "mechanism.beams.beam.end", "there is no node 'top'; nodes are root, tip"),
+        ("end: tip", "end: root", "mechanism.beams.beam.end", "a beam needs two different nodes, not 'root' twice"),
+        ("[400 mm, 0 mm]", "[0 mm, 0 mm]", "mechanism.beams.beam.end", "at the same place"),
+        ("node: tip", "node: root", "mechanism.drive.node", "'root' cannot move: its support is 'clamped'"),
+        ("node: tip", "node: tipp", "mechanism.drive.node", "there is no node 'tipp'"),
+        ("travel: 100 mm", "force: 1 N", "analysis.force", "does not go with a drive of kind 'displacement'"),
+        ("travel: 100 mm", "travel: 10 deg", "analysis.travel", "must be a length"),
+        ("travel: 100 mm", "travel: 0 mm", "analysis.travel", "must not be 0"),
+        ("support: clamped}", "support: guided}", "mechanism.nodes.root", "needs 'direction'"),
+        ("support: clamped}", "support: clampd}", "mechanism.nodes.root.support", "did you mean 'clamped'?"),
+        ("end: tip}", "end: tip, shape: {kind: arch}}", "mechanism.beams.beam.shape.kind", "did you mean 'arc'?"),
+        ("end: tip}", "end: tip, shape: {kind: arc}}", "mechanism.beams.beam.shape", "the key 'sweep' is missing"),
+        ("end: tip}", "end: tip, shape: {kind: arc, sweep: 1}}", "mechanism.beams.beam.shape.sweep", "has no unit"),
+        ("thickness: 1 mm", "thickness: [[0, 1 mm], [0.5, 1 mm]]", "mechanism.thickness", "from 0 to 1"),
+        ("thickness: 1 mm", "thickness: 1 mm\n  shear: true", "mechanism.shear", "add 'axial: true'"),
+        ("thickness: 1 mm", "thickness: -1 mm", "mechanism.thickness", "must be > 0"),
+        ("youngs_modulus: 2.4 GPa", "youngs_modulus: 0 GPa", "mechanism.material.youngs_modulus", "must be > 0"),
+        ("{youngs_modulus: 2.4 GPa, yield_strength: 50 MPa}", "pon", "mechanism.material", "did you mean 'pom'"),
+        (MORE, f"{MORE}\n    b.2: {{start: root, end: tip}}", 'mechanism.beams.\'b.2\'', "a name is a letter"),
+        ("support: clamped}", "support: clamped}\n    far: {at: [9 mm, 9 mm]}", "mechanism.nodes.far", "no beam"),
+        (
+            MORE,
+            f"{MORE}\n  links: [{{master: tip, node: root}}]",
+            "mechanism.links.0.node",
+            "'root' has a support of its own",
+        ),
+        (MORE, SLIDE, "mechanism.springs.s.node", "there is no node 'to'"),
+        (MORE, LOOSE, "mechanism.springs.s", "give either 'end'"),
+        (MORE, f"{MORE}\n  loads: [{{kind: line, beam: bam}}]", "mechanism.loads.0.beam", "there is no beam 'bam'"),
+        (MORE, f"{MORE}\n  copies: {{layers: 2}}", "mechanism.copies.layers", "of a node that is 'guided'"),
+        ("points: 21", FORMULA, "analysis.surface.profile.height", "is no formula"),
+        ("points: 21", FILE, "analysis.surface.profile.file", "there is no file 'no.csv'"),
+        ("analysis:", RESCALE, "design.rescale", "'width' is given"),
+    ],
+)  # fmt: skip
+def test_nonsense_is_refused_at_its_place(old, new, path, words):
+    line, where, message = only((old, new))
+    assert where == path
+    assert words in message
+    assert line > 0
+
+
+def test_all_faults_are_told_at_once():
+    found = faults(("start: root, end: tip", "start: foot, end: top"), ("node: tip", "node: end"))
+    assert [path for _, path, _ in found] == [
+        "mechanism.beams.beam.start",
+        "mechanism.beams.beam.end",
+        "mechanism.drive.node",
+    ]
+
+
+def test_links_may_not_run_in_a_circle():
+    nodes = (
+        "tip: {at: [400 mm, 0 mm]}",
+        "tip: {at: [400 mm, 0 mm]}\n    a: {at: [1 mm, 0 mm]}\n    b: {at: [2 mm, 0 mm]}",
+    )
+    links = (MORE, f"{MORE}\n  links: [{{master: a, node: b}}, {{master: b, node: a}}]")
+    assert only(nodes, links)[1:] == ("mechanism.links.1", "the links through 'a' form a loop")
+
+
+def test_a_node_that_slides_is_driven_along_its_way():
+    slides = ("tip: {at: [400 mm, 0 mm]}", "tip: {at: [400 mm, 0 mm], support: guided, direction: 60 deg}")
+    assert only(slides)[1:] == ("mechanism.drive.direction", "'tip' slides along another direction")
+
+
+def test_what_no_support_holds_cannot_be_moved_beforehand():
+    moved = ("support: clamped", "support: pinned, moved: {rotation: 1 deg}")
+    assert "leaves that free" in only(moved)[2]
+
+
+def test_rescaling_needs_a_mechanism_of_beams_alone():
+    text = (CONFIGS / "beam_lan2010.yaml").read_text()
+    spring = ("  drive:", "  loads: [{kind: point, node: n3, fy: 1 N}]\n  drive:")
+    design = ("analysis:", "design: {rescale: {force: 15 N}}\nanalysis:")
+    assert "Eq. 6 is about beams alone" in only(spring, design, text=text)[2]
+
+
+def test_switches_choose_the_model_and_the_stress():
+    assert (cantilever().fidelity, cantilever().stress) == ("inextensible", "bending")
+    axial = cantilever(("width: 100 mm", "width: 100 mm\n  axial: true"))
+    assert (axial.fidelity, axial.stress) == ("extensible", "total")
+    both = cantilever(("width: 100 mm", "width: 100 mm\n  axial: true\n  shear: true"))
+    assert both.fidelity == "reissner"
+    assert both.replace({"analysis.fidelity": "inextensible"}).fidelity == "inextensible"
+
+
+def test_values_below_names_are_found_by_their_path():
+    spec = config("beam_lan2010")
+    assert spec.at("mechanism.nodes.n3.at.1") == pytest.approx(0.01877)
+    assert spec.at("mechanism.beams.b1.shape.coefficients.2") == -1.5707
+    changed = spec.replace({"mechanism.nodes.n3.at.1": "19 mm"})
+    assert changed.at("mechanism.nodes.n3.at.1") == pytest.approx(0.019)
+    assert changed.at("mechanism.nodes.n4.at") == spec.at("mechanism.nodes.n4.at")
+
+
+def test_paths_below_names_can_be_varied_and_are_listed():
+    kind = type(config("beam_lan2010"))
+    assert leaf(kind, "mechanism.nodes.n3.at.1").kind == "quantity"
+    assert leaf(kind, "mechanism.beams.b1.shape.length").kind == "quantity"
+    assert "mechanism.nodes.NAME.at.0" in set(paths(kind))
+    listed = {key.path for key in keys("beam")}
+    assert {"mechanism.nodes.NAME.at", "mechanism.beams.NAME.shape.sweep", "mechanism.links[].master"} <= listed
+
+
+def test_a_written_specification_reads_back_equal():
+    for name in ("beam_lan2010", "beam_end_effector", "beam_rescaled"):
+        spec = config(name)
+        assert cfmkit.loads(cfmkit.dumps(spec)) == spec

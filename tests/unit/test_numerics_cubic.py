@@ -1,0 +1,68 @@
+"""Local cubics and formulas: exact on cubics, fourth order, and nothing but formulas."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from cfmkit.numerics.cubic import bisect, crossing, first_extreme, value_at, values_at
+from cfmkit.numerics.formula import formula
+
+X = np.array([0.0, 0.3, 1.0, 1.4, 2.0, 3.1])
+
+
+@given(st.lists(st.floats(-2, 2), min_size=4, max_size=4), st.floats(0, 3.1))
+def test_a_cubic_is_met_exactly(coefficients, place):
+    assert value_at(X, np.polyval(coefficients, X), place) == pytest.approx(np.polyval(coefficients, place), abs=1e-10)
+
+
+def test_the_error_falls_with_the_fourth_power_of_the_spacing():
+    errors = []
+    for count in (11, 21, 41):
+        x, places = np.linspace(0, 3, count), np.linspace(0, 3, 997)
+        errors.append(np.abs(values_at(x, np.sin(x), places) - np.sin(places)).max())
+    assert np.log2(np.array(errors[:-1]) / errors[1:]) == pytest.approx([4, 4], abs=0.5)
+
+
+def test_crossings_and_extremes_of_a_sine():
+    x = np.linspace(0, 6, 241)
+    assert crossing(x, np.sin(x), 0.5) == pytest.approx(np.pi / 6, abs=1e-7)
+    assert crossing(x, np.sin(x), 1.5) is None
+    assert crossing(x, np.cos(x), 0.5) == 0
+    assert first_extreme(x, np.sin(x)) == pytest.approx((np.pi / 2, 1), abs=1e-6)
+    assert first_extreme(x, np.sin(x), -1, after=2.0) == pytest.approx((1.5 * np.pi, -1), abs=1e-6)
+    assert first_extreme(x, x) is None
+
+
+def test_bisection_finds_where_a_condition_begins_to_hold():
+    assert bisect(lambda place: place > 0.25, 0.0, 1.0) == pytest.approx(0.25, abs=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [("2", 2.0), ("x**2 - 1", 3.0), ("-x + max(x, 3)", 1.0), ("sin(pi*x/4)", 1.0), ("sqrt(abs(-x*2))", 2.0)],
+)
+def test_formulas_are_computed(text, expected):
+    np.testing.assert_allclose(formula(text)(np.full(3, 2.0)), expected)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("x +", "is no formula"),
+        ("", "is no formula"),
+        ("y*2", "'y' means nothing here"),
+        ("__import__('os')", "means nothing here"),
+        ("x.real", "means nothing here"),
+        ("[x]", "means nothing here"),
+        ("sin(x, x)", "takes 1 value"),
+        ("True", "means nothing here"),
+        ("'a'", "means nothing here"),
+        ("x" * 600, "at most 500"),
+    ],
+)
+def test_anything_else_is_refused(text, words):
+    with pytest.raises(ValueError, match=words.replace("(", r"\(")):
+        formula(text)
