@@ -86,7 +86,8 @@ def _exact(item: Dimension) -> Fraction:
 
 
 COMMON: Mapping[tuple[str, str], Fraction] = MappingProxyType(
-    {(item.name, item.unit): _exact(item) for item in _DIMENSIONS if item.unit} | {("ratio", "%"): Fraction(1, 100)}
+    {(item.name, item.unit): _exact(item) for item in _DIMENSIONS if item.unit}
+    | {("ratio", "%"): Fraction(1, 100), ("angle", "rad"): Fraction(1), ("stress", "GPa"): Fraction(10**9)}
 )
 """Exact SI size of what nearly every file says, by (dimension, unit): these need no look into pint's registry."""
 

@@ -279,6 +279,11 @@ def test_border_factors_agree_with_the_unit_registry(name: str) -> None:
     assert border_factor(name) == pytest.approx(1 / float(size), rel=1e-15)
 
 
+@pytest.mark.parametrize(("name", "unit"), [key for key in COMMON if key[1] not in ("1", "")])
+def test_what_needs_no_look_into_the_registry_agrees_with_it(name: str, unit: str) -> None:
+    assert COMMON[name, unit] == unit_size(unit).factor
+
+
 @pytest.mark.parametrize("name", READABLE)
 def test_the_example_of_a_dimension_is_of_that_dimension(name: str) -> None:
     assert read_quantity(DIMENSIONS[name].example, name) > 0
