@@ -17,6 +17,8 @@ FAMILY = Family(
     analyze=analyze,
     design=design,
     values=DEFINITIONS,
+    draw="cfmkit.families.vcfm.draw",
+    outline="cfmkit.families.vcfm.outline",
     analyze_block=analyze_block,
     headline=(
         "constant_force",
@@ -28,6 +30,7 @@ FAMILY = Family(
         "spring_stress_max",
         "bistable_stress_max",
     ),
+    branches=("load",),
     template="vcfm.yaml",
     findings=FINDINGS,
     references=(

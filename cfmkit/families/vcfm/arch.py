@@ -66,7 +66,7 @@ class CosineArch:
     def linear(self) -> tuple[Any, Any]:
         """Where the arch is buckled, from and to [m]; NaN where it never is."""
         places = np.linspace(0.0, 2.0, 2001) * self.strip.rise
-        above = np.flatnonzero(self._root(places) >= BUCKLED)
+        above = np.flatnonzero(self.root(places) >= BUCKLED)
         if not len(above):
             return np.nan, np.nan
         return tuple(
@@ -78,7 +78,7 @@ class CosineArch:
         """Return where z passes pi^2, by bisection."""
         for _ in range(40):
             middle = 0.5 * (outside + inside)
-            if self._root(np.array([middle]))[0] >= BUCKLED:
+            if self.root(np.array([middle]))[0] >= BUCKLED:
                 inside = middle
             else:
                 outside = middle
@@ -93,8 +93,8 @@ class CosineArch:
         """Return the force of one leaf along the motion [N], on the stable branch."""
         travel = np.asarray(travel, dtype=float)
         line = self.critical_force * (4.0 / 3.0 * self.strip.rise - travel) / self.strip.reach
-        z = self._root(travel)
-        q, _, _, g = self._waves(z, travel)
+        z = self.root(travel)
+        q, _, _, g = self.waves(z, travel)
         slope = np.real(g * np.cos(q))
         bent = self.critical_force * z / BUCKLED * slope * self.developed / self.strip.reach
         return np.asarray(np.where(z >= BUCKLED, line, bent))
@@ -102,12 +102,12 @@ class CosineArch:
     def stress(self, travel: Any) -> FloatArray:
         """Return the largest stress of the arch, bending and axial [Pa]."""
         travel = np.asarray(travel, dtype=float)
-        z = self._root(travel)
+        z = self.root(travel)
         curvature = np.where(z >= BUCKLED, self._buckled_curvature(travel), self._bent_curvature(z, travel))
         axial = np.abs(self.critical_force * np.minimum(z, BUCKLED) / BUCKLED) / self.strip.area
         return np.asarray(0.5 * self.strip.youngs_modulus * self.strip.thickness * curvature + axial)
 
-    def _waves(self, z: FloatArray, travel: FloatArray) -> tuple[Any, Any, Any, Any]:
+    def waves(self, z: FloatArray, travel: FloatArray) -> tuple[Any, Any, Any, Any]:
         """Return q, k, the amplitude c of the shape's own wave and that of the other, g; complex in tension."""
         q = np.sqrt(np.asarray(z, dtype=complex))
         q = np.where(np.abs(q - 0.5 * np.pi) < 1e-6, 0.5 * np.pi + 1e-6, np.where(np.abs(q) < 1e-4, 1e-4, q))
@@ -118,12 +118,12 @@ class CosineArch:
 
     def _shortening(self, z: FloatArray, travel: FloatArray) -> FloatArray:
         """Return how much shorter the arch is than as made, over its length, by Gauss's quadrature."""
-        q, _, c, g = (item[..., None] for item in self._waves(z, travel))
+        q, _, c, g = (item[..., None] for item in self.waves(z, travel))
         own = np.pi / self.developed * np.cos(0.5 * np.pi * _NODES)
         slope = np.real(-c * own + g * (np.cos(q) - np.cos(q * _NODES)))
         return np.asarray(0.25 * ((0.5 * self.strip.rise * own) ** 2 - slope**2) @ _WEIGHTS)
 
-    def _root(self, travel: FloatArray) -> FloatArray:
+    def root(self, travel: FloatArray) -> FloatArray:
         """Return z at each travel, by bisection: the shortening falls as the load grows."""
         low, high = np.full(travel.shape, -_LOOSE), np.full(travel.shape, _POLE * (1 - 1e-12))
         stretch = self.critical_force / (BUCKLED * self.strip.axial)
@@ -135,19 +135,25 @@ class CosineArch:
         return np.asarray(0.5 * (low + high))
 
     def _bent_curvature(self, z: FloatArray, travel: FloatArray) -> FloatArray:
-        q, k, c, g = (item[..., None] for item in self._waves(np.minimum(z, _POLE - 0.1), travel))
+        q, k, c, g = (item[..., None] for item in self.waves(np.minimum(z, _POLE - 0.1), travel))
         wave = (np.pi / self.developed) ** 2 * np.cos(0.5 * np.pi * (1.0 + _PLACES))
         bend = np.real(-(c + 0.5 * self.strip.rise) * wave + g * k * np.sin(q * _PLACES))
         return np.asarray(np.abs(bend).max(axis=-1))
 
-    def _buckled_curvature(self, travel: FloatArray) -> FloatArray:
+    def buckled_amplitude(self, travel: FloatArray) -> FloatArray:
+        """Return the slope of the free buckling wave [rad]: what the rest of the shape leaves of the shortening."""
         length, rise = self.developed, self.strip.rise
         a, c = np.pi / length, rise / 6.0
         slope = (4.0 / 3.0 * rise - travel) / length
         spent = 0.125 * (a * rise) ** 2 - 2.0 * self.critical_force / self.strip.axial
-        amplitude = 2.0 * (spent - 0.5 * (a * c) ** 2 - 1.5 * slope**2 + 16.0 / 3.0 * c * slope / length)
-        phase = np.pi * (1.0 + _PLACES)
-        free = np.sqrt(np.maximum(amplitude, 0.0))[..., None] * np.cos(phase)
-        bend = -(c + 0.5 * rise) * a * a * np.cos(0.5 * phase) + 2.0 * a * (slope[..., None] * np.sin(phase) - free)
-        other = bend + 4.0 * a * free
-        return np.asarray(np.maximum(np.abs(bend).max(axis=-1), np.abs(other).max(axis=-1)))
+        square = 2.0 * (spent - 0.5 * (a * c) ** 2 - 1.5 * slope**2 + 16.0 / 3.0 * c * slope / length)
+        return np.asarray(np.sqrt(np.maximum(square, 0.0)))
+
+    def _buckled_curvature(self, travel: FloatArray) -> FloatArray:
+        length, rise = self.developed, self.strip.rise
+        a, c = np.pi / length, rise / 6.0
+        slope, phase = (4.0 / 3.0 * rise - travel) / length, np.pi * (1.0 + _PLACES)
+        free = self.buckled_amplitude(travel)[..., None] * np.cos(phase)
+        own = -(c + 0.5 * rise) * a * a * np.cos(0.5 * phase) + 2.0 * a * slope[..., None] * np.sin(phase)
+        both = (np.abs(own + sign * 2.0 * a * free).max(axis=-1) for sign in (1.0, -1.0))
+        return np.asarray(np.maximum(*both))

@@ -117,7 +117,10 @@ class Frame(Model):
 
     shuttle_width: PositiveLength = Field(0.008, description="of the shuttle between the leaves")
     spacing: PositiveLength = Field(0.020, description="between the two Vs on the shuttle")
-    block: PositiveLength = Field(0.006, description="size of the diamond's rigid corners, and width of the frame")
+    block: PositiveLength = Field(0.006, description="width of walls, corners and blocks")
+    corner: PositiveLength = Field(
+        0.012, description="height of the diamond's rigid corners: it closes at about this and twice its leaves' rise"
+    )
     clearance: NonNegativeLength = Field(0.008, description="between the last V and the diamond")
 
 

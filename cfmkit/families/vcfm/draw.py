@@ -1,0 +1,243 @@
+"""Pictures of a mechanism of snap-through leaves and a preloaded spring: its curves, its preloads, and itself, bent."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.families.vcfm.model import rest_of
+from cfmkit.families.vcfm.scene import scene
+from cfmkit.families.vcfm.truss import TrussLeaf
+from cfmkit.plots import parts
+from cfmkit.plots.curves import Look, plot_curve
+from cfmkit.plots.diagram import Diagram, Limit, Region, Scale, Series, diagram_figure
+from cfmkit.plots.loop import loop_figure
+from cfmkit.plots.style import (
+    BLACK,
+    BLUE,
+    GREY,
+    LINES,
+    ORANGE,
+    PURPLE,
+    SMALL,
+    VERMILLION,
+    axes_mm,
+    new_figure,
+    styled,
+)
+from cfmkit.plots.text import Heading, value_text, write_heading
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from cfmkit.curves import FloatArray
+    from cfmkit.families.vcfm.model import Push, Solution
+    from cfmkit.families.vcfm.scene import Scene
+    from cfmkit.results import Result
+
+TRAVEL = Scale("displacement", "length")
+PRELOADS = 41
+"""Preloads of the map."""
+
+
+def figures(result: Result) -> dict[str, Callable[[], Figure]]:
+    """Return what draws each picture of a result, by file stem; empty if nothing was solved."""
+    if result.state is None or not result.curves:
+        return {}
+    makers = [force, split, stress, mechanism]
+    if len(result.curves) > 1:
+        makers += [preloads, from_rest, adjustability]
+    return {maker.__name__: partial(maker, result) for maker in makers}
+
+
+def force(result: Result) -> Figure:
+    """Return the nominal curve with the requirement bands."""
+    solution: Solution = result.state
+    flat = solution.parts.balance
+    level = float(np.asarray(solution.sampler.spring(np.array([flat + solution.nominal.preload]))[0])[0])
+    look = Look(levels=(Limit(level, f"the spring alone, at {value_text(flat, 'length')}"),), regions=_beyond(solution))
+    nominal = type(result)(**{**vars(result), "curves": result.curves[:1]})
+    return loop_figure(nominal, look, "force over travel of the shuttle, from the as-made pose")
+
+
+def _beyond(solution: Solution) -> tuple[Region, ...]:
+    """Return the part of the travel where the leaves have straightened again."""
+    end, last = solution.character.linear[1], float(solution.nominal.travel[-1])
+    return (Region(end, last, "leaves straightened"),) if np.isfinite(end) and end < last * (1 - 1e-6) else ()
+
+
+def split(result: Result) -> Figure:
+    """Return what leaves and spring give, their sum, and the paper's law of the leaves [D, Fig. 3 and 11]."""
+    solution: Solution = result.state
+    push = solution.nominal
+    series = [
+        Series(push.force, "sum", BLACK, prefer=0.55),
+        Series(push.spring_force, "spring", ORANGE, prefer=0.85),
+        Series(push.leaves.force, "leaves", BLUE, prefer=0.35),
+    ]
+    if solution.spec.mechanism.bistable.structure == "v-beam" and not isinstance(solution.parts.leaf, TrussLeaf):
+        bars = solution.parts.half_beams * np.asarray(TrussLeaf(solution.parts.strip).force(push.travel))
+        series.append(Series(bars, "leaves by the truss law", GREY, dashed=True, prefer=0.4))
+    found = list(_beyond(solution))
+    low, _ = solution.character.linear
+    if np.isfinite(low):
+        found.insert(0, Region(push.travel[0], low, "not yet buckled"))
+    diagram = Diagram(push.travel, TRAVEL, Scale("force", "force"), series, (), found)
+    subject = f"leaves and spring, preload {value_text(push.preload, 'length')}"
+    return diagram_figure(Heading.of(result, subject), [diagram])
+
+
+def stress(result: Result) -> Figure:
+    """Return the largest stress in leaves and spring over the travel, for the nominal and the largest preload."""
+    solution: Solution = result.state
+    nominal, most = solution.nominal, max(solution.pushes, key=lambda push: push.preload)
+    over = most.travel
+    series = [
+        Series(np.interp(over, nominal.travel, nominal.leaves.stress, left=np.nan), "leaves", BLUE, prefer=0.5),
+        Series(np.interp(over, nominal.travel, nominal.spring_stress, left=np.nan), "spring", ORANGE, prefer=0.6),
+    ]
+    if most is not nominal:
+        text = f"spring, preload {value_text(most.preload, 'length')}"
+        series.append(Series(most.spring_stress, text, VERMILLION, prefer=0.5))
+    allowed = solution.spec.mechanism.material.allowable
+    passed = allowed is not None and bool(max(np.nanmax(item.values) for item in series) > allowed * 1.005)
+    limits = [Limit(allowed, f"allowed {value_text(allowed, 'stress')}", trouble=passed)] if allowed else []
+    diagram = Diagram(over, TRAVEL, Scale("largest stress", "stress"), series, limits, _beyond(solution))
+    return diagram_figure(Heading.of(result, "largest stress"), [diagram])
+
+
+@styled
+def preloads(result: Result) -> Figure:
+    """Return the curves of all preloads over the travel from the as-made pose [D, Fig. 13 (a)]."""
+    return _curves(result, "force for each preload, from the as-made pose", shifted=False)
+
+
+@styled
+def from_rest(result: Result) -> Figure:
+    """Return the curves of all preloads, each from where the shuttle rests [D, Fig. 13 (b)]."""
+    return _curves(result, "force for each preload, from where the shuttle rests", shifted=True)
+
+
+def _curves(result: Result, subject: str, shifted: bool) -> Figure:
+    solution: Solution = result.state
+    heading, figure = Heading.of(result, subject), new_figure()
+    write_heading(figure, heading)
+    ax = axes_mm(figure, (15.0, 12.0, 140.0, 100.0 - heading.height_mm - 14.0))
+    curves = []
+    for curve, push in zip(result.curves, solution.pushes, strict=True):
+        back = (push.rest or 0.0) if shifted else 0.0
+        curves.append(type(curve)(curve.motion - back, curve.effort, curve.branch, curve.stable, label=curve.label))
+    plot_curve(curves, ax, Look(arrows=False))
+    for number, (push, window) in enumerate(zip(solution.pushes, solution.windows, strict=True)):
+        if window is not None:
+            _mark(ax, push, window, (push.rest or 0.0) if shifted else 0.0, LINES[number % len(LINES)])
+    if shifted:
+        ax.set_xlabel("displacement from rest [mm]")
+    return figure
+
+
+def _mark(ax: Axes, push: Push, window: tuple[float, float], back: float, color: str) -> None:
+    """Mark both ends of a constant-force window on its curve."""
+    places = np.array(window)
+    ax.plot(
+        parts.mm(places - back), np.interp(places, push.travel, push.force), linestyle="", marker="|", markersize=9,
+        markeredgewidth=1.2, color=color, zorder=4, gid="window",
+    )  # fmt: skip
+
+
+def adjustability(result: Result) -> Figure:
+    """Return the constant force and the rest position over the preload, with the paper's straight rules."""
+    solution: Solution = result.state
+    given = np.array([push.preload for push in solution.pushes])
+    over = np.linspace(given.min(), given.max(), PRELOADS)
+    one = solution.character
+    places = np.linspace(*solution.window, 41)
+    leaves = solution.sampler.leaves(places).force
+    mean = np.array([(leaves + solution.sampler.spring(places + preload)[0]).mean() for preload in over])
+    grid = np.linspace(0.0, float(solution.nominal.travel[-1]), 241)
+    rests = np.array([_shift(solution, float(preload), grid) for preload in over])
+    nominal = float(np.interp(solution.nominal.preload, over, mean))
+    straight = nominal + one.positive_stiffness * (over - solution.nominal.preload)
+    by_rule = one.positive_stiffness * over / (one.positive_stiffness + one.first_stiffness)
+    x, first = Scale("preload", "length"), Scale("constant force", "force")
+    forces = [Series(mean, "mean in the window", BLUE, prefer=0.4)]
+    if np.abs(straight - mean).max() > 2e-3 * np.abs(mean).max():
+        forces.append(Series(straight, "F + K_p dr", GREY, dashed=True, prefer=0.7))
+    shifts = [
+        Series(rests, "rest position, moved back by", PURPLE, prefer=0.4),
+        Series(by_rule, "K_p dr/(K_p + K_b1)", GREY, dashed=True, prefer=0.7),
+    ]
+    diagrams = [Diagram(over, x, first, forces), Diagram(over, x, Scale("shift", "length"), shifts)]
+    return diagram_figure(Heading.of(result, "what the preload adjusts"), diagrams)
+
+
+def _shift(solution: Solution, preload: float, grid: FloatArray) -> float:
+    rest = rest_of(solution.sampler, preload, grid)
+    return np.nan if rest is None else -rest
+
+
+@styled
+def mechanism(result: Result) -> Figure:
+    """Return the mechanism to scale in four poses: bent as the leaves really bend."""
+    solution: Solution = result.state
+    poses = _poses(solution)
+    scenes = [scene(solution, travel, preload) for _, travel, preload in poses]
+    boxes = np.array([one.box for one in scenes])
+    left, bottom = boxes[:, :2].min(axis=0)
+    right, top = boxes[:, 2:].max(axis=0)
+    room = 0.12 * (top - bottom)
+    box = (left - 0.02 * (right - left), bottom - room, right + 0.02 * (right - left), top + room)
+    heading = Heading.of(result, "mechanism to scale")
+    across = 68.0
+    up = across * (box[3] - box[1]) / (box[2] - box[0])
+    figure = new_figure(160.0, heading.height_mm + 12.0 + 2.0 * (up + 8.0))
+    write_heading(figure, heading)
+    for number, (one, (text, travel, preload)) in enumerate(zip(scenes, poses, strict=True)):
+        row, column = divmod(number, 2)
+        ax = axes_mm(figure, (14.0 + column * (across + 5.0), 12.0 + (1 - row) * (up + 8.0), across, up))
+        _draw(ax, one)
+        if travel > 0:
+            parts.force_arrow(ax, (one.top[0], one.top[1] + 0.9 * room), one.top, "force")
+        if preload:
+            away = (one.base[0], one.base[1] - np.sign(preload) * 0.9 * room)
+            tail, tip = (away, one.base) if preload > 0 else (one.base, away)
+            parts.force_arrow(ax, tail, tip, "preload")
+        parts.to_scale(ax, box)
+        ax.set_title(text, fontsize=SMALL, loc="left")
+        ax.set_xlabel("x [mm]" if row else "")
+        ax.set_ylabel("" if column else "y [mm]")
+        ax.tick_params(labelbottom=bool(row), labelleft=not column)
+    return figure
+
+
+def _poses(solution: Solution) -> list[tuple[str, float, float]]:
+    """Return four poses worth seeing: (what, travel, preload)."""
+    nominal, most = solution.nominal, max(solution.pushes, key=lambda push: abs(push.preload))
+    low, high = solution.window
+    middle = 0.5 * (low + high)
+    told, pushed = value_text(middle, "length"), value_text(most.preload, "length")
+    first = [("as made", 0.0, 0.0), (f"pushed by {told}", middle, nominal.preload)]
+    if most.preload == nominal.preload:
+        end = float(nominal.travel[-1])
+        flat = solution.parts.balance
+        rest = [(f"pushed by {value_text(place, 'length')}", place, nominal.preload) for place in (flat, end)]
+        return [*first, *rest]
+    rest_at = most.rest or 0.0
+    return [
+        *first,
+        (f"at rest with a preload of {pushed}", rest_at, most.preload),
+        (f"pushed by {told}, preload {pushed}", middle, most.preload),
+    ]
+
+
+def _draw(ax: Axes, one: Scene) -> None:
+    """Draw the parts in one pose."""
+    parts.plate(ax, one.rigid, "rigid")
+    for name, outlines, color in (("leaf", one.leaves, BLUE), ("spring", one.spring, ORANGE)):
+        for outline in outlines:
+            ax.fill(*parts.mm(outline).T, color=color, linewidth=0.4, zorder=2.0, gid=name)

@@ -1,0 +1,190 @@
+"""Both structures as closed contours that can be cut or printed: the leaves with shuttle and walls, and the spring.
+
+Sizes of shuttle, walls and blocks are those of `mechanism.frame`. The two parts stand apart, the spring below; of eight
+folded beams one half is drawn, to be made twice, and an odd number of leaves is made up to whole Vs.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.families.vcfm.parts import strip_of
+from cfmkit.geometry import Arc, Contour, Curve2D, Drawing, Edge, Line, Smooth
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from cfmkit.curves import FloatArray
+    from cfmkit.families.vcfm.spec import VcfmSpec
+
+GAP = 0.01
+"""Between the two parts of the drawing [m]."""
+
+POINTS = 201
+"""Of the edge of a cosine arch."""
+
+RIM = 0.75
+"""Half height of rigid blocks beyond the middle of a leaf, in its thicknesses."""
+
+Point = tuple[float, float]
+Item = Point | Arc | Smooth
+"""A corner, or an edge that is not straight."""
+
+
+def drawing(spec: VcfmSpec) -> Drawing:
+    """Return the leaves with shuttle and walls and the spring, and a table of the leaves' centre line."""
+    leaves, low = leaves_contours(spec)
+    places, heights, _ = _centre_line(spec)
+    table = Curve2D("leaf", {"x": (places, "length"), "y": (heights, "length")})
+    return Drawing("vcfm", (*leaves, *spring_contours(spec, low - GAP)), (table,))
+
+
+def leaves_contours(spec: VcfmSpec) -> tuple[list[Contour], float]:
+    """Return the outline of shuttle, leaves and walls with the holes between them, and its lowest point [m]."""
+    frame, about = spec.mechanism.frame, spec.mechanism.bistable
+    strip, levels = strip_of(about, spec.mechanism.material), -(-about.half_beams // 2)
+    half, top, bottom = 0.5 * frame.shuttle_width, (levels - 1) * frame.spacing + frame.clearance, -frame.clearance
+    wall, rise = half + float(strip.reach), float(strip.rise)
+    wall_top, wall_bottom = (levels - 1) * frame.spacing - rise + frame.block, -rise - frame.block
+    upper = [_edge(spec, 1.0, (half, level * frame.spacing)) for level in range(levels)]
+    lower = [_edge(spec, -1.0, (half, level * frame.spacing)) for level in range(levels)]
+    out = wall + frame.block
+    right: list[Item] = [(0.0, top), (half, top), *upper[-1], (wall, wall_top), (out, wall_top)]
+    right += [(out, wall_bottom), (wall, wall_bottom), *_back(lower[0]), (half, bottom), (0.0, bottom)]
+    contours = [_contour([*right, *_mirrored(right)])]
+    for below, above in pairwise(range(levels)):
+        hole = [*lower[above], *_back(upper[below])]
+        contours += [_contour(hole, hole=True), _contour(_mirrored(hole), hole=True)]
+    return contours, min(bottom, wall_bottom)
+
+
+def _centre_line(spec: VcfmSpec) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return x, y [m] and slope of a leaf as made, from the shuttle at (0, 0) to the wall."""
+    about = spec.mechanism.bistable
+    strip = strip_of(about, spec.mechanism.material)
+    reach, rise = float(strip.reach), float(strip.rise)
+    if about.structure == "cosine":
+        x = np.linspace(0.0, reach, POINTS)
+        wave = np.pi * x / reach
+        return x, -0.5 * rise * (1.0 - np.cos(wave)), -0.5 * np.pi * rise / reach * np.sin(wave)
+    x = np.linspace(0.0, reach, 2)
+    return x, -rise * x / reach, np.full(2, -rise / reach)
+
+
+def _edge(spec: VcfmSpec, side: float, apex: Point) -> list[Item]:
+    """Return the upper (1) or lower (-1) edge of a leaf from the shuttle at `apex` to the wall."""
+    about = spec.mechanism.bistable
+    x, y, slope = _centre_line(spec)
+    stretch = np.hypot(1.0, slope)
+    if about.structure == "cosine":
+        half = 0.5 * side * about.thickness
+        points = np.column_stack([x - half * slope / stretch, y + half / stretch]) + np.array(apex)
+        return [Smooth(points, np.column_stack([1.0 / stretch, slope / stretch]))]
+    thin = about.thickness
+    stations, heights = [0.0, 1.0], [thin, thin]
+    if about.structure == "hybrid":
+        end, thick = float(about.flexure_length or 0.0) / about.length, (about.stiffening or 4.0) * thin
+        stations, heights = [0.0, end, end, 1.0 - end, 1.0 - end, 1.0], [thin, thin, thick, thick, thin, thin]
+    up = 0.5 * side * float(stretch[0])
+    return [
+        (apex[0] + share * float(x[-1]), apex[1] + share * float(y[-1]) + up * height)
+        for share, height in zip(stations, heights, strict=True)
+    ]
+
+
+def spring_contours(spec: VcfmSpec, top: float) -> list[Contour]:
+    """Return the spring with its rigid blocks, its upper end at `top` [m]."""
+    about, frame = spec.mechanism.positive, spec.mechanism.frame
+    half = 0.5 * frame.block
+    if about.structure == "straight":
+        right, bottom = _straight(spec, top)
+        return [_contour([(-half, top), *right[1:-1], (-half, bottom)])] if about.loaded == "half" else [_whole(right)]
+    outer, inner, base = (_bend if about.structure == "u-shape" else _diamond)(spec, top)
+    low = base - frame.block
+    if about.loaded == "half":
+        ends = _corners(inner)
+        hollow: list[Item] = [(-half, ends[1][1]), *_back(inner), (-half, ends[0][1])]
+        return [_contour([(-half, top), (half, top), *outer, (half, low), (-half, low), *hollow])]
+    whole = _whole([(0.0, top), (half, top), *outer, (half, low), (0.0, low)])
+    return [whole, _contour([*inner, *_mirrored(inner)], hole=True)]
+
+
+def _diamond(spec: VcfmSpec, top: float) -> tuple[list[Item], list[Item], float]:
+    """Return outer and inner edge of the right chain from its top down, and the height of its lower end [m]."""
+    about, frame = spec.mechanism.positive, spec.mechanism.frame
+    strip = strip_of(about, spec.mechanism.material)
+    half, x = 0.5 * frame.block, 0.5 * frame.block + float(strip.reach)
+    rise, v = float(strip.rise), 0.5 * about.thickness / float(np.cos(strip.angle))
+    rim = RIM * about.thickness
+    high = top - frame.block
+    up, down = high - rise, high - rise - frame.corner
+    base, out = down - rise, x + frame.block
+    outer: list[Item] = [(half, high + v), (x, up + v), (x, up + rim), (out, up + rim)]
+    outer += [(out, down - rim), (x, down - rim), (x, down - v), (half, base - v)]
+    return outer, [(half, high - v), (x, up - v), (x, down + v), (half, base + v)], base
+
+
+def _bend(spec: VcfmSpec, top: float) -> tuple[list[Item], list[Item], float]:
+    """Return the same of a U-shaped chain."""
+    about, frame = spec.mechanism.positive, spec.mechanism.frame
+    half, v, radius = 0.5 * frame.block, 0.5 * about.thickness, float(about.radius or 0.0)
+    high, x = top - frame.block, 0.5 * frame.block + about.length
+    center, base = (x, high - radius), high - 2.0 * radius
+    edges: list[list[Item]] = []
+    for side in (1.0, -1.0):
+        arc = Arc(center, radius + side * v, 0.5 * np.pi, -0.5 * np.pi)
+        edges.append([(half, high + side * v), arc, (half, base - side * v)])
+    return edges[0], edges[1], base
+
+
+def _straight(spec: VcfmSpec, top: float) -> tuple[list[Item], float]:
+    """Return the right half of a straight beam with its blocks, and its lowest point [m]."""
+    about, frame = spec.mechanism.positive, spec.mechanism.frame
+    half, v = 0.5 * frame.block, 0.5 * about.thickness
+    x, middle = half + about.length, top - frame.block
+    out, bottom = x + frame.block, top - frame.block - half
+    right: list[Item] = [(0.0, top), (half, top), (half, middle + v), (x, middle + v), (x, middle + half)]
+    right += [(out, middle + half), (out, middle - half), (x, middle - half), (x, middle - v), (half, middle - v)]
+    return [*right, (half, bottom), (0.0, bottom)], bottom
+
+
+def _whole(right: list[Item]) -> Contour:
+    return _contour([*right, *_mirrored(right)])
+
+
+def _corners(items: Sequence[Item]) -> tuple[Point, Point]:
+    """Return where a chain begins and ends."""
+    (first, _), (_, last) = _ends(items[0]), _ends(items[-1])
+    return first, last
+
+
+def _ends(item: Item) -> tuple[Point, Point]:
+    if isinstance(item, tuple):
+        return item, item
+    first, last = item.ends
+    return (first.real, first.imag), (last.real, last.imag)
+
+
+def _back(items: Sequence[Item]) -> list[Item]:
+    """Return a chain run the other way."""
+    return [item if isinstance(item, tuple) else item.reversed() for item in reversed(items)]
+
+
+def _mirrored(items: Sequence[Item]) -> list[Item]:
+    """Return the mirror image of a chain, run the other way, so that it closes the first."""
+    return [(-item[0], item[1]) if isinstance(item, tuple) else item.mirrored() for item in _back(items)]
+
+
+def _contour(items: Sequence[Item], hole: bool = False) -> Contour:
+    """Return a closed contour through corners and edges, straight between them."""
+    edges: list[Edge] = []
+    for item, following in zip(items, [*items[1:], items[0]], strict=True):
+        if not isinstance(item, tuple):
+            edges.append(item)
+        start, stop = _ends(item)[1], _ends(following)[0]
+        if np.hypot(stop[0] - start[0], stop[1] - start[1]) > 1e-12:
+            edges.append(Line(start, stop))
+    return Contour(tuple(edges), "cut", closed=True, hole=hole)
