@@ -80,14 +80,14 @@ class BlockAnswer:
         is no matter of one branch stands under the name "" alone.
     target : (n,) array, optional
         Force or torque that each curve should have [N or N m].
-    kind : {"force", "torque"}
-        What the effort of the curves is.
+    kind : {"force", "torque"}, optional
+        What the effort of the curves is; None: as the names of the metrics say.
     """
 
     done: NDArray[Any]
     values: tuple[Mapping[str, FloatArray], ...]
     target: FloatArray | None = None
-    kind: Kind = "force"
+    kind: Kind | None = None
 
 
 @dataclass(frozen=True)

@@ -30,7 +30,7 @@ BLOCK = 4096
 
 def vectorised(study: Study, plan: Plan) -> bool:
     """Return whether the family's block model can do this study."""
-    if family(study.spec.family).analyze_block is None or study.design or study.curves or not len(plan):
+    if family(study.spec.family).analyze_block is None or study.design or not len(plan):
         return False
     return _answer(study, plan, 0, 1) is not None
 
@@ -51,7 +51,12 @@ def evaluate_block(study: Study, plan: Plan, start: int, stop: int) -> Rows:
     values, met = _columns(study, answer), _met(study, answer)
     values[singly], met[singly] = rest.values, rest.met
     odd = {singly[k]: item for k, item in rest.odd.items()}
-    return Rows(values, met, odd, {}, {singly[k]: item for k, item in rest.bugs.items()})
+    bugs = {singly[k]: item for k, item in rest.bugs.items()}
+    curves = {singly[k]: item for k, item in rest.curves.items()}
+    if study.curves:
+        # Rows are those of the block, whether curves are wanted or not.
+        curves |= {int(k): study.evaluate(plan.point(start + int(k))).curve for k in np.flatnonzero(done)}
+    return Rows(values, met, odd, curves, bugs)
 
 
 def _answer(study: Study, plan: Plan, start: int, stop: int) -> BlockAnswer | None:

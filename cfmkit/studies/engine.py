@@ -65,8 +65,10 @@ class Work:
 
     @property
     def step(self) -> int:
-        """Number of points in a job: of small studies few, so that every process has some."""
-        return min(BLOCK, max(SMALLEST, len(self.plan) // JOBS)) if self.vectorised else 1
+        """Number of points in a job: of small studies few, so that every process has some; few with their curves."""
+        if not self.vectorised:
+            return 1
+        return SMALLEST if self.study.curves else min(BLOCK, max(SMALLEST, len(self.plan) // JOBS))
 
     def jobs(self) -> Iterator[Job]:
         """Yield every job in the order of the points."""

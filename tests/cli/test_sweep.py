@@ -16,9 +16,10 @@ import pytest
 RADII = "mechanism.roller_radius=8 mm:16 mm:5"
 BRACES = "mechanism.brace_length=[60 mm, 200 mm, -1 mm]"
 FEW = (
-    # the last of these is not computed in blocks
     "--metrics", "force_mean,force_ripple,theoretical_force,usable_stroke", "--no-plots",
     "--set", "analysis.points=41", "--set", "requirements=[]",
+    # a cam cut for friction is not computed in blocks
+    "--set", "mechanism.profile.friction=0.0001",
 )  # fmt: skip
 JOURNAL = ".cfmkit-journal.jsonl"
 
@@ -50,6 +51,18 @@ def test_the_bytes_do_not_depend_on_the_number_of_processes(cli, tmp_path, jobs)
     cli("sweep", str(CAM), *varied, "-o", "one", "-j", "1", *FEW, "--curves")
     cli("sweep", str(CAM), *varied, "-o", "other", "-j", jobs, *FEW, "--curves", "--timeout-per-point", "60")
     for name in ("results.csv", "curves.csv", "metrics.json", "resolved.yaml"):
+        assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "other" / name).read_bytes(), name
+
+
+@pytest.mark.parametrize("options", [("-j", "2"), ("--curves",), ("--timeout-per-point", "60"), ()])
+def test_an_ordinary_sweep_of_the_cam_has_the_same_bytes_however_it_is_done(cli, tmp_path, options):
+    """Every column, in blocks: in one process or two, with curves and pictures or without, fresh or resumed."""
+    command = ("sweep", str(CAM), "--vary", "mechanism.rest_half_width=60 mm:70 mm:90", "--set", "analysis.points=41")
+    cli(*command, "-o", "one", "-j", "1", "--no-plots")
+    plots = () if options == () else ("--no-plots",)
+    cli(*command, "-o", "other", *options, *plots)
+    cli(*command, "-o", "other", *options, *plots)
+    for name in ("results.csv", "metrics.json", "resolved.yaml"):
         assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "other" / name).read_bytes(), name
 
 

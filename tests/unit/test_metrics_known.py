@@ -128,3 +128,14 @@ def test_default_columns_of_a_torque_are_torques():
     assert sample.kind == "torque"
     own = values_of_family(family("slider-crank").values)
     assert {*work.study.names} <= {item.name for item in definitions("torque", own)}
+
+
+@pytest.mark.parametrize("names", [("torque_mean", "half_band"), ("force_mean", "half_band")])
+def test_a_block_of_torques_takes_either_name_and_bounds_of_a_torque(names):
+    spec = with_requirements({"metric": "force_max", "max": "150 N*mm"})
+    work = prepare(spec, Request(vary=(wish(f"{STIFFNESS}=1 N/cm:20 N/cm:9"),), metrics=names))
+    assert work.vectorised
+    (rows,) = [rows for _, rows in run(work).batches()]
+    alone = [work.study.evaluate(work.plan.point(k)) for k in range(9)]
+    assert np.allclose(rows.values, [one.values for one in alone], rtol=1e-9)
+    assert rows.met.tolist() == [list(one.met) for one in alone]

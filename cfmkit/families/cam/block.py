@@ -3,8 +3,8 @@
 Such a cam carries its roller along s = (x - x0)^2 / 2A, so that the state at every travel
 is explicit, and whole arrays of designs are one array operation. The formulas are those
 of `cam_profile` and `statics`, in the same order, for a cam with its own brace and
-roller, without weight. Everything else (an undercut cam, a stroke that the brace does not
-reach, a jam between two samples) is left to the model of one cam.
+roller, without weight. An undercut cam is one of these from the end of its corner on (`block_corner`).
+Everything else (a stroke that the brace does not reach, a jam) is left to the model of one cam.
 """
 
 from __future__ import annotations
@@ -14,9 +14,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.families.base import BlockAnswer
-from cfmkit.families.cam.block_forces import METRICS, SCALARS, Designs, Slab, measured
+from cfmkit.families.cam.block_corner import CornerSlab, shapes
+from cfmkit.families.cam.block_forces import Designs, Slab
+from cfmkit.families.cam.block_measures import BRANCHES, CYCLES, KNOWN, WINDOWED, measured
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from numpy.typing import NDArray
 
     from cfmkit.curves import FloatArray
@@ -25,6 +29,8 @@ if TYPE_CHECKING:
 
 SLAB = 60_000
 """Samples that are worked on together: few enough to stay in a processor's cache."""
+
+Settings = tuple[int, bool, float]
 
 VARIED = {
     "mechanism.brace_length": "brace",
@@ -51,18 +57,36 @@ def analyze_block(spec: CamSpec, block: Block) -> BlockAnswer | None:
         The variants and the measures.
     """
     names = [measure.name for measure in block.measures]
-    if not _applies(spec, block) or not set(names) <= set(SCALARS) | set(METRICS):
+    if not _applies(spec, block) or not set(names) <= KNOWN:
         return None
     designs = _designs(spec, block)
-    done = designs.sound.copy()
+    done = np.zeros(block.size, dtype=bool)
     values = [_empty(measure.name, block.size) for measure in block.measures]
-    for chosen in _slabs(np.flatnonzero(done), spec.analysis.points):
-        cams = Slab(designs.take(chosen), spec.analysis.points, "contact_force_max" in names)
+    settings = spec.analysis.points, "contact_force_max" in names, spec.analysis.band
+    for chosen, cams in (*_plain(designs, settings), *_undercut(designs, settings)):
         done[chosen] = cams.solved
         for measure, found in zip(block.measures, values, strict=True):
             for branch, numbers in measured(cams, measure).items():
                 found[branch][chosen] = numbers
-    return BlockAnswer(done, tuple(values), designs.target)
+    return BlockAnswer(done, tuple(values), designs.target, "force")
+
+
+def _plain(designs: Designs, settings: Settings) -> Iterator[tuple[NDArray[np.intp], Slab]]:
+    """Yield (places, designs whose rollers run on the flank), few at a time."""
+    for chosen in _slabs(np.flatnonzero(designs.sound), settings[0]):
+        yield chosen, Slab(designs.take(chosen), *settings)
+
+
+def _undercut(designs: Designs, settings: Settings) -> Iterator[tuple[NDArray[np.intp], Slab]]:
+    """Yield (places, designs whose rollers start on a corner), few at a time."""
+    for chosen in _slabs(np.flatnonzero(designs.undercut), settings[0]):
+        found, which = shapes(designs.take(chosen), settings[0])
+        there = [one for one in found if one is not None]
+        place = np.cumsum([one is not None for one in found]) - 1
+        kept = np.array([found[at] is not None for at in which.tolist()])
+        if there:
+            slab = CornerSlab(designs.take(chosen[kept]), *settings)
+            yield chosen[kept], slab.with_shapes(there, place[which[kept]])
 
 
 def _applies(spec: CamSpec, block: Block) -> bool:
@@ -77,6 +101,7 @@ def _applies(spec: CamSpec, block: Block) -> bool:
         and spec.analysis.path_method == "quadrature"
         and spec.analysis.origin == "path-start"
         and spec.analysis.travel is None
+        and spec.analysis.manufacturing is None
         and profile.stroke is not None
     )
     if not plain or not set(block.values) <= set(VARIED):
@@ -84,13 +109,13 @@ def _applies(spec: CamSpec, block: Block) -> bool:
     if isinstance(mechanism.springs.stiffness, tuple) or (spec.design is None and "design.force" in block.values):
         return False
     # A window cuts every curve at the same samples only if all have the same travel.
-    windowed = any(measure.window for measure in block.measures if measure.name in METRICS)
+    windowed = any(measure.window for measure in block.measures if measure.name in WINDOWED)
     return not windowed or ("mechanism.profile.stroke" not in block.values and _covered(spec, block))
 
 
 def _covered(spec: CamSpec, block: Block) -> bool:
     stroke = spec.mechanism.profile.stroke or 0.0
-    windows = [measure.window for measure in block.measures if measure.window and measure.name in METRICS]
+    windows = [measure.window for measure in block.measures if measure.window and measure.name in WINDOWED]
     return all(low >= 0 and high <= stroke for low, high in windows)
 
 
@@ -128,5 +153,5 @@ def _slabs(chosen: NDArray[np.intp], points: int) -> list[NDArray[np.intp]]:
 
 
 def _empty(name: str, size: int) -> dict[str, FloatArray]:
-    branches = ("load", "unload") if name in METRICS and name != "hysteresis_area" else ("",)
+    branches = BRANCHES if name in WINDOWED and name not in CYCLES else ("",)
     return {branch: np.full(size, np.nan) for branch in branches}

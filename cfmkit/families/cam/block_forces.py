@@ -13,12 +13,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
-
     from numpy.typing import NDArray
 
     from cfmkit.curves import FloatArray
-    from cfmkit.families.base import Measure
 
 _SLACK = 1e-9
 
@@ -65,11 +62,20 @@ class Designs:
     @cached_property
     def sound(self) -> NDArray[np.bool_]:
         """Whether the closed form holds from the start of the stroke to its end."""
+        return self._possible & (self.radius <= self.curvature_radius)
+
+    @cached_property
+    def undercut(self) -> NDArray[np.bool_]:
+        """Whether the roller starts on a corner and may reach the end of the stroke."""
+        return self._possible & (self.radius > self.curvature_radius) & (self.radius < self.brace)
+
+    @cached_property
+    def _possible(self) -> NDArray[np.bool_]:
         positive = np.ones(len(self), dtype=bool)
         for value in (self.brace, self.x0, self.radius, self.stiffness, self.constant, self.stroke, self.target):
             positive &= value > 0
         reaches = self.end < self.brace - 2e-9 * (self.brace - self.x0)
-        fits = (self.radius <= self.curvature_radius) & (self.radius <= self.brace)
+        fits = self.radius <= self.brace
         starts = self.x0 < self.brace * (1 - 1e-5)
         return positive & reaches & fits & starts & (self.friction >= 0) & (self.friction < 1)
 
@@ -94,12 +100,15 @@ class Slab:
         Samples on each branch.
     contacts : bool
         Whether contact forces are wanted.
+    band : float
+        Half width of the force band of the usable stroke, as a fraction.
     """
 
-    def __init__(self, designs: Designs, points: int, contacts: bool) -> None:
+    def __init__(self, designs: Designs, points: int, contacts: bool, band: float = 0.05) -> None:
         """Remember what is asked."""
-        self.designs, self.points, self.contacts = designs, points, contacts
-        self.spreads: dict[tuple[str, Any], _Spread] = {}
+        self.designs, self.points, self.contacts, self.band = designs, points, contacts, band
+        self.usable: tuple[FloatArray, FloatArray] | None = None
+        self.spreads: dict[tuple[str, Any], Spread] = {}
 
     @cached_property
     def travel(self) -> FloatArray:
@@ -120,9 +129,14 @@ class Slab:
         return (2.0 * self.designs.constant[:, None] * self.travel) ** 0.5
 
     @cached_property
+    def half_width(self) -> FloatArray:
+        """x of the right roller's centre [m]."""
+        return self.designs.x0[:, None] + self.stretch
+
+    @cached_property
     def tangent(self) -> FloatArray:
         """Tangent of the brace's angle from the axis."""
-        return tangents(self.designs.x0[:, None] + self.stretch, self.designs.brace[:, None])
+        return tangents(self.half_width, self.designs.brace[:, None])
 
     @cached_property
     def slope(self) -> FloatArray:
@@ -155,44 +169,79 @@ class Slab:
             contact[:, 0] = np.where(ideal, 0.5 * limit * (1.0 + self.slope[:, 0] ** 2) ** 0.5, 0.0)
         return Forces(slider, contact, np.asarray((lever[:, 1:] > 0).all(axis=1)))
 
+    @cached_property
+    def flank(self) -> NDArray[np.bool_]:
+        """Where the roller runs on the flank, which broadcasts to (designs, points)."""
+        return np.ones((1, 1), dtype=bool)
+
+    @cached_property
+    def corner_travel(self) -> FloatArray:
+        """Travel at which the roller leaves the cam's corner [m]; 0 where it starts on the flank."""
+        return np.zeros(len(self.designs))
+
+    @cached_property
+    def corner_peak(self) -> FloatArray:
+        """Largest force on the way up on the corner [N]; NaN without one."""
+        return np.full(len(self.designs), np.nan)
+
+    @cached_property
+    def jam_travel(self) -> FloatArray:
+        """Travel at the start over which friction lets no force move the slider up [m].
+
+        There is no lever until s/A (1 - mu t) = mu (1 + t^2), s the stretch and t the brace's tangent.
+        """
+        cams, mu = self.designs, self.designs.friction
+        stretch = np.zeros(len(cams))
+        for _ in range(8):
+            tangent = tangents(cams.x0 + stretch, cams.brace)
+            # Rounding at a start without any lever is not a jam, as in `statics.jams`.
+            stretch = np.maximum(cams.constant * (mu * (1.0 + tangent * tangent) - 1e-12) / (1.0 - mu * tangent), 0.0)
+        return np.where(mu > 0, stretch * stretch / (2.0 * cams.constant), 0.0)
+
     @property
     def solved(self) -> NDArray[np.bool_]:
         """Whether a force was found at every sample."""
         return self.up.moves & self.down.moves
 
-    def spread(self, branch: str, window: Any) -> _Spread:
+    def spread(self, branch: str, window: Any) -> Spread:
         """Return the forces of one branch inside a window."""
         if (branch, window) not in self.spreads:
             forces = self.up if branch == "load" else self.down
-            self.spreads[branch, window] = _Spread(self.travel, forces.slider, window)
+            self.spreads[branch, window] = Spread(self.travel, forces.slider, window)
         return self.spreads[branch, window]
 
 
-class _Spread:
+class Spread:
     """The forces of one branch inside a window."""
 
     def __init__(self, travel: FloatArray, force: FloatArray, window: tuple[float, float] | None) -> None:
+        """Cut the window out."""
         self.motion, self.force = (travel, force) if window is None else _inside(travel, force, window)
 
     @cached_property
     def mean(self) -> FloatArray:
+        """Mean force of each design [N]."""
         return np.asarray(self.force.mean(axis=1))
 
     @cached_property
     def max(self) -> FloatArray:
+        """Largest force [N]."""
         return np.asarray(self.force.max(axis=1))
 
     @cached_property
     def min(self) -> FloatArray:
+        """Smallest force [N]."""
         return np.asarray(self.force.min(axis=1))
 
     @cached_property
     def deviation(self) -> FloatArray:
+        """Standard deviation (n - 1) of the force [N]."""
         offset = self.force - self.mean[:, None]
         return np.asarray(np.sqrt(np.einsum("ij,ij->i", offset, offset) / (offset.shape[1] - 1)))
 
     @cached_property
     def work(self) -> FloatArray:
+        """Integral of the force over the travel [J]."""
         steps = np.diff(self.motion, axis=1)
         return np.asarray(np.einsum("ij,ij->i", steps, 0.5 * (self.force[:, 1:] + self.force[:, :-1])))
 
@@ -215,75 +264,3 @@ def _between(travel: FloatArray, force: FloatArray, after: int, place: float) ->
     share = (place - left) / (right - left)
     effort = force[:, after - 1] + share * (force[:, after] - force[:, after - 1])
     return np.full((len(travel), 1), place), effort[:, None]
-
-
-def measured(cams: Slab, measure: Measure) -> Mapping[str, FloatArray]:
-    """Return what a measure is for some designs: branch -> (n,) values, "" for what belongs to no branch."""
-    if measure.name in SCALARS:
-        return {"": SCALARS[measure.name](cams)}
-    if measure.name == "hysteresis_area":
-        return {"": cams.spread("load", measure.window).work - cams.spread("unload", measure.window).work}
-    function = METRICS[measure.name]
-    return {branch: function(cams.spread(branch, measure.window), cams.designs) for branch in ("load", "unload")}
-
-
-def _ripple(one: _Spread, _cams: Designs) -> FloatArray:
-    return (one.max - one.min) / one.max
-
-
-def _half_band(one: _Spread, _cams: Designs) -> FloatArray:
-    return (one.max - one.min) / (one.max + one.min)
-
-
-def _from_mean(one: _Spread, _cams: Designs) -> FloatArray:
-    return np.maximum(one.max - one.mean, one.mean - one.min) / one.mean
-
-
-def _from_target(one: _Spread, cams: Designs) -> FloatArray:
-    return np.maximum(np.abs(one.max - cams.target), np.abs(one.min - cams.target)) / cams.target
-
-
-METRICS: dict[str, Callable[[_Spread, Designs], FloatArray]] = {
-    "force_mean": lambda one, _cams: one.mean,
-    "force_sd": lambda one, _cams: one.deviation,
-    "force_max": lambda one, _cams: one.max,
-    "force_min": lambda one, _cams: one.min,
-    "force_ripple": _ripple,
-    "half_band": _half_band,
-    "deviation_from_mean": _from_mean,
-    "deviation_from_target": _from_target,
-    "hysteresis_area": lambda one, _cams: one.work,
-}
-
-
-def _smallest_constant(cams: Slab) -> FloatArray:
-    one = cams.designs
-    p = tangents(one.x0, one.brace)
-    inverse = (1.0 + p * p) ** 1.5 / one.radius - (1.0 + p * p) ** 1.5 / one.brace
-    return np.where(inverse > 0, 1.0 / inverse, np.nan)
-
-
-def _largest_contact(cams: Slab) -> FloatArray:
-    contacts = [forces.contact for forces in (cams.up, cams.down) if forces.contact is not None]
-    return np.asarray(np.max([one.max(axis=1) for one in contacts], axis=0))
-
-
-def _half_gap(cams: Slab) -> FloatArray:
-    up, down = cams.up.slider, cams.down.slider
-    total = up + down
-    return np.asarray(np.where(total > 0, (up - down) / np.where(total > 0, total, 1.0), -np.inf).max(axis=1))
-
-
-SCALARS: dict[str, Callable[[Slab], FloatArray]] = {
-    "force_constant": lambda cams: cams.designs.constant,
-    "spring_stiffness": lambda cams: cams.designs.stiffness,
-    "theoretical_force": lambda cams: 4.0 * cams.designs.stiffness * cams.designs.constant,
-    "undercut_travel": lambda cams: np.zeros(len(cams.designs)),
-    "roller_radius_max": lambda cams: cams.designs.curvature_radius,
-    "force_constant_min": _smallest_constant,
-    "corner_force_max": lambda cams: np.full(len(cams.designs), np.nan),
-    "spring_elongation_max": lambda cams: 2.0 * cams.stretch[:, -1],
-    "contact_force_max": _largest_contact,
-    "brace_angle_max": lambda cams: np.arcsin((cams.designs.x0 + cams.stretch[:, -1]) / cams.designs.brace),
-    "friction_half_gap_max": _half_gap,
-}

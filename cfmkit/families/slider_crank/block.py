@@ -69,7 +69,7 @@ def analyze_block(spec: SliderCrankSpec, block: Block) -> BlockAnswer | None:
         for measure, found in zip(block.measures, values, strict=True):
             found[""][rows] = slab.measured(measure)
     target = target_of(spec)
-    return BlockAnswer(done, values, None if target is None else np.full(block.size, target))
+    return BlockAnswer(done, values, None if target is None else np.full(block.size, target), base.assembly.drive)
 
 
 def _rates(spec: SliderCrankSpec, block: Block) -> tuple[FloatArray, NDArray[np.bool_]]:

@@ -1,0 +1,179 @@
+"""Many undercut cams at once: the roller starts on the cam's corner.
+
+Where the corner is and when the roller leaves it is found once for each different shape, by
+the model of one cam; the forces of all designs that share it are one array operation.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.bodies.cam_cut import WholeCamUndercut, cut
+from cfmkit.bodies.cam_path import reach
+from cfmkit.bodies.cam_profile import SlopeLaw
+from cfmkit.bodies.cam_track import Track
+from cfmkit.bodies.track_states import NoTrack
+from cfmkit.families.cam.block_forces import Forces, Slab, tangents
+from cfmkit.families.cam.build import CLOSE
+from cfmkit.families.cam.statics import jams
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from cfmkit.bodies.track_states import TrackStates
+    from cfmkit.curves import FloatArray
+    from cfmkit.families.cam.block_forces import Designs
+
+PEAK = 129
+"""Samples on the corner among which the largest force is looked for."""
+
+SHAPE = ("constant", "x0", "brace", "radius", "stroke")
+"""What decides where the corner is, in the order of `shape`."""
+
+_SAME = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """One cam with its roller's states: at all samples, and on the corner."""
+
+    track: Track
+    travel: FloatArray
+    states: TrackStates
+    corner: TrackStates
+
+    @property
+    def corner_travel(self) -> float:
+        """Travel at which the roller leaves the corner [m]."""
+        return self.track.corner_end - self.track.start
+
+
+def shape(law: SlopeLaw, radius: float, stroke: float, points: int) -> Shape | None:
+    """Return a cam that the roller climbs from its corner to the end of the stroke; None if there is none [m]."""
+    path, end = reach(law, stroke)
+    try:
+        profile = cut(path, radius, end)
+        track = Track(profile, radius, law.brace_length)
+    except (WholeCamUndercut, NoTrack):
+        return None
+    total = track.end - track.start
+    rises = not track.turns_back and float(path.travel(end)) >= stroke * (1 - CLOSE)
+    if profile.corner is None or not rises or abs(total - stroke) > _SAME * stroke or track.corner_end <= track.start:
+        return None
+    travel = np.linspace(0.0, total, points)
+    on_corner = np.linspace(0.0, min(track.corner_end - track.start, total) * (1 - 1e-9), PEAK)
+    return Shape(track, travel, track.states(track.start + travel), track.states(track.start + on_corner))
+
+
+def shapes(designs: Designs, points: int) -> tuple[list[Shape | None], NDArray[np.intp]]:
+    """Return the different cams among some designs, and which of them each design has, (n,)."""
+    rows, which = np.unique(np.stack([getattr(designs, name) for name in SHAPE], axis=1), axis=0, return_inverse=True)
+    laws = [(SlopeLaw(*row[:3]), row[3], row[4]) for row in rows.tolist()]
+    return [shape(law, radius, stroke, points) for law, radius, stroke in laws], which.reshape(-1)
+
+
+class CornerSlab(Slab):
+    """Some undercut designs at all their samples.
+
+    Parameters
+    ----------
+    designs : Designs
+        Those whose shapes exist.
+    found : list of Shape
+        Different cams.
+    which : (d,) array of int
+        Which of them each design has.
+    """
+
+    found: list[Shape]
+    which: NDArray[np.intp]
+
+    def with_shapes(self, found: list[Shape], which: NDArray[np.intp]) -> CornerSlab:
+        """Return the slab itself, with the shapes of its designs."""
+        self.found, self.which = found, which
+        return self
+
+    def _states(self, name: str, corner: bool = False) -> FloatArray:
+        each = [getattr(one.corner if corner else one.states, name) for one in self.found]
+        return np.asarray(np.stack(each)[self.which])
+
+    @cached_property
+    def travel(self) -> FloatArray:
+        """Travel of the slider [m]."""
+        return np.asarray(np.stack([one.travel for one in self.found])[self.which])
+
+    @cached_property
+    def half_width(self) -> FloatArray:
+        """x of the right roller's centre [m]."""
+        return self._states("x")
+
+    @cached_property
+    def stretch(self) -> FloatArray:
+        """x - x0 [m]."""
+        return self.half_width - self.designs.x0[:, None]
+
+    @cached_property
+    def slope(self) -> FloatArray:
+        """Slope of the track."""
+        return self._states("slope")
+
+    @cached_property
+    def flank(self) -> NDArray[np.bool_]:
+        """Where the roller runs on the flank."""
+        return ~self._states("on_corner").astype(bool)
+
+    @cached_property
+    def corner_travel(self) -> FloatArray:
+        """Travel at which the roller leaves the corner [m]."""
+        return np.array([one.corner_travel for one in self.found])[self.which]
+
+    @cached_property
+    def jams(self) -> list[tuple[tuple[float, float], ...]]:
+        """Intervals of travel in which no force moves the slider up [m], of each design."""
+        known: dict[tuple[int, float], tuple[tuple[float, float], ...]] = {}
+        for at, friction in zip(self.which.tolist(), self.designs.friction.tolist(), strict=True):
+            if friction and (at, friction) not in known:
+                one = self.found[at]
+                intervals = jams(one.track, friction, one.states if self.points < 100 else None)
+                known[at, friction] = tuple((low - one.track.start, high - one.track.start) for low, high in intervals)
+        pairs = zip(self.which.tolist(), self.designs.friction.tolist(), strict=True)
+        return [known.get(pair, ()) for pair in pairs]
+
+    @cached_property
+    def jam_travel(self) -> FloatArray:
+        """Travel at the start over which friction lets no force move the slider up [m]."""
+        return np.array([next((high for low, high in each if low <= 0), 0.0) for each in self.jams])
+
+    @cached_property
+    def corner_peak(self) -> FloatArray:
+        """Largest force on the way up on the corner [N], from samples refined by a parabola through the highest."""
+        x, slope = self._states("x", corner=True), self._states("slope", corner=True)
+        force = self._over(x - self.designs.x0[:, None], slope, x, self.designs.friction).slider
+        top, rows = force.argmax(axis=1), np.arange(len(force))
+        inner = np.clip(top, 1, force.shape[1] - 2)
+        left, middle, right = force[rows, inner - 1], force[rows, inner], force[rows, inner + 1]
+        bend = left - 2.0 * middle + right
+        refined = np.where(bend < 0, middle - (right - left) ** 2 / (8.0 * np.where(bend < 0, bend, -1.0)), middle)
+        held = np.array(
+            [any(low < end for low, _ in each) for each, end in zip(self.jams, self.corner_travel, strict=True)]
+        )
+        return np.where(held, np.nan, np.where(top == inner, refined, force[rows, top]))
+
+    def _forces(self, friction: FloatArray) -> Forces:
+        return self._over(self.stretch, self.slope, self.half_width, friction)
+
+    def _over(self, stretch: FloatArray, slope: FloatArray, x: FloatArray, friction: FloatArray) -> Forces:
+        """Return the forces at some states, as `statics.forces` does without weight."""
+        mu, tangent = friction[:, None], tangents(x, self.designs.brace[:, None])
+        turn = 1.0 + mu * slope
+        lever = slope - mu - tangent * turn
+        moves = lever > 0
+        spring = 2.0 * self.designs.stiffness[:, None] * np.maximum(stretch, 0.0)
+        divisor = np.where(moves, lever, 1.0)
+        contact = np.sqrt(1.0 + slope * slope) * spring / divisor if self.contacts else None
+        solved = np.asarray((moves | (spring == 0)).all(axis=1))
+        return Forces(2.0 * (spring * turn) / divisor, contact, solved)

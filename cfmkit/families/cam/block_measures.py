@@ -1,0 +1,154 @@
+"""What is asked of many cams at once: metrics over windows, and the family's own values."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.families.cam.block_forces import tangents
+from cfmkit.families.cam.values import DEFINITIONS
+from cfmkit.metrics.many import RANGES, ManyBranches, rms_to_target, usable_interval
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from cfmkit.curves import FloatArray
+    from cfmkit.families.base import Measure
+    from cfmkit.families.cam.block_forces import Designs, Slab, Spread
+
+    Window = tuple[float, float] | None
+
+BRANCHES = ("load", "unload")
+
+
+def measured(cams: Slab, measure: Measure) -> Mapping[str, FloatArray]:
+    """Return what a measure is for some designs: branch -> (n,) values, "" for what belongs to no branch."""
+    if measure.name in SCALARS:
+        return {"": SCALARS[measure.name](cams)}
+    if measure.name in ABSENT:
+        return {"": np.full(len(cams.designs), np.nan)}
+    if measure.name in CYCLES:
+        return {"": CYCLES[measure.name](cams, measure.window)}
+    if measure.name in METRICS:
+        function = METRICS[measure.name]
+        return {branch: function(cams.spread(branch, measure.window), cams.designs) for branch in BRANCHES}
+    branches = {branch: _branch(cams, branch, measure.window) for branch in BRANCHES}
+    if measure.name == RMS:
+        return {branch: rms_to_target(many, cams.designs.target) for branch, many in branches.items()}
+    return {branch: RANGES[measure.name](many) for branch, many in branches.items()}
+
+
+def _branch(cams: Slab, branch: str, window: Window) -> ManyBranches:
+    effort = (cams.up if branch == "load" else cams.down).slider
+    if window is None:
+        return ManyBranches(cams.travel, effort, cams.travel[:, 0], cams.travel[:, -1])
+    low, high = (np.full(len(cams.designs), end) for end in window)
+    return ManyBranches(cams.travel, effort, low, high)
+
+
+def _ripple(one: Spread, _cams: Designs) -> FloatArray:
+    return (one.max - one.min) / one.max
+
+
+def _half_band(one: Spread, _cams: Designs) -> FloatArray:
+    return (one.max - one.min) / (one.max + one.min)
+
+
+def _from_mean(one: Spread, _cams: Designs) -> FloatArray:
+    return np.maximum(one.max - one.mean, one.mean - one.min) / one.mean
+
+
+def _from_target(one: Spread, cams: Designs) -> FloatArray:
+    return np.maximum(np.abs(one.max - cams.target), np.abs(one.min - cams.target)) / cams.target
+
+
+METRICS: dict[str, Callable[[Spread, Designs], FloatArray]] = {
+    "force_mean": lambda one, _cams: one.mean,
+    "force_sd": lambda one, _cams: one.deviation,
+    "force_max": lambda one, _cams: one.max,
+    "force_min": lambda one, _cams: one.min,
+    "force_ripple": _ripple,
+    "half_band": _half_band,
+    "deviation_from_mean": _from_mean,
+    "deviation_from_target": _from_target,
+}
+"""Metrics of one branch inside its window."""
+
+RMS = "rms_to_target"
+
+
+def _hysteresis(cams: Slab, window: Window) -> FloatArray:
+    return cams.spread("load", window).work - cams.spread("unload", window).work
+
+
+def _usable(cams: Slab) -> tuple[FloatArray, FloatArray]:
+    if cams.usable is None:
+        branches = [_branch(cams, branch, None) for branch in BRANCHES]
+        cams.usable = usable_interval(branches, cams.designs.target, cams.band, cams.corner_travel)
+    return cams.usable
+
+
+def _usable_stroke(cams: Slab, _window: Window) -> FloatArray:
+    start, end = _usable(cams)
+    return np.where(np.isnan(start), 0.0, end - start)
+
+
+CYCLES: dict[str, Callable[[Slab, Window], FloatArray]] = {
+    "hysteresis_area": _hysteresis,
+    "usable_stroke": _usable_stroke,
+    "usable_start": lambda cams, _window: _usable(cams)[0],
+    "usable_end": lambda cams, _window: _usable(cams)[1],
+}
+"""Metrics of both branches together."""
+
+
+def _smallest_constant(cams: Slab) -> FloatArray:
+    one = cams.designs
+    p = tangents(one.x0, one.brace)
+    inverse = (1.0 + p * p) ** 1.5 / one.radius - (1.0 + p * p) ** 1.5 / one.brace
+    return np.where(inverse > 0, 1.0 / inverse, np.nan)
+
+
+def _largest_contact(cams: Slab) -> FloatArray:
+    contacts = [forces.contact for forces in (cams.up, cams.down) if forces.contact is not None]
+    return np.asarray(np.max([one.max(axis=1) for one in contacts], axis=0))
+
+
+def _half_gap(cams: Slab) -> FloatArray:
+    up, down = cams.up.slider, cams.down.slider
+    total = up + down
+    usable = cams.flank & (total > 0)
+    return np.asarray(np.where(usable, (up - down) / np.where(usable, total, 1.0), -np.inf).max(axis=1))
+
+
+def _pressure_angle(cams: Slab) -> FloatArray:
+    angle = np.arctan2(1.0 + cams.slope * cams.tangent, cams.slope - cams.tangent)
+    return np.asarray(np.where(cams.flank, angle, -np.inf).max(axis=1))
+
+
+SCALARS: dict[str, Callable[[Slab], FloatArray]] = {
+    "force_constant": lambda cams: cams.designs.constant,
+    "spring_stiffness": lambda cams: cams.designs.stiffness,
+    "theoretical_force": lambda cams: 4.0 * cams.designs.stiffness * cams.designs.constant,
+    "undercut_travel": lambda cams: cams.corner_travel,
+    "roller_radius_max": lambda cams: cams.designs.curvature_radius,
+    "force_constant_min": _smallest_constant,
+    "corner_force_max": lambda cams: cams.corner_peak,
+    "jam_travel": lambda cams: cams.jam_travel,
+    "spring_elongation_max": lambda cams: 2.0 * cams.stretch.max(axis=1),
+    "contact_force_max": _largest_contact,
+    "pressure_angle_max": _pressure_angle,
+    "brace_angle_max": lambda cams: np.arcsin(cams.half_width.max(axis=1) / cams.designs.brace),
+    "friction_half_gap_max": _half_gap,
+}
+"""The family's own values."""
+
+ABSENT = frozenset(DEFINITIONS) - frozenset(SCALARS)
+"""Values of motions, contacts, measured and tolerated cams: a cam without these has none."""
+
+WINDOWED = frozenset((*METRICS, *CYCLES, *RANGES, RMS))
+"""What is measured over a window, or against its ends."""
+
+KNOWN = WINDOWED | frozenset(DEFINITIONS)
+"""Everything that can be asked."""

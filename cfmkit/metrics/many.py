@@ -1,0 +1,193 @@
+"""Metrics that are lengths of travel, for many curves at once: those of `ranges`, row by row.
+
+Each row is one branch: its motion increases, and its effort is known at every sample.
+The formulas are those for one curve, in the same order.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.metrics.flatness import UNIFORM_POINTS
+from cfmkit.metrics.ranges import ROUNDING
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from numpy.typing import NDArray
+
+    from cfmkit.curves import FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class ManyBranches:
+    """One branch of many curves.
+
+    Attributes
+    ----------
+    motion, effort : (d, n) array
+        Increasing along each row [m or rad], and finite [N or N m].
+    low, high : (d,) array
+        Ends of the window, or of the travel where there is no window.
+    """
+
+    motion: FloatArray
+    effort: FloatArray
+    low: FloatArray
+    high: FloatArray
+
+    def at(self, places: FloatArray) -> FloatArray:
+        """Return the effort at places of each row, (d, m), by linear interpolation."""
+        last = self.motion.shape[1] - 1
+        rows = np.arange(len(self.motion))[:, None]
+        left = np.stack([row.searchsorted(at, "right") for row, at in zip(self.motion, places, strict=True)]) - 1
+        left = np.minimum(np.maximum(left, 0), last - 1)
+        start, stop = self.motion[rows, left], self.motion[rows, left + 1]
+        first, second = self.effort[rows, left], self.effort[rows, left + 1]
+        inside = (second - first) / (stop - start) * (places - start) + first
+        beyond = np.where(places >= self.motion[:, -1:], self.effort[:, -1:], inside)
+        found: FloatArray = np.where(places <= self.motion[:, :1], self.effort[:, :1], beyond)
+        return found
+
+
+def rms_to_target(many: ManyBranches, target: FloatArray) -> FloatArray:
+    """Return `flatness.rms_to_target` of each row, (d,); `target` is (d,)."""
+    low, high = many.low[:, None], many.high[:, None]
+    places = low + (high - low) * np.arange(1, UNIFORM_POINTS + 1) / UNIFORM_POINTS
+    offset = many.at(places) - target[:, None]
+    return np.asarray(np.sqrt(np.einsum("ij,ij->i", offset, offset) / UNIFORM_POINTS))
+
+
+def range_95(many: ManyBranches) -> FloatArray:
+    """Return `ranges.range_95` of each row, (d,); call it with numpy's warnings off, as all of these."""
+    return many.high - _first_95(many)
+
+
+def range_95_fraction(many: ManyBranches) -> FloatArray:
+    """Return `ranges.range_95_fraction` of each row, (d,)."""
+    return np.where(many.high > 0, (many.high - _first_95(many)) / many.high, np.nan)
+
+
+def _first_95(many: ManyBranches) -> FloatArray:
+    motion, effort, rows = many.motion, many.effort, np.arange(len(many.motion))
+    nominal = many.at(many.high[:, None])[:, 0]
+    before = (motion < many.high[:, None]).sum(axis=1)
+    reached = (effort / nominal[:, None] >= 0.95 - ROUNDING) & (np.arange(motion.shape[1]) < before[:, None])
+    first = np.where(reached.any(axis=1), reached.argmax(axis=1), before)
+    sample, earlier = np.minimum(first, motion.shape[1] - 1), np.maximum(first - 1, 0)
+    place = np.where(first < before, motion[rows, sample], many.high)
+    level = np.where(first < before, effort[rows, sample], nominal)
+    heights = effort[rows, earlier] - 0.95 * nominal, level - 0.95 * nominal
+    crossed = _crossing((motion[rows, earlier], place), heights)
+    return np.where(nominal == 0, np.nan, np.where(first == 0, motion[:, 0], crossed))
+
+
+def _crossing(motion: tuple[FloatArray, FloatArray], height: tuple[FloatArray, FloatArray]) -> FloatArray:
+    step = height[1] - height[0]
+    return np.where(np.abs(step) > 0, motion[0] - height[0] * (motion[1] - motion[0]) / step, motion[1])
+
+
+def band_range(many: ManyBranches, tolerance: float) -> FloatArray:
+    """Return `ranges.band_range` of each row about the middle of its window, (d,)."""
+    motion, place = many.motion, (many.low + many.high) / 2
+    here = many.at(place[:, None])[:, 0]
+    offset = many.effort / here[:, None] - 1
+    outside = ~(np.abs(offset) <= tolerance * (1 + ROUNDING))
+    index = (motion < place[:, None]).sum(axis=1)
+    samples = np.arange(motion.shape[1])
+    left, right = outside & (samples < index[:, None]), outside & (samples >= index[:, None])
+    low = _edge(many, offset, (motion.shape[1] - 1 - left[:, ::-1].argmax(axis=1), 1), (index, place), tolerance)
+    high = _edge(many, offset, (right.argmax(axis=1), -1), (index, place), tolerance)
+    low = np.where(left.any(axis=1), low, motion[:, 0])
+    high = np.where(right.any(axis=1), high, motion[:, -1])
+    return np.where(here == 0, np.nan, high - low)
+
+
+def _edge(
+    many: ManyBranches,
+    offset: FloatArray,
+    bad: tuple[NDArray[np.intp], int],
+    pose: tuple[NDArray[np.intp], FloatArray],
+    tolerance: float,
+) -> FloatArray:
+    """Return where the offset leaves the band between the sample `bad` and its neighbour inside."""
+    rows, (worst, inward), (index, place) = np.arange(len(offset)), bad, pose
+    inner = np.minimum(np.maximum(worst + inward, 0), offset.shape[1] - 1)
+    # The reference pose, with no offset, stands between the samples index - 1 and index.
+    beside = worst == (index - 1 if inward > 0 else index)
+    good, height = (
+        np.where(beside, place, many.motion[rows, inner]),
+        np.where(beside, 0.0, offset[rows, inner]),
+    )
+    level = np.where(offset[rows, worst] > 0, tolerance, -tolerance)
+    return _crossing((many.motion[rows, worst], good), (offset[rows, worst] - level, height - level))
+
+
+def usable_interval(
+    branches: Sequence[ManyBranches], target: FloatArray, band: float, valid: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return start and end of `ranges.usable_interval` of each row, (d,) each; NaN where there is none.
+
+    Parameters
+    ----------
+    branches : sequence of ManyBranches
+        Of one motion.
+    target : (d,) array
+        What the efforts are compared with, not zero.
+    band : float
+        Half width of the band, as a fraction.
+    valid : (d,) array
+        Where the mechanism starts to work as intended.
+    """
+    motion = branches[0].motion
+    # What is usable of each step between two samples, and whether a new interval begins there.
+    steps = _Steps(motion[:, :-1].copy(), motion[:, 1:].copy(), np.zeros(motion[:, 1:].shape, dtype=bool))
+    steps.begins[:, 0] = True
+    width = band * (1 + ROUNDING)
+    for branch in branches:
+        ratio = branch.effort / target[:, None] - 1
+        for height in (ratio - width, -width - ratio):
+            _narrow(motion, height, steps)
+    since = np.maximum.accumulate(np.where(steps.begins, np.arange(steps.begins.shape[1]), 0), axis=1)
+    start = np.maximum(np.take_along_axis(steps.low, since, axis=1), valid[:, None])
+    length, rows = steps.high - start, np.arange(len(motion))
+    best = length.argmax(axis=1)
+    some = length[rows, best] > 0
+    return np.where(some, start[rows, best], np.nan), np.where(some, steps.high[rows, best], np.nan)
+
+
+@dataclass(frozen=True, eq=False)
+class _Steps:
+    low: FloatArray
+    high: FloatArray
+    begins: NDArray[np.bool_]
+
+
+def _narrow(motion: FloatArray, height: FloatArray, steps: _Steps) -> None:
+    """Take from each step between two samples the part over which a piecewise linear height is positive."""
+    bad = ~(height <= 0)
+    if not bad.any():
+        return
+    left, right = bad[:, :-1], bad[:, 1:]
+    rise = height[:, 1:] - height[:, :-1]
+    mixed = left != right
+    place = motion[:, :-1] - height[:, :-1] * (motion[:, 1:] - motion[:, :-1]) / np.where(mixed, rise, 1.0)
+    np.copyto(steps.low, np.maximum(steps.low, place), where=left & ~right)
+    np.copyto(steps.high, np.minimum(steps.high, place), where=right & ~left)
+    np.copyto(steps.low, motion[:, 1:], where=left & right)
+    np.copyto(steps.high, motion[:, :-1], where=left & right)
+    np.logical_or(steps.begins, left, out=steps.begins)
+
+
+BAND_RANGES = {"band_range_05pct": 0.005, "band_range_1pct": 0.01, "band_range_5pct": 0.05}
+RANGES: dict[str, Callable[[ManyBranches], FloatArray]] = {
+    "range_95": range_95,
+    "range_95_fraction": range_95_fraction,
+    "band_range_05pct": lambda many: band_range(many, BAND_RANGES["band_range_05pct"]),
+    "band_range_1pct": lambda many: band_range(many, BAND_RANGES["band_range_1pct"]),
+    "band_range_5pct": lambda many: band_range(many, BAND_RANGES["band_range_5pct"]),
+}
+"""What needs nothing but the branch."""

@@ -1,0 +1,66 @@
+"""Range metrics of many curves at once are those of each curve."""
+
+import numpy as np
+import pytest
+
+from cfmkit.curves import Curve
+from cfmkit.metrics import Frame, Window
+from cfmkit.metrics.evaluation import survey
+from cfmkit.metrics.many import RANGES, ManyBranches, rms_to_target, usable_interval
+from cfmkit.metrics.table import TABLE
+
+DEFINED = {item.name: item for item in TABLE}
+COUNT, POINTS = 300, 41
+
+
+def curves(seed):
+    """Return motions and efforts that rise, wave, cross their bands, and touch them exactly."""
+    rng = np.random.default_rng(seed)
+    motion = np.sort(rng.uniform(0.0, 1.0, (COUNT, POINTS)), axis=1)
+    motion[:, 0] = 0.0
+    waves = rng.uniform(0.0, 0.12, (COUNT, 1)) * np.sin(rng.uniform(1, 40, (COUNT, 1)) * motion)
+    effort = 10.0 * (1.0 + waves + rng.uniform(-0.1, 0.1, (COUNT, 1)) * motion)
+    effort[::3, 0] = 0.0
+    effort[::5] = np.round(effort[::5] * 2.0) / 2.0
+    effort[1::7] = 10.0
+    return motion, effort
+
+
+def alone(motion, efforts, window, name):
+    """Return a metric of one curve whose branches have one motion, unloading stored backwards."""
+    path = np.concatenate([motion, *(motion[::-1] for _ in efforts[1:])])
+    effort = np.concatenate([efforts[0], *(one[::-1] for one in efforts[1:])])
+    branch = np.repeat(["load", "unload"][: len(efforts)], len(motion))
+    frame = Frame(target=10.0, valid=((0.05, float(motion[-1])),))
+    view = survey(Curve(path, effort, branch, np.ones(len(path), bool)), frame, window)
+    definition = DEFINED[name]
+    value = view.worst(definition, view.each(definition)).value
+    return np.nan if value is None else value
+
+
+@pytest.mark.parametrize("window", [None, (0.2, 0.8)])
+@pytest.mark.parametrize("name", [*RANGES, "rms_to_target"])
+def test_a_range_of_many_curves_is_that_of_each(name, window):
+    motion, effort = curves(1)
+    motion[:, -1] = 1.0
+    low, high = (np.full(COUNT, end) for end in window) if window else (motion[:, 0], motion[:, -1])
+    many = ManyBranches(motion, effort, low, high)
+    with np.errstate(all="ignore"):
+        found = rms_to_target(many, np.full(COUNT, 10.0)) if name == "rms_to_target" else RANGES[name](many)
+    wanted = [alone(motion[k], [effort[k]], Window(*window) if window else None, name) for k in range(COUNT)]
+    assert np.allclose(found, wanted, rtol=1e-12, atol=1e-13, equal_nan=True)
+    assert np.ptp(found[np.isfinite(found)]) > 0.01
+
+
+@pytest.mark.parametrize("seed", [2, 3])
+def test_the_usable_interval_of_many_loops_is_that_of_each(seed):
+    motion, load = curves(seed)
+    _, unload = curves(seed + 10)
+    unload[::40] = 20.0
+    branches = [ManyBranches(motion, one, motion[:, 0], motion[:, -1]) for one in (load, unload)]
+    start, end = usable_interval(branches, np.full(COUNT, 10.0), 0.05, np.full(COUNT, 0.05))
+    found = {"usable_start": start, "usable_end": end, "usable_stroke": np.nan_to_num(end - start)}
+    for name, values in found.items():
+        wanted = [alone(motion[k], [load[k], unload[k]], None, name) for k in range(COUNT)]
+        assert np.allclose(values, wanted, rtol=1e-12, atol=1e-13, equal_nan=True)
+    assert 20 < np.isfinite(start).sum() < COUNT
