@@ -1,4 +1,4 @@
-"""The beam family: closures, copies, surfaces, rescaling, findings; limits, symmetries and other networks than Lan's."""
+"""The beam family: closures, copies, surfaces, rescaling, findings; limits, symmetries, other networks than Lan's."""
 
 from __future__ import annotations
 
