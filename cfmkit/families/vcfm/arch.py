@@ -64,25 +64,22 @@ class CosineArch:
 
     @cached_property
     def linear(self) -> tuple[Any, Any]:
-        """Where the arch is buckled, from and to [m]; NaN where it never is."""
-        places = np.linspace(0.0, 2.0, 2001) * self.strip.rise
-        above = np.flatnonzero(self.root(places) >= BUCKLED)
-        if not len(above):
-            return np.nan, np.nan
-        return tuple(
-            self._edge(float(places[i]), float(places[j]))
-            for i, j in ((above[0] - 1, above[0]), (above[-1] + 1, above[-1]))
-        )  # type: ignore[return-value]
+        """Where the arch is buckled, from and to [m]; NaN where it never is.
 
-    def _edge(self, outside: float, inside: float) -> float:
-        """Return where z passes pi^2, by bisection."""
-        for _ in range(40):
-            middle = 0.5 * (outside + inside)
-            if self.root(np.array([middle]))[0] >= BUCKLED:
-                inside = middle
-            else:
-                outside = middle
-        return inside
+        At a given load the shortening is quadratic in the travel: where it fits the load of buckling, that begins.
+        """
+        rise = float(self.strip.rise)
+        constant, by_drop, by_square = (float(item[0]) for item in self._quadratic(np.array([BUCKLED])))
+        drops = np.roots([by_square, by_drop, constant - self._stretch * BUCKLED])
+        if np.iscomplex(drops).any():
+            return np.nan, np.nan
+        first, last = sorted(rise - drops.real)
+        return float(first), float(last)
+
+    @property
+    def _stretch(self) -> Any:
+        """Shortening by the axial force, per z."""
+        return self.critical_force / (BUCKLED * self.strip.axial)
 
     def buckled(self, travel: Any) -> Any:
         """Return whether the arch is buckled."""
@@ -116,23 +113,47 @@ class CosineArch:
         g = 0.5 * k * (self.strip.rise - travel + 2.0 * c) / (q * np.cos(q) - np.sin(q))
         return q, k, c, g
 
-    def _shortening(self, z: FloatArray, travel: FloatArray) -> FloatArray:
-        """Return how much shorter the arch is than as made, over its length, by Gauss's quadrature."""
-        q, _, c, g = (item[..., None] for item in self.waves(z, travel))
+    def _quadratic(self, z: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return the coefficients of the shortening in the drop h - d still to go, by Gauss's quadrature."""
+        (q, k, c, _), rise = (item[..., None] for item in self.waves(z, np.zeros(z.shape))), self.strip.rise
         own = np.pi / self.developed * np.cos(0.5 * np.pi * _NODES)
-        slope = np.real(-c * own + g * (np.cos(q) - np.cos(q * _NODES)))
-        return np.asarray(0.25 * ((0.5 * self.strip.rise * own) ** 2 - slope**2) @ _WEIGHTS)
+        with np.errstate(all="ignore"):
+            wave = 0.5 * k * (np.cos(q) - np.cos(q * _NODES)) / (q * np.cos(q) - np.sin(q))
+        still, moved = np.real(-c * own + 2.0 * c * wave), np.real(wave)
+        made = (0.5 * rise * own) ** 2
+        return tuple(0.25 * item @ _WEIGHTS for item in (made - still**2, -2.0 * still * moved, -(moved**2)))
+
+    @cached_property
+    def _table(self) -> tuple[FloatArray, tuple[FloatArray, ...]]:
+        """Loads z from strong tension up to the pole, and the shortening's coefficients there."""
+        z = _POLE - np.geomspace(_LOOSE, 1e-10, 4000)
+        return z, self._quadratic(z)
 
     def root(self, travel: FloatArray) -> FloatArray:
-        """Return z at each travel, by bisection: the shortening falls as the load grows."""
-        low, high = np.full(travel.shape, -_LOOSE), np.full(travel.shape, _POLE * (1 - 1e-12))
-        stretch = self.critical_force / (BUCKLED * self.strip.axial)
-        for _ in range(56):
-            z = 0.5 * (low + high)
+        """Return z at each travel: the shortening falls as the load grows, so there is one.
+
+        Found in a table by bisection, then refined between its neighbours by secants.
+        """
+        drop, (table, known) = self.strip.rise - np.asarray(travel, dtype=float), self._table
+
+        def excess(z: FloatArray, coefficients: tuple[FloatArray, ...]) -> FloatArray:
+            constant, by_drop, by_square = coefficients
+            return np.asarray(self._stretch * z - constant - drop * (by_drop + drop * by_square))
+
+        low, high = np.zeros(drop.shape, dtype=int), np.full(drop.shape, len(table) - 1)
+        while (high - low > 1).any():
+            middle = (low + high) // 2
+            over = excess(table[middle], tuple(item[middle] for item in known)) > 0
+            low, high = np.where(over, low, middle), np.where(over, middle, high)
+        before, z = table[low], table[high]
+        size_before, size = (excess(table[at], tuple(item[at] for item in known)) for at in (low, high))
+        for _ in range(6):
             with np.errstate(all="ignore"):
-                over = stretch * z > self._shortening(z, travel)
-            low, high = np.where(over, low, z), np.where(over, z, high)
-        return np.asarray(0.5 * (low + high))
+                step = size * (z - before) / (size - size_before)
+            before, size_before = z, size
+            z = np.clip(z - np.where(np.isfinite(step), step, 0.0), table[low], table[high])
+            size = excess(z, self._quadratic(z))
+        return np.asarray(z)
 
     def _bent_curvature(self, z: FloatArray, travel: FloatArray) -> FloatArray:
         q, k, c, g = (item[..., None] for item in self.waves(np.minimum(z, _POLE - 0.1), travel))
