@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from cfmkit.curves import FloatArray
 
 _STEP = 1e-30
-_ITERATIONS = 40
+_ITERATIONS, _CONVERGED = 40, 1e-9
 _GAUSS = np.polynomial.legendre.leggauss(8)
 
 
@@ -195,45 +195,66 @@ class _Elements:
             levers.append((cc * ax - ss * ay) * fy - (ss * ax + cc * ay) * fx)
         return np.stack([-fx, -fy, first - levers[0], fx, fy, last + levers[1]], axis=1)
 
-    def system(self, u: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return gradient and Hessian of the energy by all freedoms."""
-        index = np.concatenate([self.dofs[:, :1] + np.arange(3), self.dofs[:, 1:] + np.arange(3)], axis=1)
+    def gradient(self, u: FloatArray) -> FloatArray:
+        """Return the gradient of the energy by all freedoms."""
+        index, out = self._index(), np.zeros(self.size)
+        np.add.at(out, index, self.forces(u[index]))
+        return out
+
+    def _index(self) -> Any:
+        return np.concatenate([self.dofs[:, :1] + np.arange(3), self.dofs[:, 1:] + np.arange(3)], axis=1)
+
+    def hessian(self, u: FloatArray) -> Any:
+        """Return the Hessian of the energy by all freedoms, sparse."""
+        from scipy.sparse import coo_array
+
+        index = self._index()
         own = u[index]
-        gradient, hessian = np.zeros(self.size), np.zeros((self.size, self.size))
-        np.add.at(gradient, index, self.forces(own))
+        columns = []
         for k in range(6):
             tilted = own.astype(complex)
             tilted[:, k] += 1j * _STEP
-            np.add.at(hessian, (index, index[:, k : k + 1]), self.forces(tilted).imag / _STEP)
-        return gradient, hessian
+            columns.append(self.forces(tilted).imag / _STEP)
+        values = np.stack(columns, axis=2)
+        rows = np.repeat(index[:, :, None], 6, axis=2)
+        return coo_array((values.ravel(), (rows.ravel(), rows.transpose(0, 2, 1).ravel())), (self.size, self.size))
 
     def solve(self, path: Path, index: int) -> _State:
         """Return the equilibrium near a point of the path."""
-        turn, free, driven = self._frames(path)
-        u = self._guess(path, index)
+        from scipy.sparse.linalg import splu
+
+        turn, free, driven = self._frames()
+        held, u = turn[:, free], self._guess(path, index)
         for _ in range(_ITERATIONS):
-            gradient, hessian = self.system(u)
-            reduced = (turn.T @ hessian @ turn)[np.ix_(free, free)]
-            step = np.linalg.solve(reduced, (turn.T @ gradient)[free])
-            u = u - turn[:, free] @ (step * min(1.0, 0.3 / max(float(np.abs(step).max()), 1e-300)))
-            if float(np.abs(step).max()) < 1e-11:
+            # pivots stay on the diagonal: their signs are those of the energy's curvatures
+            factors = splu(
+                (held.T @ self.hessian(u) @ held).tocsc(),
+                permc_spec="MMD_AT_PLUS_A",
+                diag_pivot_thresh=0.0,
+                options={"SymmetricMode": True},
+            )
+            step = factors.solve(held.T @ self.gradient(u))
+            u = u - held @ (step * min(1.0, 0.3 / max(float(np.abs(step).max()), 1e-300)))
+            if float(np.abs(step).max()) < _CONVERGED:
                 break
         else:
             return _State(np.nan, np.nan, False)
         dof, sense = driven
-        effort = sense * float((turn.T @ self.system(u)[0])[dof])
-        lowest = float(np.linalg.eigvalsh(0.5 * (reduced + reduced.T))[0])
-        return _State(effort, self._stress(u), lowest > 0)
+        effort = sense * float((turn.T @ self.gradient(u))[dof])
+        return _State(effort, self._stress(u), bool((factors.U.diagonal() > 0).all()))
 
-    def _frames(self, path: Path) -> tuple[FloatArray, Any, tuple[int, float]]:
-        """Return the turn of the nodes' frames, the freedoms that are free, and the driven one with its sense."""
-        turn, free = np.eye(self.size), np.ones(self.size, dtype=bool)
+    def _frames(self) -> tuple[Any, Any, tuple[int, float]]:
+        """Return the turn of the nodes' frames (sparse), the freedoms that are free, the driven one with its sense."""
+        from scipy.sparse import lil_array
+
+        turn, free = lil_array((self.size, self.size)), np.ones(self.size, dtype=bool)
+        turn.setdiag(1.0)
         for name in self.layout.masters:
             first, angle = self.layout.first[name], self.layout.direction[name]
             c, s = np.cos(angle), np.sin(angle)
-            turn[first : first + 2, first : first + 2] = [[c, -s], [s, c]]
+            turn[first : first + 2, first : first + 2] = np.array([[c, -s], [s, c]])
             free[first : first + 3] = self.layout.free[first : first + 3]
-        return turn, np.flatnonzero(free), self.layout.driven  # type: ignore[return-value]
+        return turn.tocsc(), np.flatnonzero(free), self.layout.driven  # type: ignore[return-value]
 
     def _guess(self, path: Path, index: int) -> FloatArray:
         """Return the path's own motions: exact at the nodes of the network, interpolated inside the beams."""
@@ -256,8 +277,7 @@ class _Elements:
 
     def _stress(self, u: FloatArray) -> float:
         """Return the largest stress at the ends of the elements."""
-        index = np.concatenate([self.dofs[:, :1] + np.arange(3), self.dofs[:, 1:] + np.arange(3)], axis=1)
-        normal, first, last, _, _ = self.local(u[index])
+        normal, first, last, _, _ = self.local(u[self._index()])
         moments = np.abs(np.stack([first, last], axis=1))
         area = self.width[:, None] * self.thickness
         found = 6 * moments / (area * self.thickness) + np.abs(normal)[:, None] / area

@@ -66,6 +66,10 @@ def design(spec: SliderCrankSpec, run: Run) -> Design:
     wanted = spec.design
     if wanted is None:
         return Design(None, Status.INVALID, "this spec has no 'design' block: add 'torque' or 'force', and a window")
+    if wanted.beam is not None or wanted.flexures is not None:
+        from cfmkit.families.slider_crank.flexures.design import design as design_part
+
+        return design_part(spec, run)
     try:
         solved, search = _searched(spec, wanted, run)
     except (Infeasible, CannotBuild) as problem:
@@ -155,6 +159,8 @@ def solve(task: Task) -> Solved:
     rates = least_squares(goal) if wanted.objective == "least-squares" else minimax(goal)
     if rates is None:
         raise Infeasible(cannot_hold(task))
+    if not rates.any():
+        raise Infeasible(cannot_hold(task) if wanted.hold_stiffness else nowhere(task))
     if wanted.slack:
         rates = chosen_rates(goal, rates, wanted)
     deviation = goal.deviation(rates)
@@ -172,8 +178,18 @@ def _written(solved: Solved) -> SliderCrankSpec:
         mechanism = solved.task.spec.mechanism.model_copy(update={"springs": springs})
     drive = "torque" if wanted.torque is not None else "force"
     name = "reference_angle" if drive == "torque" else "reference_travel"
-    analysis = spec.analysis.model_copy(update={"drive": drive, name: _reference(solved)})
+    written = {"drive": drive, name: _reference(solved)} | _seen(solved)
+    analysis = spec.analysis.model_copy(update=written)
     return spec.model_copy(update={"mechanism": mechanism, "analysis": analysis})
+
+
+def _seen(solved: Solved) -> dict[str, tuple[float, float]]:
+    """Return the motion of the analysis, if it is stated and has to be longer to show all of the window."""
+    name = "angle" if solved.task.wanted.torque is not None else "travel"
+    asked: tuple[float, float] | None = getattr(solved.task.spec.analysis, name)
+    if asked is None or (asked[0] <= solved.window[0] and solved.window[1] <= asked[1]):
+        return {}
+    return {name: (min(asked[0], solved.window[0]), max(asked[1], solved.window[1]))}
 
 
 def _reference(solved: Solved) -> float:

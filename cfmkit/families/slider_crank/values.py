@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.families.slider_crank.classes import CLASSES
-from cfmkit.families.slider_crank.flexures.values import DEFINITIONS as OF_PARTS
+from cfmkit.families.slider_crank.flexures.definitions import DEFINITIONS as OF_PARTS
 from cfmkit.families.slider_crank.thresholds import scale_factors, small_angle_number
 from cfmkit.results import Quantity
 

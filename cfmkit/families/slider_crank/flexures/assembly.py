@@ -21,6 +21,8 @@ from cfmkit.families.slider_crank.flexures.sizing import Flexure
 from cfmkit.materials import material
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from cfmkit.beams import Network, Path
     from cfmkit.bodies.slider_crank import Linkage
     from cfmkit.curves import FloatArray
@@ -94,7 +96,12 @@ def strip_of(printed: Printed, linkage: Linkage, unloaded: float) -> Strip:
 
 def lumped_chain(printed: Printed, linkage: Linkage, unloaded: float) -> Chain:
     """Return flexures and rigid links as a chain to press."""
-    parts, made_of, pins = flexures_of(printed), elasticity(printed), joints(linkage, unloaded)
+    return chain_of_flexures(flexures_of(printed), elasticity(printed), linkage, unloaded)
+
+
+def chain_of_flexures(parts: Sequence[Flexure], made_of: Elasticity, linkage: Linkage, unloaded: float) -> Chain:
+    """Return given flexures, with rigid links between them, as a chain to press."""
+    pins = joints(linkage, unloaded)
     ends = flexure_ends(pins, [one.length for one in parts], [one.before for one in parts])
 
     def rise(path: Path, index: int) -> float:

@@ -17,9 +17,10 @@ from cfmkit.families.slider_crank.build import CannotBuild, linkage_of, resolve,
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.flexures.assembly import elasticity, lumped_chain, strip_chain, strip_of
 from cfmkit.families.slider_crank.flexures.checks import findings_of
+from cfmkit.families.slider_crank.flexures.definitions import DEFINITIONS
 from cfmkit.families.slider_crank.flexures.pressing import Ending
 from cfmkit.families.slider_crank.flexures.solution import Printed
-from cfmkit.families.slider_crank.flexures.values import DEFINITIONS, numbers
+from cfmkit.families.slider_crank.flexures.values import numbers
 from cfmkit.families.slider_crank.values import DEFINITIONS as ALL
 from cfmkit.results import Quantity, Result, Status
 

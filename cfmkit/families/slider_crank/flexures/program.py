@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from cfmkit.curves import FloatArray
     from cfmkit.families.slider_crank.flexures.task import Form, Task
 
-POINTS, DENSE, SAMPLES = 12, 33, 8
+POINTS, DENSE, SAMPLES = 12, 81, 8
 """Where the force is computed, where its band is kept, and samples of the stress in each linear piece."""
 
 RMS_POINTS = 10

@@ -129,10 +129,7 @@ class FlexureDesign(Model):
     """Sections of the flexures from the springs' rates and the stress: closed forms, then the exact force."""
 
     length: PositiveLength | None = Field(None, description="of all three; default: as they are, else a fifth of r1")
-    width: PositiveLength | None = Field(
-        None, description="of all three; default: each follows from its stress and its rate"
-    )
-    exact: bool = Field(True, description="scale the widths so that the beams, not the springs, give the force")
+    exact: bool = Field(True, description="correct the closed forms until the beams have the force and the stress")
 
 
 class StripDesign(Model):

@@ -62,7 +62,7 @@ class Form:
     Attributes
     ----------
     count : int
-        Thicknesses.
+        Thicknesses; 1: the same everywhere.
     per_piece : tuple of int
         How many stations each straight piece has where their shares vary; empty: evenly spaced, fixed.
     shares : tuple of tuples
@@ -100,4 +100,7 @@ class Form:
 
     def strip(self, x: Any, corners: FloatArray) -> Strip:
         """Return the strip that numbers describe: thicknesses and width in mm, shares of the pieces' lengths."""
-        return Strip(corners, self.width_of(x), np.asarray(x[: self.count]) * SMALL, self.places(x, corners))
+        thickness = np.asarray(x[: self.count]) * SMALL
+        if self.count == 1:
+            return Strip(corners, self.width_of(x), np.repeat(thickness, 2), np.array([0.0, 1.0]))
+        return Strip(corners, self.width_of(x), thickness, self.places(x, corners))

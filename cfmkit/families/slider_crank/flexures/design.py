@@ -1,0 +1,280 @@
+"""From a force and a ripple to a strip, or from springs to flexures: a complete specification again.
+
+The strip is searched with a little of the band and of the stress in reserve, rounded, pressed again at many places, and
+its stroke is where the first limit is met. Independent elements then compute force and stress once more.
+
+Reference
+---------
+[B] P. Bilancia, A. Geraci, G. Berselli, SMASIS2019-5519, sec. 2.2 and 3.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.errors import InputError
+from cfmkit.families.slider_crank.build import CannotBuild, linkage_of, resolve, unloaded_angle
+from cfmkit.families.slider_crank.findings import finding, mm
+from cfmkit.families.slider_crank.flexures.assembly import corners, elasticity, travel_direction
+from cfmkit.families.slider_crank.flexures.descent import Ending
+from cfmkit.families.slider_crank.flexures.judged import Judged, judge, rounded
+from cfmkit.families.slider_crank.flexures.model import slider_reach
+from cfmkit.families.slider_crank.flexures.resize import design_flexures
+from cfmkit.families.slider_crank.flexures.search import LOOSE, Found, Ranges, search, uniform_for_stroke
+from cfmkit.families.slider_crank.flexures.spec import StripSpec
+from cfmkit.families.slider_crank.flexures.task import Form, Task
+from cfmkit.results import Design, Finding, Status
+from cfmkit.units import format_short
+
+if TYPE_CHECKING:
+    from cfmkit.bodies.slider_crank import Linkage
+    from cfmkit.curves import FloatArray
+    from cfmkit.families.base import Run
+    from cfmkit.families.slider_crank.flexures.spec import StripDesign
+    from cfmkit.families.slider_crank.spec import SliderCrankSpec
+
+RESERVES, RESERVE_STRESS = (4e-5, 2e-4), 5e-4
+"""What the search keeps of the band (a share of the force), more if that was not enough, and of the stress allowed."""
+
+ENOUGH = 0.99
+"""Share of the stroke searched that the finished strip must have, or the search is repeated with more in reserve."""
+
+DECIMALS = 9
+"""Of lengths in metres."""
+
+DEFAULT_THICKNESS = (0.5e-3, 2e-3)
+DEFAULT_WIDTH = (5e-3, 8e-3)
+"""Ranges where none is given [m]: what printing makes, and the width of [B, Table 3]."""
+
+
+def design(spec: SliderCrankSpec, run: Run) -> Design:
+    """Return a specification with the strip, or the flexures, that the `design` block asks for.
+
+    Parameters
+    ----------
+    spec : SliderCrankSpec
+        With `design.beam` or `design.flexures`.
+    run : Run
+        Seed of the random starts, and progress.
+
+    Returns
+    -------
+    Design
+        INFEASIBLE, with the reason and the nearest, where the targets contradict the ranges.
+    """
+    wanted = spec.design
+    if wanted is None or wanted.force is None:
+        return Design(None, Status.INVALID, "a part that is pressed needs 'design.force'")
+    try:
+        spec = resolve(spec)
+        linkage = linkage_of(spec.mechanism)
+        unloaded = unloaded_angle(spec.mechanism, linkage)
+        if wanted.beam is None:
+            return design_flexures(spec, linkage, unloaded)
+        return _strip(spec, linkage, unloaded, run)
+    except CannotBuild as problem:
+        return Design(None, Status.INFEASIBLE, problem.finding.message, warnings=(problem.finding,))
+    except InputError as problem:
+        return Design(None, Status.INVALID, str(problem))
+
+
+def _strip(spec: SliderCrankSpec, linkage: Linkage, unloaded: float, run: Run) -> Design:
+    wanted = spec.design.beam if spec.design else None
+    assert wanted is not None
+    task = task_of(spec, linkage, unloaded)
+    form, ranges = form_of(spec, wanted, task, linkage, unloaded)
+    if wanted.shape == "uniform" and task.goal != "stroke":
+        return _closed(spec, wanted, task, ranges)
+    judged = None
+    for reserve in RESERVES:
+        kept = replace(task, ripple=task.ripple - reserve)
+        found = search(kept, form, ranges, wanted.seeds, run.seed, run.progress)
+        if not found.descent.feasible:
+            return _infeasible(found)
+        judged = judge(rounded(found.values, ranges.form), found, _limits(spec), linkage, unloaded)
+        if judged is None or judged.window[1] > ENOUGH * found.program.stroke(found.descent.z):
+            break
+    if judged is None:
+        return _infeasible(found)
+    return Design(
+        _written(spec, judged, wanted),
+        Status.COMPLETE,
+        _message(found, judged),
+        active_bounds=judged.active,
+        warnings=_warnings(found, judged),
+    )
+
+
+def task_of(spec: SliderCrankSpec, linkage: Linkage, unloaded: float) -> Task:
+    """Return what the strip of a `design` block is to do, with its reserve.
+
+    Raises
+    ------
+    cfmkit.errors.InputError
+        If the goal lacks its tolerance or its travel.
+    """
+    wanted = spec.design
+    assert wanted is not None
+    assert wanted.beam is not None
+    assert wanted.force is not None
+    beam, ripple, travel = wanted.beam, wanted.tolerance, wanted.travel
+    if beam.goal == "stroke" and (ripple is None or travel is not None):
+        raise InputError("the longest stroke needs 'design.tolerance', and no 'design.travel'; else set 'goal: ripple'")
+    if beam.goal != "stroke" and travel is None:
+        raise InputError(f"the goal {beam.goal!r} needs 'design.travel', over which the force is wanted")
+    reach = slider_reach(linkage, unloaded)
+    start, stroke = travel if travel is not None else (beam.start, 0.2 * reach)
+    if beam.goal != "rms" and start <= 0:
+        raise InputError("'design.travel' must begin behind the run-in, above 0: the force begins at zero there")
+    made_of = elasticity(spec.mechanism)
+    limit = made_of.allowable_stress if beam.stressed else None
+    limit = None if limit is None else limit * (1.0 - RESERVE_STRESS)
+    line = corners(spec.mechanism, spec.mechanism.beam, linkage, unloaded)
+    return Task(
+        line,
+        travel_direction(linkage),
+        type(made_of)(made_of.youngs_modulus, made_of.poisson_ratio, limit),
+        wanted.force / spec.mechanism.legs,
+        float(start),
+        float(stroke),
+        ripple or LOOSE,
+        beam.goal,
+        beam.longest or 0.5 * reach,
+    )
+
+
+def form_of(
+    spec: SliderCrankSpec, wanted: StripDesign, task: Task, linkage: Linkage, unloaded: float
+) -> tuple[Form, Ranges]:
+    """Return how the strip is described, and the ranges of its numbers."""
+    beam = spec.mechanism.beam
+    width = wanted.width if wanted.width is not None else (beam.width if beam is not None else DEFAULT_WIDTH)
+    fixed = None if isinstance(width, tuple) else float(width)
+    per_piece: tuple[int, ...] = ()
+    shares: tuple[tuple[float, ...], ...] = ()
+    count = {"uniform": 1, "even": wanted.nodes}.get(wanted.shape, 0)
+    if wanted.shape == "shares":
+        if beam is None or beam.shares is None:
+            raise InputError("the shape 'shares' needs 'mechanism.beam.shares'")
+        count = 2 + sum(len(piece) for piece in beam.shares)
+        moving = wanted.shares is not None
+        per_piece = tuple(len(piece) for piece in beam.shares) if moving else ()
+        shares = () if moving else beam.shares
+    rows = list(wanted.thicknesses or [wanted.thickness or DEFAULT_THICKNESS] * count)
+    if len(rows) != count:
+        raise InputError(f"design.beam.thicknesses has {len(rows)} ranges, and there are {count} thicknesses")
+    form = Form(count, per_piece, shares, fixed)
+    if form.placed and len(wanted.shares or ()) != form.placed:
+        raise InputError(
+            f"design.beam.shares has {len(wanted.shares or ())} ranges, and there are {form.placed} shares"
+        )
+    table = [(low * 1e3, high * 1e3) for low, high in rows] + list(wanted.shares or ())
+    if isinstance(width, tuple):
+        table.append((width[0] * 1e3, width[1] * 1e3))
+    return form, Ranges(np.array(table), task.longest)
+
+
+def _limits(spec: SliderCrankSpec) -> tuple[float | None, float | None]:
+    """Return the ripple and the stress that the finished strip is held to."""
+    wanted = spec.design
+    assert wanted is not None
+    assert wanted.beam is not None
+    stress = elasticity(spec.mechanism).allowable_stress if wanted.beam.stressed else None
+    return (wanted.tolerance if wanted.beam.goal == "stroke" else None), stress
+
+
+def _closed(spec: SliderCrankSpec, wanted: StripDesign, task: Task, ranges: Ranges) -> Design:
+    """Return the uniform strip for a stroke: thickness from the stress, width from the force."""
+    found = uniform_for_stroke(task)
+    if found is None:
+        told = finding("target_unreachable", "the strip has no equilibrium over the travel, or no stress limit")
+        return Design(None, Status.INFEASIBLE, told.message, warnings=(told,))
+    thickness, width = found
+    low, high = ranges.form[0] / 1e3
+    if not low <= thickness <= high:
+        text = f"the stress asks for a thickness of {mm(thickness)}, outside {mm(low)} to {mm(high)}"
+        told = finding("target_unreachable", text)
+        nearest = {"design.beam.thickness": mm(thickness)}
+        return Design(None, Status.INFEASIBLE, text, nearest_feasible=nearest, warnings=(told,))
+    if isinstance(wanted.width, tuple) and not wanted.width[0] <= width <= wanted.width[1]:
+        reached = task.force * np.clip(width, *wanted.width) / width
+        text = (
+            f"{format_short(task.force, 'force')} need a width of {mm(width)}; within {mm(wanted.width[0])} to "
+            f"{mm(wanted.width[1])} the nearest is {format_short(float(reached), 'force')}"
+        )
+        told = finding("target_unreachable", text)
+        nearest = {"design.force": format_short(float(reached), "force"), "design.beam.width": mm(width)}
+        return Design(None, Status.INFEASIBLE, text, nearest_feasible=nearest, warnings=(told,))
+    part = _part(spec, {"width": round(width, DECIMALS), "thickness": round(thickness, DECIMALS), "shares": None})
+    text = f"thickness {mm(thickness)} from the stress at {mm(task.stroke)}, width {mm(width)} from the force"
+    return Design(_with_part(spec, part, (task.start, task.stroke)), Status.COMPLETE, text)
+
+
+def _infeasible(found: Found) -> Design:
+    descent = found.descent
+    if descent.ending is Ending.NO_ANSWER:
+        told = finding("target_unreachable", f"the search {descent.ending.value}")
+        return Design(None, Status.INFEASIBLE, told.message, warnings=(told,))
+    text = (
+        f"no strip within the ranges keeps the force, the band and the stress: the nearest misses one by "
+        f"{descent.violation:.3g} % of the force or a tenth of that of the stress ({descent.ending.value})"
+    )
+    told = finding("target_unreachable", text)
+    nearest = {"stroke": mm(found.program.stroke(descent.z))}
+    return Design(None, Status.INFEASIBLE, text, nearest_feasible=nearest, warnings=(told,))
+
+
+def _part(spec: SliderCrankSpec, changes: dict[str, object]) -> StripSpec:
+    """Return the strip as the specification says it, with changes."""
+    kept = {} if spec.mechanism.beam is None else spec.mechanism.beam.model_dump(exclude_unset=True)
+    kept.pop("offset", None)
+    return StripSpec.model_validate(kept | changes)
+
+
+def _with_part(spec: SliderCrankSpec, part: StripSpec, window: tuple[float, float]) -> SliderCrankSpec:
+    analysis = spec.analysis.model_copy(
+        update={"travel": (0.0, window[1]), "window": window, "fidelity": None, "drive": "force"}
+    )
+    mechanism = spec.mechanism.model_copy(update={"beam": part})
+    return spec.model_copy(update={"mechanism": mechanism, "analysis": analysis})
+
+
+def _written(spec: SliderCrankSpec, judged: Judged, wanted: StripDesign) -> SliderCrankSpec:
+    strip = judged.strip
+    values: FloatArray = np.asarray(strip.thickness)
+    listed = tuple(round(float(value), DECIMALS) for value in values)
+    thickness = listed[0] if wanted.shape == "uniform" else listed
+    width = round(float(strip.width), DECIMALS)
+    part = _part(spec, {"width": width, "thickness": thickness, "shares": judged.shares})
+    return _with_part(spec, part, judged.window)
+
+
+def _message(found: Found, judged: Judged) -> str:
+    descent, count = found.descent, found.form.count
+    what = "one thickness" if count == 1 else f"{count} thicknesses"
+    if found.task.goal == "rms":
+        head = f"root mean square {format_short(judged.rms, 'force')} over {mm(judged.window[1])}"
+    else:
+        head = f"within {100 * judged.ripple:.3g} % from {mm(judged.window[0])} to {mm(judged.window[1])}"
+    compared = ""
+    if found.uniform is not None and found.uniform.feasible and count > 1 and found.task.goal == "stroke":
+        within = 100.0 * max(found.task.ripple, LOOSE)
+        compared = f"; one thickness reaches {mm(0.01 * float(found.uniform.z[-1]))} within {within:.3g} %"
+    opinion = judged.opinion
+    return (
+        f"{what}, {head}{compared}; {descent.ending.value} after {descent.evaluations} strips; {opinion.elements} "
+        f"corotational elements: force {100 * opinion.force:+.2g} %, stress {100 * opinion.stress:+.2g} %"
+    )
+
+
+def _warnings(found: Found, judged: Judged) -> tuple[Finding, ...]:
+    told = []
+    if found.descent.ending is not Ending.OPTIMUM:
+        text = f"the search was {found.descent.ending.value}: a better strip may exist; try 'design.beam.seeds'"
+        told.append(finding("optimizer_stopped", text))
+    if not judged.opinion.stable:
+        told.append(finding("second_opinion", "corotational elements call the equilibrium unstable"))
+    return tuple(told)

@@ -1,0 +1,239 @@
+"""From a task to a strip: the uniform one first, then more and more thicknesses, each from the one before."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.families.slider_crank.flexures.descent import Descent, Ending, descend
+from cfmkit.families.slider_crank.flexures.program import StripProgram
+from cfmkit.families.slider_crank.flexures.task import SMALL, Form
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from cfmkit.curves import FloatArray
+    from cfmkit.families.slider_crank.flexures.task import Task
+
+COARSE = 5
+"""Thicknesses of the first tapered strip; then twice as many intervals each time."""
+
+LOOSE = 0.01
+"""Ripple within which the coarse strip is sought: few thicknesses cannot keep less."""
+
+SCATTER = 0.15
+"""Standard deviation of the logarithm of the thicknesses that other starts begin with."""
+
+_ROUNDS = 12
+
+
+@dataclass(frozen=True)
+class Ranges:
+    """Smallest and largest value of every number of a form, (n, 2) in its units, and of the stroke [m]."""
+
+    form: FloatArray
+    longest: float
+
+
+@dataclass(frozen=True)
+class Found:
+    """A strip that was found.
+
+    Attributes
+    ----------
+    task, form, ranges : Task, Form, Ranges
+        What was asked.
+    program : StripProgram
+        Of the last search.
+    descent : Descent
+        Its outcome.
+    uniform : Descent or None
+        That of one thickness, within `LOOSE` at least, for comparison; None where it has no equilibrium.
+    """
+
+    task: Task
+    form: Form
+    ranges: Ranges
+    program: StripProgram
+    descent: Descent
+    uniform: Descent | None
+
+    @property
+    def values(self) -> FloatArray:
+        """Numbers of the form."""
+        return self.descent.z[: self.form.size]
+
+
+def uniform_thickness(task: Task, width: float, guess: float = 1e-3) -> float:
+    """Return the thickness [m] with which a strip of one thickness has the force, on average of its extremes.
+
+    The force follows the third power of the thickness but for stretching and shear: a few corrections do.
+    """
+    program = StripProgram(replace(task, goal="ripple"), Form(1, width=width))
+    thickness = guess
+    for _ in range(_ROUNDS):
+        state = program.state(np.array([thickness / SMALL, 1.0]))
+        if state is None:
+            return guess
+        level = 0.5 * (state.force.max() + state.force.min())
+        factor = float((task.force / level) ** (1.0 / 3.0))
+        thickness *= factor
+        if abs(factor - 1.0) < 1e-10:
+            break
+    return thickness
+
+
+def uniform_for_stroke(task: Task, guess: float = 1e-3) -> tuple[float, float] | None:
+    """Return thickness and width [m] of the strip that has the allowable stress at the stroke, and the force.
+
+    The stress does not depend on the width and the force is proportional to it: first the thickness from
+    the stress, then the width from the force. None where there is no stress limit or no equilibrium.
+    """
+    limit = task.material.allowable_stress
+    if limit is None:
+        return None
+    thickness, width = guess, 5e-3
+    for _ in range(_ROUNDS):
+        program = StripProgram(replace(task, goal="ripple"), Form(1, width=width))
+        state = program.state(np.array([thickness / SMALL, 1.0]))
+        if state is None:
+            return None
+        worst = float(state.path.peak_stress().value[state.path.at_asked[-1]])
+        level = 0.5 * (state.force.max() + state.force.min())
+        width *= task.force / level
+        factor = limit / worst
+        thickness *= factor
+        width /= factor**3
+        if abs(factor - 1.0) < 1e-10:
+            break
+    return thickness, width
+
+
+def search(
+    task: Task, form: Form, ranges: Ranges, starts: int, seed: int, report: Callable[[float, str], None]
+) -> Found:
+    """Return the best strip found: from the uniform one coarse to fine, and from random ones where asked.
+
+    Parameters
+    ----------
+    task : Task
+        What the strip is to do.
+    form : Form
+        How it is described.
+    ranges : Ranges
+        Of its numbers.
+    starts : int
+        How many, the uniform strip included.
+    seed : int
+        Of the random ones.
+    report : callable
+        Takes a fraction and a text.
+    """
+    uniform = _uniform(task, form, ranges)
+    steps = _ladder(form)
+    best: Found | None = None
+    rng = np.random.default_rng(seed)
+    for number in range(starts):
+        report(number / starts, f"start {number + 1} of {starts}")
+        found = _climb(task, form, ranges, steps if number == 0 else (form.count,), uniform, rng if number else None)
+        if best is None or _rank(found.descent) < _rank(best.descent):
+            best = found
+    assert best is not None
+    report(1.0, "done")
+    return best
+
+
+def _rank(descent: Descent) -> tuple[bool, float]:
+    return not descent.feasible, descent.objective if descent.feasible else descent.violation
+
+
+def _ladder(form: Form) -> tuple[int, ...]:
+    """Return the numbers of thicknesses that are gone through."""
+    if form.per_piece or form.shares or form.count <= COARSE:
+        return (form.count,)
+    count, steps = COARSE, [COARSE]
+    while 2 * count - 1 < form.count:
+        count = 2 * count - 1
+        steps.append(count)
+    return (*steps, form.count)
+
+
+def _climb(
+    task: Task,
+    form: Form,
+    ranges: Ranges,
+    steps: tuple[int, ...],
+    uniform: Descent | None,
+    rng: np.random.Generator | None,
+) -> Found:
+    """Return the outcome of one start: every search begins where the one with fewer thicknesses ended."""
+    x, last = _begin(task, form, ranges, uniform, steps[0])
+    if rng is not None:
+        x[: steps[0]] *= np.exp(SCATTER * rng.standard_normal(steps[0]))
+    for count in steps:
+        now = replace(form, count=count)
+        own = len(x) - (form.size - form.count)
+        x = np.concatenate([_refined(x[:own], count), x[own:]])
+        coarse = count < steps[-1]
+        goal = replace(task, ripple=max(task.ripple, LOOSE)) if coarse else task
+        program = StripProgram(goal, now)
+        bounds = _bounds(task, ranges, form, count)
+        start = np.append(x, last) if program.extra else x
+        descent = descend(program, start, bounds, 20 if coarse else 100, 1e-3 if coarse else _precise(task))
+        x = descent.z[: now.size]
+        last = descent.z[-1]
+    return Found(task, form, ranges, program, descent, uniform)
+
+
+def _precise(task: Task) -> float:
+    return 1e-9 if task.goal == "rms" else 1e-6
+
+
+def _refined(values: FloatArray, count: int) -> FloatArray:
+    """Return thicknesses on more nodes, the same strip."""
+    old = np.linspace(0.0, 1.0, len(values))
+    return values if len(values) == count else np.interp(np.linspace(0.0, 1.0, count), old, values)
+
+
+def _begin(task: Task, form: Form, ranges: Ranges, uniform: Descent | None, count: int) -> tuple[FloatArray, float]:
+    """Return the first numbers, and the first value of the goal."""
+    low, high = ranges.form.T
+    middle = 0.5 * (low + high)
+    if form.per_piece or form.shares or uniform is None:
+        x = middle.copy()
+        return x, _first_goal(task, uniform)
+    x = np.concatenate([np.full(count, uniform.z[0]), middle[form.count :]])
+    return x, _first_goal(task, uniform)
+
+
+def _first_goal(task: Task, uniform: Descent | None) -> float:
+    if task.goal == "stroke":
+        known = None if uniform is None or not np.isfinite(uniform.violation) else float(uniform.z[-1])
+        return known if known is not None else 100.0 * task.stroke
+    return 2.0
+
+
+def _bounds(task: Task, ranges: Ranges, form: Form, count: int) -> FloatArray:
+    """Return the bounds of a search with another number of thicknesses, and of its goal."""
+    own = ranges.form
+    thickness = own[: form.count] if count == form.count else np.tile(own[0], (count, 1))
+    rows = np.concatenate([thickness, own[form.count :]])
+    if task.goal == "rms":
+        return rows
+    goal = [100.0 * (task.start + 2e-3), 100.0 * ranges.longest] if task.goal == "stroke" else [1e-3, 100.0]
+    return np.concatenate([rows, [goal]])
+
+
+def _uniform(task: Task, form: Form, ranges: Ranges) -> Descent | None:
+    """Return the best strip of one thickness."""
+    own = ranges.form
+    width = form.width or float(own[-1].mean()) * SMALL
+    first = uniform_thickness(task, width, float(own[0].mean()) * SMALL) / SMALL
+    program = StripProgram(replace(task, ripple=max(task.ripple, LOOSE)), Form(1, width=width))
+    last = [100.0 * task.stroke] if task.goal == "stroke" else [2.0]
+    bounds = _bounds(task, Ranges(own[:1], ranges.longest), Form(1, width=width), 1)
+    start = np.array([first, *last]) if program.extra else np.array([first])
+    found = descend(program, start, bounds)
+    return None if found.ending is Ending.NO_ANSWER else found
