@@ -29,6 +29,7 @@ from cfmkit.families.slider_crank.solved import (
     active_bounds,
     cannot_hold,
     check_reach,
+    hopeless,
     message,
     not_proven,
     nowhere,
@@ -43,6 +44,9 @@ if TYPE_CHECKING:
     from cfmkit.families.base import Run
     from cfmkit.families.slider_crank.spec import CrankDesign, SliderCrankSpec
 
+
+HOPELESS = 0.5
+"""Springs that miss the target by more are no design, even where no tolerance is stated."""
 
 EFFORT = {"least-squares": (15, 30), "minimax": (11, 14), "widest": (5, 10)}
 """Values of each free length on the grid, and around its best: a least-squares problem costs the least."""
@@ -164,6 +168,8 @@ def solve(task: Task) -> Solved:
     if wanted.slack:
         rates = chosen_rates(goal, rates, wanted)
     deviation = goal.deviation(rates)
+    if deviation > HOPELESS and wanted.tolerance is None:
+        raise Infeasible(hopeless(task, deviation))
     if wanted.window is not None and wanted.tolerance is not None and deviation > wanted.tolerance:
         raise Infeasible(*too_far(task, deviation))
     return Solved(task, window, rates, deviation, goal.rms(rates))

@@ -85,6 +85,15 @@ def nowhere(task: Task) -> Finding:
     return finding("infeasible_targets", "no window keeps the tolerance; allow more, or change the lengths")
 
 
+def hopeless(task: Task, deviation: float) -> Finding:
+    """Return that even the best springs have nothing of a constant effort, and why."""
+    text = f"even the best springs are off by {100 * deviation:.3g} %: that is no constant {task.assembly.drive}"
+    if task.assembly.drive == "torque" and task.assembly.start >= task.assembly.stretched:
+        text += "; springs that are relaxed beyond the stretched position only give a torque that rises there"
+        return finding("no_zero_stiffness", text)
+    return finding("infeasible_targets", f"{text}; ask for a narrower window, or change the lengths")
+
+
 def too_far(task: Task, deviation: float) -> tuple[Finding, dict[str, str]]:
     """Return that a window is too wide for its tolerance, and what would be feasible."""
     wanted = task.wanted

@@ -26,6 +26,12 @@ LAW = 0.533
 
 STEPS = 24
 
+CLOSE = 1.0 - 1e-4
+"""A deviation between this share of the tolerance and all of it ends the search: the width is then right to 3e-5."""
+
+NARROW = 0.08
+"""Once a window is found, the next one is looked for so near, as a share of its width."""
+
 KEPT = 1.0 - 2e-5
 """Between the places on which it is judged, a deviation can be larger by this."""
 
@@ -63,14 +69,19 @@ def widest(task: Task, tolerance: float) -> Window | None:
     tolerance *= KEPT
     width, middle = _first_guess(task, tolerance)
     best: Window | None = None
-    low, high = 0.0, last - first
+    low, high, look = 0.0, last - first, 0.6
     for _ in range(STEPS):
-        found = _best_place(task, min(width, last - first), middle)
+        width = min(width, last - first)
+        found = _best_place(task, width, middle, look)
+        if found is not None:
+            middle, look = 0.5 * (found.low + found.high), NARROW
         if found is not None and found.deviation <= tolerance:
-            best, middle, low = found, 0.5 * (found.low + found.high), max(low, found.width)
+            best, low = found, max(low, width)
+            if found.deviation >= tolerance * CLOSE or width >= last - first:
+                break
         else:
             high = min(high, width)
-        if high - low <= 1e-7 * high or (best is not None and best.width >= (last - first) * (1 - 1e-12)):
+        if high - low <= 1e-6 * high:
             break
         width = _next_width(found, tolerance, (low, high), width)
     return best
@@ -90,14 +101,13 @@ def _next_width(found: Window | None, tolerance: float, bracket: tuple[float, fl
     low, high = bracket
     if found is None or found.deviation <= 0.0:
         return 0.5 * (low + high)
-    step = width * min(max((tolerance / found.deviation) ** (1 / 3), 0.5), 2.0)
-    # A little to the safe side of the estimate, so that both ends of the bracket close in.
-    step *= 1.0 - 2e-8 if found.deviation > tolerance else 1.0 + 2e-8
+    wanted = tolerance * (0.5 + 0.5 * CLOSE)
+    step = width * min(max((wanted / found.deviation) ** (1 / 3), 0.5), 2.0)
     return step if low < step < high else 0.5 * (low + high)
 
 
-def _best_place(task: Task, width: float, middle: float) -> Window | None:
-    """Return the window of a width with the smallest largest deviation near a place."""
+def _best_place(task: Task, width: float, middle: float, look: float) -> Window | None:
+    """Return the window of a width with the smallest largest deviation near a place, by shares of the width."""
     from scipy.optimize import minimize_scalar
 
     first, last = task.allowed
@@ -110,10 +120,12 @@ def _best_place(task: Task, width: float, middle: float) -> Window | None:
         return found.deviation if found else 1e300
 
     start = min(max(middle - 0.5 * width, first), room)
-    bracket = max(first, start - 0.6 * width), min(room, start + 0.6 * width)
-    found = minimize_scalar(deviation, bounds=bracket, method="bounded", options={"xatol": 1e-5 * width, "maxiter": 30})
-    ends = [low for low in (first, room) if bracket[0] <= low <= bracket[1]]
-    low = min([float(found.x), *ends], key=deviation)
+    bracket = max(first, start - look * width), min(room, start + look * width)
+    found = minimize_scalar(deviation, bounds=bracket, method="bounded", options={"xatol": 1e-4 * width, "maxiter": 25})
+    ends = [end for end in (first, room) if end in bracket]
+    low = min([float(found.x), *ends], key=deviation) if ends else float(found.x)
+    if look < 0.5 and min(abs(low - bracket[0]), abs(low - bracket[1])) < 1e-3 * width and low not in ends:
+        return _best_place(task, width, low + 0.5 * width, 0.6)
     return judged(task, low, low + width)
 
 
