@@ -8,6 +8,7 @@ from cfmkit.families.slider_crank.build import resolve
 from cfmkit.families.slider_crank.classes import CLASSES
 from cfmkit.families.slider_crank.design import design
 from cfmkit.families.slider_crank.findings import FINDINGS
+from cfmkit.families.slider_crank.gradient import gradient
 from cfmkit.families.slider_crank.model import analyze
 from cfmkit.families.slider_crank.spec import SliderCrankSpec
 from cfmkit.families.slider_crank.values import DEFINITIONS
@@ -22,7 +23,9 @@ FAMILY = Family(
     values=DEFINITIONS,
     words={"stiffness_class": CLASSES},
     resolve=resolve,
+    gradient=gradient,
     draw="cfmkit.families.slider_crank.draw",
+    outline="cfmkit.families.slider_crank.outline",
     headline=("stiffness_class", "band_range_05pct", "half_band", "energy_max", "crank_pin_rotation_max"),
     template="slider-crank.yaml",
     findings=FINDINGS,

@@ -9,6 +9,7 @@ import numpy as np
 
 from cfmkit.bodies.slider_crank_springs import JOINTS
 from cfmkit.families.slider_crank.classes import NEGATIVE
+from cfmkit.families.slider_crank.flexures.solution import Printed
 from cfmkit.families.slider_crank.pose import KEY_ROOM, Scene, key_positions, scene, torsion_spring
 from cfmkit.plots import parts
 from cfmkit.plots.bands import limits_on
@@ -41,6 +42,10 @@ def figures(result: Result) -> dict[str, Callable[[], Figure]]:
     """Return what draws each picture of a result of the family, by file stem; empty if nothing was solved."""
     if result.state is None or not result.curves:
         return {}
+    if isinstance(result.state, Printed):
+        from cfmkit.families.slider_crank.flexures.draw import figures as of_part
+
+        return of_part(result)
     makers = [curve, energy, springs, joints, linkage]
     return {maker.__name__: partial(maker, result) for maker in makers}
 

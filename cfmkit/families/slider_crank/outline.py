@@ -1,0 +1,125 @@
+"""The parts of a slider-crank: one piece with flexures or a strip, or two links with pin holes.
+
+Flexures, strip and distances of pins are exact. What is around them is a sensible choice: pads behind the clamped
+end and at the slider, links wider than any flexure, eyes around the pins of the two links.
+"""
+
+from __future__ import annotations
+
+import itertools
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.families.slider_crank.build import linkage_of, resolve, unloaded_angle
+from cfmkit.families.slider_crank.flexures.assembly import corners, flexures_of, strip_of
+from cfmkit.geometry import Arc, Contour, Curve2D, Drawing, Line, circle, polygon
+
+if TYPE_CHECKING:
+    from cfmkit.curves import FloatArray
+    from cfmkit.families.slider_crank.flexures.chain import Strip
+    from cfmkit.families.slider_crank.spec import SliderCrankSpec
+
+PAD = (0.012, 0.010)
+"""Length and width of the pads [m]."""
+
+LINK_RATIO, EYE_SHARE, HOLE_SHARE = 5.0, 0.08, 0.04
+"""Width of a link in flexure thicknesses; radii of eyes and pin holes in lengths of the shorter link."""
+
+
+def drawing(spec: SliderCrankSpec) -> Drawing:
+    """Return the outlines of a slider-crank as its fidelity has it, with a table of its sections.
+
+    Raises
+    ------
+    cfmkit.families.slider_crank.build.CannotBuild
+        If it cannot be assembled.
+    """
+    spec = resolve(spec)
+    linkage = linkage_of(spec.mechanism)
+    if spec.fidelity == "prb":
+        return _links(linkage.crank, linkage.coupler)
+    unloaded = unloaded_angle(spec.mechanism, linkage)
+    if spec.fidelity == "beam":
+        return _strip(
+            strip_of(spec.mechanism, linkage, unloaded), spec.mechanism.beam.offset if spec.mechanism.beam else 0
+        )
+    parts = flexures_of(spec.mechanism)
+    points = corners(spec.mechanism, None, linkage, unloaded)
+    thick = [0.5 * one.thickness for one in parts]
+    bar = 0.5 * LINK_RATIO * max(2.0 * half for half in thick)
+    order = [0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 5, 5]
+    own = [thick[0], thick[0], bar, bar, thick[1], thick[1], bar, bar, thick[2], thick[2]]
+    half = np.array([0.5 * PAD[1], *own, 0.5 * PAD[1]])
+    table = {
+        "x": (points[:, 0], "length"),
+        "y": (points[:, 1], "length"),
+        "thickness": (np.repeat([one.thickness for one in parts], 2), "length"),
+        "width": (np.repeat([one.width for one in parts], 2), "length"),
+    }
+    return Drawing("slider-crank", _piece(points[order], half), (Curve2D("flexures", table),))
+
+
+def _strip(strip: Strip, offset: float) -> Drawing:
+    """Return a strip as it is drawn: without what printing adds."""
+    marks = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(strip.corners, axis=0).T))])
+    fractions = np.unique(np.concatenate([marks / marks[-1], strip.places]))
+    points = np.column_stack([np.interp(fractions * marks[-1], marks, strip.corners[:, k]) for k in (0, 1)])
+    thickness = np.interp(fractions, strip.places, np.asarray(strip.thickness)) - offset
+    half = np.array([0.5 * PAD[1], *(0.5 * thickness), 0.5 * PAD[1]])
+    order = [0, *range(len(points)), len(points) - 1]
+    table = {
+        "place": (fractions * marks[-1], "length"),
+        "x": (points[:, 0], "length"),
+        "y": (points[:, 1], "length"),
+        "thickness": (thickness, "length"),
+    }
+    return Drawing("slider-crank", _piece(points[order], half), (Curve2D("strip", table),))
+
+
+def _piece(points: FloatArray, half: FloatArray) -> tuple[Contour, ...]:
+    """Return the outline around a chain of points with half widths [m], between two pads, and its centre line."""
+    first, last = points[0], points[-1]
+    begin, end = _direction(points, 0), _direction(points, len(points) - 1)
+    line = np.vstack([first - PAD[0] * begin, points, last + PAD[0] * end])
+    wide = np.concatenate([[half[0]], half, [half[-1]]])
+    normals = np.array([_normal(line, k) for k in range(len(line))])
+    left, right = line + wide[:, None] * normals, line - wide[:, None] * normals
+    around = [(float(x), float(y)) for x, y in np.concatenate([left, right[::-1]])]
+    kept = [point for point, following in zip(around, [*around[1:], around[0]], strict=True) if point != following]
+    centre = [(float(x), float(y)) for x, y in dict.fromkeys(map(tuple, points))]
+    path = Contour(tuple(Line(a, b) for a, b in itertools.pairwise(centre)), "path")
+    return polygon(kept, "cut"), path
+
+
+def _direction(points: FloatArray, k: int) -> FloatArray:
+    """Return the unit vector along a chain at one of its points, between its distinct neighbours."""
+    apart = np.flatnonzero(np.hypot(*(points - points[k]).T) > 0)
+    before, after = apart[apart < k], apart[apart > k]
+    start = points[before[-1]] if len(before) else points[k]
+    stop = points[after[0]] if len(after) else points[k]
+    way: FloatArray = (stop - start) / np.hypot(*(stop - start))
+    return way
+
+
+def _normal(points: FloatArray, k: int) -> FloatArray:
+    x, y = _direction(points, k)
+    return np.array([-y, x])
+
+
+def _links(crank: float, coupler: float) -> Drawing:
+    """Return two links with a hole for each pin, beside each other."""
+    short = min(crank, coupler)
+    eye, hole = EYE_SHARE * short, HOLE_SHARE * short
+    contours: list[Contour] = []
+    for number, length in enumerate((crank, coupler)):
+        y = -3.0 * eye * number
+        edges = (
+            Line((0.0, y - eye), (length, y - eye)),
+            Arc((length, y), eye, -0.5 * np.pi, 0.5 * np.pi),
+            Line((length, y + eye), (0.0, y + eye)),
+            Arc((0.0, y), eye, 0.5 * np.pi, 1.5 * np.pi),
+        )
+        contours.append(Contour(edges, "cut", closed=True))
+        contours += [circle((x, y), hole, "cut", hole=True) for x in (0.0, length)]
+    return Drawing("slider-crank", tuple(contours))
