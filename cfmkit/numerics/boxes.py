@@ -141,4 +141,4 @@ def _refine(function: Callable[[float], float], bracket: tuple[float, float], mo
     def finite(share: float) -> float:
         return min(function(float(share)), 1e300)
 
-    minimize_scalar(finite, bounds=bracket, method="bounded", options={"xatol": 1e-9, "maxiter": most})
+    minimize_scalar(finite, bounds=bracket, method="bounded", options={"xatol": 1e-7, "maxiter": most})

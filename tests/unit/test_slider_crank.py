@@ -354,3 +354,22 @@ def test_turning_points_between_samples_are_found():
     steps = np.diff(cut.value[1])
     assert (np.diff(np.sign(steps[steps != 0])) != 0).sum() == 2  # both within one cell
     assert sharpened(x, curves, slopes)[0].min() == pytest.approx(-16 / 27**0.5)
+
+
+@pytest.mark.parametrize("name", ["li2019_prototype", "bilancia2019"])
+def test_gradients_are_those_of_differences(name):
+    spec = config(name)
+    paths = [f"mechanism.springs.{joint}" for joint in ("pivot", "crank_pin", "slider_pin", "slider")]
+    found = cfmkit.api.family("slider-crank").gradient(spec, [*paths, "mechanism.offset"])
+    assert len(found) > 6
+    for path in paths:
+        rate = spec.at(path)
+        step = 1e-4 * (rate or (1.0 if path.endswith("slider") else 1e-3))
+        low = max(rate - step, 0.0)
+        ends = [
+            cfmkit.api.evaluate(cfmkit.analyze(spec.replace({path: value})), list(found))
+            for value in (low, rate + step)
+        ]
+        for metric, by_path in found.items():
+            difference = (ends[1][metric].value - ends[0][metric].value) / (rate + step - low)
+            assert by_path[path] == pytest.approx(difference, rel=2e-3, abs=1e-9), (metric, path)

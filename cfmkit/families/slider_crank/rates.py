@@ -140,13 +140,11 @@ def least_squares(goal: Goal) -> FloatArray:
     """Return the rates with the smallest root mean square of the deviations; `held` is not looked at."""
     from scipy.optimize import lsq_linear, nnls
 
-    scales = goal.scales()
-    matrix = goal.matrix / scales
-    if np.isinf(goal.upper).all():
-        scaled, _ = nnls(matrix, goal.wanted)
+    scales, there = goal.scales(), goal.upper > 0.0
+    matrix, scaled = goal.matrix / scales, np.zeros(len(goal.upper))
+    if np.isinf(goal.upper[there]).all():
+        scaled[there], _ = nnls(matrix[:, there], goal.wanted)
     else:
-        there = goal.upper > 0.0
-        scaled = np.zeros(len(scales))
         found = lsq_linear(matrix[:, there], goal.wanted, (0.0, (goal.upper * scales)[there]), method="bvls", tol=1e-14)
         scaled[there] = found.x
     rates: FloatArray = scaled / scales
