@@ -94,10 +94,12 @@ def _returns(solution: Solution) -> Iterator[Finding]:
         )
         yield finding("bistable", f"without the spring the leaves snap to a second stable pose; with it {back}")
     inside = push.inside((low, high))
-    if len(inside) and inside.min() <= 0:
+    beyond = push.rest is None or push.rest > low
+    if beyond or (len(inside) and inside.min() <= 0):
+        told = newton(float(inside.min())) if len(inside) and not beyond else "zero and below"
         yield finding(
             "force_reversal",
-            f"within {mm(low)} ... {mm(high)} the force falls to {newton(float(inside.min()))}: no outward force is "
+            f"within {mm(low)} ... {mm(high)} the force falls to {told}: no outward force is "
             f"left; a preload above {mm(-solution.parts.balance)} and K_p >= K_n keep it positive",
         )
     yield from _overload(solution, push)
@@ -119,11 +121,10 @@ def _preloads(solution: Solution) -> Iterator[Finding]:
         if push.preload >= 0:
             continue
         inside = push.inside(solution.window)
-        if push.rest is None or not len(inside) or inside.min() <= 0:
-            least = newton(float(inside.min())) if len(inside) else "none"
+        if push.rest is None or push.rest > solution.window[0] or inside.min() <= 0:
             yield finding(
                 "preload_out_of_range",
-                f"with a preload of {mm(push.preload)} no outward force is left in the window (least: {least}): the "
+                f"with a preload of {mm(push.preload)} no outward force is left in the window: the "
                 f"force there is K_p (h + dr), which vanishes at {mm(-solution.parts.balance)}",
             )
             return
@@ -170,10 +171,10 @@ def _imperfect(solution: Solution) -> Iterator[Finding]:
     about, exact = solution.spec.mechanism.bistable, solution.spec.analysis.fidelity == "exact"
     share = about.waviness / about.thickness
     if share > WAVY or (about.waviness and not exact):
-        told = "counts in" if exact else "is left out here: only 'analysis.fidelity: exact' has"
-        effect = ", which lowers the negative stiffness" if share > WAVY else ""
+        told = "is counted in" if exact else "is left out: only 'analysis.fidelity: exact' has it"
+        effect = "; it rounds the peak and lowers the negative stiffness" if share > WAVY else ""
         yield finding(
-            "imperfection", f"waviness of {mm(about.waviness)}, {percent(share)} of the thickness, {told} it{effect}"
+            "imperfection", f"waviness of {mm(about.waviness)}, {percent(share)} of the thickness, {told}{effect}"
         )
     push = solution.nominal
     if not push.leaves.stable.all():

@@ -96,10 +96,9 @@ class Traced:
             force[chosen] = law(x[chosen])
         own = self.sense * self.places
         stress = np.interp(x, own, self.stress)
-        near = np.searchsorted(0.5 * (own[1:] + own[:-1]), x)
         beyond = x > self.sense * self.edges[-1] * (1 + 1e-9) + 1e-15
         force[beyond], stress[beyond] = np.nan, np.nan
-        return force, stress, self.stable[near], self._buckled[pieces]
+        return force, stress, self._stable[pieces], self._buckled[pieces]
 
     @property
     def buckled_range(self) -> tuple[float, float]:
@@ -109,14 +108,19 @@ class Traced:
 
     @cached_property
     def _buckled(self) -> Any:
-        """Whether most of the points of each piece are on a branch that was not there as made."""
+        """Whether each piece is on a branch that was not there as made."""
+        return self._most(self.buckled, False)
+
+    @cached_property
+    def _stable(self) -> Any:
+        """Whether each piece is stable."""
+        return self._most(self.stable, True)
+
+    def _most(self, flags: Any, empty: bool) -> Any:
+        """Return what most of the points of each piece are."""
         pieces = self._piece(self.places)
-        return np.array(
-            [
-                self.buckled[pieces == k].mean() > 0.5 if (pieces == k).any() else False
-                for k in range(len(self.edges) - 1)
-            ]
-        )
+        found = [flags[pieces == number] for number in range(len(self.edges) - 1)]
+        return np.array([one.mean() > 0.5 if len(one) else empty for one in found])
 
 
 def traced(network: Network, node: str, end: float, **control: Any) -> Traced:

@@ -1,0 +1,301 @@
+"""Identities and limits of the vcfm family: laws, windows, blocks, tables, shapes, outlines, pictures."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from vcfm_support import CONFIGS, MM, TABLE_I, analyzed, leaf, table_i
+
+import cfmkit
+from cfmkit import api
+from cfmkit.export import files
+from cfmkit.families.base import Block, Measure
+from cfmkit.families.vcfm.block import METRICS, SCALARS, VARIED, analyze_block
+from cfmkit.families.vcfm.parts import parts
+from cfmkit.families.vcfm.sbranch import POLE, axial_root, compliance, end_curvature, pose
+from cfmkit.families.vcfm.shapes import centre_line
+from cfmkit.families.vcfm.springs import Diamond
+from cfmkit.families.vcfm.strip import Strip
+from cfmkit.families.vcfm.vbeam import VBeam
+from cfmkit.families.vcfm.windows import longest_window
+from cfmkit.results import Status
+from cfmkit.studies.columns import metrics_of
+from cfmkit.studies.engine import Work, run
+from cfmkit.studies.plan import Draw, sampled
+from cfmkit.studies.study import Study
+from cfmkit.studies.variation import axes, wishes
+
+# --- the S form ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("z", [-900.0, -30.0, -0.36, -0.34, 0.0, 0.34, 0.36, 5.0, 15.0, 20.0])
+def test_the_shortening_is_a_quarter_of_the_falling_end_curvature(z):
+    """e = -(dw/dz)/4 and its own derivative, across the ranges of series, circular and hyperbolic functions."""
+    step = 1e-4 * max(1.0, abs(z) * 1e-2)
+    ends = np.array([z - step, z + step])
+    e, slope = compliance(np.array([z]))
+    assert e[0] == pytest.approx(-0.25 * np.diff(end_curvature(ends))[0] / (2 * step), rel=1e-6)
+    assert slope[0] == pytest.approx(np.diff(compliance(ends)[0])[0] / (2 * step), rel=1e-5)
+
+
+def test_the_axial_root_solves_its_equation_everywhere():
+    travel = np.concatenate([-np.geomspace(1e-6, 0.2, 40), np.geomspace(1e-6, 0.4, 200)])
+    at = pose(np.radians(7), travel)
+    stretch = (1 / 35) ** 2 / 3
+    z = axial_root(at.shortening, at.turn, stretch)
+    assert (z < POLE).all()
+    assert stretch * z + at.turn**2 * compliance(z)[0] == pytest.approx(at.shortening, abs=1e-15, rel=1e-9)
+
+
+def test_a_pose_keeps_its_digits_for_tiny_travels():
+    at = pose(np.radians(7), np.array([1e-9]))
+    assert at.turn[0] == pytest.approx(1e-9 * np.cos(np.radians(7)), rel=1e-8)
+    assert at.shortening[0] == pytest.approx(1e-9 * np.sin(np.radians(7)), rel=1e-8)
+
+
+def test_the_force_is_the_derivative_of_no_jump():
+    """The two laws are joined where they cross."""
+    law = VBeam(leaf())
+    for place in law.linear:
+        below, above = law.force(np.array([place - 1e-9, place + 1e-9]))
+        assert above == pytest.approx(below, abs=1e-7)
+
+
+def test_laws_are_the_same_for_one_leaf_and_for_many():
+    thickness = np.array([0.6, 0.9, 1.2, 1.4])
+    travel = np.linspace(-0.5, 7, 61)
+    together = VBeam(leaf(thickness[:, None])).force(travel[None, :])
+    for row, one in zip(together, thickness, strict=True):
+        assert row == pytest.approx(VBeam(leaf(float(one))).force(travel), rel=1e-9, abs=1e-10)
+
+
+def test_forces_scale_with_width_modulus_and_size():
+    travel, strip = np.linspace(0.1, 6, 50), leaf()
+    wide = VBeam(Strip(35.0, strip.angle, 1.0, 12.0, 1477.0, 0.3))
+    stiff = VBeam(Strip(35.0, strip.angle, 1.0, 6.0, 2954.0, 0.3))
+    large = VBeam(Strip(70.0, strip.angle, 2.0, 12.0, 1477.0, 0.3))
+    once = VBeam(strip).force(travel)
+    assert wide.force(travel) == pytest.approx(2 * once, rel=1e-12)
+    assert stiff.force(travel) == pytest.approx(2 * once, rel=1e-12)
+    assert large.force(2 * travel) == pytest.approx(4 * once, rel=1e-9)
+
+
+def test_a_diamond_without_angle_is_a_parallel_guide():
+    flat = Strip(25.0, 0.0, 1.0, 10.0, 1477.0, 0.3)
+    assert Diamond(flat).stiffness == pytest.approx(12 * flat.bending / 25.0**3, rel=6e-3)
+
+
+# --- windows ---------------------------------------------------------------------------------------------------
+
+
+def plain_longest(force, flatness):
+    best = (0, 0)
+    for i in range(len(force)):
+        for j in range(i, len(force)):
+            part = force[i : j + 1]
+            if part.min() > 0 and part.max() - part.min() <= flatness * part.max() and j - i > best[1] - best[0]:
+                best = (i, j)
+    return best
+
+
+def test_the_longest_window_is_what_trying_all_gives():
+    curves = np.random.default_rng(3).normal(size=(30, 40)).cumsum(axis=1) * 0.1 + 5
+    curves[4, 10] = np.nan
+    first, last = longest_window(curves, 0.05)
+    for curve, start, stop in zip(curves, first, last, strict=True):
+        assert (start, stop) == plain_longest(np.where(np.isnan(curve), -1, curve), 0.05)
+
+
+# --- blocks ----------------------------------------------------------------------------------------------------
+
+RANGES = {
+    "mechanism.positive.length": "22 mm:28 mm",
+    "mechanism.positive.thickness": "1.2 mm:1.8 mm",
+    "mechanism.bistable.angle": "5 deg:9 deg",
+    "mechanism.bistable.thickness": "0.6 mm:1.5 mm",
+    "mechanism.bistable.half_beams": [2, 4],
+    "mechanism.material.youngs_modulus": "1200 MPa:2000 MPa",
+}
+NAMES = tuple(name for name in (*METRICS, *SCALARS) if name != "deviation_from_target")
+
+
+@pytest.mark.parametrize("model", ["truss", "analytic"])
+@pytest.mark.parametrize("window", ["[2 mm, 4 mm]", "[1.003 mm, 4.111 mm]", "null"])
+def test_a_block_has_the_numbers_of_its_points(model, window):
+    spec = table_i(f"analysis.fidelity={model}", f"analysis.window={window}", "analysis.points=101", "requirements=[]")
+    ranges = {path: item for path, item in RANGES.items() if not path.endswith("modulus")}
+    plan = sampled(axes(spec, wishes(ranges), drawn=True), Draw("sobol", 64))
+    many = Work(Study(spec, plan.paths, metrics_of(spec, NAMES)), plan)
+    assert many.vectorised
+    together = run(many)
+    for k in range(0, 64, 4):
+        alone = many.study.evaluate(many.plan.point(k))
+        assert together.row(k).status(0) == (alone.status, alone.message)
+        values = np.array([np.nan if value is None else value for value in alone.values])
+        block = together.row(k).values[0]
+        wrong = ~np.isclose(block, values, rtol=1e-8, atol=1e-9, equal_nan=True)
+        assert not wrong.any(), [(NAMES[m], block[m], values[m]) for m in np.flatnonzero(wrong)]
+
+
+def test_every_size_that_a_block_varies_is_one_of_the_spec():
+    spec = table_i("mechanism.material={youngs_modulus: 1477 MPa}")
+    for path in VARIED:
+        assert spec.at(path) is not None
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [["analysis.fidelity=exact"], ["mechanism.bistable.structure=cosine"], ["analysis.preloads=[1 mm]"]],
+)
+def test_what_has_no_closed_form_over_arrays_is_left_to_the_model_of_one(changes):
+    block = Block({"mechanism.bistable.width": np.array([5e-3, 6e-3])}, (Measure("force_mean", (2e-3, 4e-3)),), 2)
+    assert analyze_block(table_i(*changes), block) is None
+    assert analyze_block(table_i(), block).done.all()
+
+
+# --- curves and tables -----------------------------------------------------------------------------------------
+
+
+def test_force_is_leaves_and_spring_together_and_every_curve_starts_at_rest():
+    found = analyzed(preloads="[0 mm, 5 mm, -1 mm]")
+    for curve, push in zip(found.curves, found.state.pushes, strict=True):
+        extra = curve.extra
+        assert curve.force == pytest.approx(extra["bistable_force"].values + extra["spring_force"].values)
+        assert curve.force[0] == pytest.approx(0, abs=1e-6)
+        assert curve.displacement[0] == pytest.approx(push.rest, abs=1e-15)
+        assert curve.label == {"preload": (push.preload, "length")}
+    assert found.state.pushes[1].rest < 0 < found.state.pushes[2].rest
+
+
+def test_the_adjustability_table_has_a_row_for_each_preload():
+    found = analyzed(preloads="[0 mm, 2.5 mm, 7.5 mm]")
+    table = found.tables["adjustability"]()
+    assert table["preload"].tolist() == [0, 2.5, 7.5]
+    stiffness = found.values["positive_stiffness"].value / 1e3
+    assert table["force_change"] == pytest.approx(stiffness * table["preload"], abs=1e-9)
+    assert (np.diff(table["rest_position"]) < 0).all()
+
+
+def test_half_of_the_spring_is_half_as_stiff():
+    whole, half = (analyzed(f"mechanism.positive.loaded={part}") for part in ("whole", "half"))
+    assert half.values["positive_stiffness"].value == pytest.approx(0.5 * whole.values["positive_stiffness"].value)
+
+
+def test_an_exact_run_that_cannot_be_followed_is_partial_and_says_how_far_it_came():
+    found = analyzed("analysis.fidelity=exact", "mechanism.bistable.guided=false", "analysis.travel=6 mm")
+    assert found.status is Status.PARTIAL
+    assert "were followed to 5.7" in found.message
+    assert found.curve.motion[-1] < 5.8 * MM
+
+
+def test_exact_forces_do_not_depend_on_the_number_of_points():
+    few, many = (analyzed("analysis.fidelity=exact", f"analysis.points={n}") for n in (31, 481))
+    at = np.interp(few.curve.motion, many.curve.motion, many.curve.force)
+    assert at == pytest.approx(few.curve.force, abs=1e-9)
+
+
+# --- design ----------------------------------------------------------------------------------------------------
+
+
+def designed(*changes, stem="vcfm_pla"):
+    return api.design(cfmkit.load(CONFIGS / f"{stem}.yaml", changes))
+
+
+LIMITS = {
+    "design.stroke=5.8 mm": ("stroke_unreachable", "design.stroke"),
+    "design.min_thickness=1.2 mm": ("too_thin", "design.stroke"),
+    "design.max_span=50 mm": ("envelope", "design.max_span"),
+    "design.max_width=8 mm": ("envelope", "design.max_width"),
+    "design.leaf_length=25 mm": ("yield", "design.leaf_length"),
+    "mechanism.bistable.half_beams=8": ("out_of_plane_buckling", "design.leaf_length"),
+}
+
+
+@pytest.mark.parametrize("change", LIMITS)
+def test_a_limit_is_named_and_the_nearest_feasible_value_works(change):
+    name, path = LIMITS[change]
+    more = ("design.min_thickness=0.5 mm",) if name == "stroke_unreachable" else ()
+    found = designed(change, *more)
+    assert found.status is Status.INFEASIBLE
+    assert found.warnings[0].name == name
+    assert set(found.nearest_feasible) == {path}
+    cured = designed(change, *more, f"{path}={found.nearest_feasible[path]}")
+    assert cured.status is Status.COMPLETE, cured.message
+
+
+def test_leaves_that_cannot_buckle_have_no_nearest_stroke():
+    found = designed("design.min_thickness=2 mm")
+    assert found.warnings[0].name == "too_thin"
+    assert "above 6.283 mm" in found.message
+    assert found.nearest_feasible == {}
+
+
+def test_a_design_without_strength_or_targets_is_invalid():
+    assert "allowable_stress" in designed("mechanism.material={youngs_modulus: 1477 MPa}").message
+    assert api.design(cfmkit.load(TABLE_I)).status is Status.INVALID
+
+
+def test_the_exact_pass_brings_the_exact_mean_to_the_target():
+    for refine, error in ((True, 2e-4), (False, 9e-3)):
+        found = designed(f"design.refine={str(refine).lower()}")
+        exact = api.analyze(found.spec.replace({"analysis.fidelity": "exact"}))
+        mean = api.evaluate(exact, ["force_mean"])["force_mean"].value
+        assert abs(mean / 11.15 - 1) < error
+        assert (abs(mean / 11.15 - 1) > 2e-3) is not refine
+
+
+def test_rise_and_preload_say_the_same():
+    one, other = (
+        designed("design={force: 11.15 N, adjustment: 5 N, stroke: 3.8 mm, rise: 4.265 mm}"),
+        designed("design={force: 11.15 N, adjustment: 5 N, stroke: 3.8 mm, preload: 1.9125560538116592 mm}"),
+    )
+    sizes = "mechanism.bistable.thickness", "mechanism.bistable.width", "mechanism.positive.width"
+    assert [one.spec.at(path) for path in sizes] == pytest.approx([other.spec.at(path) for path in sizes], rel=1e-9)
+
+
+# --- shapes, outlines, pictures --------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("stem", "error"), [("ding2022", 0.035), ("cosine", 0.05), ("hybrid", 0.16)])
+@pytest.mark.parametrize("travel", [-1.0, 0.5, 2.0, 4.0])
+def test_drawn_leaves_have_the_shape_of_exact_ones(stem, error, travel):
+    from cfmkit.beams import Control, Displacement, trace
+    from cfmkit.families.vcfm.exact import DOWN, leaf_network
+
+    spec = cfmkit.load(CONFIGS / f"vcfm_{stem}.yaml")
+    drawn = centre_line(parts(spec).leaf, travel * MM)
+    drive = Displacement("shuttle", DOWN, travel * MM * np.linspace(0, 1, 7)[1:])
+    apart = []
+    for sign in (1, -1):
+        exact = trace(leaf_network(spec), drive, Control(sign=sign)).shape("leaf", -1)
+        apart.append(np.abs(np.interp(drawn[:, 0], *exact.T) - drawn[:, 1]).max())
+    assert min(apart) < error * MM
+
+
+@pytest.mark.parametrize("loaded", ["whole", "half"])
+@pytest.mark.parametrize("structure", ["diamond", "folded", "straight", "u-shape"])
+@pytest.mark.parametrize("kind", ["v-beam", "cosine", "hybrid"])
+def test_both_structures_can_be_written_for_cutting(kind, structure, loaded):
+    """The writer refuses outlines that are open, cross themselves or lie in each other."""
+    spec = table_i(
+        f"mechanism.bistable.structure={kind}", "mechanism.bistable.flexure_length=5 mm",
+        f"mechanism.positive.structure={structure}", "mechanism.positive.radius=4 mm",
+        f"mechanism.positive.loaded={loaded}",
+    )  # fmt: skip
+    drawing = api.drawing(spec)
+    assert {"vcfm.dxf", "vcfm.svg", "leaf.csv"} <= set(files(drawing))
+    holes = [contour for contour in drawing.contours if contour.hole]
+    inside = loaded == "whole" and structure != "straight"
+    assert len(holes) == 2 + inside
+    assert len(drawing.contours) == 4 + inside
+
+
+@pytest.mark.parametrize("stem", ["ding2022", "cosine", "straight", "hybrid", "u_shape"])
+def test_every_picture_can_be_drawn(stem):
+    result = api.analyze(cfmkit.load(CONFIGS / f"vcfm_{stem}.yaml", ["analysis.points=61"]))
+    pictures = api.figures(result)
+    assert {"force", "split", "stress", "mechanism"} <= set(pictures)
+    for draw in pictures.values():
+        figure = draw()
+        assert figure.axes
+    assert ("adjustability" in pictures) is (len(result.curves) > 1)
