@@ -11,7 +11,7 @@ import numpy as np
 
 from cfmkit.beams.kernels.model import TABLE_COLUMNS, Model
 from cfmkit.beams.kernels.rk8 import NODES, STAGES
-from cfmkit.beams.plan import LINE, SLIDE, TURN
+from cfmkit.beams.numbering import LINE, SLIDE, TURN
 from cfmkit.beams.section import Taper
 
 if TYPE_CHECKING:

@@ -75,8 +75,9 @@ class Control:
         Error of forces and positions allowed, relative to the largest of the path [1].
     through_folds : bool
         Follow the path by its arc length, through limit points of the drive, instead of by the drive.
-    branch : {"stable", "primary"}
-        At a bifurcation leave for a stable branch, or stay on the path and say so.
+    branch : {"stable", "primary", "stop"}
+        Where stability is lost leave for a stable branch, stay on the path and say so, or end the path there: the
+        quickest way to know that a design is no good.
     sign : {1, -1}
         Which of two mirror-image branches is taken.
     largest_turn : float
@@ -92,7 +93,7 @@ class Control:
 
     tolerance: float = 1e-7
     through_folds: bool = False
-    branch: Literal["stable", "primary"] = "stable"
+    branch: Literal["stable", "primary", "stop"] = "stable"
     sign: Literal[1, -1] = 1
     largest_turn: float = 0.35
     first_step: float | None = None
@@ -103,8 +104,8 @@ class Control:
         """Check the values."""
         if not 1e-12 <= self.tolerance <= 0.1:
             raise InputError(f"the tolerance must be between 1e-12 and 0.1, got {self.tolerance}")
-        if self.branch not in ("stable", "primary") or self.sign not in (1, -1):
-            raise InputError("branch is 'stable' or 'primary', sign 1 or -1")
+        if self.branch not in ("stable", "primary", "stop") or self.sign not in (1, -1):
+            raise InputError("branch is 'stable', 'primary' or 'stop', sign 1 or -1")
         if not (self.largest_turn > 0 and self.most_points >= 2):
             raise InputError("largest_turn must be positive and most_points at least 2")
         if not np.isfinite(self.imperfection):

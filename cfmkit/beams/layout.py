@@ -11,7 +11,8 @@ from cfmkit.beams.beam import Fit, fit, same_value
 from cfmkit.beams.bundle import Bundle
 from cfmkit.beams.drive import Displacement, Drive, Rotation
 from cfmkit.beams.network import LineSpring, Network, PointLoad, SlideSpring, Spring, TorsionSpring
-from cfmkit.beams.plan import GROUND, NOWHERE, driven, plan_of
+from cfmkit.beams.numbering import GROUND, NOWHERE
+from cfmkit.beams.plan import driven, plan_of
 from cfmkit.errors import InputError
 
 if TYPE_CHECKING:

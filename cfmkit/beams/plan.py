@@ -7,82 +7,20 @@ freedom once.
 from __future__ import annotations
 
 from collections import OrderedDict
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cfmkit.beams.drive import Drive, Loading, Rotation
-from cfmkit.beams.network import LineLoad, Network, PointLoad, SlideSpring, TorsionSpring, same_direction
+from cfmkit.beams.network import LineLoad, Network, SlideSpring, TorsionSpring, same_direction
+from cfmkit.beams.numbering import LINE, SLIDE, TURN, Builder, Plan, apart, nonzero
 from cfmkit.errors import InputError
 
 if TYPE_CHECKING:
-    from cfmkit.beams.kernels.model import IntArray
     from cfmkit.beams.network import LoadOn, Spring
 
-LINE, TURN, SLIDE = 0, 1, 2  # as in cfmkit.beams.kernels.springs
-GROUND, NOWHERE = -1, -1
 _KEPT = 64
 _plans: OrderedDict[Any, Plan] = OrderedDict()
-
-
-@dataclass(frozen=True)
-class Plan:
-    """Numbers of degrees of freedom and attachments.
-
-    Attributes
-    ----------
-    masters : list of str
-        Nodes that no link moves; three degrees of freedom each, in this order.
-    first, turn, swing : dict
-        First degree of freedom of every master; rotation of every node, and that by which its place swings about its
-        master's.
-    dof_count : int
-        Degrees of freedom, those of the ground (the last three) included.
-    pins : dict
-        (beam, side) and names of pinned nodes to the rotation that they have of their own.
-    place_dof : (n, 4) int array
-        As in `cfmkit.beams.kernels.model.Model`.
-    place_node, place_master, place_offset : (n,) int arrays
-        Node and master of an attachment, GROUND for places on the ground; its beam's end, 2 beam + side, or NOWHERE.
-    ground_of : dict
-        Places on the ground to the spring that is held there.
-    beam_end : (beams, 2) int array
-    spring_place, spring_kind, load_place, load_when, load_follows : int arrays
-    load_of, line_load_of : list of (int, int)
-        Where each point load and each line load comes from: 0 for the network's, 1 for the drive's, and which.
-    line_beam : list of int
-        The beam under each line load.
-    free : (dofs,) bool array
-    slot : (dofs,) int array
-    """
-
-    masters: list[str]
-    first: dict[str, int]
-    turn: dict[str, int]
-    swing: dict[str, int]
-    dof_count: int
-    pins: dict[Any, int]
-    place_dof: IntArray
-    place_node: IntArray
-    place_master: IntArray
-    place_offset: IntArray
-    ground_of: dict[int, int]
-    beam_end: IntArray
-    spring_place: IntArray
-    spring_kind: IntArray
-    load_place: IntArray
-    load_follows: IntArray
-    load_of: list[tuple[int, int]]
-    line_load_of: list[tuple[int, int]]
-    line_beam: list[int]
-    free: Any
-    slot: IntArray
-
-    @property
-    def offsets(self) -> bool:
-        """Whether any beam's end has an offset."""
-        return bool((self.place_offset != NOWHERE).any())
 
 
 def driven(network: Network, drive: Drive) -> tuple[str, int, float] | None:
@@ -123,7 +61,7 @@ def plan_of(network: Network, drive: Drive, moved: tuple[str, int, float] | None
     key = _key(network, drive, moved)
     plan = _plans.get(key)
     if plan is None:
-        plan = _plans[key] = _Builder(network, drive, moved).plan()
+        plan = _plans[key] = Builder(network, drive, moved).plan()
         if len(_plans) > _KEPT:
             _plans.popitem(last=False)
     return plan
@@ -133,29 +71,19 @@ def _key(network: Network, drive: Drive, moved: tuple[str, int, float] | None) -
     """Return all that a plan depends on."""
     nodes = [(name, (s := node.support).along, s.across, s.rotation) for name, node in network.nodes.items()]
     beams = [
-        (name, b.start, b.end, b.start_joint, b.end_joint, _nonzero(b.start_offset), _nonzero(b.end_offset))
+        (name, b.start, b.end, b.start_joint, b.end_joint, nonzero(b.start_offset), nonzero(b.end_offset))
         for name, b in network.beams.items()
     ]
     key: list[Any] = [tuple(nodes), tuple(beams), moved and moved[:2]]
     if network.links:
-        apart = tuple(_apart(network, link.node) for link in network.links)
-        key += [network.links, apart]
+        away = tuple(apart(network, link.node) for link in network.links)
+        key += [network.links, away]
     if network.springs:
         key.append(tuple(_spring_key(spring) for spring in network.springs))
     driving = drive.loads if isinstance(drive, Loading) else ()
     if network.loads or driving:
         key += [tuple(_load_key(load) for load in loads) for loads in (network.loads, driving)]
     return tuple(key)
-
-
-def _nonzero(offset: tuple[Any, Any]) -> bool:
-    return bool(offset[0] != 0 or offset[1] != 0)
-
-
-def _apart(network: Network, node: str) -> bool:
-    """Tell whether a node is away from its master."""
-    one, other = network.nodes[node], network.nodes[network.master_of(node)]
-    return bool(one.x != other.x or one.y != other.y)
 
 
 def _spring_key(spring: Spring) -> Any:
@@ -168,145 +96,3 @@ def _load_key(load: LoadOn) -> Any:
     if isinstance(load, LineLoad):
         return (load.beam,)
     return load.node, load.follows, load.moment != 0
-
-
-class _Builder:
-    """Numbers degrees of freedom and attachments, once for every make-up."""
-
-    def __init__(self, network: Network, drive: Drive, moved: tuple[str, int, float] | None) -> None:
-        self.network, self.drive, self.moved = network, drive, moved
-        self.masters = [name for name in network.nodes if not network.moved(name)]
-        self.first = {name: 3 * i for i, name in enumerate(self.masters)}
-        self.names = list(network.nodes)
-        self.count = 3 * len(self.masters)
-        self.pins: dict[Any, int] = {}
-        for link in network.links:
-            if not link.turns:
-                self._pin(link.node)
-        for name, beam in network.beams.items():
-            for side, joint in enumerate((beam.start_joint, beam.end_joint)):
-                if joint == "pin":
-                    self._pin((name, side))
-        self.ground = self.count
-        self.count += 3
-        self.turn = {name: self._turn(name) for name in self.names}
-        self.rows: list[tuple[tuple[int, int, int, int], int, int, int]] = []
-        self.arms: list[bool] = []
-        self.ground_of: dict[int, int] = {}
-
-    def _pin(self, what: Any) -> None:
-        self.pins[what] = self.count
-        self.count += 1
-
-    def _turn(self, node: str) -> int:
-        """Return the rotation of a node."""
-        body = self.network.body_of(node)
-        return self.pins[body] if body in self.pins else self.first[body] + 2
-
-    def _swing(self, node: str) -> int:
-        """Return the rotation by which a node's place swings about its master's."""
-        body = self.network.body_of(node)
-        if body in self.pins and not _apart(self.network, body):
-            return self.pins[body]
-        return self.first[self.network.master_of(node)] + 2
-
-    def plan(self) -> Plan:
-        """Collect the attachments."""
-        names = list(self.network.beams)
-        ends = [[self._beam_place(k, name, side) for side in (0, 1)] for k, name in enumerate(names)]
-        springs = [self._spring(k, spring) for k, spring in enumerate(self.network.springs)]
-        load_of, line_of, line_beam, loads = [], [], [], []
-        driving = self.drive.loads if isinstance(self.drive, Loading) else ()
-        for when, given in enumerate((self.network.loads, driving)):
-            for k, load in enumerate(given):
-                if isinstance(load, PointLoad):
-                    load_of.append((when, k))
-                    loads.append((self._place(load.node), load.follows, load.moment != 0))
-                else:
-                    line_of.append((when, k))
-                    line_beam.append(names.index(load.beam))
-        free = self._free(np.array(ends), springs, loads)
-        slot = np.full(self.count, -1, dtype=np.int64)
-        slot[free] = np.arange(int(free.sum()))
-        return Plan(
-            masters=self.masters,
-            first=self.first,
-            turn=self.turn,
-            swing={name: self._swing(name) for name in self.names},
-            dof_count=self.count,
-            pins=self.pins,
-            place_dof=np.array([row[0] for row in self.rows], dtype=np.int64),
-            place_node=np.array([row[1] for row in self.rows], dtype=np.int64),
-            place_master=np.array([row[2] for row in self.rows], dtype=np.int64),
-            place_offset=np.array([row[3] for row in self.rows], dtype=np.int64),
-            ground_of=self.ground_of,
-            beam_end=np.array(ends, dtype=np.int64),
-            spring_place=np.array([row[1:] for row in springs], dtype=np.int64).reshape(-1, 2),
-            spring_kind=np.array([row[0] for row in springs], dtype=np.int64),
-            load_place=np.array([row[0] for row in loads], dtype=np.int64),
-            load_follows=np.array([int(row[1]) for row in loads], dtype=np.int64),
-            load_of=load_of,
-            line_load_of=line_of,
-            line_beam=line_beam,
-            free=free,
-            slot=slot,
-        )
-
-    def _place(self, node: str, offset: int = NOWHERE, carried: bool = False, pose: int | None = None) -> int:
-        """Add an attachment to a node, with the offset of a beam's end; return its index."""
-        master, body = self.network.master_of(node), self.network.body_of(node)
-        first, turn, apart = self.first[master], self._swing(node), _apart(self.network, node)
-        if body in self.pins and _apart(self.network, body) and (carried or self._away(node, body)):
-            raise InputError(f"{body!r} is pinned to a rigid arm: it cannot carry offsets or rigid links of its own")
-        own = self.turn[node] if pose is None else pose
-        self.rows.append(((first, first + 1, turn, own), self.names.index(node), self.names.index(master), offset))
-        self.arms.append(apart or carried)
-        return len(self.rows) - 1
-
-    def _away(self, node: str, body: str) -> bool:
-        one, other = self.network.nodes[node], self.network.nodes[body]
-        return bool(one.x != other.x or one.y != other.y)
-
-    def _ground_place(self, spring: int) -> int:
-        g = self.ground
-        self.rows.append(((g, g + 1, g + 2, g + 2), GROUND, GROUND, NOWHERE))
-        self.arms.append(False)
-        self.ground_of[len(self.rows) - 1] = spring
-        return len(self.rows) - 1
-
-    def _beam_place(self, number: int, name: str, side: int) -> int:
-        beam = self.network.beams[name]
-        node, offset = ((beam.start, beam.start_offset), (beam.end, beam.end_offset))[side]
-        carried = _nonzero(offset)
-        return self._place(node, 2 * number + side if carried else NOWHERE, carried, self.pins.get((name, side)))
-
-    def _spring(self, number: int, spring: Spring) -> tuple[int, int, int]:
-        """Return kind and the two attachments of a spring."""
-        if isinstance(spring, SlideSpring):
-            return SLIDE, self._ground_place(number), self._place(spring.node)
-        if isinstance(spring, TorsionSpring):
-            start = self._ground_place(number) if spring.start is None else self._place(spring.start)
-            return TURN, start, self._place(spring.end)
-        start = self._place(spring.start)
-        return LINE, start, self._ground_place(number) if spring.end is None else self._place(spring.end)
-
-    def _free(self, beam_end: Any, springs: list[tuple[int, int, int]], loads: list[tuple[int, bool, bool]]) -> Any:
-        """Decide which degrees of freedom are free; a rotation that nothing resists or uses is held at zero."""
-        free = np.zeros(self.count, dtype=bool)
-        for name in self.masters:
-            support, first = self.network.nodes[name].support, self.first[name]
-            free[first : first + 3] = (not support.along, not support.across, not support.rotation)
-        dofs = [row[0] for row in self.rows]
-        turned = set(beam_end.ravel().tolist()) | {p for row in springs if row[0] == TURN for p in row[1:]}
-        needed = {dofs[p][3] for p in turned} | {dofs[p][3] for p, follows, moment in loads if follows or moment}
-        needed |= {d[2] for d, arm in zip(dofs, self.arms, strict=True) if arm}
-        for name in self.masters:
-            free[self.first[name] + 2] &= self.first[name] + 2 in needed
-        for pin in self.pins.values():
-            free[pin] = pin in needed
-        if self.moved is not None:
-            free[self.first[self.moved[0]] + self.moved[1] % 3] = False
-        return free
-
-
-__all__ = ["GROUND", "LINE", "NOWHERE", "SLIDE", "TURN", "Plan", "driven", "plan_of"]

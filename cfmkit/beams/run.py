@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 _HOPS = 60  # decisions on one path
 _FINE_STEPS = 8
+_LOOSEST = 1e-7  # tolerance of Newton's method
 _SMALLEST = 1e-7  # shortest step as a share of the drive's range
 
 
@@ -47,7 +48,7 @@ class Run:
 
     def __post_init__(self) -> None:
         """Build the solver."""
-        self.solver = Solver(self.layout, self.mesh, min(1e-9, 1e-3 * self.control.tolerance))
+        self.solver = Solver(self.layout, self.mesh, min(_LOOSEST, 1e-3 * self.control.tolerance))
         self.targets = self.layout.drive.points / self.layout.scales.drive
         self.points: Points = Points(np.empty((0, self.solver.size)), np.empty(0), np.empty((0, INFO)))
         self.branches: list[str] = []
@@ -93,6 +94,11 @@ class Run:
             code, asked, spot = self._leg(spot, asked)
             hops += 1
             if code == DONE and asked == len(self.targets):
+                return
+            if code == INERTIA and self.control.branch == "stop":
+                self.status = PathStatus.JUMPS
+                where = float(self.points.drive[-1]) * self.unit
+                self.message = f"stability is lost at {where:.6g}: the path ends there"
                 return
             if code == INERTIA:
                 following = branches.cross(self)
@@ -222,19 +228,20 @@ class Run:
             self.status, self.message = PathStatus.LOST, f"no step converged {where}"
 
     def estimate(self) -> float:
-        """Return the largest of `errors` at up to four points: spread out, and where the forces are largest."""
-        if not len(self.points):
+        """Return the largest of `errors` at up to three points: middle, last, and where the forces are largest."""
+        count = len(self.points)
+        if not count:
             return 0.0
-        samples = np.linspace(0, len(self.points) - 1, 4)[1:].astype(int)
-        hardest = np.abs(self.points.y[:, self.solver.n_free : self.solver.n]).max(axis=1).argmax()
-        return float(self.errors(np.unique(np.append(samples, hardest))).max())
+        hardest = int(np.abs(self.points.y[:, self.solver.n_free : self.solver.n]).max(axis=1).argmax())
+        return float(self.errors({count // 2, count - 1, hardest}).max())
 
     def errors(self, indices: Any) -> FloatArray:
         """Return the difference to a mesh of twice the steps at points: forces and positions, relative to the path.
 
         Infinite where the finer mesh has no equilibrium nearby.
         """
-        fine = Solver(self.layout, self.mesh.finer(), self.solver.tolerance)
+        tolerance = max(self.solver.tolerance, 0.02 * self.control.tolerance)
+        fine = Solver(self.layout, self.mesh.finer(), tolerance, self.solver)
         scale = max(1e-12, float(np.abs(self.points.y[:, self.solver.n_free : self.solver.n]).max()))
         return np.array([self._error_at(fine, int(index), scale) for index in indices])
 

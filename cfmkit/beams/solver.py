@@ -63,9 +63,9 @@ class Spot:
 class Solver:
     """Equilibria of a layout on a mesh. Holds work space: not for two threads at once."""
 
-    def __init__(self, layout: Layout, mesh: Mesh, tolerance: float = 1e-11) -> None:
-        """Build the arrays."""
-        self.layout, self.mesh, self.tolerance = layout, mesh, tolerance
+    def __init__(self, layout: Layout, mesh: Mesh, tolerance: float = 1e-11, like: Solver | None = None) -> None:
+        """Build the arrays; what does not depend on the mesh is taken over from a solver of the same layout."""
+        self.layout, self.mesh, self.tolerance, self.like = layout, mesh, tolerance, like
         self.cut = grid(layout, mesh)
         self.table = table(layout, self.cut)
         self.model: Model = self._build()
@@ -81,7 +81,12 @@ class Solver:
         self.unit[-1] = 1.0
 
     def _build(self) -> Model:
-        return assemble_model(self.layout, self.cut, self.table)
+        if self.like is None:
+            return assemble_model(self.layout, self.cut, self.table)
+        cut = self.cut
+        return self.like.model._replace(
+            table=self.table, width=cut.width, segment_step=cut.segment_step, beam_segment=cut.beam_segment
+        )
 
     def _scratch(self) -> tuple[Any, ...]:
         n, dofs = self.n + 1, self.n_dofs
@@ -107,16 +112,12 @@ class Solver:
     @staticmethod
     def unstressed_of(m: Model, cut: Grid) -> FloatArray:
         """Return where the segments start before any load, (segments, 2), dimensionless."""
-        steps = cut.edges[:, 1] - cut.edges[:, 0]
         turns = np.exp(1j * m.table[:, :, 0]) * m.table[:, :, 1]
-        runs = (turns * WEIGHTS).sum(axis=1) * steps
-        starts = np.empty(len(m.segment_step) - 1, dtype=complex)
-        for beam in range(len(m.beam_end)):
-            place = m.beam_end[beam, 0]
-            at = complex(*(m.place_origin[place] + m.place_arm[place]))
-            for segment in range(m.beam_segment[beam], m.beam_segment[beam + 1]):
-                starts[segment] = at
-                at += runs[m.segment_step[segment] : m.segment_step[segment + 1]].sum()
+        runs = np.add.reduceat((turns @ WEIGHTS) * cut.width, m.segment_step[:-1])
+        places = m.beam_end[:, 0]
+        first = (m.place_origin[places] + m.place_arm[places]) @ np.array([1.0, 1j])
+        before = np.cumsum(runs) - runs
+        starts = before + np.repeat(first - before[m.beam_segment[:-1]], np.diff(m.beam_segment))
         return np.stack([starts.real, starts.imag], axis=1)
 
     def ramp(self) -> Model:
@@ -127,7 +128,7 @@ class Solver:
         self, y: FloatArray, drive: float, border: FloatArray | None = None, target: float | None = None
     ) -> Spot | None:
         """Return the equilibrium near (y, drive) where border . (z, drive) = target; at this drive by default."""
-        new, state, tangent = y.copy(), np.zeros(4), np.zeros(self.n + 1)
+        new, state, tangent = y.copy(), np.zeros(5), np.zeros(self.n + 1)
         state[0] = drive
         border = self.unit if border is None else border
         goal = drive if target is None else target
@@ -167,9 +168,8 @@ class Solver:
     def rest(self) -> tuple[Spot | None, float]:
         """Return the equilibrium from which the drive starts, or None and the share of the preload reached."""
         zero = Spot(self.unstressed(), 0.0, np.zeros(self.n + 1))
-        ramp = self.ramp()
-        constant = bool(ramp.rate.any() or ramp.load_value.any() or ramp.line_load.any())
-        if constant:
+        if self.layout.network.loads or self.layout.base.any():
+            ramp = self.ramp()
             options = march_options(self.tolerance, 0.25, 0.35)
             code, points = self._march(ramp, zero, np.array([1.0]), options, 400)
             if code != 0:

@@ -14,7 +14,6 @@ from __future__ import annotations
 import numpy as np
 
 from cfmkit.beams.kernels.compiler import kernel
-from cfmkit.beams.kernels.dense import clear, copy_matrix
 from cfmkit.beams.kernels.flow import flow, plain_flow
 
 E, F, E2, G, C_D, SMALL = 0, 1, 2, 3, 4, 5  # blocks of a relation; C_D: c in columns 0, 1
@@ -63,7 +62,9 @@ def sweep(m, e, y, first_slot, drive, ends, rel, store, work):
         m.line_load[e, 0, 1] + drive * m.line_load[e, 1, 1],
     )
     for k in range(6):
-        clear(rel[k])
+        for i in range(3):
+            for j in range(3):
+                rel[k, i, j] = 0.0
     for k in range(3):
         rel[E, k, k] = 1.0
         rel[E2, k, k] = 1.0
@@ -90,7 +91,7 @@ def sweep(m, e, y, first_slot, drive, ends, rel, store, work):
         rq = (y[at] + out[10] - qx, y[at + 1] + out[15] - qy, out[0] - qr)
         rp = (h - ph, v - pv, out[5] - pm)
         stiff = rel[F, 2, 2]
-        denominator = _append(rel, store[j], out, rq, rp, drv)
+        denominator = _append(rel, store, j, out, rq, rp, drv)
         own = out[9]
         least = min(least, own)
         if j > begin and own != 0.0:
@@ -103,76 +104,68 @@ def sweep(m, e, y, first_slot, drive, ends, rel, store, work):
 
 
 @kernel
-def _append(rel, keep, out, rq, rp, drv):
-    """Append a segment to the relation; return the scalar pivot of the elimination."""
-    copy_matrix(keep[E], rel[E])
-    copy_matrix(keep[F], rel[F])
-    copy_matrix(keep[C_D], rel[C_D])
-    copy_matrix(keep[BEFORE], rel[E2])
+def _append(rel, store, n, out, rq, rp, drv):
+    """Append segment n to the relation; return the scalar pivot of the elimination.
+
+    Whole arrays with all their indices, here and below: views of them cost more than the arithmetic.
+    """
+    for i in range(3):
+        for j in range(3):
+            store[n, E, i, j], store[n, F, i, j] = rel[E, i, j], rel[F, i, j]
+            store[n, C_D, i, j], store[n, BEFORE, i, j] = rel[C_D, i, j], rel[E2, i, j]
     turn = out[6]  # dM1 by the start's rotation: the only entry of dp1/dq0
     g0, g1 = out[7] + turn * rel[F, 2, 0], out[8] + turn * rel[F, 2, 1]
     pivot = out[9] + turn * rel[F, 2, 2]
     if pivot == 0.0:
         return pivot
-    k = keep[SMALL]
-    k[2, 0] = turn
     # dp_j = W dp_{j+1} + e3 (hq . dq_a) + hb; W differs from 1 in its last row only
-    k[0, 0], k[0, 1], k[0, 2] = -g0 / pivot, -g1 / pivot, 1.0 / pivot
+    k0, k1, k2 = -g0 / pivot, -g1 / pivot, 1.0 / pivot
+    store[n, SMALL, 0, 0], store[n, SMALL, 0, 1], store[n, SMALL, 0, 2] = k0, k1, k2
     for i in range(3):
-        k[1, i] = -turn * rel[E, 2, i] / pivot
-    for col in range(2):
-        if col == 0:
-            b0, b1, b2 = -rp[0], -rp[1], -rp[2] - turn * rel[C_D, 2, 0]
-        else:
-            b0, b1, b2 = -drv[3], -drv[4], -drv[5] - turn * rel[C_D, 2, 1]
-        hb = k[0, 0] * b0 + k[0, 1] * b1 + k[0, 2] * b2
-        # hb is kept beside the relation: columns of keep[E2] and, for the force at the start, of keep[G]
-        keep[E2, 0, col], keep[E2, 1, col], keep[E2, 2, col] = b0, b1, hb
-    _propagate(rel, keep, out, rq, drv)
+        store[n, SMALL, 1, i] = -turn * rel[E, 2, i] / pivot
+    store[n, SMALL, 2, 0] = turn
+    # hb, for the residual and for the drive
+    b0, b1 = -rp[0], -rp[1]
+    store[n, E2, 0, 0], store[n, E2, 1, 0] = b0, b1
+    store[n, E2, 2, 0] = k0 * b0 + k1 * b1 - k2 * (rp[2] + turn * rel[C_D, 2, 0])
+    b0, b1 = -drv[3], -drv[4]
+    store[n, E2, 0, 1], store[n, E2, 1, 1] = b0, b1
+    store[n, E2, 2, 1] = k0 * b0 + k1 * b1 - k2 * (drv[5] + turn * rel[C_D, 2, 1])
+    _propagate(rel, store, n, out, rq, drv)
     return pivot
 
 
 @kernel
-def _propagate(rel, keep, out, rq, drv):
-    """Replace the relation by that after the segment."""
-    k = keep[SMALL]
-    e, f, e2, g, c = rel[E], rel[F], rel[E2], rel[G], rel[C_D]
-    olde, oldf, oldc = keep[E], keep[F], keep[C_D]
+def _propagate(rel, store, n, out, rq, drv):
+    """Replace the relation by that after segment n."""
     ax, ay, ar = out[11], out[16], out[1]  # dX, dY, dphi by the start's rotation
-    keep[E2, 0, 2], keep[E2, 1, 2], keep[E2, 2, 2] = ax, ay, ar
-    p = keep[G]  # scratch: P = A F + B
-    for i in range(3):
-        p[0, i] = oldf[0, i] + ax * oldf[2, i] + out[12 + i]
-        p[1, i] = oldf[1, i] + ay * oldf[2, i] + out[17 + i]
-        p[2, i] = ar * oldf[2, i] + out[2 + i]
+    store[n, E2, 0, 2], store[n, E2, 1, 2], store[n, E2, 2, 2] = ax, ay, ar
+    k0, k1, k2 = store[n, SMALL, 0, 0], store[n, SMALL, 0, 1], store[n, SMALL, 0, 2]
+    for i in range(3):  # P = A F + B
+        store[n, G, 0, i] = store[n, F, 0, i] + ax * store[n, F, 2, i] + out[12 + i]
+        store[n, G, 1, i] = store[n, F, 1, i] + ay * store[n, F, 2, i] + out[17 + i]
+        store[n, G, 2, i] = ar * store[n, F, 2, i] + out[2 + i]
     for r in range(3):
-        last = p[r, 2]
-        f[r, 0] = p[r, 0] + last * k[0, 0]
-        f[r, 1] = p[r, 1] + last * k[0, 1]
-        f[r, 2] = last * k[0, 2]
-    for i in range(3):
-        e[0, i] = olde[0, i] + ax * olde[2, i] + p[0, 2] * k[1, i]
-        e[1, i] = olde[1, i] + ay * olde[2, i] + p[1, 2] * k[1, i]
-        e[2, i] = ar * olde[2, i] + p[2, 2] * k[1, i]
-    for col in range(2):
-        h = keep[E2]
-        for r in range(3):
-            own = rq[r] if col == 0 else drv[r]
-            if r == 0:
-                moved = oldc[0, col] + ax * oldc[2, col]
-            elif r == 1:
-                moved = oldc[1, col] + ay * oldc[2, col]
-            else:
-                moved = ar * oldc[2, col]
-            c[r, col] = moved + own + p[r, 0] * h[0, col] + p[r, 1] * h[1, col] + p[r, 2] * h[2, col]
-            rel[SMALL, r, col] += e2[r, 0] * h[0, col] + e2[r, 1] * h[1, col] + e2[r, 2] * h[2, col]
-    for r in range(3):
-        last = e2[r, 2]
+        last, own = store[n, G, r, 2], (0.0 if r == 2 else 1.0)
+        along = ax if r == 0 else (ay if r == 1 else ar)
+        rel[F, r, 0], rel[F, r, 1] = store[n, G, r, 0] + last * k0, store[n, G, r, 1] + last * k1
+        rel[F, r, 2] = last * k2
         for i in range(3):
-            g[r, i] += last * k[1, i]
-        e2[r, 0] += last * k[0, 0]
-        e2[r, 1] += last * k[0, 1]
-        e2[r, 2] = last * k[0, 2]
+            moved = own * store[n, E, r, i] + along * store[n, E, 2, i]
+            rel[E, r, i] = moved + last * store[n, SMALL, 1, i]
+        for col in range(2):
+            moved = own * store[n, C_D, r, col] + along * store[n, C_D, 2, col] + (rq[r] if col == 0 else drv[r])
+            for i in range(3):
+                moved += store[n, G, r, i] * store[n, E2, i, col]
+                rel[SMALL, r, col] += rel[E2, r, i] * store[n, E2, i, col]
+            rel[C_D, r, col] = moved
+    for r in range(3):
+        last = rel[E2, r, 2]
+        for i in range(3):
+            rel[G, r, i] += last * store[n, SMALL, 1, i]
+        rel[E2, r, 0] += last * k0
+        rel[E2, r, 1] += last * k1
+        rel[E2, r, 2] = last * k2
 
 
 @kernel
@@ -181,16 +174,19 @@ def unfold(m, e, first_slot, store, dqa, dpb, ddrive, dy):
     begin, end = m.beam_segment[e], m.beam_segment[e + 1]
     n0, n1, n2 = dpb[0], dpb[1], dpb[2]
     for j in range(end - 1, begin - 1, -1):
-        keep = store[j]
-        k, h = keep[SMALL], keep[E2]
-        turn = k[1, 0] * dqa[0] + k[1, 1] * dqa[1] + k[1, 2] * dqa[2]
-        last = k[0, 0] * n0 + k[0, 1] * n1 + k[0, 2] * n2 + turn + h[2, 0] + h[2, 1] * ddrive
-        n0, n1, n2 = n0 + h[0, 0] + h[0, 1] * ddrive, n1 + h[1, 0] + h[1, 1] * ddrive, last
+        last = store[j, E2, 2, 0] + store[j, E2, 2, 1] * ddrive
+        last += store[j, SMALL, 0, 0] * n0 + store[j, SMALL, 0, 1] * n1 + store[j, SMALL, 0, 2] * n2
+        for r in range(3):
+            last += store[j, SMALL, 1, r] * dqa[r]
+        n0 += store[j, E2, 0, 0] + store[j, E2, 0, 1] * ddrive
+        n1 += store[j, E2, 1, 0] + store[j, E2, 1, 1] * ddrive
+        n2 = last
         at = first_slot[1] + 6 * j
         for r in range(3):
-            dq = keep[C_D, r, 0] + keep[C_D, r, 1] * ddrive
-            dq += keep[E, r, 0] * dqa[0] + keep[E, r, 1] * dqa[1] + keep[E, r, 2] * dqa[2]
-            dq += keep[F, r, 0] * n0 + keep[F, r, 1] * n1 + keep[F, r, 2] * n2
+            dq = store[j, C_D, r, 0] + store[j, C_D, r, 1] * ddrive
+            for i in range(3):
+                dq += store[j, E, r, i] * dqa[i]
+            dq += store[j, F, r, 0] * n0 + store[j, F, r, 1] * n1 + store[j, F, r, 2] * n2
             dy[at + r] = dq
         dy[at + 3], dy[at + 4], dy[at + 5] = n0, n1, n2
 

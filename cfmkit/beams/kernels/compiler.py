@@ -6,8 +6,9 @@ from typing import Any
 
 import numba
 
-_INNER: dict[str, Any] = {"error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-_DOOR: dict[str, Any] = {"error_model": "numpy", "no_cfunc_wrapper": True, "cache": True, "nogil": True}
+_MATH: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract"}}  # fused multiply and add: NaN stays NaN
+_INNER: dict[str, Any] = {**_MATH, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+_DOOR: dict[str, Any] = {**_MATH, "no_cfunc_wrapper": True, "cache": True, "nogil": True}
 
 kernel: Any = numba.njit(**_INNER)
 """For functions that others call, compiled into the doors of `cfmkit.beams.kernels.entry`.

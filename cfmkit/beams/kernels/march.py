@@ -139,7 +139,7 @@ def march(m, n_free, y, drive, tangent, targets, options, out_y, out_drive, out_
     natural, step, smallest, greatest, turn = options[2] > 0.5, options[3], options[4], options[5], options[6]
     n, size = tangent.shape[0] - 1, y.shape[0]
     times, past = np.zeros(KEPT), np.zeros((KEPT, size + 1))
-    guess, new, state, row = np.empty(size + 1), np.empty(size), np.empty(4), np.empty(4)
+    guess, new, state, row = np.empty(size + 1), np.empty(size), np.zeros(5), np.empty(4)
     border, new_tangent, unit = np.empty(n + 1), np.empty(n + 1), np.zeros(n + 1)
     unit[n] = 1.0
     t, stored, asked, index = (drive if natural else 0.0), 0, 0, options[11]
@@ -194,7 +194,7 @@ def _between(m, n_free, old, new, state, targets, asked, stored, options, outs, 
     """
     size = new.shape[0]
     n_all = targets.shape[0]
-    y, s = np.empty(size), np.empty(4)
+    y, s = np.empty(size), np.zeros(5)
     row, tangent = np.empty(4), np.empty(unit.shape[0])
     before, after = old[size], state[0]
     rising = after > before

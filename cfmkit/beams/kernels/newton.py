@@ -148,7 +148,8 @@ def solve(m, n_free, y, state, border, target, limits, tangent, scratch):
     """Newton's method for equilibrium with border . (z, drive) = target; y and state[0] (the drive) are updated.
 
     limits: (tolerance, most iterations). On return tangent holds d(z, drive) per unit along the border and
-    state[1:4] the number of unstable directions, the shortness measure and the last increment.
+    state[1:4] the number of unstable directions, the shortness measure and the last increment. state[4] carries from
+    one solution to the next how the increment follows from the square of the one before.
     Returns a code and the number of iterations.
     """
     h, h2, rhs, residual, values, ends, rel, store, work, dy = scratch
@@ -171,9 +172,9 @@ def solve(m, n_free, y, state, border, target, limits, tangent, scratch):
             y[i] += share * dy[i]
         state[0] += share * rhs[n, 0]
         size = max(pose, force)
-        growth = 30.0
-        if before > 0.0:
-            growth = max(growth, size / (before * before))
+        if before > 1e-6:
+            state[4] = size / (before * before)
+        growth = max(30.0, 3.0 * state[4])
         if share == 1.0 and (growth * size * size < limits[0] or size < 1e-2 * limits[0]):
             for i in range(n + 1):
                 tangent[i] = rhs[i, 1]
