@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,11 +10,12 @@ import numpy as np
 from cfmkit.errors import Problem, QuantityError, SpecError
 from cfmkit.metrics.evaluation import Survey, Value, kind_of, survey_of, window_of
 from cfmkit.metrics.known import branch_fault, known_metrics
+from cfmkit.metrics.limits import Limits, bound
 from cfmkit.metrics.report import finite_border
 from cfmkit.metrics.subjects import span_text
 from cfmkit.metrics.table import Definition, split_name, unknown_metric
 from cfmkit.metrics.traces import Window
-from cfmkit.units import DIMENSIONS, border_unit, format_short, read_one_of, to_border
+from cfmkit.units import DIMENSIONS, border_unit
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -23,9 +23,6 @@ if TYPE_CHECKING:
     from cfmkit.curves import Kind
     from cfmkit.results import Result
     from cfmkit.spec import Requirement, Spec
-
-ROUNDING = 1e-9
-"""A value on its bound is within it, whatever the conversion of units does to the last bits (relative)."""
 
 _MOTION = {"force": "length", "torque": "angle"}
 
@@ -111,12 +108,17 @@ def requirement_problems(
     branches: Sequence[str] = (),
 ) -> Iterator[Problem]:
     """Yield what is wrong with requirements: unknown metrics or branches, bounds and windows of the wrong dimension."""
-    table: dict[str, list[Definition]] = {}
-    for item in known:
-        table.setdefault(item.name, []).append(item)
+    table = _by_name(known)
     for index, requirement in enumerate(requirements):
         for key, message in _faults(requirement, table, kind, branches):
             yield Problem("", 0, 0, f"requirements.{index}.{key}", message)
+
+
+def _by_name(known: Iterable[Definition]) -> dict[str, list[Definition]]:
+    table: dict[str, list[Definition]] = {}
+    for item in known:
+        table.setdefault(item.name, []).append(item)
+    return table
 
 
 def _faults(
@@ -142,7 +144,7 @@ def _bound_faults(requirement: Requirement, dimensions: tuple[str, ...]) -> Iter
     bounds = []
     for key, text in (("min", requirement.min), ("max", requirement.max)):
         try:
-            bounds.append(_bound(text, dimensions))
+            bounds.append(bound(text, dimensions))
         except QuantityError as problem:
             yield key, f"a bound of {requirement.metric!r}: {problem}"
             return
@@ -163,11 +165,6 @@ def _window_faults(over: tuple[float, float], meant: Definition, kind: Kind | No
         yield "over", f"the curve is a {kind} curve: its window is {right}, not {wrong}"
 
 
-@lru_cache(maxsize=256)
-def _bound(text: str | None, dimensions: tuple[str, ...]) -> float | None:
-    return None if text is None else read_one_of(text, dimensions)[0]
-
-
 def check(
     requirements: Sequence[Requirement], result: Result, extra_definitions: Iterable[Definition] = ()
 ) -> tuple[Outcome, ...]:
@@ -186,7 +183,7 @@ def check(
     problems = tuple(requirement_problems(requirements, known, kind))
     if problems:
         raise SpecError(problems)
-    table = {item.name: item for item in reversed(known)}
+    table = _by_name(known)
     surveys: dict[Window | None, Survey | None] = {}
     return tuple(_outcome(requirement, result, table, surveys) for requirement in requirements)
 
@@ -200,10 +197,10 @@ def _own(result: Result) -> Iterator[Definition]:
 def _outcome(
     requirement: Requirement,
     result: Result,
-    table: Mapping[str, Definition],
+    table: Mapping[str, Sequence[Definition]],
     surveys: dict[Window | None, Survey | None],
 ) -> Outcome:
-    definition = table[split_name(requirement.metric)[0]]
+    definition = _meant(requirement, table[split_name(requirement.metric)[0]])
     window = _window(requirement, result)
     if window not in surveys:
         surveys[window] = survey_of(result, window)
@@ -225,6 +222,11 @@ def _outcome(
     )
 
 
+def _meant(requirement: Requirement, items: Sequence[Definition]) -> Definition:
+    """Return the definition in whose dimension the bounds are: without a curve nothing else tells angle from length."""
+    return next((item for item in items if not list(_bound_faults(requirement, (item.dimension,)))), items[0])
+
+
 def _window(requirement: Requirement, result: Result) -> Window | None:
     over = requirement.over
     return window_of(result) if over is None else Window(float(over[0]), float(over[1]))
@@ -242,57 +244,3 @@ def _over(definition: Definition, window: Window | None, kind: Kind) -> str:
     if not definition.windowed:
         return ""
     return f" over {span_text(window.lo, window.hi, kind)}" if window else " over the full travel"
-
-
-@dataclass(frozen=True)
-class Limits:
-    """The bounds of one requirement, as numbers and as they were written."""
-
-    dimension: str
-    min: float | None
-    max: float | None
-    text: str
-
-    @classmethod
-    def of(cls, requirement: Requirement, dimension: str) -> Limits:
-        """Return the bounds of a requirement that has been validated."""
-        low, high = _bound(requirement.min, (dimension,)), _bound(requirement.max, (dimension,))
-        if requirement.min is None:
-            text = f"allowed <= {requirement.max}"
-        elif requirement.max is None:
-            text = f"required >= {requirement.min}"
-        else:
-            text = f"required {requirement.min} ... {requirement.max}"
-        return cls(dimension, low, high, text)
-
-    def met(self, value: float | None) -> bool:
-        """Return whether a value keeps both bounds."""
-        if value is None:
-            return False
-        high = self.max is None or value <= self.max + ROUNDING * abs(self.max)
-        return high and (self.min is None or value >= self.min - ROUNDING * abs(self.min))
-
-    def margin(self, item: Value) -> float:
-        """Return how far a value is inside the bounds; least for none."""
-        if item.value is None:
-            return -float("inf")
-        gaps = [item.value - self.min] if self.min is not None else []
-        return min([*gaps, self.max - item.value] if self.max is not None else gaps)
-
-    def sentence(self, metric: str, item: Value, over: str) -> str:
-        """Return the outcome in one line."""
-        name, branch = split_name(metric)
-        words = name.replace("_", " ") + (f" on {branch}" if branch else "")
-        if item.value is None:
-            return f"{words}{over}: no value ({item.reason}), {self.text}: missed"
-        return f"{words} {self.shown(item.value)}{over}, {self.text}: {'ok' if self.met(item.value) else 'missed'}"
-
-    def shown(self, value: float) -> str:
-        """Return a value rounded for reading, but never so far that it seems to be on the other side of a bound."""
-        for digits in range(4, 18):
-            rounded = float(f"{to_border(value, self.dimension):.{digits}g}") / float(to_border(1.0, self.dimension))
-            if self.met(rounded) == self.met(value):
-                break
-        if self.dimension == "ratio" and "%" not in self.text:
-            return f"{value:.{digits}g}"
-        return format_short(value, self.dimension, digits)

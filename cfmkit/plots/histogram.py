@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from cfmkit.curves import FloatArray
-    from cfmkit.metrics.requirements import Limits
+    from cfmkit.metrics.limits import Limits
     from cfmkit.studies.sensitivity.findings import Findings
 
 MOST_BINS = 40

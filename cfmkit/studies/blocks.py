@@ -9,7 +9,7 @@ import numpy as np
 from cfmkit.families import family
 from cfmkit.families.base import Block, Measure
 from cfmkit.metrics import metrics_by_name, other_name, split_name, values_of_family
-from cfmkit.metrics.requirements import ROUNDING, Limits
+from cfmkit.metrics.limits import ROUNDING, Limits
 from cfmkit.studies.rows import Rows, gathered
 
 if TYPE_CHECKING:

@@ -373,3 +373,12 @@ def test_gradients_are_those_of_differences(name):
         for metric, by_path in found.items():
             difference = (ends[1][metric].value - ends[0][metric].value) / (rate + step - low)
             assert by_path[path] == pytest.approx(difference, rel=2e-3, abs=1e-9), (metric, path)
+
+
+def test_a_mechanism_without_a_curve_misses_requirements_in_degrees():
+    from cfmkit import report
+
+    found = report.report_on(cfmkit.analyze(config("li2019", mechanism__offset="700 mm")))
+    assert found.exit_code == 4
+    assert found.missed[0].dimension == "angle"
+    assert "no value" in found.missed[0].sentence

@@ -74,7 +74,9 @@ class Assembly:
         if self.drive == "torque":
             return self.linkage.arc(self.unloaded)
         way = self.linkage.branch * float(self.linkage.slider_position(np.asarray(self.unloaded)))
-        return way - self.linkage.stretched_position, way - self.linkage.nearest_position
+        relaxed_there = self.linkage.knee(self.unloaded) == 0.0
+        first = 0.0 if relaxed_there else way - self.linkage.stretched_position
+        return first, way - self.linkage.nearest_position
 
     @property
     def stretched(self) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 from cfmkit.errors import Problem, SolutionError, SpecError, UsageError
 from cfmkit.families import family
 from cfmkit.metrics import check, values_of_family
-from cfmkit.metrics.requirements import Limits
+from cfmkit.metrics.limits import Limits
 from cfmkit.results import Finding
 from cfmkit.studies.columns import metrics_of
 from cfmkit.studies.plan import MOST_POINTS, refuse_too_many
