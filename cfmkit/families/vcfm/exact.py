@@ -136,6 +136,10 @@ class ExactSampler:
         force, stress, stable, buckled = (np.where(back, one, other) for one, other in zip(behind, ahead, strict=True))
         return Samples(self.each * force, stress, stable, buckled)
 
+    def leaf_force(self, travel: FloatArray) -> FloatArray:
+        """Return the force of all leaves alone [N]."""
+        return self.leaves(travel).force
+
     def spring(self, compression: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return force [N] and largest stress [Pa] of the spring at some compressions [m]."""
         place = self.chain.travel * np.asarray(compression, dtype=float)

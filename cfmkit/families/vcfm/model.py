@@ -20,6 +20,7 @@ from cfmkit.families.vcfm.samples import LawSampler
 from cfmkit.families.vcfm.tables import adjustability, readings
 from cfmkit.families.vcfm.values import values_of
 from cfmkit.families.vcfm.windows import longest_window
+from cfmkit.numerics.roots import bracketed_root
 from cfmkit.results import Result, Status
 
 if TYPE_CHECKING:
@@ -165,20 +166,22 @@ def rest_of(sampler: Sampler, preload: float, grid: FloatArray) -> float | None:
     if preload == 0:
         return 0.0
     if preload > 0:
-        return _bisected(sampler, preload, -preload, 0.0)
-    force = sampler.leaves(grid).force + sampler.spring(grid + preload)[0]
+        return _balanced(sampler, preload, -preload, 0.0)
+    force = sampler.leaf_force(grid) + sampler.spring(grid + preload)[0]
     beyond = np.flatnonzero(force >= 0)
-    return _bisected(sampler, preload, grid[beyond[0] - 1], grid[beyond[0]]) if len(beyond) else None
+    return _balanced(sampler, preload, grid[beyond[0] - 1], grid[beyond[0]]) if len(beyond) else None
 
 
-def _bisected(sampler: Sampler, preload: float, low: float, high: float) -> float:
+def _balanced(sampler: Sampler, preload: float, low: float, high: float) -> float:
     """Return where the force vanishes between a place where it is negative and one where it is not."""
-    for _ in range(52):
-        middle = np.array([0.5 * (low + high)])
-        force = sampler.leaves(middle).force + sampler.spring(middle + preload)[0]
+
+    def force(travel: float) -> float:
+        place = np.array([travel])
+        found = float((sampler.leaf_force(place) + sampler.spring(place + preload)[0])[0])
         # no value: farther back than the leaves were followed, where they pull still harder
-        low, high = (low, float(middle[0])) if force[0] >= 0 else (float(middle[0]), high)
-    return 0.5 * (low + high)
+        return found if np.isfinite(found) else -1e30
+
+    return bracketed_root(force, float(low), float(high))
 
 
 def _push(sampler: Sampler, preload: float, grid: FloatArray) -> Push:

@@ -49,6 +49,9 @@ class Sampler(Protocol):
     def leaves(self, travel: FloatArray) -> Samples:
         """Return what all leaves do at some travels [m]."""
 
+    def leaf_force(self, travel: FloatArray) -> FloatArray:
+        """Return the force of all leaves alone [N]."""
+
     def spring(self, compression: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return force [N] and largest stress [Pa] of the spring at some compressions [m]."""
 
@@ -68,6 +71,10 @@ class LawSampler:
         force = self.parts.half_beams * np.asarray(leaf.force(travel), dtype=float)
         buckled = np.asarray(leaf.buckled(travel))
         return Samples(force, np.asarray(leaf.stress(travel), dtype=float), np.ones(travel.shape, dtype=bool), buckled)
+
+    def leaf_force(self, travel: FloatArray) -> FloatArray:
+        """Return the force of all leaves alone [N]."""
+        return np.asarray(self.parts.half_beams * np.asarray(self.parts.leaf.force(travel), dtype=float))
 
     def spring(self, compression: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return force [N] and largest stress [Pa] of the spring at some compressions [m]."""
