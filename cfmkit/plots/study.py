@@ -102,7 +102,7 @@ def _clear_of_poles(axes: Axes, lines: Sequence[Line]) -> None:
 def draw_metric(found: Findings, metric: Scale) -> Figure:
     """Return one metric over the only parameter."""
     figure = new_figure(120, 75)
-    axes = axes_mm(figure, (18, 13, 96, 56))
+    axes = axes_mm(figure, (28, 13, 86, 56) if metric.words else (18, 13, 96, 56))
     (parameter,) = found.varied
     order = np.argsort(parameter.values, kind="stable")
     x, y = parameter.values[order], metric.values[order]
@@ -113,7 +113,6 @@ def draw_metric(found: Findings, metric: Scale) -> Figure:
     ticks(axes.yaxis, metric)
     if metric.words:
         axes.set_title(metric.label, fontsize=SMALL, loc="left")
-        axes.tick_params(axis="y", rotation=90)
     if found.best is not None:
         star(axes, parameter.values[found.best], metric.values[found.best])
     return figure

@@ -30,6 +30,9 @@ GRID = 1025
 """Places of the grid. Efforts between them are cubics; classes change within 1e-9 of where they should."""
 
 
+SAME = 1e-9
+"""An equilibrium so near to the unloaded position, as a share of the motion, is that position."""
+
 EDGE = 1.0 + 1e-9
 """An effort on the edge of a band is inside it, whatever the last bits say."""
 
@@ -159,7 +162,8 @@ class Character:
         low, high = self.curve.place[0, before], self.curve.place[0, after]
         if low <= self.assembly.start <= high and after - before > 1:
             return self.assembly.start
-        return bracketed_root(self.effort, float(low), float(high))
+        root = bracketed_root(self.effort, float(low), float(high))
+        return self.assembly.start if abs(root - self.assembly.start) <= SAME * (self.high - self.low) else root
 
     def band(self, reference: float, tolerance: float) -> tuple[float, float] | None:
         """Return the interval around a reference in which the effort is within a tolerance of that there.

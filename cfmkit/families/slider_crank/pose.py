@@ -99,7 +99,8 @@ def key_positions(solution: Solution) -> tuple[Key, ...]:
         middle = key(solution, "stretched", stretched)
     else:
         middle = key(solution, "half way", 0.5 * (low + high))
-    last = key(solution, "last", high) if stable is None else key(solution, "second stable", stable.motion)
+    far = high if abs(high - start) >= abs(low - start) else low
+    last = key(solution, "last", far) if stable is None else key(solution, "second stable", stable.motion)
     return first, middle, last
 
 
