@@ -62,12 +62,30 @@ def cross(run: Run) -> Spot | None:
     if left is None:
         return _no_branch(run, found, other)
     run.drop_last()
+    left = _not_beyond(run, found, left, forward)
     run.branch = f"bifurcated at {found.spot.drive * run.unit:.6g}, sign {run.control.sign:+d}"
     run.append(run.as_points(left, -1))
     run.entry = 0.5 * abs(left.drive - found.spot.drive)
     run.closed = False
     run.end = _end_of_branch(run, other, found) if run.natural else None
     return left
+
+
+def _not_beyond(run: Run, found: Singular, left: Spot, forward: float) -> Spot:
+    """Return the entry of a branch, moved back before the next point asked for where it lies beyond that.
+
+    Away from a bifurcation a branch opens like the square root of the distance.
+    """
+    ahead = (run.targets[run.asked() :] - found.spot.drive) * forward
+    reach, nearest = (left.drive - found.spot.drive) * forward, 0.5 * ahead[ahead > 0].min(initial=np.inf)
+    if not (run.natural and 2.0 * nearest < reach):
+        return left
+    start = run.fine.reduce(found.spot).y
+    guess = start + np.sqrt(nearest / reach) * (left.y - start)
+    near = run.solver.solve(guess, found.spot.drive + forward * nearest)
+    if near is None or near.unstable > left.unstable:
+        return left
+    return near if pose_change(run.solver, near.y, start) > 0.3 * pose_change(run.solver, guess, start) else left
 
 
 def _no_branch(run: Run, found: Singular, other: Spot) -> Spot | None:
@@ -119,6 +137,12 @@ def _end_of_branch(run: Run, other: Spot, found: Singular) -> BranchEnd | None:
     return BranchEnd(closing.spot.drive, reduced(closing.spot).y, reduced(beyond), closing.before, closing.after)
 
 
+def room(run: Run, place: float, sense: float) -> float:
+    """Return how far from a bifurcation to go on, in one sense: not beyond the next point asked for."""
+    ahead = (run.targets - place) * sense
+    return 0.5 * float(min(2.0 * BEFORE_END * run.span, ahead[ahead > 0].min(initial=np.inf)))
+
+
 def rejoin(run: Run, spot: Spot) -> Spot | None:
     """Go back to the path that the branch left, if the branch has come close to it; else go on along the branch."""
     end, run.end = run.end, None
@@ -129,7 +153,8 @@ def rejoin(run: Run, spot: Spot) -> Spot | None:
     if pose_change(run.solver, spot.y, end.y) > 0.5 * apart:
         return spot
     run.closed = True
-    start = run.solver.solve(end.beyond.y, end.drive + np.sign(end.drive - spot.drive) * BEFORE_END * run.span)
+    sense = float(np.sign(end.drive - spot.drive))
+    start = run.solver.solve(end.beyond.y, end.drive + sense * room(run, end.drive, sense))
     if start is None or start.unstable > end.after:
         start = end.beyond
     run.events.append(Event("bifurcation", end.drive * run.unit, end.before, end.after))
@@ -140,6 +165,8 @@ def rejoin(run: Run, spot: Spot) -> Spot | None:
 
 def hop(run: Run, spot: Spot, asked: int) -> Spot | None:
     """Step over the end of a branch onto the path that it joins there: a small change for a small advance."""
+    if run.end is not None and abs(run.end.drive - spot.drive) <= BEFORE_END * run.span:
+        return rejoin(run, spot)
     forward = float(np.sign(run.targets[asked] - spot.drive))
     for power in range(-6, -1):
         ahead = 10.0**power * run.span

@@ -115,6 +115,9 @@ class Run:
             if self.too_long:
                 return
             asked = self.asked()
+        if asked < len(self.targets):
+            last = float(self.points.drive[-1]) * self.unit
+            self.status, self.message = PathStatus.LOST, f"the path turned back and forth at {last:.6g}"
 
     def asked(self) -> int:
         """Return the number of points asked for that are done."""
@@ -170,7 +173,7 @@ class Run:
         left, numbers = self.targets[asked:], np.arange(asked, len(self.targets))
         if self.end is not None:
             sense = np.sign(self.end.drive - spot.drive)
-            last = self.end.drive - sense * branches.BEFORE_END * self.span
+            last = self.end.drive - sense * branches.room(self, self.end.drive, -sense)
             inside = np.logical_and.accumulate((last - left) * sense > 0)
             if not inside.all():
                 left, numbers = np.append(left[inside], last), np.append(numbers[inside], -1)

@@ -1,0 +1,42 @@
+"""However densely points are asked for, a V-beam buckles once, straightens once, and reaches the last of them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from cfmkit.beams import CLAMPED, Beam, Displacement, Network, Node, PathStatus, Section, guided, trace
+
+MM = 1e-3
+
+
+def pressed(points):
+    section = Section(1477e6, 6 * MM, 1 * MM, shear=True, poisson_ratio=0.3)
+    nodes = {
+        "wall": Node(0, 0, CLAMPED),
+        "shuttle": Node(35 * MM * np.cos(np.radians(7)), 35 * MM * np.sin(np.radians(7)), guided(np.pi / 2)),
+    }
+    return trace(
+        Network(nodes, {"v": Beam("wall", "shuttle", section)}), Displacement("shuttle", -np.pi / 2, points * MM)
+    )
+
+
+@pytest.mark.parametrize("count", [120, 480, 600, 960])
+def test_points_next_to_a_bifurcation_are_reached_on_their_branch(count):
+    """Among them 4.75 mm, 0.0002 mm before the leaf straightens, and 0.9125 mm, 0.0002 mm after it buckles."""
+    path = pressed(np.linspace(0, 6, count + 1)[1:])
+    assert path.status is PathStatus.COMPLETE
+    assert len(path.at_asked) == count
+    assert path.stable.all()
+    assert [event.drive / MM for event in path.events] == pytest.approx([0.912302, 4.750175], abs=1e-6)
+    assert (np.diff(path.drive) > 0).all()
+
+
+@pytest.mark.parametrize("off", [-1e-3, -1e-4, 1e-4, 1e-3])
+@pytest.mark.parametrize("place", [0.9123017, 4.7501750])
+def test_the_force_is_continuous_across_a_bifurcation(place, off):
+    path = pressed(np.array([0.5, place + off, 5.5]))
+    smooth = pressed(np.array([0.5, place - 0.05, place + 0.05, 5.5]))
+    force, around = path.effort[path.at_asked][1], smooth.effort[smooth.at_asked][1:3]
+    assert path.status is PathStatus.COMPLETE
+    assert around.min() - 0.05 <= force <= around.max() + 0.05
