@@ -62,7 +62,8 @@ def neighbouring(path: Path, network: Network, drive: Drive, largest_turn: float
         guess = path.points.y[index] * factors
         spot = solver.solve(guess.copy(), value / solver.layout.scales.drive)
         near = spot is not None and pose_change(solver, spot.y, guess) <= largest_turn
-        if spot is None or not near or spot.unstable > int(path.points.info[index, 0]):
+        # a segment beyond its own critical length (shortness below zero) counts its unstable directions wrongly
+        if spot is None or not near or not spot.shortness > 0 or spot.unstable > int(path.points.info[index, 0]):
             missing.append(value)
             continue
         info = np.zeros(_INFO)

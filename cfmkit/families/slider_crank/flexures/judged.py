@@ -170,7 +170,7 @@ def _held(solution: Printed, ratio: FloatArray, inside: Any, limits: tuple[float
                 places = ", ".join(mm(float(solution.travel[k])) for k in peaks)
                 told.append(f"{name} edge of the band at {places}")
     last = np.flatnonzero(inside)[-1]
-    if stress is not None and solution.stress[last] > (1.0 - 0.1 * HELD) * stress:
+    if stress is not None and solution.stress[last] > (1.0 - 0.5 * HELD) * stress:
         where = mm(float(solution.place[last]))
         told.append(f"stress {format_short(stress, 'stress')} at the end, {where} along the strip")
     return told

@@ -9,7 +9,7 @@ itself. Their equilibria are solved from those of a chain that is bowed, or kink
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from typing import TYPE_CHECKING
 
@@ -134,8 +134,9 @@ class Chain:
             path = _trace(self.build(self.points), drive, tolerance)
             if path.status is PathStatus.COMPLETE:
                 return self._judged(path, wanted)
-        helper = mirrored(self.points, self.pins) if clear and wanted != self.side else self._bowed(wanted)
-        return self._from(helper, drive, wanted, tolerance)
+        other = clear and wanted != self.side
+        helper = mirrored(self.points, self.pins) if other else self._bowed(wanted)
+        return self._from(helper, drive, wanted, tolerance, other)
 
     def _bowed(self, side: int) -> FloatArray:
         """Return the points with the crank pin moved a little to one side: a chain that cannot go the wrong way."""
@@ -146,13 +147,18 @@ class Chain:
         moved: FloatArray = self.points + np.outer(side * BOW * self.length * hat, np.array([-axis[1], axis[0]]))
         return moved
 
-    def _from(self, helper: FloatArray, drive: Displacement, wanted: int, tolerance: float) -> Pressed:
-        """Return the equilibria nearest to those of a chain that is kinked to the side wanted."""
+    def _from(self, helper: FloatArray, drive: Displacement, wanted: int, tolerance: float, other: bool) -> Pressed:
+        """Return the equilibria nearest to those of a chain that is kinked to the side wanted.
+
+        The branch to which the kink does not lead begins with a limit point: nothing before it, nor rest, is on it.
+        """
         known = _trace(self.build(helper), drive, tolerance)
         if known.status is not PathStatus.COMPLETE:
             return self._judged(known, wanted, helped=True)
         path = neighbouring(known, self.build(self.points), drive)
-        if 0 < len(path.drive) < len(drive.points) and path.drive[0] > drive.points[0]:
+        first = _beginning(path, drive) if other else 0
+        if other and 0 < first < len(drive.points):
+            path = _since(path, first)
             text = f"with its kink the other way the chain has an equilibrium from {path.drive[0] * 1e3:.4g} mm on only"
             return Pressed(path, Ending.STARTS_LATE, text, wanted)
         return self._judged(path, wanted)
@@ -179,6 +185,26 @@ _ENDINGS = {
     PathStatus.LIMIT_POINT: Ending.LIMIT_POINT,
     PathStatus.JUMPS: Ending.UNSTABLE,
 }
+
+
+def _beginning(path: Path, drive: Displacement) -> int:
+    """Return the number of the first point from which on nothing is missing, rest not counted."""
+    found = np.zeros(len(drive.points), dtype=bool)
+    found[path.asked] = True
+    found &= drive.points != 0.0
+    return int(np.flatnonzero(~found)[-1]) + 1 if not found.all() else 0
+
+
+def _since(path: Path, first: int) -> Path:
+    """Return a path from the point with a number on."""
+    keep = path.asked >= first
+    return replace(
+        path,
+        points=path.points.take(keep),
+        branch=path.branch[keep],
+        accurate=path.accurate[keep],
+        status=PathStatus.COMPLETE,
+    )
 
 
 def _trace(network: Network, drive: Displacement, tolerance: float) -> Path:

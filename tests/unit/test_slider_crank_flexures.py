@@ -1,0 +1,339 @@
+"""Flexures and strips of slider-cranks: identities, limits, and everything that can go wrong, by its name."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+from flexure_support import (
+    ABS,
+    LINKAGE,
+    MM,
+    RATES,
+    TABLE_2,
+    THICKNESS,
+    UNLOADED,
+    WIDTH,
+    corners,
+    lumped_chain,
+    strip_chain,
+)
+
+import cfmkit
+from cfmkit import api
+from cfmkit.beams.corotational import recheck
+from cfmkit.families.slider_crank.findings import FINDINGS
+from cfmkit.families.slider_crank.flexures.chain import Elasticity, joints, kink, mirrored, spread
+from cfmkit.families.slider_crank.flexures.findings import FINDINGS as OF_PARTS
+from cfmkit.families.slider_crank.flexures.pressing import Ending
+from cfmkit.families.slider_crank.flexures.program import StripProgram
+from cfmkit.families.slider_crank.flexures.sizing import Flexure, rotations, sized
+from cfmkit.families.slider_crank.flexures.task import Form, Task
+from cfmkit.families.slider_crank.flexures.values import first_at
+from cfmkit.numerics.barycentric import differentiation, interpolation
+from cfmkit.results import Status
+
+if TYPE_CHECKING:
+    from cfmkit.results import Result
+
+CONFIGS = Path(__file__).parents[2] / "configs"
+TRAVEL = np.array([0.1, 1.0, 5.0, 18.0]) * MM
+
+
+def spec(name: str, *changes: str) -> Any:
+    return cfmkit.load(CONFIGS / f"slider_crank_{name}.yaml", changes)
+
+
+def names(result: Result) -> set[str]:
+    return {item.name for item in result.warnings}
+
+
+# --- closed forms ---------------------------------------------------------------------------------------------
+
+
+def test_sized_flexures_have_the_rate_and_the_stress() -> None:
+    one = sized(0.0354, 10.8 * MM, 1.8e9, 42.5e6, 0.53)
+    assert one.rate(1.8e9) == pytest.approx(0.0354)
+    assert one.rotation(1.8e9, 42.5e6) == pytest.approx(0.53)
+    assert one.volume == pytest.approx(3 * 1.8e9 * 0.0354 * 0.53**2 / 42.5e6**2)
+
+
+@pytest.mark.parametrize(
+    ("stroke", "thickness", "width"), [(4, 1.055, 2.17), (10, 0.666, 8.61), (18, 0.497, 20.75), (35, 0.359, 55.1)]
+)
+def test_flexures_at_the_crank_pin_grow_wide_with_the_stroke(stroke: float, thickness: float, width: float) -> None:
+    """Width with the third power of the rotation: small flexures cannot have a long stroke."""
+    turn = float(abs(rotations(LINKAGE, UNLOADED, np.array([stroke * MM]))[1, 0]))
+    one = sized(float(RATES[1]), 10.8 * MM, 1.8e9, 42.5e6, turn)
+    assert one.thickness / MM == pytest.approx(thickness, abs=6e-4)
+    assert one.width / MM == pytest.approx(width, rel=2e-3)
+
+
+def test_a_short_flexure_is_the_spring_it_stands_for() -> None:
+    """The correction goes to one with the length."""
+    from cfmkit.bodies.slider_crank_springs import along_slider
+
+    parts = []
+    for rate in RATES:
+        thickness = (12 * rate * 0.3 * MM / (1.8e9 * 2.73)) ** 0.25
+        parts.append(Flexure(0.3 * MM, thickness, 2.73 * thickness))
+    springs = RATES @ along_slider(LINKAGE, 0.56, 1, np.array([5 * MM])).effort[:3]
+    assert lumped_chain(0.56, parts).press(np.array([5 * MM])).force[0] == pytest.approx(springs[0], rel=4e-3)
+
+
+# --- chains and branches ------------------------------------------------------------------------------------
+
+
+def test_mirroring_about_the_line_turns_the_kink_and_keeps_the_ends() -> None:
+    pins = joints(LINKAGE, UNLOADED)
+    other = mirrored(pins, pins)
+    assert kink(other) == pytest.approx(-kink(pins))
+    np.testing.assert_allclose(other[[0, 2]], pins[[0, 2]], atol=1e-15)
+
+
+def test_places_at_the_corners_are_those_of_the_corners() -> None:
+    line = np.array([[0.0, 0.0], [3.0, 4.0], [3.0, 14.0]])
+    np.testing.assert_allclose(spread(line, [[0.5], [0.1, 0.9]]), [0, 1 / 6, 0.4, 14 / 15, 1], atol=1e-15)
+
+
+def test_force_is_proportional_to_the_width_and_the_stress_does_not_know_it() -> None:
+    one, two = (strip_chain(width=w).press(TRAVEL) for w in (WIDTH, 2 * WIDTH))
+    np.testing.assert_allclose(two.force, 2 * one.force, rtol=1e-8)
+    np.testing.assert_allclose(two.path.peak_stress().value, one.path.peak_stress().value, rtol=1e-8)
+
+
+def test_force_is_proportional_to_the_modulus() -> None:
+    soft, hard = (strip_chain(material=Elasticity(e, 0.35)).press(TRAVEL).force for e in (1e9, 3e9))
+    np.testing.assert_allclose(hard, 3 * soft, rtol=1e-8)
+
+
+@pytest.mark.parametrize("unloaded", [LINKAGE.stretched_angle, LINKAGE.stretched_angle + 1e-7, UNLOADED, 0.53])
+def test_both_sides_are_found_stable_and_on_the_side_asked_for(unloaded: float) -> None:
+    """Straight, nearly straight, kinked either way; the energy is at a minimum by independent elements, too."""
+    for side in (1, -1):
+        found = strip_chain(0.977 * MM, unloaded=unloaded).press(np.array([2.0, 10.0]) * MM, side)
+        assert found.ending is Ending.COMPLETE
+        assert found.side == side
+        assert recheck(found.path, elements=24).stable.all()
+
+
+def test_the_branch_found_is_the_lowest() -> None:
+    """The next buckling mode would need many times the force: the first is the one that a column of pins has."""
+    straight = strip_chain(0.977 * MM, unloaded=LINKAGE.stretched_angle)
+    forces = [straight.press(np.array([0.2 * MM]), side).force[0] for side in (1, -1)]
+    rigidity, length = 1.8e9 * WIDTH * (0.977 * MM) ** 3 / 12, 127.42 * MM
+    first = 4 * np.pi**2 * rigidity / length**2  # clamped at both ends, the slider held across its way
+    along = np.cos(LINKAGE.stretched_angle)
+    np.testing.assert_allclose(forces, first * along, rtol=0.02)
+
+
+def test_the_side_of_a_straight_chain_hardly_matters_at_first() -> None:
+    chain = strip_chain(0.977 * MM, unloaded=LINKAGE.stretched_angle)
+    one, other = (chain.press(np.array([0.05 * MM]), side).force[0] for side in (1, -1))
+    assert one == pytest.approx(other, rel=2e-3)
+
+
+def test_a_chain_that_begins_late_on_its_other_side_says_from_where() -> None:
+    """With a large kink the other branch begins with a snap."""
+    found = strip_chain(0.977 * MM, unloaded=0.60).press(np.linspace(0.0, 20.0, 41) * MM, -1)
+    assert found.ending is Ending.STARTS_LATE
+    assert "mm on only" in found.message
+    assert found.travel[0] > 0
+
+
+def test_pressing_beyond_all_reason_is_not_complete() -> None:
+    found = strip_chain().press(np.array([1.0, 400.0]) * MM)
+    assert found.ending is not Ending.COMPLETE
+    assert len(found.travel) <= 1
+
+
+# --- the program ----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("goal", ["stroke", "ripple", "rms"])
+@pytest.mark.parametrize("moving", [False, True])
+def test_slopes_of_the_program_are_those_of_differences(goal: Any, moving: bool) -> None:
+    shares = ((0.285, 0.803), (0.582, 0.851), (0.245, 0.842), (0.578, 0.798), (0.231, 0.765))
+    form = Form(12, (2,) * 5) if moving else Form(4, width=WIDTH)
+    x = np.concatenate([THICKNESS / MM, np.concatenate(shares), [5.1]]) if moving else np.array([0.95, 1.02, 0.9, 0.99])
+    program = StripProgram(Task(corners(), np.pi, ABS, 1.5, MM, 21 * MM, 0.01, goal), form)
+    z = np.append(x, 2.1) if program.extra else x
+    answer = program.slopes(z)
+    assert answer is not None
+    for k in {0, 3, form.size - 1, len(z) - 1} | ({13} if moving else set()):
+        sides = []
+        for step in (-1e-4, 1e-4):
+            moved = z.copy()
+            moved[k] += step
+            value = program.values(moved)
+            assert value is not None
+            sides.append(np.append(value[1], value[0]))
+        slope = (sides[1] - sides[0]) / 2e-4
+        exact = np.append(answer[1][:, k], answer[0][k])
+        np.testing.assert_allclose(exact, slope, atol=2e-5 * np.abs(slope).max() + 1e-9)
+
+
+def test_a_strip_without_equilibrium_has_no_answer() -> None:
+    program = StripProgram(Task(corners(), np.pi, ABS, 1.5, MM, 20 * MM, 0.01), Form(3, width=WIDTH))
+    assert program.values(np.array([1.0, 1.0, 1.0, 30.0])) is None
+
+
+def test_polynomials_through_nodes_are_exact() -> None:
+    nodes, places = np.cos(np.linspace(0, np.pi, 6)), np.linspace(-1, 1, 9)
+    np.testing.assert_allclose(interpolation(nodes, places) @ nodes**5, places**5, atol=1e-14)
+    np.testing.assert_allclose(differentiation(nodes) @ nodes**5, 5 * nodes**4, atol=1e-13)
+
+
+def test_first_at_is_the_first_crossing_and_none_where_there_is_none() -> None:
+    x, y = np.arange(4.0), np.array([0.0, 2.0, 1.0, 3.0])
+    assert first_at(x, y, 1.5) == pytest.approx(0.75)
+    assert first_at(x, y, 9.0) is None
+    assert first_at(x, y + 5.0, 1.0) == 0.0
+
+
+# --- findings ---------------------------------------------------------------------------------------------------
+
+CASES = {
+    "straight_start": ("strip", ["mechanism.unloaded_angle=30.963756532073525 deg"]),
+    "kink_too_small": ("strip", []),
+    "long_run_in": ("strip", ["mechanism.unloaded_angle=0.58 rad"]),
+    "overstressed": ("strip", ["analysis.travel=[0 mm, 37 mm]"]),
+    "too_thin": ("strip", ["mechanism.process.thinnest=1.2 mm"]),
+    "lateral_buckling": ("strip", ["mechanism.beam.width=1.5 mm"]),
+    "side_force": ("strip", []),
+    "pulled": ("strip", ["analysis.travel=[-1 mm, 5 mm]"]),
+    "branch_begins_late": ("strip", ["mechanism.unloaded_angle=0.60 rad", "analysis.side=before"]),
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_what_can_go_wrong_is_found_by_name(name: str) -> None:
+    config, changes = CASES[name]
+    result = api.analyze(spec(config, "analysis.points=61", "analysis.recheck=false", *changes))
+    assert name in names(result), result.message
+    if name in ("pulled",):
+        assert result.status is Status.NO_EQUILIBRIUM
+        assert not result.curves
+
+
+def test_a_travel_beyond_all_reason_is_never_a_complete_curve() -> None:
+    result = api.analyze(spec("strip", "analysis.points=21", "analysis.travel=[0 mm, 300 mm]"))
+    assert result.status in (Status.PARTIAL, Status.NO_EQUILIBRIUM)
+    assert names(result) & {"limit_point", "unstable", "not_converged"}
+
+
+def test_findings_of_parts_are_findings_of_the_family() -> None:
+    assert set(OF_PARTS) <= set(FINDINGS)
+
+
+def test_a_part_that_is_missing_is_refused_with_its_name() -> None:
+    with pytest.raises(cfmkit.SpecError, match=r"mechanism\.beam"):
+        spec("lumped", "analysis.fidelity=beam")
+    with pytest.raises(cfmkit.SpecError, match="springs"):
+        spec("strip", "analysis.fidelity=prb")
+    with pytest.raises(cfmkit.SpecError, match="drive: force"):
+        spec("strip", "analysis.drive=torque")
+
+
+def test_shares_that_do_not_fit_are_refused() -> None:
+    with pytest.raises(cfmkit.SpecError, match="places 2 thicknesses"):
+        spec("strip", "mechanism.beam.shares=[[0.2, 0.8], [], [], [], []]")
+    result = api.analyze(spec("tapered", "mechanism.beam.centreline=[[0 mm, 0 mm], [105 mm, 63 mm]]"))
+    assert result.status is Status.INVALID
+    assert "5 pieces" in result.message
+
+
+# --- designs ----------------------------------------------------------------------------------------------------
+
+
+def test_flexures_designed_for_springs_have_their_force_and_the_stress_allowed() -> None:
+    wanted = spec("lumped")
+    found = api.design(wanted)
+    assert found.status is Status.COMPLETE
+    result = api.analyze(found.spec)
+    assert result.curve.extra["max_stress"].values.max() == pytest.approx(42.5e6, rel=1e-4)
+    springs = api.analyze(wanted.replace({"analysis.fidelity": "prb"})).curve
+    both = [np.interp(np.linspace(0.4, 4, 40) * MM, c.motion, c.effort).mean() for c in (result.curve, springs)]
+    assert both[0] == pytest.approx(both[1], rel=1e-3)
+    widths = {found.spec.at(f"mechanism.flexures.{name}.width") for name in ("pivot", "crank_pin", "slider_pin")}
+    assert len(widths) == 1
+
+
+def test_uncorrected_flexures_push_a_tenth_too_hard() -> None:
+    found = api.design(spec("lumped", "design.flexures.exact=false"))
+    assert "9.9" in found.message or "10" in found.message
+    level = api.analyze(found.spec).values["kink"].value
+    assert level == pytest.approx(0.0853e-3, abs=1e-6)
+
+
+def test_a_strip_too_wide_for_its_range_is_infeasible_and_says_what_would_do() -> None:
+    found = api.design(spec("strip", "design.force=5 N"))
+    assert found.status is Status.INFEASIBLE
+    assert {item.name for item in found.warnings} == {"target_unreachable"}
+    assert set(found.nearest_feasible) == {"design.force", "design.beam.width"}
+    wider = spec("strip", "design.force=5 N", "design.beam.width=[5 mm, 30 mm]")
+    assert api.design(wider).status is Status.COMPLETE
+
+
+def test_a_design_tells_what_holds_it() -> None:
+    found = api.design(spec("taper_design"))
+    text = " | ".join(found.active_bounds)
+    assert "upper edge of the band" in text
+    assert "lower edge of the band" in text
+    assert "stress 42.5 MPa at the end" in text
+    assert "converged to a local optimum" in found.message
+    assert "corotational elements" in found.message
+
+
+def test_a_thickness_at_its_bound_is_told() -> None:
+    found = api.design(spec("taper_design", "design.beam.thickness=[0.5 mm, 1.5 mm]"))
+    assert any("mechanism.beam.thickness.6 at its largest, 1.5 mm" in item for item in found.active_bounds)
+
+
+def test_a_band_that_no_strip_keeps_is_infeasible() -> None:
+    narrow = ["design.tolerance=0.05 %", "design.beam.nodes=2", "design.beam.thickness=[0.9 mm, 0.91 mm]"]
+    found = api.design(spec("taper_design", *narrow))
+    assert found.status is Status.INFEASIBLE
+    assert {item.name for item in found.warnings} == {"target_unreachable"}
+
+
+def test_random_starts_repeat_with_their_seed() -> None:
+    from cfmkit.families.base import Run
+
+    wanted = spec("taper_design", "design.beam.seeds=2", "design.beam.nodes=5")
+    one, two = (api.design(wanted, Run(seed=3)) for _ in range(2))
+    assert one.spec == two.spec
+
+
+def test_goals_without_what_they_need_are_refused() -> None:
+    assert "design.tolerance" in api.design(spec("taper_design", "design.travel=[1 mm, 20 mm]")).message
+    assert "design.travel" in api.design(spec("taper_design", "design.beam.goal=ripple")).message
+
+
+# --- outline ----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["lumped", "strip", "tapered"])
+def test_the_outline_has_the_flexures_thickness(name: str) -> None:
+    drawn = api.drawing(spec(name))
+    cut = next(contour for contour in drawn.contours if contour.layer == "cut")
+    points = np.array([edge.start for edge in cut.edges])  # type: ignore[union-attr]
+    sides = points[: len(points) // 2], points[len(points) // 2 :][::-1]
+    gaps = np.hypot(*(sides[0] - sides[1]).T)
+    table = drawn.tables[0].columns["thickness"][0]
+    assert gaps.min() == pytest.approx(table.min(), rel=1e-6)
+
+
+def test_printing_allowance_is_not_drawn() -> None:
+    thin = api.drawing(spec("strip", "mechanism.beam.offset=0.1 mm")).tables[0].columns["thickness"][0]
+    np.testing.assert_allclose(thin, 0.97721 * MM)
+
+
+def test_two_links_with_pins_are_drawn_for_springs() -> None:
+    drawn = api.drawing(spec("bilancia2019"))
+    holes = [contour for contour in drawn.contours if contour.hole]
+    apart = holes[1].edges[0].center[0] - holes[0].edges[0].center[0]  # type: ignore[union-attr]
+    assert apart == pytest.approx(54 * MM)
+    assert TABLE_2[0].length == pytest.approx(54 * MM / 5)
