@@ -382,3 +382,34 @@ def test_a_mechanism_without_a_curve_misses_requirements_in_degrees():
     assert found.exit_code == 4
     assert found.missed[0].dimension == "angle"
     assert "no value" in found.missed[0].sentence
+
+
+def test_whatever_the_linkage_the_curve_is_finite_or_a_finding_says_why():
+    """Random lengths, offsets beyond reach, starts at and near the stretched position, both drives and branches."""
+    from cfmkit.families.slider_crank.spec import SliderCrankSpec
+
+    random = np.random.default_rng(7)
+    for _ in range(80):
+        crank, coupler = random.uniform(0.005, 0.1, 2).tolist()
+        springs = {name: float(random.choice([0, 1]) * 10 ** random.uniform(-3, 1)) for name in ("pivot", "crank_pin")}
+        mechanism = {
+            "crank_length": crank,
+            "coupler_length": coupler,
+            "offset": float(random.uniform(-1.1, 1.1) * (crank + coupler)),
+            "branch": str(random.choice(["right", "left"])),
+            "springs": springs | {"slider": float(10 ** random.uniform(0, 4))},
+            "unloaded_offset": float(random.choice([0.0, 1e-9, 1e-4, -1e-13, 0.01, -0.3, 0.5])),
+        }
+        low, start = float(random.uniform(-3, 3)), float(random.uniform(-0.05, 0.05))
+        analysis = {
+            "drive": str(random.choice(["torque", "force"])),
+            "points": 20,
+            "angle": (low, low + float(10 ** random.uniform(-4, 1))),
+            "travel": (start, start + float(10 ** random.uniform(-6, -1))),
+        }
+        about = {"family": "slider-crank", "mechanism": mechanism, "analysis": analysis}
+        result = cfmkit.analyze(SliderCrankSpec.model_validate(about))
+        assert result.curves or result.warnings
+        for curve in result.curves:
+            assert np.isfinite(curve.effort).all()
+            assert np.isfinite([item.value for item in result.values.values() if item.value is not None]).all()

@@ -46,7 +46,7 @@ def figures(result: Result) -> dict[str, Callable[[], Figure]]:
         from cfmkit.families.slider_crank.flexures.draw import figures as of_part
 
         return of_part(result)
-    makers = [curve, energy, springs, joints, linkage]
+    makers = [curve, energy, springs, joints, linkage] if result.state.assembly.rates.any() else [joints, linkage]
     return {maker.__name__: partial(maker, result) for maker in makers}
 
 

@@ -180,7 +180,7 @@ def solve(spec: SliderCrankSpec, assembly: Assembly) -> tuple[Solution, tuple[Fi
         raise CannotBuild(short.name, short.message)
     motion = np.linspace(start, stop, spec.analysis.points)
     units = assembly.units(motion)
-    finite = np.isfinite(assembly.rates @ np.where(assembly.rates[:, None] > 0, units.effort, 0.0))
+    finite = np.isfinite(units.effort[assembly.rates > 0.0]).all(axis=0)
     if not finite.all():  # at an end of the motion only: the unbounded place itself is left out
         motion = motion[finite]
         units = assembly.units(motion)
