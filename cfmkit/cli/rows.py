@@ -117,6 +117,8 @@ def _branches(report: Report, name: str, metrics: Mapping[str, Quantity]) -> str
 
 
 def _short(quantity: Quantity, digits: int = 4) -> str:
+    if quantity.word is not None:
+        return quantity.word
     return "no value" if quantity.value is None else format_short(quantity.value, quantity.dimension, digits)
 
 
