@@ -1,0 +1,45 @@
+"""Printed slider-cranks as a user runs them: design to a drawing, three models side by side."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+
+from cfmkit.tables import read_csv
+
+CONFIGS = Path(__file__).parents[2] / "configs"
+
+
+def test_a_designed_strip_comes_with_its_drawing_its_limits_and_a_second_opinion(cli):
+    (cli.folder / "taper.yaml").write_bytes((CONFIGS / "slider_crank_taper_design.yaml").read_bytes())
+    done = cli("design", "taper.yaml", "-o", "out", "--no-plots")
+    assert done.code == 0, done.err
+    assert "converged to a local optimum" in " ".join(done.out.split())
+    assert {path.name for path in (cli.folder / "out/geometry").iterdir()} >= {
+        "slider-crank.dxf",
+        "slider-crank.svg",
+        "strip.csv",
+    }
+    told = json.loads((cli.folder / "out/metrics.json").read_text())["metrics"]
+    assert abs(told["recheck_force"]["value"]) < 1e-4
+    assert abs(told["recheck_stress"]["value"]) < 2e-3
+    again = cli("analyze", "out/design.yaml", "-o", "again", "--no-plots", "-q")
+    assert again.code == 0
+
+
+def test_springs_flexures_and_strip_stand_side_by_side_with_their_differences(cli):
+    """The paper's overlay: springs and flexures agree within 0.5 %, the printed strip has 0.3 N more than both."""
+    (cli.folder / "tapered.yaml").write_bytes((CONFIGS / "slider_crank_tapered.yaml").read_bytes())
+    done = cli("analyze", "tapered.yaml", "--compare-fidelity", "-o", "out")
+    assert done.code == 0, done.err
+    assert (cli.folder / "out/figures/fidelity.png").read_bytes().startswith(b"\x89PNG")
+    table = read_csv((cli.folder / "out/curve.csv").read_bytes())
+    names = np.array(table["fidelity"])
+    assert list(dict.fromkeys(names.tolist())) == ["beam", "prb", "lumped"]
+    force = {name: np.array(table["force [N]"], dtype=float)[names == name][-1] for name in set(names.tolist())}
+    assert abs(force["prb"] / force["lumped"] - 1) < 5e-3
+    assert 0.27 < force["beam"] - force["lumped"] < 0.31
+    told = json.loads((cli.folder / "out/metrics.json").read_text())["metrics"]
+    assert told["fidelity_mean[lumped]"]["value"] < -0.28
