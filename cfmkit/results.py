@@ -162,6 +162,25 @@ class Design:
     """The outcome of a design: a complete new specification, or why there is none.
 
     A design is never its own judge: its `spec` is analysed like any other.
+
+    Attributes
+    ----------
+    spec : Spec or None
+        The new specification.
+    status, message : Status and str
+        How the design ended.
+    active_bounds : tuple of str
+        What holds the design where it is.
+    nearest_feasible : mapping of str to str
+        Where there is no design: path of the specification -> the nearest value for which there would be one.
+    warnings : tuple of Finding
+        What the user must know.
+    values : mapping
+        What was found out beside the analysis of the new specification.
+    notes : tuple of (str, str)
+        Paragraphs of the page: the word that begins each, and the text.
+    tables : mapping
+        Name of a CSV file without its ending -> what makes it.
     """
 
     spec: Spec | None
@@ -170,6 +189,9 @@ class Design:
     active_bounds: tuple[str, ...] = ()
     nearest_feasible: Mapping[str, str] = field(default_factory=dict)
     warnings: tuple[Finding, ...] = ()
+    values: Mapping[str, Quantity] = field(default_factory=dict)
+    notes: tuple[tuple[str, str], ...] = ()
+    tables: Mapping[str, Callable[[], Table]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Fall back to the status's sentence."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from contextlib import nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,6 +17,7 @@ from cfmkit.store import RunFolder, stable_hash
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
+    from contextlib import AbstractContextManager
 
     from cfmkit.cli.options import Computing, OneSpec
     from cfmkit.cli.terminal import Terminal
@@ -28,18 +30,25 @@ FIRST = ("metrics.json", "resolved.yaml", "curve.csv")
 """Files that every run may write: what is in their way is found before anything is computed."""
 
 
+def _as_it_is(_folder: RunFolder, run: Run) -> AbstractContextManager[Run]:
+    """Leave a run as it is."""
+    return nullcontext(run)
+
+
 @dataclass(frozen=True)
 class Verb:
     """What distinguishes one computing verb from another.
 
     `compute` returns the report on a spec; `done` is the word for it, in the header; `inputs` is
-    what the manifest says about other files than the spec.
+    what the manifest says about other files than the spec; `running` makes of a run in the folder one
+    that works in several processes, or notes what it has finished.
     """
 
     name: str
     done: str
     compute: Callable[[Spec, Run], Report]
     inputs: Mapping[str, Any] = field(default_factory=dict)
+    running: Callable[[RunFolder, Run], AbstractContextManager[Run]] = _as_it_is
 
 
 @dataclass(frozen=True)
@@ -69,7 +78,8 @@ def execute(verb: Verb, options: Computing, terminal: Terminal) -> Answer:
     spec = _spec(document, options)
     with RunFolder(out) as folder, terminal.progress() as progress:
         folder.check(*FIRST)
-        found = _computed(verb, spec, Run(options.seed, progress), document)
+        with verb.running(folder, Run(options.seed, progress)) as run:
+            found = _computed(verb, spec, run, document)
         for name, data in report.files(found, plots=not options.no_plots):
             folder.write(name, data)
         origin = provenance(verb.name, spec, options.spec, terminal)

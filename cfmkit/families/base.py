@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -19,17 +19,74 @@ def _silent(_fraction: float, _text: str) -> None:
     """Ignore progress: the default for library use."""
 
 
+class Executor(Protocol):
+    """How independent jobs get done: `cfmkit.studies.executors` and `cfmkit.studies.pool` have several ways."""
+
+    def __call__(
+        self, work: Callable[[Any], Any], jobs: Iterator[Any], stopping: Callable[[], bool], /
+    ) -> Iterator[tuple[Any, Any]]:
+        """Yield (job, outcome) as they finish; take no more jobs once ``stopping()`` is true."""
+
+
+def _one_by_one(
+    work: Callable[[Any], Any], jobs: Iterator[Any], stopping: Callable[[], bool], /
+) -> Iterator[tuple[Any, Any]]:
+    """Do one job after the other in this process: the default for library use."""
+    for job in jobs:
+        if stopping():
+            return
+        yield job, work(job)
+
+
+class Notes(Protocol):
+    """Where a long run notes what it has finished, for the run after it: `cfmkit.studies.journal.Journal`."""
+
+    def find(self, key: str, /) -> int:
+        """Return where the record of a key (32 hexadecimal digits) lies; -1 if there is none."""
+
+    def read(self, place: int, /) -> Any:
+        """Return a record."""
+
+    def add(self, key: str, record: Any, /) -> int:
+        """Keep a record of plain numbers, words, lists and mappings; return where it lies."""
+
+
+class _Forgotten:
+    """Keeps nothing: the default for library use."""
+
+    def find(self, _key: str, /) -> int:
+        return -1
+
+    def read(self, place: int, /) -> Any:
+        raise KeyError(place)
+
+    def add(self, _key: str, _record: Any, /) -> int:
+        return -1
+
+
 @dataclass(frozen=True)
 class Run:
-    """How a function is to be run: seed, progress report and time budget.
+    """How a function is to be run.
 
-    `progress` is called with a fraction in [0, 1] and a short text.
-    `time_budget` is in seconds, or None for no limit.
+    Attributes
+    ----------
+    seed : int
+        Of everything random.
+    progress : callable
+        Is told a fraction in [0, 1] and a short text.
+    time_budget : float, optional
+        In seconds; None: no limit.
+    executor : Executor
+        Does independent jobs, in this process or in others.
+    notes : Notes
+        Keeps what is finished.
     """
 
     seed: int = 0
     progress: Callable[[float, str], None] = _silent
     time_budget: float | None = None
+    executor: Executor = _one_by_one
+    notes: Notes = field(default_factory=_Forgotten)
 
 
 @dataclass(frozen=True)

@@ -21,8 +21,12 @@ def design(spec: BeamSpec, run: Run) -> Design:
     run : Run
         Seed, progress and time budget.
     """
-    if spec.design is None or spec.design.rescale is None:
-        return Design(None, Status.INVALID, "this spec has no 'design' block: add 'rescale'")
-    from cfmkit.families.beam.rescale import rescaled
+    if spec.design is not None and spec.design.rescale is not None:
+        from cfmkit.families.beam.rescale import rescaled
 
-    return rescaled(spec, spec.design.rescale)
+        return rescaled(spec, spec.design.rescale)
+    if spec.design is not None and spec.design.optimise is not None:
+        from cfmkit.families.beam.shaping.design import shaped
+
+        return shaped(spec, spec.design.optimise, run)
+    return Design(None, Status.INVALID, "this spec has no 'design' block: add 'rescale' or 'optimise'")

@@ -23,6 +23,7 @@ from cfmkit.families.beam.parts.spec import (
     checked_thickness,
     known_material,
 )
+from cfmkit.families.beam.shaping.spec import Optimise
 from cfmkit.families.beam.surface.spec import Surface
 from cfmkit.spec import Analysis, Displacement, Model, Spec, refuse
 from cfmkit.units import DIMENSIONS, Force, Length, Ratio, Torque
@@ -105,6 +106,13 @@ class BeamDesign(Model):
     """What `cfmkit design` is to do."""
 
     rescale: Rescale | None = Field(None, description="another size, section or material for the same curve")
+    optimise: Optimise | None = Field(None, description="node positions and beam shapes for a constant force")
+
+    @model_validator(mode="after")
+    def _one_way(self) -> Self:
+        if (self.rescale is None) == (self.optimise is None):
+            raise ValueError("give either 'rescale' or 'optimise'")
+        return self
 
 
 class BeamAnalysis(Analysis):

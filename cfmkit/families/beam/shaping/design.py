@@ -1,0 +1,268 @@
+"""`design: {optimise: ...}`: from a specification to the task, from the best audited start to a specification."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit._version import __version__
+from cfmkit.beams.beam import fit
+from cfmkit.families.beam.build import assemble
+from cfmkit.families.beam.findings import finding
+from cfmkit.families.beam.shaping.audit import Audit, Spread, audited
+from cfmkit.families.beam.shaping.infeasible import blocked, held_by
+from cfmkit.families.beam.shaping.multistart import Explored, deadline_of, explored, ranked
+from cfmkit.families.beam.shaping.report import notes_of, starts_table, values_of
+from cfmkit.families.beam.shaping.search import Found, Plan, improved, widened
+from cfmkit.families.beam.shaping.task import Coordinate, Limits, Task
+from cfmkit.families.beam.shaping.variables import Variables
+from cfmkit.results import Design, Finding, Status
+from cfmkit.store import stable_hash
+
+if TYPE_CHECKING:
+    from cfmkit.families.base import Run
+    from cfmkit.families.beam.shaping.spec import Optimise
+    from cfmkit.families.beam.spec import BeamSpec
+
+AUDITED = 5
+"""Designs that are audited, the best first, until one is sound."""
+
+MARGIN = 5e-4
+"""The search asks for so much less stress: it takes a limit that is missed by less than 1e-4 for met."""
+
+_NOT_DECIDING = {"name", "description", "requirements", "sweep", "sensitivity"}
+_GRID, _FINE = 1e-7, 1e-6  # designed coordinates [m] and coefficients [rad] are rounded to so much
+
+
+def shaped(spec: BeamSpec, wanted: Optimise, run: Run) -> Design:
+    """Return a specification with optimised nodes and shapes, or why there is none.
+
+    Parameters
+    ----------
+    spec : BeamSpec
+        Driven by a displacement.
+    wanted : Optimise
+        What is to be reached, what may vary, what must hold.
+    run : Run
+        Seed, progress, time budget, processes, notes.
+    """
+    problem = fault_of(spec, wanted)
+    if problem:
+        return Design(None, Status.INVALID, problem)
+    task = task_of(spec, wanted)
+    plan = Plan(drawn=wanted.drawn, deadline=deadline_of(wanted.time_budget, run.time_budget))
+    identity = stable_hash([spec.model_dump(mode="json", exclude=_NOT_DECIDING), run.seed, __version__])
+    result = explored(task, plan, (wanted.starts, wanted.widened), identity, run)
+    spread = Spread(wanted.tolerances.nodes, wanted.tolerances.coefficients, wanted.tolerances.samples, run.seed)
+    best = _best(task, result, spread, plan)
+    if isinstance(best, Design):
+        return replace(best, tables={"starts": lambda: starts_table(task, result)})
+    found, audit = best
+    return Design(
+        written(spec, task, found),
+        Status.COMPLETE,
+        _told(task, found, result),
+        active_bounds=held_by(task, found),
+        warnings=_warnings(task, found, audit, result),
+        values=values_of(audit, spread),
+        notes=notes_of(task, audit, spread, held_by(task, found)),
+        tables={"starts": lambda: starts_table(task, result)},
+    )
+
+
+def fault_of(spec: BeamSpec, wanted: Optimise) -> str:
+    """Return what keeps the block from making sense with its mechanism; empty if nothing does."""
+    mechanism = spec.mechanism
+    if mechanism.drive.kind != "displacement":
+        return f"design.optimise needs a drive of kind 'displacement', not {mechanism.drive.kind!r}"
+    for name in wanted.free:
+        if name not in mechanism.nodes:
+            return f"design.optimise.free names {name!r}, which is not a node; nodes: {', '.join(mechanism.nodes)}"
+        ranges = (wanted.free[name].x, wanted.free[name].y)
+        if ranges == (None, None) and wanted.limits.envelope is None:
+            return f"design.optimise.free.{name} says no range: give 'x', 'y' or limits.envelope"
+    for name in wanted.beams or ():
+        if name not in mechanism.beams:
+            return f"design.optimise.beams names {name!r}, which is not a beam; beams: {', '.join(mechanism.beams)}"
+    if not wanted.free and (wanted.orders[-1] == 0 or wanted.beams == ()):
+        return "design.optimise leaves nothing to vary: name free nodes, or an order of the shapes above 0"
+    if spec.extent < wanted.window[1] * (1 - 1e-12):
+        return "analysis.travel ends before design.optimise.window: let it reach the end of the window"
+    return ""
+
+
+def task_of(spec: BeamSpec, wanted: Optimise) -> Task:
+    """Return what is to be shaped; of layers in series one, which moves its share."""
+    mechanism = spec.mechanism
+    layers = mechanism.copies.layers if mechanism.copies else 1
+    if layers > 1 and mechanism.copies:
+        one = mechanism.copies.model_copy(update={"layers": 1})
+        spec = spec.model_copy(update={"mechanism": mechanism.model_copy(update={"copies": one})})
+    assembly = assemble(spec)
+    return Task(
+        network=assembly.network,
+        driven=assembly.driven,
+        direction=assembly.direction,
+        copies=float(assembly.parallel),
+        window=(wanted.window[0] / layers, wanted.window[1] / layers),
+        coordinates=tuple(_coordinates(wanted)),
+        shaped=wanted.beams if wanted.beams is not None else tuple(mechanism.beams),
+        orders=wanted.orders,
+        coefficient_limit=wanted.coefficient_limit,
+        limits=_limits(wanted, assembly.allowable_stress),
+        objective=wanted.objective,
+        half_band=wanted.half_band,
+        compared=None if wanted.compare is None else (wanted.compare[0] / layers, wanted.compare[1] / layers),
+    )
+
+
+def _coordinates(wanted: Optimise) -> list[Coordinate]:
+    box = wanted.limits.envelope
+    found = []
+    for name, node in wanted.free.items():
+        both = node.x is None and node.y is None
+        for axis, given in enumerate((node.x, node.y)):
+            inside = (box.x, box.y)[axis] if both and box is not None else given
+            if inside is not None:
+                found.append(Coordinate(name, axis, *inside))
+    return found
+
+
+def _limits(wanted: Optimise, allowable_stress: float | None) -> Limits:
+    limits, force = wanted.limits, wanted.force
+    box, deformed = limits.envelope, limits.deformed_envelope
+    return Limits(
+        stress=allowable_stress * (1 - MARGIN) if limits.stress and allowable_stress else None,
+        envelope=None if box is None else (*box.x, *box.y),
+        deformed_envelope=None if deformed is None else (*deformed.x, *deformed.y),
+        length_ratio=limits.max_length_ratio,
+        slenderness=limits.min_slenderness,
+        clearance=limits.clearance,
+        opening=limits.joint_opening,
+        radius=limits.min_radius,
+        force_min=force.min,
+        force_target=force.target,
+        force_tolerance=force.tolerance,
+    )
+
+
+def _best(task: Task, result: Explored, spread: Spread, plan: Plan) -> tuple[Found, Audit] | Design:
+    """Return the best design whose audit is sound, or why there is none."""
+    candidates = list(ranked(task, result.found))
+    if not candidates:
+        some = [one for one in result.found.values() if one is not None]
+        if not some:
+            return _nothing(task, result)
+        why = blocked(task, some, replace(plan, deadline=None))
+        if why.freed is None:
+            missed = "; ".join(f"{name} ({about})" for name, about in why.missed.items())
+            said = f"no shape of {len(some)} starts meets all limits; the best misses {missed}"
+            return Design(None, Status.INFEASIBLE, said, nearest_feasible=why.nearest)
+        free = replace(plan, deadline=None)
+        candidates = [(-1, widened(task, improved(task, why.freed, free), free))]
+    first = candidates[0][1]
+    if task.objective == "range" and first.objective > task.half_band:
+        flattest = min((one for _, one in candidates), key=lambda one: one.objective)
+        said = (
+            f"no shape of {len(result.found)} starts keeps the force within +-{task.half_band:.2%} over the window "
+            f"asked for; the flattest keeps it within +-{flattest.objective:.2%}"
+        )
+        nearest = {"design.optimise.half_band": f"at least {1.02 * flattest.objective:.2%}"}
+        return Design(None, Status.INFEASIBLE, said, nearest_feasible=nearest)
+    fallback = None
+    for _, one in candidates[:AUDITED]:
+        rounded = _rounded(task, one)
+        audit = audited(Variables(task, one.order), rounded, spread)
+        if audit.sound:
+            return rounded, audit
+        fallback = fallback or (rounded, audit)
+    assert fallback is not None
+    return fallback
+
+
+def _nothing(task: Task, result: Explored) -> Design:
+    if result.missing:
+        return Design(None, Status.INFEASIBLE, "the time budget ended before any start led to a design: give it more")
+    said = (
+        "no random network could be followed over the window without losing stability or crossing beams: "
+        "widen the envelope or the ranges of the free nodes, or shorten the window"
+    )
+    return Design(None, Status.INFEASIBLE, said)
+
+
+def _rounded(task: Task, found: Found) -> Found:
+    """Return a design with coordinates and coefficients that print short."""
+    places, x = len(task.coordinates), found.x.copy()
+    x[:places] = np.round(x[:places] * task.size / _GRID) * _GRID / task.size
+    x[places:] = np.round(x[places:] / _FINE) * _FINE
+    return replace(found, x=x)
+
+
+def written(spec: BeamSpec, task: Task, found: Found) -> BeamSpec:
+    """Return the specification with nodes and shapes written out, and the window of the design as its window."""
+    variables = Variables(task, found.order)
+    network = variables.build(found.x)
+    moved = dict.fromkeys(one.node for one in task.coordinates)
+    nodes = {name: (float(network.nodes[name].x), float(network.nodes[name].y)) for name in moved}
+    changes: dict[str, Any] = {f"mechanism.nodes.{name}.at": at for name, at in nodes.items()}
+    for name in task.shaped:
+        beam = network.beams[name]
+        start, end = network.nodes[beam.start], network.nodes[beam.end]
+        reach = (
+            end.x - start.x + beam.end_offset[0] - beam.start_offset[0],
+            end.y - start.y + beam.end_offset[1] - beam.start_offset[1],
+        )
+        fitted = fit(beam, reach)
+        shape = {
+            "kind": "polynomial",
+            "coefficients": (float(np.real(fitted.rotation)), *(float(c) for c in beam.shape.coefficients[1:])),  # type: ignore[union-attr]
+            "length": float(np.real(fitted.length)),
+        }
+        changes[f"mechanism.beams.{name}.shape"] = shape
+    layers = spec.mechanism.copies.layers if spec.mechanism.copies else 1
+    start = np.ceil(found.start * layers / 1e-6) * 1e-6
+    changes["analysis.window"] = (float(start), float(task.window[1] * layers))
+    return spec.replace(changes)
+
+
+def _told(task: Task, found: Found, result: Explored) -> str:
+    """Return what the search did, in one sentence."""
+    some = [one for one in result.found.values() if one is not None]
+    feasible = [one for one in some if one.feasible]
+    total = sum(one.evaluations for one in some)
+    reused = f", {result.reused} from the journal" if result.reused else ""
+    left = f", {result.missing} not done in the time" if result.missing else ""
+    share = 1 - found.start / task.window[1]
+    return (
+        f"force within +-{found.objective:.2%} over {share:.1%} of the travel; {len(feasible)} of "
+        f"{len(result.found)} starts meet all limits ({total} traces{reused}{left}); the last "
+        f"minimisation {found.ending}"
+    )
+
+
+def _warnings(task: Task, found: Found, audit: Audit, result: Explored) -> tuple[Finding, ...]:
+    """Return what the audit holds against the design."""
+    out = []
+    if not audit.sound:
+        faults = [
+            "the path ends early" if not audit.complete else "",
+            "it is not stable all the way" if not audit.stable else "",
+            f"beams cross at {audit.crossings} of the poses" if audit.crossings else "",
+        ]
+        out.append(finding("design_unsound", "the design fails its audit: " + ", ".join(filter(None, faults))))
+    if task.objective == "paper":
+        out.append(
+            finding(
+                "objective_ill_posed",
+                f"F(a)/F(b) - 1 = {found.objective:.3f} is bounded by nothing but the limits: a force that falls from "
+                f"b to a is rewarded; over the window the half band is "
+                + (f"{audit.half_band:.1%}" if audit.half_band is not None else "not known"),
+                "design.optimise.objective=ripple",
+            )
+        )
+    if result.missing:
+        said = f"{result.missing} of the starts were not done in the time budget; run again to go on"
+        out.append(finding("search_cut_short", said))
+    return tuple(out)

@@ -1,0 +1,155 @@
+"""What is minimised: a form of the objective with variables of its own beside the design variables.
+
+[Lan, eq. 1] compares the force at two displacements, F(a)/F(b) - 1. Nothing bounds that from below: a mechanism that
+snaps through between b and a reaches -1 and less. The flattest force over a window has no such escape: with s the half
+band and r its middle, s is least subject to r (1 - s) <= F <= r (1 + s) at every pose.
+
+Reference
+---------
+[Lan] C.-C. Lan, J.-H. Wang, Y.-H. Chen, A compliant constant-force mechanism (2010), eq. 1 and table 1.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from cfmkit.curves import FloatArray
+    from cfmkit.families.beam.shaping.limits import View
+
+LEAST_MIDDLE = 1e-3
+
+
+@dataclass(frozen=True)
+class Aim:
+    """Objective and rows at one point, with derivatives by the design variables and by the goal's own ones."""
+
+    value: float
+    by_x: FloatArray | None
+    by_own: FloatArray
+    rows: FloatArray
+    rows_by_x: FloatArray | None
+    rows_by_own: FloatArray
+
+
+class Goal(Protocol):
+    """A form of the objective."""
+
+    bounds: FloatArray
+    """Of its own variables, (o, 2)."""
+
+    def start(self, view: View) -> FloatArray:
+        """Return its own variables that fit the design best."""
+
+    def window_start(self, own: FloatArray, otherwise: float) -> float:
+        """Return where the window begins [m]: `otherwise`, if that is not one of its own variables."""
+
+    def aim(self, view: View, own: FloatArray) -> Aim:
+        """Return objective and rows."""
+
+
+def unit_of_force(view: View) -> float:
+    """Return the bending rigidity of the first beam over the square of the size [N], times the copies."""
+    task = view.response.variables.task
+    section = next(iter(task.network.beams.values())).section
+    middle = section.rigidities(np.array([0.5]), 0.5)[0]
+    return float(np.real(middle[0])) / task.size**2 * task.copies
+
+
+@dataclass(frozen=True)
+class Flattest:
+    """The half band s about the level r over the window; its own variables are r [unit of force] and s."""
+
+    bounds = np.array([(LEAST_MIDDLE, np.inf), (0.0, 10.0)])
+
+    def start(self, view: View) -> FloatArray:
+        """Return level and half band of the design."""
+        force = view.response.state.force[view.poses.window] / unit_of_force(view)
+        middle = max(0.5 * (force.max() + force.min()), 0.05 * abs(force).max(), LEAST_MIDDLE)
+        return np.array([middle, min(10.0, abs(force / middle - 1).max())])
+
+    def window_start(self, own: FloatArray, otherwise: float) -> float:
+        """Return the given start."""
+        return otherwise
+
+    def aim(self, view: View, own: FloatArray) -> Aim:
+        """Return the half band and its rows."""
+        level, band = own
+        unit = unit_of_force(view) * level
+        ratio = view.response.state.force[view.poses.window] / unit
+        rows = np.concatenate([1 + band - ratio, ratio - 1 + band])
+        by_own = np.ones((len(rows), 2))
+        by_own[:, 0] = np.concatenate([ratio, -ratio]) / level
+        if not view.sloped:
+            return Aim(float(band), None, np.array([0.0, 1.0]), rows, None, by_own)
+        slope = view.response.slopes.force[view.poses.window] / unit
+        by_x = np.concatenate([-slope, slope])
+        return Aim(float(band), np.zeros(by_x.shape[1]), np.array([0.0, 1.0]), rows, by_x, by_own)
+
+
+@dataclass(frozen=True)
+class Widest:
+    """The start of the window over its end, at a given half band; its own variables are the level r and that share.
+
+    Limits are looked at in the poses of the window, which move with its start; their derivatives by it are left out:
+    the largest stress is at its end, which stays.
+    """
+
+    end: float
+    half_band: float
+    bounds = np.array([(LEAST_MIDDLE, np.inf), (0.02, 0.98)])
+
+    def start(self, view: View) -> FloatArray:
+        """Return level and window of the design."""
+        return np.array([Flattest().start(view)[0], view.poses.at[view.poses.window[0]] / self.end])
+
+    def window_start(self, own: FloatArray, otherwise: float) -> float:
+        """Return the start of the window that is wanted."""
+        return float(own[1]) * self.end
+
+    def aim(self, view: View, own: FloatArray) -> Aim:
+        """Return the share of the travel before the window, and the rows of the half band."""
+        flat = Flattest().aim(view, np.array([own[0], self.half_band]))
+        level, share = own
+        at = view.poses.at[view.poses.window]
+        force = view.response.state.force[view.poses.window] / (unit_of_force(view) * level)
+        moves = (1 - (at - at[0]) / (at[-1] - at[0])) * self.end
+        by_share = _derivative(at, force) * moves
+        by_own = np.stack([flat.rows_by_own[:, 0], np.concatenate([-by_share, by_share])], axis=1)
+        return Aim(float(share), flat.by_x, np.array([0.0, 1.0]), flat.rows, flat.rows_by_x, by_own)
+
+
+def _derivative(at: FloatArray, values: FloatArray) -> FloatArray:
+    """Return the derivative of the polynomial through values at Chebyshev-Lobatto points."""
+    from numpy.polynomial import chebyshev
+
+    t = 2 * (at - at[0]) / (at[-1] - at[0]) - 1
+    terms = chebyshev.chebfit(t, values, len(t) - 1)
+    return np.asarray(chebyshev.chebval(t, chebyshev.chebder(terms)) * 2 / (at[-1] - at[0]))
+
+
+@dataclass(frozen=True)
+class Compared:
+    """The objective of the paper, F(a)/F(b) - 1, literally; no variables of its own."""
+
+    bounds = np.zeros((0, 2))
+
+    def start(self, view: View) -> FloatArray:
+        """Return nothing."""
+        return np.zeros(0)
+
+    def window_start(self, own: FloatArray, otherwise: float) -> float:
+        """Return the given start."""
+        return otherwise
+
+    def aim(self, view: View, own: FloatArray) -> Aim:
+        """Return the objective; it has no rows."""
+        at, from_ = view.response.state.force[view.poses.compared]
+        none = np.zeros((0, len(view.response.x)))
+        if not view.sloped:
+            return Aim(at / from_ - 1, None, own, own, None, np.zeros((0, 0)))
+        by_at, by_from = view.response.slopes.force[view.poses.compared]
+        return Aim(at / from_ - 1, by_at / from_ - at * by_from / from_**2, own, own, none, np.zeros((0, 0)))

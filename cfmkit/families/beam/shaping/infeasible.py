@@ -1,0 +1,143 @@
+"""Where no start meets all limits: which of them block, and the nearest values for which there would be a shape."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.families.beam.shaping.goals import Flattest
+from cfmkit.families.beam.shaping.limits import thickest
+from cfmkit.families.beam.shaping.program import Shaping
+from cfmkit.families.beam.shaping.search import VIOLATION, Found, Plan, met
+from cfmkit.families.beam.shaping.variables import Variables
+from cfmkit.units import format_short
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Mapping
+
+    from cfmkit.families.beam.shaping.task import Limits, Task
+
+MOST = 3
+"""Designs that are looked at, the ones that miss the limits least."""
+
+
+@dataclass(frozen=True)
+class Blocked:
+    """Why there is no design.
+
+    Attributes
+    ----------
+    missed : mapping
+        Limit -> by how much the best design misses it, and where.
+    nearest : mapping of str to str
+        Path below `design.optimise` or `mechanism` -> value for which the other limits could be met.
+    freed : Found or None
+        A design that meets all limits after all.
+    """
+
+    missed: Mapping[str, str]
+    nearest: Mapping[str, str]
+    freed: Found | None
+
+
+def blocked(task: Task, found: Iterable[Found], plan: Plan) -> Blocked:
+    """Return what blocks, judged from the designs that miss the limits least."""
+    best = sorted(found, key=lambda one: one.violation)[:MOST]
+    missed = missed_by(task, best[0])
+    nearest: dict[str, str] = {}
+    for name in missed:
+        gives = [met(task, one, task.orders[-1], plan, (name,)) for one in best]
+        for one in gives:
+            if one.feasible:
+                return Blocked(missed, {}, one)
+        slack = min((one.violation for one in gives if set(missed_by(task, one)) <= {name}), default=None)
+        if slack is not None:
+            nearest |= NEAREST[name](task, 1.05 * slack)
+    return Blocked(missed, nearest, None)
+
+
+def missed_by(task: Task, found: Found) -> dict[str, str]:
+    """Return the limits that a design misses, each with its worst place and by how much, the worst first."""
+    program = Shaping(Variables(task, found.order), found.start, Flattest())
+    view = program.view(found.x)
+    if view is None:
+        return {}
+    worst: list[tuple[float, str, str]] = []
+    for name, many in program.limits(view):
+        rows = min(many, key=lambda one: one.values.min(initial=np.inf), default=None)
+        if rows is not None and rows.values.min(initial=0.0) < -VIOLATION:
+            at = int(rows.values.argmin())
+            worst.append((float(rows.values[at]), name, rows.about()[at]))
+    return {name: f"{about}: missed by {-value:.1%}" for value, name, about in sorted(worst)}
+
+
+def held_by(task: Task, found: Found, close: float = 2e-3) -> tuple[str, ...]:
+    """Return the limits and bounds that hold a design, by name and place."""
+    variables = Variables(task, found.order)
+    program = Shaping(variables, found.start, Flattest())
+    view = program.view(found.x, sloped=True)
+    low, high = variables.bounds.T
+    at_bound = (found.x - low < 1e-4) | (high - found.x < 1e-4)
+    held = [f"{name} at its bound" for name, at in zip(variables.names, at_bound, strict=True) if at]
+    if view is None:
+        return tuple(held)
+    for name, many in program.limits(view):
+        for rows in many:
+            about = rows.about()
+            moves = abs(rows.slopes).max(axis=1, initial=0.0) > 1e-9 if rows.slopes is not None else rows.values < 1
+            held += [f"{name}: {about[k]}" for k in np.flatnonzero((rows.values < close) & moves)]
+    return tuple(held)
+
+
+def _stress(task: Task, slack: float) -> dict[str, str]:
+    allowed = (task.limits.stress or 0.0) * (1 + slack)
+    return {"allowable stress": f"at least {format_short(allowed, 'stress')}"}
+
+
+def _force(task: Task, slack: float) -> dict[str, str]:
+    limits = task.limits
+    if limits.force_min is not None:
+        return {"design.optimise.force.min": f"at most {format_short(limits.force_min * (1 - slack), 'force')}"}
+    return {"design.optimise.force.tolerance": f"at least {limits.force_tolerance + slack:.3g}"}
+
+
+def _clearance(task: Task, slack: float) -> dict[str, str]:
+    thick = max(thickest(beam.section) for beam in task.network.beams.values())
+    gap = ((task.limits.clearance or 0.0) + thick) * (1 - slack) - thick
+    return {"design.optimise.limits.clearance": f"at most {format_short(max(0.0, gap), 'length')}"}
+
+
+def _box(key: str) -> Callable[[Task, float], dict[str, str]]:
+    def nearest(task: Task, slack: float) -> dict[str, str]:
+        more = format_short(slack * task.size, "length")
+        return {f"design.optimise.limits.{key}": f"wider by {more} on the sides that hold"}
+
+    return nearest
+
+
+def _scaled(
+    key: str, value: Callable[[Limits, float], float], sense: str, dimension: str
+) -> Callable[..., dict[str, str]]:
+    def nearest(task: Task, slack: float) -> dict[str, str]:
+        return {f"design.optimise.limits.{key}": f"{sense} {format_short(value(task.limits, slack), dimension)}"}
+
+    return nearest
+
+
+NEAREST: dict[str, Callable[[Task, float], dict[str, str]]] = {
+    "stress": _stress,
+    "envelope": _box("envelope"),
+    "deformed_envelope": _box("deformed_envelope"),
+    "max_length_ratio": _scaled(
+        "max_length_ratio", lambda one, s: 1 / max(1e-3, 1 / (one.length_ratio or 1.0) - s), "at least", "count"
+    ),
+    "min_slenderness": _scaled(
+        "min_slenderness", lambda one, s: (one.slenderness or 0.0) * (1 - s), "at most", "count"
+    ),
+    "min_radius": _scaled("min_radius", lambda one, s: (one.radius or 0.0) * (1 - s), "at most", "length"),
+    "clearance": _clearance,
+    "force": _force,
+}
+"""For each limit what it would have to be if it gives way by an amount in its own scale."""

@@ -1,0 +1,202 @@
+"""The limits of a task as rows that must be at least zero, all of order one, with their derivatives."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.families.beam.shaping.lengths import Length, lengths
+from cfmkit.families.beam.shaping.separation import Pair, pairs, separations
+from cfmkit.numerics.sampled import largest
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from cfmkit.beams import Section
+    from cfmkit.curves import FloatArray
+    from cfmkit.families.beam.shaping.poses import Poses
+    from cfmkit.families.beam.shaping.response import Response
+
+SIDES = {"stress": ("left side", "right side"), "x": ("right", "left"), "y": ("top", "bottom")}
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Some rows of one limit: values (m,), derivatives (m, k) if asked, and what each row is about."""
+
+    values: FloatArray
+    slopes: FloatArray | None
+    about: Callable[[], list[str]]
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """What the limits look at: the response at the poses of a window from `start`, with derivatives or without."""
+
+    response: Response
+    poses: Poses
+    start: float
+    sloped: bool = False
+
+    @cached_property
+    def lengths(self) -> dict[str, Length]:
+        """Lengths of all beams."""
+        return lengths(self.response.variables, self.response.x)
+
+    def rows(self, values: FloatArray, slopes: Callable[[], FloatArray], about: Callable[[], list[str]]) -> Rows:
+        """Return rows; the derivatives are computed only if they are wanted."""
+        return Rows(values.ravel(), slopes().reshape(values.size, -1) if self.sloped else None, about)
+
+    def section(self, beam: str) -> Section:
+        """Return the section of a beam."""
+        return self.response.variables.task.network.beams[beam].section
+
+
+def stress(view: View) -> list[Rows]:
+    """Signed extremes of the bending stress of each beam at every pose but rest, against the allowable stress."""
+    allowed = view.response.variables.task.limits.stress
+    return [] if allowed is None else [_extremes(view, "stress", slice(1, None), (allowed, allowed), allowed)]
+
+
+def envelope(view: View) -> list[Rows]:
+    """Extremes of the centre lines before loading."""
+    return _inside(view, view.response.variables.task.limits.envelope, slice(0, 1))
+
+
+def deformed_envelope(view: View) -> list[Rows]:
+    """Extremes of the centre lines at every pose."""
+    return _inside(view, view.response.variables.task.limits.deformed_envelope, slice(None))
+
+
+def _inside(view: View, box: tuple[float, float, float, float] | None, which: slice) -> list[Rows]:
+    size = view.response.variables.task.size
+    if box is None:
+        return []
+    return [_extremes(view, "x", which, (box[1], -box[0]), size), _extremes(view, "y", which, (box[3], -box[2]), size)]
+
+
+def _extremes(view: View, what: str, which: slice, most: tuple[float, float], unit: float) -> Rows:
+    """Return (most - largest value along each beam) / unit at some poses, of the value and of its negative."""
+    lines = view.response.state.lines
+    found = [np.zeros(0)] * len(lines)
+    by: list[FloatArray] = []
+    for number, (name, line) in enumerate(lines.items()):
+        values = getattr(line, what)[which]
+        top, _, weights = largest(line.place, np.stack([values, -values]))
+        found[number] = (np.array(most)[:, None] - top) / unit
+        if view.sloped:
+            weights[1] *= -1
+            slopes = getattr(view.response.slopes.lines[name], what)[which]
+            by.append(-np.matmul(weights.transpose(1, 0, 2), slopes).transpose(1, 0, 2) / unit)
+    values = np.concatenate([one.ravel() for one in found])
+    sides = SIDES[what]
+
+    def about() -> list[str]:
+        at = view.poses.at[which]
+        return [f"{name}, {side}, at {1e3 * pose:.4g} mm" for name in lines for side in sides for pose in at]
+
+    return view.rows(values, lambda: np.concatenate([one.reshape(-1, one.shape[-1]) for one in by]), about)
+
+
+def length_ratio(view: View) -> list[Rows]:
+    """Length over chord of the beams whose shape varies."""
+    task = view.response.variables.task
+    if task.limits.length_ratio is None:
+        return []
+    least = 1.0 / task.limits.length_ratio
+    many = {name: one for name, one in view.lengths.items() if name in task.shaped}
+    values = np.array([one.straightness - least for one in many.values()])
+    return [view.rows(values, lambda: np.array([one.by_straightness for one in many.values()]), lambda: list(many))]
+
+
+def slenderness(view: View) -> list[Rows]:
+    """Length over the largest thickness of every beam."""
+    task = view.response.variables.task
+    if task.limits.slenderness is None:
+        return []
+    many = view.lengths
+    least = np.array([task.limits.slenderness * thickest(view.section(name)) for name in many])
+    values = np.array([one.length for one in many.values()]) / least - 1.0
+    slopes = np.array([one.by_length for one in many.values()]) / least[:, None]
+    return [view.rows(values, lambda: slopes, lambda: list(many))]
+
+
+def radius(view: View) -> list[Rows]:
+    """Signed extremes of the curvature of the beams whose shape varies, before loading."""
+    variables = view.response.variables
+    least = variables.task.limits.radius
+    if least is None or variables.order == 0:
+        return []
+    u = np.linspace(0, 1, 17)
+    powers = np.arange(1, variables.order + 1) * u[:, None] ** np.arange(variables.order)
+    found = []
+    for row, name in enumerate(variables.task.shaped):
+        first = len(variables.task.coordinates) + variables.order * row
+        one = view.lengths[name]
+        turn = powers @ view.response.x[first : first + variables.order]
+        for sign in (1.0, -1.0):
+            value, _, weights = largest(u, sign * turn)
+            slopes = least * value / one.length**2 * one.by_length
+            slopes[first : first + variables.order] -= sign * least / one.length * (weights @ powers)
+            values = np.atleast_1d(1.0 - least * value / one.length)
+            found.append(view.rows(values, lambda slopes=slopes: slopes, lambda name=name: [name]))  # type: ignore[misc]
+    return found
+
+
+def clearance(view: View) -> list[Rows]:
+    """Gap of every pair of beams, and of every beam with itself, before loading and under load."""
+    task = view.response.variables.task
+    if task.limits.clearance is None:
+        return []
+    found = []
+    for pair in pairs(task.network):
+        value, slopes = separations(view, pair)
+
+        def about(pair: Pair = pair) -> list[str]:
+            both = " and ".join(dict.fromkeys(pair.beams))
+            return [f"{both}, at {1e3 * at:.4g} mm" for at in view.poses.at[view.poses.shown]]
+
+        found.append(view.rows(value, slopes, about))
+    return found
+
+
+def force(view: View) -> list[Rows]:
+    """Mean force over the window, against a least value and a target."""
+    limits, weights = view.response.variables.task.limits, view.poses.mean
+    mean = float(weights @ view.response.state.force)
+    rows: list[tuple[float, float, str]] = []
+    if limits.force_min is not None:
+        rows.append((mean / limits.force_min - 1.0, 1.0 / limits.force_min, "least mean"))
+    if limits.force_target is not None:
+        target, share = limits.force_target, limits.force_tolerance
+        rows.append((mean / target - 1.0 + share, 1.0 / target, "target, from below"))
+        rows.append((1.0 - mean / target + share, -1.0 / target, "target, from above"))
+    if not rows:
+        return []
+
+    def slopes() -> FloatArray:
+        return np.outer([factor for _, factor, _ in rows], weights @ view.response.slopes.force)
+
+    return [view.rows(np.array([value for value, _, _ in rows]), slopes, lambda: [about for _, _, about in rows])]
+
+
+LIMITS: dict[str, Callable[[View], list[Rows]]] = {
+    "stress": stress,
+    "envelope": envelope,
+    "deformed_envelope": deformed_envelope,
+    "max_length_ratio": length_ratio,
+    "min_slenderness": slenderness,
+    "min_radius": radius,
+    "clearance": clearance,
+    "force": force,
+}
+"""All limits by name."""
+
+
+def thickest(section: Section) -> float:
+    """Return the largest thickness of a section [m]."""
+    thickness = section.thickness
+    return float(thickness if isinstance(thickness, float | int) else np.max(thickness.values))

@@ -1,0 +1,113 @@
+"""What a shape design reports beside the analysis of its specification: the audit and the table of all starts."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.results import Quantity
+from cfmkit.units import format_short
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from cfmkit.families.beam.shaping.audit import Audit, Spread
+    from cfmkit.families.beam.shaping.multistart import Explored
+    from cfmkit.families.beam.shaping.task import Task
+    from cfmkit.tables import Table
+
+DEFINITIONS = {
+    "audit_half_band": ("ratio", "(max - min)/(max + min) of the force over the window of the design"),
+    "audit_half_band_reissner": ("ratio", "the same with beams that stretch and shear"),
+    "audit_strict_range": ("ratio", "share of the travel up to d in which (max - min) <= 5 % of max"),
+    "audit_strict_range_reissner": ("ratio", "the same with beams that stretch and shear"),
+    "audit_stress": ("stress", "largest bending stress from rest to d"),
+    "audit_gap": ("length", "least gap between surfaces of different beams from rest to d, away from joints"),
+    "audit_crossings": ("count", "poses, of 61 from rest to d, at which beams cross"),
+    "tolerance_half_band_median": ("ratio", "median half band of networks within the tolerances"),
+    "tolerance_half_band_p90": ("ratio", "half band that nine of ten networks within the tolerances keep"),
+    "tolerance_strict_range_median": ("ratio", "median share of the travel with (max - min) <= 5 % of max"),
+    "tolerance_strict_range_p10": ("ratio", "share of the travel that nine of ten networks reach"),
+    "tolerance_lost": ("count", "networks within the tolerances that cannot be followed to d"),
+}
+
+
+def values_of(audit: Audit, spread: Spread) -> Mapping[str, Quantity]:
+    """Return the audit by name."""
+    bands, ranges = audit.bands, audit.ranges
+    numbers: dict[str, float | None] = {
+        "audit_half_band": audit.half_band,
+        "audit_half_band_reissner": audit.stiff,
+        "audit_strict_range": audit.strict,
+        "audit_strict_range_reissner": audit.strict_stiff,
+        "audit_stress": audit.stress,
+        "audit_gap": audit.gap,
+        "audit_crossings": float(audit.crossings),
+        "tolerance_half_band_median": float(np.median(bands)) if len(bands) else None,
+        "tolerance_half_band_p90": float(np.quantile(bands, 0.9)) if len(bands) else None,
+        "tolerance_strict_range_median": float(np.median(ranges)) if len(ranges) else None,
+        "tolerance_strict_range_p10": float(np.quantile(ranges, 0.1)) if len(ranges) else None,
+        "tolerance_lost": float(audit.lost),
+    }
+    return {name: Quantity(value, *DEFINITIONS[name]) for name, value in numbers.items()}
+
+
+def notes_of(task: Task, audit: Audit, spread: Spread, held: tuple[str, ...]) -> tuple[tuple[str, str], ...]:
+    """Return the paragraphs of the page."""
+    return tuple(note for note in (_audit(task, audit), _tolerances(audit, spread), _held(held)) if note[1])
+
+
+def _audit(task: Task, audit: Audit) -> tuple[str, str]:
+    parts = [
+        "stable all the way" if audit.stable else "not stable all the way",
+        "no crossings" if not audit.crossings else f"beams cross at {audit.crossings} poses",
+    ]
+    if audit.half_band is not None:
+        parts.append(
+            f"force +-{audit.half_band:.2%} over the window, within 5 % over {audit.strict or 0:.1%} of the way"
+        )
+    if audit.stiff is not None:
+        parts.append(f"with stretching and shear +-{audit.stiff:.2%} and {audit.strict_stiff or 0:.1%}")
+    if audit.stress is not None:
+        parts.append(f"bending stress up to {format_short(audit.stress, 'stress')}")
+    if audit.gap is not None:
+        parts.append(f"gaps of at least {format_short(audit.gap, 'length')}")
+    return "audit", ", ".join(parts)
+
+
+def _tolerances(audit: Audit, spread: Spread) -> tuple[str, str]:
+    if not len(audit.bands):
+        return "spread", ""
+    lost = f"; {audit.lost} cannot be followed to the end" if audit.lost else ""
+    return "spread", (
+        f"nodes off by {format_short(spread.nodes, 'length')} and coefficients by {spread.coefficients:g} rad "
+        f"(standard deviations, {spread.samples} networks): force +-{np.median(audit.bands):.2%} in the median, "
+        f"+-{np.quantile(audit.bands, 0.9):.2%} in nine of ten; within 5 % over {np.median(audit.ranges):.1%} of the "
+        f"way in the median, {np.quantile(audit.ranges, 0.1):.1%} in nine of ten{lost}"
+    )
+
+
+def _held(held: tuple[str, ...]) -> tuple[str, str]:
+    more = f" and {len(held) - 8} more" if len(held) > 8 else ""
+    return "held by", "; ".join(held[:8]) + more
+
+
+def starts_table(task: Task, result: Explored) -> Table:
+    """Return one row a start, in order."""
+    from cfmkit.tables import Table, TableColumn
+
+    rows = [(index, one) for index, one in result.found.items() if one is not None]
+    columns = {
+        "window_share": [1 - one.start / task.window[1] for _, one in rows],
+        "objective": [one.objective for _, one in rows],
+        "violation": [max(0.0, one.violation) for _, one in rows],
+    }
+    return Table(
+        (
+            TableColumn("start", tuple(index for index, _ in rows)),
+            *(TableColumn(name, np.array(values, dtype=float), "1") for name, values in columns.items()),
+            TableColumn("evaluations", tuple(one.evaluations for _, one in rows)),
+            TableColumn("ending", tuple(one.ending for _, one in rows)),
+        )
+    )

@@ -1,0 +1,123 @@
+"""What the engine answers for one vector of design variables: force, centre lines and stresses, with exact slopes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.beams import Control, Displacement, PathStatus, Taper, gradient, trace
+from cfmkit.errors import CfmError
+
+if TYPE_CHECKING:
+    from cfmkit.beams import Path, Section
+    from cfmkit.curves import FloatArray
+    from cfmkit.families.beam.shaping.variables import Variables
+
+# A design that loses stability in the window is no answer; the audit looks at branches.
+CONTROL = Control(tolerance=1e-5, branch="stop", most_points=200)
+
+
+class NoAnswer(Exception):
+    """The engine has no derivatives here."""
+
+
+@dataclass(frozen=True)
+class Line:
+    """One beam at p poses, at r places along it.
+
+    Attributes
+    ----------
+    place : (r,) array
+        Fraction of the arc length.
+    x, y : (p, r) array
+        Centre line [m].
+    stress : (p, r) array
+        Bending stress on the left side [Pa]: signed.
+    """
+
+    place: FloatArray
+    x: FloatArray
+    y: FloatArray
+    stress: FloatArray
+
+
+@dataclass(frozen=True)
+class State:
+    """The network at p poses: the mechanism's force (p,) [N] and its beams by name."""
+
+    force: FloatArray
+    lines: dict[str, Line]
+
+
+@dataclass(frozen=True, eq=False)
+class Response:
+    """The answer for one vector of variables: the state, and on demand its derivatives by the variables (last axis)."""
+
+    variables: Variables
+    x: FloatArray
+    path: Path
+
+    @cached_property
+    def keep(self) -> Any:
+        """Indices of the poses on the path."""
+        return self.path.at_asked
+
+    @cached_property
+    def state(self) -> State:
+        """Force and beams."""
+        states = np.moveaxis(self.path.sampler.states[self.keep], 2, 0)
+        return State(self.path.effort[self.keep] * self.variables.task.copies, self._lines(states))
+
+    @cached_property
+    def slopes(self) -> State:
+        """Derivatives of everything in the state.
+
+        Raises
+        ------
+        NoAnswer
+            Where the engine has none.
+        """
+        try:
+            found = gradient(self.path, self.variables.build, self.x)
+        except (CfmError, np.linalg.LinAlgError):
+            raise NoAnswer from None
+        return State(found.effort * self.variables.task.copies, self._lines(np.moveaxis(found.rows, 2, 0)))
+
+    def _lines(self, states: FloatArray) -> dict[str, Line]:
+        """Return the beams from dimensionless states (7, p, rows, ...)."""
+        from cfmkit.beams.recover import MOMENT, X, Y
+
+        sampler, scales = self.path.sampler, self.path.layout.scales
+        lines = {}
+        for number, name in enumerate(self.variables.task.network.beams):
+            rows = sampler.rows(number)
+            place = sampler.place(number, rows.t)
+            once = np.append(True, np.diff(place) > 0)  # the ends of segments occur twice
+            at = rows.index[once]
+            stress = _stress_of_moment(self.variables.task.network.beams[name].section, place[once]) * scales.moment
+            stress = stress.reshape(-1, *[1] * (states.ndim - 3))
+            x, y, moment = (states[which][:, at] for which in (X, Y, MOMENT))
+            lines[name] = Line(place[once], x * scales.length, y * scales.length, moment * stress)
+        return lines
+
+
+def respond(variables: Variables, x: FloatArray, poses: FloatArray) -> Response | None:
+    """Return the response of a network at poses that begin with rest [m]; None where it does not reach them all."""
+    task = variables.task
+    try:
+        path = trace(variables.build(x), Displacement(task.driven, task.direction, poses), CONTROL)
+    except CfmError:
+        return None
+    return Response(variables, x.copy(), path) if path.status is PathStatus.COMPLETE else None
+
+
+def _stress_of_moment(section: Section, place: FloatArray) -> FloatArray:
+    """Return the bending stress at the surface per moment, 6 / (width thickness^2), at places along a beam [1/m3]."""
+    given = section.thickness
+    thickness = (
+        np.interp(place, given.stations, given.values) if isinstance(given, Taper) else np.full(len(place), given)
+    )
+    return np.asarray(6.0 / (section.width * thickness**2))

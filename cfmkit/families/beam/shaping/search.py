@@ -1,0 +1,255 @@
+"""One start of the search: a random network, made to meet the limits, then flattened order by order, then widened.
+
+A flat force and low stress seldom come together in a random network. One that is flat is easy to draw, and the stress
+can be brought down while it stays flat: so the limits are met first, with the half band capped, by letting all of them
+give way by one amount that is minimised. The other way round ends in stiff springs that meet every limit.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from time import time
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.families.beam.shaping.goals import Compared, Flattest, Widest
+from cfmkit.families.beam.shaping.limits import LIMITS
+from cfmkit.families.beam.shaping.program import Shaping
+from cfmkit.families.beam.shaping.starts import candidates
+from cfmkit.families.beam.shaping.variables import Variables
+from cfmkit.numerics.sqp import Effort, Optimum, minimize
+
+if TYPE_CHECKING:
+    from cfmkit.curves import FloatArray
+    from cfmkit.families.beam.shaping.task import Task
+
+VIOLATION = 1e-4
+"""A limit missed by less than this share holds."""
+
+_WIDENINGS = 3  # minimisations, each from the last
+_CLOSE = 2e-3  # of the end of the window: a gain that is not worth another one
+_ALMOST = 2e-3  # a limit missed by less is repaired afterwards
+_BACK = 0.1  # of the gain is given up where it cannot be
+_TOLERANCE = 1e-5  # of the objective
+_FLAT = 0.05  # a random network with this half band is flat enough to begin with
+_ROUNDS = 6  # towards the limits
+_STIFF = 0.2  # one with this is a spring, and not looked at further
+_STEEP = 20.0  # what a half band beyond that counts against the violation of the limits
+
+
+@dataclass(frozen=True)
+class Plan:
+    """How much is tried at one start.
+
+    Attributes
+    ----------
+    drawn, tries : int
+        Random networks that are looked at, and how many of the best are made to meet the limits until one does.
+    meeting, flattening, widening : int
+        Steps of one round towards the limits, of one flattening, and of the widening of the window.
+    deadline : float or None
+        When the time is up, in seconds of the clock `time.time`.
+    """
+
+    drawn: int = 80
+    tries: int = 4
+    meeting: int = 12
+    flattening: int = 40
+    widening: int = 50
+    deadline: float | None = None
+
+    def late(self) -> bool:
+        """Tell whether the time is up."""
+        return self.deadline is not None and time() > self.deadline
+
+    def effort(self, steps: int, enough: float = -np.inf, violation: float = VIOLATION) -> Effort:
+        """Return the effort of one minimisation."""
+        return Effort(steps, _TOLERANCE, violation, self.late, enough)
+
+
+@dataclass(frozen=True)
+class Found:
+    """A design on the way.
+
+    Attributes
+    ----------
+    x, order : (k,) array and int
+        The design variables and the order of their shapes.
+    start : float
+        Where the window begins [m].
+    objective : float
+        Half band over the window, or the objective of the paper [1].
+    violation : float
+        By how much the worst limit is missed, in its own scale [1].
+    ending : str
+        Why the last minimisation ended.
+    evaluations : int
+        Traces of the network so far.
+    """
+
+    x: FloatArray
+    order: int
+    start: float
+    objective: float
+    violation: float
+    ending: str
+    evaluations: int
+
+    @property
+    def feasible(self) -> bool:
+        """Whether all limits hold."""
+        return self.violation <= VIOLATION
+
+
+def searched(task: Task, seed: int, index: int, plan: Plan) -> Found | None:
+    """Return what a start leads to; None where no random network could be followed over the window.
+
+    Parameters
+    ----------
+    task : Task
+        What is shaped.
+    seed, index : int
+        Of the run and of the start: the same pair gives the same answer.
+    plan : Plan
+        How much is tried.
+    """
+    best: Found | None = None
+    evaluations = plan.drawn
+    coarse = next((order for order in task.orders if order), task.orders[-1])
+    for first in drawn(task, np.random.default_rng([seed, index]), plan)[: plan.tries]:
+        found = met(task, replace(first, evaluations=evaluations), coarse, plan)
+        evaluations = found.evaluations
+        if best is None or found.violation < best.violation:
+            best = found
+        if best.feasible or plan.late():
+            break
+    if best is None:
+        return None
+    best = replace(best, evaluations=evaluations)
+    return improved(task, best if best.feasible else met(task, best, task.orders[-1], plan), plan)
+
+
+def improved(task: Task, found: Found, plan: Plan) -> Found:
+    """Return a design flattened in every order from its own on."""
+    for order in task.orders:
+        if order >= found.order and not plan.late():
+            found = _flattened(task, found, order, plan, plan.flattening)
+    return found
+
+
+def drawn(task: Task, rng: np.random.Generator, plan: Plan) -> list[Found]:
+    """Return random straight networks that can be followed over the window, the most promising first."""
+    variables = Variables(task, 0)
+    program = Shaping(variables, task.window[0], Flattest())
+    found: list[Found] = []
+    for number, x in enumerate(candidates(variables, rng)):
+        if (number >= plan.drawn and found) or number >= 10 * plan.drawn or plan.late():
+            break
+        view = program.view(x)
+        if view is not None:
+            band = _half_band(view.response.state.force[view.poses.window])
+            excess = worst_of(program, x) if band < _STIFF else np.inf
+            found.append(Found(x, 0, task.window[0], band, excess, "", 1))
+    return sorted(found, key=lambda one: (one.violation + _STEEP * max(0.0, one.objective - _FLAT), one.objective))
+
+
+def met(task: Task, found: Found, order: int, plan: Plan, give: tuple[str, ...] = tuple(LIMITS)) -> Found:
+    """Return a design that misses some limits as little as possible, at a half band that is no larger or small enough.
+
+    Given up where a round does not halve what is missed.
+    """
+    cap = max(_FLAT, 1.1 * found.objective)
+    variables, x = Variables(task, found.order).raised(found.x, max(order, found.order))
+    program = Shaping(variables, found.start, Flattest(), give, cap)
+    for _ in range(_ROUNDS):
+        z = program.begin(x)
+        if z is None:
+            return found
+        optimum = minimize(program, z, program.bounds, plan.effort(plan.meeting, enough=0.0))
+        now, before = found_of(program, optimum, found.evaluations), found.violation
+        found = now if now.violation < before else replace(found, evaluations=now.evaluations)
+        if found.feasible or not found.violation < 0.5 * before or plan.late():
+            break
+        x = found.x
+    return found
+
+
+def _flattened(task: Task, found: Found, order: int, plan: Plan, steps: int) -> Found:
+    """Return a design with the objective minimised; the one before where that is better."""
+    variables, x = Variables(task, found.order).raised(found.x, order)
+    program = Shaping(variables, found.start, Compared() if task.objective == "paper" else Flattest())
+    z = program.begin(x)
+    if z is None:
+        return found
+    optimum = minimize(program, z, program.bounds, plan.effort(steps))
+    now = found_of(program, optimum, found.evaluations)
+    worse = found.feasible and not now.feasible
+    return replace(found, evaluations=now.evaluations) if worse else now
+
+
+def found_of(program: Shaping, optimum: Optimum, before: int = 0) -> Found:
+    """Return an optimum as a design; its objective is measured anew, without the help of the goal's own variables."""
+    x, goal = optimum.z[: program.variables.count], program.goal
+    start = goal.window_start(optimum.z[program.variables.count :][: len(goal.bounds)], program.start)
+    objective = optimum.objective
+    view = program.view(x, start)
+    if not isinstance(goal, Compared) and view is not None:
+        objective = _half_band(view.response.state.force[view.poses.window])
+    return Found(
+        x,
+        program.variables.order,
+        start,
+        objective,
+        worst_of(program, x, start),
+        optimum.ending.value,
+        before + optimum.evaluations,
+    )
+
+
+def _half_band(force: FloatArray) -> float:
+    middle = float(force.max() + force.min())
+    return float(np.ptp(force)) / middle if middle > 0 else np.inf
+
+
+def worst_of(program: Shaping, x: FloatArray, start: float | None = None) -> float:
+    """Return by how much the worst limit is missed."""
+    view = program.view(x, start)
+    if view is None:
+        return np.inf
+    return max((-float(one.values.min(initial=0.0)) for _, many in program.limits(view) for one in many), default=0.0)
+
+
+def widened(task: Task, found: Found, plan: Plan) -> Found:
+    """Return the design with the widest window in which the force stays in the wanted band.
+
+    The start of the window is a variable like all others; the window grows from the last design, whose force is flatter
+    than it has to be.
+    """
+    if task.objective != "range" or not (found.feasible and found.objective <= task.half_band):
+        return found
+    goal = Widest(task.window[1], task.half_band)
+    for _ in range(_WIDENINGS):
+        program = Shaping(Variables(task, found.order), found.start, goal)
+        z = program.begin(found.x)
+        if z is None or plan.late():
+            return found
+        effort = plan.effort(plan.widening, violation=_ALMOST)
+        wide = found_of(program, minimize(program, z, program.bounds, effort), found.evaluations)
+        now = _repaired(task, wide, found, plan)
+        gain, found = found.start - now.start, now
+        if not gain > _CLOSE * task.window[1]:
+            break
+    return found
+
+
+def _repaired(task: Task, wide: Found, good: Found, plan: Plan) -> Found:
+    """Return a design near one that all but meets the limits, that does, at nearly its window; else the good one."""
+    start = wide.start
+    while start < good.start and not plan.late():
+        now = _flattened(task, replace(wide, start=start), wide.order, plan, plan.meeting)
+        if now.feasible and now.objective <= task.half_band:
+            return now
+        wide = replace(wide, evaluations=now.evaluations)
+        start += _BACK * (good.start - start) + _CLOSE * task.window[1]
+    return replace(good, evaluations=wide.evaluations)

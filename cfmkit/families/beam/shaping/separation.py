@@ -1,0 +1,114 @@
+"""How far beams stay apart: a smooth bound of the least gap of a pair over what is required, with derivatives.
+
+Beams that meet in a joint come close to each other there. So the gap that is required between two places grows with
+the way between them around the joint, up to the full one; that also asks for an angle between beams that meet.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations_with_replacement
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.numerics.sampled import soft_least
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from cfmkit.beams import Network
+    from cfmkit.curves import FloatArray
+    from cfmkit.families.beam.shaping.limits import View
+
+SHARPNESS = 25.0
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Two beams, or one twice, and the ends (0 or 1 of each) at which they meet."""
+
+    beams: tuple[str, str]
+    joints: tuple[tuple[int, int], ...]
+
+    @property
+    def alone(self) -> bool:
+        """Whether it is one beam with itself."""
+        return self.beams[0] == self.beams[1]
+
+
+def pairs(network: Network) -> list[Pair]:
+    """Return all pairs of beams, each beam with itself included."""
+    return [_pair(network, *names) for names in combinations_with_replacement(network.beams, 2)]
+
+
+def _pair(network: Network, first: str, second: str) -> Pair:
+    ends = [[network.master_of(end) for end in (network.beams[n].start, network.beams[n].end)] for n in (first, second)]
+    joints = [(i, j) for i in (0, 1) for j in (0, 1) if ends[0][i] == ends[1][j]]
+    return Pair((first, second), () if first == second else tuple(joints))
+
+
+def separations(view: View, pair: Pair) -> tuple[FloatArray, Callable[[], FloatArray]]:
+    """Return (gap / required gap - 1) of a pair at the poses that are shown (q,), and what makes the derivatives."""
+    state, shown = view.response.state, view.poses.shown
+    a, b = (state.lines[name] for name in pair.beams)
+    way, by_way = _way(view, pair)
+    wanted = _wanted(view, pair)
+    opening = view.response.variables.task.limits.opening
+    near = opening * way < wanted
+    required = np.where(near, opening * way, wanted)
+    i, j = np.nonzero(_compared(pair, way, len(a.place)))
+    dx, dy = a.x[shown][:, i] - b.x[shown][:, j], a.y[shown][:, i] - b.y[shown][:, j]
+    distance = np.hypot(dx, dy) + 1e-12
+    ratio = distance / required[i, j]
+    soft = [soft_least(row, SHARPNESS) for row in ratio]
+
+    def slopes() -> FloatArray:
+        by = view.response.slopes.lines
+        share = np.array([weights for _, weights in soft]) / required[i, j]
+        out = []
+        for q, pose in enumerate(shown):
+            pull = np.stack([share[q] * dx[q] / distance[q], share[q] * dy[q] / distance[q]])
+            total = np.zeros(view.response.x.shape)
+            for sign, name, index in ((1.0, pair.beams[0], i), (-1.0, pair.beams[1], j)):
+                count = len(state.lines[name].place)
+                total += sign * np.bincount(index, pull[0], count) @ by[name].x[pose]
+                total += sign * np.bincount(index, pull[1], count) @ by[name].y[pose]
+            push = np.where(near[i, j], opening * share[q] * ratio[q], 0.0)
+            out.append(total - np.tensordot(push, by_way[:, i, j], axes=(0, 1)))
+        return np.array(out)
+
+    return np.array([value for value, _ in soft]) - 1.0, slopes
+
+
+def _compared(pair: Pair, way: FloatArray, count: int) -> Any:
+    """Return which places are compared: not a joint with itself, and no neighbours on one beam."""
+    if pair.alone:
+        return np.triu(np.ones((count, count), dtype=bool), 2)
+    return way > 1e-9
+
+
+def _wanted(view: View, pair: Pair) -> float:
+    """Return the gap of the centre lines [m]: that of the surfaces and half the thickness of both beams."""
+    from cfmkit.families.beam.shaping.limits import thickest
+
+    thickness = sum(0.5 * thickest(view.section(name)) for name in pair.beams)
+    return float((view.response.variables.task.limits.clearance or 0.0) + thickness)
+
+
+def _way(view: View, pair: Pair) -> tuple[FloatArray, FloatArray]:
+    """Return the way between places of the two beams (r, r) [m], infinite where they do not meet; and (k, r, r)."""
+    (first, second), lines = pair.beams, view.response.state.lines
+    one, other = view.lengths[first], view.lengths[second]
+    u, v = lines[first].place[:, None], lines[second].place[None, :]
+    if pair.alone:
+        return abs(u - v) * one.length, abs(u - v) * one.by_length[:, None, None]
+    way = np.full((u.size, v.size), np.inf)
+    by_way = np.zeros((len(one.by_length), u.size, v.size))
+    for end, at in pair.joints:
+        p, q = abs(u - end), abs(v - at)
+        here = p * one.length + q * other.length
+        slope = p * one.by_length[:, None, None] + q * other.by_length[:, None, None]
+        shorter = here < way
+        way, by_way = np.where(shorter, here, way), np.where(shorter, slope, by_way)
+    return way, by_way

@@ -1,0 +1,106 @@
+"""What the block `design.optimise` of a beam mechanism may say."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from cfmkit.spec import Model
+from cfmkit.units import Angle, Force, Length, Ratio, Time
+
+Range = tuple[Length, Length]
+PositiveLength = Annotated[Length, Field(gt=0)]
+
+
+class Box(Model):
+    """A rectangle."""
+
+    x: Range = Field(description="[left, right]")
+    y: Range = Field(description="[bottom, top]")
+
+    @model_validator(mode="after")
+    def _increases(self) -> Self:
+        for name in ("x", "y"):
+            low, high = getattr(self, name)
+            if not low < high:
+                raise ValueError(f"{name!r} must be increasing")
+        return self
+
+
+class FreeNode(Model):
+    """Where a node may go: along x, along y, or both; without either both, within the envelope."""
+
+    x: Range | None = Field(None, description="[left, right]; default: the envelope, if `y` is left out, too")
+    y: Range | None = Field(None, description="[bottom, top]; default: the envelope, if `x` is left out, too")
+
+
+class ForceWanted(Model):
+    """The mean force over the window, of all copies together."""
+
+    min: Annotated[Force, Field(gt=0)] | None = Field(None, description="at least so much")
+    target: Annotated[Force, Field(gt=0)] | None = Field(None, description="so much, within `tolerance`")
+    tolerance: Annotated[Ratio, Field(gt=0, lt=1)] = Field(0.01, description="share of the target")
+
+
+class ShapeLimits(Model):
+    """What every shape must keep to. The stress limit is the mechanism's: yield strength over safety factor."""
+
+    stress: bool = Field(True, description="whether the bending stress is limited, at every pose from rest on")
+    envelope: Box | None = Field(None, description="where centre lines must lie before loading")
+    deformed_envelope: Box | None = Field(None, description="where centre lines must lie at every pose")
+    max_length_ratio: Annotated[Ratio, Field(gt=1)] | None = Field(1.5, description="length over distance of the ends")
+    min_slenderness: Annotated[float, Field(gt=0)] | None = Field(10.0, description="length over largest thickness")
+    clearance: Annotated[Length, Field(ge=0)] | None = Field(
+        None,
+        description="gap between the surfaces of beams, before and under load; also the least feature between them",
+    )
+    joint_opening: Annotated[float, Field(gt=0, lt=1)] = Field(
+        0.35, description="near a joint the gap between centre lines, over the way around the joint"
+    )
+    min_radius: PositiveLength | None = Field(None, description="radius of curvature of centre lines before loading")
+
+
+class Tolerances(Model):
+    """What the audit lets vary: standard deviations."""
+
+    nodes: Annotated[Length, Field(ge=0)] = Field(1e-4, description="of the coordinates of free nodes")
+    coefficients: Annotated[Angle, Field(ge=0)] = Field(0.02, description="of the shape coefficients c1, c2, ...")
+    samples: int = Field(40, ge=2, le=10_000, description="networks that are drawn")
+
+
+class Optimise(Model):
+    """Node positions and beam shapes for a constant force over a window of displacement."""
+
+    window: Range = Field(description="[c, d]: where the force is to be constant; `range` moves c towards rest")
+    objective: Literal["range", "ripple", "paper"] = Field(
+        "range",
+        description="widest window with `half_band`, flattest over the window, or F(a)/F(b) - 1 of Lan, ill-posed",
+    )
+    half_band: Annotated[Ratio, Field(gt=0, lt=1)] = Field(
+        0.025, description="(max - min)/(max + min) to hold, for `range`; 2.5 % keeps within 5 % of the maximum"
+    )
+    compare: tuple[Length, Length] | None = Field(None, description="[a, b] of the objective `paper`")
+    free: dict[str, FreeNode] = Field({}, description="nodes that may move: {n3: {}, n2: {y: [0 mm, 40 mm]}}")
+    beams: tuple[str, ...] | None = Field(None, description="beams whose shape may change; default: all")
+    orders: tuple[Annotated[int, Field(ge=0, le=6)], ...] = Field(
+        (1, 2), min_length=1, description="orders of the shape polynomials, from coarse to fine"
+    )
+    coefficient_limit: Annotated[Angle, Field(gt=0)] = Field(1.5707963267948966, description="of c1, c2, ...")
+    limits: ShapeLimits = Field(default_factory=ShapeLimits, description="what every shape must keep to")
+    force: ForceWanted = Field(default_factory=ForceWanted, description="mean force over the window")
+    starts: int = Field(20, ge=1, le=10_000, description="random starts")
+    drawn: int = Field(60, ge=1, le=100_000, description="random networks looked at for each start")
+    widened: int = Field(4, ge=1, le=10_000, description="how many of the best are widened, for `range`")
+    time_budget: Annotated[Time, Field(gt=0)] | None = Field(None, description="end the search after so long")
+    tolerances: Tolerances = Field(default_factory=Tolerances, description="for the audit")
+
+    @model_validator(mode="after")
+    def _sensible(self) -> Self:
+        if not 0 < self.window[0] < self.window[1]:
+            raise ValueError("'window' must be increasing and begin after rest")
+        if list(self.orders) != sorted(set(self.orders)):
+            raise ValueError("'orders' must be increasing, e.g. [0, 1, 2]")
+        if (self.objective == "paper") != (self.compare is not None):
+            raise ValueError("'compare' and 'objective: paper' belong together: give both or neither")
+        return self

@@ -1,0 +1,123 @@
+"""What is to be shaped: the network, what may vary, the window, and what must hold."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from cfmkit.beams import Network
+
+Objective = Literal["ripple", "range", "paper"]
+
+
+@dataclass(frozen=True)
+class Coordinate:
+    """A coordinate of a node that may vary, 0 for x and 1 for y, between two places [m]."""
+
+    node: str
+    axis: int
+    low: float
+    high: float
+
+    @property
+    def name(self) -> str:
+        """As reports call it: ``n3.x``."""
+        return f"{self.node}.{'xy'[self.axis]}"
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What must hold; None: not asked.
+
+    Attributes
+    ----------
+    stress : float
+        Largest bending stress at every pose [Pa].
+    envelope : (xmin, xmax, ymin, ymax)
+        Where the centre lines must lie before loading [m].
+    deformed_envelope : (xmin, xmax, ymin, ymax)
+        The same at every pose.
+    length_ratio : float
+        Largest length over distance of the ends [1].
+    slenderness : float
+        Least length over thickness [1].
+    clearance : float
+        Least gap between the surfaces of beams, before and under load [m].
+    opening : float
+        Near a joint the gap between centre lines grows at least so fast with the way around the joint [1].
+    radius : float
+        Least radius of curvature of a centre line before loading [m].
+    force_min, force_target, force_tolerance : float
+        Least mean force over the window, and a mean force to meet within a share [N, N, 1].
+    """
+
+    stress: float | None = None
+    envelope: tuple[float, float, float, float] | None = None
+    deformed_envelope: tuple[float, float, float, float] | None = None
+    length_ratio: float | None = 1.5
+    slenderness: float | None = 10.0
+    clearance: float | None = None
+    opening: float = 0.35
+    radius: float | None = None
+    force_min: float | None = None
+    force_target: float | None = None
+    force_tolerance: float = 0.01
+
+
+@dataclass(frozen=True)
+class Task:
+    """A network to be shaped.
+
+    Attributes
+    ----------
+    network : Network
+        As it stands: fixed nodes, sections, supports; the start where its shapes are wanted.
+    driven, direction : str and float
+        The node that is moved, and where to [rad].
+    copies : float
+        Forces of the mechanism are so many times those of the network.
+    window : (float, float)
+        Displacements between which the force is to be constant [m].
+    coordinates : tuple of Coordinate
+        What may vary of the nodes.
+    shaped : tuple of str
+        The beams whose shape may vary.
+    orders : tuple of int
+        Orders of the shape polynomials, from coarse to fine.
+    coefficient_limit : float
+        Largest coefficient [rad].
+    limits : Limits
+        What must hold.
+    objective : str
+        "ripple": flattest over the window; "range": the widest window with `half_band`; "paper": F(a)/F(b) - 1.
+    half_band : float
+        (max - min)/(max + min) that is to hold over the widest window [1].
+    compared : (float, float)
+        a and b of the objective of the paper [m].
+    points : int
+        Poses in the window.
+    """
+
+    network: Network
+    driven: str
+    direction: float
+    copies: float
+    window: tuple[float, float]
+    coordinates: tuple[Coordinate, ...]
+    shaped: tuple[str, ...]
+    orders: tuple[int, ...] = (0, 1, 2)
+    coefficient_limit: float = 0.5 * np.pi
+    limits: Limits = field(default_factory=Limits)
+    objective: Objective = "range"
+    half_band: float = 0.025
+    compared: tuple[float, float] | None = None
+    points: int = 13
+
+    @property
+    def size(self) -> float:
+        """The unit of length: the largest distance of two nodes along an axis [m]."""
+        places = np.array([(node.x, node.y) for node in self.network.nodes.values()])
+        return float(np.ptp(places, axis=0).max())

@@ -1,0 +1,75 @@
+"""Extremes of sampled smooth functions, with derivatives: the vertex of the parabola through the best three samples.
+
+By the envelope theorem the derivative of an extreme is that of the function at a fixed place, so that the same
+three weights give both.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from cfmkit.curves import FloatArray
+
+
+def largest(places: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the largest values along the last axis: value, place, and weights of the samples.
+
+    Parameters
+    ----------
+    places : (r,) or (..., r) array
+        Increasing.
+    values : (..., r) array
+        Samples.
+
+    Returns
+    -------
+    value, place : (...) array
+        Of the vertex; at the ends, and where the parabola has no vertex between the neighbours, of the best sample.
+    weights : (..., r) array
+        The value, and its derivatives by anything, are the sums of weight times sample.
+    """
+    shape, count = values.shape, values.shape[-1]
+    flat = values.reshape(-1, count)
+    where = np.broadcast_to(places, shape).reshape(-1, count)
+    rows = np.arange(len(flat))
+    best = flat.argmax(axis=1)
+    three = np.clip(best, 1, count - 2)[:, None] + np.array([-1, 0, 1])
+    t, f = where[rows[:, None], three], flat[rows[:, None], three]
+    vertex = _vertex(t, f, where[rows, best])
+    away = vertex[:, None] - t
+    weight = away[:, [1, 2, 0]] * away[:, [2, 0, 1]] / ((t - t[:, [1, 2, 0]]) * (t - t[:, [2, 0, 1]]))
+    weights = np.zeros_like(flat)
+    weights[rows[:, None], three] = weight
+    return (weight * f).sum(axis=1).reshape(shape[:-1]), vertex.reshape(shape[:-1]), weights.reshape(shape)
+
+
+def _vertex(t: FloatArray, f: FloatArray, otherwise: FloatArray) -> FloatArray:
+    """Return where the parabolas through three samples (n, 3) each are highest, `otherwise` where they have no top."""
+    first = (f[:, 1] - f[:, 0]) / (t[:, 1] - t[:, 0])
+    second = (f[:, 2] - f[:, 1]) / (t[:, 2] - t[:, 1])
+    bend = (second - first) / (t[:, 2] - t[:, 0])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        vertex = 0.5 * (t[:, 0] + t[:, 1]) - 0.5 * first / bend
+    inside = (bend < 0) & (vertex >= t[:, 0]) & (vertex <= t[:, 2])
+    result: FloatArray = np.where(inside, vertex, otherwise)
+    return result
+
+
+def soft_least(values: FloatArray, sharpness: float) -> tuple[float, FloatArray]:
+    """Return a smooth lower bound of the least of some values, and its derivatives by them.
+
+    -ln(sum(exp(-k v)))/k lies below the least by at most ln(n)/k.
+
+    Examples
+    --------
+    >>> least, weights = soft_least(np.array([1.0, 2.0]), 50.0)
+    >>> round(least, 6), weights.round(6).tolist()
+    (1.0, [1.0, 0.0])
+    """
+    lowest = values.min()
+    powers = np.exp(-sharpness * (values - lowest))
+    total = powers.sum()
+    return float(lowest - np.log(total) / sharpness), powers / total

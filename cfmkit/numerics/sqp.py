@@ -1,0 +1,212 @@
+"""Constrained minimisation of smooth functions with exact slopes: sequential quadratic programming.
+
+The work is done by SLSQP; added are what a model that cannot be evaluated everywhere needs (a step to where it has no
+answer is shortened), the best point seen in place of the last, and which constraints hold the optimum.
+
+Reference
+---------
+[K] D. Kraft, A software package for sequential quadratic programming, DFVLR-FB 88-28 (1988).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from cfmkit.curves import FloatArray
+
+_FAR = 1e3  # what a point without an answer counts, in units of the objective and of the constraints
+
+
+class Ending(Enum):
+    """Why a minimisation ended."""
+
+    OPTIMUM = "converged to a local optimum"
+    STEPS = "ended after the steps allowed"
+    STUCK = "no step improves the point further"
+    INCOMPATIBLE = "the constraints contradict each other near the point"
+    NO_ANSWER = "the model has no answer at the start"
+    OUT_OF_TIME = "the time allowed ran out"
+
+
+class Program(Protocol):
+    """What is minimised: an objective, and constraints that are to be at least zero, both of order one."""
+
+    def values(self, z: FloatArray) -> tuple[float, FloatArray] | None:
+        """Return the objective and the constraints (m,) at z (n,); None where the model has no answer."""
+
+    def slopes(self, z: FloatArray) -> tuple[FloatArray, FloatArray] | None:
+        """Return their derivatives by z, (n,) and (m, n)."""
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How long to try.
+
+    Attributes
+    ----------
+    steps : int
+        At most so many.
+    tolerance : float
+        A change of the objective that is small.
+    violation : float
+        What counts as none.
+    stop : callable
+        Asked before each evaluation whether the time is up.
+    enough : float
+        End at the first point without violation whose objective is this or less.
+    """
+
+    steps: int = 60
+    tolerance: float = 1e-6
+    violation: float = 1e-5
+    stop: Callable[[], bool] = field(default=lambda: False)
+    enough: float = -np.inf
+
+
+@dataclass(frozen=True)
+class Optimum:
+    """The best point that was found.
+
+    Attributes
+    ----------
+    z : (n,) array
+        Where.
+    objective, constraints : float and (m,) array
+        There; of no use if the ending is NO_ANSWER.
+    ending : Ending
+        Why the search ended.
+    evaluations : int
+        How often the model was asked for values.
+    """
+
+    z: FloatArray
+    objective: float
+    constraints: FloatArray
+    ending: Ending
+    evaluations: int
+
+    @property
+    def violation(self) -> float:
+        """By how much the worst constraint is violated."""
+        return max(0.0, -float(self.constraints.min(initial=np.inf)))
+
+
+def minimize(program: Program, start: FloatArray, bounds: FloatArray, effort: Effort | None = None) -> Optimum:
+    """Return the best point found from a start.
+
+    Parameters
+    ----------
+    program : Program
+        What is minimised.
+    start : (n,) array
+        Where to begin; moved into the bounds.
+    bounds : (n, 2) array
+        Lowest and highest values; never left.
+    effort : Effort, optional
+        When to end.
+    """
+    effort = effort or Effort()
+    z = np.clip(start, *bounds.T)
+    memory = _Memory(program, effort)
+    if memory.at(z) is None:
+        return Optimum(z, np.inf, np.zeros(0), Ending.NO_ANSWER, memory.evaluations)
+    return memory.best_as(_solved(memory, z, bounds))
+
+
+def _solved(memory: _Memory, z: FloatArray, bounds: FloatArray) -> Ending:
+    """Run the solver; its answers are in the memory."""
+    from scipy.optimize import minimize as slsqp
+
+    try:
+        found = slsqp(  # type: ignore[call-overload]
+            memory.objective,
+            z,
+            jac=memory.objective_slope,
+            method="SLSQP",
+            bounds=[(float(low), float(high)) for low, high in bounds],
+            constraints=[{"type": "ineq", "fun": memory.constraints, "jac": memory.constraint_slopes}],
+            options={"maxiter": memory.effort.steps, "ftol": memory.effort.tolerance},
+        )
+    except _Enough as end:
+        return end.ending
+    return _ENDINGS.get(int(found.status), Ending.STUCK)
+
+
+_ENDINGS = {0: Ending.OPTIMUM, 4: Ending.INCOMPATIBLE, 9: Ending.STEPS}
+
+
+class _Enough(Exception):
+    def __init__(self, ending: Ending) -> None:
+        self.ending = ending
+
+
+class _Memory:
+    """The program with its last answers, the best point, and numbers in place of missing answers."""
+
+    def __init__(self, program: Program, effort: Effort) -> None:
+        self.program, self.effort = program, effort
+        self.evaluations = 0
+        self.point: FloatArray | None = None
+        self.answer: Any = None
+        self.sloped: FloatArray | None = None
+        self.slope: Any = None
+        self.best: tuple[tuple[float, float], FloatArray, float, FloatArray] | None = None
+
+    def at(self, z: FloatArray) -> Any:
+        if self.point is None or not np.array_equal(z, self.point):
+            if self.effort.stop():
+                raise _Enough(Ending.OUT_OF_TIME)
+            self.point, self.answer = z.copy(), self.program.values(z)
+            self.evaluations += 1
+            if self.answer is not None:
+                self._keep(z, *self.answer)
+            if self.best is not None and self.best[0] <= (0.0, self.effort.enough):
+                raise _Enough(Ending.OPTIMUM)
+        return self.answer
+
+    def _keep(self, z: FloatArray, objective: float, constraints: FloatArray) -> None:
+        excess = max(0.0, -float(constraints.min(initial=np.inf)))
+        rank = (0.0, objective) if excess <= self.effort.violation else (excess, objective)
+        if self.best is None or rank < self.best[0]:
+            self.best = rank, z.copy(), objective, constraints
+
+    def best_as(self, ending: Ending) -> Optimum:
+        assert self.best is not None
+        _, z, objective, constraints = self.best
+        return Optimum(z, objective, constraints, ending, self.evaluations)
+
+    def objective(self, z: FloatArray) -> float:
+        answer = self.at(z)
+        return float(answer[0]) if answer is not None else self._worst() + _FAR
+
+    def constraints(self, z: FloatArray) -> FloatArray:
+        answer = self.at(z)
+        if answer is not None:
+            return np.asarray(answer[1])
+        assert self.best is not None
+        return np.asarray(np.minimum(self.best[3], 0.0) - 1.0)
+
+    def _worst(self) -> float:
+        assert self.best is not None
+        return abs(self.best[2])
+
+    def slopes_at(self, z: FloatArray) -> Any:
+        if self.sloped is None or not np.array_equal(z, self.sloped):
+            found = self.program.slopes(z)
+            if found is not None or self.slope is None:
+                self.slope = found
+            self.sloped = z.copy()
+        return self.slope
+
+    def objective_slope(self, z: FloatArray) -> FloatArray:
+        return np.asarray(self.slopes_at(z)[0])
+
+    def constraint_slopes(self, z: FloatArray) -> FloatArray:
+        return np.asarray(self.slopes_at(z)[1])
