@@ -122,7 +122,7 @@ class ExactSampler:
         network, back = leaf_network(spec), max(back, 0.02 * end)
         self.each = about.half_beams * (1.0 if about.guided else 0.5)
         self.pushed = traced(network, "shuttle", end, branch=spec.analysis.branch, imperfection=about.waviness)
-        self.pulled = traced(network, "shuttle", -back)
+        self.pulled = traced(network, "shuttle", -back, tolerance=1e-6)
         self.chain = spring_chain(spec)
         ends = (max(preloads) + end, min(min(preloads) - back, -0.02 * end))
         self.sides = [traced(self.chain.network, self.chain.node, self.chain.travel * side) for side in ends]
@@ -151,6 +151,8 @@ class ExactSampler:
     def character(self) -> Character:
         """Stiffnesses and linear range as traced."""
         push = self.pushed
+        if not push.edges[-1]:
+            return Character(np.nan, 0.0, np.nan, (np.nan, np.nan))
         first, last = push.buckled_range
         places = np.linspace(first + 0.1 * (last - first), last - 0.1 * (last - first), 41)
         if np.isfinite(first):

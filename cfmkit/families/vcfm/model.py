@@ -31,6 +31,10 @@ if TYPE_CHECKING:
     from cfmkit.families.vcfm.spec import VcfmSpec
 
 
+LEAST = 5
+"""Points below which there is no curve to speak of."""
+
+
 @dataclass(frozen=True)
 class Push:
     """One curve: the mechanism at one preload.
@@ -127,10 +131,10 @@ def analyze(spec: VcfmSpec, run: Run) -> Result:
         One curve a preload, the nominal one first. PARTIAL if a beam cannot be followed to the end of the travel.
     """
     solution = solve(spec)
+    if len(solution.nominal.travel) < LEAST:
+        return Result(spec, Status.NO_EQUILIBRIUM, solution.sampler.problem)
     short = solution.nominal.travel[-1] < spec.travel * (1 - 1e-9) or bool(solution.sampler.problem)
     status = Status.PARTIAL if short else Status.COMPLETE
-    if not len(solution.nominal.travel) or np.isnan(solution.nominal.force).all():
-        return Result(spec, Status.NO_EQUILIBRIUM, solution.sampler.problem)
     return Result(
         spec=_as_run(spec),
         status=status,
@@ -157,19 +161,25 @@ def solve(spec: VcfmSpec) -> Solution:
         # the closed form says how far back the shuttle goes; the real one is within a few percent of it
         rests = [rest_of(sampler, preload, grid) for preload in spec.analysis.preloads]
         sampler = ExactSampler(spec, spec.travel, 1.2 * max([-(rest or 0.0) for rest in rests] + [0.0]))
-    pushes = tuple(_push(sampler, preload, grid) for preload in spec.analysis.preloads)
+    nominal, *others = (_push(sampler, preload, grid) for preload in spec.analysis.preloads)
+    # a preload at which the spring cannot be followed has no curve; the sampler's problem says so
+    pushes = (nominal, *(push for push in others if len(push.travel) >= LEAST))
     return Solution(spec, made, sampler, sampler.character, pushes)
 
 
 def rest_of(sampler: Sampler, preload: float, grid: FloatArray) -> float | None:
-    """Return where the shuttle rests at a preload [m]: the first place without force, from the as-made pose on."""
+    """Return where the shuttle rests at a preload [m]: the first place without force, from the as-made pose on.
+
+    None where there is none, or where the spring could not be followed so far.
+    """
     if preload == 0:
         return 0.0
     if preload > 0:
-        return _balanced(sampler, preload, -preload, 0.0)
+        there = sampler.spring(np.array([preload]))[0][0]
+        return _balanced(sampler, preload, -preload, 0.0) if there > 0 else None
     force = sampler.leaf_force(grid) + sampler.spring(grid + preload)[0]
     beyond = np.flatnonzero(force >= 0)
-    return _balanced(sampler, preload, grid[beyond[0] - 1], grid[beyond[0]]) if len(beyond) else None
+    return _balanced(sampler, preload, grid[beyond[0] - 1], grid[beyond[0]]) if len(beyond) and beyond[0] else None
 
 
 def _balanced(sampler: Sampler, preload: float, low: float, high: float) -> float:

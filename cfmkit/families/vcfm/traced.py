@@ -21,11 +21,11 @@ if TYPE_CHECKING:
 
 DOWN = -0.5 * np.pi
 
-GRIDS = (127, 113, 149, 101)
-"""Points asked for along a path; the others are tried where a point next to a bifurcation is not reached."""
+GRIDS = (127, 113)
+"""Points asked for along a path; the second where the first leave a doubt."""
 
 CLOSE = 0.02
-"""Bifurcations closer than this share of the travel are looked at again with other points."""
+"""Bifurcations closer than this share of the travel are looked at again."""
 
 DENSE = 600
 """Points asked for of a path with corners."""
@@ -125,18 +125,14 @@ class Traced:
 
 def traced(network: Network, node: str, end: float, **control: Any) -> Traced:
     """Return what a network does while a node moves down by up to `end` [m], or up where that is negative."""
-    smooth, found = not control.get("imperfection"), []
-    for count in GRIDS if smooth else (DENSE,):
-        found.append(_once(network, node, end * np.arange(1, count + 1) / count, control))
-        if not _doubtful(found[-1]):
+    grids = (DENSE,) if control.get("imperfection") else GRIDS
+    for count in grids:
+        found = _once(network, node, end * np.arange(1, count + 1) / count, control)
+        gaps = np.abs(np.diff(found.edges[1:-1]))
+        # bifurcations close together may come from a point asked for next to one: other points tell
+        if found.problem or not (gaps < CLOSE * abs(found.edges[-1])).any():
             break
-    return min(found, key=_doubtful)
-
-
-def _doubtful(found: Traced) -> float:
-    """Return how little a trace is to be trusted: a point asked for next to a bifurcation shows it twice."""
-    gaps = np.abs(np.diff(found.edges[1:-1]))
-    return 10.0 * bool(found.problem) + float((gaps < CLOSE * abs(found.edges[-1])).sum())
+    return found
 
 
 def _once(network: Network, node: str, places: FloatArray, control: dict[str, Any]) -> Traced:
