@@ -48,7 +48,7 @@ if TYPE_CHECKING:
 HOPELESS = 0.5
 """Springs that miss the target by more are no design, even where no tolerance is stated."""
 
-EFFORT = {"least-squares": (15, 30), "minimax": (11, 14), "widest": (5, 10)}
+EFFORT = {"least-squares": (13, 20), "minimax": (11, 14), "widest": (5, 10)}
 """Values of each free length on the grid, and around its best: a least-squares problem costs the least."""
 
 
