@@ -38,7 +38,7 @@ class Bundle:
     def __init__(self, network: Network, ends: Any, beam_end: Any) -> None:
         """Fit the plain beams; `ends` (places, 2) [m] has the attachments, `beam_end` those of each beam."""
         self.names, self.beams = list(network.beams), list(network.beams.values())
-        plain = [k for k, beam in enumerate(self.beams) if _is_plain(beam)]
+        plain = [k for k, beam in enumerate(self.beams) if is_plain(beam)]
         self.plain = plain
         self.others = [] if len(plain) == len(self.beams) else [k for k in range(len(self.beams)) if k not in plain]
         if plain:
@@ -53,7 +53,7 @@ class Bundle:
         reach = ends[beam_end[:, 1]] - ends[beam_end[:, 0]]
         dx, dy = reach[:, 0], reach[:, 1]
         distance = (dx * dx + dy * dy) ** 0.5
-        angle = c @ _powers(most)
+        angle = c @ powers(most)
         weights = GAUSS[1]
         cx, cy = np.cos(angle) @ weights, np.sin(angle) @ weights
         own = (cx * cx + cy * cy) ** 0.5
@@ -79,7 +79,8 @@ class Bundle:
             (s.youngs_modulus, s.width, s.thickness, s.axial, s.shear, s.poisson_ratio, s.shear_factor)
             for s in sections
         ]
-        young, width, thickness, axial, shear, poisson, factor = np.array(values).T
+        self.sections = np.array(values).T
+        young, width, thickness, axial, shear, poisson, factor = self.sections
         area = width * thickness
         self.bending = young * area * thickness * thickness / 12
         self.stretch = axial / (young * area)
@@ -129,12 +130,13 @@ class Bundle:
         return out
 
 
-def _is_plain(beam: Beam) -> bool:
+def is_plain(beam: Beam) -> bool:
+    """Tell whether a beam has a polynomial angle and one thickness."""
     return isinstance(beam.shape, Polynomial) and not isinstance(beam.section.thickness, Taper)
 
 
 @lru_cache(maxsize=32)
-def _powers(count: int) -> Any:
+def powers(count: int) -> Any:
     """Return the powers (count, n) of the Gauss nodes of the whole beam."""
     powers = np.vander(GAUSS[0], count, increasing=True).T.copy()
     powers.setflags(write=False)

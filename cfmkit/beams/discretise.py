@@ -61,6 +61,12 @@ class Grid:
     beam_of_step: Any
     piece: Any
 
+    def stages(self, steps: Any) -> FloatArray:
+        """Return the parameters of all stages of some steps, one after the other."""
+        edges = self.edges[steps]
+        places: FloatArray = (edges[:, :1] + (edges[:, 1:] - edges[:, :1]) * NODES).ravel()
+        return places
+
     @cached_property
     def width(self) -> FloatArray:
         """Widths of the steps in the parameter."""
@@ -130,13 +136,13 @@ def table(layout: Layout, cut: Grid, known: Any = None) -> Any:
     """
     bundle, scales = layout.bundle, layout.scales
     if not bundle.others:
-        first = cut.edges[: len(cut.edges) // len(bundle.plain)]
-        out = bundle.table(_stages(first)).reshape(len(cut.edges), STAGES, -1)
+        first = slice(0, len(cut.edges) // len(bundle.plain))
+        out = bundle.table(cut.stages(first)).reshape(len(cut.edges), STAGES, -1)
     else:
         blocks: list[Any] = [None] * len(bundle.beams)
         if bundle.plain:
             steps = cut.beam_of_step == bundle.plain[0]
-            plain = bundle.table(_stages(cut.edges[steps])).reshape(len(bundle.plain), -1, STAGES, TABLE_COLUMNS)
+            plain = bundle.table(cut.stages(steps)).reshape(len(bundle.plain), -1, STAGES, TABLE_COLUMNS)
             for number, block in zip(bundle.plain, plain, strict=True):
                 blocks[number] = block
         for number in bundle.others:
@@ -146,12 +152,6 @@ def table(layout: Layout, cut: Grid, known: Any = None) -> Any:
         out = np.ascontiguousarray(np.concatenate(blocks))
     out *= np.array([1.0, 1 / scales.length, scales.rigidity / scales.length, *[scales.force / scales.length] * 2])
     return out
-
-
-def _stages(edges: FloatArray) -> FloatArray:
-    """Return the parameters of all stages of some steps, one after the other."""
-    places: FloatArray = (edges[:, :1] + (edges[:, 1:] - edges[:, :1]) * NODES).ravel()
-    return places
 
 
 def _other(layout: Layout, name: str, cut: Grid, steps: Any, known: Any) -> Any:

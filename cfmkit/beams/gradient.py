@@ -41,8 +41,8 @@ class Gradient:
         Indices of the points.
     unknowns : (p, unknowns, k) array
         Derivatives of everything that was solved for, dimensionless.
-    held : (p, dofs + 1, k) array
-        Derivatives of the forces on all degrees of freedom and of the springs' energy, dimensionless.
+    push : (p, k) array
+        Derivatives of the force on what the drive moves, dimensionless, where no force turns with its node.
     tilts, tilt : Tilts, Tilt
         How the network and its arrays change.
     """
@@ -50,7 +50,7 @@ class Gradient:
     path: Path
     points: Any
     unknowns: FloatArray
-    held: FloatArray
+    push: FloatArray
     tilts: Tilts
     tilt: Tilt
 
@@ -62,7 +62,20 @@ class Gradient:
             return read_only(outputs.load_displacement(self, layout.drive))
         dof, sense = layout.driven  # type: ignore[misc]
         unit = layout.scales.moment if dof == layout.first[layout.drive.node] + 2 else layout.scales.force
-        return read_only(-sense * unit * self.held[:, dof])
+        if self.path.solver.model.load_follows.any():
+            return read_only(-sense * unit * self.held[:, dof])
+        return read_only(-unit * self.push)
+
+    @cached_property
+    def held(self) -> FloatArray:
+        """Derivatives of the forces on all degrees of freedom and of the springs' energy, (p, dofs + 1, k)."""
+        from cfmkit.beams.kernels import entry
+
+        s = self.path.solver
+        out = np.empty((len(self.points), s.n_dofs + 1, len(self.tilts)))
+        ys, drives = self.path.points.y[self.points], self.path.points.drive[self.points]
+        entry.held_slopes(s.model, self.tilt, s.n_free, ys, drives, self.unknowns, out)
+        return out
 
     @property
     def motion(self) -> Mapping[str, FloatArray]:
@@ -146,15 +159,15 @@ def gradient(path: Path, build: Callable[[Any], Network], variables: Any, points
         If a variable changes how the network is made up, or the tangent is singular at a point.
     """
     from cfmkit.beams.kernels import entry
-    from cfmkit.beams.tilt import Tilts, tilted_layouts
+    from cfmkit.beams.tilt import Tilts
 
     solver = path.solver
-    tilts = Tilts(path.layout, tilted_layouts(path.layout, build, variables))
+    tilts = Tilts(path.layout, build, variables)
     tilt = tilts.arrays(solver.model, solver.cut)
     chosen = np.asarray(path.at_asked if points is None else points, dtype=np.int64)
-    unknowns = np.zeros((len(chosen), solver.size, len(tilts)))
-    held = np.zeros((len(chosen), solver.n_dofs + 1, len(tilts)))
+    unknowns = np.empty((len(chosen), solver.size, len(tilts)))
+    push = np.empty((len(chosen), len(tilts)))
     ys, drives = path.points.y[chosen], path.points.drive[chosen]
-    if not entry.slopes(solver.model, tilt, solver.n_free, ys, drives, (unknowns, held), solver.scratch):
+    if not entry.slopes(solver.model, tilt, solver.n_free, ys, drives, (unknowns, push), solver.scratch):
         raise InputError("the tangent is singular at a point of the path: no derivative there")
-    return Gradient(path, read_only(chosen, np.int64), unknowns, held, tilts, tilt)
+    return Gradient(path, read_only(chosen, np.int64), unknowns, push, tilts, tilt)

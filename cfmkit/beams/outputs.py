@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from cfmkit.beams.drive import Loading
     from cfmkit.beams.gradient import Gradient
     from cfmkit.beams.network import LineLoad
+    from cfmkit.beams.plain_tilt import PlainTilt
     from cfmkit.curves import FloatArray
 
 
@@ -38,8 +39,10 @@ def _turned(frame: float, by: FloatArray, a: Any, b: Any) -> tuple[FloatArray, F
 
 def _frame(g: Gradient, node: str) -> tuple[float, FloatArray]:
     """Return the direction of a node's frame and its derivatives (k,)."""
-    turns = [slope(layout.direction[node]) for layout in g.tilts.tilted]
-    return float(np.real(g.path.layout.direction[node])), np.array(turns, dtype=float)
+    direction = float(np.real(g.path.layout.direction[node]))
+    if g.tilts.plain is not None:
+        return direction, np.zeros(len(g.tilts))
+    return direction, np.array([slope(layout.direction[node]) for layout in g.tilts.tilted], dtype=float)
 
 
 def motion(g: Gradient, node: str) -> FloatArray:
@@ -49,9 +52,9 @@ def motion(g: Gradient, node: str) -> FloatArray:
     along, across = (_values(g, layout.first[master] + k) for k in range(2))
     turn, dturn = _values(g, layout.plan.swing[node])
     dx, dy = _turned(*_frame(g, master), along, across)
-    arms = [np.subtract(one.position(node), one.position(master)) for one in (layout, *g.tilts.tilted)]
-    ax, ay = np.real(arms[0])
-    px, py = slope(np.array(arms[1:])).T
+    ax, ay = np.real(np.subtract(layout.position(node), layout.position(master)))
+    pairs = [(network.nodes[node], network.nodes[master]) for network, _ in g.tilts.built]
+    px, py = slope(np.array([(one.x - other.x, one.y - other.y) for one, other in pairs])).T
     c, s = np.cos(turn)[:, None], np.sin(turn)[:, None]
     dx = dx * length + (c - 1) * px - s * py - (s * ax + c * ay) * dturn
     dy = dy * length + s * px + (c - 1) * py + (c * ax - s * ay) * dturn
@@ -74,10 +77,10 @@ def rows(g: Gradient) -> FloatArray:
 
     sampler, solver = g.path.sampler, g.path.solver
     tilt = g.tilts.arrays(sampler.model, sampler.cut, every=True)
-    out = np.empty((len(g.points), sampler.states.shape[1], 7, len(g.tilts)))
+    out = np.empty((len(g.points), sampler.states.shape[1], 7 * len(g.tilts)))
     ys, drives = g.path.points.y[g.points], g.path.points.drive[g.points]
     entry.row_slopes(sampler.model, tilt, solver.n_free, ys, drives, g.unknowns, out)
-    return out[:, :, [2, 3, 0, 1, 4, 5, 6]]
+    return out.reshape(*out.shape[:2], 7, -1)[:, :, [2, 3, 0, 1, 5, 6, 4]]
 
 
 def energy(g: Gradient) -> FloatArray:
@@ -130,6 +133,8 @@ def sections(g: Gradient, beam: str) -> SectionSlopes:
 def _geometry(g: Gradient, beam: str, at: Any) -> tuple[FloatArray, float, FloatArray, tuple[Any, Any, Any]]:
     """Return angle (n,), width and thickness (n,) at the rows of a beam, and their derivatives (n, k), (k,), (n, k)."""
     cut, count = g.path.sampler.cut, len(g.tilts)
+    if g.tilts.plain is not None:
+        return _plain_geometry(g, g.tilts.plain, beam, at)
     angles, thicks, widths = [], [], []
     for layout in (g.path.layout, *g.tilts.tilted):
         fitted, section = layout.fits[beam], layout.network.beams[beam].section
@@ -149,6 +154,14 @@ def _geometry(g: Gradient, beam: str, at: Any) -> tuple[FloatArray, float, Float
         slope(np.array(thicks[1:])).reshape(count, -1).T,
     )
     return angles[0].real, float(np.real(widths[0])), thicks[0].real, by
+
+
+def _plain_geometry(g: Gradient, tilt: PlainTilt, beam: str, at: Any) -> tuple[Any, float, Any, tuple[Any, Any, Any]]:
+    """Return the same for a network of plain beams."""
+    fitted, section = g.path.layout.fits[beam], g.path.layout.network.beams[beam].section
+    number, ones = list(g.path.layout.network.beams).index(beam), np.ones(len(at.t))
+    by = (tilt.angle(number, at.t), tilt.sections[:, number, 1], ones[:, None] * tilt.sections[:, number, 2])
+    return fitted.angle(at.t, 0.5), float(section.width), section.thickness_at(at.t, 0.5), by
 
 
 def stress_extremes(g: Gradient, beam: str, axial: bool) -> FloatArray:
@@ -181,7 +194,7 @@ def load_displacement(g: Gradient, drive: Loading) -> FloatArray:
 
     total = np.zeros((len(g.points), len(g.tilts)))
     for number, load in enumerate(drive.loads):
-        others = [layout.drive.loads[number] for layout in g.tilts.tilted]  # type: ignore[union-attr]
+        others = [drive.loads[number] for _, drive in g.tilts.built]
         total += _point_work(g, load, others) if isinstance(load, PointLoad) else _line_work(g, load, others)
     return total
 

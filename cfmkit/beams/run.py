@@ -97,8 +97,8 @@ class Run:
                 return
             if code == INERTIA and self.control.branch == "stop":
                 self.status = PathStatus.JUMPS
-                where = float(self.points.drive[-1]) * self.unit
-                self.message = f"stability is lost at {where:.6g}: the path ends there"
+                last = float(self.points.drive[-1]) * self.unit
+                self.message = f"stability is lost at {last:.6g}: the path ends there"
                 return
             if code == INERTIA:
                 following = branches.cross(self)

@@ -6,7 +6,7 @@ that accepts complex numbers. Only what depends on the variable is computed agai
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,6 +14,7 @@ import numpy as np
 from cfmkit.beams.discretise import assemble_model, table
 from cfmkit.beams.kernels.model import Tilt
 from cfmkit.beams.layout import Layout
+from cfmkit.beams.plain_tilt import plain_tilt
 from cfmkit.errors import InputError
 
 if TYPE_CHECKING:
@@ -42,34 +43,36 @@ def slope(value: Any) -> Any:
     return np.imag(value) / STEP
 
 
-def tilted_layouts(layout: Layout, build: Callable[[Any], Any], variables: Any) -> list[Layout]:
-    """Return the layouts with each variable in turn moved by an imaginary step.
-
-    `build` returns a network, or a network and its drive where variables change the drive's loads or direction.
-    """
-    x = np.asarray(variables, dtype=float)
-    found = []
-    for k in range(len(x)):
-        moved = x.astype(complex)
-        moved[k] += 1j * STEP
-        built = build(moved)
-        network, drive = built if isinstance(built, tuple) else (built, layout.drive)
-        tilted = Layout(network, drive, layout)
-        tilted.scales = layout.scales
-        found.append(tilted)
-    return found
-
-
-@dataclass(frozen=True)
 class Tilts:
     """A layout and what it becomes with each design variable."""
 
-    layout: Layout
-    tilted: list[Layout]
+    def __init__(self, layout: Layout, build: Callable[[Any], Any], variables: Any) -> None:
+        """Build the network with each variable in turn moved by an imaginary step.
+
+        `build` returns a network, or a network and its drive where variables change the drive's loads or direction.
+        """
+        x = np.asarray(variables, dtype=float)
+        self.layout, self.built = layout, []
+        for k in range(len(x)):
+            moved = x.astype(complex)
+            moved[k] += 1j * STEP
+            built = build(moved)
+            self.built.append(built if isinstance(built, tuple) else (built, layout.drive))
+        self.plain = plain_tilt(layout, self.built, STEP)
 
     def __len__(self) -> int:
         """Return the number of variables."""
-        return len(self.tilted)
+        return len(self.built)
+
+    @cached_property
+    def tilted(self) -> list[Layout]:
+        """The layouts with each variable in turn moved by an imaginary step."""
+        found = []
+        for network, drive in self.built:
+            tilted = Layout(network, drive, self.layout)
+            tilted.scales = self.layout.scales
+            found.append(tilted)
+        return found
 
     def arrays(self, model: Model, cut: Grid, every: bool = False) -> Tilt:
         """Return the derivatives of a model's arrays; with `every` each beam is paired with every variable.
@@ -79,6 +82,8 @@ class Tilts:
         cfmkit.errors.InputError
             If a variable changes how the network is made up, not only its values.
         """
+        if self.plain is not None:
+            return self.plain.arrays(cut, every)
         tilted = [self._model(k, layout, model, cut) for k, layout in enumerate(self.tilted)]
         tables = np.stack([slope(table(layout, cut, model.table)) for layout in self.tilted], axis=-1)
         variable, first, begin, blocks = [], [0], [], []
@@ -97,12 +102,21 @@ class Tilts:
         moves = np.zeros(len(self), dtype=np.bool_)
         for values in parts.values():
             moves |= values.reshape(len(self), -1).any(axis=1)
+        held = (parts["base"] != 0) | (parts["rate"] != 0)
+        shifts = held[:, model.place_dof].any(axis=2)
+        for name in ("origin", "arm", "frame"):
+            shifts |= parts[name].any(axis=2)
+        touches = shifts[:, model.beam_end].any(axis=2).T
+        for number in range(len(touches)):
+            touches[number, variable[first[number] : first[number + 1]]] = True
         return Tilt(
             variable=np.array(variable, dtype=np.int64),
             first=np.array(first, dtype=np.int64),
             table=np.ascontiguousarray(np.concatenate(blocks)),
             begin=np.array(begin, dtype=np.int64),
             moves=moves,
+            shifts=shifts,
+            touches=np.ascontiguousarray(touches),
             **parts,
         )
 

@@ -28,7 +28,7 @@ def solve_with(a, b):  # type: ignore[no-untyped-def]
 
 def test_compiled_code_is_kept_under_the_digest_of_all_kernels() -> None:
     trace(*_pulled_beam())
-    for door in (entry._real, entry.states, entry.slopes, entry.row_slopes):
+    for door in (entry._real, entry.states, entry.slopes, entry.row_slopes, entry.held_slopes):
         assert entry.digest()[:16] in door.py_func.__qualname__
     assert list(Path(entry._real.stats.cache_path).glob(f"*{entry.digest()[:16]}*.nbi"))
 

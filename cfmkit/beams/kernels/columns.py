@@ -10,30 +10,38 @@ from __future__ import annotations
 
 import numpy as np
 
-from cfmkit.beams.kernels.chain import BEFORE, E2, SMALL, E, F, G
-from cfmkit.beams.kernels.compiler import kernel
-from cfmkit.beams.kernels.dense import lu_solve
-from cfmkit.beams.kernels.flow_slopes import ROWS, flow_slopes
-from cfmkit.beams.kernels.force_slopes import beam_slopes, load_slopes, pose_slope, spring_slopes, value_slopes
-from cfmkit.beams.kernels.newton import assemble
+from cfmkit.beams.kernels.chain import BEFORE, E2, SMALL, E, F, G, pose_of
+from cfmkit.beams.kernels.compiler import inlined, kernel
+from cfmkit.beams.kernels.dense import clear, lu_solve
+from cfmkit.beams.kernels.flow_slopes import flow_slopes
+from cfmkit.beams.kernels.force_slopes import (
+    beam_slopes,
+    load_slopes,
+    pose_slope,
+    spring_slopes,
+    turned_force,
+    value_changes,
+    value_slopes,
+)
+from cfmkit.beams.kernels.newton import all_values, assemble
 from cfmkit.beams.kernels.rk8 import STAGES
 
 
 @kernel
 def _segment_slopes(m, tilt, e, y, n, drive, ends):
-    """Set the derivatives of the end states of a beam's segments at unchanged starts: ends (segments, 9, count)."""
+    """Set the derivatives of the end states of a beam's segments at unchanged starts: ends (segments, 9 count)."""
     begin, count = m.beam_segment[e], tilt.first[e + 1] - tilt.first[e]
     load = (m.line_load[e, 0, 0] + drive * m.line_load[e, 1, 0], m.line_load[e, 0, 1] + drive * m.line_load[e, 1, 1])
-    none = np.empty((1, ROWS, count))
+    none = np.empty((1, 1))
     for j in range(begin, m.beam_segment[e + 1]):
         first = m.segment_step[j]
         state = ends[j - begin]
         for q in range(count):
             k = tilt.variable[tilt.first[e] + q]
             for r in range(7):
-                state[r, q] = 0.0
+                state[r * count + q] = 0.0
             for r in range(2):
-                state[7 + r, q] = tilt.line[k, e, 0, r] + drive * tilt.line[k, e, 1, r]
+                state[(7 + r) * count + q] = tilt.line[k, e, 0, r] + drive * tilt.line[k, e, 1, r]
         o = n + 6 * j
         start = (y[o + 2], y[o + 3], y[o + 4], y[o + 5])
         at = tilt.begin[e] + (first - m.segment_step[begin]) * STAGES * 5 * count
@@ -46,25 +54,23 @@ def _chain_slopes(m, tilt, e, ends, store, c, d, parts):
 
     parts (segments, k, 6) keeps the closure before each segment and what `_unfold_slopes` needs.
     """
-    begin = m.beam_segment[e]
+    begin, first = m.beam_segment[e], tilt.first[e]
+    n = tilt.first[e + 1] - first
     for j in range(begin, m.beam_segment[e + 1]):
-        keep, first = store[j], tilt.first[e]
-        small, p, e2, a = keep[SMALL], keep[G], keep[BEFORE], keep[E2]
-        for q in range(tilt.first[e + 1] - first):
+        t = j - begin
+        for q in range(n):
             k = tilt.variable[first + q]
-            s = ends[j - begin, :, q]
-            part = parts[j, k]
             for r in range(3):
-                part[r] = c[k, r]
-            b0, b1 = -s[4], -s[5]
-            b2 = small[0, 0] * b0 + small[0, 1] * b1 - small[0, 2] * (s[1] + small[2, 0] * c[k, 2])
-            part[3], part[4], part[5] = b0, b1, b2
+                parts[j, k, r] = c[k, r]
+            turn, b0, b1 = c[k, 2], -ends[t, 5 * n + q], -ends[t, 6 * n + q]
+            b2 = store[j, SMALL, 0, 0] * b0 + store[j, SMALL, 0, 1] * b1
+            b2 -= store[j, SMALL, 0, 2] * (ends[t, n + q] + store[j, SMALL, 2, 0] * turn)
+            parts[j, k, 3], parts[j, k, 4], parts[j, k, 5] = b0, b1, b2
             for r in range(3):
-                d[k, r] += e2[r, 0] * b0 + e2[r, 1] * b1 + e2[r, 2] * b2
-            turn = c[k, 2]
-            c[k, 0] += a[0, 2] * turn + s[2] + p[0, 0] * b0 + p[0, 1] * b1 + p[0, 2] * b2
-            c[k, 1] += a[1, 2] * turn + s[3] + p[1, 0] * b0 + p[1, 1] * b1 + p[1, 2] * b2
-            c[k, 2] = a[2, 2] * turn + s[0] + p[2, 0] * b0 + p[2, 1] * b1 + p[2, 2] * b2
+                d[k, r] += store[j, BEFORE, r, 0] * b0 + store[j, BEFORE, r, 1] * b1 + store[j, BEFORE, r, 2] * b2
+                moved = store[j, E2, r, 2] * turn + ends[t, (2 + r if r < 2 else 0) * n + q]
+                moved += store[j, G, r, 0] * b0 + store[j, G, r, 1] * b1 + store[j, G, r, 2] * b2
+                c[k, r] = moved + (c[k, r] if r < 2 else 0.0)
 
 
 @kernel
@@ -72,118 +78,205 @@ def _unfold_slopes(m, e, k, n, store, parts, dqa, dpb, dy):
     """Set the derivatives of the unknowns of all segments of beam e by variable k."""
     n0, n1, n2 = dpb[0], dpb[1], dpb[2]
     for j in range(m.beam_segment[e + 1] - 1, m.beam_segment[e] - 1, -1):
-        keep, part = store[j], parts[j, k]
-        small = keep[SMALL]
-        turn = small[1, 0] * dqa[0] + small[1, 1] * dqa[1] + small[1, 2] * dqa[2]
-        n2 = small[0, 0] * n0 + small[0, 1] * n1 + small[0, 2] * n2 + turn + part[5]
-        n0, n1 = n0 + part[3], n1 + part[4]
+        last = store[j, SMALL, 0, 0] * n0 + store[j, SMALL, 0, 1] * n1 + store[j, SMALL, 0, 2] * n2 + parts[j, k, 5]
+        for r in range(3):
+            last += store[j, SMALL, 1, r] * dqa[r]
+        n0, n1, n2 = n0 + parts[j, k, 3], n1 + parts[j, k, 4], last
         at = n + 6 * j
         for r in range(3):
-            dq = part[r]
-            dq += keep[E, r, 0] * dqa[0] + keep[E, r, 1] * dqa[1] + keep[E, r, 2] * dqa[2]
-            dq += keep[F, r, 0] * n0 + keep[F, r, 1] * n1 + keep[F, r, 2] * n2
-            dy[at + r, k] = dq
+            dq = parts[j, k, r]
+            for i in range(3):
+                dq += store[j, E, r, i] * dqa[i]
+            dy[at + r, k] = dq + store[j, F, r, 0] * n0 + store[j, F, r, 1] * n1 + store[j, F, r, 2] * n2
         dy[at + 3, k], dy[at + 4, k], dy[at + 5, k] = n0, n1, n2
 
 
 @kernel
-def _right_side(m, tilt, k, y, drive, n_free, values, rel, c, d, rhs, work):
-    """Set column k of the right side: minus the changes of the residual at unchanged unknowns."""
-    dvalues, force, w, pose, dstart, dend = work
-    n_dofs = values.shape[0]
-    for i in range(n_dofs):
-        force[i] = 0.0
-        dvalues[i] = 0.0 if m.slot[i] >= 0 else tilt.base[k, i] + drive * tilt.rate[k, i]
+def _frames(m, values, pose, frames):
+    """Set for both ends of every beam cos and sin of the frame and the turned arm, (beams, 2, 4)."""
     for e in range(m.beam_end.shape[0]):
-        last = n_free + 3 * e
-        pose_slope(m, tilt, k, m.beam_end[e, 0], values, dvalues, pose[0])
-        pose_slope(m, tilt, k, m.beam_end[e, 1], values, dvalues, pose[1])
-        for r in range(3):
-            dstart[e, r], dend[e, r], total = d[e, k, r], 0.0, c[e, k, r] - pose[1, r]
-            for s in range(3):
-                dstart[e, r] += rel[e, G, r, s] * pose[0, s]
-                total += rel[e, E, r, s] * pose[0, s]
-            rhs[last + r, k] = -total
-    if tilt.moves[k]:
-        load_slopes(m, tilt, k, values, dvalues, drive, w, force)
-        spring_slopes(m, tilt, k, values, dvalues, w, force)
-    beam_slopes(m, tilt, k, y, n_free, values, dvalues, dstart, dend, w, force)
-    for i in range(n_dofs):
-        if m.slot[i] >= 0:
-            rhs[m.slot[i], k] = -force[i]
+        for side in range(2):
+            i = m.beam_end[e, side]
+            ox, oy = pose_of(m, values, i, pose)
+            frames[e, side, 0], frames[e, side, 1] = m.place_frame[i, 0], m.place_frame[i, 1]
+            frames[e, side, 2], frames[e, side, 3] = ox, oy
 
 
 @kernel
-def slopes(m, tilt, n_free, ys, drives, out, held, scratch):
+def _beam_sides(m, tilt, y, drive, n_free, values, frames, rel, c, d, rhs, push, work):
+    """Set the right sides as far as beams make them: minus the changes of the residual at unchanged unknowns.
+
+    push (k) collects the change of the force that the drive works against.
+    """
+    dvalues, force, _, pose = work
+    n = n_free + 3 * m.beam_end.shape[0]
+    for e in range(m.beam_end.shape[0]):
+        ia, ib, last, own = m.beam_end[e, 0], m.beam_end[e, 1], n_free + 3 * e, n + 6 * m.beam_segment[e] + 3
+        for k in range(tilt.moves.shape[0]):
+            if not tilt.touches[e, k]:
+                continue
+            for r in range(3):
+                rhs[last + r, k] = -c[e, k, r]
+            if tilt.shifts[k, ia] or tilt.shifts[k, ib]:
+                value_changes(m, tilt, k, drive, dvalues)
+            if tilt.shifts[k, ia]:
+                pose_slope(m, tilt, k, ia, values, dvalues, pose)
+                for r in range(3):
+                    for s in range(3):
+                        d[e, k, r] += rel[e, G, r, s] * pose[s]
+                        rhs[last + r, k] -= rel[e, E, r, s] * pose[s]
+                turned_force(m, tilt, k, ia, pose, y[own], y[own + 1], force)
+                _lower(m, ia, k, force[0], force[1], force[2], 0.0, rhs, push)
+            fc, fs, ox, oy = frames[e, 0, 0], frames[e, 0, 1], frames[e, 0, 2], frames[e, 0, 3]
+            fx, fy = d[e, k, 0], d[e, k, 1]
+            _lower(m, ia, k, fc * fx + fs * fy, fc * fy - fs * fx, ox * fy - oy * fx, d[e, k, 2], rhs, push)
+            if tilt.shifts[k, ib]:
+                pose_slope(m, tilt, k, ib, values, dvalues, pose)
+                for r in range(3):
+                    rhs[last + r, k] += pose[r]
+                turned_force(m, tilt, k, ib, pose, -y[last], -y[last + 1], force)
+                _lower(m, ib, k, force[0], force[1], force[2], 0.0, rhs, push)
+
+
+@inlined
+def _lower(m, i, k, along, across, arm, turn, rhs, push):
+    """Take changes of the forces on a place's degrees of freedom off the right side; the drive's share to `push`."""
+    for r in range(4):
+        dof = m.place_dof[i, r]
+        force = along if r == 0 else (across if r == 1 else (arm if r == 2 else turn))
+        if m.slot[dof] >= 0:
+            rhs[m.slot[dof], k] -= force
+        push[k] += m.rate[dof] * force
+
+
+@kernel
+def _other_sides(m, tilt, k, drive, values, rhs, push, work):
+    """Add to the right side of variable k what loads and springs make."""
+    dvalues, force, w, _ = work
+    value_changes(m, tilt, k, drive, dvalues)
+    for i in range(force.shape[0]):
+        force[i] = 0.0
+    load_slopes(m, tilt, k, values, dvalues, drive, w, force)
+    spring_slopes(m, tilt, k, values, dvalues, w, force)
+    for i in range(force.shape[0]):
+        if m.slot[i] >= 0:
+            rhs[m.slot[i], k] -= force[i]
+        push[k] += m.rate[i] * force[i]
+
+
+@inlined
+def _start_slope(m, tilt, e, k, frames, values, dvalues, pose):
+    """Set the derivative of the pose of the start of a beam."""
+    i = m.beam_end[e, 0]
+    if tilt.shifts[k, i]:
+        pose_slope(m, tilt, k, i, values, dvalues, pose)
+        return
+    fc, fs, ox, oy = frames[e, 0, 0], frames[e, 0, 1], frames[e, 0, 2], frames[e, 0, 3]
+    a, b, turn = dvalues[m.place_dof[i, 0]], dvalues[m.place_dof[i, 1]], dvalues[m.place_dof[i, 2]]
+    pose[0], pose[1] = fc * a - fs * b - oy * turn, fs * a + fc * b + ox * turn
+    pose[2] = dvalues[m.place_dof[i, 3]]
+
+
+@kernel
+def slopes(m, tilt, n_free, ys, drives, out, pushes, scratch):
     """Set the derivatives of the unknowns at points by all variables; tell whether every tangent is regular.
 
-    out (points, unknowns, k); held (points, dofs + 1, k): derivatives of the forces on all degrees of freedom, as
-    `cfmkit.beams.kernels.observe.forces` has them, and of the springs' energy.
+    out (points, unknowns, k); pushes (points, k): derivatives of the force on what the drive moves, in the drive's
+    sense, where the tangent is symmetric (no force turns with its node).
     """
     h, _, _, residual, values, ends, rel, store, work, _ = scratch
     n, count, beams = h.shape[0] - 1, tilt.moves.shape[0], m.beam_end.shape[0]
-    segments = m.segment_step.shape[0] - 1
     c, d = np.zeros((beams, count, 3)), np.zeros((beams, count, 3))
-    parts = np.zeros((segments, count, 6))
+    parts = np.zeros((m.segment_step.shape[0] - 1, count, 6))
     most, wide = 0, 0
     for e in range(beams):
         most = max(most, tilt.first[e + 1] - tilt.first[e])
         wide = max(wide, m.beam_segment[e + 1] - m.beam_segment[e])
-    moved = np.empty((wide, 9, most))
-    dvalues, force, w, pose = np.zeros(values.shape[0]), np.zeros(values.shape[0]), np.zeros((12, 7)), np.zeros((2, 7))
-    dstart, dend = np.zeros((beams, 3)), np.zeros((beams, 3))
-    room = (dvalues, force, w, pose, dstart, dend)
-    matrix, rhs = np.empty((n, n)), np.zeros((n, count))
+    moved = np.empty((wide, 9 * most))
+    dofs, pose, others = values.shape[0], np.zeros(7), m.load_place.shape[0] + m.spring_kind.shape[0] > 0
+    room = (np.zeros(dofs), np.zeros(dofs), np.zeros((12, 7)), pose)
+    frames, matrix, rhs, dpb = np.empty((beams, 2, 4)), np.empty((n, n)), np.empty((n, count)), np.empty(3)
     for p in range(ys.shape[0]):
-        y, drive = ys[p], drives[p]
+        y, drive, dy, push = ys[p], drives[p], out[p], pushes[p]
         assemble(m, y, drive, n_free, h, residual, values, ends, rel, store, work)
+        _frames(m, values, pose, frames)
+        clear(rhs)
+        for k in range(count):
+            push[k] = 0.0
         for e in range(beams):
-            for k in range(count):
-                for r in range(3):
-                    c[e, k, r], d[e, k, r] = 0.0, 0.0
+            clear(c[e])
+            clear(d[e])
             own = tilt.first[e + 1] - tilt.first[e]
             if own > 0:
-                block = moved[:, :, :own]
+                block = moved[:, : 9 * own]
                 _segment_slopes(m, tilt, e, y, n, drive, block)
                 _chain_slopes(m, tilt, e, block, store, c[e], d[e], parts)
+        _beam_sides(m, tilt, y, drive, n_free, values, frames, rel, c, d, rhs, push, room)
         for k in range(count):
-            _right_side(m, tilt, k, y, drive, n_free, values, rel, c, d, rhs, room)
+            if others and tilt.moves[k]:
+                _other_sides(m, tilt, k, drive, values, rhs, push, room)
         for i in range(n):
             for j in range(n):
                 matrix[i, j] = h[i, j]
         if not lu_solve(matrix, rhs):
             return False
-        dy = out[p]
+        _spread_out(m, tilt, drive, n_free, (values, frames, h), (store, parts), rhs, dy, push, (room[0], pose, dpb))
+    return True
+
+
+@kernel
+def _spread_out(m, tilt, drive, n_free, state, chains, dz, dy, push, work):
+    """Set the derivatives of all unknowns from those of z."""
+    (values, frames, h), (store, parts), (dvalues, pose, dpb) = state, chains, work
+    n = dz.shape[0]
+    for k in range(dz.shape[1]):
         for i in range(n):
-            for k in range(count):
-                dy[i, k] = rhs[i, k]
+            dy[i, k] = dz[i, k]
+            push[k] += h[i, n] * dz[i, k]
+        value_slopes(m, tilt, k, drive, dz, dvalues)
+        for e in range(m.beam_end.shape[0]):
+            _start_slope(m, tilt, e, k, frames, values, dvalues, pose)
+            for r in range(3):
+                dpb[r] = dz[n_free + 3 * e + r, k]
+            _unfold_slopes(m, e, k, n, store, parts, pose, dpb, dy)
+
+
+@kernel
+def held_slopes(m, tilt, n_free, ys, drives, dys, out):
+    """Set the derivatives of the forces on all degrees of freedom and of the springs' energy, (points, dofs + 1, k).
+
+    The forces are those of `cfmkit.beams.kernels.observe.forces`.
+    """
+    count, beams, dofs = tilt.moves.shape[0], m.beam_end.shape[0], m.slot.shape[0]
+    n = n_free + 3 * beams
+    values, dvalues, force, w = np.empty(dofs), np.empty(dofs), np.empty(dofs), np.zeros((12, 7))
+    dstart, dend = np.empty((beams, 3)), np.empty((beams, 3))
+    for p in range(ys.shape[0]):
+        y, drive, dy = ys[p], drives[p], dys[p]
+        all_values(m, y, drive, values)
         for k in range(count):
             value_slopes(m, tilt, k, drive, dy, dvalues)
-            for i in range(force.shape[0]):
+            for i in range(dofs):
                 force[i] = 0.0
             for e in range(beams):
-                pose_slope(m, tilt, k, m.beam_end[e, 0], values, dvalues, pose[0])
                 for r in range(3):
-                    dend[e, r] = dy[n_free + 3 * e + r, k]
-                _unfold_slopes(m, e, k, n, store, parts, pose[0], dend[e], dy)
-                for r in range(3):
-                    dstart[e, r] = dy[n + 6 * m.beam_segment[e] + 3 + r, k]
+                    dstart[e, r], dend[e, r] = dy[n + 6 * m.beam_segment[e] + 3 + r, k], dy[n_free + 3 * e + r, k]
             load_slopes(m, tilt, k, values, dvalues, drive, w, force)
-            held[p, force.shape[0], k] = spring_slopes(m, tilt, k, values, dvalues, w, force)
+            out[p, dofs, k] = spring_slopes(m, tilt, k, values, dvalues, w, force)
             beam_slopes(m, tilt, k, y, n_free, values, dvalues, dstart, dend, w, force)
-            for i in range(force.shape[0]):
-                held[p, i, k] = force[i]
-    return True
+            for i in range(dofs):
+                out[p, i, k] = force[i]
 
 
 @kernel
 def row_slopes(m, tilt, n_free, y, drive, dy, out):
     """Set the derivatives of the states at the step boundaries of all segments at one point by all variables.
 
-    `tilt` pairs every beam with every variable. out (steps + segments, 7, k): as in `cfmkit.beams.kernels.observe`.
+    `tilt` pairs every beam with every variable. out (steps + segments, 7 k): phi, M, X, Y,
+    energy, h, v, each by all variables.
     """
     n, count = n_free + 3 * m.beam_end.shape[0], dy.shape[1]
-    state = np.zeros((9, count))
+    state = np.zeros(9 * count)
     row = 0
     for e in range(m.beam_end.shape[0]):
         load = (
@@ -194,10 +287,11 @@ def row_slopes(m, tilt, n_free, y, drive, dy, out):
         for j in range(m.beam_segment[e], m.beam_segment[e + 1]):
             o, first, last = n + 6 * j, m.segment_step[j], m.segment_step[j + 1]
             for k in range(count):
-                state[0, k], state[1, k], state[2, k], state[3, k] = dy[o + 2, k], dy[o + 5, k], dy[o, k], dy[o + 1, k]
-                state[4, k], state[5, k], state[6, k] = dy[o + 3, k], dy[o + 4, k], 0.0
+                state[k], state[count + k] = dy[o + 2, k], dy[o + 5, k]
+                state[2 * count + k], state[3 * count + k], state[4 * count + k] = dy[o, k], dy[o + 1, k], 0.0
+                state[5 * count + k], state[6 * count + k] = dy[o + 3, k], dy[o + 4, k]
                 for r in range(2):
-                    state[7 + r, k] = tilt.line[k, e, 0, r] + drive * tilt.line[k, e, 1, r]
+                    state[(7 + r) * count + k] = tilt.line[k, e, 0, r] + drive * tilt.line[k, e, 1, r]
             start = (y[o + 2], y[o + 3], y[o + 4], y[o + 5])
             at = tilt.begin[e] + (first - begin) * STAGES * 5 * count
             rows = out[row : row + last - first + 1]

@@ -17,6 +17,10 @@ They have no way in from Python (that halves the time to compile): calling one f
 """
 
 
+inlined: Any = numba.njit(**_INNER, forceinline=True)
+"""For small functions in the innermost loops: a call with arrays costs more than they do."""
+
+
 def door(stamp: str) -> Any:
     """Return a decorator for functions called from Python: kept on disk, in files named after the stamp.
 

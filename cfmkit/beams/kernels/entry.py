@@ -21,7 +21,7 @@ from cfmkit.beams.kernels import observe as _observe
 from cfmkit.beams.kernels.compiler import door
 
 _follow, _solve, _forces, _states = _march.march, _newton.solve, _observe.forces, _observe.states
-_slopes, _row_slopes = _columns.slopes, _columns.row_slopes
+_slopes, _row_slopes, _held_slopes = _columns.slopes, _columns.row_slopes, _columns.held_slopes
 
 
 def digest() -> str:
@@ -56,12 +56,16 @@ def _doors(stamp: str) -> tuple[Any, ...]:
         for p in range(ys.shape[0]):
             _row_slopes(m, tilt, n_free, ys[p], drives[p], dys[p], out[p])
 
-    return real, states, slopes, row_slopes
+    @door(stamp)
+    def held_slopes(m, tilt, n_free, ys, drives, dys, out):
+        _held_slopes(m, tilt, n_free, ys, drives, dys, out)
+
+    return real, states, slopes, row_slopes, held_slopes
 
 
 SOLVE, MARCH, FORCES = 0, 1, 2
 STAMP = digest()
-_real, states, slopes, row_slopes = _doors(STAMP)
+_real, states, slopes, row_slopes, held_slopes = _doors(STAMP)
 
 
 def announce() -> None:

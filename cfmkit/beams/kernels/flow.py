@@ -14,14 +14,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from cfmkit.beams.kernels.compiler import kernel
+from cfmkit.beams.kernels.compiler import inlined, kernel
 from cfmkit.beams.kernels.rk8 import COUPLING, NODES, STAGES, WEIGHTS
 
 COLUMNS = 5  # the state itself, then its derivatives by the start's rotation, h, v and M
 SLOPE, PLACE, AT = 0, 1, 2  # of the work space: slopes of (phi, M), slopes of (X, Y), in AT: (phi, M), (X, Y), stage
 
 
-@kernel
+@inlined
 def sincos(x):
     """Return sine and cosine to rounding, without branches: as in fdlibm, reduced by two words of pi/2."""
     n = np.floor(x * 0.6366197723675814 + 0.5)
@@ -39,7 +39,7 @@ def sincos(x):
     return (1.0 - (q & 2)) * first, (1.0 - ((q + 1) & 2)) * second
 
 
-@kernel
+@inlined
 def _slopes(table, step, i, h, v, w):
     """Set the slopes of (phi, M) and (X, Y) with their derivatives at stage i of a step."""
     s, c = sincos(table[step, i, 0] + w[AT, 2, 0])
@@ -65,7 +65,7 @@ def _slopes(table, step, i, h, v, w):
     w[SLOPE, i, 8] += -xp + vv * h - hv * v
 
 
-@kernel
+@inlined
 def _combine(i, length, w):
     """Set phi, M and their derivatives at stage i (sums in registers: this is where most of the time goes)."""
     a = b = c = d = e = f = g = h = p = q = 0.0

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from cfmkit.beams.kernels.compiler import kernel
-from cfmkit.beams.kernels.dense import copy_matrix
+from cfmkit.beams.kernels.compiler import inlined, kernel
+from cfmkit.beams.kernels.flow import sincos
 from cfmkit.beams.kernels.rk8 import COUPLING, STAGES, WEIGHTS
 
-ROWS = 7  # phi, M, X, Y, h, v, strain energy: as in `cfmkit.beams.kernels.flow.plain_flow`
+ROWS = 7  # phi, M, X, Y, strain energy, h, v
 
 
 @kernel
@@ -20,86 +20,99 @@ def flow_slopes(table, width, steps, start, load, changes, at, state, rows):
     """Integrate the state and the columns of its derivatives over the steps of a segment.
 
     start: phi, h, v, M; load: line load (wx, wy); changes: the flattened changes of the table, from index `at`.
-    state (9, count) holds the derivatives of phi, M, X, Y, h, v, energy at the start and then at the end; its last
-    two rows are those of the line load. rows (steps + 1, 7, count): the derivatives at all step boundaries, if there
-    is room.
+    state (9 count) holds the derivatives of phi, M, X, Y, energy, h, v and those of the line load, each for all
+    variables, at the start and then at the end. rows (steps + 1, 7 count): the derivatives at all step boundaries,
+    if there is room.
     """
-    count = state.shape[1]
-    base, slope, now = np.zeros((STAGES, 3)), np.empty((STAGES, 5, count)), np.empty((5, count))
+    count = state.shape[0] // 9
+    base, slope, now = np.empty((STAGES, 2)), np.empty((STAGES, 5 * count)), np.empty(5 * count)
     keep = rows.shape[0] > 1
     for step in range(steps[0], steps[1]):
         if keep:
-            copy_matrix(rows[step - steps[0]], state[:ROWS])
+            for q in range(ROWS * count):
+                rows[step - steps[0], q] = state[q]
         o = at + (step - steps[0]) * STAGES * 5 * count
         for i in range(STAGES):
-            row = table[step, i]
-            place = _combined(table[step], width[step], i, start, load, (changes, o), state, base, slope, now)
-            _stage(row, place, (changes, o + i * 5 * count), now, base[i], slope[i])
-        start = _combined(table[step], width[step], STAGES, start, load, (changes, o), state, base, slope, now)
+            place = _combined(table, step, width[step], i, start, load, (changes, o), state, base, slope, now)
+            _stage(table, step, i, place, (changes, o + i * 5 * count), now, base, slope)
+        start = _combined(table, step, width[step], STAGES, start, load, (changes, o), state, base, slope, now)
         for j in range(STAGES):
             w = width[step] * WEIGHTS[j]
             if w != 0.0:
-                for q in range(count):
-                    state[2, q] += w * slope[j, 2, q]
-                    state[3, q] += w * slope[j, 3, q]
-                    state[6, q] += w * slope[j, 4, q]
-        for q in range(count):
-            state[0, q], state[1, q], state[4, q], state[5, q] = now[0, q], now[1, q], now[2, q], now[3, q]
+                for q in range(2 * count, 5 * count):
+                    state[q] += w * slope[j, q]
+        for q in range(2 * count):
+            state[q], state[5 * count + q] = now[q], now[2 * count + q]
     if keep:
-        copy_matrix(rows[steps[1] - steps[0]], state[:ROWS])
+        for q in range(ROWS * count):
+            rows[steps[1] - steps[0], q] = state[q]
 
 
-@kernel
-def _combined(stages, width, i, start, load, changed, state, base, slope, now):
+@inlined
+def _combined(table, step, width, i, start, load, changed, state, base, slope, now):
     """Set `now` (phi, M, h, v and arc length, differentiated) at stage i, or at the step's end for i = STAGES.
 
     Returns phi, h, v and M there.
     """
-    changes, o = changed
-    count = now.shape[1]
-    phi, moment, run = start[0], start[3], 0.0
-    loaded = load[0] != 0.0 or load[1] != 0.0
-    for q in range(count):
-        now[0, q], now[1, q], now[4, q] = state[0, q], state[1, q], 0.0
+    count = now.shape[0] // 5
+    phi, moment, h, v = start[0], start[3], start[1], start[2]
+    for q in range(2 * count):
+        now[q], now[2 * count + q] = state[q], state[5 * count + q]
     for j in range(i):
         w = width * (WEIGHTS[j] if i == STAGES else COUPLING[i, j])
         if w != 0.0:
             phi += w * base[j, 0]
             moment += w * base[j, 1]
-            run += w * stages[j, 1]
-            for q in range(count):
-                now[0, q] += w * slope[j, 0, q]
-                now[1, q] += w * slope[j, 1, q]
-            if loaded:
-                first = o + (j * 5 + 1) * count
-                for q in range(count):
-                    now[4, q] += w * changes[first + q]
-    for q in range(count):
-        now[2, q] = state[4, q] - state[7, q] * run - load[0] * now[4, q]
-        now[3, q] = state[5, q] - state[8, q] * run - load[1] * now[4, q]
-    return phi, start[1] - load[0] * run, start[2] - load[1] * run, moment
+            for q in range(2 * count):
+                now[q] += w * slope[j, q]
+    if load[0] != 0.0 or load[1] != 0.0:
+        run = _run(table, step, width, i, changed, now)
+        h, v = h - load[0] * run, v - load[1] * run
+        for q in range(count):
+            now[2 * count + q] -= state[7 * count + q] * run + load[0] * now[4 * count + q]
+            now[3 * count + q] -= state[8 * count + q] * run + load[1] * now[4 * count + q]
+    return phi, h, v, moment
 
 
 @kernel
-def _stage(row, place, changed, now, base, slope):
+def _run(table, step, width, i, changed, now):
+    """Return the arc length up to stage i and set its derivatives."""
+    changes, o = changed
+    count, run = now.shape[0] // 5, 0.0
+    for q in range(count):
+        now[4 * count + q] = 0.0
+    for j in range(i):
+        w = width * (WEIGHTS[j] if i == STAGES else COUPLING[i, j])
+        run += w * table[step, j, 1]
+        for q in range(count):
+            now[4 * count + q] += w * changes[o + (j * 5 + 1) * count + q]
+    return run
+
+
+@inlined
+def _stage(table, step, i, place, changed, now, base, slope):
     """Set the slopes of phi and M at one stage (base) and those of the derivatives of phi, M, X, Y and energy."""
     changes, o = changed
-    count = now.shape[1]
+    n = now.shape[0] // 5
     phi, h, v, moment = place
-    c, s = np.cos(row[0] + phi), np.sin(row[0] + phi)
+    s, c = sincos(table[step, i, 0] + phi)
+    bends, pulls, slides = table[step, i, 2], table[step, i, 3], table[step, i, 4]
     normal, shear = h * c + v * s, v * c - h * s
-    stretch, slip = row[1] + row[3] * normal, row[4] * shear
+    stretch, slip = table[step, i, 1] + pulls * normal, slides * shear
     xp, yp = stretch * c - slip * s, stretch * s + slip * c
-    base[0], base[1] = row[2] * moment, yp * h - xp * v
-    for q in range(count):
-        turn = now[0, q] + changes[o + q]
-        bend, pull, slide = changes[o + 2 * count + q], changes[o + 3 * count + q], changes[o + 4 * count + q]
-        dn = shear * turn + now[2, q] * c + now[3, q] * s
-        dv = now[3, q] * c - now[2, q] * s - normal * turn
-        a, b = changes[o + count + q] + pull * normal + row[3] * dn, slide * shear + row[4] * dv
+    base[i, 0], base[i, 1] = bends * moment, yp * h - xp * v
+    stiff = pulls == 0.0 and slides == 0.0
+    for q in range(n):
+        turn, dm, dh, dv = now[q] + changes[o + q], now[n + q], now[2 * n + q], now[3 * n + q]
+        a, b, bend = changes[o + n + q], 0.0, changes[o + 2 * n + q]
+        own = bend * moment * moment
+        if not stiff:
+            pull, slide = changes[o + 3 * n + q], changes[o + 4 * n + q]
+            dn, dq = shear * turn + dh * c + dv * s, dv * c - dh * s - normal * turn
+            a += pull * normal + pulls * dn
+            b = slide * shear + slides * dq
+            own += pull * normal * normal + slide * shear * shear + 2 * (pulls * normal * dn + slides * shear * dq)
         dx, dy = -yp * turn + a * c - b * s, xp * turn + a * s + b * c
-        slope[0, q] = bend * moment + row[2] * now[1, q]
-        slope[1, q] = dy * h - dx * v + yp * now[2, q] - xp * now[3, q]
-        slope[2, q], slope[3, q] = dx, dy
-        own = bend * moment * moment + pull * normal * normal + slide * shear * shear
-        slope[4, q] = 0.5 * own + row[2] * moment * now[1, q] + row[3] * normal * dn + row[4] * shear * dv
+        slope[i, q], slope[i, n + q] = bend * moment + bends * dm, dy * h - dx * v + yp * dh - xp * dv
+        slope[i, 2 * n + q], slope[i, 3 * n + q] = dx, dy
+        slope[i, 4 * n + q] = 0.5 * own + bends * moment * dm

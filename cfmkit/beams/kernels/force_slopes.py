@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from cfmkit.beams.kernels.chain import pose_of
-from cfmkit.beams.kernels.compiler import kernel
+from cfmkit.beams.kernels.compiler import inlined, kernel
 from cfmkit.beams.kernels.springs import LINE, TURN, spring_law
 
 
@@ -18,6 +18,20 @@ def value_slopes(m, tilt, k, drive, dz, values):
 
 
 @kernel
+def value_changes(m, tilt, k, drive, values):
+    """Set the derivatives of all degrees of freedom at unchanged unknowns."""
+    for i in range(values.shape[0]):
+        values[i] = 0.0 if m.slot[i] >= 0 else tilt.base[k, i] + drive * tilt.rate[k, i]
+
+
+@kernel
+def turned_force(m, tilt, k, i, pose, fx, fy, out):
+    """Set the changes that an unchanged force at a place makes as its frame and arm turn; pose: see `pose_slope`."""
+    dc, ds = tilt.frame[k, i, 0], tilt.frame[k, i, 1]
+    out[0], out[1], out[2] = dc * fx + ds * fy, dc * fy - ds * fx, pose[5] * fy - pose[6] * fx
+
+
+@inlined
 def pose_slope(m, tilt, k, i, values, dvalues, out):
     """Set the derivative of a place's pose (out[:3]), its turned arm (out[3:5]) and that arm's derivative (out[5:])."""
     d = m.place_dof[i]

@@ -92,6 +92,10 @@ class Tilt(NamedTuple):
         Where each beam begins in `table`.
     moves : (k,) bool array
         Whether a variable changes anything but the tables.
+    shifts : (k, places) bool array
+        Whether it moves an attachment at unchanged unknowns.
+    touches : (beams, k) bool array
+        Whether it changes a beam's table or line load, or shifts one of its ends.
     origin, arm, frame : (k, places, 2) arrays
     base, rate : (k, dofs) arrays
     spring : (k, springs, 4) array
@@ -104,6 +108,8 @@ class Tilt(NamedTuple):
     table: FloatArray
     begin: IntArray
     moves: Any
+    shifts: Any
+    touches: Any
     origin: FloatArray
     arm: FloatArray
     frame: FloatArray
