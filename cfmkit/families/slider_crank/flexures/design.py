@@ -42,6 +42,9 @@ RESERVES, RESERVE_STRESS = (4e-5, 2e-4), 5e-4
 ENOUGH = 0.99
 """Share of the stroke searched that the finished strip must have, or the search is repeated with more in reserve."""
 
+TOLD = 4
+"""So many of the limits that hold a strip are named in the message; all are in the document of `--json`."""
+
 DECIMALS = 9
 """Of lengths in metres."""
 
@@ -263,10 +266,12 @@ def _message(found: Found, judged: Judged) -> str:
     if found.uniform is not None and found.uniform.feasible and count > 1 and found.task.goal == "stroke":
         within = 100.0 * max(found.task.ripple, LOOSE)
         compared = f"; one thickness reaches {mm(0.01 * float(found.uniform.z[-1]))} within {within:.3g} %"
-    opinion = judged.opinion
+    opinion, shown = judged.opinion, judged.active[:TOLD]
+    more = f" and {len(judged.active) - TOLD} more" if len(judged.active) > TOLD else ""
+    held = f"; held by {', '.join(shown)}{more}" if shown else ""
     return (
-        f"{what}, {head}{compared}; {descent.ending.value} after {descent.evaluations} strips; {opinion.elements} "
-        f"corotational elements: force {100 * opinion.force:+.2g} %, stress {100 * opinion.stress:+.2g} %"
+        f"{what}, {head}{compared}; {descent.ending.value} after {descent.evaluations} strips{held}; "
+        f"{opinion.elements} corotational elements: force {100 * opinion.force:+.2g} %, stress {100 * opinion.stress:+.2g} %"
     )
 
 
