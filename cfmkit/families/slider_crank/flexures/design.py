@@ -271,7 +271,8 @@ def _message(found: Found, judged: Judged) -> str:
     held = f"; held by {', '.join(shown)}{more}" if shown else ""
     return (
         f"{what}, {head}{compared}; {descent.ending.value} after {descent.evaluations} strips{held}; "
-        f"{opinion.elements} corotational elements: force {100 * opinion.force:+.2g} %, stress {100 * opinion.stress:+.2g} %"
+        f"{opinion.elements} corotational elements: force {100 * opinion.force:+.2g} %, "
+        f"stress {100 * opinion.stress:+.2g} %"
     )
 
 
