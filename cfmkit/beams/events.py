@@ -6,6 +6,7 @@ a bifurcation: there the null vector points along the path that crosses.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     from cfmkit.curves import FloatArray
 
 _SEARCHES = 40
-_CLOSE = 1e-6  # share of the determinant at the ends that is near enough to interpolate the rest
+_CLOSE = 1e-5  # share of the determinant at the ends that is near enough to interpolate the rest
 _FIRST_KICK, _KICK, _KICKS = 1e-3, 0.06, 16  # how far from a bifurcation its branch is entered [rad]
 
 
@@ -37,8 +38,8 @@ def locate(solver: Solver, one: Spot, other: Spot, natural: bool, fold: bool = F
     """Return the singular point between two neighbouring equilibria with different inertia.
 
     The determinant of the tangent, with the sign that the inertia gives it, is brought near zero by the Illinois
-    variant of the rule of false position. The last bit is interpolated: at a bifurcation no bordered system is
-    regular, so that Newton's method does not get there.
+    variant of the rule of false position, or faster where inverse interpolation stays inside the bracket. The last bit
+    is interpolated: at a bifurcation no bordered system is regular, so that Newton's method does not get there.
     """
     search = _Search(solver, one, other, natural)
     for attempt in range(_SEARCHES):
@@ -75,6 +76,10 @@ class _Search:
         """Shrink the bracket once; tell whether to go on."""
         (low, f_low), (high, f_high) = self.low, self.high
         share = 0.5 * (low + high) if middle else (low * f_high - high * f_low) / (f_high - f_low)
+        if not middle and len(self.samples) > 2:
+            chosen, weights = self._nearest()
+            guess = float(sum(w * sample[0] for w, sample in zip(weights, chosen, strict=True)))
+            share = guess if low + 1e-3 * (high - low) < guess < high - 1e-3 * (high - low) else share
         _, _, base = min(self.samples, key=lambda sample: abs(sample[0] - share))
         at = next(sample[0] for sample in self.samples if sample[2] is base)
         y = base.y + (share - at) * (self.other.y - self.one.y)
@@ -90,19 +95,23 @@ class _Search:
             self.high, self.low = (share, value), (low, f_low if middle else 0.5 * f_low)
         return abs(value) > _CLOSE * self.scale and self.high[0] - self.low[0] > 1e-13
 
+    def _nearest(self) -> tuple[list[tuple[float, float, Spot]], list[float]]:
+        """Return up to four samples nearest to zero and the weights that interpolate between them where it is."""
+        ranked = sorted(self.samples, key=lambda sample: abs(sample[1]))
+        chosen = [ranked[0]]
+        for sample in ranked[1:]:
+            if len(chosen) < 4 and all(abs(sample[1] - c[1]) > 1e-3 * abs(sample[1]) for c in chosen):
+                chosen.append(sample)
+        values = [c[1] for c in chosen]
+        return chosen, [math.prod(v / (v - u) for v in values if v != u) for u in values]
+
     def near_enough(self) -> bool:
         """Tell whether the determinant has come down to a small share of what it is at the ends."""
         return min(abs(sample[1]) for sample in self.samples) < 0.05 * self.scale
 
     def interpolated(self) -> Spot:
         """Return the point where the determinant vanishes, from the samples nearest to it."""
-        ranked = sorted((s for s in self.samples), key=lambda sample: abs(sample[1]))
-        chosen = [ranked[0]]
-        for sample in ranked[1:]:
-            if len(chosen) < 4 and all(abs(sample[1] - c[1]) > 1e-3 * abs(sample[1]) for c in chosen):
-                chosen.append(sample)
-        values = np.array([c[1] for c in chosen])
-        weights = np.array([np.prod([v / (v - u) for v in values if v != u]) for u in values])
+        chosen, weights = self._nearest()
         y = sum(w * c[2].y for w, c in zip(weights, chosen, strict=True))
         drive = float(sum(w * c[2].drive for w, c in zip(weights, chosen, strict=True)))
         return Spot(np.asarray(y), drive, chosen[0][2].tangent)

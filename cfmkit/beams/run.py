@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from cfmkit.curves import FloatArray
 
 _HOPS = 60  # decisions on one path
-_FINE_STEPS = 8
+_FINE_STEPS = 32  # of a beam, where singular points are looked for
 _LOOSEST = 1e-7  # tolerance of Newton's method
 _SMALLEST = 1e-7  # shortest step as a share of the drive's range
 
@@ -67,7 +67,7 @@ class Run:
         Integration forward breaks the symmetry of a beam by its error, and that acts on a bifurcation as an
         imperfection does: singular points are looked for where that error is rounding.
         """
-        steps = max(_FINE_STEPS, 2 * self.mesh.steps)
+        steps = max(-(-_FINE_STEPS // self.mesh.segments), 2 * self.mesh.steps)
         return ExpandedSolver(self.layout, Mesh(self.mesh.segments, steps), 1e-11)
 
     def follow(self) -> None:
