@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections import deque
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import partial
+from itertools import islice
 from multiprocessing import get_context
 from typing import TYPE_CHECKING, Any
 
@@ -13,11 +15,14 @@ from cfmkit.errors import CfmError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
+    from concurrent.futures import Future
 
     from cfmkit.beams.drive import Control, Drive
     from cfmkit.beams.network import Network
     from cfmkit.beams.path import Path
     from cfmkit.curves import FloatArray
+
+_CHUNK, _AHEAD = 32, 4  # networks sent at once; chunks for each process that are on their way
 
 
 @dataclass(frozen=True)
@@ -64,7 +69,7 @@ def trace_many(
     Parameters
     ----------
     networks : iterable of Network
-        Taken one by one in one process, all at once for several.
+        Taken one by one, or as they are needed by several processes: however many there are, few are kept.
     drive : Displacement, Rotation or Loading
         What is done to each.
     control : Control, optional
@@ -78,10 +83,25 @@ def trace_many(
     if workers <= 1:
         yield from map(one, networks)
         return
-    many = list(networks)
-    size = max(1, len(many) // (8 * workers))
     with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
-        yield from pool.map(one, many, chunksize=size)
+        waiting: deque[Future[list[Outcome]]] = deque()
+        for chunk in _chunks(networks):
+            waiting.append(pool.submit(_outcomes, chunk, one))
+            if len(waiting) > _AHEAD * workers:
+                yield from waiting.popleft().result()
+        while waiting:
+            yield from waiting.popleft().result()
+
+
+def _chunks(networks: Iterable[Network]) -> Iterator[list[Network]]:
+    """Yield the networks in lists of at most `_CHUNK`."""
+    source = iter(networks)
+    while chunk := list(islice(source, _CHUNK)):
+        yield chunk
+
+
+def _outcomes(networks: list[Network], one: Callable[[Network], Outcome]) -> list[Outcome]:
+    return [one(network) for network in networks]
 
 
 def _outcome(network: Network, drive: Drive, control: Control | None, collect: Callable[[Path], Any]) -> Outcome:

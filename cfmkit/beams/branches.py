@@ -179,7 +179,8 @@ def hop(run: Run, spot: Spot, asked: int) -> Spot | None:
         back = run.fine.solve(wide.y, spot.drive - forward * ahead)
         found = None if back is None or back.unstable == wide.unstable else locate(run.fine, wide, back, True)
         place, before = (spot.drive, near.unstable) if found is None else (found.spot.drive, found.after)
-        run.events.append(Event("bifurcation", place * run.unit, before, near.unstable))
+        kind = "unresolved" if found is None else "bifurcation"
+        run.events.append(Event(kind, place * run.unit, before, near.unstable))
         run.branch = "primary"
         run.append(run.as_points(near, -1))
         return near

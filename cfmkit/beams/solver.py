@@ -139,8 +139,7 @@ class Solver:
 
     def tangent_at(self, y: FloatArray, drive: float) -> tuple[FloatArray, FloatArray]:
         """Return the tangent by the unknowns z, symmetrised, and by the drive."""
-        out = np.empty((1, 2 * self.n_dofs + 1))
-        entry.forces(self.model, self.n_free, y.copy()[None], np.array([drive]), out, self.scratch)
+        entry.tangent(self.model, self.n_free, y.copy(), drive, self.scratch)
         h = self.scratch[0][: self.n]
         return 0.5 * (h[:, : self.n] + h[:, : self.n].T), h[:, self.n].copy()
 

@@ -81,4 +81,4 @@ def test_a_branch_s_end_that_was_stepped_over_is_noticed(
     assert all(name.startswith("bifurcated") for name in names[:on_branch])
     assert all(name == "primary" for name in names[on_branch:])
     assert path.events[-1].kind == "unresolved"
-    assert path.events[-1].drive == pytest.approx(travel[on_branch] * 1e-3)
+    assert travel[on_branch - 1] < path.events[-1].drive * 1e3 <= travel[on_branch] * (1 + 1e-9)

@@ -21,6 +21,7 @@ from cfmkit.beams.kernels import observe as _observe
 from cfmkit.beams.kernels.compiler import door
 
 _follow, _solve, _forces, _states = _march.march, _newton.solve, _observe.forces, _observe.states
+_tangent = _observe.tangent
 _slopes, _row_slopes, _held_slopes = _columns.slopes, _columns.row_slopes, _columns.held_slopes
 
 
@@ -40,7 +41,10 @@ def _doors(stamp: str) -> tuple[Any, ...]:
             return _solve(m, n_free, a[0], d, b, one, (options[0], options[1]), c, scratch)
         if task == MARCH:
             return _follow(m, n_free, f, one, c, b, options, a, d, e, scratch)
-        _forces(m, n_free, a, d, e, scratch)
+        if task == TANGENT:
+            _tangent(m, n_free, f, one, scratch)
+        else:
+            _forces(m, n_free, a, d, e, scratch)
         return 0, 0
 
     @door(stamp)
@@ -63,7 +67,7 @@ def _doors(stamp: str) -> tuple[Any, ...]:
     return real, states, slopes, row_slopes, held_slopes
 
 
-SOLVE, MARCH, FORCES = 0, 1, 2
+SOLVE, MARCH, FORCES, TANGENT = 0, 1, 2, 3
 STAMP = digest()
 _real, states, slopes, row_slopes, held_slopes = _doors(STAMP)
 
@@ -105,6 +109,11 @@ def march(
 def forces(m: Any, n_free: int, ys: Any, drives: Any, out: Any, scratch: Any) -> None:
     """Set values, residual forces and spring energy at points; see `cfmkit.beams.kernels.observe.forces`."""
     _real(FORCES, m, n_free, 0.0, drives, (ys, drives, drives, drives, out, drives), scratch)
+
+
+def tangent(m: Any, n_free: int, y: Any, drive: float, scratch: Any) -> None:
+    """Set the first matrix of the work space to the Jacobian; see `cfmkit.beams.kernels.observe.tangent`."""
+    _real(TANGENT, m, n_free, drive, y, (y[None], y, y, y, _NONE, y), scratch)
 
 
 _NONE = np.zeros((0, 0))

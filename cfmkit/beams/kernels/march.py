@@ -12,7 +12,7 @@ DONE, STALLED, INERTIA, LONG, FULL, OUTSIDE = 0, 1, 2, 3, 4, 5
 """Why a march ended: all asked points reached; the smallest step failed; the number of unstable directions changed;
 a segment is too long for its load; no room for more points; the drive left its range."""
 
-KEPT = 4  # points that the extrapolation uses
+KEPT = 6  # points that the extrapolation uses
 SHORT = 0.25  # dM1/dM0 of a segment below which it must be split
 INFO = 6  # unstable directions, index of the asked point or -1, parameter, iterations, d(drive)/ds, shortness
 

@@ -6,23 +6,45 @@ from cfmkit.beams.kernels.chain import pose_of
 from cfmkit.beams.kernels.compiler import kernel
 from cfmkit.beams.kernels.flow import plain_flow
 from cfmkit.beams.kernels.newton import all_values, assemble
-from cfmkit.beams.kernels.springs import add_springs
+from cfmkit.beams.kernels.springs import add_force, add_loads, add_springs, jacobian
 
 STATE = 7  # x, y, rotation, moment, h, v, strain energy since the segment's start
 
 
 @kernel
 def forces(m, n_free, ys, drives, out, scratch):
-    """Set degrees of freedom, residual forces on them and the springs' energy, side by side, at each point."""
-    h, _, _, residual, values, ends, rel, store, work, _ = scratch
-    n = values.shape[0]
+    """Set degrees of freedom, residual forces on them and the springs' energy, side by side, at solved points.
+
+    The forces of beams are those at the ends that the solution has.
+    """
+    h, _, _, residual, values, _, _, _, work, _ = scratch
+    n, beams = values.shape[0], m.beam_end.shape[0]
+    pose, jac, force = work[4, 6], work[4, 0:3, :4], work[4, 7]
     for p in range(ys.shape[0]):
-        assemble(m, ys[p], drives[p], n_free, h, residual, values, ends, rel, store, work)
-        for i in range(n):
-            out[p, i], out[p, n + i] = values[i], residual[i]
+        y = ys[p]
+        all_values(m, y, drives[p], values)
         for i in range(residual.shape[0]):
             residual[i] = 0.0
+        add_loads(m, values, drives[p], h, residual, work)
         out[p, 2 * n] = add_springs(m, values, h, residual, work)
+        for e in range(beams):
+            own, last = n_free + 3 * beams + 6 * m.beam_segment[e] + 3, n_free + 3 * e
+            for side in range(2):
+                i = m.beam_end[e, side]
+                arm = pose_of(m, values, i, pose)
+                jacobian(m, i, arm, jac)
+                for r in range(3):
+                    force[r] = y[own + r] if side == 0 else -y[last + r]
+                add_force(m, h, residual, i, arm, jac, force)
+        for i in range(n):
+            out[p, i], out[p, n + i] = values[i], residual[i]
+
+
+@kernel
+def tangent(m, n_free, y, drive, scratch):
+    """Set the first matrix of the work space to the Jacobian at a point."""
+    h, _, _, residual, values, ends, rel, store, work, _ = scratch
+    assemble(m, y, drive, n_free, h, residual, values, ends, rel, store, work)
 
 
 @kernel
@@ -50,4 +72,4 @@ def states(m, n_free, y, drive, out):
             row += rows
 
 
-__all__ = ["STATE", "all_values", "forces", "pose_of", "states"]
+__all__ = ["STATE", "all_values", "forces", "pose_of", "states", "tangent"]
