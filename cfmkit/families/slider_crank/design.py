@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.bodies.slider_crank_springs import JOINTS
-from cfmkit.families.slider_crank.build import CannotBuild, resolve
+from cfmkit.families.slider_crank.build import TURN, CannotBuild, default_motion, resolve
 from cfmkit.families.slider_crank.family_of_optima import alternatives, chosen_rates, even_best
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.rates import least_squares, minimax
@@ -133,10 +133,11 @@ def _height(spec: SliderCrankSpec, lengths: dict[str, float]) -> float:
     goal = task.goal(wanted.window)
     if goal is None:
         return math.inf
-    if wanted.objective == "least-squares":
-        return goal.rms(least_squares(goal))
-    rates = minimax(goal)
-    return math.inf if rates is None else goal.deviation(rates)
+    least = wanted.objective == "least-squares"
+    rates = least_squares(goal) if least else minimax(goal)
+    if rates is None:
+        return math.inf
+    return goal.rms(rates) if least else goal.deviation(rates)
 
 
 def solve(task: Task) -> Solved:
@@ -190,12 +191,15 @@ def _written(solved: Solved) -> SliderCrankSpec:
 
 
 def _seen(solved: Solved) -> dict[str, tuple[float, float]]:
-    """Return the motion of the analysis, if it is stated and has to be longer to show all of the window."""
+    """Return the motion of the analysis, if it has to be another one to show all of the window."""
     name = "angle" if solved.task.wanted.torque is not None else "travel"
     asked: tuple[float, float] | None = getattr(solved.task.spec.analysis, name)
-    if asked is None or (asked[0] <= solved.window[0] and solved.window[1] <= asked[1]):
+    low, high = asked or default_motion(solved.task.assembly)
+    if low <= solved.window[0] and solved.window[1] <= high:
         return {}
-    return {name: (min(asked[0], solved.window[0]), max(asked[1], solved.window[1]))}
+    if asked is None and high - low >= TURN and solved.window[1] <= low:
+        return {name: (low - TURN, low)}
+    return {name: (min(low, solved.window[0]), max(high, solved.window[1]))}
 
 
 def _reference(solved: Solved) -> float:

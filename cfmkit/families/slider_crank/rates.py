@@ -7,6 +7,7 @@ least-squares problem with bounds. Which other rates are as good is one more lin
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -136,10 +137,12 @@ def _solved(goal: Goal, cost: FloatArray, worst: float | None) -> FloatArray | N
     return None if found.status != 0 or found.x is None else np.maximum(found.x, 0.0)
 
 
-def least_squares(goal: Goal) -> FloatArray:
-    """Return the rates with the smallest root mean square of the deviations; `held` is not looked at."""
+def least_squares(goal: Goal) -> FloatArray | None:
+    """Return the rates with the smallest root mean square of the deviations; None if `held` cannot be met."""
     from scipy.optimize import lsq_linear, nnls
 
+    if goal.held is not None:
+        return _held_least_squares(goal)
     scales, there = goal.scales(), goal.upper > 0.0
     matrix, scaled = goal.matrix / scales, np.zeros(len(goal.upper))
     if np.isinf(goal.upper[there]).all():
@@ -149,6 +152,39 @@ def least_squares(goal: Goal) -> FloatArray:
         scaled[there] = found.x
     rates: FloatArray = scaled / scales
     return rates
+
+
+def _held_least_squares(goal: Goal) -> FloatArray | None:
+    """Return the least squares among all ways to leave a rate free, at zero or at its largest: few springs."""
+    assert goal.held is not None
+    scales = goal.scales()
+    row, wanted = goal.held[0] / scales, goal.held[1]
+    top = goal.upper * scales
+    best: tuple[float, FloatArray] | None = None
+    for ends in product(*[(np.nan, 0.0, end) if 0.0 < end < np.inf else (0.0, np.nan)[: 1 + (end > 0)] for end in top]):
+        scaled = _free_least_squares(goal.matrix / scales, goal.wanted, (row, wanted), np.array(ends))
+        if scaled is None or (scaled < 0.0).any() or (scaled > top).any():
+            continue
+        rates = scaled / scales
+        if best is None or goal.rms(rates) < best[0]:
+            best = goal.rms(rates), rates
+    return None if best is None else best[1]
+
+
+def _free_least_squares(
+    matrix: FloatArray, wanted: FloatArray, held: tuple[FloatArray, float], ends: FloatArray
+) -> FloatArray | None:
+    """Return the unknowns, a row held and those not NaN in `ends` as they are there; None if that is impossible."""
+    free, solved = np.isnan(ends), np.nan_to_num(ends)
+    row, left = held[0][free], held[1] - held[0] @ solved
+    size = float(row @ row)
+    if size == 0.0:
+        return solved if abs(left) <= 1e-12 * float(np.abs(held[0]).max()) and not free.any() else None
+    base = row * (left / size)
+    along = np.linalg.svd(row[None])[2][1:].T  # the directions that leave the row as it is
+    gap = wanted - matrix @ solved - matrix[:, free] @ base
+    solved[free] = base + along @ np.linalg.lstsq(matrix[:, free] @ along, gap, rcond=None)[0]
+    return solved
 
 
 def ranges(goal: Goal, worst: float) -> FloatArray:

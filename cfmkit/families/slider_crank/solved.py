@@ -70,26 +70,36 @@ def check_reach(task: Task, window: tuple[float, float]) -> None:
 def cannot_hold(task: Task) -> Finding:
     """Return why a slope in the stretched position cannot be had."""
     text = "no springs, none of them negative, have that slope in the stretched position within their largest rates"
-    if task.assembly.stretched <= task.assembly.start:
-        text += ": the unloaded position is not before it, where only positive slopes exist"
+    if task.assembly.stretched == task.assembly.start:
+        text += ": the springs are relaxed there, and only positive slopes exist"
     elif task.goal((task.assembly.start, task.assembly.stretched)) is not None and "slider" not in task.wanted.springs:
         text += ": torsion springs alone have positive slopes; use the spring at the slider"
     return finding("no_zero_stiffness", text)
 
 
 def nowhere(task: Task) -> Finding:
-    """Return why no window keeps the tolerance."""
+    """Return why no window keeps the tolerance, or why no springs are better than none in the window."""
+    window = task.wanted.window
+    goal = task.goal(window) if window is not None else None
+    if goal is not None and task.assembly.drive == "torque" and (goal.matrix[:, :3] <= 0.0).all():
+        other = format_short(-task.wanted.target, "torque")
+        text = f"in the window torsion springs turn the crank the other way; ask for 'design.torque: {other}'"
+        return finding("infeasible_targets", text)
     if "slider" not in task.wanted.springs and task.assembly.drive == "torque":
         text = "torsion springs alone give no constant torque next to the stretched position; use the slider's, too"
         return finding("no_zero_stiffness", text)
+    if window is not None:
+        text = f"in the window the best springs are none: no others come closer to a constant {task.assembly.drive}"
+        return finding("infeasible_targets", f"{text}; ask for another window, or allow other springs")
     return finding("infeasible_targets", "no window keeps the tolerance; allow more, or change the lengths")
 
 
 def hopeless(task: Task, deviation: float) -> Finding:
     """Return that even the best springs have nothing of a constant effort, and why."""
     text = f"even the best springs are off by {100 * deviation:.3g} %: that is no constant {task.assembly.drive}"
-    if task.assembly.drive == "torque" and task.assembly.start >= task.assembly.stretched:
-        text += "; springs that are relaxed beyond the stretched position only give a torque that rises there"
+    ahead = (task.assembly.stretched - task.assembly.start) * task.wanted.target
+    if task.assembly.drive == "torque" and ahead <= 0.0:
+        text += "; the stretched position does not lie ahead of the unloaded one, and the torque only rises there"
         return finding("no_zero_stiffness", text)
     return finding("infeasible_targets", f"{text}; ask for a narrower window, or change the lengths")
 

@@ -68,7 +68,6 @@ class Mechanism(Printed):
 
 
 JointName = Literal["pivot", "crank_pin", "slider_pin", "slider"]
-PositiveTorque = Annotated[Torque, Field(gt=0)]
 PositiveForce = Annotated[Force, Field(gt=0)]
 
 
@@ -84,7 +83,9 @@ class MaxRates(Model):
 class CrankDesign(PrintedDesign):
     """What `cfmkit design` is to reach: rates of the springs, and lengths where a range is given."""
 
-    torque: PositiveTorque | None = Field(None, description="wanted at the crank, all legs together")
+    torque: Torque | None = Field(
+        None, description="wanted at the crank, all legs together; negative: towards smaller angles"
+    )
     force: PositiveForce | None = Field(None, description="wanted at the slider, all legs together")
     angle: tuple[Angle, Angle] | None = Field(None, description="crank angles at which the torque is wanted")
     travel: tuple[Length, Length] | None = Field(
@@ -128,6 +129,8 @@ class CrankDesign(PrintedDesign):
     def _one_target(self) -> Self:
         if (self.torque is None) == (self.force is None):
             raise ValueError("give either 'torque' or 'force': what is wanted constant")
+        if self.torque == 0.0:
+            raise ValueError("'torque' must not be 0: springs that are absent do that")
         if self.torque is None and (self.angle or self.stiffness is not None or self.hold_stiffness):
             raise ValueError("'angle', 'stiffness' and 'hold_stiffness' belong to 'torque'; with 'force' give 'travel'")
         if self.force is None and self.travel:

@@ -10,7 +10,7 @@ k phi (1 + s)(1 + p s (s - 1)); p > 4 is bistable, 1 < p < 4 local negative, p =
 
 from __future__ import annotations
 
-from math import cos
+from math import cos, remainder, tau
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -76,14 +76,12 @@ def _highest(function: Callable[[FloatArray], FloatArray], low: float, high: flo
 
 
 def small_angle_number(assembly: Assembly) -> float | None:
-    """Return p of the law for small angles; None where the unloaded position is not before the stretched one."""
+    """Return p of the law for small angles; None where the springs are relaxed stretched, or there is no torsion."""
     link = assembly.linkage
-    lead = link.stretched_angle - assembly.unloaded
-    if link.branch < 0:
-        lead = -lead
+    lead = remainder(link.stretched_angle - assembly.unloaded, tau)
     ratio = link.crank / link.coupler
     torsion = assembly.rates[0] + (1.0 + ratio) ** 2 * assembly.rates[1] + ratio**2 * assembly.rates[2]
-    if lead <= 0.0 or torsion == 0.0:
+    if lead == 0.0 or torsion == 0.0:
         return None
     bend = link.crank * (1.0 + ratio) / cos(link.stretched_angle)
     return float(assembly.rates[3] * bend**2 * lead**2 / (2.0 * torsion))

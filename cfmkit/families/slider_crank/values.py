@@ -97,7 +97,7 @@ _WHY = {
     "constant_travel": "the reference is outside the motion, or the force there is zero",
     "bistable_factor": "it needs torsion springs and a spring at the slider",
     "positive_factor": "it needs torsion springs and a spring at the slider",
-    "small_angle_number": "the unloaded position is not before the stretched one, or there is no torsion spring",
+    "small_angle_number": "the unloaded position is the stretched one, or there is no torsion spring",
     "folded_angle": "the coupler cannot fold over the crank",
 }
 

@@ -1,0 +1,96 @@
+"""Designs of slider-cranks: mirror images, held slopes, and targets that cannot be."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from slider_crank import config
+
+import cfmkit
+
+
+@pytest.mark.parametrize(
+    ("offset", "start", "branch", "mirrored"),
+    [("-30 mm", "5 deg", "right", lambda angle: -angle), ("30 mm", "185 deg", "left", lambda angle: 180 - angle)],
+)
+@pytest.mark.parametrize("window", [(0.866, 4.866), None])
+def test_the_mirror_image_of_a_design_has_the_opposite_torque(offset, start, branch, mirrored, window):
+    about = {"mechanism__offset": offset, "mechanism__unloaded_angle": start, "mechanism__branch": branch}
+    design = {"tolerance": "0.5 %"}
+    if window is not None:
+        design["angle"] = [f"{angle} deg" for angle in window]
+    first = cfmkit.design(config("li2019", analysis__angle=None, design=design | {"torque": "2 N*mm"}))
+    if window is not None:
+        design["angle"] = sorted(
+            (f"{mirrored(angle)} deg" for angle in window), key=lambda text: float(text.split()[0])
+        )
+    second = cfmkit.design(config("li2019", analysis__angle=None, design=design | {"torque": "-2 N*mm"}, **about))
+    rates = [found.spec.mechanism.springs.slider for found in (first, second)]
+    assert rates[1] == pytest.approx(rates[0], rel=1e-4)
+    widths = [cfmkit.analyze(found.spec).values["constant_angle"].value for found in (first, second)]
+    assert widths[1] == pytest.approx(widths[0], rel=1e-3)
+
+
+def test_a_torque_in_the_other_direction_is_told():
+    design = {"torque": "2 N*mm", "angle": ("-15 deg", "-10 deg")}
+    found = cfmkit.design(config("li2019", design=design))
+    assert found.status.key == "infeasible"
+    assert "-2 N*mm" in found.message
+    with pytest.raises(cfmkit.SpecError, match="must not be 0"):
+        config("li2019", design=design | {"torque": 0.0})
+
+
+def test_a_window_in_which_no_springs_help_is_told():
+    design = {"torque": "2 N*mm", "angle": ("0.866 deg", "4.866 deg"), "springs": ("slider",)}
+    found = cfmkit.design(config("li2019", design=design))
+    assert found.status.key == "infeasible"
+    assert "in the window" in found.message
+
+
+@pytest.mark.parametrize("caps", [None, {"slider": "0.14 N/mm"}, {"slider_pin": "0.2 N*mm/rad", "pivot": "0 N*mm/rad"}])
+@pytest.mark.parametrize("slope", [3.0, -3.0])
+def test_least_squares_holds_a_slope_too(caps, slope):
+    """Equal to the best of a general solver, slope included."""
+    from scipy.optimize import minimize
+
+    from cfmkit.families.slider_crank.rates import least_squares
+    from cfmkit.families.slider_crank.targets import Task, plain_assembly
+
+    design = {
+        "torque": "2 N*mm", "angle": ("0.866 deg", "4.866 deg"), "objective": "least-squares",
+        "stiffness": f"{2 * slope} N*mm/rad", "hold_stiffness": True, "max_rates": caps,
+    }  # fmt: skip
+    spec = config("li2019", design=design)
+    goal = Task(spec, plain_assembly(spec.mechanism, spec)).goal(spec.design.angle)
+    found, (row, held) = least_squares(goal), goal.held
+    scales = goal.scales()
+    line = {"type": "eq", "fun": lambda at: row @ (at / scales) - held, "jac": lambda _: row / scales}
+    starts = np.eye(4) * (goal.upper * scales).clip(max=1.0)
+    others = [
+        minimize(
+            lambda at: np.sum(goal.residual(at / scales) ** 2), start, constraints=[line], method="SLSQP",
+            bounds=list(zip(np.zeros(4), goal.upper * scales, strict=True)), options={"ftol": 1e-14, "maxiter": 400},
+        )
+        for start in starts
+    ]  # fmt: skip
+    best = min((other.fun for other in others if abs(line["fun"](other.x)) < 1e-9), default=None)
+    if best is None:
+        assert found is None
+        return
+    assert row @ found == pytest.approx(held, rel=1e-9)
+    assert (found >= 0).all()
+    assert (found <= goal.upper * (1 + 1e-12)).all()
+    assert goal.rms(found) ** 2 * len(goal.wanted) <= best * (1 + 1e-6)
+
+
+def test_the_law_for_small_angles_holds_from_either_side_and_after_a_turn():
+    values = [
+        cfmkit.analyze(config("li2019", mechanism__unloaded_angle=f"{start} deg", mechanism__offset=offset, **motion))
+        .values["small_angle_number"].value
+        for start, offset, motion in (
+            (-5, "30 mm", {}),
+            (5, "-30 mm", {}),
+            (355, "30 mm", {"analysis__angle": ("355 deg", "374 deg")}),
+        )
+    ]  # fmt: skip
+    assert values == pytest.approx([0.99269] * 3, rel=1e-4)
