@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from cfmkit.families import family
@@ -99,7 +99,11 @@ def _below(block: dict[str, Any], blocks: dict[str, Any], path: str) -> Iterator
     required = block.get("required", ())
     for name, node in block.get("properties", {}).items():
         here = f"{path}.{name}" if path else name
-        yield _key(here, node, blocks, name in required)
+        key = _key(here, node, blocks, name in required)
+        if path and "const" in node and not key.description:
+            # the one word that makes a block the kind it is means what the block means
+            key = replace(key, description=block.get("description", ""))
+        yield key
         for inner, marker in _inner_blocks(node, blocks):
             yield from _below(inner, blocks, here + marker)
 

@@ -154,7 +154,7 @@ def usable_interval(
     since = np.maximum.accumulate(np.where(steps.begins, np.arange(steps.begins.shape[1]), 0), axis=1)
     start = np.maximum(np.take_along_axis(steps.low, since, axis=1), valid[:, None])
     length, rows = steps.high - start, np.arange(len(motion))
-    best = length.argmax(axis=1)
+    best = (length >= length.max(axis=1, keepdims=True) * (1 - 1e-9)).argmax(axis=1)
     some = length[rows, best] > 0
     return np.where(some, start[rows, best], np.nan), np.where(some, steps.high[rows, best], np.nan)
 

@@ -128,7 +128,9 @@ def usable_interval(cycle: Cycle) -> Interval | None:
     bad = sorted(interval for branch in cycle.branches for interval in _bad(branch, reference))
     allowed = cycle.frame.valid if cycle.frame.valid is not None else (travel,)
     gaps = [gap for lo, hi in allowed for gap in _gaps(max(lo, travel[0]), min(hi, travel[1]), bad)]
-    return max(gaps, key=lambda gap: gap[1] - gap[0], default=None)
+    longest = max((high - low for low, high in gaps), default=0.0)
+    # the first of those that are equally long but for rounding
+    return next((gap for gap in gaps if gap[1] - gap[0] >= longest * (1 - 1e-9)), None)
 
 
 def _mean(cycle: Cycle) -> float:

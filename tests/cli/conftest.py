@@ -36,14 +36,14 @@ class Cli:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
 
-    def __call__(self, *arguments: str, stdin: str | bytes = "", **environment: str) -> Outcome:
+    def __call__(self, *arguments: str, stdin: str | bytes = "", timeout: float = 300, **environment: str) -> Outcome:
         done = subprocess.run(
             [COMMAND, *arguments],
             cwd=self.folder,
             input=stdin.encode() if isinstance(stdin, str) else stdin,
             env=self.environment(**environment),
             capture_output=True,
-            timeout=120,
+            timeout=timeout,
             check=False,
         )
         return Outcome(done.returncode, done.stdout.decode(), done.stderr.decode())

@@ -41,8 +41,11 @@ def batch(cli, *arguments: str, quick: bool = True):
     return cli("batch", *arguments, "-o", "out", *(("--no-plots", "-j", "1") if quick else ()))
 
 
-def test_the_configurations_of_the_package_pass_as_a_batch(cli):
-    done = cli("batch", str(CONFIGS), "-o", "out", "--no-plots", "--junit", "reports/cfmkit.xml")
+@pytest.mark.parametrize(
+    "verb", [("--verb", "analyze"), pytest.param((), id="design", marks=pytest.mark.slow)], ids=lambda verb: verb[-1]
+)
+def test_the_configurations_of_the_package_pass_as_a_batch(cli, verb):
+    done = cli("batch", str(CONFIGS), "-o", "out", "--no-plots", "--junit", "reports/cfmkit.xml", *verb, timeout=1200)
     assert done.code == 0, done.out + done.err
     found = rows(cli)
     assert len(found) == len([*CONFIGS.rglob("*.yaml")])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
@@ -10,9 +11,20 @@ import cfmkit
 from cfmkit import families
 
 CONFIGS = sorted((Path(__file__).parents[2] / "configs").glob("*.yaml"))
+LONG = ("beam_design_lan",)
 
 
-@pytest.mark.parametrize("path", CONFIGS, ids=lambda path: path.stem)
+def _cases():
+    return [pytest.param(path, marks=pytest.mark.slow) if path.stem in LONG else path for path in CONFIGS]
+
+
+def metrics(folder):
+    """Return what metrics.json holds, and its warnings, of which a design may have more than an analysis."""
+    document = json.loads((folder / "metrics.json").read_text())
+    return document, {item["name"] for item in document.pop("warnings")}
+
+
+@pytest.mark.parametrize("path", _cases(), ids=lambda path: path.stem)
 def test_a_config_is_analysed_and_designed_with_exit_0(cli, path):
     spec = cfmkit.load(path)
     assert cli("analyze", str(path), "-o", "one", "-q", "--no-plots").code == 0
@@ -20,5 +32,7 @@ def test_a_config_is_analysed_and_designed_with_exit_0(cli, path):
         return
     assert cli("design", str(path), "-o", "two", "-q", "--no-plots").code == 0
     assert cli("analyze", "two/design.yaml", "-o", "three", "-q", "--no-plots").code == 0
-    for name in ("metrics.json", "curve.csv"):
-        assert (cli.folder / "two" / name).read_bytes() == (cli.folder / "three" / name).read_bytes(), name
+    (designed, told), (analysed, found) = (metrics(cli.folder / name) for name in ("two", "three"))
+    assert designed == analysed
+    assert found <= told
+    assert (cli.folder / "two/curve.csv").read_bytes() == (cli.folder / "three/curve.csv").read_bytes()

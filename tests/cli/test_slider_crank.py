@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -34,7 +35,7 @@ def test_torque_mode_writes_angles_torques_and_pictures(cli):
     metrics = json.loads((cli.folder / "out/metrics.json").read_text())["metrics"]
     assert metrics["stiffness_class"]["value"] == "zero"
     assert metrics["constant_angle"]["value"] == pytest.approx(2.7088, abs=1e-4)
-    assert "stiffness class          zero" in done.out
+    assert re.search(r"^  stiffness class +zero$", done.out, re.M)
 
 
 @pytest.mark.usefixtures("specs")

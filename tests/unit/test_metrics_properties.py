@@ -4,7 +4,7 @@ import itertools
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 from cfmkit.curves import Column, Curve
@@ -96,7 +96,14 @@ def test_a_travel_twice_as_long_doubles_lengths_and_areas_and_leaves_forces_and_
         assert same(more[name], item.value, power), name
 
 
+TWO_EQUAL_STRETCHES = [
+    [np.array([0.0, 1.125, 1.1875, 1.25, 1.4375]), np.array([62.5, 41.0, 25.0, 25.0, 25.0])],
+    [np.array([0.0, 0.0625, 0.125, 1.4375]), np.array([25.0, 86.625, 25.0, 25.0])],
+]
+
+
 @PROPERTY
+@example(TWO_EQUAL_STRETCHES, (0.0, 1.0))
 @given(loops(), WINDOWS)
 def test_the_direction_in_which_a_branch_is_stored_changes_nothing(sides, part):
     window = Window(part[0] * sides[0][0][-1], part[1] * sides[0][0][-1])
