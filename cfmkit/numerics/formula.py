@@ -21,7 +21,7 @@ _TWO = {
     ast.Div: operator.truediv,
     ast.Pow: operator.pow,
 }
-_ONE = {ast.UAdd: operator.pos, ast.USub: operator.neg}
+_ONE: dict[type[ast.unaryop], Callable[[Any], Any]] = {ast.UAdd: operator.pos, ast.USub: operator.neg}
 _FUNCTIONS = {name: getattr(np, name) for name in ("sin", "cos", "tan", "sqrt", "exp", "abs", "tanh", "log")} | {
     "min": np.minimum,
     "max": np.maximum,
@@ -57,7 +57,7 @@ def formula(text: str) -> Callable[[FloatArray], FloatArray]:
 
 
 def _value(node: ast.expr, x: FloatArray) -> Any:
-    if isinstance(node, ast.Constant) and type(node.value) in (int, float):
+    if isinstance(node, ast.Constant) and isinstance(node.value, int | float) and not isinstance(node.value, bool):
         return float(node.value)
     if isinstance(node, ast.Name) and node.id in ("x", "pi"):
         return x if node.id == "x" else np.pi
