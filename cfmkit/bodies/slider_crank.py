@@ -82,7 +82,7 @@ class Linkage:
         Folded; where the offset is too large for that, the stretched position on the other side.
         """
         short = self.crank - self.coupler
-        if abs(self.offset) >= abs(short):
+        if abs(self.offset) > abs(short):
             return -self.stretched_position
         return math.sqrt((short - self.offset) * (short + self.offset))
 

@@ -94,3 +94,37 @@ def test_the_law_for_small_angles_holds_from_either_side_and_after_a_turn():
         )
     ]  # fmt: skip
     assert values == pytest.approx([0.99269] * 3, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("limited", "least"),
+    [
+        ({"max_rates": {"slider": "0.001 N/mm"}}, 50.0),
+        ({"springs": ("pivot", "crank_pin", "slider_pin")}, 40.0),
+        (
+            {"max_rates": {
+                "slider": "0.001 N/mm", "pivot": "0.01 N*mm/rad", "crank_pin": "0.01 N*mm/rad",
+                "slider_pin": "0.1 N*mm/rad",
+            }},
+            10.0,
+        ),
+    ],
+)  # fmt: skip
+def test_springs_that_fail_at_the_stretched_position_get_a_window_elsewhere(limited, least):
+    design = {"torque": "2 N*mm", "tolerance": "0.5 %"} | limited
+    found = cfmkit.design(config("li2019", analysis__angle=None, design=design))
+    assert "window_not_proven" in {item.name for item in found.warnings}
+    result = cfmkit.analyze(found.spec)
+    low, high = (result.values[f"constant_angle_{end}"].value for end in ("start", "end"))
+    assert np.rad2deg(high - low) > least
+    assert result.values["reference_torque"].value == pytest.approx(2e-3)
+    rates = found.spec.mechanism.springs
+    assert rates.slider <= (1.0 if "max_rates" in limited else 0.0)
+
+
+def test_a_window_that_moves_on_while_it_is_searched_grows_to_the_tolerance():
+    """From a start where the force is steep the search wanders; the window it ends with uses up the tolerance."""
+    design = {"force": "1.5 N", "tolerance": "0.5 %", "springs": ("pivot", "crank_pin", "slider_pin")}
+    changes = {"mechanism__unloaded_angle": None, "mechanism__unloaded_offset": 0.5}
+    found = cfmkit.design(config("bilancia2019", design=design, **changes))
+    assert "at most 0.5 %" in found.message

@@ -181,5 +181,5 @@ def default_motion(assembly: Assembly) -> tuple[float, float]:
         return assembly.start, assembly.start + TURN
     room = SHORT_OF_END * (high - low)
     if assembly.drive == "force":
-        return 0.0, high - room
+        return (0.0, high - room) if high > room else (low + room, 0.0)  # relaxed folded, it can only be pulled
     return low + room, high - room

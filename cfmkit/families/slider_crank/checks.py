@@ -77,13 +77,20 @@ def _of_torque(spec: SliderCrankSpec, solution: Solution) -> Iterator[Finding]:
             f"over a full turn the spring at the {' and at the '.join(name.replace('_', ' ') for name in wound)} is "
             "wound up: after it the torque is another one; springs at slider and slider pin alone repeat themselves",
         )
-    first, last = (found.equilibria[0], found.equilibria[-1]) if found.equilibria else (None, None)
-    if first and last and first.stable and last.stable and abs(last.motion - first.motion - TURN) < 1e-6:
+    rests = [item.motion for item in found.equilibria if item.stable]
+    again = [(a, b) for a in rests for b in rests if a < b and _same_pose(a, b)]
+    if again:
+        different = sum(not any(_same_pose(a, b) for a in rests if a < b) for b in rests)
         yield finding(
             "same_position_twice",
-            f"{deg(first.motion)} and {deg(last.motion)} are the same position: the {found.name} curve has "
-            f"{int(found.classified.stable[0]) - 1} different stable positions on the circle",
+            f"{deg(again[0][0])} and {deg(again[0][1])} are the same position: the {found.name} curve has "
+            f"{different} different stable positions on the circle",
         )
+
+
+def _same_pose(first: float, second: float) -> bool:
+    """Return whether two crank angles are whole turns apart."""
+    return abs(math.remainder(second - first, TURN)) < 1e-6
 
 
 def _of_force(spec: SliderCrankSpec, solution: Solution) -> Iterator[Finding]:

@@ -86,7 +86,8 @@ def _constant(curves: Monotone, window: tuple[float, float], tolerance: float) -
     inside = (curves.place >= window[0]) & (curves.place <= window[1]) & np.isfinite(curves.value)
     high = np.where(inside, curves.value, -np.inf).max(axis=1)
     low = np.where(inside, curves.value, np.inf).min(axis=1)
-    constant: NDArray[np.bool_] = inside.any(axis=1) & (high - low <= tolerance * np.abs(high + low))
+    with np.errstate(invalid="ignore"):  # where no place is inside
+        constant: NDArray[np.bool_] = inside.any(axis=1) & (high - low <= tolerance * np.abs(high + low))
     return constant
 
 

@@ -151,8 +151,8 @@ def not_proven(solved: Solved) -> Finding:
     low, high = (_place(solved, end) for end in solved.window)
     return finding(
         "window_not_proven",
-        f"{low} to {high} is the widest window that a local search from the stretched position found; wider ones may "
-        "exist",
+        f"{low} to {high} is the widest window that a local search found, from the stretched position or from the "
+        "flattest place; wider ones may exist",
     )
 
 

@@ -2,7 +2,8 @@
 
 For a width, the place of the window with the smallest largest deviation is searched; the width is then found by
 steps in the law deviation ~ width^3 inside a shrinking bracket. A local search from the
-neighbourhood of the stretched position: wider windows may exist elsewhere.
+neighbourhood of the stretched position, or, where that has none, from the flattest place of
+the motion: wider windows may exist elsewhere.
 """
 
 from __future__ import annotations
@@ -31,6 +32,9 @@ CLOSE = 1.0 - 1e-4
 
 NARROW = 0.08
 """Once a window is found, the next one is looked for so near, as a share of its width."""
+
+POOR, PLACES = 0.5, 25
+"""A window narrower than this share of what was expected is also looked for elsewhere, at so many places."""
 
 KEPT = 1.0 - 2e-5
 """Between the places on which it is judged, a deviation can be larger by this."""
@@ -68,8 +72,29 @@ def widest(task: Task, tolerance: float) -> Window | None:
         return None
     tolerance *= KEPT
     width, middle = _first_guess(task, tolerance)
+    width = min(width, last - first)
+    best = _grown(task, tolerance, width, middle, 0.6)
+    if best is not None and best.width >= POOR * width:
+        return best
+    elsewhere = _flattest(task, width)
+    found = None if elsewhere is None else _grown(task, tolerance, width, elsewhere, NARROW)
+    return max((item for item in (best, found) if item is not None), key=lambda item: item.width, default=None)
+
+
+def _flattest(task: Task, width: float) -> float | None:
+    """Return the middle of the window of a width with the smallest deviation, of some all over the motion."""
+    first, last = task.allowed
+    places = (first + (last - width - first) * k / (PLACES - 1) for k in range(PLACES))
+    found = [item for item in (_solved(task, low, low + width, COARSE) for low in places) if item is not None]
+    best = min(found, key=lambda item: item.deviation, default=None)
+    return None if best is None else 0.5 * (best.low + best.high)
+
+
+def _grown(task: Task, tolerance: float, width: float, middle: float, look: float) -> Window | None:
+    """Return the widest window found from a width and a middle on, looking aside by a share of the width."""
+    first, last = task.allowed
     best: Window | None = None
-    low, high, look = 0.0, last - first, 0.6
+    low, high = 0.0, last - first
     for _ in range(STEPS):
         width = min(width, last - first)
         found = _best_place(task, width, middle, look)
@@ -79,6 +104,8 @@ def widest(task: Task, tolerance: float) -> Window | None:
             best, low = found, max(low, width)
             if found.deviation >= tolerance * CLOSE or width >= last - first:
                 break
+            if width > 0.9 * high and found.deviation < 0.5 * tolerance:
+                high = last - first  # the window has moved on from where that width had failed
         else:
             high = min(high, width)
         if high - low <= 1e-6 * high:
