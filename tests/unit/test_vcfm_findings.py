@@ -99,9 +99,85 @@ def test_the_stroke_that_a_design_cannot_reach_is_told_with_the_nearest_that_it_
     assert "above 4.35 mm" in design.message
 
 
+def test_a_pull_at_which_nothing_holds_the_shuttle_is_told_and_not_more():
+    for model in ("analytic", "exact"):
+        found = analyzed(f"analysis.fidelity={model}", "requirements=[]", preloads="[-10 mm]")
+        assert "a preload of -10 mm" in message(found, "preload_out_of_range")
+        assert found.values["rest_shift_max"].value is None
+        assert found.values["least_force"].value < 0
+
+
+def test_a_window_beyond_the_travel_says_nothing_of_a_pull():
+    found = analyzed("analysis.window=[7 mm, 9 mm]", "requirements=[]", preloads="[0 mm, -1 mm]")
+    assert "preload_out_of_range" not in names(found)
+
+
+def test_the_least_force_is_that_past_the_peak_of_the_leaves():
+    found = analyzed()
+    assert found.values["least_force"].value == pytest.approx(12.02, abs=0.01)  # where they buckle, not at rest
+    assert "12.02 N at least (at 0.9125 mm" in message(found, "bistable")
+    assert analyzed(*leaf(thickness="3.1 mm")).values["least_force"].value is None
+
+
+@pytest.mark.parametrize(
+    ("changes", "preload", "words"),
+    [
+        ((), "-10 mm", "stretched by 10 mm"),
+        ((), "30 mm", "compressed by 36 mm"),
+        (("mechanism.positive.angle=20 deg",), "0 mm", "leaves of the spring are at 20 deg"),
+    ],
+)
+def test_a_spring_beyond_its_closed_form_is_told(changes, preload, words):
+    changes = ("requirements=[]", *changes)
+    assert words in message(analyzed(*changes, preloads=f"[{preload}]"), "theory_range")
+    assert "theory_range" not in names(analyzed(*changes, "analysis.fidelity=exact", preloads=f"[{preload}]"))
+
+
+def designed(*changes):
+    return api.design(cfmkit.load("configs/vcfm_pla.yaml", ["requirements=[]", *changes]))
+
+
+def test_leaves_of_a_given_length_that_the_preload_pulls_too_hard_are_refused():
+    """The stress allowed is passed at rest, in tension; longer leaves are within it."""
+    found = designed("design.adjustment=100 N", "design.leaf_length=31 mm")
+    assert found.status is Status.INFEASIBLE
+    assert found.warnings[0].name == "stress_unreachable"
+    longer = found.nearest_feasible["design.leaf_length"]
+    assert designed("design.adjustment=100 N", f"design.leaf_length={longer}").status is Status.COMPLETE
+
+
+def test_a_design_holds_its_stress_where_the_whole_preload_pulls_the_leaves():
+    found = designed("design.adjustment=100 N", "analysis.travel=4.7 mm")
+    full = found.spec.design.preload_stroke
+    exact = api.analyze(found.spec.replace({"analysis.fidelity": "exact", "analysis.preloads": (0.0, full)}))
+    assert exact.values["bistable_stress_max"].value == pytest.approx(30e6, rel=2e-3)
+    pulled = exact.curves[1]
+    assert pulled.extra["bistable_stress"].values.argmax() == 0
+
+
+def test_what_is_proposed_meets_the_limits_that_come_next_too():
+    found = designed("design.leaf_length=30.23 mm", "design.stroke=1 mm")
+    assert found.warnings[0].name == "yield"
+    near = [f"{path}={value}" for path, value in found.nearest_feasible.items()]
+    assert designed("design.leaf_length=30.23 mm", "design.stroke=1 mm", *near).status is Status.COMPLETE
+
+
+def test_a_design_for_a_shuttle_that_can_turn_is_refused():
+    found = designed("mechanism.bistable.guided=false")
+    assert found.warnings[0].name == "asymmetric_buckling"
+    assert found.nearest_feasible == {"mechanism.bistable.guided": "true"}
+
+
+def test_a_design_whose_exact_leaves_jump_is_refused_with_a_longer_stroke():
+    found = designed("design.stroke=0.1 mm", "design.leaf_length=40 mm")
+    assert found.warnings[0].name == "no_linear_region"
+    longer = found.nearest_feasible["design.stroke"]
+    assert designed(f"design.stroke={longer}", "design.leaf_length=40 mm").status is Status.COMPLETE
+
+
 def test_every_finding_is_explained_and_no_other_can_be_made():
     tested = {*CASES, "preload_out_of_range", "force_reversal", "unstable_branch", "stroke_unreachable"}
-    designs = {"too_thin", "envelope", "stress_unreachable"}  # see test_vcfm_design.py
+    designs = {"too_thin", "envelope", "stress_unreachable"}  # the first two: test_vcfm_model.py
     assert tested | designs == set(FINDINGS)
     with pytest.raises(KeyError):
         finding("bad_luck", "")

@@ -9,6 +9,7 @@ import numpy as np
 
 from cfmkit.families.vcfm.findings import finding, mm, mpa, newton, percent, rate
 from cfmkit.families.vcfm.preload import measured_stiffness_for
+from cfmkit.families.vcfm.springs import Diamond
 from cfmkit.families.vcfm.vbeam import (
     BISTABLE_ABOVE,
     FLAT_BUCKLED_ABOVE,
@@ -32,6 +33,9 @@ WAVY = 0.02
 
 TURNING = 20.1907 / (4.0 * np.pi**2)
 """Load at which a leaf buckles whose shuttle can turn, over that with a shuttle that cannot."""
+
+PRESSED, STRETCHED = 0.3, 0.12
+"""Deflection of a diamond's leaf over its length beyond which its stiffness is off by more than 3 and 4 percent."""
 
 ROUNDING = 1e-9
 
@@ -76,20 +80,27 @@ def _flatness(solution: Solution) -> Iterator[Finding]:
             "not_flat",
             f"K_p = {rate(one.positive_stiffness)} and K_n = {rate(one.negative_stiffness)} do not cancel: over "
             f"{mm(low)} ... {mm(high)} the force varies by {percent(ripple)} of its maximum, {percent(allowed)} is "
-            f"allowed; make one of the two structures {percent(abs(one.positive_stiffness / max(one.negative_stiffness, 1e-30) - 1))} "  # noqa: E501
-            "stiffer or softer by its width",
+            f"allowed{_balancing(one.positive_stiffness, one.negative_stiffness)}",
         )
+
+
+def _balancing(positive: float, negative: float) -> str:
+    """Return by how much the width of either structure is off, where that is what is wrong."""
+    if negative <= 0 or positive <= 0 or abs(positive / negative - 1.0) < 0.01:
+        return ""
+    wide, stiff = positive / negative, negative / positive
+    return f"; leaves {wide:.3g} times as wide, or a spring {stiff:.3g} times as wide, make them equal"
 
 
 def _returns(solution: Solution) -> Iterator[Finding]:
     push, (low, high) = solution.nominal, solution.window
-    moving = push.travel > max(push.rest or 0.0, 0.0) + 1e-3 * solution.parts.strip.rise
-    least = int(np.argmin(np.where(moving, push.force, np.inf)))
-    force, place = float(push.force[least]), float(push.travel[least])
     q = float(solution.parts.strip.slenderness)
-    if solution.spec.mechanism.bistable.structure == "v-beam" and q > BISTABLE_ABOVE:
+    if push.least and solution.spec.mechanism.bistable.structure == "v-beam" and q > BISTABLE_ABOVE:
+        place, force = push.least
+        end = mm(float(push.travel[-1]))
         back = (
-            f"its force stays above {newton(force)} (at {mm(place)}), so the mechanism returns by itself"
+            f"its force past the peak of the leaves is {newton(force)} at least (at {mm(place)}; followed to {end}), "
+            "so the mechanism returns by itself"
             if force > 0
             else f"its force falls to {newton(force)} at {mm(place)}: the mechanism stays there until it is pulled back"
         )
@@ -122,11 +133,12 @@ def _preloads(solution: Solution) -> Iterator[Finding]:
         if push.preload >= 0:
             continue
         inside = push.inside(solution.window)
-        if push.rest is None or push.rest > solution.window[0] or inside.min() <= 0:
+        if push.rest is None or push.rest > solution.window[0] or inside.min(initial=np.inf) <= 0:
+            low, high = solution.window
             yield finding(
                 "preload_out_of_range",
-                f"with a preload of {mm(push.preload)} no outward force is left in the window: the "
-                f"force there is K_p (h + dr), which vanishes at {mm(-solution.parts.balance)}",
+                f"with a preload of {mm(push.preload)} no outward force is left somewhere in {mm(low)} ... {mm(high)}: "
+                f"where the leaves are flat it is K_p (h + dr), which vanishes at {mm(-solution.parts.balance)}",
             )
             return
 
@@ -207,6 +219,29 @@ def _range(solution: Solution) -> Iterator[Finding]:
             f"({mm(reach)}): the force there is off by percents; verify with 'analysis.fidelity: exact'",
             "analysis.fidelity=exact",
         )
+    yield from _spring_range(solution)
+
+
+def _spring_range(solution: Solution) -> Iterator[Finding]:
+    spring = solution.parts.spring
+    if not isinstance(spring, Diamond):
+        return
+    angle, length = float(spring.strip.angle), float(spring.strip.length)
+    ends = [push.preload + float(place) for push in solution.pushes for place in (push.travel[0], push.travel[-1])]
+    worst = max(ends, key=lambda end: end / PRESSED if end > 0 else -end / STRETCHED)
+    share = abs(worst) / (2.0 * length)
+    if angle > STEEP:
+        told = f"the leaves of the spring are at {degrees(angle):.3g} deg: its stiffness changes with its compression"
+    elif share > (PRESSED if worst > 0 else STRETCHED):
+        what = "compressed" if worst > 0 else "stretched"
+        told = f"the spring is {what} by {mm(abs(worst))}, each leaf by {percent(share)} of its length"
+    else:
+        return
+    yield finding(
+        "theory_range",
+        f"{told}; the closed form's constant stiffness is off by percents: verify with 'analysis.fidelity: exact'",
+        "analysis.fidelity=exact",
+    )
 
 
 def _truss(solution: Solution) -> Iterator[Finding]:

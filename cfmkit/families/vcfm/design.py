@@ -34,6 +34,9 @@ if TYPE_CHECKING:
 SQUAT = 2.0
 """Least width of a leaf over its thickness: narrower ones buckle out of the plane."""
 
+ROUNDS = 8
+"""Limits met one after the other on the way to what is feasible."""
+
 
 def design(spec: VcfmSpec, run: Run) -> Design:
     """Return a complete specification that meets the targets of the `design` block.
@@ -50,6 +53,18 @@ def design(spec: VcfmSpec, run: Run) -> Design:
     Design
         INFEASIBLE, with the reason and the nearest feasible values, if there is none.
     """
+    found = _attempt(spec)
+    nearest, last = dict(found.nearest_feasible), found
+    for _ in range(ROUNDS):
+        if last.status is not Status.INFEASIBLE or not last.nearest_feasible:
+            break
+        # what cures one limit may break the next: what is proposed must meet all of them
+        last = _attempt(spec.replace({path: {"true": True}.get(value, value) for path, value in nearest.items()}))
+        nearest |= last.nearest_feasible
+    return replace(found, nearest_feasible=nearest if last.status is Status.COMPLETE else {})
+
+
+def _attempt(spec: VcfmSpec) -> Design:
     target, allowable = spec.design, spec.mechanism.material.allowable
     if target is None:
         return Design(None, Status.INVALID, "this spec has no 'design' block: add the targets 'force', 'stroke', ...")
@@ -85,6 +100,7 @@ def closed_form(spec: VcfmSpec, target: VcfmDesign) -> Sizes:
         With the constraint that cannot be met, and the nearest value that can.
     """
     about, rise = spec.mechanism.material, target.height
+    check_guide(spec)
     thickness = thickness_for(target)
     shortest = shortest_leaf(spec, target, thickness)
     length = target.leaf_length or shortest
@@ -122,6 +138,19 @@ def spring_side(spec: VcfmSpec, target: VcfmDesign, leaf: Strip) -> Strip:
     side = Strip(length, tilt, t, 1.0, e, made.poisson)
     share = 0.5 if positive.loaded == "half" else 1.0
     return replace(side, width=float(target.force / target.height / Diamond(side, share).stiffness))
+
+
+def check_guide(spec: VcfmSpec) -> None:
+    """Raise if the shuttle can turn: the leaves would buckle at half the load that they are sized for."""
+    if not spec.mechanism.bistable.guided:
+        raise Infeasible(
+            finding(
+                "asymmetric_buckling",
+                "the shuttle can turn, so the leaves buckle at half the load and the force is not constant: use two "
+                "Vs at a distance, or a guide",
+            ),
+            {"mechanism.bistable.guided": "true"},
+        )
 
 
 def check_width(spec: VcfmSpec, target: VcfmDesign, leaf: Strip) -> None:

@@ -21,6 +21,9 @@ STEEPEST = radians(15)
 MARGIN = 1.01
 """On that where a leaf length is proposed: the exact model changes widths by less than a percent."""
 
+SNAPPING = 3.2
+"""Rise over thickness below which leaves that buckle may do so with a jump."""
+
 ROOM = 1.02
 """On the room that is proposed: the exact stress may lengthen the spring, and so widen it."""
 
@@ -89,6 +92,13 @@ def _stroke_for(rise: float, thickness: float) -> float:
             )
         )
     return 4.0 * rise / 3.0 * sqrt(free)
+
+
+def followable_stroke(rise: float, leaf: Strip) -> dict[str, str]:
+    """Return the stroke from which on exact leaves buckle without a jump; nothing where that is not what is wrong."""
+    if rise >= SNAPPING * leaf.thickness:
+        return {}
+    return {"design.stroke": at_least(_stroke_for(rise, rise / SNAPPING))}
 
 
 def shortest_leaf(spec: VcfmSpec, target: VcfmDesign, thickness: float) -> float:

@@ -66,6 +66,15 @@ class Push:
         total: FloatArray = np.add(self.leaves.force, self.spring_force)
         return total
 
+    @cached_property
+    def least(self) -> tuple[float, float] | None:
+        """Where and how small the force becomes once the leaves are past their peak [m, N]; None if they have none."""
+        falls = np.flatnonzero((np.diff(self.leaves.force) < 0) & (self.travel[:-1] >= 0))
+        if not len(falls):
+            return None
+        lowest = int(falls[0] + np.argmin(self.force[falls[0] :]))
+        return float(self.travel[lowest]), float(self.force[lowest])
+
     def window(self, flatness: float) -> tuple[float, float] | None:
         """Return the longest stretch on which (max - min)/max of the force is within `flatness` [m]; None if none."""
         first, last = longest_window(self.force[None, :], flatness)

@@ -11,7 +11,11 @@ import numpy as np
 from cfmkit.families.vcfm.design import sized_leaf, written
 from cfmkit.families.vcfm.exact import ExactSampler
 from cfmkit.families.vcfm.findings import finding, mpa
-from cfmkit.families.vcfm.limits import Infeasible, Sizes, at_least
+from cfmkit.families.vcfm.limits import Infeasible, Sizes, at_least, followable_stroke
+from cfmkit.families.vcfm.model import rest_of
+from cfmkit.families.vcfm.parts import parts
+from cfmkit.families.vcfm.samples import LawSampler
+from cfmkit.numerics.roots import bracketed_root
 
 if TYPE_CHECKING:
     from cfmkit.families.vcfm.spec import VcfmSpec
@@ -57,16 +61,27 @@ def refined(spec: VcfmSpec, sizes: Sizes) -> Sizes:
 def fit_widths(spec: VcfmSpec, sizes: Sizes) -> tuple[Sizes, tuple[float, float]]:
     """Return the sizes with widths that make the exact force flattest, and the exact stress of leaves and spring [Pa].
 
-    The fit is over the middle 84 % of the linear region, without preload; the stress of the leaves is the largest up
-    to its end, that of the spring the one there with the whole preload.
+    The fit is over the middle 84 % of the linear region, without preload; the stress of the leaves is the largest from
+    where the whole preload pulls them to the end of that region, that of the spring the one there under that preload.
+
+    Raises
+    ------
+    Infeasible
+        If the exact leaves cannot be followed that far.
     """
     target = spec.design
     first, last = sizes.linear
     middle, half = 0.5 * (first + last), 0.5 * MIDDLE * (last - first)
     places = np.linspace(middle - half, middle + half, 101)
-    spec_of_pass = written(spec, sizes)
     full = target.preload_stroke if target else 0.0
-    sampler = ExactSampler(spec_of_pass.replace({"analysis.preloads": (0.0, full)}), last, 0.02 * last)
+    made = written(spec, sizes).replace({"analysis.preloads": (0.0, full), "analysis.branch": "stable"})
+    back = -(rest_of(LawSampler(parts(made)), full, places) or 0.0)
+    sampler = ExactSampler(made, last, max(1.2 * back, 0.02 * last))
+    if sampler.problem:
+        raise Infeasible(
+            finding("no_linear_region", f"the exact model does not confirm the design: {sampler.problem}"),
+            followable_stroke(target.height, sizes.leaf) if target else {},
+        )
     leaves, spring = sampler.leaves(places).force, sampler.spring(places)[0]
     wanted = np.full(len(places), target.force if target else 0.0)
     (wide, stiff), *_ = np.linalg.lstsq(np.column_stack([leaves, spring]), wanted, rcond=None)
@@ -74,6 +89,17 @@ def fit_widths(spec: VcfmSpec, sizes: Sizes) -> tuple[Sizes, tuple[float, float]
     fitted = Sizes(
         replace(leaf, width=float(leaf.width * wide)), replace(side, width=float(side.width * stiff)), sizes.linear
     )
-    end = np.linspace(0.0, last, 201)
+    end = np.concatenate([[_rest(sampler, full, (wide, stiff))], np.linspace(0.0, last, 201)])
     stresses = float(sampler.leaves(end).stress.max()), float(sampler.spring(np.array([last + full]))[1].max())
     return fitted, stresses
+
+
+def _rest(sampler: ExactSampler, preload: float, factors: tuple[float, float]) -> float:
+    """Return where the shuttle rests at a preload with both widths changed by factors [m]."""
+
+    def force(travel: float) -> float:
+        place = np.array([travel])
+        return float((factors[0] * sampler.leaf_force(place) + factors[1] * sampler.spring(place + preload)[0])[0])
+
+    farthest = max(-preload, sampler.pulled.edges[-1])
+    return farthest if force(farthest) >= 0 else bracketed_root(force, farthest, 0.0)

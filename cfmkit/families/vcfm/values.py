@@ -34,7 +34,7 @@ DEFINITIONS = {
     "rest_shift_max": ("length", "largest distance of a rest position from the as-made pose, over all preloads"),
     "force_change_max": ("force", "largest change of the mean force by a preload, against the nominal one"),
     "force_per_preload": ("stiffness", "that change over the change of the preload"),
-    "least_force": ("force", "least force between rest and the end of the travel: positive if it returns by itself"),
+    "least_force": ("force", "least force once the leaves are past their peak: positive if it returns by itself"),
     "stiffness_mismatch": ("ratio", "|K_p - K_n| times the length of the window over the constant force"),
     "spring_stress_max": ("stress", "largest stress of the spring up to the end of the window, over all preloads"),
     "bistable_stress_max": ("stress", "largest stress of the leaves up to the end of the window, over all preloads"),
@@ -63,8 +63,8 @@ def values_of(solution: Solution) -> Mapping[str, Quantity]:
         "window_length": window[1] - window[0] if window else 0.0,
         "window_force": float(nominal.inside(window).mean()) if window else None,
         "rest_position": nominal.rest,
-        "rest_shift_max": max(abs(push.rest) for push in solution.pushes if push.rest is not None),
-        "least_force": _least(nominal),
+        "rest_shift_max": max((abs(push.rest) for push in solution.pushes if push.rest is not None), default=None),
+        "least_force": nominal.least[1] if nominal.least else None,
         "stiffness_mismatch": abs(one.positive_stiffness - one.negative_stiffness) * span / force if force else None,
         "spring_stress_max": _largest(solution, "spring"),
         "bistable_stress_max": _largest(solution, "leaves"),
@@ -80,13 +80,6 @@ def _quantity(name: str, value: float | None) -> Quantity:
 def _constant_force(solution: Solution) -> float:
     place = np.array([float(solution.parts.balance) + solution.nominal.preload])
     return float(solution.sampler.spring(place)[0][0])
-
-
-def _least(push: Push) -> float | None:
-    """Return the least force beyond the first percent of the travel, where it starts from zero [N]."""
-    start = push.rest or 0.0
-    moving = push.force[push.travel > start + 0.01 * (push.travel[-1] - start)]
-    return float(moving.min()) if len(moving) else None
 
 
 def mean_force(solution: Solution, push: Push) -> float | None:
