@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 from vcfm_support import analyzed, message, names, table_i
 
 import cfmkit
 from cfmkit import api
 from cfmkit.errors import SpecError
+from cfmkit.families.vcfm import refine
+from cfmkit.families.vcfm.exact import ExactSampler
 from cfmkit.families.vcfm.findings import FINDINGS, finding
 from cfmkit.results import Status
 
@@ -168,11 +171,21 @@ def test_a_design_for_a_shuttle_that_can_turn_is_refused():
     assert found.nearest_feasible == {"mechanism.bistable.guided": "true"}
 
 
-def test_a_design_whose_exact_leaves_jump_is_refused_with_a_longer_stroke():
+def test_a_design_whose_exact_leaves_cannot_be_followed_is_refused_with_a_longer_stroke(monkeypatch):
+    class Jumping(ExactSampler):
+        """Leaves that jump where they are thick."""
+
+        def __init__(self, spec, end, back):
+            super().__init__(spec, end, back)
+            about = spec.mechanism.bistable
+            if about.length * np.sin(about.angle) < 3.19 * about.thickness:
+                self.problem = "the leaves jump"
+
+    monkeypatch.setattr(refine, "ExactSampler", Jumping)
     found = designed("design.stroke=0.1 mm", "design.leaf_length=40 mm")
     assert found.warnings[0].name == "no_linear_region"
-    longer = found.nearest_feasible["design.stroke"]
-    assert designed(f"design.stroke={longer}", "design.leaf_length=40 mm").status is Status.COMPLETE
+    assert "the leaves jump" in found.message
+    assert found.nearest_feasible == {"design.stroke": "1.082 mm"}
 
 
 def test_every_finding_is_explained_and_no_other_can_be_made():
