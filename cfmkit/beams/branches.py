@@ -130,7 +130,7 @@ def _end_of_branch(run: Run, other: Spot, found: Singular) -> BranchEnd | None:
             break
     one = run.fine.solve(run.fine.expand(earlier.y[-1]), float(earlier.drive[-1]))
     beyond = run.fine.solve(run.fine.expand(points.y[-1]), float(points.drive[-1]))
-    closing = None if one is None or beyond is None else locate(run.fine, one, beyond, natural=True)
+    closing = None if one is None or beyond is None else locate(run.fine, one, beyond, natural=True, vector=False)
     if closing is None or beyond is None:
         return None
     reduced = run.fine.reduce
@@ -177,7 +177,9 @@ def hop(run: Run, spot: Spot, asked: int) -> Spot | None:
         if near is None or pose_change(run.solver, near.y, spot.y) > 0.2 * np.sqrt(ahead / run.span) + 1e-3:
             continue
         back = run.fine.solve(wide.y, spot.drive - forward * ahead)
-        found = None if back is None or back.unstable == wide.unstable else locate(run.fine, wide, back, True)
+        found = (
+            None if back is None or back.unstable == wide.unstable else locate(run.fine, wide, back, True, vector=False)
+        )
         place, before = (spot.drive, near.unstable) if found is None else (found.spot.drive, found.after)
         kind = "unresolved" if found is None else "bifurcation"
         run.events.append(Event(kind, place * run.unit, before, near.unstable))

@@ -34,8 +34,10 @@ class Singular:
     after: int
 
 
-def locate(solver: Solver, one: Spot, other: Spot, natural: bool, fold: bool = False) -> Singular | None:
-    """Return the singular point between two neighbouring equilibria with different inertia.
+def locate(
+    solver: Solver, one: Spot, other: Spot, natural: bool, fold: bool = False, vector: bool = True
+) -> Singular | None:
+    """Return the singular point between two neighbouring equilibria with different inertia; its null vector if wanted.
 
     The determinant of the tangent, with the sign that the inertia gives it, is brought near zero by the Illinois
     variant of the rule of false position, or faster where inverse interpolation stays inside the bracket. The last bit
@@ -47,7 +49,9 @@ def locate(solver: Solver, one: Spot, other: Spot, natural: bool, fold: bool = F
             break
     if not search.near_enough():
         return None
-    return _singular(solver, search.interpolated(), (one, other), fold)
+    spot = search.interpolated()
+    null = _null_of(solver, spot, search.regular) if vector else np.zeros(solver.n)
+    return Singular(spot, null, fold, one.unstable, other.unstable)
 
 
 class _Search:
@@ -69,6 +73,8 @@ class _Search:
     def _measure(self, spot: Spot) -> float:
         """Return the size of the tangent's determinant: positive with the inertia of the first end, else negative."""
         matrix, _ = self.solver.tangent_at(spot.y, spot.drive)
+        if spot is self.one:
+            self.regular = matrix
         size = float(np.exp(np.linalg.slogdet(matrix)[1]))
         return size if spot.unstable == self.one.unstable else -size
 
@@ -80,10 +86,7 @@ class _Search:
             chosen, weights = self._nearest()
             guess = float(sum(w * sample[0] for w, sample in zip(weights, chosen, strict=True)))
             share = guess if low + 1e-3 * (high - low) < guess < high - 1e-3 * (high - low) else share
-        _, _, base = min(self.samples, key=lambda sample: abs(sample[0] - share))
-        at = next(sample[0] for sample in self.samples if sample[2] is base)
-        y = base.y + (share - at) * (self.other.y - self.one.y)
-        drive = base.drive + (share - at) * (self.other.drive - self.one.drive)
+        y, drive = self._guess(share)
         near = self.solver.solve(y, drive, self.border, self.start + share * (self.stop - self.start))
         if near is None:
             return False
@@ -94,6 +97,14 @@ class _Search:
         else:
             self.high, self.low = (share, value), (low, f_low if middle else 0.5 * f_low)
         return abs(value) > _CLOSE * self.scale and self.high[0] - self.low[0] > 1e-13
+
+    def _guess(self, share: float) -> tuple[FloatArray, float]:
+        """Return unknowns and drive at a share, interpolated between the nearest samples."""
+        near = sorted(self.samples, key=lambda sample: abs(sample[0] - share))[:3]
+        places = [sample[0] for sample in near]
+        weights = [math.prod((share - q) / (p - q) for q in places if q != p) for p in places]
+        y = sum(w * sample[2].y for w, sample in zip(weights, near, strict=True))
+        return np.asarray(y), float(sum(w * sample[2].drive for w, sample in zip(weights, near, strict=True)))
 
     def _nearest(self) -> tuple[list[tuple[float, float, Spot]], list[float]]:
         """Return up to four samples nearest to zero and the weights that interpolate between them where it is."""
@@ -117,18 +128,16 @@ class _Search:
         return Spot(np.asarray(y), drive, chosen[0][2].tangent)
 
 
-def _singular(solver: Solver, spot: Spot, ends: tuple[Spot, Spot], fold: bool) -> Singular:
-    """Find the null vector in the scaling that balances a regular tangent nearby."""
-    one, other = ends
-    balance = np.ones(solver.n)
-    regular, _ = solver.tangent_at(one.y, one.drive)
+def _null_of(solver: Solver, spot: Spot, regular: FloatArray) -> FloatArray:
+    """Return the null vector in the scaling that balances a regular tangent nearby."""
+    balance, sizes = np.ones(solver.n), np.abs(regular)
     for _ in range(8):
-        balance /= np.sqrt(np.abs(regular * np.outer(balance, balance)).max(axis=1))
+        balance /= np.sqrt((sizes * balance).max(axis=1) * balance)
     matrix, _ = solver.tangent_at(spot.y, spot.drive)
     null = _null_vector(matrix * np.outer(balance, balance))
     direction = null * balance
     direction *= np.sign(direction[np.argmax(np.abs(null))]) / np.linalg.norm(direction)
-    return Singular(spot, direction, fold, one.unstable, other.unstable)
+    return np.asarray(direction)
 
 
 def _null_vector(matrix: FloatArray) -> FloatArray:

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from cfmkit.beams.path import Path
     from cfmkit.beams.run import Run
 
+_EARLY = 0.1  # share of the points: segments that are too long before it are cut in four
 _ROUNDS = 8  # meshes tried before giving up on the tolerance
 
 
@@ -59,7 +60,8 @@ def _solved(network: Network, drive: Drive, control: Control) -> Run:
         run = Run(layout, mesh, control)
         run.follow()
         if run.too_long and round_ < _ROUNDS - 1:
-            mesh = mesh.shorter()
+            early = run.asked() < _EARLY * len(drive.points)
+            mesh = mesh.shorter().shorter() if early else mesh.shorter()
             continue
         run.error = run.estimate()
         if run.error <= control.tolerance or round_ == _ROUNDS - 1:

@@ -2,9 +2,34 @@
 
 from __future__ import annotations
 
+import contextlib
+import sys
 from typing import Any
 
 import numba
+
+_ARRAYS = "numba.np.arraymath"
+
+
+def _leave_blas_out() -> None:
+    """Load the compiler's array functions without the BLAS that they ask for and that nothing here uses.
+
+    It would be scipy's, a quarter of a second to import. Whoever does use it still gets it, on first use.
+    """
+    if _ARRAYS in sys.modules or "scipy.linalg" in sys.modules:
+        return
+    with contextlib.suppress(ImportError, AttributeError):  # another version of the compiler: then with it
+        from numba.np import linalg
+
+        ask, linalg.ensure_blas = linalg.ensure_blas, lambda: None
+        try:
+            from numba.np import arraymath
+        finally:
+            linalg.ensure_blas = ask
+        vars(arraymath)["ensure_blas"] = ask
+
+
+_leave_blas_out()
 
 _MATH: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract"}}  # fused multiply and add: NaN stays NaN
 _INNER: dict[str, Any] = {**_MATH, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
