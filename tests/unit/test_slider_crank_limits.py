@@ -55,3 +55,16 @@ def test_a_window_outside_the_motion_is_no_trouble():
         warnings.simplefilter("error")
         result = cfmkit.analyze(config("li2019", analysis__window=("60 deg", "70 deg")))
     assert "stretched_outside_window" in {item.name for item in result.warnings}
+
+
+@pytest.mark.parametrize(("start", "side"), [(-30.0, "beyond"), (0.542 / DEG, "before")])
+def test_on_the_other_side_the_springs_are_nowhere_relaxed(start, side):
+    base = "li2019" if start < 0 else "bilancia2019"
+    changes = {"mechanism__unloaded_angle": f"{start} deg", "analysis__travel": ("0 mm", "20 mm")}
+    spec = config(base, **changes, analysis__drive="force", analysis__side=side, analysis__window=None)
+    result = cfmkit.analyze(spec)
+    assert abs(result.curve.force).min() > 0.05
+    assert result.values["stable_positions"].value == 0
+    assert "run_in" not in {item.name for item in result.warnings}
+    if base == "bilancia2019":
+        assert "force_unbounded" in {item.name for item in result.warnings}

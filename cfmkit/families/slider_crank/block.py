@@ -215,7 +215,9 @@ class Slab:
         places = np.broadcast_to(self.base.nodes[0], self.sharp.shape)
         spec = self.base.spec
         curves = Monotone(places, self.sharp)
-        return classify(curves, self.base.assembly.start, spec.analysis.tolerance, window_of(spec))
+        return classify(
+            curves, self.base.assembly.start, spec.analysis.tolerance, window_of(spec), self.base.assembly.rest
+        )
 
     @cached_property
     def band(self) -> tuple[FloatArray, FloatArray]:

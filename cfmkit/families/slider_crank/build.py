@@ -69,6 +69,12 @@ class Assembly:
         return self.unloaded if self.drive == "torque" else 0.0
 
     @property
+    def rest(self) -> float:
+        """The motion at which the springs are relaxed; NaN on the side of the stretched position where they are not."""
+        other_side = self.drive == "force" and self.side * self.linkage.knee(self.unloaded) < 0.0
+        return math.nan if other_side else self.start
+
+    @property
     def reach(self) -> tuple[float, float]:
         """Ends of the motion that the linkage allows [rad or m]; infinite where the crank turns fully."""
         if self.drive == "torque":

@@ -101,7 +101,7 @@ class Character:
     @cached_property
     def classified(self) -> Classified:
         """Class, drop and number of equilibria."""
-        return classify(self.curve, self.assembly.start, self.tolerance, self.window)
+        return classify(self.curve, self.assembly.start, self.tolerance, self.window, self.assembly.rest)
 
     @property
     def kind(self) -> int:
@@ -139,7 +139,7 @@ class Character:
         )
 
     def _roots(self) -> Iterator[tuple[float, bool]]:
-        place, sign = self.curve.place[0], signs(self.curve, self.assembly.start)[0]
+        place, sign = self.curve.place[0], signs(self.curve, self.assembly.rest)[0]
         known = np.flatnonzero(sign)
         if not len(known):
             return
@@ -155,15 +155,15 @@ class Character:
     def _end(self, end: int, inner: int) -> float:
         """Return an equilibrium at an end of the interval: the unloaded position itself where that is meant."""
         place = self.curve.place[0]
-        close = abs(place[end] - self.assembly.start) <= abs(place[end] - place[inner])
-        return self.assembly.start if close else float(place[end])
+        close = abs(place[end] - self.assembly.rest) <= abs(place[end] - place[inner])
+        return self.assembly.rest if close else float(place[end])
 
     def _between(self, before: int, after: int) -> float:
         low, high = self.curve.place[0, before], self.curve.place[0, after]
-        if low <= self.assembly.start <= high and after - before > 1:
-            return self.assembly.start
+        if low <= self.assembly.rest <= high and after - before > 1:
+            return self.assembly.rest
         root = bracketed_root(self.effort, float(low), float(high))
-        return self.assembly.start if abs(root - self.assembly.start) <= SAME * (self.high - self.low) else root
+        return self.assembly.rest if abs(root - self.assembly.rest) <= SAME * (self.high - self.low) else root
 
     def band(self, reference: float, tolerance: float) -> tuple[float, float] | None:
         """Return the interval around a reference in which the effort is within a tolerance of that there.

@@ -110,6 +110,13 @@ def _of_force(spec: SliderCrankSpec, solution: Solution) -> Iterator[Finding]:
                 "beyond is taken; with an offset the other way has another force",
                 "analysis.side=before",
             )
+    elif math.isnan(assembly.rest) and abs(knee) < RUN_IN and solution.motion[0] <= 0.0:
+        yield finding(
+            "force_unbounded",
+            f"the crank is on the other side of the stretched position than where the springs are relaxed, "
+            f"{deg(abs(assembly.unloaded - link.stretched_angle))} away: the force comes down from no bound; "
+            "leave 'analysis.side' out for the side on which they are relaxed",
+        )
     elif abs(knee) < RUN_IN and solution.motion[0] <= 0.0 <= solution.motion[-1]:
         yield from _run_in(solution, knee)
     low = assembly.reach[0]

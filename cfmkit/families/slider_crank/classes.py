@@ -54,7 +54,13 @@ class Classified:
     unstable: NDArray[np.intp]
 
 
-def classify(curves: Monotone, start: float, tolerance: float, window: tuple[float, float] | None = None) -> Classified:
+def classify(
+    curves: Monotone,
+    start: float,
+    tolerance: float,
+    window: tuple[float, float] | None = None,
+    rest: float | None = None,
+) -> Classified:
     """Return the class of each curve.
 
     Parameters
@@ -67,11 +73,13 @@ def classify(curves: Monotone, start: float, tolerance: float, window: tuple[flo
         Half width of a band that counts as constant: a drop of no more than twice that is zero stiffness.
     window : tuple of (float, float), optional
         Where the effort is wanted constant: if it is, the stiffness is zero even without any fall.
+    rest : float, optional
+        Where the effort is known to be zero, NaN for nowhere; default: at the start.
     """
     place, value = curves.place, curves.value
     before, after = place <= start, place >= start
     drop = np.maximum(_drop(np.where(after, value, np.nan)), _drop(np.where(before, -value, np.nan)[:, ::-1]))
-    stable, unstable = _equilibria(curves, start)
+    stable, unstable = _equilibria(curves, start if rest is None else rest)
     falls = drop > 0.0
     if window is not None:
         falls = falls | _constant(curves, window, tolerance)

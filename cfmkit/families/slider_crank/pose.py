@@ -91,7 +91,7 @@ def key_positions(solution: Solution) -> tuple[Key, ...]:
     """Return three telling positions: unloaded, stretched or unstable, and the second stable one or the last."""
     low, high = float(solution.motion[0]), float(solution.motion[-1])
     start, stretched = solution.assembly.start, solution.assembly.stretched
-    first = key(solution, "unloaded", start) if low <= start <= high else key(solution, "first", low)
+    first = key(solution, "unloaded", start) if low <= solution.assembly.rest <= high else key(solution, "first", low)
     unstable, stable = solution.nearest(False), solution.nearest(True)
     if unstable is not None:
         middle = key(solution, "unstable", unstable.motion)
