@@ -299,3 +299,13 @@ def test_every_picture_can_be_drawn(stem):
         figure = draw()
         assert figure.axes
     assert ("adjustability" in pictures) is (len(result.curves) > 1)
+
+
+def test_the_map_of_preloads_shows_where_the_window_starts():
+    """From the as-made pose it stays where the leaves buckle; from rest it begins later the more the preload."""
+    found = analyzed(preloads="[4 mm, 7.5 mm]")
+    drawn = api.figures(found)["adjustability"]()
+    lines = [line.get_ydata() for line in drawn.axes[-1].lines if len(line.get_ydata()) > 10]
+    assert len(drawn.axes) == 3
+    assert lines[0] == pytest.approx(0.91, abs=0.02)
+    assert lines[1][-1] - lines[1][0] == pytest.approx(0.955 - 0.571, abs=0.03)

@@ -10,6 +10,7 @@ import numpy as np
 from cfmkit.families.vcfm.model import rest_of
 from cfmkit.families.vcfm.scene import scene
 from cfmkit.families.vcfm.truss import TrussLeaf
+from cfmkit.families.vcfm.windows import longest_window
 from cfmkit.plots import parts
 from cfmkit.plots.curves import Look, plot_curve
 from cfmkit.plots.diagram import Diagram, Limit, Region, Scale, Series, diagram_figure
@@ -41,6 +42,9 @@ if TYPE_CHECKING:
     from cfmkit.results import Result
 
 TRAVEL = Scale("displacement", "length")
+FINE = 961
+"""Places at which the start of a window is looked for."""
+
 PRELOADS = 41
 """Preloads of the map."""
 
@@ -151,7 +155,7 @@ def _mark(ax: Axes, push: Push, window: tuple[float, float], back: float, color:
 
 
 def adjustability(result: Result) -> Figure:
-    """Return the constant force and the rest position over the preload, with the paper's straight rules."""
+    """Return the constant force, the rest position and where the window starts, with the paper's straight rules."""
     solution: Solution = result.state
     given = np.array([push.preload for push in solution.pushes])
     over = np.linspace(given.min(), given.max(), PRELOADS)
@@ -172,8 +176,24 @@ def adjustability(result: Result) -> Figure:
         Series(rests, "rest position, moved back by", PURPLE, prefer=0.4),
         Series(by_rule, "K_p dr/(K_p + K_b1)", GREY, dashed=True, prefer=0.7),
     ]
+    starts = _starts(solution, over)
+    begins = [
+        Series(starts, "start of the window, from the as-made pose", BLUE, prefer=0.4),
+        Series(starts + rests, "start of the window, from rest", PURPLE, prefer=0.7),
+    ]
     diagrams = [Diagram(over, x, first, forces), Diagram(over, x, Scale("shift", "length"), shifts)]
+    if np.isfinite(starts + rests).any():
+        diagrams.append(Diagram(over, x, Scale("start", "length"), begins))
     return diagram_figure(Heading.of(result, "what the preload adjusts"), diagrams)
+
+
+def _starts(solution: Solution, preloads: FloatArray) -> FloatArray:
+    """Return where the longest window within the flatness starts at each preload [m]; NaN where there is none."""
+    travel = np.linspace(0.0, float(solution.nominal.travel[-1]), FINE)
+    leaves = solution.sampler.leaves(travel).force
+    forces = np.array([leaves + solution.sampler.spring(travel + preload)[0] for preload in preloads])
+    first, last = longest_window(forces, solution.spec.analysis.flatness)
+    return np.where(last > first, travel[first], np.nan)
 
 
 def _shift(solution: Solution, preload: float, grid: FloatArray) -> float:
