@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
+import pytest
 
 from cfmkit.beams import CLAMPED, Beam, Control, Displacement, Network, Node, PathStatus, Section, arc, guided, trace
 from cfmkit.beams.batch import trace_many
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
 
 DRIVE = Displacement("d", -np.pi / 2, np.array([1e-3, 2e-3]))
 
@@ -37,3 +43,20 @@ def test_two_processes_give_the_same_as_one() -> None:
     one, two = (list(trace_many(networks, DRIVE, workers=w)) for w in (1, 2))
     for a, b in zip(one, two, strict=True):
         np.testing.assert_array_equal(a.value.effort, b.value.effort)
+
+
+@pytest.mark.parametrize(("workers", "most"), [(1, 1), (2, 9 * 32)])
+def test_networks_are_taken_as_they_are_needed(workers: int, most: int) -> None:
+    """Endlessly many networks do not fill the memory."""
+    taken = 0
+
+    def endless() -> Iterator[Network]:
+        nonlocal taken
+        while True:
+            taken += 1
+            yield bent(0.3)
+
+    outcomes = trace_many(endless(), DRIVE, Control(tolerance=1e-4), workers=workers)
+    assert next(outcomes).status == "COMPLETE"
+    outcomes.close()  # type: ignore[attr-defined]
+    assert 1 <= taken <= most
