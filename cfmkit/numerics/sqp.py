@@ -10,7 +10,7 @@ Reference
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import Enum
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -45,6 +45,11 @@ class Program(Protocol):
         """Return their derivatives by z, (n,) and (m, n)."""
 
 
+def _never() -> bool:
+    """Return False: there is time."""
+    return False
+
+
 @dataclass(frozen=True)
 class Effort:
     """How long to try.
@@ -66,7 +71,7 @@ class Effort:
     steps: int = 60
     tolerance: float = 1e-6
     violation: float = 1e-5
-    stop: Callable[[], bool] = field(default=lambda: False)
+    stop: Callable[[], bool] = _never
     enough: float = -np.inf
 
 
@@ -115,27 +120,28 @@ def minimize(program: Program, start: FloatArray, bounds: FloatArray, effort: Ef
     effort = effort or Effort()
     z = np.clip(start, *bounds.T)
     memory = _Memory(program, effort)
-    if memory.at(z) is None:
-        return Optimum(z, np.inf, np.zeros(0), Ending.NO_ANSWER, memory.evaluations)
-    return memory.best_as(_solved(memory, z, bounds))
+    try:
+        if memory.at(z) is None:
+            return Optimum(z, np.inf, np.zeros(0), Ending.NO_ANSWER, memory.evaluations)
+        ending = _solved(memory, z, bounds)
+    except _Enough as end:
+        ending = end.ending
+    return memory.best_as(ending) if memory.best else Optimum(z, np.inf, np.zeros(0), ending, memory.evaluations)
 
 
 def _solved(memory: _Memory, z: FloatArray, bounds: FloatArray) -> Ending:
     """Run the solver; its answers are in the memory."""
     from scipy.optimize import minimize as slsqp
 
-    try:
-        found = slsqp(  # type: ignore[call-overload]
-            memory.objective,
-            z,
-            jac=memory.objective_slope,
-            method="SLSQP",
-            bounds=[(float(low), float(high)) for low, high in bounds],
-            constraints=[{"type": "ineq", "fun": memory.constraints, "jac": memory.constraint_slopes}],
-            options={"maxiter": memory.effort.steps, "ftol": memory.effort.tolerance},
-        )
-    except _Enough as end:
-        return end.ending
+    found = slsqp(  # type: ignore[call-overload]
+        memory.objective,
+        z,
+        jac=memory.objective_slope,
+        method="SLSQP",
+        bounds=[(float(low), float(high)) for low, high in bounds],
+        constraints=[{"type": "ineq", "fun": memory.constraints, "jac": memory.constraint_slopes}],
+        options={"maxiter": memory.effort.steps, "ftol": memory.effort.tolerance},
+    )
     return _ENDINGS.get(int(found.status), Ending.STUCK)
 
 
@@ -200,8 +206,9 @@ class _Memory:
     def slopes_at(self, z: FloatArray) -> Any:
         if self.sloped is None or not np.array_equal(z, self.sloped):
             found = self.program.slopes(z)
-            if found is not None or self.slope is None:
-                self.slope = found
+            if found is None and self.slope is None:
+                raise _Enough(Ending.STUCK)
+            self.slope = self.slope if found is None else found
             self.sloped = z.copy()
         return self.slope
 

@@ -28,8 +28,15 @@ def designable(path: Path) -> bool:
     return families.family(cfmkit.load(path).family).design is not None and cfmkit.load(path).design is not None
 
 
+SEARCHES = {"beam_design_lan"}  # designs by a search of minutes
+
 every_design = pytest.mark.parametrize(
-    "path", [path for path in CONFIGS if designable(path)], ids=lambda path: path.stem
+    "path",
+    [
+        pytest.param(path, id=path.stem, marks=[pytest.mark.slow] if path.stem in SEARCHES else [])
+        for path in CONFIGS
+        if designable(path)
+    ],
 )
 
 

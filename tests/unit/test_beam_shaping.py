@@ -85,7 +85,7 @@ def test_the_widest_window_has_the_derivative_of_the_force_by_its_start() -> Non
     _, rows = program.slopes(z)
     step = np.zeros_like(z)
     step[-1] = 1e-5
-    band = slice(0, 26)
+    band = slice(0, 34)
     slope = (program.values(z + step)[1] - program.values(z - step)[1])[band] / 2e-5
     np.testing.assert_allclose(rows[band, -1], slope, atol=1e-4)
 

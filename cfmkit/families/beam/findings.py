@@ -21,6 +21,7 @@ FINDINGS = {
     "rescale_stress": "after scaling, the stress reaches the allowable one within the window",
     "design_unsound": "the best shape that was found fails its audit",
     "objective_ill_posed": "the objective of the paper rewards a force that falls",
+    "starts_lost": "processes that worked on starts died",
     "search_cut_short": "the time budget ended before all starts were done",
     "surface_out_of_reach": "the surface asks for more displacement than the mechanism is solved for",
     "tip_lifts_off": "the force is not positive somewhere along the surface: the tip leaves it",

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from cfmkit.families.beam.shaping.limits import View
 
 LEAST_MIDDLE = 1e-3
+WEIGHT = 10.0
+"""On the half band: a solver that begins with the identity for the Hessian takes too small a slope for none."""
 
 
 @dataclass(frozen=True)
@@ -84,10 +86,10 @@ class Flattest:
         by_own = np.ones((len(rows), 2))
         by_own[:, 0] = np.concatenate([ratio, -ratio]) / level
         if not view.sloped:
-            return Aim(float(band), None, np.array([0.0, 1.0]), rows, None, by_own)
+            return Aim(WEIGHT * float(band), None, np.array([0.0, WEIGHT]), rows, None, by_own)
         slope = view.response.slopes.force[view.poses.window] / unit
         by_x = np.concatenate([-slope, slope])
-        return Aim(float(band), np.zeros(by_x.shape[1]), np.array([0.0, 1.0]), rows, by_x, by_own)
+        return Aim(WEIGHT * float(band), np.zeros(by_x.shape[1]), np.array([0.0, WEIGHT]), rows, by_x, by_own)
 
 
 @dataclass(frozen=True)

@@ -48,14 +48,25 @@ def blocked(task: Task, found: Iterable[Found], plan: Plan) -> Blocked:
     missed = missed_by(task, best[0])
     nearest: dict[str, str] = {}
     for name in missed:
-        gives = [met(task, one, task.orders[-1], plan, (name,)) for one in best]
+        gives = [_given(task, one, plan, (name,)) for one in best]
         for one in gives:
             if one.feasible:
                 return Blocked(missed, {}, one)
         slack = min((one.violation for one in gives if set(missed_by(task, one)) <= {name}), default=None)
         if slack is not None:
-            nearest |= NEAREST[name](task, 1.05 * slack)
+            nearest |= NEAREST[name](task, 1.02 * slack)
+    if not nearest:  # none gives way alone: all that are missed together, by the same share
+        gives = [_given(task, one, plan, tuple(missed)) for one in best]
+        slack = min((one.violation for one in gives if set(missed_by(task, one)) <= set(missed)), default=None)
+        if slack is not None:
+            nearest = {key: value for name in missed for key, value in NEAREST[name](task, 1.02 * slack).items()}
     return Blocked(missed, nearest, None)
+
+
+def _given(task: Task, found: Found, plan: Plan, give: tuple[str, ...]) -> Found:
+    """Return a design that meets all limits but some, and misses those as little as possible."""
+    rest = [met(task, found, task.orders[-1], plan, tuple(set(missed_by(task, found)) - set(give)) or give, 0.9)]
+    return met(task, rest[0], task.orders[-1], plan, give, 0.98)
 
 
 def missed_by(task: Task, found: Found) -> dict[str, str]:

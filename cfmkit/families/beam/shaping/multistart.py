@@ -55,12 +55,15 @@ class Explored:
     reused : int
         Starts that were noted by a run before.
     missing : int
-        Starts for which the time did not suffice.
+        Starts that led to nothing: the time did not suffice, or a process died.
+    lost : tuple of str
+        Why processes died.
     """
 
     found: dict[int, Found | None]
     reused: int
     missing: int
+    lost: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -102,32 +105,34 @@ def explored(task: Task, plan: Plan, counts: tuple[int, int], identity: str, run
     starts, wide = counts
     widens = task.objective == "range"
     share = (0.0, 0.75 if widens else 1.0)
-    records, reused = _done(Stage(OneStart(task, run.seed, plan), tuple(range(starts)), identity, share), run)
+    records, reused, lost = _done(Stage(OneStart(task, run.seed, plan), tuple(range(starts)), identity, share), run)
     found = {index: _found(records[index]["found"]) for index in sorted(records)}
     if widens:
         best = dict(list(ranked(task, found))[:wide])
         stage = Stage(OneWidening(task, best, plan), tuple(best), f"{identity} widened", (share[1], 1.0))
-        more, _ = _done(stage, run)
+        more, _, also = _done(stage, run)
+        lost += also
         found |= {index: _found(record["found"]) for index, record in more.items()}
-    return Explored(found, reused, starts - len(found))
+    return Explored(found, reused, starts - len(found), lost)
 
 
-def _done(stage: Stage, run: Run) -> tuple[dict[int, Any], int]:
-    """Return the records of a stage by number, and how many were noted before."""
+def _done(stage: Stage, run: Run) -> tuple[dict[int, Any], int, tuple[str, ...]]:
+    """Return the records of a stage by number, how many were noted before, and why processes died."""
     keys = {job: hashlib.sha256(f"{stage.identity} {job}".encode()).hexdigest()[:32] for job in stage.jobs}
     places = {job: run.notes.find(key) for job, key in keys.items()}
     records = {job: run.notes.read(place) for job, place in places.items() if place >= 0}
-    reused = len(records)
+    reused, lost = len(records), list[str]()
     _tell(stage, run, records)
     left = [job for job in stage.jobs if job not in records]
     for job, record in run.executor(stage.work, iter(left), stage.work.plan.late):
         if not isinstance(record, dict):
-            continue  # its process died
+            lost.append(str(getattr(record, "message", record)))
+            continue
         records[job] = record
         if not record["late"]:
             run.notes.add(keys[job], record)
         _tell(stage, run, records)
-    return records, reused
+    return records, reused, tuple(dict.fromkeys(lost))
 
 
 def _tell(stage: Stage, run: Run, records: dict[int, Any]) -> None:

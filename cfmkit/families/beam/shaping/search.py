@@ -116,9 +116,8 @@ def searched(task: Task, seed: int, index: int, plan: Plan) -> Found | None:
     """
     best: Found | None = None
     evaluations = plan.drawn
-    coarse = next((order for order in task.orders if order), task.orders[-1])
     for first in drawn(task, np.random.default_rng([seed, index]), plan)[: plan.tries]:
-        found = met(task, replace(first, evaluations=evaluations), coarse, plan)
+        found = met(task, replace(first, evaluations=evaluations), _coarse(task), plan)
         evaluations = found.evaluations
         if best is None or found.violation < best.violation:
             best = found
@@ -139,25 +138,38 @@ def improved(task: Task, found: Found, plan: Plan) -> Found:
 
 
 def drawn(task: Task, rng: np.random.Generator, plan: Plan) -> list[Found]:
-    """Return random straight networks that can be followed over the window, the most promising first."""
-    variables = Variables(task, 0)
-    program = Shaping(variables, task.window[0], Flattest())
+    """Return random networks that can be followed over the window, the most promising first.
+
+    Straight ones; curved ones too where those cannot move, as a single beam that does not stretch.
+    """
     found: list[Found] = []
-    for number, x in enumerate(candidates(variables, rng)):
-        if (number >= plan.drawn and found) or number >= 10 * plan.drawn or plan.late():
+    for order in dict.fromkeys((0, _coarse(task))):
+        variables = Variables(task, order)
+        program = Shaping(variables, task.window[0], Flattest())
+        for number, x in enumerate(candidates(variables, rng)):
+            if number >= plan.drawn or plan.late():
+                break
+            view = program.view(x)
+            if view is not None:
+                band = _half_band(view.response.state.force[view.poses.window])
+                excess = worst_of(program, x) if band < _STIFF else np.inf
+                found.append(Found(x, order, task.window[0], band, excess, "", 1))
+        if len(found) >= plan.tries:
             break
-        view = program.view(x)
-        if view is not None:
-            band = _half_band(view.response.state.force[view.poses.window])
-            excess = worst_of(program, x) if band < _STIFF else np.inf
-            found.append(Found(x, 0, task.window[0], band, excess, "", 1))
     return sorted(found, key=lambda one: (one.violation + _STEEP * max(0.0, one.objective - _FLAT), one.objective))
 
 
-def met(task: Task, found: Found, order: int, plan: Plan, give: tuple[str, ...] = tuple(LIMITS)) -> Found:
+def _coarse(task: Task) -> int:
+    """Return the lowest order that bends a beam, if there is one."""
+    return next((order for order in task.orders if order), task.orders[-1])
+
+
+def met(
+    task: Task, found: Found, order: int, plan: Plan, give: tuple[str, ...] = tuple(LIMITS), share: float = 0.5
+) -> Found:
     """Return a design that misses some limits as little as possible, at a half band that is no larger or small enough.
 
-    Given up where a round does not halve what is missed.
+    Given up where a round does not bring what is missed below a share of what it was.
     """
     cap = max(_FLAT, 1.1 * found.objective)
     variables, x = Variables(task, found.order).raised(found.x, max(order, found.order))
@@ -169,7 +181,7 @@ def met(task: Task, found: Found, order: int, plan: Plan, give: tuple[str, ...] 
         optimum = minimize(program, z, program.bounds, plan.effort(plan.meeting, enough=0.0))
         now, before = found_of(program, optimum, found.evaluations), found.violation
         found = now if now.violation < before else replace(found, evaluations=now.evaluations)
-        if found.feasible or not found.violation < 0.5 * before or plan.late():
+        if found.feasible or not found.violation < share * before or plan.late():
             break
         x = found.x
     return found

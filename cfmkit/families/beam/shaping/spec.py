@@ -91,7 +91,7 @@ class Optimise(Model):
     force: ForceWanted = Field(default_factory=ForceWanted, description="mean force over the window")
     starts: int = Field(20, ge=1, le=10_000, description="random starts")
     drawn: int = Field(60, ge=1, le=100_000, description="random networks looked at for each start")
-    widened: int = Field(4, ge=1, le=10_000, description="how many of the best are widened, for `range`")
+    widened: int = Field(8, ge=1, le=10_000, description="how many of the best are widened, for `range`")
     time_budget: Annotated[Time, Field(gt=0)] | None = Field(None, description="end the search after so long")
     tolerances: Tolerances = Field(default_factory=Tolerances, description="for the audit")
 

@@ -1,4 +1,4 @@
-"""Random starts: free nodes anywhere, beams straight, none crossing another, none too short."""
+"""Random starts: free nodes anywhere, beams straight or bent at random, no chord crossing another, none too short."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ _LEAST_CHORD = 0.1  # of the mean distance of joined nodes, if no slenderness is
 
 
 def candidates(variables: Variables, rng: np.random.Generator) -> Iterator[FloatArray]:
-    """Yield vectors of variables, all shape coefficients zero; at most 2000 places are tried."""
+    """Yield vectors of variables, coefficients up to half their limit; at most 2000 places are tried."""
     low, high = variables.bounds.T
     places = len(variables.task.coordinates)
     for _ in range(_MOST):
-        x = np.zeros(variables.count)
-        x[:places] = rng.uniform(low[:places], high[:places])
+        x = rng.uniform(low, high)
+        x[places:] *= 0.5
         if sound(variables, x):
             yield x
 

@@ -114,10 +114,17 @@ class Task:
     objective: Objective = "range"
     half_band: float = 0.025
     compared: tuple[float, float] | None = None
-    points: int = 13
+    points: int = 17
 
     @property
     def size(self) -> float:
-        """The unit of length: the largest distance of two nodes along an axis [m]."""
-        places = np.array([(node.x, node.y) for node in self.network.nodes.values()])
-        return float(np.ptp(places, axis=0).max())
+        """The unit of length: the largest distance along an axis of coordinates that do not vary, and of ranges [m].
+
+        It does not depend on where the free nodes are: a design that is designed again comes out the same.
+        """
+        free = {(one.node, one.axis): (one.low, one.high) for one in self.coordinates}
+        spans = []
+        for axis in (0, 1):
+            places = [free.get((name, axis), ((node.x, node.y)[axis],)) for name, node in self.network.nodes.items()]
+            spans.append(np.ptp([value for some in places for value in some]))
+        return float(max(spans))
