@@ -204,6 +204,8 @@ CASES = {
     "lateral_buckling": ("strip", ["mechanism.beam.width=1.5 mm"]),
     "side_force": ("strip", []),
     "pulled": ("strip", ["analysis.travel=[-1 mm, 5 mm]"]),
+    "force_negative": ("strip", ["analysis.travel=[0 mm, 150 mm]"]),
+    "wrong_branch": ("strip", ["mechanism.beam.centreline=[[0 mm,0 mm],[10 mm,7.5 mm],[50 mm,29 mm],[100 mm,60 mm]]"]),
     "branch_begins_late": ("strip", ["mechanism.unloaded_angle=0.60 rad", "analysis.side=before"]),
 }
 
@@ -213,7 +215,7 @@ def test_what_can_go_wrong_is_found_by_name(name: str) -> None:
     config, changes = CASES[name]
     result = api.analyze(spec(config, "analysis.points=61", "analysis.recheck=false", *changes))
     assert name in names(result), result.message
-    if name in ("pulled",):
+    if name in ("pulled", "wrong_branch"):
         assert result.status is Status.NO_EQUILIBRIUM
         assert not result.curves
 
@@ -222,6 +224,42 @@ def test_a_travel_beyond_all_reason_is_never_a_complete_curve() -> None:
     result = api.analyze(spec("strip", "analysis.points=21", "analysis.travel=[0 mm, 300 mm]"))
     assert result.status in (Status.PARTIAL, Status.NO_EQUILIBRIUM)
     assert names(result) & {"limit_point", "unstable", "not_converged"}
+
+
+def test_a_second_opinion_that_differs_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two elements to a strip are too few to agree; with enough of them nothing is told."""
+    from cfmkit.families.slider_crank.flexures import solution
+
+    wanted = spec("strip", "analysis.points=21", "analysis.recheck=true")
+    assert "second_opinion" not in names(api.analyze(wanted))
+    monkeypatch.setattr(solution, "by_elements", lambda path, points: recheck(path, points, elements=2))
+    assert "second_opinion" in names(api.analyze(wanted))
+
+
+def test_a_strip_is_on_its_side_from_the_first_micrometre() -> None:
+    """Its centre line passes the kink on a chord, farther off the crank pin than it has moved by then."""
+    result = api.analyze(spec("strip", "analysis.travel=[0 mm, 1 um]", "analysis.window=[0 mm, 1 um]"))
+    assert result.status is Status.COMPLETE
+    assert result.curve.effort[-1] == pytest.approx(0.0517, abs=1e-3)
+
+
+def test_the_kink_of_a_line_of_its_own_is_that_of_the_line() -> None:
+    points = ["analysis.points=21", "analysis.recheck=false"]
+    line = "mechanism.beam.centreline=[[0 mm, 0 mm], [50 mm, {} mm], [100 mm, 60 mm]]"
+    right = api.analyze(spec("strip", line.format(29), *points))
+    assert right.values["kink"].value == pytest.approx(-np.cos(np.arctan(0.6)) * MM)
+    assert right.status is Status.COMPLETE
+    assert "straight_start" in names(api.analyze(spec("strip", line.format(30), *points)))
+
+
+def test_flexures_longer_than_their_links_are_refused() -> None:
+    """A line that runs back on itself would have an equilibrium, too."""
+    for changes in (("strip", "mechanism.beam.flexure_length=80 mm"), ("lumped", "design.flexures.length=80 mm")):
+        result = (api.analyze if changes[0] == "strip" else api.design)(spec(*changes))
+        assert result.status is Status.INVALID
+        assert "take 80 mm of the crank" in result.message
+    with pytest.raises(cfmkit.SpecError, match="same corner twice"):
+        spec("strip", "mechanism.beam.centreline=[[0 mm, 0 mm], [0 mm, 0 mm], [1 mm, 0 mm]]")
 
 
 def test_findings_of_parts_are_findings_of_the_family() -> None:
@@ -297,6 +335,37 @@ def test_a_band_that_no_strip_keeps_is_infeasible() -> None:
     found = api.design(spec("taper_design", *narrow))
     assert found.status is Status.INFEASIBLE
     assert {item.name for item in found.warnings} == {"target_unreachable"}
+
+
+def test_what_would_be_feasible_is_said_with_its_number() -> None:
+    found = api.design(spec("taper_design", "design.force=100 N", "design.beam.nodes=3"))
+    assert found.status is Status.INFEASIBLE
+    nearest = found.nearest_feasible["design.force"]
+    assert api.design(spec("taper_design", f"design.force={nearest}", "design.beam.nodes=3")).status is Status.COMPLETE
+
+
+def test_a_given_travel_keeps_the_stress_at_its_exact_peak() -> None:
+    """Between the samples of the search the stress is higher: it is then searched again."""
+    wanted = ["design={force: 1.5 N, travel: [1 mm, 60 mm], beam: {goal: ripple, nodes: 5}}", "analysis.recheck=false"]
+    result = api.analyze(api.design(spec("taper_design", *wanted)).spec)
+    assert result.curve.extra["max_stress"].values.max() <= 42.5e6
+    assert "overstressed" not in names(result)
+
+
+def test_an_optimiser_that_stops_is_told() -> None:
+    """The root mean square of 25 mm has a flat valley: the steps allowed do not reach its end."""
+    from cfmkit.families.slider_crank.flexures import descent
+
+    wanted = "design={force: 1.5 N, travel: [1 mm, 25 mm], beam: {goal: rms, nodes: 5}}"
+    found = api.design(spec("taper_design", wanted))
+    assert descent.Ending.OPTIMUM.value not in found.message
+    assert "optimizer_stopped" in {item.name for item in found.warnings}
+
+
+def test_a_longest_stroke_before_the_band_is_refused() -> None:
+    found = api.design(spec("taper_design", "design.beam.longest=0.5 mm"))
+    assert found.status is Status.INVALID
+    assert "design.beam.longest" in found.message
 
 
 def test_random_starts_repeat_with_their_seed() -> None:

@@ -13,6 +13,7 @@ from cfmkit.families.slider_crank.flexures.chain import (
     Strip,
     flexure_ends,
     joints,
+    kink,
     lumped,
     spread,
 )
@@ -110,17 +111,33 @@ def chain_of_flexures(parts: Sequence[Flexure], made_of: Elasticity, linkage: Li
     return Chain(ends, pins, lambda points: lumped(points, parts, made_of), travel_direction(linkage), rise)
 
 
-def strip_chain(strip: Strip, made_of: Elasticity, linkage: Linkage, unloaded: float) -> Chain:
-    """Return a strip as a chain to press."""
-    pins = joints(linkage, unloaded)
+def pins_of(printed: Printed, linkage: Linkage, unloaded: float) -> FloatArray:
+    """Return the three points of a chain that say where it is kinked, (3, 2) [m].
+
+    Pivot, crank pin and slider pin; of a strip with a centre line of its own the ends, and between them the corner
+    farthest off the line through them, or the middle of a straight one.
+    """
+    line = None if printed.beam is None else printed.beam.centreline
+    if line is None:
+        return joints(linkage, unloaded)
+    points = np.array(line)
+    off = [abs(kink(np.array([points[0], point, points[-1]]))) for point in points[1:-1]]
+    middle = points[1 + int(np.argmax(off))] if off else 0.5 * (points[0] + points[-1])
+    return np.array([points[0], middle, points[-1]])
+
+
+def strip_chain(strip: Strip, made_of: Elasticity, pins: FloatArray, direction: float) -> Chain:
+    """Return a strip as a chain to press, kinked as three points of it say, in a direction of travel [rad]."""
 
     def build(points: FloatArray) -> Network:
         return Strip(points, strip.width, strip.thickness, strip.places).network(made_of)
 
     def rise(path: Path, index: int) -> float:
-        return _sideways(pins, path.shape(STRIP, index)[_crank_row(path, pins)] - pins[1])
+        before = _unloaded_samples(path)
+        row = int(np.hypot(*(before - pins[1]).T).argmin())
+        return _sideways(pins, path.shape(STRIP, index)[row] - before[row])
 
-    return Chain(strip.corners, pins, build, travel_direction(linkage), rise)
+    return Chain(strip.corners, pins, build, direction, rise)
 
 
 def travel_direction(linkage: Linkage) -> float:
@@ -134,10 +151,12 @@ def _sideways(pins: FloatArray, moved: FloatArray) -> float:
     return float(axis[0] * moved[1] - axis[1] * moved[0])
 
 
-def _crank_row(path: Path, pins: FloatArray) -> int:
-    """Return the sample of a strip that lies nearest to the crank pin before any load."""
-    fitted = path.fits[STRIP]
-    strip = path.layout.network.beams[STRIP]
-    line = np.asarray(strip.shape.points)  # type: ignore[union-attr]
-    share = float(np.hypot(*(pins[1] - line[0]))) / float(np.real(fitted.length))
-    return int(np.abs(path.sections(STRIP).place[0] - share).argmin())
+def _unloaded_samples(path: Path) -> FloatArray:
+    """Return where the samples of a strip lie before any load, (k, 2) [m].
+
+    The strip passes a kink on a chord, and a little off the crank pin: motions are those of its own points.
+    """
+    line = np.asarray(path.layout.network.beams[STRIP].shape.points)  # type: ignore[union-attr]
+    marks = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
+    place = path.sections(STRIP).place[0] * marks[-1]
+    return np.column_stack([np.interp(place, marks, line[:, 0]), np.interp(place, marks, line[:, 1])])

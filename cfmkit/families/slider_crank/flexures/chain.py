@@ -18,6 +18,7 @@ import numpy as np
 
 from cfmkit.beams import CLAMPED, FREE, Beam, Link, Network, Node, Polyline, Section, Support, Taper, guided
 from cfmkit.curves import read_only
+from cfmkit.errors import InputError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -105,8 +106,20 @@ def flexure_ends(places: FloatArray, lengths: Sequence[float], before: Sequence[
         The joints [m].
     lengths, before : sequences of three
         Length of each flexure [m], and the share of it that lies before its joint.
+
+    Raises
+    ------
+    cfmkit.errors.InputError
+        If two flexures are together longer than the link between their joints.
     """
     crank, coupler = places[1] - places[0], places[2] - places[1]
+    for k, (link, name) in enumerate(((crank, "crank"), (coupler, "coupler"))):
+        used = (1.0 - before[k]) * lengths[k] + before[k + 1] * lengths[k + 1]
+        if used > np.hypot(*link):
+            raise InputError(
+                f"the flexures at its ends take {used * 1e3:.4g} mm of the {name}, which has "
+                f"{np.hypot(*link) * 1e3:.4g} mm: make them shorter"
+            )
     crank, coupler = crank / np.hypot(*crank), coupler / np.hypot(*coupler)
     along = ((crank, crank), (crank, coupler), (coupler, coupler))
     ends = []

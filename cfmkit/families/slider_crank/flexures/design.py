@@ -18,12 +18,13 @@ import numpy as np
 from cfmkit.errors import InputError
 from cfmkit.families.slider_crank.build import CannotBuild, linkage_of, resolve, unloaded_angle
 from cfmkit.families.slider_crank.findings import finding, mm
-from cfmkit.families.slider_crank.flexures.assembly import corners, elasticity, travel_direction
+from cfmkit.families.slider_crank.flexures.assembly import corners, elasticity, pins_of, travel_direction
 from cfmkit.families.slider_crank.flexures.descent import Ending
+from cfmkit.families.slider_crank.flexures.infeasible import infeasible
 from cfmkit.families.slider_crank.flexures.judged import Judged, judge, rounded
 from cfmkit.families.slider_crank.flexures.model import slider_reach
 from cfmkit.families.slider_crank.flexures.resize import design_flexures
-from cfmkit.families.slider_crank.flexures.search import LOOSE, Found, Ranges, search, uniform_for_stroke
+from cfmkit.families.slider_crank.flexures.search import LOOSE, SHORTEST, Found, Ranges, search, uniform_for_stroke
 from cfmkit.families.slider_crank.flexures.spec import StripSpec
 from cfmkit.families.slider_crank.flexures.task import Form, Task
 from cfmkit.results import Design, Finding, Status
@@ -91,17 +92,21 @@ def _strip(spec: SliderCrankSpec, linkage: Linkage, unloaded: float, run: Run) -
     form, ranges = form_of(spec, wanted, task, linkage, unloaded)
     if wanted.shape == "uniform" and task.goal != "stroke":
         return _closed(spec, wanted, task, ranges)
-    judged = None
+    judged, pins, allowed = None, pins_of(spec.mechanism, linkage, unloaded), task.material.allowable_stress
     for reserve in RESERVES:
-        kept = replace(task, ripple=task.ripple - reserve)
+        made_of = replace(task.material, allowable_stress=allowed)
+        kept = replace(task, ripple=task.ripple - reserve, material=made_of)
         found = search(kept, form, ranges, wanted.seeds, run.seed, run.progress)
         if not found.descent.feasible:
-            return _infeasible(found)
-        judged = judge(rounded(found.values, ranges.form), found, _limits(spec), linkage, unloaded)
-        if judged is None or judged.window[1] > ENOUGH * found.program.stroke(found.descent.z):
+            return infeasible(found)
+        judged = judge(rounded(found.values, ranges.form), found, _limits(spec), pins)
+        if judged is not None and allowed is not None:
+            allowed /= max(1.0, judged.overstress)
+        good = judged is None or judged.window[1] > ENOUGH * found.program.stroke(found.descent.z)
+        if good and allowed == made_of.allowable_stress:
             break
     if judged is None:
-        return _infeasible(found)
+        return infeasible(found)
     return Design(
         _written(spec, judged, wanted),
         Status.COMPLETE,
@@ -132,6 +137,10 @@ def task_of(spec: SliderCrankSpec, linkage: Linkage, unloaded: float) -> Task:
     start, stroke = travel if travel is not None else (beam.start, 0.2 * reach)
     if beam.goal != "rms" and start <= 0:
         raise InputError("'design.travel' must begin behind the run-in, above 0: the force begins at zero there")
+    if beam.goal == "stroke" and beam.longest is not None and beam.longest <= start + SHORTEST:
+        raise InputError(
+            f"'design.beam.longest' must be more than {mm(SHORTEST)} beyond 'design.beam.start', {mm(float(start))}"
+        )
     made_of = elasticity(spec.mechanism)
     limit = made_of.allowable_stress if beam.stressed else None
     limit = None if limit is None else limit * (1.0 - RESERVE_STRESS)
@@ -214,20 +223,6 @@ def _closed(spec: SliderCrankSpec, wanted: StripDesign, task: Task, ranges: Rang
     part = _part(spec, {"width": round(width, DECIMALS), "thickness": round(thickness, DECIMALS), "shares": None})
     text = f"thickness {mm(thickness)} from the stress at {mm(task.stroke)}, width {mm(width)} from the force"
     return Design(_with_part(spec, part, (task.start, task.stroke)), Status.COMPLETE, text)
-
-
-def _infeasible(found: Found) -> Design:
-    descent = found.descent
-    if descent.ending is Ending.NO_ANSWER:
-        told = finding("target_unreachable", f"the search {descent.ending.value}")
-        return Design(None, Status.INFEASIBLE, told.message, warnings=(told,))
-    text = (
-        f"no strip within the ranges keeps the force, the band and the stress: the nearest misses one by "
-        f"{descent.violation:.3g} % of the force or a tenth of that of the stress ({descent.ending.value})"
-    )
-    told = finding("target_unreachable", text)
-    nearest = {"stroke": mm(found.program.stroke(descent.z))}
-    return Design(None, Status.INFEASIBLE, text, nearest_feasible=nearest, warnings=(told,))
 
 
 def _part(spec: SliderCrankSpec, changes: dict[str, object]) -> StripSpec:

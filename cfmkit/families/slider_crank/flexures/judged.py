@@ -16,7 +16,6 @@ from cfmkit.families.slider_crank.flexures.values import first_at
 from cfmkit.units import format_short
 
 if TYPE_CHECKING:
-    from cfmkit.bodies.slider_crank import Linkage
     from cfmkit.curves import FloatArray
     from cfmkit.families.slider_crank.flexures.chain import Strip
     from cfmkit.families.slider_crank.flexures.search import Found
@@ -24,6 +23,7 @@ if TYPE_CHECKING:
 
 PLACES = 240
 DIGITS = 6  # of millimetres
+MESHED = 2e-4  # of the stress: by how much its peak depends on how finely the strip is sampled
 HELD = 0.02  # a limit that is so near, as a share of itself, holds the design
 
 
@@ -45,6 +45,8 @@ class Judged:
         What holds it.
     opinion : SecondOpinion
         Of corotational elements.
+    overstress : float
+        Largest stress over the allowed one where the stroke is given; 1 where the stress ends it.
     """
 
     strip: Strip
@@ -54,6 +56,7 @@ class Judged:
     rms: float
     active: tuple[str, ...]
     opinion: SecondOpinion
+    overstress: float
 
 
 def rounded(values: FloatArray, ranges: FloatArray) -> FloatArray:
@@ -65,8 +68,7 @@ def judge(
     values: FloatArray,
     found: Found,
     limits: tuple[float | None, float | None],
-    linkage: Linkage,
-    unloaded: float,
+    pins: FloatArray,
 ) -> Judged | None:
     """Return what became of a strip; None if it has no equilibrium over its travel.
 
@@ -78,12 +80,12 @@ def judge(
         The search that they come from.
     limits : (float or None, float or None)
         Ripple as a share and stress [Pa] that end the stroke, where it is what is sought.
-    linkage, unloaded : Linkage, float
-        Where it is built in.
+    pins : (3, 2) array
+        Where it is kinked, as `assembly.pins_of` says [m].
     """
     task, form = found.task, found.form
     strip = form.strip(values, task.corners)
-    chain = strip_chain(strip, task.material, linkage, unloaded)
+    chain = strip_chain(strip, task.material, pins, task.direction)
     end = found.program.stroke(found.descent.z)
     first = max(task.start, 1e-3 * end)
     travel = np.unique(np.concatenate([np.geomspace(first, end, PLACES // 4), np.linspace(first, end, PLACES)]))
@@ -107,6 +109,7 @@ def judge(
         _rms(chain_force(solution, task.start, stroke), task.force),
         (*_at_bounds(found, values), *_held(solution, ratio, inside, limits)),
         opinion,
+        1.0 if stress is None or task.goal == "stroke" else float(solution.stress.max() / stress),
     )
 
 
@@ -127,7 +130,7 @@ def _last(solution: Printed, ratio: FloatArray, ripple: float | None, stress: fl
         place = first_at(solution.travel, np.abs(ratio), ripple * (1.0 + 1e-12))
         ends += [] if place is None else [place]
     if stress is not None:
-        place = first_at(solution.travel, solution.stress, stress)
+        place = first_at(solution.travel, solution.stress, stress * (1.0 - MESHED))
         ends += [] if place is None else [place]
     return min(ends)
 

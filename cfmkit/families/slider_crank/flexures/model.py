@@ -15,7 +15,14 @@ from cfmkit.curves import Column, Curve
 from cfmkit.errors import InputError
 from cfmkit.families.slider_crank.build import CannotBuild, linkage_of, resolve, side_of, unloaded_angle
 from cfmkit.families.slider_crank.findings import finding
-from cfmkit.families.slider_crank.flexures.assembly import elasticity, lumped_chain, strip_chain, strip_of
+from cfmkit.families.slider_crank.flexures.assembly import (
+    elasticity,
+    lumped_chain,
+    pins_of,
+    strip_chain,
+    strip_of,
+    travel_direction,
+)
 from cfmkit.families.slider_crank.flexures.checks import findings_of
 from cfmkit.families.slider_crank.flexures.definitions import DEFINITIONS
 from cfmkit.families.slider_crank.flexures.pressing import Ending
@@ -110,7 +117,8 @@ def chain_of(spec: SliderCrankSpec, linkage: Linkage, unloaded: float) -> Chain:
     if spec.fidelity == "lumped":
         return lumped_chain(spec.mechanism, linkage, unloaded)
     strip = strip_of(spec.mechanism, linkage, unloaded)
-    return strip_chain(strip, elasticity(spec.mechanism), linkage, unloaded)
+    pins = pins_of(spec.mechanism, linkage, unloaded)
+    return strip_chain(strip, elasticity(spec.mechanism), pins, travel_direction(linkage))
 
 
 def slider_reach(linkage: Linkage, unloaded: float) -> float:

@@ -34,6 +34,9 @@ STRAIGHT, CLEAR = 1e-9, 2e-4
 BOW = 2e-3
 """Offset that a chain is given to send it to one side, in lengths of the chain."""
 
+BENT = 0.1
+"""Offset beyond which it is a frame rather than a chain, and goes where its shape sends it."""
+
 
 class Ending(Enum):
     """How pressing a chain ended."""
@@ -175,7 +178,8 @@ class Chain:
         if ending is Ending.COMPLETE and not stable.all():
             first = path.drive[path.at_asked][~stable][0]
             ending, message = Ending.UNSTABLE, f"unstable from {first * 1e3:.4g} mm on"
-        if ending is Ending.COMPLETE and side != wanted:
+        chain_like = abs(kink(self.pins)) <= BENT * self.length
+        if ending is Ending.COMPLETE and side != wanted and (chain_like or wanted != self.side):
             ending, message = Ending.WRONG_BRANCH, Ending.WRONG_BRANCH.value
         return Pressed(path, ending, message, side)
 

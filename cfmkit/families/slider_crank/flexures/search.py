@@ -26,6 +26,12 @@ LOOSE = 0.01
 SCATTER = 0.15
 """Standard deviation of the logarithm of the thicknesses that other starts begin with."""
 
+SHORTEST = 2e-3
+"""Length of the band that is sought at least [m]."""
+
+WIDEST, NARROWING = 0.1, 5
+"""Largest share of the force by which a band is widened at first where it is out of reach, and steps back to it."""
+
 _ROUNDS = 12
 
 
@@ -141,6 +147,9 @@ def search(
         if best is None or _rank(found.descent) < _rank(best.descent):
             best = found
     assert best is not None
+    if task.goal == "stroke" and not (best.descent.feasible and best.descent.ending is Ending.OPTIMUM):
+        found = _tightened(task, form, ranges, uniform)
+        best = min(best, found, key=lambda one: _rank(one.descent))
     report(1.0, "done")
     return best
 
@@ -187,6 +196,22 @@ def _climb(
     return Found(task, form, ranges, program, descent, uniform)
 
 
+def _tightened(task: Task, form: Form, ranges: Ranges, uniform: Descent | None) -> Found:
+    """Return the outcome of a band that begins as wide as the uniform strip needs it, and is made narrower in steps.
+
+    Where a band is out of reach of the first strip, the steps towards it get stuck; those within bands do not.
+    """
+    x, last = _begin(task, form, ranges, uniform, form.count)
+    missed = 0.0 if uniform is None else min(0.01 * uniform.violation, WIDEST)
+    loose = max(task.ripple, LOOSE) + missed
+    for ripple in np.geomspace(loose, task.ripple, NARROWING):
+        program = StripProgram(replace(task, ripple=float(ripple)), form)
+        start = np.append(x, last)
+        descent = descend(program, start, _bounds(task, ranges, form, form.count))
+        x, last = descent.z[: form.size], descent.z[-1]
+    return Found(task, form, ranges, program, descent, uniform)
+
+
 def _precise(task: Task) -> float:
     return 1e-9 if task.goal == "rms" else 1e-6
 
@@ -222,7 +247,7 @@ def _bounds(task: Task, ranges: Ranges, form: Form, count: int) -> FloatArray:
     rows = np.concatenate([thickness, own[form.count :]])
     if task.goal == "rms":
         return rows
-    goal = [100.0 * (task.start + 2e-3), 100.0 * ranges.longest] if task.goal == "stroke" else [1e-3, 100.0]
+    goal = [100.0 * (task.start + SHORTEST), 100.0 * ranges.longest] if task.goal == "stroke" else [1e-3, 100.0]
     return np.concatenate([rows, [goal]])
 
 

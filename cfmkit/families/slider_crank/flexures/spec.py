@@ -83,6 +83,8 @@ class StripSpec(Model):
                 )
             if any(a >= b for piece in self.shares for a, b in itertools.pairwise(piece)):
                 raise ValueError("'shares' must increase within each piece")
+        if any(a == b for a, b in itertools.pairwise(self.centreline or ())):
+            raise ValueError("'centreline' has the same corner twice in a row")
         if min(self.values) + self.offset <= 0:
             raise ValueError("'offset' leaves no thickness")
         return self
@@ -141,7 +143,7 @@ class StripDesign(Model):
     goal: Literal["stroke", "ripple", "rms"] = Field(
         "stroke", description="longest stroke within `tolerance`, or smallest deviation over `travel`"
     )
-    nodes: int = Field(9, ge=2, le=65, description="thicknesses of the shape 'even'")
+    nodes: int = Field(17, ge=2, le=65, description="thicknesses of the shape 'even'")
     thickness: LengthRange | None = Field(None, description="smallest and largest everywhere")
     thicknesses: tuple[LengthRange, ...] | None = Field(None, description="or for each of them")
     shares: tuple[ShareRange, ...] | None = Field(None, description="ranges of 'beam.shares'; default: fixed")

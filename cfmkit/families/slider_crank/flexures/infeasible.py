@@ -1,0 +1,40 @@
+"""What is said where no strip meets its targets: how far the nearest is off, and which target it would meet."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from cfmkit.families.slider_crank.findings import finding, mm
+from cfmkit.families.slider_crank.flexures.descent import VIOLATION, Ending
+from cfmkit.results import Design, Status
+from cfmkit.units import format_short
+
+if TYPE_CHECKING:
+    from cfmkit.families.slider_crank.flexures.search import Found
+
+
+def infeasible(found: Found) -> Design:
+    """Return what the nearest strip misses, and the target that it would meet."""
+    descent, program, task = found.descent, found.program, found.task
+    state = None if descent.ending is Ending.NO_ANSWER else program.state(descent.z)
+    if state is None:
+        told = finding("target_unreachable", f"the search {descent.ending.value}")
+        return Design(None, Status.INFEASIBLE, told.message, warnings=(told,))
+    low, high = float(state.force.min()), float(state.force.max())
+    level, missed, nearest = 0.5 * (low + high), [], {}
+    off, limit = max(high / task.force - 1.0, 1.0 - low / task.force), task.material.allowable_stress
+    if off > program.ripple(descent.z):
+        missed.append(f"is up to {100 * off:.3g} % off the force")
+        flat = high - low <= 2.0 * level * program.ripple(descent.z)
+        name = "design.force" if flat else "design.tolerance"
+        nearest[name] = format_short(level, "force") if flat else format_short(off, "ratio")
+    worst = float(state.stress.max())
+    if limit is not None and worst > limit * (1.0 + 0.1 * VIOLATION):
+        missed.append(f"has a stress of {format_short(worst, 'stress')}")
+        nearest["allowable stress"] = format_short(worst, "stress")
+    text = (
+        f"no strip within the ranges keeps the force, the band and the stress: from {mm(task.start)} to "
+        f"{mm(program.stroke(descent.z))} the nearest {' and '.join(missed)} ({descent.ending.value})"
+    )
+    told = finding("target_unreachable", text)
+    return Design(None, Status.INFEASIBLE, text, nearest_feasible=nearest, warnings=(told,))
