@@ -156,6 +156,13 @@ def leave(solver: ExpandedSolver, singular: Singular, sign: int, forward: float)
     `sign` says which of the two mirror images; `forward` is the sense in which the drive goes. None if the branch
     leads backwards (the bifurcation is subcritical) or is not more stable.
     """
+    # leaves that lie almost flat have branches shorter than the usual entry
+    found = (_leave(solver, singular, sign, forward, size) for size in (_KICK, 0.25 * _KICK, 0.06 * _KICK))
+    return next((spot for spot in found if spot is not None), None)
+
+
+def _leave(solver: ExpandedSolver, singular: Singular, sign: int, forward: float, size: float) -> Spot | None:
+    """Return an equilibrium on the branch that is about `size` [rad] away from the bifurcation."""
     spot = singular.spot
     border = np.append(singular.null, 0.0)
     level = float(singular.null @ spot.y[: solver.n])
@@ -163,11 +170,11 @@ def leave(solver: ExpandedSolver, singular: Singular, sign: int, forward: float)
     for _ in range(_KICKS):
         guess = solver.shifted(spot.y, spot.drive, sign * kick * singular.null)
         moved = pose_change(solver, guess, spot.y)
-        if not 0.3 * _KICK <= moved <= _KICK:
-            kick *= 0.7 * _KICK / moved if moved > 0 else 10.0
+        if not 0.3 * size <= moved <= size:
+            kick *= 0.7 * size / moved if moved > 0 else 10.0
             continue
         near = solver.solve(guess, spot.drive, border, level + sign * kick)
-        if near is None or pose_change(solver, near.y, guess) > 0.5 * _KICK:
+        if near is None or pose_change(solver, near.y, guess) > 0.5 * size:
             kick *= 0.5
             continue
         ahead = (near.drive - spot.drive) * forward > 0

@@ -40,3 +40,20 @@ def test_the_force_is_continuous_across_a_bifurcation(place, off):
     force, around = path.effort[path.at_asked][1], smooth.effort[smooth.at_asked][1:3]
     assert path.status is PathStatus.COMPLETE
     assert around.min() - 0.05 <= force <= around.max() + 0.05
+
+
+@pytest.mark.parametrize(("length", "slenderness"), [(80, 3.3), (192, 5), (192, 3.6), (35, 3.15)])
+def test_leaves_that_lie_almost_flat_or_hardly_buckle_keep_their_stable_branch(length, slenderness):
+    """A leaf of rise h and thickness h/Q buckles and straightens at 2h/3 (1 -/+ sqrt(1 - (pi/Q)^2)), nearly."""
+    rise = 4.265 * MM
+    nodes = {
+        "wall": Node(0, 0, CLAMPED),
+        "shuttle": Node(np.sqrt((length * MM) ** 2 - rise**2), rise, guided(np.pi / 2)),
+    }
+    leaf = Beam("wall", "shuttle", Section(1477e6, 6 * MM, rise / slenderness))
+    path = trace(Network(nodes, {"v": leaf}), Displacement("shuttle", -np.pi / 2, np.linspace(0.02, 1.4, 70) * rise))
+    assert path.status is PathStatus.COMPLETE
+    assert path.stable.all()
+    root = np.sqrt(1 - (np.pi / slenderness) ** 2)
+    expected = 2 / 3 * rise * np.array([1 - root, 1 + root])
+    assert [event.drive for event in path.events] == pytest.approx(expected, abs=0.015 * rise)
