@@ -118,6 +118,17 @@ class Chain:
         """Distance of pivot and slider pin [m]."""
         return float(np.hypot(*(self.pins[2] - self.pins[0])))
 
+    @property
+    def reach(self) -> float:
+        """How far the slider pin could be from the pivot, the chain pulled straight [m]."""
+        return max(float(np.hypot(*np.diff(line, axis=0).T).sum()) for line in (self.pins, self.points))
+
+    def _reach(self, travel: FloatArray) -> FloatArray:
+        """Return the distance of slider pin and pivot after some travel [m]."""
+        way = np.array([np.cos(self.direction), np.sin(self.direction)])
+        distance: FloatArray = np.hypot(*(self.pins[2] - self.pins[0] + np.outer(travel, way)).T)
+        return distance
+
     def press(self, travel: FloatArray, side: int = 0, tolerance: float = 1e-7) -> Pressed:
         """Return the equilibria at travels on one side, that of the kink unless asked otherwise.
 
@@ -130,6 +141,11 @@ class Chain:
         tolerance : float
             As in `cfmkit.beams.Control`.
         """
+        taut = np.flatnonzero(self._reach(travel) > (1.0 + 1e-9) * self.reach)
+        if len(taut):
+            near = self.press(travel[: taut[0]] if taut[0] else np.zeros(1), side, tolerance)
+            text = f"the chain is taut before {travel[taut[0]] * 1e3:.4g} mm; beyond, it could only be torn"
+            return replace(near, ending=Ending.LIMIT_POINT, message=text) if near.ending is Ending.COMPLETE else near
         drive = Displacement(SLIDER, self.direction, travel)
         wanted = side or self.side or 1
         clear = abs(kink(self.pins)) > CLEAR * self.length
