@@ -173,8 +173,8 @@ def solve(m, n_free, y, state, border, target, limits, tangent, scratch):
         state[0] += share * rhs[n, 0]
         size = max(pose, force)
         if before > 1e-6:
-            state[4] = size / (before * before)
-        growth = max(30.0, 3.0 * state[4])
+            state[4] = max(0.5 * state[4], size / (before * before))
+        growth = max(30.0, 10.0 * state[4])
         if share == 1.0 and (growth * size * size < limits[0] or size < 1e-2 * limits[0]):
             for i in range(n + 1):
                 tangent[i] = rhs[i, 1]
