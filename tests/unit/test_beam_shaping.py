@@ -13,7 +13,7 @@ from cfmkit import load
 from cfmkit.beams import Polynomial, trace
 from cfmkit.beams.beam import fit
 from cfmkit.families.base import Run
-from cfmkit.families.beam.shaping.audit import Spread, audited, half_band, strict_share
+from cfmkit.families.beam.shaping.audit import Spread, audited, half_band, lines_cross, strict_share
 from cfmkit.families.beam.shaping.design import task_of, written
 from cfmkit.families.beam.shaping.goals import Compared, Flattest, Widest
 from cfmkit.families.beam.shaping.infeasible import blocked, missed_by
@@ -85,7 +85,7 @@ def test_the_widest_window_has_the_derivative_of_the_force_by_its_start() -> Non
     _, rows = program.slopes(z)
     step = np.zeros_like(z)
     step[-1] = 1e-5
-    band = slice(0, 34)
+    band = slice(0, 98)
     slope = (program.values(z + step)[1] - program.values(z - step)[1])[band] / 2e-5
     np.testing.assert_allclose(rows[band, -1], slope, atol=1e-4)
 
@@ -152,6 +152,15 @@ def test_flat_ranges_are_measured_from_the_end() -> None:
     at = np.linspace(0.0, 10.0, 61)
     assert strict_share(at, np.minimum(at / 4, 1.0) + 1e-9) == pytest.approx(0.62, abs=0.01)
     assert half_band(at, 1 + 0.02 * np.sin(at), 2.0) == pytest.approx(0.02, abs=1e-4)
+
+
+def test_lines_cross_but_not_in_the_joint_where_they_end() -> None:
+    one = np.array([[0.0, 0.0], [1.0, 0.1], [2.0, 0.0]])
+    off = np.array([[2.0 + 1e-7, 1e-7], [1.5, 1.0], [0.0, 2.0]])  # joined to within the error of a path
+    over = np.array([[1.5, -1.0], [1.4, 1.0], [0.0, 2.0]])
+    assert not lines_cross(one, off, True)
+    assert lines_cross(one, over, False)
+    assert not lines_cross(one, one, True)
 
 
 def test_the_objective_of_the_paper_falls_without_the_force_getting_flatter() -> None:

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
 POSES = 61
 STRICT = 0.05
+_JOINED = 1e-4  # of the chords: lines that end in a joint meet within the error of the path
 
 
 @dataclass(frozen=True)
@@ -162,11 +163,11 @@ def crossing(task: Task, path: Path, pose: int) -> bool:
     lines = {name: path.shape(name, pose) for name in task.network.beams}
     shared = {pair.beams: pair.joints for pair in pairs(task.network)}
     return any(
-        _lines_cross(lines[one], lines[other], bool(shared[one, other])) for one, other in combinations(lines, 2)
-    ) or any(_lines_cross(line, line, True) for line in lines.values())
+        lines_cross(lines[one], lines[other], bool(shared[one, other])) for one, other in combinations(lines, 2)
+    ) or any(lines_cross(line, line, True) for line in lines.values())
 
 
-def _lines_cross(one: FloatArray, other: FloatArray, joined: bool) -> bool:
+def lines_cross(one: FloatArray, other: FloatArray, joined: bool) -> bool:
     """Tell whether two polylines (n, 2) cross; pieces that share an end, or touch at a common joint, do not."""
     p, q = one[:, 0] + 1j * one[:, 1], other[:, 0] + 1j * other[:, 1]
     a, b, c, d = p[:-1, None], p[1:, None], q[None, :-1], q[None, 1:]
@@ -176,7 +177,7 @@ def _lines_cross(one: FloatArray, other: FloatArray, joined: bool) -> bool:
     if joined:
         size = abs(p[-1] - p[0]) + abs(q[-1] - q[0])
         near = np.min([abs(u - v) for u in (a, b) for v in (c, d)], axis=0)
-        hit &= near > 1e-9 * size
+        hit &= near > _JOINED * size
     return bool(hit.any())
 
 

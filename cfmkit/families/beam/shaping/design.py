@@ -33,7 +33,7 @@ MARGIN = 2e-3
 """The search asks for so much less stress and slimmer beams: the stress peaks between its poses and places, too."""
 
 _NOT_DECIDING = {"name", "description", "requirements", "sweep", "sensitivity"}
-_GRID, _FINE = 1e-7, 1e-6  # designed coordinates [m] and coefficients [rad] are rounded to so much
+_PLACES, _TURNS = 7, 6  # decimals of designed coordinates [m] and coefficients [rad]
 
 
 def shaped(spec: BeamSpec, wanted: Optimise, run: Run) -> Design:
@@ -197,8 +197,8 @@ def _nothing(task: Task, result: Explored) -> Design:
 def _rounded(task: Task, found: Found) -> Found:
     """Return a design with coordinates and coefficients that print short."""
     places, x = len(task.coordinates), found.x.copy()
-    x[:places] = np.round(x[:places] * task.size / _GRID) * _GRID / task.size
-    x[places:] = np.round(x[places:] / _FINE) * _FINE
+    x[:places] = np.round(x[:places] * task.size, _PLACES) / task.size
+    x[places:] = np.round(x[places:], _TURNS)
     return replace(found, x=np.clip(x, *Variables(task, found.order).bounds.T))
 
 
@@ -207,7 +207,7 @@ def written(spec: BeamSpec, task: Task, found: Found) -> BeamSpec:
     variables = Variables(task, found.order)
     network = variables.build(found.x)
     moved = dict.fromkeys(one.node for one in task.coordinates)
-    nodes = {name: (float(network.nodes[name].x), float(network.nodes[name].y)) for name in moved}
+    nodes = {name: (_place(network.nodes[name].x), _place(network.nodes[name].y)) for name in moved}
     changes: dict[str, Any] = {f"mechanism.nodes.{name}.at": at for name, at in nodes.items()}
     for name in task.shaped:
         beam = network.beams[name]
@@ -224,9 +224,13 @@ def written(spec: BeamSpec, task: Task, found: Found) -> BeamSpec:
         }
         changes[f"mechanism.beams.{name}.shape"] = shape
     layers = spec.mechanism.copies.layers if spec.mechanism.copies else 1
-    start = np.ceil(found.start * layers / 1e-6) * 1e-6
-    changes["analysis.window"] = (float(start), float(task.window[1] * layers))
+    start = round(float(np.ceil(found.start * layers * 1e6)) / 1e6, 6)
+    changes["analysis.window"] = (start, float(task.window[1] * layers))
     return spec.replace(changes)
+
+
+def _place(value: float) -> float:
+    return round(float(value), _PLACES)
 
 
 def _told(task: Task, found: Found, result: Explored) -> str:

@@ -2,7 +2,8 @@
 
 [Lan, eq. 1] compares the force at two displacements, F(a)/F(b) - 1. Nothing bounds that from below: a mechanism that
 snaps through between b and a reaches -1 and less. The flattest force over a window has no such escape: with s the half
-band and r its middle, s is least subject to r (1 - s) <= F <= r (1 + s) at every pose.
+band and r its middle, s is least subject to r (1 - s) <= F <= r (1 + s). That is asked of the polynomial through the
+poses of the window, at three times as many places: a force that is out of the band between poses is out of the band.
 
 Reference
 ---------
@@ -12,6 +13,7 @@ Reference
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
@@ -21,6 +23,7 @@ if TYPE_CHECKING:
     from cfmkit.families.beam.shaping.limits import View
 
 LEAST_MIDDLE = 1e-3
+_FINER = 3
 WEIGHT = 10.0
 """On the half band: a solver that begins with the identity for the Hessian takes too small a slope for none."""
 
@@ -53,6 +56,20 @@ class Goal(Protocol):
         """Return objective and rows."""
 
 
+def window_force(view: View) -> FloatArray:
+    """Return the force at many places of the window [N]: the polynomial through its poses."""
+    return np.asarray(_finer(len(view.poses.window)) @ view.response.state.force[view.poses.window])
+
+
+@cache
+def _finer(count: int) -> FloatArray:
+    """Return the matrix from values at Chebyshev-Lobatto points to values at three times as many, in order."""
+    from numpy.polynomial import chebyshev
+
+    coarse, fine = (-np.cos(np.linspace(0, np.pi, n)) for n in (count, _FINER * (count - 1) + 1))
+    return np.asarray(chebyshev.chebvander(fine, count - 1) @ np.linalg.inv(chebyshev.chebvander(coarse, count - 1)))
+
+
 def unit_of_force(view: View) -> float:
     """Return the bending rigidity of the first beam over the square of the size [N], times the copies."""
     task = view.response.variables.task
@@ -69,7 +86,7 @@ class Flattest:
 
     def start(self, view: View) -> FloatArray:
         """Return level and half band of the design."""
-        force = view.response.state.force[view.poses.window] / unit_of_force(view)
+        force = window_force(view) / unit_of_force(view)
         middle = max(0.5 * (force.max() + force.min()), 0.05 * abs(force).max(), LEAST_MIDDLE)
         return np.array([middle, min(10.0, abs(force / middle - 1).max())])
 
@@ -81,13 +98,13 @@ class Flattest:
         """Return the half band and its rows."""
         level, band = own
         unit = unit_of_force(view) * level
-        ratio = view.response.state.force[view.poses.window] / unit
+        ratio = window_force(view) / unit
         rows = np.concatenate([1 + band - ratio, ratio - 1 + band])
         by_own = np.ones((len(rows), 2))
         by_own[:, 0] = np.concatenate([ratio, -ratio]) / level
         if not view.sloped:
             return Aim(WEIGHT * float(band), None, np.array([0.0, WEIGHT]), rows, None, by_own)
-        slope = view.response.slopes.force[view.poses.window] / unit
+        slope = _finer(len(view.poses.window)) @ view.response.slopes.force[view.poses.window] / unit
         by_x = np.concatenate([-slope, slope])
         return Aim(WEIGHT * float(band), np.zeros(by_x.shape[1]), np.array([0.0, WEIGHT]), rows, by_x, by_own)
 
@@ -119,7 +136,7 @@ class Widest:
         at = view.poses.at[view.poses.window]
         force = view.response.state.force[view.poses.window] / (unit_of_force(view) * level)
         moves = (1 - (at - at[0]) / (at[-1] - at[0])) * self.end
-        by_share = _derivative(at, force) * moves
+        by_share = _finer(len(at)) @ (_derivative(at, force) * moves)
         by_own = np.stack([flat.rows_by_own[:, 0], np.concatenate([-by_share, by_share])], axis=1)
         return Aim(float(share), flat.by_x, np.array([0.0, 1.0]), flat.rows, flat.rows_by_x, by_own)
 

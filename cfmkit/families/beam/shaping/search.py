@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.beam.shaping.goals import Compared, Flattest, Widest
+from cfmkit.families.beam.shaping.goals import Compared, Flattest, Widest, window_force
 from cfmkit.families.beam.shaping.limits import LIMITS
 from cfmkit.families.beam.shaping.program import Shaping
 from cfmkit.families.beam.shaping.starts import candidates
@@ -151,7 +151,7 @@ def drawn(task: Task, rng: np.random.Generator, plan: Plan) -> list[Found]:
                 break
             view = program.view(x)
             if view is not None:
-                band = _half_band(view.response.state.force[view.poses.window])
+                band = _half_band(window_force(view))
                 excess = worst_of(program, x) if band < _STIFF else np.inf
                 found.append(Found(x, order, task.window[0], band, excess, "", 1))
         if len(found) >= plan.tries:
@@ -207,7 +207,7 @@ def found_of(program: Shaping, optimum: Optimum, before: int = 0) -> Found:
     objective = optimum.objective
     view = program.view(x, start)
     if not isinstance(goal, Compared) and view is not None:
-        objective = _half_band(view.response.state.force[view.poses.window])
+        objective = _half_band(window_force(view))
     return Found(
         x,
         program.variables.order,

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cfmkit.families.beam.shaping.response import Line
 from cfmkit.numerics.sampled import soft_least
 
 if TYPE_CHECKING:
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from cfmkit.families.beam.shaping.limits import View
 
 SHARPNESS = 25.0
+_PLACES = 16
 
 
 @dataclass(frozen=True)
@@ -51,7 +53,7 @@ def _pair(network: Network, first: str, second: str) -> Pair:
 def separations(view: View, pair: Pair) -> tuple[FloatArray, Callable[[], FloatArray]]:
     """Return (gap / required gap - 1) of a pair at the poses that are shown (q,), and what makes the derivatives."""
     state, shown = view.response.state, view.poses.shown
-    a, b = (state.lines[name] for name in pair.beams)
+    a, b = (thinned(state.lines[name]) for name in pair.beams)
     way, by_way = _way(view, pair)
     wanted = _wanted(view, pair)
     opening = view.response.variables.task.limits.opening
@@ -64,14 +66,14 @@ def separations(view: View, pair: Pair) -> tuple[FloatArray, Callable[[], FloatA
     soft = [soft_least(row, SHARPNESS) for row in ratio]
 
     def slopes() -> FloatArray:
-        by = view.response.slopes.lines
+        by = {name: thinned(view.response.slopes.lines[name]) for name in pair.beams}
         share = np.array([weights for _, weights in soft]) / required[i, j]
         out = []
         for q, pose in enumerate(shown):
             pull = np.stack([share[q] * dx[q] / distance[q], share[q] * dy[q] / distance[q]])
             total = np.zeros(view.response.x.shape)
             for sign, name, index in ((1.0, pair.beams[0], i), (-1.0, pair.beams[1], j)):
-                count = len(state.lines[name].place)
+                count = by[name].x.shape[1]
                 total += sign * np.bincount(index, pull[0], count) @ by[name].x[pose]
                 total += sign * np.bincount(index, pull[1], count) @ by[name].y[pose]
             push = np.where(near[i, j], opening * share[q] * ratio[q], 0.0)
@@ -79,6 +81,12 @@ def separations(view: View, pair: Pair) -> tuple[FloatArray, Callable[[], FloatA
         return np.array(out)
 
     return np.array([value for value, _ in soft]) - 1.0, slopes
+
+
+def thinned(line: Line) -> Line:
+    """Return a line at about 17 of its places: a smooth bound must not depend on how finely the engine cut the beam."""
+    step = max(1, (len(line.place) - 1) // _PLACES)
+    return Line(line.place[::step], line.x[:, ::step], line.y[:, ::step], line.stress[:, ::step])
 
 
 def _compared(pair: Pair, way: FloatArray, count: int) -> Any:
@@ -100,7 +108,7 @@ def _way(view: View, pair: Pair) -> tuple[FloatArray, FloatArray]:
     """Return the way between places of the two beams (r, r) [m], infinite where they do not meet; and (k, r, r)."""
     (first, second), lines = pair.beams, view.response.state.lines
     one, other = view.lengths[first], view.lengths[second]
-    u, v = lines[first].place[:, None], lines[second].place[None, :]
+    u, v = thinned(lines[first]).place[:, None], thinned(lines[second]).place[None, :]
     if pair.alone:
         return abs(u - v) * one.length, abs(u - v) * one.by_length[:, None, None]
     way = np.full((u.size, v.size), np.inf)
