@@ -13,6 +13,10 @@ from cfmkit.cli.options import Changing, Common, Quiet
 from cfmkit.errors import CfmError, ExitCode
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from rich.text import Text
+
     from cfmkit.cli.terminal import Terminal
     from cfmkit.spec import Spec
 
@@ -45,7 +49,9 @@ def run(options: Options, terminal: Terminal) -> Answer:
     found = [_checked(name, options.changes) for name in options.specs]
 
     def view(terminal: Terminal) -> None:
-        terminal.show(_table(found, terminal.verbose > 0))
+        for line in _lines(found, terminal.verbose > 0):
+            line.no_wrap, line.overflow = True, "ignore"  # names stand whole, whatever the width
+            terminal.show(line)
 
     return Answer(
         {"files": [_record(item) for item in found], "message": _message(found)},
@@ -81,25 +87,24 @@ def _record(item: Finding) -> dict[str, Any]:
     return {"file": item.file, "ok": item.spec is not None, **about, "errors": list(item.failure.errors)}
 
 
-def _table(found: list[Finding], requirements: bool) -> Any:
-    from rich.table import Table
+def _lines(found: list[Finding], requirements: bool) -> Iterator[Text]:
+    """Yield one line a file, and its requirements if asked for."""
     from rich.text import Text
 
     from cfmkit.cli.terminal import BAD, GOOD
 
-    grid = Table.grid(padding=(0, 2, 0, 0))
+    wide = max(len(item.file) for item in found)
     for item in found:
         if item.spec is None:
             count = len(item.failure.errors)
-            told = f"{count} problem{'s' if count > 1 else ''}"
-            grid.add_row(Text(item.file, overflow="fold"), Text("INVALID", BAD), Text(told))
-        else:
-            grid.add_row(
-                Text(item.file, overflow="fold"), Text("ok", GOOD), Text(f"{item.spec.family}  {item.spec.name}")
-            )
-            for requirement in item.spec.requirements if requirements else ():
-                grid.add_row("", "", Text(f"  {_required(requirement)}"))
-    return grid
+            told = f"  {count} problem{'s' if count > 1 else ''}"
+            yield Text.assemble(item.file.ljust(wide), "  ", ("INVALID", BAD), told)
+            continue
+        yield Text.assemble(
+            item.file.ljust(wide), "  ", ("ok", GOOD), f"       {item.spec.family}  {item.spec.name}", **whole
+        )
+        for requirement in item.spec.requirements if requirements else ():
+            yield Text(f"    {_required(requirement)}")
 
 
 def _required(requirement: Any) -> str:
