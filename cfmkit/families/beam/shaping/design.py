@@ -155,6 +155,9 @@ def _best(task: Task, result: Explored, spread: Spread, plan: Plan) -> tuple[Fou
         some = [one for one in result.found.values() if one is not None]
         if not some:
             return _nothing(task, result)
+        if plan.late():
+            said = f"none of {len(some)} starts met all limits in the time allowed: give it more, or run again to go on"
+            return Design(None, Status.INFEASIBLE, said)
         why = blocked(task, some, replace(plan, deadline=None))
         if why.freed is None:
             missed = "; ".join(f"{name} ({about})" for name, about in why.missed.items())
@@ -224,8 +227,8 @@ def written(spec: BeamSpec, task: Task, found: Found) -> BeamSpec:
         }
         changes[f"mechanism.beams.{name}.shape"] = shape
     layers = spec.mechanism.copies.layers if spec.mechanism.copies else 1
-    start = round(float(np.ceil(found.start * layers * 1e6)) / 1e6, 6)
-    changes["analysis.window"] = (start, float(task.window[1] * layers))
+    begins = round(float(np.ceil(found.start * layers * 1e6)) / 1e6, 6)
+    changes["analysis.window"] = (begins, float(task.window[1] * layers))
     return spec.replace(changes)
 
 
@@ -241,10 +244,12 @@ def _told(task: Task, found: Found, result: Explored) -> str:
     reused = f", {result.reused} from the journal" if result.reused else ""
     left = f", {result.missing} not done in the time" if result.missing else ""
     share = 1 - found.start / task.window[1]
+    reached = f"force within +-{found.objective:.2%} over {share:.1%} of the travel"
+    if task.objective == "paper":
+        reached = f"F(a)/F(b) - 1 = {found.objective:.3f}"
     return (
-        f"force within +-{found.objective:.2%} over {share:.1%} of the travel; {len(feasible)} of "
-        f"{len(result.found)} starts meet all limits ({total} traces{reused}{left}); the last "
-        f"minimisation {found.ending}"
+        f"{reached}; {len(feasible)} of {len(result.found)} starts meet all limits ({total} traces{reused}{left}); "
+        f"the last minimisation {found.ending}"
     )
 
 

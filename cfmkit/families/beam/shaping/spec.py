@@ -101,6 +101,6 @@ class Optimise(Model):
             raise ValueError("'window' must be increasing and begin after rest")
         if list(self.orders) != sorted(set(self.orders)):
             raise ValueError("'orders' must be increasing, e.g. [0, 1, 2]")
-        if (self.objective == "paper") != (self.compare is not None):
-            raise ValueError("'compare' and 'objective: paper' belong together: give both or neither")
+        if self.objective == "paper" and self.compare is None:
+            raise ValueError("'objective: paper' needs 'compare': the displacements [a, b]")
         return self

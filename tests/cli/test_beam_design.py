@@ -1,0 +1,60 @@
+"""Shape design as a user runs it: it goes on where it was, and says what blocks where there is no design."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+CONFIGS = Path(__file__).parents[2] / "configs"
+
+
+@pytest.fixture
+def arch(tmp_path):
+    """A small shape design as ``arch.yaml`` in the folder of `cli`."""
+    (tmp_path / "arch.yaml").write_bytes((CONFIGS / "beam_design_arch.yaml").read_bytes())
+    return "arch.yaml"
+
+
+def test_a_design_is_repeated_from_the_journal_with_the_same_bytes(cli, arch):
+    first = cli("design", arch, "-o", "out", "--no-plots")
+    assert first.code == 0
+    design = (cli.folder / "out/design.yaml").read_bytes()
+    report = json.loads((cli.folder / "out/metrics.json").read_text())["metrics"]
+    assert report["audit_half_band"]["value"] < 0.01
+    assert report["tolerance_half_band_p90"]["value"] > report["audit_half_band"]["value"]
+    again = cli("design", arch, "-o", "out", "--no-plots", "-j", "1")
+    assert again.code == 0
+    assert "2 from the journal" in " ".join(again.out.split())
+    assert (cli.folder / "out/design.yaml").read_bytes() == design
+    assert cli("analyze", "out/design.yaml", "-o", "judged", "--no-plots").code == 0
+
+
+def test_without_a_shape_the_blocking_limit_and_the_nearest_value_are_named(cli, arch):
+    done = cli("design", arch, "-o", "out", "--no-plots", "--set", "design.optimise.force.min=50 N")
+    said = " ".join(done.out.split())
+    assert done.code == 4
+    assert "meets all limits; the best misses force (least mean: missed by" in said
+    assert "feasible design.optimise.force.min = at most" in said
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ("design.optimise.free={q: {x: [0 mm, 1 mm]}}", "'q', which is not a node; nodes: a, b"),
+        ("design.optimise.window=[6 mm, 20 mm]", "analysis.travel ends before"),
+        ("design.optimise.objective=paper", "needs 'compare'"),
+        ("design.rescale={force: 2 N}", "either 'rescale' or 'optimise'"),
+    ],
+)
+def test_a_task_that_makes_no_sense_is_refused_in_one_line(cli, arch, change, said):
+    done = cli("design", arch, "-o", "out", "--no-plots", "--set", change)
+    assert done.code == 3
+    assert said in " ".join((done.out + done.err).split())
+
+
+def test_a_budget_of_no_time_is_told(cli, arch):
+    done = cli("design", arch, "-o", "out", "--no-plots", "--set", "design.optimise.time_budget=0.001 s")
+    assert done.code == 4
+    assert "the time budget ended before any start" in " ".join(done.out.split())
