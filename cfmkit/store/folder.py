@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import os
 import re
+import signal
 import time
+from contextlib import contextmanager
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from types import MappingProxyType
@@ -20,7 +22,7 @@ from cfmkit.store.names import JOURNAL, MANIFEST, checked_name, hash_in, mode_of
 from cfmkit.store.transaction import NEW, RUN
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterator, Mapping
     from types import TracebackType
 
     from cfmkit.store.disk import Data
@@ -75,14 +77,14 @@ class RunFolder:
         """Create and lock the folder, repair what a killed run left, read the last manifest."""
         self._started = datetime.now(UTC)
         self._clock = time.monotonic()
-        with reporting(self.path, "use the folder"):
-            self._create_and_lock()
-            try:
+        try:
+            with _undisturbed(), reporting(self.path, "use the folder"):
+                self._create_and_lock()
                 self._take_over()
-            except BaseException:
-                self._leave()
-                raise
-        self._owner = os.getpid()
+            self._owner = os.getpid()
+        except BaseException:
+            self._leave()
+            raise
         return self
 
     def __exit__(
@@ -246,6 +248,19 @@ class RunFolder:
         transaction.clear(self.path)
         self._lock.release()
         disk.remove_empty(self._created)
+
+
+@contextmanager
+def _undisturbed() -> Iterator[None]:
+    """Hold back the signals that end a run: between making a folder and remembering it they would leave it there."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _alive(process: int) -> bool:

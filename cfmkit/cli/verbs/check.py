@@ -100,9 +100,7 @@ def _lines(found: list[Finding], requirements: bool) -> Iterator[Text]:
             told = f"  {count} problem{'s' if count > 1 else ''}"
             yield Text.assemble(item.file.ljust(wide), "  ", ("INVALID", BAD), told)
             continue
-        yield Text.assemble(
-            item.file.ljust(wide), "  ", ("ok", GOOD), f"       {item.spec.family}  {item.spec.name}", **whole
-        )
+        yield Text.assemble(item.file.ljust(wide), "  ", ("ok", GOOD), f"       {item.spec.family}  {item.spec.name}")
         for requirement in item.spec.requirements if requirements else ():
             yield Text(f"    {_required(requirement)}")
 
