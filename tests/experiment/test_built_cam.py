@@ -63,9 +63,7 @@ def test_a_measured_cam_has_the_values_of_any_cam_and_says_when_springs_and_fric
     )
     spec = spec_of(tmp_path).replace({"mechanism.springs.max_elongation": 0.09, "mechanism.rolling_friction": 0.6})
     found = {item.name: item.message for item in cfmkit.analyze(spec).warnings}
-    assert found["spring_overstretched"].startswith(
-        "the springs are stretched by 99.31 mm"
-    )
+    assert found["spring_overstretched"].startswith("the springs are stretched by 99.31 mm")
     assert "friction (0.6) holds a roller at" in found["up_jam"]
     long = spec_of(tmp_path).replace({"mechanism.rest_half_width": 0.08, "mechanism.profile.rest_half_width": 0.068})
     assert "spring_slack" in {item.name for item in cfmkit.analyze(long).warnings}
