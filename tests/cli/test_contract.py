@@ -19,9 +19,9 @@ def _cases():
 
 
 def metrics(folder):
-    """Return what metrics.json holds, and its warnings, of which a design may have more than an analysis."""
+    """Return what metrics.json holds, its numbers and its warnings; a design may add to both what it alone knows."""
     document = json.loads((folder / "metrics.json").read_text())
-    return document, {item["name"] for item in document.pop("warnings")}
+    return document, document.pop("metrics"), {item["name"] for item in document.pop("warnings")}
 
 
 @pytest.mark.parametrize("path", _cases(), ids=lambda path: path.stem)
@@ -32,7 +32,8 @@ def test_a_config_is_analysed_and_designed_with_exit_0(cli, path):
         return
     assert cli("design", str(path), "-o", "two", "-q", "--no-plots").code == 0
     assert cli("analyze", "two/design.yaml", "-o", "three", "-q", "--no-plots").code == 0
-    (designed, told), (analysed, found) = (metrics(cli.folder / name) for name in ("two", "three"))
+    (designed, more, told), (analysed, numbers, found) = (metrics(cli.folder / name) for name in ("two", "three"))
     assert designed == analysed
+    assert numbers == {name: more[name] for name in numbers}
     assert found <= told
     assert (cli.folder / "two/curve.csv").read_bytes() == (cli.folder / "three/curve.csv").read_bytes()
