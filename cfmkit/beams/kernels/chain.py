@@ -13,29 +13,36 @@ from __future__ import annotations
 
 import numpy as np
 
-from cfmkit.beams.kernels.compiler import kernel
+from cfmkit.beams.kernels.compiler import inlined, kernel, maker
 from cfmkit.beams.kernels.flow import flow, plain_flow
 
 E, F, E2, G, C_D, SMALL = 0, 1, 2, 3, 4, 5  # blocks of a relation; C_D: c in columns 0, 1
 BEFORE = 6  # of what is kept of a segment: E2 before it; its SMALL[2, 0] and E2[:, 2] hold the segment's own turns
 
 
+@inlined
+def places_of(m):
+    """Return what `pose_of` needs of a model."""
+    return m.place_dof, m.place_frame, m.place_origin, m.place_arm
+
+
 @kernel
-def pose_of(m, values, i, pose):
+def pose_of(places, values, i, pose):
     """Set the pose of attachment i; return its arm, turned."""
-    d = m.place_dof[i]
-    fc, fs = m.place_frame[i, 0], m.place_frame[i, 1]
-    a, b, turn = values[d[0]], values[d[1]], values[d[2]]
-    ct, st = np.cos(turn), np.sin(turn)
-    ox = ct * m.place_arm[i, 0] - st * m.place_arm[i, 1]
-    oy = st * m.place_arm[i, 0] + ct * m.place_arm[i, 1]
-    pose[0] = m.place_origin[i, 0] + fc * a - fs * b + ox
-    pose[1] = m.place_origin[i, 1] + fs * a + fc * b + oy
-    pose[2] = values[d[3]]
+    dofs, frames, origins, arms = places
+    fc, fs = frames[i, 0], frames[i, 1]
+    a, b, turn = values[dofs[i, 0]], values[dofs[i, 1]], values[dofs[i, 2]]
+    ox = oy = 0.0
+    if arms[i, 0] != 0.0 or arms[i, 1] != 0.0:
+        ct, st = np.cos(turn), np.sin(turn)
+        ox, oy = ct * arms[i, 0] - st * arms[i, 1], st * arms[i, 0] + ct * arms[i, 1]
+    pose[0] = origins[i, 0] + fc * a - fs * b + ox
+    pose[1] = origins[i, 1] + fs * a + fc * b + oy
+    pose[2] = values[dofs[i, 3]]
     return ox, oy
 
 
-@kernel
+@maker
 def _drive_column(m, e, steps, start, load, dp):
     """Set the derivative of a segment's end pose and force by the drive, where a line load grows with it."""
     states = np.empty((steps[1] - steps[0] + 1, 7), dtype=np.complex128)
@@ -191,4 +198,4 @@ def unfold(m, e, first_slot, store, dqa, dpb, ddrive, dy):
         dy[at + 3], dy[at + 4], dy[at + 5] = n0, n1, n2
 
 
-__all__ = ["BEFORE", "C_D", "E2", "SMALL", "E", "F", "G", "np", "pose_of", "sweep", "unfold"]
+__all__ = ["BEFORE", "C_D", "E2", "SMALL", "E", "F", "G", "np", "places_of", "pose_of", "sweep", "unfold"]

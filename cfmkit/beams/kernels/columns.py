@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from cfmkit.beams.kernels.chain import BEFORE, E2, SMALL, E, F, G, pose_of
-from cfmkit.beams.kernels.compiler import inlined, kernel
+from cfmkit.beams.kernels.chain import BEFORE, E2, SMALL, E, F, G, places_of, pose_of
+from cfmkit.beams.kernels.compiler import inlined, kernel, maker
 from cfmkit.beams.kernels.dense import clear, lu_solve
 from cfmkit.beams.kernels.flow_slopes import flow_slopes
 from cfmkit.beams.kernels.force_slopes import (
@@ -27,7 +27,7 @@ from cfmkit.beams.kernels.newton import all_values, assemble
 from cfmkit.beams.kernels.rk8 import STAGES
 
 
-@kernel
+@maker
 def _segment_slopes(m, tilt, e, y, n, drive, ends):
     """Set the derivatives of the end states of a beam's segments at unchanged starts: ends (segments, 9 count)."""
     begin, count = m.beam_segment[e], tilt.first[e + 1] - tilt.first[e]
@@ -94,10 +94,11 @@ def _unfold_slopes(m, e, k, n, store, parts, dqa, dpb, dy):
 @kernel
 def _frames(m, values, pose, frames):
     """Set for both ends of every beam cos and sin of the frame and the turned arm, (beams, 2, 4)."""
+    places = places_of(m)
     for e in range(m.beam_end.shape[0]):
         for side in range(2):
             i = m.beam_end[e, side]
-            ox, oy = pose_of(m, values, i, pose)
+            ox, oy = pose_of(places, values, i, pose)
             frames[e, side, 0], frames[e, side, 1] = m.place_frame[i, 0], m.place_frame[i, 1]
             frames[e, side, 2], frames[e, side, 3] = ox, oy
 
@@ -177,7 +178,7 @@ def _start_slope(m, tilt, e, k, frames, values, dvalues, pose):
     pose[2] = dvalues[m.place_dof[i, 3]]
 
 
-@kernel
+@maker
 def slopes(m, tilt, n_free, ys, drives, out, pushes, scratch):
     """Set the derivatives of the unknowns at points by all variables; tell whether every tangent is regular.
 
@@ -241,7 +242,7 @@ def _spread_out(m, tilt, drive, n_free, state, chains, dz, dy, push, work):
             _unfold_slopes(m, e, k, n, store, parts, pose, dpb, dy)
 
 
-@kernel
+@maker
 def held_slopes(m, tilt, n_free, ys, drives, dys, out):
     """Set the derivatives of the forces on all degrees of freedom and of the springs' energy, (points, dofs + 1, k).
 
@@ -268,7 +269,7 @@ def held_slopes(m, tilt, n_free, ys, drives, dys, out):
                 out[p, i, k] = force[i]
 
 
-@kernel
+@maker
 def row_slopes(m, tilt, n_free, y, drive, dy, out):
     """Set the derivatives of the states at the step boundaries of all segments at one point by all variables.
 

@@ -31,18 +31,36 @@ def _leave_blas_out() -> None:
 
 _leave_blas_out()
 
+
+def _uncounted() -> dict[str, Any]:
+    """Return the option that leaves out the counting of references to arrays, where the compiler has it.
+
+    Counting is atomic, and a function counts every array of a model that it is handed: that took longer than the
+    arithmetic. Without it a function cannot make arrays; those that it is handed are held by its caller.
+    """
+    try:
+        from numba.core.options import DefaultOptions
+    except ImportError:
+        return {}
+    return {"_nrt": False} if hasattr(DefaultOptions, "_nrt") else {}
+
+
 _MATH: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract"}}  # fused multiply and add: NaN stays NaN
 _INNER: dict[str, Any] = {**_MATH, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+_UNCOUNTED = _uncounted()
 _DOOR: dict[str, Any] = {**_MATH, "no_cfunc_wrapper": True, "cache": True, "nogil": True}
 
-kernel: Any = numba.njit(**_INNER)
-"""For functions that others call, compiled into the doors of `cfmkit.beams.kernels.entry`.
+kernel: Any = numba.njit(**_INNER, **_UNCOUNTED)
+"""For functions that others call, compiled into the doors of `cfmkit.beams.kernels.entry`; they make no arrays.
 
 They have no way in from Python (that halves the time to compile): calling one from Python ends the process.
 """
 
+maker: Any = numba.njit(**_INNER, **dict.fromkeys(_UNCOUNTED, True))
+"""For kernels that make arrays of their own."""
 
-inlined: Any = numba.njit(**_INNER, forceinline=True)
+
+inlined: Any = numba.njit(**_INNER, **_UNCOUNTED, forceinline=True)
 """For small functions in the innermost loops: a call with arrays costs more than they do."""
 
 

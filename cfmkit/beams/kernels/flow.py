@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cfmkit.beams.kernels.compiler import inlined, kernel
+from cfmkit.beams.kernels.compiler import inlined, kernel, maker
 from cfmkit.beams.kernels.rk8 import COUPLING, NODES, STAGES, WEIGHTS
 
 COLUMNS = 5  # the state itself, then its derivatives by the start's rotation, h, v and M
@@ -140,7 +140,7 @@ def _run(table, step, width, i):
     return total * width
 
 
-@kernel
+@maker
 def plain_flow(table, width, steps, start, load, states):
     """Integrate without derivatives; works on complex numbers too (derivatives by complex steps).
 

@@ -8,14 +8,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from cfmkit.beams.kernels.compiler import inlined, kernel
+from cfmkit.beams.kernels.compiler import inlined, kernel, maker
 from cfmkit.beams.kernels.flow import sincos
 from cfmkit.beams.kernels.rk8 import COUPLING, STAGES, WEIGHTS
 
 ROWS = 7  # phi, M, X, Y, strain energy, h, v
 
 
-@kernel
+@maker
 def flow_slopes(table, width, steps, start, load, changes, at, state, rows):
     """Integrate the state and the columns of its derivatives over the steps of a segment.
 

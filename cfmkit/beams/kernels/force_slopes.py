@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cfmkit.beams.kernels.chain import pose_of
+from cfmkit.beams.kernels.chain import places_of, pose_of
 from cfmkit.beams.kernels.compiler import inlined, kernel
 from cfmkit.beams.kernels.springs import LINE, TURN, spring_law
 
@@ -109,11 +109,11 @@ def spring_slopes(m, tilt, k, values, dvalues, w, out):
     """Add the derivatives of the springs' forces; return that of their energy."""
     pa, pb, force, dforce, block, gap = w[0], w[1], w[2], w[3], w[4:7, :3], w[7]
     sa, sb = w[8], w[9]
-    energy = 0.0
+    places, energy = places_of(m), 0.0
     for q in range(m.spring_kind.shape[0]):
         i, j = m.spring_place[q, 0], m.spring_place[q, 1]
-        pose_of(m, values, i, pa)
-        pose_of(m, values, j, pb)
+        pose_of(places, values, i, pa)
+        pose_of(places, values, j, pb)
         pose_slope(m, tilt, k, i, values, dvalues, sa)
         pose_slope(m, tilt, k, j, values, dvalues, sb)
         spring_law(m.spring_kind[q], m.spring_value[q], pa, pb, force, block)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cfmkit.beams.kernels.compiler import kernel
+from cfmkit.beams.kernels.compiler import kernel, maker
 from cfmkit.beams.kernels.dense import copy
 from cfmkit.beams.kernels.newton import SOLVED, solve
 
@@ -128,7 +128,7 @@ def _forward(border, tangent):
     return along > 0.0
 
 
-@kernel
+@maker
 def march(m, n_free, y, drive, tangent, targets, options, out_y, out_drive, out_info, scratch):
     """Follow the path from the equilibrium (y, drive) through the targets.
 
@@ -185,7 +185,7 @@ def march(m, n_free, y, drive, tangent, targets, options, out_y, out_drive, out_
     return DONE, stored
 
 
-@kernel
+@maker
 def _between(m, n_free, old, new, state, targets, asked, stored, options, outs, unit, scratch):
     """Solve at the asked values of the drive that a step of arc length has passed; return (asked, stored).
 

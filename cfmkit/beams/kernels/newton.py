@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from cfmkit.beams.kernels.chain import C_D, E2, SMALL, E, F, G, pose_of, sweep, unfold
+from cfmkit.beams.kernels.chain import C_D, E2, SMALL, E, F, G, places_of, pose_of, sweep, unfold
 from cfmkit.beams.kernels.compiler import kernel
 from cfmkit.beams.kernels.dense import clear, copy_matrix, lu_solve, positive_count
-from cfmkit.beams.kernels.springs import add_block, add_entry, add_force, add_loads, add_springs, jacobian
+from cfmkit.beams.kernels.springs import add_block, add_force, add_loads, add_springs, jacobian, wires_of
 
 SOLVED, SINGULAR, DIVERGED, SLOW = 0, 1, 2, 3
 LARGEST_TURN = 1.0  # longest Newton step [rad or lengths]: longer ones are shortened, not refused
@@ -37,14 +37,15 @@ def assemble(m, y, drive, n_free, h, residual, values, ends, rel, store, work):
     n = n_free + 3 * n_beams
     w = work[4]
     ja, jb, force = w[0:3, :4], w[3:6, :4], w[6]
+    places, wires = places_of(m), wires_of(m)
     index, least = 0, 1.0
     add_loads(m, values, drive, h, residual, work)
     add_springs(m, values, h, residual, work)
     for e in range(n_beams):
         ia, ib = m.beam_end[e, 0], m.beam_end[e, 1]
-        arm_a, arm_b = pose_of(m, values, ia, ends[0]), pose_of(m, values, ib, ends[1])
-        jacobian(m, ia, arm_a, ja)
-        jacobian(m, ib, arm_b, jb)
+        arm_a, arm_b = pose_of(places, values, ia, ends[0]), pose_of(places, values, ib, ends[1])
+        jacobian(m.place_frame, ia, arm_a, ja)
+        jacobian(m.place_frame, ib, arm_b, jb)
         change, short = sweep(m, e, y, (n_free, n), drive, ends, rel[e], store, work)
         index += change
         least = min(least, short)
@@ -52,11 +53,11 @@ def assemble(m, y, drive, n_free, h, residual, values, ends, rel, store, work):
         last = n_free + 3 * e
         for r in range(3):
             force[r] = y[own + r] + rel[e, SMALL, r, 0]
-        add_force(m, h, residual, ia, arm_a, ja, force)
+        add_force(wires, h, residual, ia, arm_a, ja, force)
         for r in range(3):
             force[r] = -y[last + r]
-        add_force(m, h, residual, ib, arm_b, jb, force)
-        add_block(m, h, ia, ia, ja, rel[e, G], ja)
+        add_force(wires, h, residual, ib, arm_b, jb, force)
+        add_block(wires, h, ia, ia, ja, rel[e, G], ja)
         _couple(m, h, e, last, ia, ib, ja, jb, rel[e])
         for r in range(3):
             residual[n_dofs + 3 * e + r] = rel[e, C_D, r, 0]
@@ -191,10 +192,11 @@ def solve(m, n_free, y, state, border, target, limits, tangent, scratch):
 def _unfold_all(m, n_free, n, ddrive, values, rel, store, dy, work):
     """Set the increments of the segments' unknowns from those of z (already in dy) and of the drive."""
     dpose, jac, pose = work[7, 0], work[7, 1:4, :4], work[7, 4]
+    places = places_of(m)
     for e in range(m.beam_end.shape[0]):
         ia = m.beam_end[e, 0]
-        arm = pose_of(m, values, ia, pose)
-        jacobian(m, ia, arm, jac)
+        arm = pose_of(places, values, ia, pose)
+        jacobian(m.place_frame, ia, arm, jac)
         for r in range(3):
             dpose[r] = 0.0
             for a in range(4):
@@ -206,4 +208,4 @@ def _unfold_all(m, n_free, n, ddrive, values, rel, store, dy, work):
         unfold(m, e, (n_free, n), store, dpose, dy[last : last + 3], ddrive, dy)
 
 
-__all__ = ["DIVERGED", "SINGULAR", "SLOW", "SOLVED", "add_entry", "all_values", "assemble", "solve"]
+__all__ = ["DIVERGED", "SINGULAR", "SLOW", "SOLVED", "all_values", "assemble", "solve"]

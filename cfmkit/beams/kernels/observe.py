@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from cfmkit.beams.kernels.chain import pose_of
+from cfmkit.beams.kernels.chain import places_of, pose_of
 from cfmkit.beams.kernels.compiler import kernel
 from cfmkit.beams.kernels.flow import plain_flow
 from cfmkit.beams.kernels.newton import all_values, assemble
-from cfmkit.beams.kernels.springs import add_force, add_loads, add_springs, jacobian
+from cfmkit.beams.kernels.springs import add_force, add_loads, add_springs, jacobian, wires_of
 
 STATE = 7  # x, y, rotation, moment, h, v, strain energy since the segment's start
 
@@ -20,6 +20,7 @@ def forces(m, n_free, ys, drives, out, scratch):
     h, _, _, residual, values, _, _, _, work, _ = scratch
     n, beams = values.shape[0], m.beam_end.shape[0]
     pose, jac, force = work[4, 6], work[4, 0:3, :4], work[4, 7]
+    places, wires = places_of(m), wires_of(m)
     for p in range(ys.shape[0]):
         y = ys[p]
         all_values(m, y, drives[p], values)
@@ -31,11 +32,11 @@ def forces(m, n_free, ys, drives, out, scratch):
             own, last = n_free + 3 * beams + 6 * m.beam_segment[e] + 3, n_free + 3 * e
             for side in range(2):
                 i = m.beam_end[e, side]
-                arm = pose_of(m, values, i, pose)
-                jacobian(m, i, arm, jac)
+                arm = pose_of(places, values, i, pose)
+                jacobian(m.place_frame, i, arm, jac)
                 for r in range(3):
                     force[r] = y[own + r] if side == 0 else -y[last + r]
-                add_force(m, h, residual, i, arm, jac, force)
+                add_force(wires, h, residual, i, arm, jac, force)
         for i in range(n):
             out[p, i], out[p, n + i] = values[i], residual[i]
 

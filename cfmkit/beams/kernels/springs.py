@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from cfmkit.beams.kernels.chain import pose_of
-from cfmkit.beams.kernels.compiler import kernel
+from cfmkit.beams.kernels.chain import places_of, pose_of
+from cfmkit.beams.kernels.compiler import inlined, kernel
 from cfmkit.beams.kernels.dense import clear
 
 LINE, TURN, SLIDE = 0, 1, 2
@@ -14,50 +14,55 @@ angle), along a fixed direction (stiffness, cos, sin, free gap)."""
 
 
 @kernel
-def jacobian(m, i, arm, jac):
+def jacobian(frames, i, arm, jac):
     """Set the 3 x 4 derivative of the pose of attachment i by its degrees of freedom."""
-    fc, fs = m.place_frame[i, 0], m.place_frame[i, 1]
+    fc, fs = frames[i, 0], frames[i, 1]
     clear(jac)
     jac[0, 0], jac[0, 1], jac[0, 2] = fc, -fs, -arm[1]
     jac[1, 0], jac[1, 1], jac[1, 2] = fs, fc, arm[0]
     jac[2, 3] = 1.0
 
 
-@kernel
-def add_entry(m, h, i, j, value):
+@inlined
+def wires_of(m):
+    """Return where forces and their derivatives go: all that the functions below need (the model is slow to pass)."""
+    return m.place_dof, m.slot, m.rate
+
+
+@inlined
+def add_entry(wires, h, i, j, value):
     """Add d(residual i)/d(dof j) to the system; driven degrees of freedom go to the drive's column."""
-    row = m.slot[i]
-    if row < 0 or value == 0.0:
-        return
-    column = m.slot[j]
-    if column >= 0:
-        h[row, column] += value
-    elif m.rate[j] != 0.0:
-        h[row, h.shape[0] - 1] += value * m.rate[j]
+    _, slots, rates = wires
+    row = slots[i]
+    if row >= 0:
+        column = slots[j]
+        if column >= 0:
+            h[row, column] += value
+        else:
+            h[row, h.shape[0] - 1] += value * rates[j]
 
 
 @kernel
-def add_block(m, h, i, j, left, block, right):
+def add_block(wires, h, i, j, left, block, right):
     """Add left^T block right for the degrees of freedom of attachments i and j."""
-    for a in range(4):
-        for b in range(4):
-            value = 0.0
-            for r in range(3):
-                if left[r, a] != 0.0:
-                    inner = 0.0
-                    for s in range(3):
-                        inner += block[r, s] * right[s, b]
-                    value += left[r, a] * inner
-            add_entry(m, h, m.place_dof[i, a], m.place_dof[j, b], value)
+    dofs = wires[0]
+    for b in range(4):
+        p = q = t = 0.0
+        for s in range(3):
+            p += block[0, s] * right[s, b]
+            q += block[1, s] * right[s, b]
+            t += block[2, s] * right[s, b]
+        for a in range(4):
+            add_entry(wires, h, dofs[i, a], dofs[j, b], left[0, a] * p + left[1, a] * q + left[2, a] * t)
 
 
 @kernel
-def add_force(m, h, residual, i, arm, jac, force):
+def add_force(wires, h, residual, i, arm, jac, force):
     """Add a force (fx, fy, moment) at attachment i to the residual, with the part of the tangent that its arm makes."""
-    d = m.place_dof[i]
+    d = wires[0][i]
     for a in range(4):
         residual[d[a]] += jac[0, a] * force[0] + jac[1, a] * force[1] + jac[2, a] * force[2]
-    add_entry(m, h, d[2], d[2], -(arm[0] * force[0] + arm[1] * force[1]))
+    add_entry(wires, h, d[2], d[2], -(arm[0] * force[0] + arm[1] * force[1]))
 
 
 @kernel
@@ -65,24 +70,25 @@ def add_loads(m, values, drive, h, residual, work):
     """Add the point loads, dead or turning with their node."""
     pose, jac, force, column = work[5, 0], work[5, 1:4, :4], work[5, 4], work[5, 5]
     n = h.shape[0] - 1
+    places, wires = places_of(m), wires_of(m)
     for k in range(m.load_place.shape[0]):
         i = m.load_place[k]
-        arm = pose_of(m, values, i, pose)
-        jacobian(m, i, arm, jac)
+        arm = pose_of(places, values, i, pose)
+        jacobian(m.place_frame, i, arm, jac)
         for r in range(3):
             force[r] = m.load_value[k, 0, r] + drive * m.load_value[k, 1, r]
             column[r] = m.load_value[k, 1, r]
         if m.load_follows[k]:
             _turn(force, pose[2])
             _turn(column, pose[2])
-        add_force(m, h, residual, i, arm, jac, force)
+        add_force(wires, h, residual, i, arm, jac, force)
         d = m.place_dof[i]
         for a in range(4):
             row = m.slot[d[a]]
             if row >= 0:
                 h[row, n] += jac[0, a] * column[0] + jac[1, a] * column[1] + jac[2, a] * column[2]
             if m.load_follows[k]:
-                add_entry(m, h, d[a], d[3], -jac[0, a] * force[1] + jac[1, a] * force[0])
+                add_entry(wires, h, d[a], d[3], -jac[0, a] * force[1] + jac[1, a] * force[0])
 
 
 @kernel
@@ -128,22 +134,23 @@ def add_springs(m, values, h, residual, work):
     w = work[6]
     pa, pb, force, block = w[0], w[1], w[2], w[3:6, :3]
     ja, jb = w[6:9, :4], w[9:12, :4]
+    places, wires = places_of(m), wires_of(m)
     energy = 0.0
     for k in range(m.spring_kind.shape[0]):
         i, j = m.spring_place[k, 0], m.spring_place[k, 1]
-        arm_a, arm_b = pose_of(m, values, i, pa), pose_of(m, values, j, pb)
-        jacobian(m, i, arm_a, ja)
-        jacobian(m, j, arm_b, jb)
+        arm_a, arm_b = pose_of(places, values, i, pa), pose_of(places, values, j, pb)
+        jacobian(m.place_frame, i, arm_a, ja)
+        jacobian(m.place_frame, j, arm_b, jb)
         energy += spring_law(m.spring_kind[k], m.spring_value[k], pa, pb, force, block)
-        add_force(m, h, residual, j, arm_b, jb, force)
+        add_force(wires, h, residual, j, arm_b, jb, force)
         for r in range(3):
             force[r] = -force[r]
-        add_force(m, h, residual, i, arm_a, ja, force)
-        add_block(m, h, i, i, ja, block, ja)
-        add_block(m, h, j, j, jb, block, jb)
+        add_force(wires, h, residual, i, arm_a, ja, force)
+        add_block(wires, h, i, i, ja, block, ja)
+        add_block(wires, h, j, j, jb, block, jb)
         for r in range(3):
             for s in range(3):
                 block[r, s] = -block[r, s]
-        add_block(m, h, i, j, ja, block, jb)
-        add_block(m, h, j, i, jb, block, ja)
+        add_block(wires, h, i, j, ja, block, jb)
+        add_block(wires, h, j, i, jb, block, ja)
     return energy
