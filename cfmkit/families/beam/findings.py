@@ -5,7 +5,7 @@ The names are stable; the sentences say what the name means. The message that a 
 
 from __future__ import annotations
 
-from cfmkit.results import Finding
+from cfmkit.families.findings import finder
 
 FINDINGS = {
     "closure_adjusted": "beams were turned and scaled to fit between rounded nodes, or nodes moved to the beams' ends",
@@ -32,9 +32,5 @@ FINDINGS = {
     "feature_small": "a beam is thinner than can be made",
 }
 
-
-def finding(name: str, message: str, *cures: str) -> Finding:
-    """Return a finding of this family; the name must be one that `FINDINGS` explains."""
-    if name not in FINDINGS:
-        raise KeyError(name)
-    return Finding(name, message, cures)
+finding = finder(FINDINGS)
+"""Return a finding of this family; the name must be one that `FINDINGS` explains."""

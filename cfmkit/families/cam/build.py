@@ -11,8 +11,9 @@ from cfmkit.bodies.cam_profile import SlopeLaw
 from cfmkit.bodies.cam_track import Track
 from cfmkit.bodies.track_states import NoTrack
 from cfmkit.errors import SolutionError
-from cfmkit.families.cam.findings import finding, mm
+from cfmkit.families.cam.findings import finding
 from cfmkit.families.cam.statics import GRAVITY, Loads
+from cfmkit.families.findings import mm
 
 if TYPE_CHECKING:
     from cfmkit.families.cam.spec import CamSpec, Masses, Mechanism

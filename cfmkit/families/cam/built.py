@@ -25,8 +25,9 @@ from cfmkit.curves import Column, Curve
 from cfmkit.errors import DataError
 from cfmkit.families.cam.build import Assembly, CannotBuild, assemble, displacement_origin
 from cfmkit.families.cam.built_values import findings_of_built, values_of_built
-from cfmkit.families.cam.findings import finding, mm
+from cfmkit.families.cam.findings import finding
 from cfmkit.families.cam.values import DEFINITIONS, design_values, largest
+from cfmkit.families.findings import mm
 from cfmkit.numerics.registration import Registration, gaps_across, register
 from cfmkit.results import Quantity, Result, Status
 from cfmkit.tables.labpoints import read_sides

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.cam.findings import finding, mm
+from cfmkit.families.cam.findings import finding
+from cfmkit.families.findings import mm
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -20,9 +20,9 @@ import numpy as np
 from cfmkit.bodies.cam_path import reach
 from cfmkit.bodies.cam_profile import SlopeLaw, brace_tangent
 from cfmkit.families.cam.build import CLOSE, CannotBuild, check_start, hanging_weights
-from cfmkit.families.cam.findings import at_least, at_most, finding, mm
+from cfmkit.families.cam.findings import finding
+from cfmkit.families.findings import at_least, at_most, mm, newton, rate
 from cfmkit.results import Design, Status
-from cfmkit.units import format_short
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -102,10 +102,10 @@ def shaping(spec: CamSpec, target: CamDesign) -> tuple[float, float]:
         raise Infeasible(
             finding(
                 "weight_too_large",
-                f"the moving parts weigh {format_short(least, 'force')}: a force of "
-                f"{format_short(target.force, 'force')} does not even carry them; ask for more, or lighten the parts",
+                f"the moving parts weigh {newton(least)}: a force of "
+                f"{newton(target.force)} does not even carry them; ask for more, or lighten the parts",
             ),
-            {"design.force": f"more than {format_short(least, 'force')}"},
+            {"design.force": f"more than {newton(least)}"},
         )
     pull = target.force - slider
     return pull, pull / (pull - 2.0 * roller)
@@ -157,7 +157,7 @@ def _from_springs(spec: CamSpec, target: CamDesign, pull: float, factor: float, 
     softer = springs.scaled_to(pull / (4.0 * smallest))
     note = (
         f"to avoid undercut A is raised from {mm(constant)} to {mm(smallest)}; the springs must then add up to "
-        f"{format_short(softer.total, 'stiffness')} instead of {format_short(springs.total, 'stiffness')}"
+        f"{rate(softer.total)} instead of {rate(springs.total)}"
     )
     return Choice(smallest, softer, ("design.avoid_undercut",), note)
 

@@ -6,14 +6,7 @@ run reports carries the numbers that decide and the cure.
 
 from __future__ import annotations
 
-import math
-from typing import TYPE_CHECKING
-
-from cfmkit.results import Finding
-from cfmkit.units import format_short
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
+from cfmkit.families.findings import finder
 
 FINDINGS = {
     "brace_too_short": "the roller is, or comes, as far from the axis as the brace is long",
@@ -45,37 +38,5 @@ FINDINGS = {
     "no_spring_fits": "no spring of the catalogue meets the limits",
 }
 
-
-def finding(name: str, message: str, *cures: str) -> Finding:
-    """Return a finding of this family; the name must be one that `FINDINGS` explains."""
-    if name not in FINDINGS:
-        raise KeyError(name)
-    return Finding(name, message, cures)
-
-
-def mm(value: float) -> str:
-    """Return a length as the user reads it: four significant digits, in mm."""
-    return format_short(value, "length")
-
-
-def at_most(length: float) -> str:
-    """Return a length [m] rounded down to four digits: as good as feasible, and feasible."""
-    return _rounded(length, math.floor)
-
-
-def at_least(length: float) -> str:
-    """Return a length [m] rounded up to four digits.
-
-    Examples
-    --------
-    >>> at_least(0.0144645), at_most(0.1693794)
-    ('14.47 mm', '169.3 mm')
-    """
-    return _rounded(length, math.ceil)
-
-
-def _rounded(length: float, way: Callable[[float], int]) -> str:
-    if length < 1e-300:
-        return "0 mm"
-    digits = 3 - math.floor(math.log10(length * 1e3))
-    return f"{way(length * 1e3 * 10.0**digits) / 10.0**digits:.4g} mm"
+finding = finder(FINDINGS)
+"""Return a finding of this family; the name must be one that `FINDINGS` explains."""

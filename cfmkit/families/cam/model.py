@@ -23,9 +23,10 @@ from cfmkit.bodies.cam_profile import brace_tangent
 from cfmkit.curves import Column, Curve, FloatArray
 from cfmkit.families.cam.build import CLOSE, Assembly, CannotBuild, assemble, displacement_origin
 from cfmkit.families.cam.checks import findings_of
-from cfmkit.families.cam.findings import finding, mm
+from cfmkit.families.cam.findings import finding
 from cfmkit.families.cam.statics import Forces, forces, jams
 from cfmkit.families.cam.values import theoretical_force, values_of
+from cfmkit.families.findings import mm
 from cfmkit.results import Result, Status
 
 if TYPE_CHECKING:

@@ -11,7 +11,8 @@ import numpy as np
 from cfmkit.bodies.slider_crank import Linkage
 from cfmkit.bodies.slider_crank_springs import UnitCurves, along_crank, along_slider
 from cfmkit.errors import SolutionError
-from cfmkit.families.slider_crank.findings import deg, finding, mm
+from cfmkit.families.findings import deg, mm
+from cfmkit.families.slider_crank.findings import finding
 
 if TYPE_CHECKING:
     from cfmkit.curves import FloatArray, Kind

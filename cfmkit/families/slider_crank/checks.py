@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.bodies.slider_crank_springs import JOINTS
+from cfmkit.families.findings import deg, mm, newton
 from cfmkit.families.slider_crank.classes import BISTABLE, BOUNDARY, SNAPS, TRISTABLE
-from cfmkit.families.slider_crank.findings import deg, finding, mm
+from cfmkit.families.slider_crank.findings import finding
 from cfmkit.units import format_short
 
 if TYPE_CHECKING:
@@ -100,7 +101,7 @@ def _of_force(spec: SliderCrankSpec, solution: Solution) -> Iterator[Finding]:
         found = solution.character.effort(0.0)
         yield finding(
             "stretched_start",
-            f"the slider starts stretched, where its force is 0/0: the limit is {_force(found)}, "
+            f"the slider starts stretched, where its force is 0/0: the limit is {newton(found)}, "
             "as of a column that buckles; a kink smaller than the part's tolerance decides to which side it gives way",
         )
         if spec.analysis.side is None:
@@ -182,7 +183,3 @@ def _of_limits(spec: SliderCrankSpec, solution: Solution) -> Iterator[Finding]:
             told, allowed = format_short(value, dimension), format_short(limit, dimension)
             what = "slider's spring" if name == "slider" else f"spring at the {name.replace('_', ' ')}"
             yield finding("joint_overrotated", f"the {what} is moved by {told}, its limit is {allowed}")
-
-
-def _force(value: float) -> str:
-    return format_short(value, "force")

@@ -6,9 +6,8 @@ run reports carries the numbers that decide and the cure.
 
 from __future__ import annotations
 
+from cfmkit.families.findings import finder
 from cfmkit.families.slider_crank.flexures.findings import FINDINGS as OF_PARTS
-from cfmkit.results import Finding
-from cfmkit.units import format_short
 
 FINDINGS = {
     "not_assemblable": "crank and coupler do not reach the slider's way, or not in the unloaded position",
@@ -39,19 +38,5 @@ FINDINGS = {
     **OF_PARTS,
 }
 
-
-def finding(name: str, message: str, *cures: str) -> Finding:
-    """Return a finding of this family; the name must be one that `FINDINGS` explains."""
-    if name not in FINDINGS:
-        raise KeyError(name)
-    return Finding(name, message, cures)
-
-
-def deg(value: float) -> str:
-    """Return an angle as the user reads it."""
-    return format_short(value, "angle")
-
-
-def mm(value: float) -> str:
-    """Return a length as the user reads it."""
-    return format_short(value, "length")
+finding = finder(FINDINGS)
+"""Return a finding of this family; the name must be one that `FINDINGS` explains."""

@@ -19,10 +19,11 @@ import numpy as np
 
 from cfmkit.bodies.slider_crank_springs import JOINTS
 from cfmkit.curves import Column, Curve, FloatArray
+from cfmkit.families.findings import deg, mm
 from cfmkit.families.slider_crank.build import CannotBuild, assemble, default_motion, resolve
 from cfmkit.families.slider_crank.character import Character, Equilibrium
 from cfmkit.families.slider_crank.checks import TURN, findings_of
-from cfmkit.families.slider_crank.findings import deg, finding, mm
+from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.reactions import reactions
 from cfmkit.families.slider_crank.values import values_of
 from cfmkit.results import Result, Status

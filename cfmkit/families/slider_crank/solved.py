@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from cfmkit.bodies.slider_crank_springs import JOINTS
+from cfmkit.families.findings import percent
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.targets import FREE
 from cfmkit.families.slider_crank.windows import widest
@@ -96,7 +97,7 @@ def nowhere(task: Task) -> Finding:
 
 def hopeless(task: Task, deviation: float) -> Finding:
     """Return that even the best springs have nothing of a constant effort, and why."""
-    text = f"even the best springs are off by {100 * deviation:.3g} %: that is no constant {task.assembly.drive}"
+    text = f"even the best springs are off by {percent(deviation)}: that is no constant {task.assembly.drive}"
     ahead = (task.assembly.stretched - task.assembly.start) * task.wanted.target
     if task.assembly.drive == "torque" and ahead <= 0.0:
         text += "; the stretched position does not lie ahead of the unloaded one, and the torque only rises there"
@@ -108,7 +109,7 @@ def too_far(task: Task, deviation: float) -> tuple[Finding, dict[str, str]]:
     """Return that a window is too wide for its tolerance, and what would be feasible."""
     wanted = task.wanted
     nearest = {"design.tolerance": f"{100 * deviation:.4g} %"}
-    text = f"the best springs are off by {100 * deviation:.3g} %, and {100 * (wanted.tolerance or 0):.3g} % are allowed"
+    text = f"the best springs are off by {percent(deviation)}, and {percent(wanted.tolerance or 0)} are allowed"
     found = widest(task, wanted.tolerance or 0.0)
     if found is not None:
         name = "angle" if task.assembly.drive == "torque" else "travel"
@@ -163,5 +164,5 @@ def _place(solved: Solved, motion: float) -> str:
 def message(solved: Solved) -> str:
     """Return the outcome in one sentence."""
     low, high = (_place(solved, end) for end in solved.window)
-    rms = f"rms {100 * solved.rms:.3g} %"
-    return f"off by at most {100 * solved.deviation:.3g} % ({rms}) over {low} to {high}"
+    rms = f"rms {percent(solved.rms)}"
+    return f"off by at most {percent(solved.deviation)} ({rms}) over {low} to {high}"

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.vcfm.findings import finding, mm, mpa, newton, percent, rate
+from cfmkit.families.findings import mm, mpa, newton, percent, rate
+from cfmkit.families.vcfm.findings import finding
 from cfmkit.families.vcfm.preload import measured_stiffness_for
 from cfmkit.families.vcfm.springs import Diamond
 from cfmkit.families.vcfm.vbeam import (

@@ -12,12 +12,12 @@ from dataclasses import replace
 from math import asin, cos, sqrt
 from typing import TYPE_CHECKING
 
-from cfmkit.families.vcfm.findings import finding, mm, mpa
+from cfmkit.families.findings import at_least, mm, mpa
+from cfmkit.families.vcfm.findings import finding
 from cfmkit.families.vcfm.limits import (
     MARGIN,
     Infeasible,
     Sizes,
-    at_least,
     check_room,
     shortest_leaf,
     thickness_for,

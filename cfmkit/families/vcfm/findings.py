@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from cfmkit.results import Finding
-from cfmkit.units import format_short
+from cfmkit.families.findings import finder
 
 FINDINGS = {
     "no_negative_stiffness": "the leaves are too thick for their rise: no negative stiffness anywhere",
@@ -27,34 +26,5 @@ FINDINGS = {
     "stress_unreachable": "no leaf length brings the exact stress below the one allowed",
 }
 
-
-def finding(name: str, message: str, *cures: str) -> Finding:
-    """Return a finding of this family; the name must be one that `FINDINGS` explains."""
-    if name not in FINDINGS:
-        raise KeyError(name)
-    return Finding(name, message, cures)
-
-
-def mm(value: float) -> str:
-    """Return a length as the user reads it: four significant digits, in mm."""
-    return format_short(value, "length")
-
-
-def newton(value: float) -> str:
-    """Return a force as the user reads it."""
-    return format_short(value, "force")
-
-
-def mpa(value: float) -> str:
-    """Return a stress as the user reads it."""
-    return format_short(value, "stress")
-
-
-def rate(value: float) -> str:
-    """Return a stiffness as the user reads it."""
-    return format_short(value, "stiffness")
-
-
-def percent(value: float) -> str:
-    """Return a ratio as the user reads it."""
-    return f"{100.0 * value:.3g} %"
+finding = finder(FINDINGS)
+"""Return a finding of this family; the name must be one that `FINDINGS` explains."""

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import ceil, floor, log10, pi, radians, sin, sqrt
+from math import pi, radians, sin, sqrt
 from typing import TYPE_CHECKING
 
-from cfmkit.families.vcfm.findings import finding, mm
+from cfmkit.families.findings import at_least, at_most, mm
+from cfmkit.families.vcfm.findings import finding
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -124,27 +125,3 @@ def check_room(target: VcfmDesign, sizes: Sizes) -> None:
                 finding("envelope", f"the {name} {verb} {mm(found[name])} {words}, there are {mm(limit)}"),
                 {f"design.{path}": at_least(ROOM * found[name])},
             )
-
-
-def at_least(length: float) -> str:
-    """Return a length [m] rounded up to four digits: as good as feasible, and feasible.
-
-    Examples
-    --------
-    >>> at_least(0.0144645), at_most(0.1693794)
-    ('14.47 mm', '169.3 mm')
-    """
-    return _rounded(length, ceil(length * 1e3 * 10.0 ** _digits(length)))
-
-
-def at_most(length: float) -> str:
-    """Return a length [m] rounded down to four digits."""
-    return _rounded(length, floor(length * 1e3 * 10.0 ** _digits(length)))
-
-
-def _digits(length: float) -> int:
-    return 3 - floor(log10(length * 1e3))
-
-
-def _rounded(length: float, number: int) -> str:
-    return f"{number / 10.0 ** _digits(length):.4g} mm"

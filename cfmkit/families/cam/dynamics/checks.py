@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.families.cam.dynamics.build import slender_rod, solid_cylinder
-from cfmkit.families.cam.findings import finding, mm
+from cfmkit.families.cam.findings import finding
+from cfmkit.families.findings import mm, newton
 from cfmkit.units import format_short
 
 if TYPE_CHECKING:
@@ -61,7 +62,7 @@ def _lift_off(moved: Moved) -> Iterator[Finding]:
             yield finding(
                 "lift_off",
                 f"the cam would have to pull {'each' if alike else f'the {side}'} roller with up to "
-                f"{_newton(-float(np.nanmin(contact)))} {_when(moved, lost)}: it leaves the cam there, "
+                f"{newton(-float(np.nanmin(contact)))} {_when(moved, lost)}: it leaves the cam there, "
                 "and what follows is not what happens",
             )
 
@@ -72,7 +73,7 @@ def _slack_cable(moved: Moved) -> Iterator[Finding]:
     if lost.any():
         yield finding(
             "slack_cable",
-            f"the force falls to {_newton(float(np.nanmin(force)))}; it is not positive {_when(moved, lost)}: "
+            f"the force falls to {newton(float(np.nanmin(force)))}; it is not positive {_when(moved, lost)}: "
             "a cable would go slack, the slider would have to be pushed",
         )
 
@@ -161,7 +162,3 @@ def _when(moved: Moved, where: NDArray[np.bool_]) -> str:
 
 def _moment(moved: Moved, index: int) -> str:
     return f"{format_short(float(moved.history.times[index]), 'time')} ({mm(float(moved.displacement[index]))})"
-
-
-def _newton(force: float) -> str:
-    return format_short(force, "force")

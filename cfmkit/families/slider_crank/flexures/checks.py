@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.slider_crank.findings import finding, mm
+from cfmkit.families.findings import mm, mpa, newton
+from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.flexures.chain import kink
 from cfmkit.families.slider_crank.flexures.findings import CLOSE, RUN_IN_SHARE, SIDE_SHARE, THINNEST_RATIO
 from cfmkit.families.slider_crank.flexures.values import first_at, stress_stroke
-from cfmkit.units import format_short
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -42,8 +42,8 @@ def _strength(solution: Printed) -> Iterator[Finding]:
     worst = int(np.argmax(solution.stress))
     yield finding(
         "overstressed",
-        f"beyond {mm(place)} of travel the stress exceeds the allowable {format_short(limit, 'stress')}; it reaches "
-        f"{format_short(float(solution.stress[worst]), 'stress')} at {mm(float(solution.travel[worst]))}, "
+        f"beyond {mm(place)} of travel the stress exceeds the allowable {mpa(limit)}; it reaches "
+        f"{mpa(float(solution.stress[worst]))} at {mm(float(solution.travel[worst]))}, "
         f"{mm(float(solution.place[worst]))} along the part from its clamped end",
         f"analysis.travel=[{mm(float(solution.travel[0]))}, {place * 1e3:.4g} mm]",
     )
@@ -61,7 +61,7 @@ def _kink(spec: SliderCrankSpec, solution: Printed) -> Iterator[Finding]:
     if solution.chain.side == 0:
         yield finding(
             "straight_start",
-            f"the chain is exactly straight: it holds {format_short(float(solution.force[1]), 'force')} before it "
+            f"the chain is exactly straight: it holds {newton(float(solution.force[1]))} before it "
             "moves sideways, and any 0.1 um decides to which side; give it a kink of 0.25 to 0.5 mm by "
             "'mechanism.unloaded_offset'",
         )
@@ -104,8 +104,8 @@ def _guide(solution: Printed) -> Iterator[Finding]:
         side = float(abs(solution.side_force[worst]))
         yield finding(
             "side_force",
-            f"the guide carries up to {format_short(side, 'force')} across the way, {100 * share[worst]:.0f} % of the "
-            f"force: friction of 0.1 there changes it by {format_short(0.1 * side, 'force')}; a mirrored pair on one "
+            f"the guide carries up to {newton(side)} across the way, {100 * share[worst]:.0f} % of the "
+            f"force: friction of 0.1 there changes it by {newton(0.1 * side)}; a mirrored pair on one "
             "slider cancels it",
         )
 

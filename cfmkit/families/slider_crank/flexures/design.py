@@ -16,8 +16,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.errors import InputError
+from cfmkit.families.findings import mm, newton, percent
 from cfmkit.families.slider_crank.build import CannotBuild, linkage_of, resolve, unloaded_angle
-from cfmkit.families.slider_crank.findings import finding, mm
+from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.flexures.assembly import corners, elasticity, pins_of, travel_direction
 from cfmkit.families.slider_crank.flexures.descent import Ending
 from cfmkit.families.slider_crank.flexures.infeasible import infeasible
@@ -28,7 +29,6 @@ from cfmkit.families.slider_crank.flexures.search import LOOSE, SHORTEST, Found,
 from cfmkit.families.slider_crank.flexures.spec import StripSpec
 from cfmkit.families.slider_crank.flexures.task import Form, Task
 from cfmkit.results import Design, Finding, Status
-from cfmkit.units import format_short
 
 if TYPE_CHECKING:
     from cfmkit.bodies.slider_crank import Linkage
@@ -214,11 +214,11 @@ def _closed(spec: SliderCrankSpec, wanted: StripDesign, task: Task, ranges: Rang
     if isinstance(wanted.width, tuple) and not wanted.width[0] <= width <= wanted.width[1]:
         reached = task.force * np.clip(width, *wanted.width) / width
         text = (
-            f"{format_short(task.force, 'force')} need a width of {mm(width)}; within {mm(wanted.width[0])} to "
-            f"{mm(wanted.width[1])} the nearest is {format_short(float(reached), 'force')}"
+            f"{newton(task.force)} need a width of {mm(width)}; within {mm(wanted.width[0])} to "
+            f"{mm(wanted.width[1])} the nearest is {newton(float(reached))}"
         )
         told = finding("target_unreachable", text)
-        nearest = {"design.force": format_short(float(reached), "force"), "design.beam.width": mm(width)}
+        nearest = {"design.force": newton(float(reached)), "design.beam.width": mm(width)}
         return Design(None, Status.INFEASIBLE, text, nearest_feasible=nearest, warnings=(told,))
     part = _part(spec, {"width": round(width, DECIMALS), "thickness": round(thickness, DECIMALS), "shares": None})
     text = f"thickness {mm(thickness)} from the stress at {mm(task.stroke)}, width {mm(width)} from the force"
@@ -254,13 +254,13 @@ def _message(found: Found, judged: Judged) -> str:
     descent, count = found.descent, found.form.count
     what = "one thickness" if count == 1 else f"{count} thicknesses"
     if found.task.goal == "rms":
-        head = f"root mean square {format_short(judged.rms, 'force')} over {mm(judged.window[1])}"
+        head = f"root mean square {newton(judged.rms)} over {mm(judged.window[1])}"
     else:
-        head = f"within {100 * judged.ripple:.3g} % from {mm(judged.window[0])} to {mm(judged.window[1])}"
+        head = f"within {percent(judged.ripple)} from {mm(judged.window[0])} to {mm(judged.window[1])}"
     compared = ""
     if found.uniform is not None and found.uniform.feasible and count > 1 and found.task.goal == "stroke":
-        within = 100.0 * max(found.task.ripple, LOOSE)
-        compared = f"; one thickness reaches {mm(0.01 * float(found.uniform.z[-1]))} within {within:.3g} %"
+        within = percent(max(found.task.ripple, LOOSE))
+        compared = f"; one thickness reaches {mm(0.01 * float(found.uniform.z[-1]))} within {within}"
     opinion, shown = judged.opinion, judged.active[:TOLD]
     more = f" and {len(judged.active) - TOLD} more" if len(judged.active) > TOLD else ""
     held = f"; held by {', '.join(shown)}{more}" if shown else ""

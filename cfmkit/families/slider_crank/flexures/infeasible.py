@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from cfmkit.families.slider_crank.findings import finding, mm
+from cfmkit.families.findings import mm, mpa, newton, percent
+from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.flexures.descent import VIOLATION, Ending
 from cfmkit.results import Design, Status
 from cfmkit.units import format_short
@@ -24,14 +25,14 @@ def infeasible(found: Found) -> Design:
     level, missed, nearest = 0.5 * (low + high), [], {}
     off, limit = max(high / task.force - 1.0, 1.0 - low / task.force), task.material.allowable_stress
     if off > program.ripple(descent.z):
-        missed.append(f"is up to {100 * off:.3g} % off the force")
+        missed.append(f"is up to {percent(off)} off the force")
         flat = high - low <= 2.0 * level * program.ripple(descent.z)
         name = "design.force" if flat else "design.tolerance"
-        nearest[name] = format_short(level, "force") if flat else format_short(off, "ratio")
+        nearest[name] = newton(level) if flat else format_short(off, "ratio")
     worst = float(state.stress.max())
     if limit is not None and worst > limit * (1.0 + 0.1 * VIOLATION):
-        missed.append(f"has a stress of {format_short(worst, 'stress')}")
-        nearest["allowable stress"] = format_short(worst, "stress")
+        missed.append(f"has a stress of {mpa(worst)}")
+        nearest["allowable stress"] = mpa(worst)
     text = (
         f"no strip within the ranges keeps the force, the band and the stress: from {mm(task.start)} to "
         f"{mm(program.stroke(descent.z))} the nearest {' and '.join(missed)} ({descent.ending.value})"

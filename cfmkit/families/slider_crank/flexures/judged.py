@@ -8,12 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.families.slider_crank.findings import mm
+from cfmkit.families.findings import mm, mpa
 from cfmkit.families.slider_crank.flexures.assembly import strip_chain
 from cfmkit.families.slider_crank.flexures.pressing import Ending
 from cfmkit.families.slider_crank.flexures.solution import Printed, SecondOpinion
 from cfmkit.families.slider_crank.flexures.values import first_at
-from cfmkit.units import format_short
 
 if TYPE_CHECKING:
     from cfmkit.curves import FloatArray
@@ -175,7 +174,7 @@ def _held(solution: Printed, ratio: FloatArray, inside: Any, limits: tuple[float
     last = np.flatnonzero(inside)[-1]
     if stress is not None and solution.stress[last] > (1.0 - 0.5 * HELD) * stress:
         where = mm(float(solution.place[last]))
-        told.append(f"stress {format_short(stress, 'stress')} at the end, {where} along the strip")
+        told.append(f"stress {mpa(stress)} at the end, {where} along the strip")
     return told
 
 

@@ -18,8 +18,9 @@ import numpy as np
 
 from cfmkit.bodies.slider_crank_springs import along_slider
 from cfmkit.errors import InputError
+from cfmkit.families.findings import mm
 from cfmkit.families.slider_crank.build import side_of
-from cfmkit.families.slider_crank.findings import finding, mm
+from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.flexures.assembly import FLEXURE_SHARE, chain_of_flexures, elasticity, flexures_of
 from cfmkit.families.slider_crank.flexures.pressing import Ending
 from cfmkit.families.slider_crank.flexures.sizing import PEAK_FACTOR, Flexure, rotations, sized

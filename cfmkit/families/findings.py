@@ -1,0 +1,90 @@
+"""How families speak of a mechanism: findings by name, and numbers as the user reads them in a sentence."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Protocol
+
+from cfmkit.results import Finding
+from cfmkit.units import format_short
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+
+class Finder(Protocol):
+    """Makes the findings of one family."""
+
+    def __call__(self, name: str, message: str, *cures: str) -> Finding:
+        """Return a finding of the family; `KeyError` for a name that the family does not explain."""
+
+
+def finder(meanings: Mapping[str, str]) -> Finder:
+    """Return what makes the findings of a family, whose names and meanings are given.
+
+    Examples
+    --------
+    >>> finding = finder({"too_thin": "a leaf thinner than can be made"})
+    >>> finding("too_thin", "0.1 mm: below 0.3 mm").name
+    'too_thin'
+    """
+
+    def finding(name: str, message: str, *cures: str) -> Finding:
+        if name not in meanings:
+            raise KeyError(name)
+        return Finding(name, message, cures)
+
+    return finding
+
+
+def mm(value: float) -> str:
+    """Return a length [m] with four significant digits, in mm."""
+    return format_short(value, "length")
+
+
+def deg(value: float) -> str:
+    """Return an angle [rad] with four significant digits, in degrees."""
+    return format_short(value, "angle")
+
+
+def newton(value: float) -> str:
+    """Return a force with four significant digits, in N."""
+    return format_short(value, "force")
+
+
+def mpa(value: float) -> str:
+    """Return a stress [Pa] with four significant digits, in MPa."""
+    return format_short(value, "stress")
+
+
+def rate(value: float) -> str:
+    """Return a stiffness [N/m] with four significant digits, in N/mm."""
+    return format_short(value, "stiffness")
+
+
+def percent(value: float) -> str:
+    """Return a ratio with three significant digits, in percent."""
+    return format_short(value, "ratio", 3)
+
+
+def at_most(length: float) -> str:
+    """Return a length [m] rounded down to four digits: as good as feasible, and feasible."""
+    return _rounded(length, math.floor)
+
+
+def at_least(length: float) -> str:
+    """Return a length [m] rounded up to four digits.
+
+    Examples
+    --------
+    >>> at_least(0.0144645), at_most(0.1693794)
+    ('14.47 mm', '169.3 mm')
+    """
+    return _rounded(length, math.ceil)
+
+
+def _rounded(length: float, way: Callable[[float], int]) -> str:
+    if length < 1e-300:
+        return "0 mm"
+    digits = 3 - math.floor(math.log10(length * 1e3))
+    return f"{way(length * 1e3 * 10.0**digits) / 10.0**digits:.4g} mm"
