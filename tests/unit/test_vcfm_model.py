@@ -250,7 +250,7 @@ def test_rise_and_preload_say_the_same():
         designed("design={force: 11.15 N, adjustment: 5 N, stroke: 3.8 mm, preload: 1.9125560538116592 mm}"),
     )
     sizes = "mechanism.bistable.thickness", "mechanism.bistable.width", "mechanism.positive.width"
-    assert [one.spec.at(path) for path in sizes] == pytest.approx([other.spec.at(path) for path in sizes], rel=1e-7)
+    assert [one.spec.at(path) for path in sizes] == pytest.approx([other.spec.at(path) for path in sizes], rel=1e-9)
 
 
 # --- shapes, outlines, pictures --------------------------------------------------------------------------------
