@@ -16,7 +16,8 @@ from cfmkit.bodies.cam_path import reach
 from cfmkit.bodies.cam_profile import SlopeLaw, brace_tangent
 from cfmkit.bodies.cam_track import Track
 from cfmkit.bodies.track_states import NoTrack
-from cfmkit.families.cam.build import CannotBuild, assemble
+from cfmkit.families.cam.build import assemble
+from cfmkit.families.refusals import CannotBuild
 
 SLOW = settings(deadline=None, max_examples=25)
 FAST = settings(deadline=None, max_examples=200)

@@ -7,7 +7,7 @@ from cam_support import cam
 
 import cfmkit
 from cfmkit.export.arcs import outlines
-from cfmkit.families.cam.build import CannotBuild
+from cfmkit.families.refusals import CannotBuild
 
 TURNS_AT_ONCE = {
     "brace_length": "1647.65 mm",

@@ -9,8 +9,9 @@ from cam_support import MM, analyze, at, cam, fixed
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from cfmkit.families.cam.build import CannotBuild, assemble, hanging_weights
+from cfmkit.families.cam.build import assemble, hanging_weights
 from cfmkit.families.cam.statics import GRAVITY
+from cfmkit.families.refusals import CannotBuild
 
 SLOW = settings(deadline=None, max_examples=60)
 

@@ -10,10 +10,10 @@ from cfmkit.bodies.cam_path import Path, reach
 from cfmkit.bodies.cam_profile import SlopeLaw
 from cfmkit.bodies.cam_track import Track
 from cfmkit.bodies.track_states import NoTrack
-from cfmkit.errors import SolutionError
 from cfmkit.families.cam.findings import finding
 from cfmkit.families.cam.statics import GRAVITY, Loads
 from cfmkit.families.findings import mm
+from cfmkit.families.refusals import CannotBuild
 
 if TYPE_CHECKING:
     from cfmkit.families.cam.spec import CamSpec, Masses, Mechanism
@@ -22,15 +22,6 @@ if TYPE_CHECKING:
 
 CLOSE = 1e-6
 """A travel that is short by so little is not short: on a nearly vertical path rounding in x alone costs 1e-8."""
-
-
-class CannotBuild(SolutionError):
-    """The mechanism cannot exist as described; carries the finding that says why."""
-
-    def __init__(self, name: str, message: str) -> None:
-        """Keep the finding."""
-        self.finding: Finding = finding(name, message)
-        super().__init__(message)
 
 
 @dataclass(frozen=True)
@@ -149,23 +140,29 @@ def check_start(law: SlopeLaw, *rollers: tuple[float, float]) -> None:
     x0, shortest = law.rest_half_width, min(brace for _, brace in rollers)
     if x0 >= shortest * (1 - 1e-6):
         raise CannotBuild(
-            "brace_too_short",
-            f"the braces ({mm(shortest)}) do not reach from the axis to the rollers, which start at "
-            f"{mm(x0)} from it; use a brace longer than {mm(x0)}",
+            finding(
+                "brace_too_short",
+                f"the braces ({mm(shortest)}) do not reach from the axis to the rollers, which start at "
+                f"{mm(x0)} from it; use a brace longer than {mm(x0)}",
+            )
         )
     for radius, brace in rollers:
         if radius >= brace:
             raise CannotBuild(
-                "rollers_collide",
-                f"there is no room for two rollers with a radius of {mm(radius)} on braces of {mm(brace)}; "
-                "use smaller rollers",
+                finding(
+                    "rollers_collide",
+                    f"there is no room for two rollers with a radius of {mm(radius)} on braces of {mm(brace)}; "
+                    "use smaller rollers",
+                )
             )
     p = float(law.frictionless(x0))
     if p + law.friction <= 0 or law.friction * p >= 1:
         raise CannotBuild(
-            "design_singular",
-            f"a profile cut for a friction of {law.friction:g} has no upward start: |friction| must stay below "
-            f"{p if law.friction <= 0 else 1 / p:.3g}",
+            finding(
+                "design_singular",
+                f"a profile cut for a friction of {law.friction:g} has no upward start: |friction| must stay below "
+                f"{p if law.friction <= 0 else 1 / p:.3g}",
+            )
         )
 
 
@@ -182,9 +179,11 @@ def _shortfall(law: SlopeLaw, stroke: float, reached: float) -> Finding | None:
         )
     if reached <= 0:
         raise CannotBuild(
-            "design_singular",
-            f"a profile cut for a friction of {law.friction:g} holds its roller: nowhere does the slider rise as the "
-            "rollers move out; use less friction or a smaller force constant",
+            finding(
+                "design_singular",
+                f"a profile cut for a friction of {law.friction:g} holds its roller: nowhere does the slider rise as "
+                "the rollers move out; use less friction or a smaller force constant",
+            )
         )
     return finding(
         "brace_too_short",
@@ -199,10 +198,12 @@ def _cut(path: Path, roller_radius: float, end: float) -> CamProfile:
     except WholeCamUndercut:
         smallest = float(path.law.curvature_radius(path.law.rest_half_width))
         raise CannotBuild(
-            "undercut_total",
-            f"nothing of the flank remains: the {mm(roller_radius)} roller is larger than the path's radius of "
-            f"curvature ({mm(smallest)} at the start), and the stroke ends before it would leave the cam's corner; "
-            "use a smaller roller, a larger force constant or a longer stroke",
+            finding(
+                "undercut_total",
+                f"nothing of the flank remains: the {mm(roller_radius)} roller is larger than the path's radius of "
+                f"curvature ({mm(smallest)} at the start), and the stroke ends before it would leave the cam's corner; "
+                "use a smaller roller, a larger force constant or a longer stroke",
+            )
         ) from None
 
 
@@ -213,20 +214,26 @@ def _track(profile: CamProfile, mechanism: Mechanism) -> Track:
         brace = mechanism.brace_length
         if problem.reason == "brace":
             raise CannotBuild(
-                "brace_too_short",
-                f"the braces ({mm(brace)}) do not reach from the axis to the rollers, which start at "
-                f"{mm(problem.start)} from it on this cam; use a brace longer than {mm(problem.start)}",
+                finding(
+                    "brace_too_short",
+                    f"the braces ({mm(brace)}) do not reach from the axis to the rollers, which start at "
+                    f"{mm(problem.start)} from it on this cam; use a brace longer than {mm(problem.start)}",
+                )
             ) from None
         if problem.reason == "crossed":
             raise CannotBuild(
-                "flanks_collide",
-                f"on this cam the right roller would start at x = {mm(problem.start)}, across the axis; use a cam with "
-                "a larger rest half width, or rollers nearer to those it is cut for",
+                finding(
+                    "flanks_collide",
+                    f"on this cam the right roller would start at x = {mm(problem.start)}, across the axis; use a cam "
+                    "with a larger rest half width, or rollers nearer to those it is cut for",
+                )
             ) from None
         raise CannotBuild(
-            "dead_point",
-            f"with a brace of {mm(brace)} the slider does not rise above its start while the rollers move out on this "
-            "cam; use a longer brace, or a cam cut for this one",
+            finding(
+                "dead_point",
+                f"with a brace of {mm(brace)} the slider does not rise above its start while the rollers move out on "
+                "this cam; use a longer brace, or a cam cut for this one",
+            )
         ) from None
 
 

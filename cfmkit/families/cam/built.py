@@ -23,11 +23,12 @@ from cfmkit.bodies.cam_flank import DesignFlank
 from cfmkit.bodies.cam_profile import brace_tangent
 from cfmkit.curves import Column, Curve
 from cfmkit.errors import DataError
-from cfmkit.families.cam.build import Assembly, CannotBuild, assemble, displacement_origin
+from cfmkit.families.cam.build import Assembly, assemble, displacement_origin
 from cfmkit.families.cam.built_values import findings_of_built, values_of_built
 from cfmkit.families.cam.findings import finding
 from cfmkit.families.cam.values import DEFINITIONS, design_values, largest
 from cfmkit.families.findings import mm
+from cfmkit.families.refusals import CannotBuild, no_result
 from cfmkit.numerics.registration import Registration, gaps_across, register
 from cfmkit.results import Quantity, Result, Status
 from cfmkit.tables.labpoints import read_sides
@@ -132,7 +133,7 @@ def analyze_built(spec: CamSpec) -> Result:
     try:
         assembly = assemble(spec)
     except CannotBuild as problem:
-        return Result(spec, Status.NO_EQUILIBRIUM, problem.finding.message, warnings=(problem.finding,))
+        return no_result(spec, problem.finding)
     registration = registered(assembly)
     tracks = _tracks(assembly, registration)
     travel, short = _travel(assembly, tracks)

@@ -19,9 +19,10 @@ import numpy as np
 
 from cfmkit.bodies.cam_path import reach
 from cfmkit.bodies.cam_profile import SlopeLaw, brace_tangent
-from cfmkit.families.cam.build import CLOSE, CannotBuild, check_start, hanging_weights
+from cfmkit.families.cam.build import CLOSE, check_start, hanging_weights
 from cfmkit.families.cam.findings import finding
 from cfmkit.families.findings import at_least, at_most, mm, newton, rate
+from cfmkit.families.refusals import CannotBuild
 from cfmkit.results import Design, Status
 
 if TYPE_CHECKING:

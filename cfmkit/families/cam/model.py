@@ -21,12 +21,13 @@ import numpy as np
 
 from cfmkit.bodies.cam_profile import brace_tangent
 from cfmkit.curves import Column, Curve, FloatArray
-from cfmkit.families.cam.build import CLOSE, Assembly, CannotBuild, assemble, displacement_origin
+from cfmkit.families.cam.build import CLOSE, Assembly, assemble, displacement_origin
 from cfmkit.families.cam.checks import findings_of
 from cfmkit.families.cam.findings import finding
 from cfmkit.families.cam.statics import Forces, forces, jams
 from cfmkit.families.cam.values import theoretical_force, values_of
 from cfmkit.families.findings import mm
+from cfmkit.families.refusals import CannotBuild, no_result
 from cfmkit.results import Result, Status
 
 if TYPE_CHECKING:
@@ -123,7 +124,7 @@ def analyze(spec: CamSpec, run: Run) -> Result:
     try:
         assembly = assemble(spec)
     except CannotBuild as problem:
-        return Result(spec, Status.NO_EQUILIBRIUM, problem.finding.message, warnings=(problem.finding,))
+        return no_result(spec, problem.finding)
     solution = with_band(solve(assembly), run.seed)
     shortfalls = _shortfalls(assembly, solution)
     failed = int(np.isnan(solution.up.slider[1:]).sum() + np.isnan(solution.down.slider[1:]).sum())

@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.cam.build import CannotBuild, assemble
+from cfmkit.families.cam.build import assemble
 from cfmkit.families.cam.checks import flanks_crossing
+from cfmkit.families.refusals import CannotBuild
 from cfmkit.geometry import Arc, Contour, Curve2D, Drawing, Edge, Line, Smooth
 
 if TYPE_CHECKING:
@@ -31,13 +32,13 @@ def drawing(spec: CamSpec) -> Drawing:
 
     Raises
     ------
-    cfmkit.families.cam.build.CannotBuild
+    cfmkit.families.refusals.CannotBuild
         If there is no cam to draw.
     """
     assembly = assemble(spec)
     profile, plate = assembly.profile, assembly.spec.mechanism.plate
     if crossing := flanks_crossing(profile):
-        raise CannotBuild(crossing.name, crossing.message)
+        raise CannotBuild(crossing)
     path = path_edge(profile)
     paths = Contour((path,), "path"), Contour((path.mirrored(),), "path")
     return Drawing("cam", (*plate_contours(profile, plate), *paths), tuple(_tables(profile)))

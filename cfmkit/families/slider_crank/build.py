@@ -10,28 +10,18 @@ import numpy as np
 
 from cfmkit.bodies.slider_crank import Linkage
 from cfmkit.bodies.slider_crank_springs import UnitCurves, along_crank, along_slider
-from cfmkit.errors import SolutionError
 from cfmkit.families.findings import deg, mm
+from cfmkit.families.refusals import CannotBuild
 from cfmkit.families.slider_crank.findings import finding
 
 if TYPE_CHECKING:
     from cfmkit.curves import FloatArray, Kind
     from cfmkit.families.slider_crank.spec import Mechanism, SliderCrankSpec
-    from cfmkit.results import Finding
 
 TURN = 2.0 * math.pi
 
 SHORT_OF_END = 1e-3
 """Share of an arc that the default motion stays away from its ends, where efforts have no bound."""
-
-
-class CannotBuild(SolutionError):
-    """The mechanism cannot exist as described; carries the finding that says why."""
-
-    def __init__(self, name: str, message: str) -> None:
-        """Keep the finding."""
-        self.finding: Finding = finding(name, message)
-        super().__init__(message)
 
 
 @dataclass(frozen=True)
@@ -109,9 +99,11 @@ def coupler_length(mechanism: Mechanism) -> float:
     reach = math.hypot(mechanism.stretched_position or 0.0, mechanism.offset)
     if reach <= mechanism.crank_length:
         raise CannotBuild(
-            "not_assemblable",
-            f"pivot and slider pin are {mm(reach)} apart when stretched, and the crank alone is "
-            f"{mm(mechanism.crank_length)}: nothing is left for the coupler; use a shorter crank",
+            finding(
+                "not_assemblable",
+                f"pivot and slider pin are {mm(reach)} apart when stretched, and the crank alone is "
+                f"{mm(mechanism.crank_length)}: nothing is left for the coupler; use a shorter crank",
+            )
         )
     return reach - mechanism.crank_length
 
@@ -128,9 +120,11 @@ def linkage_of(mechanism: Mechanism) -> Linkage:
     linkage = Linkage(mechanism.crank_length, coupler_length(mechanism), mechanism.offset, branch)
     if not linkage.assemblable:
         raise CannotBuild(
-            "not_assemblable",
-            f"crank and coupler together are {mm(linkage.crank + linkage.coupler)}, but the slider's way passes the "
-            f"pivot at {mm(abs(linkage.offset))}; make the links longer or the offset smaller",
+            finding(
+                "not_assemblable",
+                f"crank and coupler together are {mm(linkage.crank + linkage.coupler)}, but the slider's way passes "
+                f"the pivot at {mm(abs(linkage.offset))}; make the links longer or the offset smaller",
+            )
         )
     return linkage
 
@@ -148,9 +142,11 @@ def unloaded_angle(mechanism: Mechanism, linkage: Linkage) -> float:
     if not linkage.reaches(angle):
         low, high = linkage.arc(linkage.stretched_angle)
         raise CannotBuild(
-            "not_assemblable",
-            f"with the crank at {deg(angle)} the coupler of {mm(linkage.coupler)} does not reach the slider's way; "
-            f"the unloaded position must be between {deg(low)} and {deg(high)}",
+            finding(
+                "not_assemblable",
+                f"with the crank at {deg(angle)} the coupler of {mm(linkage.coupler)} does not reach the slider's way; "
+                f"the unloaded position must be between {deg(low)} and {deg(high)}",
+            )
         )
     return angle
 

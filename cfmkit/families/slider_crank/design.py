@@ -18,7 +18,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.bodies.slider_crank_springs import JOINTS
-from cfmkit.families.slider_crank.build import TURN, CannotBuild, default_motion, resolve
+from cfmkit.families.refusals import CannotBuild
+from cfmkit.families.slider_crank.build import TURN, default_motion, resolve
 from cfmkit.families.slider_crank.family_of_optima import alternatives, chosen_rates, even_best
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.rates import least_squares, minimax

@@ -20,7 +20,8 @@ import numpy as np
 from cfmkit.bodies.slider_crank_springs import JOINTS
 from cfmkit.curves import Column, Curve, FloatArray
 from cfmkit.families.findings import deg, mm
-from cfmkit.families.slider_crank.build import CannotBuild, assemble, default_motion, resolve
+from cfmkit.families.refusals import CannotBuild, no_result
+from cfmkit.families.slider_crank.build import assemble, default_motion, resolve
 from cfmkit.families.slider_crank.character import Character, Equilibrium
 from cfmkit.families.slider_crank.checks import TURN, findings_of
 from cfmkit.families.slider_crank.findings import finding
@@ -137,7 +138,7 @@ def analyze(spec: SliderCrankSpec, run: Run) -> Result:
         assembly = assemble(spec)
         solution, shortfalls = solve(spec, assembly)
     except CannotBuild as problem:
-        return Result(spec, Status.NO_EQUILIBRIUM, problem.finding.message, warnings=(problem.finding,))
+        return no_result(spec, problem.finding)
     status = Status.PARTIAL if shortfalls else Status.COMPLETE
     return Result(
         spec=_as_run(spec, assembly),
@@ -178,7 +179,7 @@ def solve(spec: SliderCrankSpec, assembly: Assembly) -> tuple[Solution, tuple[Fi
     short = _shortfall(assembly, (low, high), (first, last))
     start, stop = max(low, first), min(high, last)
     if short is not None and not start < stop:
-        raise CannotBuild(short.name, short.message)
+        raise CannotBuild(short)
     motion = np.linspace(start, stop, spec.analysis.points)
     units = assembly.units(motion)
     finite = np.isfinite(units.effort[assembly.rates > 0.0]).all(axis=0)

@@ -32,7 +32,7 @@ def drawing(spec: SliderCrankSpec) -> Drawing:
 
     Raises
     ------
-    cfmkit.families.slider_crank.build.CannotBuild
+    cfmkit.families.refusals.CannotBuild
         If it cannot be assembled.
     """
     spec = resolve(spec)

@@ -5,12 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from cfmkit.families.cam.build import Assembly, CannotBuild, assemble, cam_start_height
+from cfmkit.families.cam.build import Assembly, assemble, cam_start_height
 from cfmkit.families.cam.dynamics.center import pieces_of
 from cfmkit.families.cam.dynamics.machine import Machine
 from cfmkit.families.cam.dynamics.motion import Cycloid
 from cfmkit.families.cam.dynamics.side import NoRise, Parts, Side
+from cfmkit.families.cam.findings import finding
 from cfmkit.families.cam.statics import GRAVITY
+from cfmkit.families.refusals import CannotBuild
 
 if TYPE_CHECKING:
     from cfmkit.families.cam.spec import CamSpec, Dynamics, Errors, LeftMasses, Masses, Mechanism
@@ -149,7 +151,9 @@ def _check(name: str, side: Side) -> None:
         _ = side.span
     except NoRise:
         raise CannotBuild(
-            "dead_point",
-            f"on the {name} side the slider rises nowhere as the roller moves out: the flank is turned too far "
-            "('mechanism.errors'), or the brace is too short for the profile",
+            finding(
+                "dead_point",
+                f"on the {name} side the slider rises nowhere as the roller moves out: the flank is turned too far "
+                "('mechanism.errors'), or the brace is too short for the profile",
+            )
         ) from None

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.curves import Column, Curve
-from cfmkit.families.cam.build import CannotBuild, displacement_origin
+from cfmkit.families.cam.build import displacement_origin
 from cfmkit.families.cam.dynamics.build import Build, build, stated_motion
 from cfmkit.families.cam.dynamics.checks import findings_of, outside, runs_on_corner
 from cfmkit.families.cam.dynamics.direct import statics
@@ -25,6 +25,7 @@ from cfmkit.families.cam.dynamics.history import History, direct_history, multib
 from cfmkit.families.cam.dynamics.multibody import CornerContact
 from cfmkit.families.cam.dynamics.values import slow_force, values_of
 from cfmkit.families.cam.values import constant_force
+from cfmkit.families.refusals import CannotBuild, no_result
 from cfmkit.results import Result, Status
 
 if TYPE_CHECKING:
@@ -80,7 +81,7 @@ def analyze(spec: CamSpec, run: Run) -> Result:
         times, missing = _inside(parts, spec)
         moved = _moved(spec, parts, times)
     except CannotBuild as problem:
-        return Result(spec, Status.NO_EQUILIBRIUM, problem.finding.message, warnings=(problem.finding,))
+        return no_result(spec, problem.finding)
     lost = int((~np.isfinite(moved.history.force)).sum())
     status, message = Status.COMPLETE, ""
     if missing:
@@ -110,7 +111,7 @@ def _inside(parts: Build, spec: CamSpec) -> tuple[FloatArray, tuple[Finding, ...
         return times, ()
     found = outside(parts, (low, high))
     if inside.sum() < 2 or dynamics.method == "multibody":
-        raise CannotBuild(found.name, found.message)
+        raise CannotBuild(found)
     return times[inside], (found,)
 
 
@@ -131,7 +132,7 @@ def _history(spec: CamSpec, parts: Build, times: FloatArray) -> History:
         return multibody_history(parts.machine, parts.motion, len(times))
     except CornerContact:
         found = runs_on_corner(parts)
-        raise CannotBuild(found.name, found.message) from None
+        raise CannotBuild(found) from None
 
 
 def _as_run(spec: CamSpec, parts: Build) -> CamSpec:

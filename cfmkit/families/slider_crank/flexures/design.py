@@ -17,7 +17,8 @@ import numpy as np
 
 from cfmkit.errors import InputError
 from cfmkit.families.findings import mm, newton, percent
-from cfmkit.families.slider_crank.build import CannotBuild, linkage_of, resolve, unloaded_angle
+from cfmkit.families.refusals import CannotBuild
+from cfmkit.families.slider_crank.build import linkage_of, resolve, unloaded_angle
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.flexures.assembly import corners, elasticity, pins_of, travel_direction
 from cfmkit.families.slider_crank.flexures.descent import Ending

@@ -13,7 +13,8 @@ import numpy as np
 
 from cfmkit.curves import Column, Curve
 from cfmkit.errors import InputError
-from cfmkit.families.slider_crank.build import CannotBuild, linkage_of, resolve, side_of, unloaded_angle
+from cfmkit.families.refusals import CannotBuild, no_result
+from cfmkit.families.slider_crank.build import linkage_of, resolve, side_of, unloaded_angle
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.flexures.assembly import (
     elasticity,
@@ -75,13 +76,13 @@ def analyze(spec: SliderCrankSpec, run: Run) -> Result:
         spec = _as_run(spec, linkage, unloaded)
         chain = chain_of(spec, linkage, unloaded)
     except CannotBuild as problem:
-        return Result(spec, Status.NO_EQUILIBRIUM, problem.finding.message, warnings=(problem.finding,))
+        return no_result(spec, problem.finding)
     except InputError as problem:
         return Result(spec, Status.INVALID, str(problem))
     low, high = spec.analysis.travel or (0.0, 0.0)
     if low < 0:
         pulled = finding("pulled", "a printed chain is pressed, not pulled: 'analysis.travel' must not begin below 0")
-        return Result(spec, Status.NO_EQUILIBRIUM, pulled.message, warnings=(pulled,))
+        return no_result(spec, pulled)
     side = side_of(spec, linkage, unloaded) * linkage.branch if spec.analysis.side is not None else 0
     pressed = chain.press(np.linspace(low, high, spec.analysis.points), side, spec.analysis.accuracy)
     usable = len(pressed.travel) > 1 and pressed.ending is not Ending.WRONG_BRANCH
