@@ -5,9 +5,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from cfmkit.errors import SolutionError
-from cfmkit.results import Result, Status
+from cfmkit.results import Design, Result, Status
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from cfmkit.results import Finding
     from cfmkit.spec import Spec
 
@@ -25,6 +27,20 @@ class CannotBuild(SolutionError):
         return type(self), (self.finding,)
 
 
+class Infeasible(Exception):
+    """Nothing meets the targets of a design; carries the finding that says why, and what would be feasible."""
+
+    def __init__(self, found: Finding, nearest: Mapping[str, str] | None = None) -> None:
+        """Keep the reason and the nearest feasible values by path."""
+        self.finding, self.nearest = found, dict(nearest or {})
+        super().__init__(found.message)
+
+
 def no_result(spec: Spec, found: Finding) -> Result:
     """Return the result of a mechanism that cannot exist, with the reason."""
     return Result(spec, Status.NO_EQUILIBRIUM, found.message, warnings=(found,))
+
+
+def no_design(found: Finding, nearest: Mapping[str, str] | None = None) -> Design:
+    """Return the outcome of targets that cannot be met, with the reason and the nearest feasible values by path."""
+    return Design(None, Status.INFEASIBLE, found.message, nearest_feasible=dict(nearest or {}), warnings=(found,))

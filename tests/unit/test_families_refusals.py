@@ -7,7 +7,7 @@ import pickle
 import pytest
 
 from cfmkit.families.findings import at_least, at_most, deg, finder, mm, mpa, newton, percent, rate
-from cfmkit.families.refusals import CannotBuild, no_result
+from cfmkit.families.refusals import CannotBuild, no_design, no_result
 from cfmkit.results import Finding, Status
 from cfmkit.spec import Spec
 
@@ -53,3 +53,12 @@ def test_a_mechanism_that_cannot_exist_is_a_result_with_the_reason():
     assert (result.status, result.message, result.warnings) == (Status.NO_EQUILIBRIUM, SHORT.message, (SHORT,))
     assert result.spec is spec
     assert result.curves == ()
+
+
+def test_targets_that_cannot_be_met_are_a_design_without_a_specification():
+    nearest = {"mechanism.brace_length": "more than 160 mm"}
+    design = no_design(SHORT, nearest)
+    assert design.spec is None
+    assert (design.status, design.message, design.warnings) == (Status.INFEASIBLE, SHORT.message, (SHORT,))
+    assert design.nearest_feasible == nearest
+    assert no_design(SHORT).nearest_feasible == {}

@@ -22,24 +22,14 @@ from cfmkit.bodies.cam_profile import SlopeLaw, brace_tangent
 from cfmkit.families.cam.build import CLOSE, check_start, hanging_weights
 from cfmkit.families.cam.findings import finding
 from cfmkit.families.findings import at_least, at_most, mm, newton, rate
-from cfmkit.families.refusals import CannotBuild
+from cfmkit.families.refusals import CannotBuild, Infeasible, no_design
 from cfmkit.results import Design, Status
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterator
 
     from cfmkit.families.base import Run
     from cfmkit.families.cam.spec import CamDesign, CamSpec, CatalogueSpring, Springs
-    from cfmkit.results import Finding
-
-
-class Infeasible(Exception):
-    """No cam meets the targets; carries the finding and what would be feasible."""
-
-    def __init__(self, found: Finding, nearest: Mapping[str, str] | None = None) -> None:
-        """Keep the reason and the nearest feasible values by path."""
-        self.finding, self.nearest = found, dict(nearest or {})
-        super().__init__(found.message)
 
 
 @dataclass(frozen=True)
@@ -73,13 +63,7 @@ def design(spec: CamSpec, run: Run) -> Design:
     try:
         return _design(spec, target)
     except Infeasible as problem:
-        return Design(
-            None,
-            Status.INFEASIBLE,
-            problem.finding.message,
-            nearest_feasible=problem.nearest,
-            warnings=(problem.finding,),
-        )
+        return no_design(problem.finding, problem.nearest)
 
 
 def _design(spec: CamSpec, target: CamDesign) -> Design:

@@ -18,13 +18,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.bodies.slider_crank_springs import JOINTS
-from cfmkit.families.refusals import CannotBuild
+from cfmkit.families.refusals import CannotBuild, Infeasible, no_design
 from cfmkit.families.slider_crank.build import TURN, default_motion, resolve
 from cfmkit.families.slider_crank.family_of_optima import alternatives, chosen_rates, even_best
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.rates import least_squares, minimax
 from cfmkit.families.slider_crank.solved import (
-    Infeasible,
     Solved,
     about_springs,
     active_bounds,
@@ -77,10 +76,10 @@ def design(spec: SliderCrankSpec, run: Run) -> Design:
         return design_part(spec, run)
     try:
         solved, search = _searched(spec, wanted, run)
-    except (Infeasible, CannotBuild) as problem:
-        nearest = problem.nearest if isinstance(problem, Infeasible) else {}
-        told = problem.finding
-        return Design(None, Status.INFEASIBLE, told.message, nearest_feasible=nearest, warnings=(told,))
+    except Infeasible as problem:
+        return no_design(problem.finding, problem.nearest)
+    except CannotBuild as problem:
+        return no_design(problem.finding)
     warnings = (*about_springs(solved), *alternatives(solved, search))
     if wanted.window is None:
         warnings = (*warnings, not_proven(solved))

@@ -7,14 +7,13 @@ from typing import TYPE_CHECKING
 
 from cfmkit.bodies.slider_crank_springs import JOINTS
 from cfmkit.families.findings import percent
+from cfmkit.families.refusals import Infeasible
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.targets import FREE
 from cfmkit.families.slider_crank.windows import widest
 from cfmkit.units import format_short
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from cfmkit.curves import FloatArray
     from cfmkit.families.slider_crank.spec import CrankDesign
     from cfmkit.families.slider_crank.targets import Task
@@ -42,15 +41,6 @@ class Solved:
     rates: FloatArray
     deviation: float
     rms: float
-
-
-class Infeasible(Exception):
-    """Nothing meets the targets; carries the finding and what would be feasible."""
-
-    def __init__(self, found: Finding, nearest: Mapping[str, str] | None = None) -> None:
-        """Keep the reason and the nearest feasible values by path."""
-        self.finding, self.nearest = found, dict(nearest or {})
-        super().__init__(found.message)
 
 
 def check_reach(task: Task, window: tuple[float, float]) -> None:

@@ -13,10 +13,10 @@ from math import asin, cos, sqrt
 from typing import TYPE_CHECKING
 
 from cfmkit.families.findings import at_least, mm, mpa
+from cfmkit.families.refusals import Infeasible, no_design
 from cfmkit.families.vcfm.findings import finding
 from cfmkit.families.vcfm.limits import (
     MARGIN,
-    Infeasible,
     Sizes,
     check_room,
     shortest_leaf,
@@ -81,13 +81,7 @@ def _attempt(spec: VcfmSpec) -> Design:
             check_width(spec, target, sizes.leaf)
             check_room(target, sizes)
     except Infeasible as problem:
-        return Design(
-            None,
-            Status.INFEASIBLE,
-            problem.finding.message,
-            nearest_feasible=problem.nearest,
-            warnings=(problem.finding,),
-        )
+        return no_design(problem.finding, problem.nearest)
     return Design(written(spec, sizes), Status.COMPLETE, active_bounds=tuple(active))
 
 

@@ -7,14 +7,12 @@ from math import pi, radians, sin, sqrt
 from typing import TYPE_CHECKING
 
 from cfmkit.families.findings import at_least, at_most, mm
+from cfmkit.families.refusals import Infeasible
 from cfmkit.families.vcfm.findings import finding
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from cfmkit.families.vcfm.spec import VcfmDesign, VcfmSpec
     from cfmkit.families.vcfm.strip import Strip
-    from cfmkit.results import Finding
 
 STEEPEST = radians(15)
 """Largest angle of the leaves that the closed forms are designed with."""
@@ -27,15 +25,6 @@ SNAPPING = 3.2
 
 ROOM = 1.02
 """On the room that is proposed: the exact stress may lengthen the spring, and so widen it."""
-
-
-class Infeasible(Exception):
-    """No mechanism meets the targets; carries the finding and what would be feasible."""
-
-    def __init__(self, found: Finding, nearest: Mapping[str, str] | None = None) -> None:
-        """Keep the reason and the nearest feasible values by path."""
-        self.finding, self.nearest = found, dict(nearest or {})
-        super().__init__(found.message)
 
 
 @dataclass(frozen=True)

@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.families.findings import at_least, mpa
+from cfmkit.families.refusals import Infeasible
 from cfmkit.families.vcfm.design import sized_leaf, written
 from cfmkit.families.vcfm.exact import ExactSampler
 from cfmkit.families.vcfm.findings import finding
-from cfmkit.families.vcfm.limits import Infeasible, Sizes, followable_stroke
+from cfmkit.families.vcfm.limits import Sizes, followable_stroke
 from cfmkit.families.vcfm.model import rest_of
 from cfmkit.families.vcfm.parts import parts
 from cfmkit.families.vcfm.samples import LawSampler

@@ -17,7 +17,7 @@ import numpy as np
 
 from cfmkit.errors import InputError
 from cfmkit.families.findings import mm, newton, percent
-from cfmkit.families.refusals import CannotBuild
+from cfmkit.families.refusals import CannotBuild, no_design
 from cfmkit.families.slider_crank.build import linkage_of, resolve, unloaded_angle
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.flexures.assembly import corners, elasticity, pins_of, travel_direction
@@ -81,7 +81,7 @@ def design(spec: SliderCrankSpec, run: Run) -> Design:
             return design_flexures(spec, linkage, unloaded)
         return _strip(spec, linkage, unloaded, run)
     except CannotBuild as problem:
-        return Design(None, Status.INFEASIBLE, problem.finding.message, warnings=(problem.finding,))
+        return no_design(problem.finding)
     except InputError as problem:
         return Design(None, Status.INVALID, str(problem))
 
@@ -203,24 +203,22 @@ def _closed(spec: SliderCrankSpec, wanted: StripDesign, task: Task, ranges: Rang
     """Return the uniform strip for a stroke: thickness from the stress, width from the force."""
     found = uniform_for_stroke(task)
     if found is None:
-        told = finding("target_unreachable", "the strip has no equilibrium over the travel, or no stress limit")
-        return Design(None, Status.INFEASIBLE, told.message, warnings=(told,))
+        return no_design(
+            finding("target_unreachable", "the strip has no equilibrium over the travel, or no stress limit")
+        )
     thickness, width = found
     low, high = ranges.form[0] / 1e3
     if not low <= thickness <= high:
         text = f"the stress asks for a thickness of {mm(thickness)}, outside {mm(low)} to {mm(high)}"
-        told = finding("target_unreachable", text)
-        nearest = {"design.beam.thickness": mm(thickness)}
-        return Design(None, Status.INFEASIBLE, text, nearest_feasible=nearest, warnings=(told,))
+        return no_design(finding("target_unreachable", text), {"design.beam.thickness": mm(thickness)})
     if isinstance(wanted.width, tuple) and not wanted.width[0] <= width <= wanted.width[1]:
         reached = task.force * np.clip(width, *wanted.width) / width
         text = (
             f"{newton(task.force)} need a width of {mm(width)}; within {mm(wanted.width[0])} to "
             f"{mm(wanted.width[1])} the nearest is {newton(float(reached))}"
         )
-        told = finding("target_unreachable", text)
         nearest = {"design.force": newton(float(reached)), "design.beam.width": mm(width)}
-        return Design(None, Status.INFEASIBLE, text, nearest_feasible=nearest, warnings=(told,))
+        return no_design(finding("target_unreachable", text), nearest)
     part = _part(spec, {"width": round(width, DECIMALS), "thickness": round(thickness, DECIMALS), "shares": None})
     text = f"thickness {mm(thickness)} from the stress at {mm(task.stroke)}, width {mm(width)} from the force"
     return Design(_with_part(spec, part, (task.start, task.stroke)), Status.COMPLETE, text)

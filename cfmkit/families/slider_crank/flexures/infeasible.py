@@ -5,13 +5,14 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from cfmkit.families.findings import mm, mpa, newton, percent
+from cfmkit.families.refusals import no_design
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.flexures.descent import VIOLATION, Ending
-from cfmkit.results import Design, Status
 from cfmkit.units import format_short
 
 if TYPE_CHECKING:
     from cfmkit.families.slider_crank.flexures.search import Found
+    from cfmkit.results import Design
 
 
 def infeasible(found: Found) -> Design:
@@ -19,8 +20,7 @@ def infeasible(found: Found) -> Design:
     descent, program, task = found.descent, found.program, found.task
     state = None if descent.ending is Ending.NO_ANSWER else program.state(descent.z)
     if state is None:
-        told = finding("target_unreachable", f"the search {descent.ending.value}")
-        return Design(None, Status.INFEASIBLE, told.message, warnings=(told,))
+        return no_design(finding("target_unreachable", f"the search {descent.ending.value}"))
     low, high = float(state.force.min()), float(state.force.max())
     level, missed, nearest = 0.5 * (low + high), [], {}
     off, limit = max(high / task.force - 1.0, 1.0 - low / task.force), task.material.allowable_stress
@@ -37,5 +37,4 @@ def infeasible(found: Found) -> Design:
         f"no strip within the ranges keeps the force, the band and the stress: from {mm(task.start)} to "
         f"{mm(program.stroke(descent.z))} the nearest {' and '.join(missed)} ({descent.ending.value})"
     )
-    told = finding("target_unreachable", text)
-    return Design(None, Status.INFEASIBLE, text, nearest_feasible=nearest, warnings=(told,))
+    return no_design(finding("target_unreachable", text), nearest)

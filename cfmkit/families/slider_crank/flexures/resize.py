@@ -19,6 +19,7 @@ import numpy as np
 from cfmkit.bodies.slider_crank_springs import along_slider
 from cfmkit.errors import InputError
 from cfmkit.families.findings import mm
+from cfmkit.families.refusals import no_design
 from cfmkit.families.slider_crank.build import side_of
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.flexures.assembly import FLEXURE_SHARE, chain_of_flexures, elasticity, flexures_of
@@ -88,14 +89,14 @@ def design_flexures(spec: SliderCrankSpec, linkage: Linkage, unloaded: float) ->
     stubby = next((one for one in first if one.length < _SLENDER * one.thickness), None)
     if stubby is not None:
         text = f"the stress would allow a thickness of {mm(stubby.thickness)} on a length of {mm(stubby.length)}"
-        told = finding("target_unreachable", f"{text}: no flexure; make them longer, or the stroke larger")
-        return Design(None, Status.INFEASIBLE, told.message, warnings=(told,))
+        return no_design(finding("target_unreachable", f"{text}: no flexure; make them longer, or the stroke larger"))
     travel = np.linspace(0.1 * stroke, stroke, _POINTS)
     springs_force = rates @ along_slider(linkage, unloaded, side, travel).effort[:3]
     found = corrected(first, made_of, (linkage, unloaded), travel, springs_force, wanted.flexures.exact)
     if found is None:
-        told = finding("not_converged", "the flexures of the closed forms have no equilibrium over the stroke")
-        return Design(None, Status.INFEASIBLE, told.message, warnings=(told,))
+        return no_design(
+            finding("not_converged", "the flexures of the closed forms have no equilibrium over the stroke")
+        )
     return Design(_written(spec, found.flexures, stroke), Status.COMPLETE, _message(found, wanted.flexures.exact))
 
 
