@@ -80,7 +80,7 @@ class PlainTilt:
             begin=first[:-1] * (len(places) * 5),
             moves=shifts.any(axis=1),
             shifts=shifts,
-            touches=np.ascontiguousarray((touched | shifts[:, layout.beam_end].any(axis=2)).T),
+            touches=(touched | shifts[:, layout.beam_end].any(axis=2)).T,
             origin=self.origin / length,
             arm=self.arm / length,
             frame=np.zeros(self.origin.shape),

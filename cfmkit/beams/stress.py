@@ -1,7 +1,8 @@
 """Where the stress along a beam is largest: an extreme between samples is found, not sampled.
 
-Near the largest sample the stress is interpolated by a polynomial over nine samples of one smooth piece; at the
-extreme of that polynomial the state is integrated, and the place is put right by the stress's exact slope.
+Around every sample that is higher than its neighbours the stress is interpolated by a polynomial over nine samples of
+one smooth piece; at the extreme of the highest polynomial the state is integrated, and the place is put right by the
+stress's exact slope.
 """
 
 from __future__ import annotations
@@ -14,14 +15,15 @@ import numpy as np
 from cfmkit.beams.recover import along_beam, sections, stress_slopes
 
 if TYPE_CHECKING:
-    from cfmkit.beams.recover import Rows, Sampler
+    from cfmkit.beams.recover import Rows, Sampler, Sections
     from cfmkit.curves import FloatArray
 
 STENCIL = 9
 _TO_POLYNOMIAL = np.linalg.inv(np.vander(np.arange(float(STENCIL)) - STENCIL // 2, increasing=True))
-_END_SLOPE = np.linalg.inv(np.vander(np.arange(float(STENCIL)), increasing=True))[1]  # at the first of nine samples
 _FIRST, _SECOND = np.arange(1.0, STENCIL), np.arange(1.0, STENCIL - 1) * np.arange(2.0, STENCIL)
 _NEWTON, _POLISH = 6, 2
+_HUMPS = 6  # highest samples between lower neighbours that are looked at; where two segments meet one counts twice
+_LEVEL = 1e-9  # relative difference of samples that counts as none
 
 
 @dataclass(frozen=True)
@@ -50,9 +52,13 @@ class StressExtremes:
 def extremes(sampler: Sampler, beam: int, axial: bool) -> tuple[FloatArray, FloatArray]:
     """Return the largest stress of a beam [Pa] at every point, and its place as a fraction of the arc length."""
     found = along_beam(sampler, beam)
-    best = found.stress(axial).argmax(axis=1)[:, None]
-    bends, pulls = (np.sign(np.take_along_axis(a, best, axis=1)) for a in (found.bending_stress, found.axial_stress))
-    value, t, _ = _peaks(sampler, beam, found, bends, pulls if axial else 0.0 * pulls)
+    sides = np.array([(1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)] if axial else [(1.0, 0.0), (-1.0, 0.0)]).T
+    bends, pulls = (np.broadcast_to(side, (len(found.moment), len(side))) for side in sides)
+    humps = _highest(sampler, sampler.rows(beam), _combined(found, bends, pulls))
+    side = humps.height.argmax(axis=1)[:, None]
+    humps = Humps(*(np.take_along_axis(part, side, axis=1) for part in humps.parts))
+    bends, pulls = (np.take_along_axis(a, side, axis=1) for a in (bends, pulls))
+    value, t = _polished(sampler, beam, humps, bends, pulls)
     return value[:, 0], sampler.place(beam, t)[:, 0]
 
 
@@ -62,9 +68,11 @@ def signed_extremes(sampler: Sampler, beam: int, axial: bool) -> StressExtremes:
     shape = (len(found.moment), 4)
     sense = np.array([1.0, -1.0, 1.0, -1.0])  # of the stress, for highest and lowest
     bends, pulls = sense * np.array([1.0, 1.0, -1.0, -1.0]), sense * float(axial)
-    value, t, row = _peaks(sampler, beam, found, np.broadcast_to(bends, shape), np.broadcast_to(pulls, shape))
+    bends, pulls = np.broadcast_to(bends, shape), np.broadcast_to(pulls, shape)
+    humps = _highest(sampler, sampler.rows(beam), _combined(found, bends, pulls))
+    value, t = _polished(sampler, beam, humps, bends, pulls)
     place = sampler.place(beam, t)
-    return StressExtremes(*(a.reshape(-1, 2, 2) for a in (value * sense, place, t, row)))
+    return StressExtremes(*(a.reshape(-1, 2, 2) for a in (value * sense, place, t, humps.first)))
 
 
 def windows(sampler: Sampler, rows: Rows) -> Any:
@@ -77,49 +85,83 @@ def windows(sampler: Sampler, rows: Rows) -> Any:
     return np.arange(len(rows.t)) - own + np.clip(own - STENCIL // 2, 0, count - STENCIL)
 
 
-def _peaks(
-    sampler: Sampler, beam: int, found: Any, bends: FloatArray, pulls: FloatArray
-) -> tuple[FloatArray, FloatArray, Any]:
-    """Return the largest of bends x bending + pulls x axial stress at n points for q choices each: arrays (n, q).
+@dataclass(frozen=True)
+class Humps:
+    """The highest hump of a stress along a beam at n points for q choices each, as interpolated.
 
-    Besides the values: parameters of the places and the first rows of the stencils.
+    Attributes
+    ----------
+    height, at : (n, q) arrays
+        Stress at the top, and its place in rows after the first of the stencil.
+    low, high : (n, q) arrays
+        The rows on both sides of the highest sample, likewise.
+    bend : (n, q) array
+        Second derivative by the row.
+    best, first : (n, q) int arrays
+        The highest sample's row and the first row of the stencil.
+    sample : (n, q) array
+        Stress at the highest sample.
     """
-    rows = sampler.rows(beam)
-    n, q = bends.shape
-    stress = bends[..., None] * found.bending_stress[:, None] + pulls[..., None] * found.axial_stress[:, None]
-    best = _side(stress, stress.argmax(axis=2), sampler.per_segment)
+
+    height: FloatArray
+    at: FloatArray
+    low: FloatArray
+    high: FloatArray
+    bend: FloatArray
+    best: Any
+    first: Any
+    sample: FloatArray
+
+    @property
+    def parts(self) -> tuple[Any, ...]:
+        """All arrays in order."""
+        return self.height, self.at, self.low, self.high, self.bend, self.best, self.first, self.sample
+
+
+def _combined(found: Sections, bends: FloatArray, pulls: FloatArray) -> FloatArray:
+    """Return bends x bending + pulls x axial stress at the rows, (n, q, rows)."""
+    return bends[..., None] * found.bending_stress[:, None] + pulls[..., None] * found.axial_stress[:, None]
+
+
+def _highest(sampler: Sampler, rows: Rows, stress: FloatArray) -> Humps:
+    """Return the highest hump of stresses (n, q, rows), by interpolation around several samples.
+
+    Of two humps of nearly one height the lower one may have the higher sample.
+    """
+    least = np.full((*stress.shape[:2], 1), -np.inf)
+    slack = _LEVEL * np.abs(stress)
+    before, after = (np.concatenate(pair, axis=2) for pair in ((least, stress[..., :-1]), (stress[..., 1:], least)))
+    ranked = np.where((stress >= before - slack) & (stress >= after - slack), stress, -np.inf)
+    best = np.argsort(-ranked, axis=2, kind="stable")[..., :_HUMPS]
     first = windows(sampler, rows)[best]
-    near = np.take_along_axis(stress, first[..., None] + np.arange(STENCIL), axis=2)
+    near = np.take_along_axis(stress[:, :, None], first[..., None] + np.arange(STENCIL), axis=3)
     middle = STENCIL // 2
     polynomial = near @ _TO_POLYNOMIAL.T
     low, high = (np.clip(best - first - middle + k, -middle, middle).astype(float) for k in (-1, 1))
     at = _top(polynomial, low, high)
-    points = np.repeat(np.arange(n), q)
+    sample = np.take_along_axis(ranked, best, axis=2)
+    height = np.where(np.isfinite(sample), np.maximum(_horner(polynomial, at), sample), -np.inf)
+    bend = _horner(polynomial[..., 2:] * _SECOND, at)
+    pick = height.argmax(axis=2)[..., None]
+    parts = (height, at + middle, low + middle, high + middle, bend, best, first, sample)
+    return Humps(*(np.take_along_axis(part, pick, axis=2)[..., 0] for part in parts))
+
+
+def _polished(
+    sampler: Sampler, beam: int, humps: Humps, bends: FloatArray, pulls: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return the stress at the tops of humps, integrated, and the parameters there: arrays (n, q)."""
+    rows, at, first = sampler.rows(beam), humps.at, humps.first
+    points = np.repeat(np.arange(len(bends)), bends.shape[1])
+    spacing = rows.t[first + 1] - rows.t[first]
     for _ in range(_POLISH):
-        value, slope = _exact(sampler, beam, (first, at + middle, points), bends, pulls)
-        bend = _horner(polynomial[..., 2:] * _SECOND, at)
-        spacing = rows.t[first + 1] - rows.t[first]
-        inside = (at > low) & (at < high) & (bend < 0)
-        at = np.where(inside, np.clip(at - spacing * slope / np.where(inside, bend, -1.0), low, high), at)
-    sampled = np.take_along_axis(stress, best[..., None], axis=2)[..., 0]
-    better = value >= sampled
-    t = np.where(better, rows.t[first] + (at + middle) * spacing, rows.t[best])
-    return np.where(better, value, sampled), t, first
-
-
-def _side(stress: FloatArray, best: Any, count: int) -> Any:
-    """Return the largest samples, or where two segments meet that sample's twin if the stress rises beyond it."""
-    total = stress.shape[2]
-    own = best % count
-    twin = np.where(
-        (own == 0) & (best > 0), best - 1, np.where((own == count - 1) & (best < total - 1), best + 1, best)
-    )
-    values = np.take_along_axis(stress, np.stack([best, twin], axis=2), axis=2)
-    level = np.abs(values[..., 0] - values[..., 1]) <= 1e-9 * np.abs(values[..., 0])  # else it jumps: a corner
-    outward = np.sign(twin - best)  # into the twin's segment
-    ahead = twin[..., None] + outward[..., None] * np.arange(STENCIL)
-    rise = np.take_along_axis(stress, np.clip(ahead, 0, total - 1), axis=2) @ _END_SLOPE
-    return np.where(level & (outward != 0) & (rise > 0), twin, best)
+        value, slope = _exact(sampler, beam, (first, at, points), bends, pulls)
+        inside = (at > humps.low) & (at < humps.high) & (humps.bend < 0)
+        step = spacing * slope / np.where(inside, humps.bend, -1.0)
+        at = np.where(inside, np.clip(at - step, humps.low, humps.high), at)
+    better = value >= humps.sample
+    t = np.where(better, rows.t[first] + at * spacing, rows.t[humps.best])
+    return np.where(better, value, humps.sample), t
 
 
 def _exact(

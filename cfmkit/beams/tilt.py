@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.beams.discretise import assemble_model, table
-from cfmkit.beams.kernels.model import Tilt
+from cfmkit.beams.kernels.model import Tilt, in_order
 from cfmkit.beams.layout import Layout
 from cfmkit.beams.plain_tilt import plain_tilt
 from cfmkit.errors import InputError
@@ -83,7 +83,7 @@ class Tilts:
             If a variable changes how the network is made up, not only its values.
         """
         if self.plain is not None:
-            return self.plain.arrays(cut, every)
+            return in_order(self.plain.arrays(cut, every))
         tilted = [self._model(k, layout, model, cut) for k, layout in enumerate(self.tilted)]
         tables = np.stack([slope(table(layout, cut, model.table)) for layout in self.tilted], axis=-1)
         variable, first, begin, blocks = [], [0], [], []
@@ -109,16 +109,17 @@ class Tilts:
         touches = shifts[:, model.beam_end].any(axis=2).T
         for number in range(len(touches)):
             touches[number, variable[first[number] : first[number + 1]]] = True
-        return Tilt(
+        tilt = Tilt(
             variable=np.array(variable, dtype=np.int64),
             first=np.array(first, dtype=np.int64),
-            table=np.ascontiguousarray(np.concatenate(blocks)),
+            table=np.concatenate(blocks),
             begin=np.array(begin, dtype=np.int64),
             moves=moves,
             shifts=shifts,
-            touches=np.ascontiguousarray(touches),
+            touches=touches,
             **parts,
         )
+        return in_order(tilt)
 
     def _model(self, k: int, layout: Layout, model: Model, cut: Grid) -> Model:
         """Return the arrays for variable k, except the table."""

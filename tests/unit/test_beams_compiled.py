@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import logging
+from functools import partial
 from pathlib import Path
 
 import numba
 import numpy as np
 import pytest
 
-from cfmkit.beams import CLAMPED, Beam, Displacement, Network, Node, Section, trace
+from cfmkit.beams import CLAMPED, Beam, Displacement, Network, Node, Section, Taper, gradient, trace
 from cfmkit.beams.kernels import dense, entry
 from cfmkit.beams.kernels.rk8 import COUPLING, NODES, WEIGHTS
 
@@ -84,3 +85,24 @@ def test_inertia_and_solution_of_random_symmetric_matrices(seed: int) -> None:
         x = b.copy()
         assert solve_with(a.copy(), x)
         np.testing.assert_allclose(a @ x, b, atol=1e-6)
+
+
+def test_nothing_is_compiled_twice() -> None:
+    """A second compilation for another order of an array in memory takes as long as the first."""
+
+    def pulled(x: np.ndarray, tapered: bool) -> Network:
+        taper = Taper(np.array([0.0, 1.0]), np.array([x[1], 2 * x[1]]))
+        nodes = {"a": Node(0.0, 0.0, CLAMPED), "b": Node(x[0], 0.0), "c": Node(2 * x[0], x[2])}
+        other = Section(2e9, 1e-2, taper if tapered else x[1])
+        beams = {"x": Beam("a", "b", Section(2e9, 1e-2, x[1])), "y": Beam("b", "c", other)}
+        return Network(nodes, beams)
+
+    x = np.array([0.1, 2e-3, 0.01])
+    for tapered in (False, True):
+        build = partial(pulled, tapered=tapered)
+        slopes = gradient(trace(build(x), Displacement("c", 0.0, np.array([1e-4]))), build, x)
+        assert np.isfinite(slopes.effort).all()
+        assert np.isfinite(slopes.held).all()
+        assert np.isfinite(slopes.stress_extremes("y")).all()
+    for door in (entry._real, entry.slopes, entry.row_slopes, entry.held_slopes):
+        assert len(door.signatures) == 1

@@ -56,7 +56,9 @@ kernel: Any = numba.njit(**_INNER, **_UNCOUNTED)
 They have no way in from Python (that halves the time to compile): calling one from Python ends the process.
 """
 
-maker: Any = numba.njit(**_INNER, **dict.fromkeys(_UNCOUNTED, True))
+_COUNTED: dict[str, Any] = dict.fromkeys(_UNCOUNTED, True)
+
+maker: Any = numba.njit(**_INNER, **_COUNTED)
 """For kernels that make arrays of their own."""
 
 

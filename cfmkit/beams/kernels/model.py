@@ -14,8 +14,9 @@ The start pose of a beam's first segment is that of its attachment and its slot 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
+import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
@@ -118,3 +119,11 @@ class Tilt(NamedTuple):
     spring: FloatArray
     load: FloatArray
     line: FloatArray
+
+
+Arrays = TypeVar("Arrays", Model, Tilt)
+
+
+def in_order(arrays: Arrays) -> Arrays:
+    """Return the arrays with their entries in C order: for every other order the code is compiled again."""
+    return type(arrays)(*map(np.ascontiguousarray, arrays))
