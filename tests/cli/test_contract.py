@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
@@ -14,14 +15,63 @@ CONFIGS = sorted((Path(__file__).parents[2] / "configs").glob("*.yaml"))
 LONG = ("beam_design_lan",)
 
 
+@dataclass(frozen=True)
+class Added:
+    """What the design of a family may say beside the analysis of the specification that it wrote."""
+
+    metrics: frozenset[str] = frozenset()
+    warnings: frozenset[str] = frozenset()
+    files: frozenset[str] = frozenset()
+
+
+ADDED = {
+    "beam": Added(
+        metrics=frozenset(
+            {
+                "audit_crossings",
+                "audit_gap",
+                "audit_half_band",
+                "audit_half_band_reissner",
+                "audit_strict_range",
+                "audit_strict_range_reissner",
+                "audit_stress",
+                "tolerance_half_band_median",
+                "tolerance_half_band_p90",
+                "tolerance_lost",
+                "tolerance_strict_range_median",
+                "tolerance_strict_range_p10",
+            }
+        ),
+        files=frozenset({"starts.csv", ".cfmkit-journal.jsonl"}),
+    ),
+    "cam": Added(),
+    "slider-crank": Added(warnings=frozenset({"near_optima", "spring_dropped", "window_not_proven"})),
+    "vcfm": Added(),
+}
+"""By family: a design that adds anything else fails."""
+
+EVERY_DESIGN = "design.yaml", "geometry/"
+"""What every design writes, and no analysis: the specification, and what is to be cut."""
+
+RUN_ITSELF = "manifest.json"
+"""Names the command, the time and the machine."""
+
+
 def _cases():
     return [pytest.param(path, marks=pytest.mark.slow) if path.stem in LONG else path for path in CONFIGS]
 
 
-def metrics(folder):
-    """Return what metrics.json holds, its numbers and its warnings; a design may add to both what it alone knows."""
-    document = json.loads((folder / "metrics.json").read_text())
-    return document, document.pop("metrics"), {item["name"] for item in document.pop("warnings")}
+def contents(folder):
+    """Return the bytes of every file of a run but its manifest, by name, and metrics.json as a document."""
+    found = {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+    del found[RUN_ITSELF]
+    return found, json.loads(found.pop("metrics.json"))
+
+
+def test_each_family_declares_what_its_designs_add():
+    assert set(ADDED) == set(families.names())
+    for name, added in ADDED.items():
+        assert added.warnings <= set(families.family(name).findings)
 
 
 @pytest.mark.parametrize("path", _cases(), ids=lambda path: path.stem)
@@ -32,8 +82,19 @@ def test_a_config_is_analysed_and_designed_with_exit_0(cli, path):
         return
     assert cli("design", str(path), "-o", "two", "-q", "--no-plots").code == 0
     assert cli("analyze", "two/design.yaml", "-o", "three", "-q", "--no-plots").code == 0
-    (designed, more, told), (analysed, numbers, found) = (metrics(cli.folder / name) for name in ("two", "three"))
-    assert designed == analysed
-    assert numbers == {name: more[name] for name in numbers}
-    assert found <= told
-    assert (cli.folder / "two/curve.csv").read_bytes() == (cli.folder / "three/curve.csv").read_bytes()
+    same_but_for(ADDED[spec.family], cli.folder / "two", cli.folder / "three")
+
+
+def same_but_for(added, design, analysis):
+    """Check that a design's folder holds all of the analysis's, to the letter, and nothing more than is declared."""
+    (files, told), (same_files, same) = contents(design), contents(analysis)
+    more = {name for name in set(files) - set(same_files) if not name.startswith(EVERY_DESIGN)}
+    assert {name: files.get(name) for name in same_files} == same_files
+    assert more <= added.files
+
+    assert {name: told["metrics"].get(name) for name in same["metrics"]} == same["metrics"]
+    assert set(told["metrics"]) - set(same["metrics"]) <= added.metrics
+    beside = [item for item in told["warnings"] if item not in same["warnings"]]
+    assert [item for item in told["warnings"] if item not in beside] == same["warnings"]
+    assert {item["name"] for item in beside} <= added.warnings
+    assert {**told, "metrics": 0, "warnings": 0} == {**same, "metrics": 0, "warnings": 0}
