@@ -1,6 +1,6 @@
 """Where the stress along a beam is largest: an extreme between samples is found, not sampled.
 
-Around every sample that is higher than its neighbours the stress is interpolated by a polynomial over nine samples of
+Around every sample that is as high as its neighbours the stress is interpolated by a polynomial over nine samples of
 one smooth piece; at the extreme of the highest polynomial the state is integrated, and the place is put right by the
 stress's exact slope.
 """
@@ -22,8 +22,7 @@ STENCIL = 9
 _TO_POLYNOMIAL = np.linalg.inv(np.vander(np.arange(float(STENCIL)) - STENCIL // 2, increasing=True))
 _FIRST, _SECOND = np.arange(1.0, STENCIL), np.arange(1.0, STENCIL - 1) * np.arange(2.0, STENCIL)
 _NEWTON, _POLISH = 6, 2
-_HUMPS = 6  # highest samples between lower neighbours that are looked at; where two segments meet one counts twice
-_LEVEL = 1e-9  # relative difference of samples that counts as none
+_HUMPS = 6  # highest samples between lower neighbours of their segments that are looked at
 
 
 @dataclass(frozen=True)
@@ -126,12 +125,13 @@ def _combined(found: Sections, bends: FloatArray, pulls: FloatArray) -> FloatArr
 def _highest(sampler: Sampler, rows: Rows, stress: FloatArray) -> Humps:
     """Return the highest hump of stresses (n, q, rows), by interpolation around several samples.
 
-    Of two humps of nearly one height the lower one may have the higher sample.
+    Of two humps of nearly one height the lower one may have the higher sample; where two segments meet, each has a
+    hump of its own.
     """
-    least = np.full((*stress.shape[:2], 1), -np.inf)
-    slack = _LEVEL * np.abs(stress)
-    before, after = (np.concatenate(pair, axis=2) for pair in ((least, stress[..., :-1]), (stress[..., 1:], least)))
-    ranked = np.where((stress >= before - slack) & (stress >= after - slack), stress, -np.inf)
+    parts = stress.reshape(*stress.shape[:2], -1, sampler.per_segment)
+    rises, level = np.diff(parts, axis=3), np.zeros((*parts.shape[:3], 1))
+    up = (np.concatenate([level, rises], axis=3) >= 0) & (np.concatenate([rises, level], axis=3) <= 0)
+    ranked = np.where(up.reshape(stress.shape), stress, -np.inf)
     best = np.argsort(-ranked, axis=2, kind="stable")[..., :_HUMPS]
     first = windows(sampler, rows)[best]
     near = np.take_along_axis(stress[:, :, None], first[..., None] + np.arange(STENCIL), axis=3)
@@ -143,8 +143,8 @@ def _highest(sampler: Sampler, rows: Rows, stress: FloatArray) -> Humps:
     height = np.where(np.isfinite(sample), np.maximum(_horner(polynomial, at), sample), -np.inf)
     bend = _horner(polynomial[..., 2:] * _SECOND, at)
     pick = height.argmax(axis=2)[..., None]
-    parts = (height, at + middle, low + middle, high + middle, bend, best, first, sample)
-    return Humps(*(np.take_along_axis(part, pick, axis=2)[..., 0] for part in parts))
+    found = (height, at + middle, low + middle, high + middle, bend, best, first, sample)
+    return Humps(*(np.take_along_axis(part, pick, axis=2)[..., 0] for part in found))
 
 
 def _polished(
