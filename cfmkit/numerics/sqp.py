@@ -1,7 +1,7 @@
 """Constrained minimisation of smooth functions with exact slopes: sequential quadratic programming.
 
 The work is done by SLSQP; added are what a model that cannot be evaluated everywhere needs (a step to where it has no
-answer is shortened), the best point seen in place of the last, and which constraints hold the optimum.
+answer is shortened), and the best point seen in place of the last.
 
 Reference
 ---------
@@ -28,11 +28,11 @@ class Ending(Enum):
     """Why a minimisation ended."""
 
     OPTIMUM = "converged to a local optimum"
-    STEPS = "ended after the steps allowed"
-    STUCK = "no step improves the point further"
-    INCOMPATIBLE = "the constraints contradict each other near the point"
-    NO_ANSWER = "the model has no answer at the start"
-    OUT_OF_TIME = "the time allowed ran out"
+    STEPS = "stopped after the steps allowed"
+    STUCK = "stopped where no step improves it"
+    INCOMPATIBLE = "stopped: the constraints contradict each other there"
+    NO_ANSWER = "could not begin: the model has no answer at the start"
+    OUT_OF_TIME = "stopped when the time was up"
 
 
 class Program(Protocol):
@@ -66,6 +66,9 @@ class Effort:
         Asked before each evaluation whether the time is up.
     enough : float
         End at the first point without violation whose objective is this or less.
+    last : bool
+        Whether to return the point where the steps end, though a better one was seen: of those without violation the
+        best is likely to be one that just counts as such, the last one has next to none if the steps converge.
     """
 
     steps: int = 60
@@ -73,22 +76,25 @@ class Effort:
     violation: float = 1e-5
     stop: Callable[[], bool] = _never
     enough: float = -np.inf
+    last: bool = False
 
 
 @dataclass(frozen=True)
 class Optimum:
-    """The best point that was found.
+    """The point that was found.
 
     Attributes
     ----------
     z : (n,) array
         Where.
     objective, constraints : float and (m,) array
-        There; of no use if the ending is NO_ANSWER.
+        There; infinite and none where the model has no answer.
     ending : Ending
         Why the search ended.
     evaluations : int
         How often the model was asked for values.
+    allowed : float
+        Violation that counts as none.
     """
 
     z: FloatArray
@@ -96,15 +102,25 @@ class Optimum:
     constraints: FloatArray
     ending: Ending
     evaluations: int
+    allowed: float
 
     @property
     def violation(self) -> float:
-        """By how much the worst constraint is violated."""
-        return max(0.0, -float(self.constraints.min(initial=np.inf)))
+        """By how much the worst constraint is violated; infinite where the model has no answer."""
+        return _excess(self.constraints) if np.isfinite(self.objective) else np.inf
+
+    @property
+    def feasible(self) -> bool:
+        """Whether all constraints hold but for what counts as none."""
+        return self.violation <= self.allowed
+
+
+def _excess(constraints: FloatArray) -> float:
+    return max(0.0, -float(constraints.min(initial=np.inf)))
 
 
 def minimize(program: Program, start: FloatArray, bounds: FloatArray, effort: Effort | None = None) -> Optimum:
-    """Return the best point found from a start.
+    """Return the best point found from a start, or the last one where that is asked for.
 
     Parameters
     ----------
@@ -122,15 +138,21 @@ def minimize(program: Program, start: FloatArray, bounds: FloatArray, effort: Ef
     memory = _Memory(program, effort)
     try:
         if memory.at(z) is None:
-            return Optimum(z, np.inf, np.zeros(0), Ending.NO_ANSWER, memory.evaluations)
-        ending = _solved(memory, z, bounds)
+            return memory.optimum(z, None, Ending.NO_ANSWER)
+        last, ending = _solved(memory, z, bounds)
+        if effort.last:
+            answer = memory.at(last)
+            return memory.optimum(last, answer, ending if answer is not None else Ending.STUCK)
     except _Enough as end:
         ending = end.ending
-    return memory.best_as(ending) if memory.best else Optimum(z, np.inf, np.zeros(0), ending, memory.evaluations)
+    if memory.best is None:
+        return memory.optimum(z, None, ending)
+    _, z, *best = memory.best
+    return memory.optimum(z, best, ending)
 
 
-def _solved(memory: _Memory, z: FloatArray, bounds: FloatArray) -> Ending:
-    """Run the solver; its answers are in the memory."""
+def _solved(memory: _Memory, z: FloatArray, bounds: FloatArray) -> tuple[FloatArray, Ending]:
+    """Run the solver; return where it ends and why. Its answers are in the memory."""
     from scipy.optimize import minimize as slsqp
 
     found = slsqp(  # type: ignore[call-overload]
@@ -142,7 +164,7 @@ def _solved(memory: _Memory, z: FloatArray, bounds: FloatArray) -> Ending:
         constraints=[{"type": "ineq", "fun": memory.constraints, "jac": memory.constraint_slopes}],
         options={"maxiter": memory.effort.steps, "ftol": memory.effort.tolerance},
     )
-    return _ENDINGS.get(int(found.status), Ending.STUCK)
+    return np.clip(found.x, *bounds.T), _ENDINGS.get(int(found.status), Ending.STUCK)
 
 
 _ENDINGS = {0: Ending.OPTIMUM, 4: Ending.INCOMPATIBLE, 9: Ending.STEPS}
@@ -178,15 +200,15 @@ class _Memory:
         return self.answer
 
     def _keep(self, z: FloatArray, objective: float, constraints: FloatArray) -> None:
-        excess = max(0.0, -float(constraints.min(initial=np.inf)))
+        excess = _excess(constraints)
         rank = (0.0, objective) if excess <= self.effort.violation else (excess, objective)
         if self.best is None or rank < self.best[0]:
             self.best = rank, z.copy(), objective, constraints
 
-    def best_as(self, ending: Ending) -> Optimum:
-        assert self.best is not None
-        _, z, objective, constraints = self.best
-        return Optimum(z, objective, constraints, ending, self.evaluations)
+    def optimum(self, z: FloatArray, answer: Any, ending: Ending) -> Optimum:
+        """Return a point with its answer, None where the model has none."""
+        objective, constraints = (np.inf, np.zeros(0)) if answer is None else answer
+        return Optimum(z, objective, constraints, ending, self.evaluations, self.effort.violation)
 
     def objective(self, z: FloatArray) -> float:
         answer = self.at(z)

@@ -15,11 +15,12 @@ from flexure_support import ABS, LINKAGE, MM, SHARES, THICKNESS, UNLOADED, WIDTH
 
 from cfmkit.families.slider_crank.flexures.chain import Elasticity, joints
 from cfmkit.families.slider_crank.flexures.chain import kink as offset
-from cfmkit.families.slider_crank.flexures.descent import Ending, descend
+from cfmkit.families.slider_crank.flexures.descent import descend
 from cfmkit.families.slider_crank.flexures.program import StripProgram
 from cfmkit.families.slider_crank.flexures.search import Found, Ranges, search, uniform_for_stroke, uniform_thickness
 from cfmkit.families.slider_crank.flexures.task import Form, Task
 from cfmkit.families.slider_crank.flexures.values import first_at
+from cfmkit.numerics.sqp import Ending
 
 TASK = Task(corners(), np.pi, ABS, 1.5, 1 * MM, 20 * MM, 0.01, "stroke", 60 * MM)
 

@@ -21,7 +21,6 @@ from cfmkit.families.refusals import CannotBuild, no_design
 from cfmkit.families.slider_crank.build import linkage_of, resolve, unloaded_angle
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.flexures.assembly import corners, elasticity, pins_of, travel_direction
-from cfmkit.families.slider_crank.flexures.descent import Ending
 from cfmkit.families.slider_crank.flexures.infeasible import infeasible
 from cfmkit.families.slider_crank.flexures.judged import Judged, judge, rounded
 from cfmkit.families.slider_crank.flexures.model import slider_reach
@@ -29,6 +28,7 @@ from cfmkit.families.slider_crank.flexures.resize import design_flexures
 from cfmkit.families.slider_crank.flexures.search import LOOSE, SHORTEST, Found, Ranges, search, uniform_for_stroke
 from cfmkit.families.slider_crank.flexures.spec import StripSpec
 from cfmkit.families.slider_crank.flexures.task import Form, Task
+from cfmkit.numerics.sqp import Ending
 from cfmkit.results import Design, Finding, Status
 
 if TYPE_CHECKING:

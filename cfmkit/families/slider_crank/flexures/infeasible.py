@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 from cfmkit.families.findings import mm, mpa, newton, percent
 from cfmkit.families.refusals import no_design
 from cfmkit.families.slider_crank.findings import finding
-from cfmkit.families.slider_crank.flexures.descent import VIOLATION, Ending
+from cfmkit.families.slider_crank.flexures.descent import VIOLATION
+from cfmkit.numerics.sqp import Ending
 from cfmkit.units import format_short
 
 if TYPE_CHECKING:
@@ -18,7 +19,10 @@ if TYPE_CHECKING:
 def infeasible(found: Found) -> Design:
     """Return what the nearest strip misses, and the target that it would meet."""
     descent, program, task = found.descent, found.program, found.task
-    state = None if descent.ending is Ending.NO_ANSWER else program.state(descent.z)
+    if descent.ending is Ending.NO_ANSWER:
+        why = "could not begin: the first strip has no equilibrium over the travel"
+        return no_design(finding("target_unreachable", f"the search {why}"))
+    state = program.state(descent.z)
     if state is None:
         return no_design(finding("target_unreachable", f"the search {descent.ending.value}"))
     low, high = float(state.force.min()), float(state.force.max())

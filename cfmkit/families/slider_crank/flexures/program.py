@@ -66,7 +66,6 @@ class StripProgram:
     task: Task
     form: Form
     known: Path | None = None
-    solved: int = 0
     _last: tuple[FloatArray, State] | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
@@ -138,7 +137,6 @@ class StripProgram:
 
     def _path(self, network: Network, travel: FloatArray) -> Path | None:
         """Return the equilibria near the last ones, else from rest."""
-        self.solved += 1
         drive = Displacement(SLIDER, self.task.direction, travel)
         if self.known is not None:
             with suppress(InputError):  # stations that move can change how finely the strip is cut

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.slider_crank.flexures.descent import Descent, Ending, descend
+from cfmkit.families.slider_crank.flexures.descent import descend
 from cfmkit.families.slider_crank.flexures.program import StripProgram
 from cfmkit.families.slider_crank.flexures.task import SMALL, Form
+from cfmkit.numerics.sqp import Ending, Optimum
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -53,9 +54,9 @@ class Found:
         What was asked.
     program : StripProgram
         Of the last search.
-    descent : Descent
+    descent : Optimum
         Its outcome.
-    uniform : Descent or None
+    uniform : Optimum or None
         That of one thickness, within `LOOSE` at least, for comparison; None where it has no equilibrium.
     """
 
@@ -63,8 +64,8 @@ class Found:
     form: Form
     ranges: Ranges
     program: StripProgram
-    descent: Descent
-    uniform: Descent | None
+    descent: Optimum
+    uniform: Optimum | None
 
     @property
     def values(self) -> FloatArray:
@@ -154,7 +155,7 @@ def search(
     return best
 
 
-def _rank(descent: Descent) -> tuple[bool, float]:
+def _rank(descent: Optimum) -> tuple[bool, float]:
     return not descent.feasible, descent.objective if descent.feasible else descent.violation
 
 
@@ -174,7 +175,7 @@ def _climb(
     form: Form,
     ranges: Ranges,
     steps: tuple[int, ...],
-    uniform: Descent | None,
+    uniform: Optimum | None,
     rng: np.random.Generator | None,
 ) -> Found:
     """Return the outcome of one start: every search begins where the one with fewer thicknesses ended."""
@@ -196,7 +197,7 @@ def _climb(
     return Found(task, form, ranges, program, descent, uniform)
 
 
-def _tightened(task: Task, form: Form, ranges: Ranges, uniform: Descent | None) -> Found:
+def _tightened(task: Task, form: Form, ranges: Ranges, uniform: Optimum | None) -> Found:
     """Return the outcome of a band that begins as wide as the uniform strip needs it, and is made narrower in steps.
 
     Where a band is out of reach of the first strip, the steps towards it get stuck; those within bands do not.
@@ -222,7 +223,7 @@ def _refined(values: FloatArray, count: int) -> FloatArray:
     return values if len(values) == count else np.interp(np.linspace(0.0, 1.0, count), old, values)
 
 
-def _begin(task: Task, form: Form, ranges: Ranges, uniform: Descent | None, count: int) -> tuple[FloatArray, float]:
+def _begin(task: Task, form: Form, ranges: Ranges, uniform: Optimum | None, count: int) -> tuple[FloatArray, float]:
     """Return the first numbers, and the first value of the goal."""
     low, high = ranges.form.T
     middle = 0.5 * (low + high)
@@ -233,7 +234,7 @@ def _begin(task: Task, form: Form, ranges: Ranges, uniform: Descent | None, coun
     return x, _first_goal(task, uniform)
 
 
-def _first_goal(task: Task, uniform: Descent | None) -> float:
+def _first_goal(task: Task, uniform: Optimum | None) -> float:
     if task.goal == "stroke":
         known = None if uniform is None or not np.isfinite(uniform.violation) else float(uniform.z[-1])
         return known if known is not None else 100.0 * task.stroke
@@ -251,7 +252,7 @@ def _bounds(task: Task, ranges: Ranges, form: Form, count: int) -> FloatArray:
     return np.concatenate([rows, [goal]])
 
 
-def _uniform(task: Task, form: Form, ranges: Ranges) -> Descent | None:
+def _uniform(task: Task, form: Form, ranges: Ranges) -> Optimum | None:
     """Return the best strip of one thickness."""
     own = ranges.form
     width = form.width or float(own[-1].mean()) * SMALL
