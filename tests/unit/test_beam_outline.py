@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from beam_support import MM, cantilever, config
+from beam_support import CANTILEVER, MM, cantilever, config
 
 import cfmkit
 from cfmkit.export import files
@@ -93,3 +93,35 @@ def test_mirroring_twice_is_nothing():
     points = np.random.default_rng(1).normal(size=(7, 2))
     again = mirrored(mirrored(points, 0.3 + 0.1j, 0.7), 0.3 + 0.1j, 0.7)
     np.testing.assert_allclose(again, points, atol=1e-14)
+
+
+def cuts(spec):
+    return [one for one in cfmkit.drawing(spec).contours if one.layer == "cut"]
+
+
+def test_beams_that_meet_on_the_mirror_axis_are_one_strip_without_a_hole():
+    """Williams' toggle: nothing but two pads and 2 x 12.949 in of a beam 0.243 in thick."""
+    found = cuts(config("beam_williams_toggle", "mechanism.part.fillet=0 mm"))
+    assert [one.hole for one in found] == [False]
+    inch = 25.4 * MM
+    beams = 2 * np.hypot(12.943, 0.386) * 0.243 * inch**2
+    pads = 2 * (4 * 0.243 * inch) ** 2
+    assert area(found) == pytest.approx(beams + pads, rel=2e-3)
+
+
+def test_a_beam_beside_its_node_is_joined_to_it_by_an_arm():
+    text = CANTILEVER.replace(
+        "beam: {start: root, end: tip}", "beam: {start: root, end: tip, end_offset: [0 mm, 9 mm]}"
+    )
+    spec = cantilever(("width: 100 mm", "width: 100 mm\n  part: {fillet: 0 mm}"), text=text)
+    (one,) = cuts(spec)
+    away = [abs(place - 0.4) for edge in one.edges for place in edge.ends]
+    assert min(away) < 3 * MM
+
+
+def test_two_halves_whose_moving_ends_have_no_pad_are_one_piece_too():
+    spec = cantilever(
+        ("tip: {at: [400 mm, 0 mm]}", "tip: {at: [400 mm, 0 mm], support: roller, direction: 90 deg}"),
+        ("analysis:", "  copies: {mirror: [420 mm, 0 mm]}\n  part: {fillet: 0 mm}\nanalysis:"),
+    )
+    assert sum(not one.hole for one in cuts(spec)) == 1

@@ -19,6 +19,7 @@ from cfmkit.families.beam.strips import Strip, mirrored, strips
 from cfmkit.geometry import Contour, Curve2D, Drawing, Smooth
 
 if TYPE_CHECKING:
+    from cfmkit.beams.network import Network
     from cfmkit.curves import FloatArray
     from cfmkit.families.beam.build import Assembly
     from cfmkit.families.beam.spec import BeamSpec
@@ -28,6 +29,9 @@ PAD = 4.0
 
 EYE, HOLE = 2.5, 1.2
 """Radii of the eye and of the hole at a pinned support, in thicknesses."""
+
+ROUGH = 1e-6
+"""A beam that ends nearer to its node than this stands on it [m]."""
 
 _CORNERS = 64
 _ON_AXIS = 0.5
@@ -70,11 +74,13 @@ def _pieces(assembly: Assembly, beams: dict[str, list[Strip]]) -> tuple[list[Flo
             size = float(strip.thickness[-1 if last else 0])
             at = strip.points[-1 if last else 0]
             pieces.append(_disc(at, 0.5 * size))
+            support = network.nodes[node].support
             if _padded(assembly, node):
                 pieces.append(_pad(strip, last))
-            elif network.nodes[node].support.across:
+            elif support.across and not support.rotation:
                 pieces.append(_disc(at, EYE * size))
                 holes.append(_disc(at, HOLE * size))
+            pieces += _arm(network, node, at, PAD * size)
     thick = max(float(strip.thickness.max()) for found in beams.values() for strip in found)
     for link in network.links:
         a, b = (_anchor(assembly, beams, one) for one in (link.master, link.node))
@@ -88,14 +94,20 @@ def _padded(assembly: Assembly, node: str) -> bool:
 
     Not on the mirror axis: there the beams of the two halves meet.
     """
-    network, axis = assembly.network, mirror_axis(assembly)
-    found = network.nodes[node]
-    if axis is not None:
-        away = ((complex(found.x, found.y) - axis[0]) / np.exp(1j * axis[1])).imag
-        if abs(away) < _ON_AXIS * thickest(assembly.spec.mechanism.thickness):
-            return False
-    linked = {link.node for link in network.links}
+    if _on_axis(assembly, node):
+        return False
+    found = assembly.network.nodes[node]
+    linked = {link.node for link in assembly.network.links}
     return (found.support.rotation and found.support.across) or node in linked
+
+
+def _on_axis(assembly: Assembly, node: str) -> bool:
+    """Tell whether a node is on the mirror axis."""
+    found, axis = assembly.network.nodes[node], mirror_axis(assembly)
+    if axis is None:
+        return False
+    away = ((complex(found.x, found.y) - axis[0]) / np.exp(1j * axis[1])).imag
+    return bool(abs(away) < _ON_AXIS * thickest(assembly.spec.mechanism.thickness))
 
 
 def _anchor(assembly: Assembly, beams: dict[str, list[Strip]], node: str) -> FloatArray:
@@ -113,6 +125,12 @@ def _ends(assembly: Assembly, beams: dict[str, list[Strip]], node: str) -> list[
     network = assembly.network
     firsts = [(found[0], False) for name, found in beams.items() if network.beams[name].start == node]
     return firsts + [(found[-1], True) for name, found in beams.items() if network.beams[name].end == node]
+
+
+def _arm(network: Network, node: str, at: FloatArray, width: float) -> list[FloatArray]:
+    """Return the bar from a node to the end of a beam that stands beside it [m]; none where it stands on it."""
+    place = np.array([network.nodes[node].x, network.nodes[node].y])
+    return [_bar(place, at, width)] if np.hypot(*(at - place)) > ROUGH else []
 
 
 def _joints(found: list[Strip]) -> list[tuple[Strip, Strip]]:
@@ -150,9 +168,10 @@ def _bars(assembly: Assembly, beams: dict[str, list[Strip]], at: complex, direct
     moving = {assembly.driven, assembly.spec.mechanism.drive.node}
     for node in sorted(moving):
         ends = _ends(assembly, beams, node)
-        if not ends:
+        if not ends or _on_axis(assembly, node):
             continue
-        middle = _pad(*ends[0])[2:].mean(axis=0)
+        padded = _padded(assembly, node)
+        middle = _pad(*ends[0])[2:].mean(axis=0) if padded else _anchor(assembly, beams, node)
         other = mirrored(middle[None], at, direction)[0]
         if np.hypot(*(other - middle)) > 0:
             found.append(_bar(middle, other, PAD * thick))
