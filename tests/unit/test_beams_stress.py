@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -50,7 +52,7 @@ def densely(path: Path, point: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]
 
     y, places, bending, axial = np.array([0.0, m]), [], [], []
     marks = [fitted.parameter(float(share)) for share in section.stations]
-    for left, right in zip(marks[:-1], marks[1:], strict=True):
+    for left, right in pairwise(marks):
         t = np.linspace(left, right, 2001)
         inside = float(fitted.arc(0.5 * (left + right)))
         found = solve_ivp(slopes, (left, right), y, "DOP853", t, args=(inside,), rtol=1e-10, atol=1e-13).y
@@ -70,7 +72,7 @@ def densely(path: Path, point: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]
         (CosineArch(0.008), TAPER, 0.03),
     ],
 )
-def test_no_place_along_a_beam_has_more_stress_than_the_largest(shape: object, thickness: object, travel: float) -> None:
+def test_no_place_has_more_stress_than_the_largest(shape: object, thickness: object, travel: float) -> None:
     path = pressed(shape, thickness, travel)
     value, place = path.beam_stress("x")
     found = path.stress_extremes("x")
