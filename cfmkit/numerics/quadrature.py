@@ -1,4 +1,4 @@
-"""Running integrals of smooth functions: Gauss-Legendre panels, refined where they need it."""
+"""Integrals of smooth functions: running ones by Gauss-Legendre panels, refined where they need it, and means."""
 
 from __future__ import annotations
 
@@ -125,3 +125,20 @@ def _panels(
     decay = np.minimum(last / np.maximum(before, np.finfo(float).tiny), 1.0)
     powers: FloatArray = np.ascontiguousarray((values @ to_powers).T)
     return powers, last * decay
+
+
+def clenshaw_curtis(count: int) -> FloatArray:
+    """Return the weights of the mean over an interval from its Chebyshev-Lobatto points; exact for polynomials.
+
+    Examples
+    --------
+    >>> clenshaw_curtis(3).round(6).tolist()
+    [0.166667, 0.666667, 0.166667]
+    """
+    turns = np.linspace(0, np.pi, count)
+    even = np.arange(0, count, 2)
+    means = 1.0 / (1.0 - even.astype(float) ** 2)  # of the even Chebyshev polynomials; the odd ones have none
+    ends = np.where((even == 0) | (even == count - 1), 0.5, 1.0)
+    weights: FloatArray = (2.0 / (count - 1)) * (np.cos(np.outer(turns, even)) @ (ends * means))
+    weights[[0, -1]] *= 0.5
+    return weights

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cfmkit.numerics.quadrature import RunningIntegral
+from cfmkit.numerics.quadrature import RunningIntegral, clenshaw_curtis
 
 FAST = settings(deadline=None, max_examples=100)
 
@@ -76,3 +76,22 @@ def test_a_function_singular_inside_ends_refinement_at_the_limit():
     integral = RunningIntegral(lambda t: 1 / np.abs(t - 1 / math.pi), 0.0, 1.0, max_panels=64)
     assert len(integral._middle) <= 128
     assert np.isfinite(integral(1.0))
+
+
+@pytest.mark.parametrize("count", [2, 3, 4, 9, 16, 17])
+def test_the_mean_from_chebyshev_points_is_exact_for_polynomials_of_a_degree_below_their_number(count):
+    nodes, weights = np.polynomial.chebyshev.chebpts2(count), clenshaw_curtis(count)
+    assert (weights > 0).all()
+    np.testing.assert_allclose(weights, weights[::-1], rtol=1e-13)
+    for degree in range(count):
+        mean = 0.0 if degree % 2 else 1.0 / (degree + 1)
+        assert weights @ nodes**degree == pytest.approx(mean, abs=1e-14)
+
+
+def test_the_mean_of_a_smooth_function_converges_faster_than_any_power():
+    def error(count):
+        return abs(clenshaw_curtis(count) @ np.exp(np.polynomial.chebyshev.chebpts2(count)) - math.sinh(1.0))
+
+    assert error(5) < 1e-3
+    assert error(9) < 1e-8
+    assert error(13) < 1e-14

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.curves import read_only
+from cfmkit.numerics.quadrature import clenshaw_curtis
 
 if TYPE_CHECKING:
     from cfmkit.curves import FloatArray
@@ -56,20 +57,3 @@ def poses_of(task: Task, start: float) -> Poses:
     mean[window] = clenshaw_curtis(task.points)
     shown = np.array([0, np.searchsorted(at, middle), window[-1]])
     return Poses(read_only(at), window, shown, read_only(mean), np.searchsorted(at, also))
-
-
-def clenshaw_curtis(count: int) -> FloatArray:
-    """Return the weights of the mean over an interval from its Chebyshev-Lobatto points; exact for polynomials.
-
-    Examples
-    --------
-    >>> clenshaw_curtis(3).round(6).tolist()
-    [0.166667, 0.666667, 0.166667]
-    """
-    turns = np.linspace(0, np.pi, count)
-    even = np.arange(0, count, 2)
-    means = 1.0 / (1.0 - even.astype(float) ** 2)  # of the even Chebyshev polynomials; the odd ones have none
-    ends = np.where((even == 0) | (even == count - 1), 0.5, 1.0)
-    weights: FloatArray = (2.0 / (count - 1)) * (np.cos(np.outer(turns, even)) @ (ends * means))
-    weights[[0, -1]] *= 0.5
-    return weights
