@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.families.beam.build import mirror_axis
+from cfmkit.families.beam.posed import bent, place, rigid_parts, spring_lines
 from cfmkit.families.beam.strips import mirrored, strips
 from cfmkit.families.beam.surface.ride import ride
 from cfmkit.families.beam.values import window_of
@@ -22,7 +23,7 @@ from cfmkit.plots.style import GREY, INK, LINES, TROUBLE, VERMILLION, axes_mm, n
 from cfmkit.plots.text import Heading, value_text, write_heading
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping
 
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
@@ -38,6 +39,9 @@ MOST_BEAMS = 6
 
 SAME = 1e-4
 """Lines closer than this share of their size are one."""
+
+NOTHING = 1e-9
+"""Forces below this share of the largest are rounding: they are drawn as zero."""
 
 
 def figures(result: Result) -> dict[str, Callable[[], Figure]]:
@@ -78,8 +82,8 @@ def shapes(result: Result) -> Figure:
     solution: Solution = result.state
     poses = np.unique(np.linspace(0, len(solution.keep) - 1, POSES).astype(int))[1:]
     drawn = {int(pose): _lines(solution, int(solution.keep[pose])) for pose in poses}
-    plates = _plates(solution)
-    box = _box([*plates, *(line for lines in drawn.values() for line in lines)])
+    plates, springs = _plates(solution), _both(solution, spring_lines(solution.path))
+    box = _box([*plates, *springs, *(line for lines in drawn.values() for line in lines)])
     width, height = box[2] - box[0], box[3] - box[1]
     scale = min(138.0 / width, 110.0 / height)
     heading = Heading.of(result, "shapes to scale, as cut and on the way")
@@ -89,6 +93,11 @@ def shapes(result: Result) -> Figure:
     ax = axes_mm(figure, room)
     for plate in plates:
         parts.plate(ax, [_counter_clockwise(plate)])
+    for number, line in enumerate(_both(solution, rigid_parts(solution.path, None))):
+        parts.edge(ax, line, f"rigid-{number}", color=GREY, linewidth=2.4, zorder=1.3, solid_capstyle="round")
+    for number, line in enumerate(springs):
+        ends = [(float(x), float(y)) for x, y in line]
+        parts.spring(ax, ends[0], ends[1], 0.02 * max(width, height), f"spring-{number}")
     labels = _poses(solution, ax, drawn)
     _supports(solution, ax)
     parts.to_scale(ax, box)
@@ -103,12 +112,15 @@ def _poses(solution: Solution, ax: Axes, drawn: dict[int, list[FloatArray]]) -> 
     from matplotlib.colors import to_hex
 
     kind = "angle" if solution.spec.mechanism.drive.kind in ("rotation", "moment") else "length"
-    at, found = solution.path.layout.position(solution.assembly.driven), []
+    found = []
     for share, (pose, lines) in zip(np.linspace(0.8, 0.0, len(drawn)), drawn.items(), strict=True):
         color = to_hex(colormaps["viridis"](share))
         for number, line in enumerate(lines):
             parts.edge(ax, line, f"pose-{pose}-{number}", color=color, linewidth=1.2, zorder=2.5)
-        moved = np.real(np.array(at)) + solution.path.motion(solution.assembly.driven)[solution.keep[pose], :2]
+        point = int(solution.keep[pose])
+        for number, line in enumerate(_both(solution, rigid_parts(solution.path, point))):
+            parts.edge(ax, line, f"rigid-{pose}-{number}", color=color, linewidth=0.7, linestyle="--", zorder=2.4)
+        moved = place(solution.path, solution.assembly.driven, point)
         text = value_text(float(solution.motion[pose]), kind)
         found.append(parts.part_name(text, [tuple(moved)], (-1.0, 0.3), color))
     index = int(np.argmax(np.where(np.isfinite(solution.stress), solution.stress, -np.inf)))
@@ -117,11 +129,11 @@ def _poses(solution: Solution, ax: Axes, drawn: dict[int, list[FloatArray]]) -> 
 
 def _peak(solution: Solution, ax: Axes, index: int) -> Label:
     """Mark where the stress is largest, on the unbent beam: there a reader finds the place on the part."""
-    name, place = str(solution.stress_at[0][index]), float(solution.stress_at[1][index])
+    name, share = str(solution.stress_at[0][index]), float(solution.stress_at[1][index])
     layout = solution.path.layout
     found = np.concatenate([strip.points for strip in strips(layout.network, layout.fits, name)])
     way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(found, axis=0).T))])
-    x, y = (float(np.interp(place * way[-1], way, found[:, k])) for k in (0, 1))
+    x, y = (float(np.interp(share * way[-1], way, found[:, k])) for k in (0, 1))
     ax.plot(*parts.mm((x, y)), marker="o", markersize=8, markerfacecolor="none", color=TROUBLE, zorder=5, gid="peak")
     return parts.part_name(value_text(float(solution.stress[index]), "stress"), [(x, y)], (1.0, 0.6), TROUBLE)
 
@@ -137,15 +149,19 @@ def _names(solution: Solution) -> list[Label]:
 
 def _lines(solution: Solution, point: int) -> list[FloatArray]:
     """Return the bent centre lines at a point of the path, those of a mirrored half included [m]."""
-    lines = [solution.path.shape(name, point) for name in solution.path.layout.network.beams]
-    axis = mirror_axis(solution.assembly)
-    return lines if axis is None else [*lines, *(mirrored(line, *axis) for line in lines)]
+    return _both(solution, [bent(solution.path, name, point) for name in solution.path.layout.network.beams])
 
 
 def _plates(solution: Solution) -> list[FloatArray]:
-    layout, axis = solution.path.layout, mirror_axis(solution.assembly)
+    layout = solution.path.layout
     found = [strip.polygon for name in layout.network.beams for strip in strips(layout.network, layout.fits, name)]
-    return found if axis is None else [*found, *(mirrored(polygon, *axis) for polygon in found)]
+    return _both(solution, found)
+
+
+def _both(solution: Solution, lines: list[FloatArray]) -> list[FloatArray]:
+    """Return lines of what is described, and those of its mirrored half."""
+    axis = mirror_axis(solution.assembly)
+    return lines if axis is None else [*lines, *(mirrored(line, *axis) for line in lines)]
 
 
 def _counter_clockwise(points: FloatArray) -> FloatArray:
@@ -162,17 +178,18 @@ def _box(outlines: list[FloatArray]) -> tuple[float, float, float, float]:
 
 
 def _supports(solution: Solution, ax: Axes) -> None:
-    """Mark the nodes by their support: squares where the rotation is held, circles where it is not."""
+    """Mark the nodes by their support: squares where the rotation is held, else circles; hollow where they slide."""
     axis, layout = mirror_axis(solution.assembly), solution.path.layout
     for name, node in layout.network.nodes.items():
         support = node.support
         if not (support.along or support.across or support.rotation) and name != solution.assembly.driven:
             continue
+        color = VERMILLION if name == solution.assembly.driven else INK
         here = np.array([[float(np.real(node.x)), float(np.real(node.y))]])
-        for place in [here] if axis is None else [here, mirrored(here, *axis)]:
+        for at in [here] if axis is None else [here, mirrored(here, *axis)]:
             ax.plot(
-                *parts.mm(place[0]), marker="s" if support.rotation else "o", markersize=4.5,
-                color=VERMILLION if name == solution.assembly.driven else INK, zorder=4, linestyle="", gid=f"at-{name}",
+                *parts.mm(at[0]), marker="s" if support.rotation else "o", markersize=4.5, color=color, zorder=4,
+                markerfacecolor=color if support.along or color != INK else "white", linestyle="", gid=f"at-{name}",
             )  # fmt: skip
 
 
@@ -187,13 +204,24 @@ def reactions(result: Result) -> Figure:
     # against the drive: what holds the load counts as positive
     along = {name: -(force[:, 0] * c + force[:, 1] * s) for name, force in forces.items()}
     across = {name: force[:, 1] * c - force[:, 0] * s for name, force in forces.items()}
+    negligible = NOTHING * max(float(np.nanmax(np.abs(force[:, :2]))) for force in forces.values())
+    along, across = ({name: _rounded(row, negligible) for name, row in rows.items()} for rows in (along, across))
     one = ", one copy" if solution.assembly.parallel > 1 else ""
-    heading = Heading.of(result, f"force of each beam on its last node{one}")
+    heading = Heading.of(result, f"force of each beam on its last node{one}{_left_out(forces)}")
     diagrams = [
         Diagram(solution.motion, _motion(result), Scale("against the drive", "force"), _series(along)),
         Diagram(solution.motion, _motion(result), Scale("across", "force"), _series(across)),
     ]
     return diagram_figure(heading, diagrams)
+
+
+def _rounded(values: FloatArray, negligible: float) -> FloatArray:
+    return np.where(np.abs(values) <= negligible, 0.0, values)
+
+
+def _left_out(beams: Mapping[str, object]) -> str:
+    """Say that a diagram has not all beams."""
+    return "" if len(beams) <= MOST_BEAMS else f"; the {MOST_BEAMS} largest of {len(beams)}"
 
 
 def _series(values: dict[str, FloatArray]) -> list[Series]:
@@ -227,7 +255,9 @@ def stress(result: Result) -> Figure:
     series = _series({name: value for name, (value, _) in solution.stresses.items()})
     part = "bending and axial" if solution.spec.stress == "total" else "bending"
     diagram = Diagram(solution.motion, _motion(result), Scale("largest stress", "stress"), series, limits)
-    return diagram_figure(Heading.of(result, f"largest stress of each beam ({part})"), [diagram])
+    return diagram_figure(
+        Heading.of(result, f"largest stress of each beam ({part}){_left_out(solution.stresses)}"), [diagram]
+    )
 
 
 def surface(result: Result) -> Figure:
