@@ -50,6 +50,15 @@ MORE = "beams:\n    beam: {start: root, end: tip}"
         ("end: tip}", "end: tip, shape: {kind: arc}}", "mechanism.beams.beam.shape", "the key 'sweep' is missing"),
         ("end: tip}", "end: tip, shape: {kind: arc, sweep: 1}}", "mechanism.beams.beam.shape.sweep", "has no unit"),
         ("thickness: 1 mm", "thickness: [[0, 1 mm], [0.5, 1 mm]]", "mechanism.thickness", "from 0 to 1"),
+        ("thickness: 1 mm", f"thickness: [[0, 1 mm]{3 * ', [0.5, 1 mm]'}, [1, 1 mm]]", "mechanism.thickness", "a step"),
+        ("thickness: 1 mm", "thickness: [[0, 1 mm], [1, 1 mm], [1, 2 mm]]", "mechanism.thickness", "at an end"),
+        ("end: tip}", "end: tip, shape: {kind: arc, sweep: 720 deg}}", "mechanism.beams.beam.shape.sweep", "turns"),
+        (
+            "end: tip}",
+            "end: tip, shape: {kind: polynomial, coefficients: [9 deg, -360 deg]}}",
+            "mechanism.beams.beam.shape.coefficients",
+            "returns to its start",
+        ),
         ("thickness: 1 mm", "thickness: 1 mm\n  shear: true", "mechanism.shear", "add 'axial: true'"),
         ("thickness: 1 mm", "thickness: -1 mm", "mechanism.thickness", "must be > 0"),
         ("youngs_modulus: 2.4 GPa", "youngs_modulus: 0 GPa", "mechanism.material.youngs_modulus", "must be > 0"),
@@ -111,6 +120,25 @@ def test_rescaling_needs_a_mechanism_of_beams_alone():
     spring = ("  drive:", "  loads: [{kind: point, node: n3, fy: 1 N}]\n  drive:")
     design = ("analysis:", "design: {rescale: {force: 15 N}}\nanalysis:")
     assert "Eq. 6 is about beams alone" in only(spring, design, text=text)[2]
+
+
+def test_everything_that_forbids_rescaling_is_told_in_one_line():
+    text = (CONFIGS / "beam_lan2010.yaml").read_text()
+    pairs = (
+        ("  drive:", "  loads: [{kind: point, node: n3, fy: 1 N}]\n  drive:"),
+        ("b1: {start: n1, end: n3,", "b1: {start: n1, end: n3, material: pom,"),
+        ("analysis:", "design: {rescale: {force: 15 N}}\nanalysis:"),
+    )
+    message = only(*pairs, text=text)[2]
+    assert "springs, loads" in message
+    assert "one material" in message
+
+
+def test_a_beam_that_names_the_material_of_the_mechanism_is_of_one_material():
+    text = (CONFIGS / "beam_lan2010.yaml").read_text()
+    material = text[text.index("{youngs_modulus") : text.index("}", text.index("{youngs_modulus")) + 1]
+    text = text.replace(material, "pom-lan-2010").replace("b1: {", "b1: {material: pom-lan-2010, ")
+    cantilever(("analysis:", "design: {rescale: {force: 15 N}}\nanalysis:"), text=text)
 
 
 def test_switches_choose_the_model_and_the_stress():

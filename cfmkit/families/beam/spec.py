@@ -158,7 +158,8 @@ class BeamSpec(Spec):
 
     @model_validator(mode="after")
     def _can_be_rescaled(self) -> Self:
-        refuse("BeamSpec", {("design", "rescale", *place): message for place, message in _rescale_faults(self)})
+        if obstacles := list(_rescale_faults(self)):
+            refuse("BeamSpec", {("design", "rescale"): "; ".join(obstacles)})
         return self
 
     @property
@@ -201,15 +202,15 @@ def _extent_faults(spec: BeamSpec) -> Iterator[tuple[tuple[str, ...], str]]:
         yield (wanted,), f"must be {DIMENSIONS[dimension].phrase} for a drive of kind {kind!r}"
 
 
-def _rescale_faults(spec: BeamSpec) -> Iterator[tuple[tuple[str, ...], str]]:
+def _rescale_faults(spec: BeamSpec) -> Iterator[str]:
     """Yield why Eq. 6 does not hold for a mechanism."""
     if spec.design is None or spec.design.rescale is None:
         return
     mechanism = spec.mechanism
     if mechanism.drive.kind != "displacement":
-        yield (), "needs a drive of kind 'displacement': the force at the end of its window is what is scaled"
+        yield "needs a drive of kind 'displacement': the force at the end of its window is what is scaled"
     moved = any(node.moved is not None for node in mechanism.nodes.values())
     if mechanism.springs or mechanism.loads or moved or spec.analysis.imperfection:
-        yield (), "Eq. 6 is about beams alone: springs, loads, moved supports and imperfections do not scale with them"
-    if len({beam.material for beam in mechanism.beams.values()}) > 1:
-        yield (), "Eq. 6 is about beams of one material"
+        yield "Eq. 6 is about beams alone: springs, loads, moved supports and imperfections do not scale with them"
+    if len({beam.material or mechanism.material for beam in mechanism.beams.values()}) > 1:
+        yield "Eq. 6 is about beams of one material"

@@ -7,8 +7,10 @@ import math
 import re
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     from cfmkit.families.beam.parts.spec import MemberSpec
     from cfmkit.families.beam.spec import Mechanism
@@ -16,6 +18,8 @@ if TYPE_CHECKING:
 Fault = tuple[tuple[str | int, ...], str]
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_-]{0,39}")
 _SAME_DIRECTION = 1e-6  # rad; the support's direction is used
+_CLOSED = 1e-9  # of the length; the engine cannot fit what is shorter
+_GAUSS = 20  # places of the quadrature on each panel, of a turn below a radian on the average
 HELD = {
     "free": (False, False, False),
     "clamped": (True, True, True),
@@ -96,12 +100,25 @@ def _beam_faults(mechanism: Mechanism, beam: MemberSpec) -> Iterator[Fault]:
     shape = beam.shape
     if shape.kind == "cosine" and shape.half and abs(shape.rise) >= reach:
         yield ("shape", "cosine", "rise"), "half an arch rises by less than its ends are apart"
+    if shape.kind == "arc" and _returns((0.0, shape.sweep)):
+        yield ("shape", "arc", "sweep"), "an arc of whole turns returns to its start: it cannot be fitted"
+    if shape.kind == "polynomial" and _returns(shape.coefficients):
+        yield ("shape", "polynomial", "coefficients"), "the shape returns to its start: it cannot be fitted"
     if shape.kind in ("polyline", "spline"):
         points = shape.points
         if any(one == other for one, other in itertools.pairwise(points)):
             yield ("shape", shape.kind, "points"), "two neighbouring points are the same"
         elif points[0] == points[-1]:
             yield ("shape", shape.kind, "points"), "the shape returns to its start: it cannot be fitted"
+
+
+def _returns(coefficients: Sequence[float]) -> bool:
+    """Tell whether a shape whose angle is a polynomial [rad] ends where it starts."""
+    panels = 8 + math.ceil(sum(map(abs, coefficients[1:])))
+    places, weights = np.polynomial.legendre.leggauss(_GAUSS)
+    u = (np.arange(panels)[:, None] + 0.5 * (places + 1)) / panels
+    chord = (np.exp(1j * np.polynomial.polynomial.polyval(u, coefficients)) * weights).sum() / (2 * panels)
+    return bool(abs(chord) < _CLOSED)
 
 
 def _link_faults(mechanism: Mechanism) -> Iterator[Fault]:

@@ -152,6 +152,8 @@ def checked_thickness(value: Thickness) -> Thickness:
         places = [place for place, _ in value]
         if places[0] != 0 or places[-1] != 1 or places != sorted(places):
             raise ValueError("the fractions of a thickness must run from 0 to 1 and never back")
+        if any(places.count(place) > (1 if place in (0, 1) else 2) for place in places):
+            raise ValueError("a fraction given twice is a step: more often means nothing, nor does a step at an end")
     return value
 
 
