@@ -9,7 +9,8 @@ from beam_support import CANTILEVER, MM, cantilever, config
 import cfmkit
 from cfmkit.export import files
 from cfmkit.export.union import merged
-from cfmkit.families.beam.strips import gaps, mirrored
+from cfmkit.families.beam import strips as strip_module
+from cfmkit.families.beam.strips import mirrored, smallest_gap
 
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]) * 10 * MM
 
@@ -77,15 +78,15 @@ def test_pinned_supports_become_eyes_with_holes():
 
 def test_gaps_of_two_parallel_lines():
     line = np.column_stack([np.linspace(0, 1, 30), np.zeros(30)])
-    (found,) = gaps({"a": line, "b": line + np.array([0.0, 0.3])}, {"a": 0.05, "b": 0.1})
+    found = smallest_gap({"a": line, "b": line + np.array([0.0, 0.3])}, {"a": 0.05, "b": 0.1})
     assert found.size == pytest.approx(0.15)
-    (crossing,) = gaps({"a": line, "b": line[:, ::-1] + np.array([0.5, -0.5])}, {"a": 0.05, "b": 0.1})
+    crossing = smallest_gap({"a": line, "b": line[:, ::-1] + np.array([0.5, -0.5])}, {"a": 0.05, "b": 0.1})
     assert crossing.size == pytest.approx(-0.15)
 
 
 def test_near_a_common_end_there_is_no_gap():
     line = np.column_stack([np.linspace(0, 1, 200), np.zeros(200)])
-    (found,) = gaps({"a": line, "b": line[:, ::-1]}, {"a": 0.01, "b": 0.01})
+    found = smallest_gap({"a": line, "b": line[:, ::-1]}, {"a": 0.01, "b": 0.01})
     assert found.size == pytest.approx(np.hypot(0.06, 0.06) - 0.02, abs=0.01)
 
 
@@ -125,3 +126,16 @@ def test_two_halves_whose_moving_ends_have_no_pad_are_one_piece_too():
         ("analysis:", "  copies: {mirror: [420 mm, 0 mm]}\n  part: {fillet: 0 mm}\nanalysis:"),
     )
     assert sum(not one.hole for one in cuts(spec)) == 1
+
+
+def test_the_smallest_gap_is_found_without_looking_at_beams_far_away(monkeypatch):
+    rng = np.random.default_rng(5)
+    lines = {f"b{k}": rng.normal(size=(1, 2)) * 9 + np.cumsum(rng.normal(size=(40, 2)), axis=0) for k in range(12)}
+    lines |= {f"{name}'": mirrored(line, 30, np.pi / 2) for name, line in lines.items()}
+    halves = {f"b{k}": 0.02 + 0.01 * k for k in range(12)}
+    looked, true = [], strip_module._gap
+    every = [true(lines, halves, *pair) for pair in strip_module._pairs(lines)]
+    monkeypatch.setattr(strip_module, "_gap", lambda *pair: looked.append(pair) or true(*pair))
+    assert smallest_gap(lines, halves) == min(every)
+    assert len(every) == 12 * 11 / 2 + 12 * 12
+    assert len(looked) < len(every) / 2

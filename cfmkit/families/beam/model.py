@@ -21,7 +21,7 @@ from cfmkit.beams import Path, PathStatus, trace
 from cfmkit.curves import Column, Curve, read_only
 from cfmkit.families.beam.build import Assembly, assemble, mirror_axis, resolve, thickest_of
 from cfmkit.families.beam.checks import findings_of
-from cfmkit.families.beam.strips import Gap, gaps, mirrored
+from cfmkit.families.beam.strips import Gap, mirrored, smallest_gap
 from cfmkit.families.beam.surface.ride import curve_of, findings_along, ride, values_along
 from cfmkit.families.beam.values import values_of
 from cfmkit.results import Result, Status
@@ -114,18 +114,18 @@ class Solution:
     def gaps(self) -> tuple[Gap | None, Gap | None]:
         """The smallest gap between two beams before any load, and of some places of the curve [m]."""
         poses = np.unique(np.linspace(0, len(self.keep) - 1, _POSES).astype(int))
-        found = [min(self._gaps(int(self.keep[pose])), default=None) for pose in poses]
+        found = [self._gap(int(self.keep[pose])) for pose in poses]
         moving = min((gap for gap in found if gap is not None), default=None)
         return found[0], moving
 
-    def _gaps(self, point: int) -> list[Gap]:
+    def _gap(self, point: int) -> Gap | None:
         network = self.path.layout.network
         lines = {name: self.path.shape(name, point) for name in network.beams}
         halves = {name: 0.5 * thickest_of(beam.section) for name, beam in network.beams.items()}
         axis = mirror_axis(self.assembly)
         if axis is not None:
             lines |= {f"{name}'": mirrored(line, *axis) for name, line in lines.items()}
-        return list(gaps(lines, halves))
+        return smallest_gap(lines, halves)
 
     def beam_force(self, beam: str) -> FloatArray:
         """Return force and moment that a beam exerts on its last node, (n, 3) [N, N, N m], of one copy."""

@@ -11,7 +11,7 @@ import numpy as np
 from cfmkit.curves import read_only
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterable, Iterator, Mapping
 
     from cfmkit.beams.beam import Fit
     from cfmkit.beams.network import Network
@@ -87,8 +87,10 @@ class Gap:
     other: str
 
 
-def gaps(lines: Mapping[str, FloatArray], halves: Mapping[str, float]) -> Iterator[Gap]:
-    """Yield the smallest gap between every two beams; near an end that they have in common there is none.
+def smallest_gap(lines: Mapping[str, FloatArray], halves: Mapping[str, float]) -> Gap | None:
+    """Return the smallest gap of two beams; near an end that they have in common there is none.
+
+    Pairs whose boxes are farther apart than that are not looked at.
 
     Parameters
     ----------
@@ -97,15 +99,36 @@ def gaps(lines: Mapping[str, FloatArray], halves: Mapping[str, float]) -> Iterat
     halves : mapping
         Half thickness by beam [m].
     """
-    for one, other in itertools.combinations(lines, 2):
-        if one.endswith("'"):
-            continue
-        a, b, half = lines[one], lines[other], halves[other.rstrip("'")]
-        for i, j in itertools.product((0, -1), repeat=2):
-            if np.hypot(*(lines[one][i] - lines[other][j])) < TOGETHER * (halves[one] + half):
-                a, b = _away(a, i, 2 * NEAR * halves[one]), _away(b, j, 2 * NEAR * half)
-        if len(a) > 1 and len(b) > 1:
-            yield Gap(_distance(a, b) - halves[one] - half, one, other)
+    boxes = {name: (line.min(axis=0), line.max(axis=0)) for name, line in lines.items()}
+
+    def least(pair: tuple[str, str]) -> float:
+        (low, high), (floor, ceiling) = boxes[pair[0]], boxes[pair[1]]
+        apart = float(np.hypot(*np.maximum(np.maximum(floor - high, low - ceiling), 0.0)))
+        return apart - sum(halves[name.rstrip("'")] for name in pair)
+
+    best: Gap | None = None
+    for bound, pair in sorted((least(pair), pair) for pair in _pairs(lines)):
+        if best is not None and bound > best.size:
+            break
+        found = _gap(lines, halves, *pair)
+        best = found if best is None or (found is not None and found < best) else best
+    return best
+
+
+def _pairs(lines: Iterable[str]) -> Iterator[tuple[str, str]]:
+    """Yield every two beams of which one at least is described and not mirrored."""
+    return ((one, other) for one, other in itertools.combinations(lines, 2) if not one.endswith("'"))
+
+
+def _gap(lines: Mapping[str, FloatArray], halves: Mapping[str, float], one: str, other: str) -> Gap | None:
+    """Return the gap of two beams; None where nothing is left of one beside their common ends."""
+    a, b, half = lines[one], lines[other], halves[other.rstrip("'")]
+    for i, j in itertools.product((0, -1), repeat=2):
+        if np.hypot(*(lines[one][i] - lines[other][j])) < TOGETHER * (halves[one] + half):
+            a, b = _away(a, i, 2 * NEAR * halves[one]), _away(b, j, 2 * NEAR * half)
+    if len(a) < 2 or len(b) < 2:
+        return None
+    return Gap(_distance(a, b) - halves[one] - half, one, other)
 
 
 def _away(line: FloatArray, end: int, length: float) -> FloatArray:
