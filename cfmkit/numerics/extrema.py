@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from cfmkit.curves import FloatArray
 
 
@@ -55,19 +57,33 @@ def monotone(place: FloatArray, value: FloatArray, slope: FloatArray) -> Monoton
     rise = high - low
     left, right = slope[:, :-1] * step, slope[:, 1:] * step
     left, right = (np.where(np.isfinite(item), item, rise) for item in (left, right))
-    # value = low + s (left + s (b + s a)); its derivative is 3 a s^2 + 2 b s + left
+    pair, inside = _turns(left, right, rise)
+    # What is missing repeats an end, so that places never decrease.
+    share = np.sort(np.where(inside, pair, np.array([0.0, 1.0])[:, None, None]), axis=0)
+    between = low + _risen(left, right, rise, share)
+    between = np.where(share == 0.0, low, np.where(share == 1.0, high, between))
+    return Monotone(_woven(np.broadcast_to(place, value.shape), place[:-1] + share * step), _woven(value, between))
+
+
+def _turns(left: FloatArray, right: FloatArray, rise: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
+    """Return where Hermite cubics turn as shares of their cells, increasing, (2, ...), and which lie inside.
+
+    With s the share, a cubic is s (left + s (b + s a)); its derivative is 3 a s^2 + 2 b s + left.
+    """
     a, b = left + right - 2.0 * rise, 3.0 * rise - 2.0 * left - right
     with np.errstate(invalid="ignore", divide="ignore"):
         root = np.sqrt(b * b - 3.0 * a * left)
         big = -(b + np.copysign(root, b))
-        pair = np.sort(np.stack([big / (3.0 * a), left / big]), axis=0)
-        inside = (pair > 0.0) & (pair < 1.0)
-    # What is missing repeats an end, so that places never decrease.
-    share = np.sort(np.where(inside, pair, np.array([0.0, 1.0])[:, None, None]), axis=0)
+        share = np.sort(np.stack([big / (3.0 * a), left / big]), axis=0)
+        return share, (share > 0.0) & (share < 1.0)
+
+
+def _risen(left: FloatArray, right: FloatArray, rise: FloatArray, share: FloatArray) -> FloatArray:
+    """Return how far Hermite cubics have risen from the start of their cells at some shares of these."""
+    a, b = left + right - 2.0 * rise, 3.0 * rise - 2.0 * left - right
     with np.errstate(invalid="ignore"):
-        between = low + share * (left + share * (b + share * a))
-    between = np.where(share == 0.0, low, np.where(share == 1.0, high, between))
-    return Monotone(_woven(np.broadcast_to(place, value.shape), place[:-1] + share * step), _woven(value, between))
+        risen: FloatArray = share * (left + share * (b + share * a))
+    return risen
 
 
 def _woven(samples: FloatArray, between: FloatArray) -> FloatArray:
@@ -104,15 +120,10 @@ def sharpened(place: FloatArray, value: FloatArray, slope: FloatArray, twice: bo
     row, cell = np.nonzero(turns)
     if not len(row):
         return value
-    low, up, first, last = value[row, cell], rise[row, cell], left[row, cell], right[row, cell]
-    a, b = first + last - 2.0 * up, 3.0 * up - 2.0 * first - last
+    cubics = left[row, cell], right[row, cell], rise[row, cell]
     found = value.copy()
-    with np.errstate(invalid="ignore", divide="ignore"):
-        root = np.sqrt(b * b - 3.0 * a * first)
-        big = -(b + np.copysign(root, b))
-        for share in np.sort(np.stack([big / (3.0 * a), first / big]), axis=0):
-            inside = (share > 0.0) & (share < 1.0)
-            height = low + share * (first + share * (b + share * a))
-            at = cell + (share > 0.5)
-            found[row[inside], at[inside]] = height[inside]
+    for share, inside in zip(*_turns(*cubics), strict=True):
+        height = value[row, cell] + _risen(*cubics, share)
+        at = cell + (share > 0.5)
+        found[row[inside], at[inside]] = height[inside]
     return found

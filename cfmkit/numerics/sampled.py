@@ -27,7 +27,7 @@ def largest(places: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatAr
     Returns
     -------
     value, place : (...) array
-        Of the vertex; at the ends, and where the parabola has no vertex between the neighbours, of the best sample.
+        Of the vertex; of the best sample where the parabola has no vertex among its three samples.
     weights : (..., r) array
         The value, and its derivatives by anything, are the sums of weight times sample.
     """

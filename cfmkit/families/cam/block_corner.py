@@ -20,6 +20,7 @@ from cfmkit.bodies.track_states import NoTrack
 from cfmkit.families.cam.block_forces import Forces, Slab, tangents
 from cfmkit.families.cam.build import CLOSE
 from cfmkit.families.cam.statics import jams
+from cfmkit.numerics import sampled
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -153,15 +154,12 @@ class CornerSlab(Slab):
         """Largest force on the way up on the corner [N], from samples refined by a parabola through the highest."""
         x, slope = self._states("x", corner=True), self._states("slope", corner=True)
         force = self._over(x - self.designs.x0[:, None], slope, x, self.designs.friction).slider
-        top, rows = force.argmax(axis=1), np.arange(len(force))
-        inner = np.clip(top, 1, force.shape[1] - 2)
-        left, middle, right = force[rows, inner - 1], force[rows, inner], force[rows, inner + 1]
-        bend = left - 2.0 * middle + right
-        refined = np.where(bend < 0, middle - (right - left) ** 2 / (8.0 * np.where(bend < 0, bend, -1.0)), middle)
+        top, last = force.argmax(axis=1), force.shape[1] - 1
+        refined, _, _ = sampled.largest(np.arange(last + 1.0), force)
         held = np.array(
             [any(low < end for low, _ in each) for each, end in zip(self.jams, self.corner_travel, strict=True)]
         )
-        return np.where(held, np.nan, np.where(top == inner, refined, force[rows, top]))
+        return np.where(held, np.nan, np.where((top > 0) & (top < last), refined, force.max(axis=1)))
 
     def _forces(self, friction: FloatArray) -> Forces:
         return self._over(self.stretch, self.slope, self.half_width, friction)

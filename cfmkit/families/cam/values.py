@@ -8,6 +8,7 @@ import numpy as np
 
 from cfmkit.families.cam.built_values import BUILT_DEFINITIONS
 from cfmkit.families.cam.statics import forces
+from cfmkit.numerics import sampled
 from cfmkit.results import Quantity
 
 if TYPE_CHECKING:
@@ -152,6 +153,4 @@ def _corner_peak(solution: Solution) -> float | None:
     top = int(np.argmax(force))
     if not 0 < top < len(force) - 1:
         return float(force[top])
-    left, middle, right = force[top - 1 : top + 2]
-    bend = left - 2.0 * middle + right
-    return float(middle - (right - left) ** 2 / (8.0 * bend)) if bend < 0 else float(middle)
+    return float(sampled.largest(travel, force)[0])
