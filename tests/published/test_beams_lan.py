@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from lan_2010 import LEG, ROWS, TRAVEL, VALUES
+from lan_2010 import CM, LEG, ROWS, TRAVEL, VALUES, half
 
 from cfmkit.beams import (
     CLAMPED,
@@ -26,34 +26,10 @@ from cfmkit.beams import (
     trace,
 )
 
-CM, MM = 1e-2, 1e-3
+MM = 1e-3
 DOWN = -np.pi / 2
 
-SHAPES = {
-    "b1": ("n1", "n3", (0.4592, 1.3092, -1.5707)),
-    "b2": ("n2", "n3", (1.6382, -0.7560, 1.5707)),
-    "b3": ("n3", "n4", (-4.081, 0.3013, 1.5707)),
-    # Table 3 prints +1.148: with it the beam misses n5 by 13.6 mm, with the minus by 0.009 mm
-    "b4": ("n4", "n5", (2.394, 0.226, -1.148)),
-}
-
-
-def table_3(
-    section: Section | None = None, closure: str = "rotscale", lengths: dict[str, float] | None = None
-) -> Network:
-    section = section or Section(2e9, 10 * MM, 1 * MM, axial=False)
-    nodes = {
-        "n1": Node(0.25 * CM, 0, CLAMPED),
-        "n2": Node(3.45 * CM, 0, CLAMPED),
-        "n3": Node(3.05 * CM, 1.877 * CM),
-        "n4": Node(1.244 * CM, 2.40 * CM),
-        "n5": Node(0.25 * CM, 4 * CM, guided(np.pi / 2)),
-    }
-    beams = {
-        name: Beam(a, b, section, Polynomial(c, None if lengths is None else lengths[name]), closure)  # type: ignore[arg-type]
-        for name, (a, b, c) in SHAPES.items()
-    }
-    return Network(nodes, beams)
+SECTION = Section(2e9, 10 * MM, 1 * MM, axial=False)
 
 
 def table_4() -> Network:
@@ -74,7 +50,7 @@ def table_4() -> Network:
 
 @pytest.fixture(scope="module")
 def path() -> Path:
-    return trace(table_3(), Displacement("n5", DOWN, np.append(0.0, TRAVEL)), Control(tolerance=1e-9))
+    return trace(half(SECTION), Displacement("n5", DOWN, np.append(0.0, TRAVEL)), Control(tolerance=1e-9))
 
 
 def test_table_3_force_at_every_half_millimetre(path: Path) -> None:
@@ -105,7 +81,7 @@ def test_table_3_largest_stress_and_its_place(path: Path) -> None:
 
 def test_paper_force_and_stress_at_full_travel() -> None:
     """F_d = 9.736 N and 48.1013 MPa at 13.6 mm: half an ulp of Tables 3's entries is worth 0.005 N and 0.09 MPa."""
-    p = trace(table_3(), Displacement("n5", DOWN, [13.6 * MM]), Control(tolerance=1e-9))
+    p = trace(half(SECTION), Displacement("n5", DOWN, [13.6 * MM]), Control(tolerance=1e-9))
     assert 2 * p.effort[-1] == pytest.approx(9.739693, abs=6e-7)
     assert 2 * p.effort[-1] == pytest.approx(9.736, abs=3 * 0.0047)
     stress = p.peak_stress(axial=False)
@@ -116,14 +92,14 @@ def test_paper_force_and_stress_at_full_travel() -> None:
 
 def test_paper_thinner_beams_with_the_same_rigidity_class() -> None:
     """Figure 9: w = 0.85 mm, t = 16.28 mm; F_d at 16.8 mm, stress 48.10 MPa."""
-    p = trace(table_3(Section(2e9, 16.28 * MM, 0.85 * MM, axial=False)), Displacement("n5", DOWN, [16.8 * MM]))
+    p = trace(half(Section(2e9, 16.28 * MM, 0.85 * MM, axial=False)), Displacement("n5", DOWN, [16.8 * MM]))
     assert 2 * p.effort[-1] == pytest.approx(9.983741, abs=2e-6)
     assert p.peak_stress(axial=False).value[-1] / 1e6 == pytest.approx(48.057829, abs=2e-5)
 
 
 def test_raw_closure_is_prestressed_as_the_rounding_says() -> None:
     lengths = {"b1": 3.404 * CM, "b2": 1.987 * CM, "b3": 2.199 * CM, "b4": 1.959 * CM}
-    p = trace(table_3(closure="raw", lengths=lengths), Displacement("n5", DOWN, [0.0, 13.6 * MM]))
+    p = trace(half(SECTION, closure="raw", lengths=lengths), Displacement("n5", DOWN, [0.0, 13.6 * MM]))
     force = 2 * p.effort[p.at_asked]
     assert force[0] == pytest.approx(0.0360, abs=6e-5)
     assert force[1] == pytest.approx(9.734157, abs=1e-6)
@@ -132,7 +108,7 @@ def test_raw_closure_is_prestressed_as_the_rounding_says() -> None:
 def test_closure_reports_what_it_changed(path: Path) -> None:
     assert all(0 < abs(path.fits[name].rotation) < 2e-3 for name in path.fits)
     lengths = {"b1": 3.404 * CM, "b2": 1.987 * CM, "b3": 2.199 * CM, "b4": 1.959 * CM}
-    fits = trace(table_3(lengths=lengths), Displacement("n5", DOWN, [MM])).fits
+    fits = trace(half(SECTION, lengths=lengths), Displacement("n5", DOWN, [MM])).fits
     np.testing.assert_allclose([fits[n].gap / CM for n in lengths], [0.0006, 0.0004, 0.0004, 0.0009], atol=6e-5)
     assert all(abs(fits[n].scale - 1) < 1e-3 for n in lengths)
 
@@ -140,9 +116,9 @@ def test_closure_reports_what_it_changed(path: Path) -> None:
 def test_a_force_that_stretches_beams_is_smaller_at_first() -> None:
     """Axial strain lowers F(0.5 mm) by 1.53 %, with shear by 2.56 %; F_d rises by 0.14 and 0.06 %."""
     drive = Displacement("n5", DOWN, [0.5 * MM, 13.6 * MM])
-    rigid = trace(table_3(), drive).effort
-    axial = trace(table_3(Section(2e9, 10 * MM, 1 * MM)), drive).effort
-    both = trace(table_3(Section(2e9, 10 * MM, 1 * MM, shear=True, poisson_ratio=0.35)), drive).effort
+    rigid = trace(half(SECTION), drive).effort
+    axial = trace(half(Section(2e9, 10 * MM, 1 * MM)), drive).effort
+    both = trace(half(Section(2e9, 10 * MM, 1 * MM, shear=True, poisson_ratio=0.35)), drive).effort
     first, last = 1, -1
     assert 100 * (axial[first] / rigid[first] - 1) == pytest.approx(-1.53, abs=0.006)
     assert 100 * (both[first] / rigid[first] - 1) == pytest.approx(-2.56, abs=0.006)
@@ -152,7 +128,7 @@ def test_a_force_that_stretches_beams_is_smaller_at_first() -> None:
 
 def test_extensible_force_of_an_independent_finite_element_program() -> None:
     """A corotational program, extrapolated from 160 and 320 elements, gives 9.7534534 N at 13.5 mm."""
-    p = trace(table_3(Section(2e9, 10 * MM, 1 * MM)), Displacement("n5", DOWN, [13.5 * MM]), Control(tolerance=1e-9))
+    p = trace(half(Section(2e9, 10 * MM, 1 * MM)), Displacement("n5", DOWN, [13.5 * MM]), Control(tolerance=1e-9))
     assert 2 * p.effort[-1] == pytest.approx(9.753453385, abs=2e-8)
 
 

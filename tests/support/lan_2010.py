@@ -1,8 +1,62 @@
-"""The tables of the mechanism of Lan, Wang and Chen (2010), computed by two independent programs to 1e-8."""
+"""The mechanism of Lan, Wang and Chen (2010), Table 3, and its tables, computed by two independent programs to 1e-8."""
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
+
+from cfmkit.beams import CLAMPED, Beam, Network, Node, Polynomial, guided
+
+if TYPE_CHECKING:
+    from cfmkit.beams import Section
+
+CM = 1e-2
+NODES = {"n3": (3.05 * CM, 1.877 * CM), "n4": (1.244 * CM, 2.40 * CM)}
+SHAPES = {
+    "b1": ("n1", "n3", (0.4592, 1.3092, -1.5707)),
+    "b2": ("n2", "n3", (1.6382, -0.7560, 1.5707)),
+    "b3": ("n3", "n4", (-4.081, 0.3013, 1.5707)),
+    # Table 3 prints +1.148: with it the beam misses n5 by 13.6 mm, with the minus by 0.009 mm
+    "b4": ("n4", "n5", (2.394, 0.226, -1.148)),
+}
+
+
+def half(
+    section: Section,
+    *,
+    nodes: dict[str, Any] | None = None,
+    coefficients: dict[str, Any] | None = None,
+    lengths: dict[str, float] | None = None,
+    closure: Any = "rotscale",
+) -> Network:
+    """Return half of the mechanism, driven at n5.
+
+    Parameters
+    ----------
+    section : Section
+        Of all beams.
+    nodes, coefficients : dict, optional
+        Other places of n3 and n4 [m], and other coefficients of the beams' tangent angles [rad], than those of Table 3.
+    lengths : dict, optional
+        Of the beams [m]; those that fit between the nodes by default.
+    closure : str
+        How a beam is fitted between its nodes, which are rounded in Table 3.
+    """
+    inner, shapes = nodes or NODES, coefficients or {name: shape for name, (_, _, shape) in SHAPES.items()}
+    placed = {
+        "n1": Node(0.25 * CM, 0, CLAMPED),
+        "n2": Node(3.45 * CM, 0, CLAMPED),
+        "n3": Node(*inner["n3"]),
+        "n4": Node(*inner["n4"]),
+        "n5": Node(0.25 * CM, 4 * CM, guided(np.pi / 2)),
+    }
+    beams = {
+        name: Beam(a, b, section, Polynomial(shapes[name], None if lengths is None else lengths[name]), closure)
+        for name, (a, b, _) in SHAPES.items()
+    }
+    return Network(placed, beams)
+
 
 # Delta [mm], F [N], v1, v2, v3, h1, h2, h3 [N], largest stress [MPa], its beam, its place
 TABLE = """

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from lan_2010 import SHAPES, half
 
 from cfmkit.beams import (
     CLAMPED,
@@ -30,19 +31,9 @@ LAN = np.array([1.877, 3.05, 1.244, 2.40, 1.3092, -1.5707, -0.7560, 1.5707, 0.30
 
 def lan(x: Any) -> Network:
     """Node positions [cm], shape coefficients, thickness [mm] and modulus [GPa] of Lan's network, extensible."""
-    section = Section(x[13] * 1e9, 10e-3, x[12] * 1e-3)
-    nodes = {
-        "n1": Node(0.25e-2, 0, CLAMPED),
-        "n2": Node(3.45e-2, 0, CLAMPED),
-        "n3": Node(x[1] * 1e-2, x[0] * 1e-2),
-        "n4": Node(x[2] * 1e-2, x[3] * 1e-2),
-        "n5": Node(0.25e-2, 4e-2, guided(np.pi / 2)),
-    }
-    ends = [("n1", "n3", 0.4592), ("n2", "n3", 1.6382), ("n3", "n4", -4.081), ("n4", "n5", 2.394)]
-    beams = {
-        f"b{k}": Beam(a, b, section, Polynomial((c, x[4 + 2 * k], x[5 + 2 * k]))) for k, (a, b, c) in enumerate(ends)
-    }
-    return Network(nodes, beams)
+    nodes = {"n3": (x[1] * 1e-2, x[0] * 1e-2), "n4": (x[2] * 1e-2, x[3] * 1e-2)}
+    varied = {name: (shape[0], x[4 + 2 * k], x[5 + 2 * k]) for k, (name, (_, _, shape)) in enumerate(SHAPES.items())}
+    return half(Section(x[13] * 1e9, 10e-3, x[12] * 1e-3), nodes=nodes, coefficients=varied)
 
 
 def arms(x: Any) -> Network:
