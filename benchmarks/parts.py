@@ -7,11 +7,10 @@ Run: python benchmarks/parts.py
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
+from timing import best
 
 import cfmkit
 from cfmkit.families import family
@@ -19,20 +18,7 @@ from cfmkit.families.cam.outline import flank_edge
 from cfmkit.numerics.biarcs import fit_arcs
 from cfmkit.plots.render import render
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
 CONFIG = Path(__file__).resolve().parent.parent / "configs" / "cam.yaml"
-
-
-def best(task: Callable[[], object], rounds: int = 7) -> float:
-    """Return the best wall time of a task [s]."""
-    times = []
-    for _ in range(rounds):
-        start = time.perf_counter()
-        task()
-        times.append(time.perf_counter() - start)
-    return min(times)
 
 
 def main() -> None:

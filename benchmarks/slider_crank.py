@@ -13,12 +13,11 @@ Reference
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.optimize import minimize
+from timing import best
 
 import cfmkit
 from cfmkit.bodies.slider_crank import Linkage
@@ -27,21 +26,8 @@ from cfmkit.families.base import Block, Measure
 from cfmkit.families.slider_crank.block import analyze_block
 from cfmkit.families.slider_crank.rates import Goal, minimax
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
 CONFIGS = Path(__file__).resolve().parent.parent / "configs"
 MILLION, DESIGNS = 1_000_000, 65_536
-
-
-def best(task: Callable[[], object], rounds: int = 5) -> float:
-    """Return the best wall time of a task [s]."""
-    times = []
-    for _ in range(rounds):
-        start = time.perf_counter()
-        task()
-        times.append(time.perf_counter() - start)
-    return min(times)
 
 
 def eq_10(angle: np.ndarray, rates: np.ndarray) -> np.ndarray:

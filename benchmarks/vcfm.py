@@ -8,12 +8,11 @@ Run: python benchmarks/vcfm.py
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.optimize import brentq
+from timing import best
 
 import cfmkit
 from cfmkit import api
@@ -26,22 +25,9 @@ from cfmkit.studies.engine import run
 from cfmkit.studies.sensitivity.methods import carry_out
 from cfmkit.studies.sensitivity.setup import prepare
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
 CONFIGS = Path(__file__).resolve().parent.parent / "configs"
 DESIGNS, POINTS = 200, 301
 GOALS = {"values": 5e5, "exact": 50e-3, "design": 2.0}
-
-
-def best(task: Callable[[], object], rounds: int = 7) -> float:
-    """Return the best wall time of a task [s]."""
-    times = []
-    for _ in range(rounds):
-        start = time.perf_counter()
-        task()
-        times.append(time.perf_counter() - start)
-    return min(times)
 
 
 def block() -> np.ndarray:
