@@ -202,7 +202,7 @@ def test_an_imperfection_is_named_and_opens_the_bifurcation():
         ("points: 21", "points: 21\n  imperfection: 0.1 mm"),
     )
     bent, perfect = cfmkit.analyze(column), cfmkit.analyze(column.replace({"analysis.imperfection": 0}))
-    assert "the beams were bent by 0.0001 m of the buckling mode" in warned(bent)["imperfection"]
+    assert "the beams were bent by 0.1 mm of the buckling mode at 0.8242 mm" in warned(bent)["imperfection"]
     assert value(bent, "bifurcation_displacement") is None
     assert value(perfect, "bifurcation_displacement") > 0
 
@@ -304,3 +304,28 @@ def test_a_design_without_a_task_says_what_to_add():
     design = cfmkit.design(config("beam_lan2010"))
     assert design.status is Status.INVALID
     assert "rescale" in design.message
+
+
+def test_places_of_the_drive_are_told_with_units_and_for_all_copies():
+    changes = ("analysis.through_folds=false", "analysis.force=5 N", "mechanism.copies={legs: 2}")
+    lee = cfmkit.analyze(config("beam_lee_frame", *changes))
+    assert "cannot go on at 3.71" in lee.message
+    assert " N: a limit point" in lee.message
+    stack = solved("beam_two_layers")
+    assert set(stack.curve.extra["path"].values) == {"primary", "bifurcated at 22.07 mm, sign +1"}
+    bent = cfmkit.analyze(config("beam_two_layers", "analysis.imperfection=0.01 mm"))
+    assert warned(bent)["imperfection"] == "the beams were bent by 0.01 mm of the buckling mode at 22.07 mm"
+
+
+def test_a_window_that_is_wider_than_the_curve_is_told():
+    wide = cfmkit.analyze(cantilever(("points: 21", "points: 21\n  window: [50 mm, 120 mm]")))
+    assert "50 mm to 120 mm is not within the curve, 0 mm to 100 mm" in warned(wide)["window_outside"]
+    exact = cfmkit.analyze(cantilever(("points: 21", "points: 21\n  window: [0 mm, 100 mm]")))
+    assert "window_outside" not in warned(exact)
+
+
+def test_the_last_point_of_a_drive_to_the_negative_side_counts():
+    result = cfmkit.analyze(cantilever(("travel: 100 mm", "travel: -300 mm"), ("50 MPa", "1 MPa")))
+    largest = result.curve.extra["max_stress"].values.max()
+    assert value(result, "stress_max") == pytest.approx(largest)
+    assert f"is {largest / 1e6:.4g} MPa" in warned(result)["stress_exceeded"]

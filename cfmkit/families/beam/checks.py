@@ -9,7 +9,8 @@ import numpy as np
 from cfmkit.beams import PathStatus
 from cfmkit.families.beam.build import thickest_of
 from cfmkit.families.beam.findings import finding
-from cfmkit.families.beam.values import window_of
+from cfmkit.families.beam.values import window_of, within
+from cfmkit.families.beam.words import drive_text, in_units
 from cfmkit.units import format_short
 
 if TYPE_CHECKING:
@@ -26,15 +27,33 @@ def findings_of(solution: Solution) -> tuple[Finding, ...]:
     """Return everything that is wrong with a solved mechanism, or that the user must know about it."""
     return tuple(
         one
-        for source in (_ending, _closure, _events, _stability, _accuracy, _imperfection, _stress, _slenderness, _gaps)
+        for source in (
+            _ending, _window, _closure, _events, _stability, _accuracy, _imperfection, _stress, _slenderness, _gaps,
+        )
         for one in source(solution)
-    )
+    )  # fmt: skip
 
 
 def _ending(solution: Solution) -> Iterator[Finding]:
     path = solution.path
     if path.status not in (PathStatus.COMPLETE, PathStatus.INACCURATE):
-        yield finding("ends_early", path.message or path.status.value)
+        yield finding("ends_early", in_units(solution.assembly, path.message or path.status.value))
+
+
+def _window(solution: Solution) -> Iterator[Finding]:
+    """Say that a window is wider than a curve that went as far as it was asked to."""
+    window, x = solution.spec.analysis.window, solution.motion
+    if window is None or len(x) < 2 or solution.path.status not in (PathStatus.COMPLETE, PathStatus.INACCURATE):
+        return
+    slack = 1e-9 * float(np.abs(x).max())
+    if window[0] < x.min() - slack or window[1] > x.max() + slack:
+        dimension = "angle" if _effort(solution) == "torque" else "length"
+        low, high, least, most = (format_short(float(v), dimension) for v in (*window, x.min(), x.max()))
+        yield finding(
+            "window_outside",
+            f"the window {low} to {high} is not within the curve, {least} to {most}: what is measured over it has no "
+            "value",
+        )
 
 
 def _closure(solution: Solution) -> Iterator[Finding]:
@@ -73,18 +92,10 @@ def _effort(solution: Solution) -> str:
     return "torque" if solution.spec.mechanism.drive.kind in ("rotation", "moment") else "force"
 
 
-def _drive(solution: Solution, value: float) -> str:
-    """Return a value of the drive as the user reads it, of all copies together."""
-    kind = solution.spec.mechanism.drive.kind
-    dimension = {"displacement": "length", "rotation": "angle", "force": "force", "moment": "torque"}[kind]
-    unit = solution.assembly.parallel if kind in ("force", "moment") else 1
-    return format_short(unit * value, dimension)
-
-
 def _events(solution: Solution) -> Iterator[Finding]:
     path = solution.path
     for kind, name in (("limit point", "limit_point"), ("bifurcation", "bifurcation")):
-        places = [_drive(solution, event.drive) for event in path.events if event.kind == kind]
+        places = [drive_text(solution.assembly, event.drive) for event in path.events if event.kind == kind]
         if places:
             more = f" and {len(places) - 6} more" if len(places) > 6 else ""
             tail = _after(solution) if kind == "bifurcation" else ""
@@ -122,7 +133,7 @@ def _accuracy(solution: Solution) -> Iterator[Finding]:
 
 
 def _imperfection(solution: Solution) -> Iterator[Finding]:
-    told = solution.path.imperfection
+    told = in_units(solution.assembly, solution.path.imperfection)
     if told.startswith("none: "):
         yield finding("imperfection", f"the beams were not bent: {told.removeprefix('none: ')}")
     elif told:
@@ -133,8 +144,7 @@ def _stress(solution: Solution) -> Iterator[Finding]:
     allowable = solution.assembly.allowable_stress
     if allowable is None or len(solution.keep) < 2:
         return
-    lo, hi = window_of(solution)
-    inside = (solution.motion >= lo * (1 - 1e-12)) & (solution.motion <= hi * (1 + 1e-12)) & solution.accurate
+    inside = within(solution, *window_of(solution))
     if not inside.any() or (worst := float(solution.stress[inside].max())) <= allowable:
         return
     index = int(np.flatnonzero(inside)[solution.stress[inside].argmax()])

@@ -24,6 +24,7 @@ from cfmkit.families.beam.checks import findings_of
 from cfmkit.families.beam.strips import Gap, mirrored, smallest_gap
 from cfmkit.families.beam.surface.ride import curve_of, findings_along, ride, values_along
 from cfmkit.families.beam.values import values_of
+from cfmkit.families.beam.words import in_units
 from cfmkit.results import Result, Status
 
 if TYPE_CHECKING:
@@ -149,7 +150,7 @@ def analyze(spec: BeamSpec, run: Run) -> Result:
     """
     solution, resolved = solve(spec), resolve(spec)
     if len(solution.keep) < 2:
-        message = f"no curve: {solution.path.message or solution.path.status.value}"
+        message = f"no curve: {in_units(solution.assembly, solution.path.message or solution.path.status.value)}"
         return Result(resolved, Status.NO_EQUILIBRIUM, message, warnings=findings_of(solution))
     status, message = _ending(solution)
     curves: tuple[Curve, ...] = (_curve(solution),)
@@ -190,7 +191,7 @@ def _ending(solution: Solution) -> tuple[Status, str]:
     path = solution.path
     if path.status is PathStatus.COMPLETE:
         return Status.COMPLETE, ""
-    return Status.PARTIAL, path.message or path.status.value
+    return Status.PARTIAL, in_units(solution.assembly, path.message or path.status.value)
 
 
 def _target(spec: BeamSpec) -> float | None:
@@ -205,7 +206,7 @@ def _curve(solution: Solution) -> Curve:
         "max_stress": Column(solution.stress, "stress"),
         "stress_beam": Column(solution.stress_at[0], "text"),
         "stress_place": Column(solution.stress_at[1], "ratio"),
-        "path": Column(path.branch[keep], "text"),
+        "path": Column(_branches(solution), "text"),
     }
     for name in path.layout.network.beams:
         x, y, moment = solution.beam_force(name).T
@@ -216,3 +217,10 @@ def _curve(solution: Solution) -> Curve:
         }
     kind: Kind = "torque" if solution.spec.mechanism.drive.kind in ("rotation", "moment") else "force"
     return Curve(solution.motion, solution.effort, np.repeat(["load"], len(keep)), solution.stable, extra, kind)
+
+
+def _branches(solution: Solution) -> Any:
+    """Return the name of the branch at every point, with units."""
+    names = solution.path.branch[solution.keep]
+    told = {name: in_units(solution.assembly, name) for name in np.unique(names).tolist()}
+    return read_only(np.array([told[name] for name in names.tolist()]), np.str_)

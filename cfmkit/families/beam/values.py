@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -76,6 +76,13 @@ def window_of(solution: Solution) -> tuple[float, float]:
     return float(solution.motion.min()), float(solution.motion.max())
 
 
+def within(solution: Solution, low: float, high: float) -> Any:
+    """Tell which accurate points of the curve are in a window."""
+    x = solution.motion
+    slack = 1e-12 * float(np.abs(x).max())
+    return (x >= low - slack) & (x <= high + slack) & solution.accurate
+
+
 def ranges(solution: Solution) -> dict[str, float | None]:
     """Return what Lan says about the range that ends at d; nothing on a curve that turns back."""
     x, force, stress = solution.motion, solution.effort, solution.stress
@@ -141,8 +148,7 @@ def _rest(solution: Solution) -> dict[str, float | None]:
     """Return what happens at rest, and the stress with all its parts."""
     path, keep = solution.path, solution.keep
     total = np.max([path.sections(name).stress()[keep].max(axis=1) for name in path.layout.network.beams], axis=0)
-    lo, hi = window_of(solution)
-    inside = (solution.motion >= lo) & (solution.motion <= hi) & solution.accurate
+    inside = within(solution, *window_of(solution))
     return {
         "prestress_force": _significant(solution.effort, solution.path.error),
         "prestress_stress": _significant(solution.stress, solution.path.error),
