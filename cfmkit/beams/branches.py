@@ -40,7 +40,11 @@ def cross(run: Run) -> Spot | None:
     _point_along(run, other)
     senses = np.sign(run.points.info[-2:, 4])
     fold = not run.natural and bool(senses[0] != senses[1])
-    found = None if one is None or beyond is None else locate(run.fine, one, beyond, run.natural, fold)
+    found = (
+        None
+        if one is None or beyond is None
+        else locate(run.fine, one, beyond, run.natural, run.control.tolerance, fold)
+    )
     if found is None or one is None:
         before, after = (int(run.points.info[k, 0]) for k in (-2, -1))
         ahead = abs(float(run.points.drive[-1] - run.points.drive[-2]))
@@ -130,11 +134,16 @@ def _end_of_branch(run: Run, other: Spot, found: Singular) -> BranchEnd | None:
             break
     one = run.fine.solve(run.fine.expand(earlier.y[-1]), float(earlier.drive[-1]))
     beyond = run.fine.solve(run.fine.expand(points.y[-1]), float(points.drive[-1]))
-    closing = None if one is None or beyond is None else locate(run.fine, one, beyond, natural=True, vector=False)
+    closing = None if one is None or beyond is None else _place(run, one, beyond)
     if closing is None or beyond is None:
         return None
     reduced = run.fine.reduce
     return BranchEnd(closing.spot.drive, reduced(closing.spot).y, reduced(beyond), closing.before, closing.after)
+
+
+def _place(run: Run, one: Spot, other: Spot) -> Singular | None:
+    """Return the singular point between two equilibria, without its null vector."""
+    return locate(run.fine, one, other, True, run.control.tolerance, vector=False)
 
 
 def room(run: Run, place: float, sense: float) -> float:
@@ -177,9 +186,7 @@ def hop(run: Run, spot: Spot, asked: int) -> Spot | None:
         if near is None or pose_change(run.solver, near.y, spot.y) > 0.2 * np.sqrt(ahead / run.span) + 1e-3:
             continue
         back = run.fine.solve(wide.y, spot.drive - forward * ahead)
-        found = (
-            None if back is None or back.unstable == wide.unstable else locate(run.fine, wide, back, True, vector=False)
-        )
+        found = None if back is None or back.unstable == wide.unstable else _place(run, wide, back)
         place, before = (spot.drive, near.unstable) if found is None else (found.spot.drive, found.after)
         kind = "unresolved" if found is None else "bifurcation"
         run.events.append(Event(kind, place * run.unit, before, near.unstable))

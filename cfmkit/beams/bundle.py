@@ -53,25 +53,34 @@ class Bundle:
         reach = ends[beam_end[:, 1]] - ends[beam_end[:, 0]]
         dx, dy = reach[:, 0], reach[:, 1]
         distance = (dx * dx + dy * dy) ** 0.5
-        angle = c @ powers(most)
-        weights = GAUSS[1]
-        cx, cy = np.cos(angle) @ weights, np.sin(angle) @ weights
-        own = (cx * cx + cy * cy) ** 0.5
+        if most == 1:
+            cx, cy = np.cos(c[:, 0]), np.sin(c[:, 0])
+            own = np.ones(len(beams))
+        else:
+            angle = c @ powers(most)
+            cx, cy = np.cos(angle) @ GAUSS[1], np.sin(angle) @ GAUSS[1]
+            own = (cx * cx + cy * cy) ** 0.5
         self._check(distance, own)
         nominal = [shape.length for shape in shapes]
         first = distance
         if any(nominal):
             first = np.array([d if one is None else one for d, one in zip(distance, nominal, strict=True)])
-        self.rotation = direction(dx * cx + dy * cy, dy * cx - dx * cy)
+        self.reach, self.drawn = reach, (first, cx, cy)
+        rotation = direction(dx * cx + dy * cy, dy * cx - dx * cy)
         self.length, self.scale = distance / own, distance / (own * first)
-        self.gap = np.hypot(np.real(dx - first * cx), np.real(dy - first * cy))
-        raw = np.array([beam.closure == "raw" for beam in beams])
-        if raw.any():
-            self.rotation, self.scale = np.where(raw, 0.0, self.rotation), np.where(raw, 1.0, self.scale)
+        if any(beam.closure == "raw" for beam in beams):
+            raw = np.array([beam.closure == "raw" for beam in beams])
+            rotation, self.scale = np.where(raw, 0.0, rotation), np.where(raw, 1.0, self.scale)
             self.length = np.where(raw, first, self.length)
-        self.coefficients = c.astype(np.result_type(c, self.rotation))
-        self.coefficients[:, 0] += self.rotation
+        self.rotation = rotation
+        self.coefficients = np.concatenate([c[:, :1] + rotation[:, None], c[:, 1:]], axis=1)
         self._set_rigidities([beam.section for beam in beams])
+
+    @property
+    def gap(self) -> Any:
+        """Distances between the far ends of the shapes as given and their nodes, (plain,) [m]."""
+        first, cx, cy = self.drawn
+        return np.hypot(np.real(self.reach[:, 0] - first * cx), np.real(self.reach[:, 1] - first * cy))
 
     def _set_rigidities(self, sections: list[Section]) -> None:
         """Set bending rigidities and the compliances of stretching and shearing, as `Section.rigidities` has them."""
@@ -81,14 +90,13 @@ class Bundle:
         ]
         self.sections = np.array(values).T
         young, width, thickness, axial, shear, poisson, factor = self.sections
-        area = width * thickness
-        self.bending = young * area * thickness * thickness / 12
-        self.stretch = axial / (young * area)
-        self.slip = shear * 2 * (1 + poisson) / (factor * young * area)
+        pull = young * width * thickness
+        self.bending = pull * thickness * thickness / 12
+        self.stretch, self.slip = axial / pull, shear * 2 * (1 + poisson) / (factor * pull)
 
     def _check(self, distance: Any, own: Any) -> None:
         """Refuse beams without length, and shapes that return to their start."""
-        if (np.real(distance) > 0).all() and (np.real(own) > 1e-9).all():
+        if min(distance.real.tolist()) > 0 and min(own.real.tolist()) > 1e-9:
             return
         for k, far, reach in zip(self.plain, np.real(distance), np.real(own), strict=True):
             beam = self.beams[k]
@@ -120,13 +128,16 @@ class Bundle:
         stiff = [float(np.real(beam.section.rigidities(np.array([0.5]), 0.5)[0][0])) for beam in others]
         return np.append(lengths, far), np.append(middles, stiff)
 
-    def table(self, places: Any) -> Any:
-        """Return angle, speed and compliances (SI) of the plain beams at places (n,) of the arc, (plain, n, 5)."""
-        kind = np.result_type(self.coefficients, self.bending)
-        out = np.empty((len(self.plain), len(places), 5), dtype=kind)
-        out[:, :, 0] = self.coefficients @ np.vander(places, self.coefficients.shape[1], increasing=True).T
+    def table(self, powers: Any, units: Any) -> Any:
+        """Return the table of the plain beams at n places of the arc, (plain, n, 5), in units (5,).
+
+        powers (m, n): of the places; see `cfmkit.beams.kernels.model.Model` for what the table holds.
+        """
         g = self.length
-        out[:, :, 1:] = np.stack([g, g / self.bending, g * self.stretch, g * self.slip], axis=1)[:, None]
+        kind = np.result_type(self.coefficients, self.bending)
+        out = np.empty((len(self.plain), powers.shape[1], 5), dtype=kind)
+        np.matmul(self.coefficients, powers, out=out[:, :, 0])
+        out[:, :, 1:] = (np.array([g, g / self.bending, g * self.stretch, g * self.slip]).T * units[1:])[:, None]
         return out
 
 

@@ -67,6 +67,18 @@ class Grid:
         places: FloatArray = (edges[:, :1] + (edges[:, 1:] - edges[:, :1]) * NODES).ravel()
         return places
 
+    def powers(self, count: int, beam: int) -> FloatArray:
+        """Return the powers (count, n) of the parameters of all stages of a beam."""
+        known = self._powers.get((count, beam))
+        if known is None:
+            places = self.stages(self.beam_of_step == beam)
+            known = self._powers[count, beam] = np.vander(places, count, increasing=True).T.copy()
+        return known
+
+    @cached_property
+    def _powers(self) -> dict[tuple[int, int], FloatArray]:
+        return {}
+
     @cached_property
     def width(self) -> FloatArray:
         """Widths of the steps in the parameter."""
@@ -135,23 +147,20 @@ def table(layout: Layout, cut: Grid, known: Any = None) -> Any:
     changed are taken over too.
     """
     bundle, scales = layout.bundle, layout.scales
+    units = np.array([1.0, 1 / scales.length, scales.rigidity / scales.length, *[scales.force / scales.length] * 2])
+    plain: Any = None
+    if bundle.plain:
+        plain = bundle.table(cut.powers(bundle.coefficients.shape[1], bundle.plain[0]), units)
+        plain = plain.reshape(len(bundle.plain), -1, STAGES, TABLE_COLUMNS)
     if not bundle.others:
-        first = slice(0, len(cut.edges) // len(bundle.plain))
-        out = bundle.table(cut.stages(first)).reshape(len(cut.edges), STAGES, -1)
-    else:
-        blocks: list[Any] = [None] * len(bundle.beams)
-        if bundle.plain:
-            steps = cut.beam_of_step == bundle.plain[0]
-            plain = bundle.table(cut.stages(steps)).reshape(len(bundle.plain), -1, STAGES, TABLE_COLUMNS)
-            for number, block in zip(bundle.plain, plain, strict=True):
-                blocks[number] = block
-        for number in bundle.others:
-            blocks[number] = _other(
-                layout, bundle.names[number], cut, np.flatnonzero(cut.beam_of_step == number), known
-            )
-        out = np.ascontiguousarray(np.concatenate(blocks))
-    out *= np.array([1.0, 1 / scales.length, scales.rigidity / scales.length, *[scales.force / scales.length] * 2])
-    return out
+        return plain.reshape(-1, STAGES, TABLE_COLUMNS)
+    blocks: list[Any] = [None] * len(bundle.beams)
+    for place, number in enumerate(bundle.plain):
+        blocks[number] = plain[place]
+    for number in bundle.others:
+        steps = np.flatnonzero(cut.beam_of_step == number)
+        blocks[number] = _other(layout, bundle.names[number], cut, steps, known) * units
+    return np.concatenate(blocks)
 
 
 def _other(layout: Layout, name: str, cut: Grid, steps: Any, known: Any) -> Any:
@@ -196,8 +205,7 @@ def assemble_model(layout: Layout, cut: Grid, values: Any, ramp: bool = False) -
     """Return the network's arrays for given tables."""
     scales, plan, places = layout.scales, layout.plan, layout.places
     base, rate = _held(layout)
-    load_value, line = _loads(layout), layout.line_load / scales.force * scales.length
-    line[:, 1] *= scales.drive
+    load_value, line = _loads(layout), _line_loads(layout)
     if ramp:
         base, rate = np.zeros_like(base), base
         load_value[:, 1], load_value[:, 0] = load_value[:, 0], 0.0
@@ -246,6 +254,15 @@ def _loads(layout: Layout) -> Any:
         unit = scales.drive if when == 1 else 1.0
         value[k][when] = (fx / scales.force * unit, fy / scales.force * unit, moment / scales.moment * unit)
     return np.array(value).reshape(len(rows), 2, 3)
+
+
+def _line_loads(layout: Layout) -> Any:
+    """Return the line loads, dimensionless: constant and per unit of the drive."""
+    if not layout.plan.line_beam:
+        return np.zeros((len(layout.network.beams), 2, 2))
+    line = layout.line_load / layout.scales.force * layout.scales.length
+    line[:, 1] *= layout.scales.drive
+    return line
 
 
 def _springs(layout: Layout) -> Any:

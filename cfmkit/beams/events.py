@@ -19,7 +19,8 @@ if TYPE_CHECKING:
     from cfmkit.curves import FloatArray
 
 _SEARCHES = 40
-_CLOSE = 1e-5  # share of the determinant at the ends that is near enough to interpolate the rest
+_CLOSE = 1e-5  # share of the determinant at the ends that is near enough to interpolate the rest: the smallest,
+_LOOSE = 10.0  # and in units of the tolerance
 _FIRST_KICK, _KICK, _KICKS = 1e-3, 0.06, 16  # how far from a bifurcation its branch is entered [rad]
 
 
@@ -35,30 +36,32 @@ class Singular:
 
 
 def locate(
-    solver: Solver, one: Spot, other: Spot, natural: bool, fold: bool = False, vector: bool = True
+    solver: Solver, one: Spot, other: Spot, natural: bool, tolerance: float, fold: bool = False, vector: bool = True
 ) -> Singular | None:
     """Return the singular point between two neighbouring equilibria with different inertia; its null vector if wanted.
+
+    `tolerance` is that of the path.
 
     The determinant of the tangent, with the sign that the inertia gives it, is brought near zero by the Illinois
     variant of the rule of false position, or faster where inverse interpolation stays inside the bracket. The last bit
     is interpolated: at a bifurcation no bordered system is regular, so that Newton's method does not get there.
     """
-    search = _Search(solver, one, other, natural)
+    search = _Search(solver, one, other, natural, min(max(_CLOSE, _LOOSE * tolerance), 0.01))
     for attempt in range(_SEARCHES):
         if not search.closer(middle=attempt % 6 == 5):
             break
     if not search.near_enough():
         return None
     spot = search.interpolated()
-    null = _null_of(solver, spot, search.regular) if vector else np.zeros(solver.n)
+    null = _null_of(solver, spot, one) if vector else np.zeros(solver.n)
     return Singular(spot, null, fold, one.unstable, other.unstable)
 
 
 class _Search:
     """A bracket around a singular point on the path between two equilibria."""
 
-    def __init__(self, solver: Solver, one: Spot, other: Spot, natural: bool) -> None:
-        self.solver, self.one, self.other = solver, one, other
+    def __init__(self, solver: Solver, one: Spot, other: Spot, natural: bool, close: float) -> None:
+        self.solver, self.one, self.other, self.close = solver, one, other, close
         weights = np.where(np.arange(solver.n) < solver.n_free, 1.0, FORCE_WEIGHT)
         chord = np.append(weights * (other.y - one.y)[: solver.n], other.drive - one.drive)
         self.border = solver.unit if natural else chord
@@ -72,11 +75,13 @@ class _Search:
 
     def _measure(self, spot: Spot) -> float:
         """Return the size of the tangent's determinant: positive with the inertia of the first end, else negative."""
-        matrix, _ = self.solver.tangent_at(spot.y, spot.drive)
-        if spot is self.one:
-            self.regular = matrix
-        size = float(np.exp(np.linalg.slogdet(matrix)[1]))
+        size = self._size(spot.y, spot.drive)
         return size if spot.unstable == self.one.unstable else -size
+
+    def _size(self, y: FloatArray, drive: float) -> float:
+        """Return the size of the tangent's determinant."""
+        matrix, _ = self.solver.tangent_at(y, drive)
+        return float(np.exp(np.linalg.slogdet(matrix)[1]))
 
     def closer(self, middle: bool) -> bool:
         """Shrink the bracket once; tell whether to go on."""
@@ -87,6 +92,9 @@ class _Search:
             guess = float(sum(w * sample[0] for w, sample in zip(weights, chosen, strict=True)))
             share = guess if low + 1e-3 * (high - low) < guess < high - 1e-3 * (high - low) else share
         y, drive = self._guess(share)
+        loose = self.close > _CLOSE and len(self.samples) > 2
+        if loose and self._size(y, drive) < self.close * self.scale:
+            return False  # near enough: solving there, where no system is regular, would take long
         near = self.solver.solve(y, drive, self.border, self.start + share * (self.stop - self.start))
         if near is None:
             return False
@@ -96,7 +104,7 @@ class _Search:
             self.low, self.high = (share, value), (high, f_high if middle else 0.5 * f_high)
         else:
             self.high, self.low = (share, value), (low, f_low if middle else 0.5 * f_low)
-        return abs(value) > _CLOSE * self.scale and self.high[0] - self.low[0] > 1e-13
+        return abs(value) > self.close * self.scale and self.high[0] - self.low[0] > 1e-13
 
     def _guess(self, share: float) -> tuple[FloatArray, float]:
         """Return unknowns and drive at a share, interpolated between the nearest samples."""
@@ -128,9 +136,9 @@ class _Search:
         return Spot(np.asarray(y), drive, chosen[0][2].tangent)
 
 
-def _null_of(solver: Solver, spot: Spot, regular: FloatArray) -> FloatArray:
-    """Return the null vector in the scaling that balances a regular tangent nearby."""
-    balance, sizes = np.ones(solver.n), np.abs(regular)
+def _null_of(solver: Solver, spot: Spot, regular: Spot) -> FloatArray:
+    """Return the null vector in the scaling that balances the tangent at a regular point nearby."""
+    balance, sizes = np.ones(solver.n), np.abs(solver.tangent_at(regular.y, regular.drive)[0])
     for _ in range(8):
         balance /= np.sqrt((sizes * balance).max(axis=1) * balance)
     matrix, _ = solver.tangent_at(spot.y, spot.drive)

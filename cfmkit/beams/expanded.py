@@ -23,20 +23,19 @@ class ExpandedSolver(Solver):
 
     def _build(self) -> Model:
         plain = assemble_model(self.layout, self.cut, self.table)
-        self.plain_free = int(self.layout.free.sum())
+        self.plain_free = self.layout.plan.n_free
         segments = len(plain.segment_step) - 1
-        firsts = plain.beam_segment[:-1]
-        inner = np.setdiff1d(np.arange(segments), firsts)  # segments that begin inside a beam
+        firsts, begins = plain.beam_segment[:-1], np.zeros(segments, dtype=np.bool_)
+        begins[firsts] = True
+        inner = np.flatnonzero(~begins)  # segments that begin inside a beam
         self.inner, self.lasts = inner, plain.beam_segment[1:] - 1
-        rest = Solver.unstressed_of(plain, self.cut)
-        self.origin = rest[inner]
         old_dofs, old_places = len(plain.slot), len(plain.place_dof)
         dof = old_dofs + 3 * np.arange(len(inner))
         begin, end = np.empty(segments, np.int64), np.empty(segments, np.int64)
         begin[firsts], end[self.lasts] = plain.beam_end[:, 0], plain.beam_end[:, 1]
         begin[inner] = old_places + np.arange(len(inner))
         end[inner - 1] = begin[inner]
-        owner = np.searchsorted(plain.beam_segment, np.arange(segments), side="right") - 1
+        owner = np.cumsum(begins) - 1
         extra = 3 * len(inner)
         return plain._replace(
             beam_segment=np.arange(segments + 1, dtype=np.int64),
@@ -44,19 +43,21 @@ class ExpandedSolver(Solver):
             line_load=np.ascontiguousarray(plain.line_load[owner]),
             place_dof=np.concatenate([plain.place_dof, np.stack([dof, dof + 1, dof + 2, dof + 2], axis=1)]),
             place_frame=np.concatenate([plain.place_frame, np.tile([1.0, 0.0], (len(inner), 1))]),
-            place_origin=np.concatenate([plain.place_origin, self.origin]),
+            place_origin=np.concatenate([plain.place_origin, np.zeros((len(inner), 2))]),
             place_arm=np.concatenate([plain.place_arm, np.zeros((len(inner), 2))]),
             base=np.concatenate([plain.base, np.zeros(extra)]),
             rate=np.concatenate([plain.rate, np.zeros(extra)]),
             slot=np.concatenate([plain.slot, self.plain_free + np.arange(extra)]),
         )
 
+    def _count_free(self) -> int:
+        return self.plain_free + 3 * len(self.inner)
+
     def expand(self, y: FloatArray) -> FloatArray:
         """Return the expanded unknowns for those of a plain solver with the same segments."""
         beams = len(self.lasts)
         parts = y[self.plain_free + 3 * beams :].reshape(-1, 6)
-        moved = parts[self.inner, :3].copy()
-        moved[:, :2] -= self.origin
+        moved = parts[self.inner, :3]
         last = np.empty((self.n_segments, 3))
         last[self.inner - 1] = parts[self.inner, 3:]
         last[self.lasts] = y[self.plain_free : self.plain_free + 3 * beams].reshape(-1, 3)

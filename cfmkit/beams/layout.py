@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import exp, log
+from statistics import fmean
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -134,7 +136,7 @@ class Layout:
 
     def _scales(self) -> Scales:
         lengths, middles = self.bundle.sizes(self.fits if self.bundle.others else None)
-        length, rigidity = float(np.mean(lengths)), float(np.exp(np.mean(np.log(middles))))
+        length, rigidity = fmean(lengths.tolist()), exp(fmean(map(log, middles.tolist())))
         return Scales(length, rigidity, self._drive_unit(length, rigidity))
 
     def _drive_unit(self, length: float, rigidity: float) -> float:
@@ -177,9 +179,9 @@ class Layout:
 
     def _frames(self) -> Any:
         """Return cos and sin of the frames of the attachments' masters."""
-        names = list(self.network.nodes)
         if not any(self.direction.values()):
-            return np.tile([1.0, 0.0], (len(self.plan.place_master), 1))
+            return self.plan.level
+        names = list(self.network.nodes)
         turns = np.array([self.direction.get(name, 0.0) for name in names])[self.plan.place_master]
         turns = np.where(self.plan.place_master == GROUND, 0.0, turns)
         return np.stack([np.cos(turns), np.sin(turns)], axis=1)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -73,10 +74,20 @@ class Plan:
     free: Any
     slot: IntArray
 
-    @property
+    @cached_property
     def offsets(self) -> bool:
         """Whether any beam's end has an offset."""
         return bool((self.place_offset != NOWHERE).any())
+
+    @cached_property
+    def n_free(self) -> int:
+        """Number of free degrees of freedom."""
+        return int(self.free.sum())
+
+    @cached_property
+    def level(self) -> Any:
+        """Cos and sin of the frames of all attachments where no support is turned, (n, 2)."""
+        return np.tile([1.0, 0.0], (len(self.place_master), 1))
 
 
 class Builder:

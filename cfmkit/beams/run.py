@@ -11,7 +11,7 @@ import numpy as np
 from cfmkit.beams import branches
 from cfmkit.beams.discretise import Mesh
 from cfmkit.beams.expanded import ExpandedSolver
-from cfmkit.beams.kernels.march import DONE, FULL, INERTIA, INFO, LONG, OUTSIDE, STALLED
+from cfmkit.beams.kernels.march import DONE, FULL, INERTIA, INFO, LONG, NO_START, OUTSIDE, STALLED
 from cfmkit.beams.path import Event, Path, PathStatus
 from cfmkit.beams.solver import Points, Solver, Spot, march_options
 from cfmkit.curves import read_only
@@ -23,7 +23,8 @@ if TYPE_CHECKING:
     from cfmkit.curves import FloatArray
 
 _HOPS = 60  # decisions on one path
-_FINE_STEPS = 32  # of a beam, where singular points are looked for
+_FINE_STEPS = 32  # of a beam, where singular points are looked for: half of them for a tolerance of
+_ROUGH = 1e-6
 _LOOSEST = 1e-7  # tolerance of Newton's method
 _SMALLEST = 1e-7  # shortest step as a share of the drive's range
 
@@ -67,7 +68,8 @@ class Run:
         Integration forward breaks the symmetry of a beam by its error, and that acts on a bifurcation as an
         imperfection does: singular points are looked for where that error is rounding.
         """
-        steps = max(-(-_FINE_STEPS // self.mesh.segments), 2 * self.mesh.steps)
+        whole = _FINE_STEPS if self.control.tolerance < _ROUGH else _FINE_STEPS // 2
+        steps = max(-(-whole // self.mesh.segments), 2 * self.mesh.steps)
         return ExpandedSolver(self.layout, Mesh(self.mesh.segments, steps), 1e-11)
 
     def follow(self) -> None:
@@ -80,18 +82,10 @@ class Run:
 
     def _follow(self) -> None:
         spot, share = self.solver.rest()
-        if spot is None:
-            self.status = PathStatus.NO_START
-            self.message = f"no equilibrium under the constant loads: lost at {share:.3g} of them"
-            return
-        spot.tangent *= float(np.sign(self.targets[np.flatnonzero(self.targets)[0]]))
-        asked = 0
-        if self.targets[0] == 0.0:
-            asked = 1
-        self.append(self.as_points(spot, 0 if asked else -1))
-        hops = 0
-        while asked < len(self.targets) and hops < _HOPS:
-            code, asked, spot = self._leg(spot, asked)
+        asked, hops, fresh = int(self.targets[0] == 0.0), 0, True
+        while spot is not None and asked < len(self.targets) and hops < _HOPS:
+            code, asked, spot = self._leg(spot, asked, fresh)
+            fresh = False
             hops += 1
             if code == DONE and asked == len(self.targets):
                 return
@@ -100,6 +94,8 @@ class Run:
                 last = float(self.points.drive[-1]) * self.unit
                 self.message = f"stability is lost at {last:.6g}: the path ends there"
                 return
+            if code == NO_START:
+                break
             if code == INERTIA:
                 following = branches.cross(self)
             elif code == DONE:
@@ -115,7 +111,10 @@ class Run:
             if self.too_long:
                 return
             asked = self.asked()
-        if asked < len(self.targets):
+        if not len(self.points):
+            self.status = PathStatus.NO_START
+            self.message = f"no equilibrium under the constant loads: lost at {share:.3g} of them"
+        elif asked < len(self.targets):
             last = float(self.points.drive[-1]) * self.unit
             self.status, self.message = PathStatus.LOST, f"the path turned back and forth at {last:.6g}"
 
@@ -150,14 +149,18 @@ class Run:
         """Return a stored point, solved again on the fine mesh."""
         return self.fine.solve(self.fine.expand(self.points.y[index]), float(self.points.drive[index]))
 
-    def _leg(self, spot: Spot, asked: int) -> tuple[int, int, Spot]:
-        """March once; return why it ended, the points done and the last spot."""
+    def _leg(self, spot: Spot, asked: int, fresh: bool) -> tuple[int, int, Spot]:
+        """March once; return why it ended, the points done and the last spot. A fresh start is yet to be solved for."""
         left, numbers = self._left(spot, asked)
         options = self.options(spot, self._first_step(spot, asked))
-        room = max(len(left) + 2, self.control.most_points - len(self.points))
+        if fresh:
+            options[-1] = np.sign(self.targets[np.flatnonzero(self.targets)[0]])
+        room = max(len(left) + 3, self.control.most_points - len(self.points))
         code, points = self.solver.march(spot, left, options, room)
         if self.natural:
             points.info[:, 1] = numbers[points.info[:, 1].astype(int)]
+        if fresh and asked:
+            points.info[:1, 1] = 0
         self.append(points)
         if len(points):
             spot = self.spot(-1) if code == STALLED else self.last(points)
@@ -245,22 +248,22 @@ class Run:
         """
         tolerance = max(self.solver.tolerance, 0.02 * self.control.tolerance)
         fine = Solver(self.layout, self.mesh.finer(), tolerance, self.solver)
-        scale = max(1e-12, float(np.abs(self.points.y[:, self.solver.n_free : self.solver.n]).max()))
-        return np.array([self._error_at(fine, int(index), scale) for index in indices])
-
-    def _error_at(self, fine: Solver, index: int, scale: float) -> float:
-        """Return the difference to a finer mesh at this drive, or across the path where it turns back."""
         n, free = self.solver.n, self.solver.n_free
-        y, drive = self.points.y[index], float(self.points.drive[index])
-        near = fine.solve(y, drive)
-        far = 0.1 * max(1.0, scale)
-        if near is None or abs(near.y - y).max() > far:
-            border = self.spot(index).tangent
-            near = fine.solve(y, drive, border, float(border[:-1] @ y[:n] + border[-1] * drive))
-        if near is None or abs(near.y - y).max() > far:
-            return np.inf
-        change = np.abs(near.y - y)
-        return max(float(change[:free].max(initial=0.0)), float(change[free:n].max() / scale), abs(near.drive - drive))
+        scale = max(1e-12, float(np.abs(self.points.y[:, free:n]).max()))
+        chosen = np.array(sorted(indices))
+        ys, drives = self.points.y[chosen], self.points.drive[chosen]
+        near, solved = fine.solve_each(ys, drives)
+        moved, far = drives.copy(), 0.1 * max(1.0, scale)
+        for k in np.flatnonzero(~solved | (np.abs(near - ys).max(axis=1) > far)):
+            border = self.spot(int(chosen[k])).tangent
+            level = float(border[:-1] @ ys[k, :n] + border[-1] * drives[k])
+            across = fine.solve(ys[k], float(drives[k]), border, level)  # where the path turns back
+            there = across is not None and np.abs(across.y - ys[k]).max() <= far
+            near[k], moved[k] = (across.y, across.drive) if there and across is not None else (np.inf, np.inf)
+        change = np.abs(near - ys)
+        pose, force = change[:, :free].max(axis=1, initial=0.0), change[:, free:n].max(axis=1) / scale
+        found: FloatArray = np.maximum(np.maximum(pose, force), np.abs(moved - drives))
+        return found
 
     def path(self) -> Path:
         """Return the outcome; where the tolerance is not reached, every point is judged by itself."""

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.beams.discretise import Grid, Mesh, assemble_model, grid, table
+from cfmkit.beams.discretise import Mesh, assemble_model, grid, table
 from cfmkit.beams.kernels import entry
-from cfmkit.beams.kernels.march import INFO
+from cfmkit.beams.kernels.march import DONE, INFO
 from cfmkit.beams.kernels.newton import SOLVED
 from cfmkit.beams.kernels.rk8 import WEIGHTS
 
@@ -69,7 +69,7 @@ class Solver:
         self.cut = grid(layout, mesh)
         self.table = table(layout, self.cut)
         self.model: Model = self._build()
-        self.n_free = int((self.model.slot >= 0).sum())
+        self.n_free = self._count_free()
         self.n_beams = len(self.model.beam_end)
         self.n_dofs = len(self.model.slot)
         self.n_segments = len(self.cut.segment_step) - 1
@@ -88,6 +88,9 @@ class Solver:
             table=self.table, width=cut.width, segment_step=cut.segment_step, beam_segment=cut.beam_segment
         )
 
+    def _count_free(self) -> int:
+        return self.layout.plan.n_free
+
     def _scratch(self) -> tuple[Any, ...]:
         n, dofs = self.n + 1, self.n_dofs
         return (
@@ -105,20 +108,15 @@ class Solver:
 
     def unstressed(self) -> FloatArray:
         """Return the unknowns of the network at rest, before any load or displacement."""
-        y = np.zeros(self.size)
-        y[self.n :].reshape(-1, 6)[:, :2] = self.unstressed_of(self.model, self.cut)
-        return y
-
-    @staticmethod
-    def unstressed_of(m: Model, cut: Grid) -> FloatArray:
-        """Return where the segments start before any load, (segments, 2), dimensionless."""
+        m, cut, y = self.model, self.cut, np.zeros(self.size)
         turns = np.exp(1j * m.table[:, :, 0]) * m.table[:, :, 1]
         runs = np.add.reduceat((turns @ WEIGHTS) * cut.width, m.segment_step[:-1])
         places = m.beam_end[:, 0]
         first = (m.place_origin[places] + m.place_arm[places]) @ np.array([1.0, 1j])
         before = np.cumsum(runs) - runs
         starts = before + np.repeat(first - before[m.beam_segment[:-1]], np.diff(m.beam_segment))
-        return np.stack([starts.real, starts.imag], axis=1)
+        y[self.n :].reshape(-1, 6)[:, :2] = np.stack([starts.real, starts.imag], axis=1)
+        return y
 
     def ramp(self) -> Model:
         """Return the arrays with a factor on all constant loads and displacements in the place of the drive."""
@@ -165,16 +163,24 @@ class Solver:
         return int(code), Points(y[:stored], drive[:stored], info[:stored])
 
     def rest(self) -> tuple[Spot | None, float]:
-        """Return the equilibrium from which the drive starts, or None and the share of the preload reached."""
-        zero = Spot(self.unstressed(), 0.0, np.zeros(self.n + 1))
+        """Return a place near the equilibrium that the drive starts from, or None and the share of the preload reached.
+
+        Places of segments are left at zero there: they follow linearly from all else.
+        """
+        zero = Spot(np.zeros(self.size), 0.0, np.zeros(self.n + 1))
         if self.layout.network.loads or self.layout.base.any():
-            ramp = self.ramp()
-            options = march_options(self.tolerance, 0.25, 0.35)
-            code, points = self._march(ramp, zero, np.array([1.0]), options, 400)
-            if code != 0:
+            options = march_options(self.tolerance, 0.25, 0.35, sense=1.0)
+            code, points = self._march(self.ramp(), zero, np.array([1.0]), options, 400)
+            if code != DONE:
                 return None, float(points.drive[-1]) if len(points) else 0.0
             zero = Spot(points.y[-1], 0.0, zero.tangent)
-        return self.solve(zero.y, 0.0), 1.0
+        return zero, 1.0
+
+    def solve_each(self, ys: FloatArray, drives: FloatArray) -> tuple[FloatArray, Any]:
+        """Return the equilibria near ys (k, unknowns) at these drives (k,), and where there are any, (k,) bool."""
+        new, solved = ys.copy(), np.empty(len(drives))
+        entry.solve_each(self.model, self.n_free, new, drives, self.limits, solved, self.scratch)
+        return new, solved > 0
 
 
 def march_options(
@@ -186,8 +192,12 @@ def march_options(
     greatest: float = np.inf,
     bounds: tuple[float, float] = (-np.inf, np.inf),
     watch: int | None = None,
+    sense: float = 0.0,
 ) -> FloatArray:
-    """Return the options of a march; `watch` is the inertia whose change ends it, None to go on."""
+    """Return the options of a march; see `cfmkit.beams.kernels.march.march`.
+
+    `watch` is the inertia at the start, whose change ends the march; None to go on.
+    """
     return np.array(
         [
             tolerance,
@@ -202,5 +212,6 @@ def march_options(
             bounds[1],
             float(watch is not None),
             float(watch or 0),
+            sense,
         ]
     )

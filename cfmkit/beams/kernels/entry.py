@@ -20,7 +20,8 @@ from cfmkit.beams.kernels import newton as _newton
 from cfmkit.beams.kernels import observe as _observe
 from cfmkit.beams.kernels.compiler import door
 
-_follow, _solve, _forces, _states = _march.march, _newton.solve, _observe.forces, _observe.states
+_follow, _solve, _each = _march.march, _newton.solve, _newton.solve_each
+_forces, _states = _observe.forces, _observe.states
 _tangent = _observe.tangent
 _slopes, _row_slopes, _held_slopes = _columns.slopes, _columns.row_slopes, _columns.held_slopes
 
@@ -41,7 +42,9 @@ def _doors(stamp: str) -> tuple[Any, ...]:
             return _solve(m, n_free, a[0], d, b, one, (options[0], options[1]), c, scratch)
         if task == MARCH:
             return _follow(m, n_free, f, one, c, b, options, a, d, e, scratch)
-        if task == TANGENT:
+        if task == EACH:
+            _each(m, n_free, a, d, (options[0], options[1]), b, scratch)
+        elif task == TANGENT:
             _tangent(m, n_free, f, one, scratch)
         else:
             _forces(m, n_free, a, d, e, scratch)
@@ -67,7 +70,7 @@ def _doors(stamp: str) -> tuple[Any, ...]:
     return real, states, slopes, row_slopes, held_slopes
 
 
-SOLVE, MARCH, FORCES, TANGENT = 0, 1, 2, 3
+SOLVE, MARCH, FORCES, TANGENT, EACH = range(5)
 STAMP = digest()
 _real, states, slopes, row_slopes, held_slopes = _doors(STAMP)
 
@@ -94,6 +97,11 @@ def solve(
         SOLVE, m, n_free, target, limits, (y[None], border, tangent, state, _NONE, y), scratch
     )
     return result
+
+
+def solve_each(m: Any, n_free: int, ys: Any, drives: Any, limits: Any, solved: Any, scratch: Any) -> None:
+    """Solve at several drives; see `cfmkit.beams.kernels.newton.solve_each`."""
+    _real(EACH, m, n_free, 0.0, limits, (ys, solved, drives, drives, _NONE, drives), scratch)
 
 
 def march(

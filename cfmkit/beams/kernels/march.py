@@ -8,9 +8,9 @@ from cfmkit.beams.kernels.compiler import kernel, maker
 from cfmkit.beams.kernels.dense import copy
 from cfmkit.beams.kernels.newton import SOLVED, solve
 
-DONE, STALLED, INERTIA, LONG, FULL, OUTSIDE = 0, 1, 2, 3, 4, 5
+DONE, STALLED, INERTIA, LONG, FULL, OUTSIDE, NO_START = range(7)
 """Why a march ended: all asked points reached; the smallest step failed; the number of unstable directions changed;
-a segment is too long for its load; no room for more points; the drive left its range."""
+a segment is too long for its load; no room for more points; the drive left its range; no equilibrium to start from."""
 
 KEPT = 6  # points that the extrapolation uses
 SHORT = 0.25  # dM1/dM0 of a segment below which it must be split
@@ -130,11 +130,13 @@ def _forward(border, tangent):
 
 @maker
 def march(m, n_free, y, drive, tangent, targets, options, out_y, out_drive, out_info, scratch):
-    """Follow the path from the equilibrium (y, drive) through the targets.
+    """Follow the path from (y, drive) through the targets.
 
     options: tolerance, iterations, natural (1) or arc length (0), first, smallest and largest step, largest change of
     a pose in a step, weight of forces in the arc length, lowest and highest drive, whether to stop where the
-    inertia changes, inertia at the start. Returns why it ended and the number of points stored.
+    inertia changes, inertia at the start, sense. A sense of 1 or -1 says that the start is near an equilibrium: it is
+    solved for and stored first, with the tangent in that sense; 0: it is one. Returns why the march ended and the
+    number of points stored.
     """
     natural, step, smallest, greatest, turn = options[2] > 0.5, options[3], options[4], options[5], options[6]
     n, size = tangent.shape[0] - 1, y.shape[0]
@@ -143,6 +145,16 @@ def march(m, n_free, y, drive, tangent, targets, options, out_y, out_drive, out_
     border, new_tangent, unit = np.empty(n + 1), np.empty(n + 1), np.zeros(n + 1)
     unit[n] = 1.0
     t, stored, asked, index = (drive if natural else 0.0), 0, 0, options[11]
+    if options[12] != 0.0:
+        state[0] = drive
+        code, iterations = solve(m, n_free, y, state, unit, drive, (options[0], options[1]), tangent, scratch)
+        if code != SOLVED:
+            return NO_START, 0
+        row[0], row[1], row[2], row[3] = -1.0, 0.0, float(iterations), tangent[n]
+        _store(0, y, state, row, out_y, out_drive, out_info)
+        stored, index = 1, state[1]
+        for i in range(n + 1):
+            tangent[i] *= 1.0 if natural else options[12]
     count = _remember(times, past, 0, t, y, drive)
     while asked < targets.shape[0]:
         if stored + targets.shape[0] - asked + 1 >= out_y.shape[0]:

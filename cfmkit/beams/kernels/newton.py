@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from cfmkit.beams.kernels.chain import C_D, E2, SMALL, E, F, G, places_of, pose_of, sweep, unfold
-from cfmkit.beams.kernels.compiler import kernel
+from cfmkit.beams.kernels.compiler import kernel, maker
 from cfmkit.beams.kernels.dense import clear, copy_matrix, lu_solve, positive_count
 from cfmkit.beams.kernels.springs import add_block, add_force, add_loads, add_springs, jacobian, wires_of
 
@@ -127,7 +127,10 @@ def tangent_index(h, n_free, eliminated, scratch):
 
 @kernel
 def largest(dy, y, n_free, n):
-    """Return the largest increment: poses as they are, forces relative to the largest force."""
+    """Return the largest increment: poses as they are, forces relative to the largest force.
+
+    Places of segments do not count: they follow linearly from all else.
+    """
     scale = 1.0
     for i in range(n_free, y.shape[0]):
         if (i < n or (i - n) % 6 > 2) and abs(y[i]) > scale:
@@ -137,9 +140,10 @@ def largest(dy, y, n_free, n):
         size = abs(dy[i])
         if not np.isfinite(size):
             return np.inf, np.inf
-        if i < n_free or (i >= n and (i - n) % 6 < 3):
+        part = (i - n) % 6 if i >= n else -1
+        if i < n_free or part == 2:
             pose = max(pose, size)
-        else:
+        elif part < 0 or part > 2:
             force = max(force, size)
     return pose, force / scale
 
@@ -188,6 +192,18 @@ def solve(m, n_free, y, state, border, target, limits, tangent, scratch):
     return SLOW, int(limits[1])
 
 
+@maker
+def solve_each(m, n_free, ys, drives, limits, solved, scratch):
+    """Solve for the equilibria near (ys, drives) at these drives; solved (points,) is set to one where it worked."""
+    n = scratch[0].shape[0] - 1
+    state, tangent, unit = np.zeros(5), np.empty(n + 1), np.zeros(n + 1)
+    unit[n] = 1.0
+    for p in range(ys.shape[0]):
+        state[0], state[4] = drives[p], 0.0
+        code, _ = solve(m, n_free, ys[p], state, unit, drives[p], limits, tangent, scratch)
+        solved[p] = 1.0 if code == SOLVED else 0.0
+
+
 @kernel
 def _unfold_all(m, n_free, n, ddrive, values, rel, store, dy, work):
     """Set the increments of the segments' unknowns from those of z (already in dy) and of the drive."""
@@ -208,4 +224,4 @@ def _unfold_all(m, n_free, n, ddrive, values, rel, store, dy, work):
         unfold(m, e, (n_free, n), store, dpose, dy[last : last + 3], ddrive, dy)
 
 
-__all__ = ["DIVERGED", "SINGULAR", "SLOW", "SOLVED", "all_values", "assemble", "solve"]
+__all__ = ["DIVERGED", "SINGULAR", "SLOW", "SOLVED", "all_values", "assemble", "solve", "solve_each"]
