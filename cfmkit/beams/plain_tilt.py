@@ -17,11 +17,14 @@ from cfmkit.beams.kernels.model import Tilt
 from cfmkit.beams.numbering import NOWHERE
 
 if TYPE_CHECKING:
+    from cfmkit.beams.beam import Beam
     from cfmkit.beams.discretise import Grid
     from cfmkit.beams.drive import Drive
     from cfmkit.beams.layout import Layout
     from cfmkit.beams.network import Network
     from cfmkit.curves import FloatArray
+
+NO_OFFSET = (0.0, 0.0)  # an end without offset
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,7 +117,8 @@ def plain_tilt(layout: Layout, built: list[tuple[Network, Drive]], step: float) 
     """Return the derivatives for networks with one variable each moved by an imaginary step; None if not that plain."""
     if layout.bundle.others or layout.network.springs or not built:
         return None
-    if not all(_alike(layout, network, drive) for network, drive in built):
+    usual = [_make_up(beam) for beam in layout.network.beams.values()]
+    if not all(_alike(layout, usual, network, drive) for network, drive in built):
         return None
     networks = [network for network, _ in built]
     where = np.array([[(node.x, node.y) for node in network.nodes.values()] for network in networks]).imag / step
@@ -143,8 +147,11 @@ def plain_tilt(layout: Layout, built: list[tuple[Network, Drive]], step: float) 
     return PlainTilt(layout, origin, arm, coefficients, sections.imag / step, rotation, length)
 
 
-def _alike(layout: Layout, network: Network, drive: Drive) -> bool:
-    """Tell whether a network differs in places, coefficients and sections of rotscaled plain beams only."""
+def _alike(layout: Layout, usual: list[Any], network: Network, drive: Drive) -> bool:
+    """Tell whether a network differs in places, coefficients and sections of rotscaled plain beams only.
+
+    usual: `_make_up` of the layout's own beams.
+    """
     base = layout.network
     if drive is not layout.drive or network.springs or network.links != base.links or network.loads != base.loads:
         return False
@@ -153,17 +160,19 @@ def _alike(layout: Layout, network: Network, drive: Drive) -> bool:
     supports = zip(network.nodes.values(), base.nodes.values(), strict=True)
     if not all(one.support is other.support or one.support == other.support for one, other in supports):
         return False
-    for one, other in zip(network.beams.values(), base.beams.values(), strict=True):
-        same = one.start == other.start and one.end == other.end and one.closure == other.closure == "rotscale"
-        joints = one.start_joint == other.start_joint and one.end_joint == other.end_joint
-        a, b = one.section, other.section
-        if not (same and joints and is_plain(one) and a.axial == b.axial and a.shear == b.shear):
-            return False
-        if (one.start_offset != (0.0, 0.0)) != (other.start_offset != (0.0, 0.0)):
-            return False
-        if (one.end_offset != (0.0, 0.0)) != (other.end_offset != (0.0, 0.0)):
-            return False
-    return True
+    beams = network.beams.values()
+    return all(map(_is_fitted, beams)) and list(map(_make_up, beams)) == usual
+
+
+def _is_fitted(beam: Beam) -> bool:
+    return beam.closure == "rotscale" and is_plain(beam)
+
+
+def _make_up(beam: Beam) -> tuple[Any, ...]:
+    """Return what no variable may change of a beam."""
+    offsets = beam.start_offset != NO_OFFSET, beam.end_offset != NO_OFFSET
+    section = beam.section.axial, beam.section.shear
+    return beam.start, beam.end, beam.start_joint, beam.end_joint, beam.closure, offsets, section
 
 
 def _offsets(networks: list[Network], beam: int, side: int) -> FloatArray:

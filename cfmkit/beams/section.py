@@ -7,6 +7,7 @@ is exactly inextensible, not merely stiff.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import inf
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -88,7 +89,7 @@ class Section:
             _positive(name, getattr(self, name))
         if not isinstance(self.thickness, Taper):
             _positive("thickness", self.thickness)
-        if not -1 < np.real(self.poisson_ratio) < 0.5 + 1e-12:
+        if not -1 < self.poisson_ratio.real < 0.5 + 1e-12:
             raise InputError(f"poisson_ratio must be between -1 and 0.5, got {self.poisson_ratio}")
 
     @property
@@ -123,5 +124,5 @@ class Section:
 
 
 def _positive(name: str, value: Any) -> None:
-    if not (np.isfinite(value) and np.real(value) > 0):
+    if not (0 < value.real < inf and abs(value.imag) < inf):
         raise InputError(f"{name} must be positive, got {value}")

@@ -13,7 +13,7 @@ import numpy as np
 from cfmkit.beams.kernels.chain import BEFORE, E2, SMALL, E, F, G, places_of, pose_of
 from cfmkit.beams.kernels.compiler import inlined, kernel, maker
 from cfmkit.beams.kernels.dense import clear, lu_solve
-from cfmkit.beams.kernels.flow_slopes import flow_slopes
+from cfmkit.beams.kernels.flow_slopes import flow_slopes, work_space
 from cfmkit.beams.kernels.force_slopes import (
     beam_slopes,
     load_slopes,
@@ -27,12 +27,11 @@ from cfmkit.beams.kernels.newton import all_values, assemble
 from cfmkit.beams.kernels.rk8 import STAGES
 
 
-@maker
-def _segment_slopes(m, tilt, e, y, n, drive, ends):
+@kernel
+def _segment_slopes(m, tilt, e, y, n, drive, ends, none, work):
     """Set the derivatives of the end states of a beam's segments at unchanged starts: ends (segments, 9 count)."""
     begin, count = m.beam_segment[e], tilt.first[e + 1] - tilt.first[e]
     load = (m.line_load[e, 0, 0] + drive * m.line_load[e, 1, 0], m.line_load[e, 0, 1] + drive * m.line_load[e, 1, 1])
-    none = np.empty((1, 1))
     for j in range(begin, m.beam_segment[e + 1]):
         first = m.segment_step[j]
         state = ends[j - begin]
@@ -45,7 +44,7 @@ def _segment_slopes(m, tilt, e, y, n, drive, ends):
         o = n + 6 * j
         start = (y[o + 2], y[o + 3], y[o + 4], y[o + 5])
         at = tilt.begin[e] + (first - m.segment_step[begin]) * STAGES * 5 * count
-        flow_slopes(m.table, m.width, (first, m.segment_step[j + 1]), start, load, tilt.table, at, state, none)
+        flow_slopes(m.table, m.width, (first, m.segment_step[j + 1]), start, load, tilt.table, at, state, none, work)
 
 
 @kernel
@@ -194,6 +193,7 @@ def slopes(m, tilt, n_free, ys, drives, out, pushes, scratch):
         most = max(most, tilt.first[e + 1] - tilt.first[e])
         wide = max(wide, m.beam_segment[e + 1] - m.beam_segment[e])
     moved = np.empty((wide, 9 * most))
+    none, work_of_flow = np.empty((1, 1)), work_space(most)
     dofs, pose, others = values.shape[0], np.zeros(7), m.load_place.shape[0] + m.spring_kind.shape[0] > 0
     room = (np.zeros(dofs), np.zeros(dofs), np.zeros((12, 7)), pose)
     frames, matrix, rhs, dpb = np.empty((beams, 2, 4)), np.empty((n, n)), np.empty((n, count)), np.empty(3)
@@ -210,7 +210,7 @@ def slopes(m, tilt, n_free, ys, drives, out, pushes, scratch):
             own = tilt.first[e + 1] - tilt.first[e]
             if own > 0:
                 block = moved[:, : 9 * own]
-                _segment_slopes(m, tilt, e, y, n, drive, block)
+                _segment_slopes(m, tilt, e, y, n, drive, block, none, work_of_flow)
                 _chain_slopes(m, tilt, e, block, store, c[e], d[e], parts)
         _beam_sides(m, tilt, y, drive, n_free, values, frames, rel, c, d, rhs, push, room)
         for k in range(count):
@@ -277,7 +277,7 @@ def row_slopes(m, tilt, n_free, y, drive, dy, out):
     energy, h, v, each by all variables.
     """
     n, count = n_free + 3 * m.beam_end.shape[0], dy.shape[1]
-    state = np.zeros(9 * count)
+    state, work = np.zeros(9 * count), work_space(count)
     row = 0
     for e in range(m.beam_end.shape[0]):
         load = (
@@ -296,5 +296,5 @@ def row_slopes(m, tilt, n_free, y, drive, dy, out):
             start = (y[o + 2], y[o + 3], y[o + 4], y[o + 5])
             at = tilt.begin[e] + (first - begin) * STAGES * 5 * count
             rows = out[row : row + last - first + 1]
-            flow_slopes(m.table, m.width, (first, last), start, load, tilt.table, at, state, rows)
+            flow_slopes(m.table, m.width, (first, last), start, load, tilt.table, at, state, rows, work)
             row += last - first + 1

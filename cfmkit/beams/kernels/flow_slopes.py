@@ -16,16 +16,22 @@ ROWS = 7  # phi, M, X, Y, strain energy, h, v
 
 
 @maker
-def flow_slopes(table, width, steps, start, load, changes, at, state, rows):
+def work_space(count):
+    """Return the arrays that `flow_slopes` needs for up to so many variables."""
+    return np.empty((STAGES, 2)), np.empty((STAGES, 5 * count)), np.empty(5 * count)
+
+
+@kernel
+def flow_slopes(table, width, steps, start, load, changes, at, state, rows, work):
     """Integrate the state and the columns of its derivatives over the steps of a segment.
 
     start: phi, h, v, M; load: line load (wx, wy); changes: the flattened changes of the table, from index `at`.
     state (9 count) holds the derivatives of phi, M, X, Y, energy, h, v and those of the line load, each for all
     variables, at the start and then at the end. rows (steps + 1, 7 count): the derivatives at all step boundaries,
-    if there is room.
+    if there is room. work: see `work_space`.
     """
     count = state.shape[0] // 9
-    base, slope, now = np.empty((STAGES, 2)), np.empty((STAGES, 5 * count)), np.empty(5 * count)
+    base, slope, now = work
     keep = rows.shape[0] > 1
     for step in range(steps[0], steps[1]):
         if keep:
@@ -33,9 +39,9 @@ def flow_slopes(table, width, steps, start, load, changes, at, state, rows):
                 rows[step - steps[0], q] = state[q]
         o = at + (step - steps[0]) * STAGES * 5 * count
         for i in range(STAGES):
-            place = _combined(table, step, width[step], i, start, load, (changes, o), state, base, slope, now)
-            _stage(table, step, i, place, (changes, o + i * 5 * count), now, base, slope)
-        start = _combined(table, step, width[step], STAGES, start, load, (changes, o), state, base, slope, now)
+            place = _combined(table, step, width[step], i, start, load, (changes, o), state, base, slope, now, count)
+            _stage(table, step, i, place, (changes, o + i * 5 * count), now, base, slope, count)
+        start = _combined(table, step, width[step], STAGES, start, load, (changes, o), state, base, slope, now, count)
         for j in range(STAGES):
             w = width[step] * WEIGHTS[j]
             if w != 0.0:
@@ -49,12 +55,11 @@ def flow_slopes(table, width, steps, start, load, changes, at, state, rows):
 
 
 @inlined
-def _combined(table, step, width, i, start, load, changed, state, base, slope, now):
+def _combined(table, step, width, i, start, load, changed, state, base, slope, now, count):
     """Set `now` (phi, M, h, v and arc length, differentiated) at stage i, or at the step's end for i = STAGES.
 
     Returns phi, h, v and M there.
     """
-    count = now.shape[0] // 5
     phi, moment, h, v = start[0], start[3], start[1], start[2]
     for q in range(2 * count):
         now[q], now[2 * count + q] = state[q], state[5 * count + q]
@@ -66,7 +71,7 @@ def _combined(table, step, width, i, start, load, changed, state, base, slope, n
             for q in range(2 * count):
                 now[q] += w * slope[j, q]
     if load[0] != 0.0 or load[1] != 0.0:
-        run = _run(table, step, width, i, changed, now)
+        run = _run(table, step, width, i, changed, now, count)
         h, v = h - load[0] * run, v - load[1] * run
         for q in range(count):
             now[2 * count + q] -= state[7 * count + q] * run + load[0] * now[4 * count + q]
@@ -75,10 +80,10 @@ def _combined(table, step, width, i, start, load, changed, state, base, slope, n
 
 
 @kernel
-def _run(table, step, width, i, changed, now):
+def _run(table, step, width, i, changed, now, count):
     """Return the arc length up to stage i and set its derivatives."""
     changes, o = changed
-    count, run = now.shape[0] // 5, 0.0
+    run = 0.0
     for q in range(count):
         now[4 * count + q] = 0.0
     for j in range(i):
@@ -90,10 +95,9 @@ def _run(table, step, width, i, changed, now):
 
 
 @inlined
-def _stage(table, step, i, place, changed, now, base, slope):
+def _stage(table, step, i, place, changed, now, base, slope, n):
     """Set the slopes of phi and M at one stage (base) and those of the derivatives of phi, M, X, Y and energy."""
     changes, o = changed
-    n = now.shape[0] // 5
     phi, h, v, moment = place
     s, c = sincos(table[step, i, 0] + phi)
     bends, pulls, slides = table[step, i, 2], table[step, i, 3], table[step, i, 4]
