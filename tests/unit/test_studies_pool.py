@@ -77,9 +77,7 @@ def test_a_job_that_kills_its_worker_twice_is_given_up_alone(doer, deed, cause):
 
 def test_a_job_that_takes_too_long_is_given_up_alone(doer):
     mixed = [(n, "hang" if n in (3, 20) else "square") for n in range(40)]
-    start = time.monotonic()
     done = dict(Pool(2, timeout=0.5)(doer, iter(mixed)))
-    assert time.monotonic() - start < 10
     assert {job[0] for job, outcome in done.items() if isinstance(outcome, Lost)} == {3, 20}
     assert done[3, "hang"].status is Status.TIMEOUT
     assert done[3, "hang"].message == "not finished within 0.5 s"
