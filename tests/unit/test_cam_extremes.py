@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import time
-
 import numpy as np
 import pytest
 from cam_support import analyze, cam, names
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from pace import within
 
 from cfmkit.results import Status
 
@@ -83,6 +82,11 @@ NO_TRAVEL_AT_ALL = {
 BARELY_REACHES = {"rest_half_width": 0.2 * (1 - 1e-5), "profile__stroke": 0.01, "roller_radius": 1e-3}
 
 
+def published():
+    """Analyse the published cam; the slowest of the absurd ones takes as long as five hundred of it."""
+    analyze(cam())
+
+
 @settings(deadline=None, max_examples=300)
 @given(absurd())
 @example(TRACE_OF_FRICTION)
@@ -95,9 +99,8 @@ BARELY_REACHES = {"rest_half_width": 0.2 * (1 - 1e-5), "profile__stroke": 0.01, 
 @example(NO_TRAVEL_AT_ALL)
 @example(BARELY_REACHES)
 def test_an_absurd_mechanism_has_an_answer_with_a_reason(changes):
-    began = time.process_time()
-    result = analyze(cam(**changes))
-    assert time.process_time() - began < 2
+    with within(5000, published):
+        result = analyze(cam(**changes))
     if not result.status.usable:
         assert len(names(result)) == 1
         return

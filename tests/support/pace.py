@@ -1,0 +1,31 @@
+"""Processor time in units of a known task, so that no test fails on a slow machine."""
+
+from __future__ import annotations
+
+import time
+from contextlib import contextmanager
+from functools import cache
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+
+@cache
+def usual(task: Callable[[], object]) -> float:
+    """Return the least processor time of a task in ten rounds [s]."""
+    spent = []
+    for _ in range(10):
+        start = time.process_time()
+        task()
+        spent.append(time.process_time() - start)
+    return min(spent)
+
+
+@contextmanager
+def within(times: float, task: Callable[[], object]) -> Iterator[None]:
+    """Check that the block takes no longer than a task would so many times."""
+    limit, start = times * usual(task), time.process_time()
+    yield
+    spent = time.process_time() - start
+    assert spent < limit, f"{spent:.3g} s, allowed is {times:g} times the usual task, {limit:.3g} s"
