@@ -288,6 +288,20 @@ def test_the_force_wanted_is_reached_with_stretching_too_and_the_error_of_equati
     assert "off by" in {item.name: item.message for item in design.warnings}["rescale_approximate"]
 
 
+def test_equation_6_is_not_blamed_for_a_width_and_is_for_a_size():
+    """The share of stretching goes with (thickness / size)^2: twice the size has a quarter of it."""
+    axial = ("mechanism.axial=true", "design.rescale.force=12 N")
+    assert not {item.name for item in cfmkit.design(config("beam_lan2010", *axial)).warnings} & {"rescale_approximate"}
+    stiff = value(solved("beam_lan2010"), "nominal_force")
+    soft = value(solved("beam_lan2010", "mechanism.axial=true"), "nominal_force")
+    error = 100 * (1 + (soft / stiff - 1) / 4) / (soft / stiff) - 100
+    for change in ("design.rescale.force=12 N", "design.rescale.free=width"):
+        design = cfmkit.design(config("beam_lan2010", "mechanism.axial=true", change, "design.rescale.size=64 mm"))
+        told = {item.name: item.message for item in design.warnings}["rescale_approximate"]
+        assert float(told.split("off by ")[1].split(" %")[0]) == pytest.approx(error, rel=0.1)
+        assert told.endswith("; corrected") == ("force" in change)
+
+
 def test_a_size_scales_every_length_in_the_plane():
     spec = config("beam_lan2010", "design.rescale.size=64 mm")
     scaled = cfmkit.design(spec).spec

@@ -49,7 +49,7 @@ def rescaled(spec: BeamSpec, wanted: Rescale) -> Design:
         What is to change.
     """
     changed = changed_spec(spec, wanted)
-    found: list[Finding] = []
+    found = _validity(spec, wanted)
     for _ in range(ROUNDS):
         before = changed
         if wanted.to_allowable_stress:
@@ -62,7 +62,6 @@ def rescaled(spec: BeamSpec, wanted: Rescale) -> Design:
         again, reached = _corrected(changed, wanted, force)
         if reached is None:
             return Design(None, Status.INFEASIBLE, f"no {wanted.free} gives {format_short(wanted.force, 'force')}")
-        found = found or _validity(changed, wanted, force)
         changed = again
         if changed == before or not wanted.to_allowable_stress:
             break
@@ -198,14 +197,32 @@ def _windowed(spec: BeamSpec, start: float, end: float) -> BeamSpec:
     return spec.model_copy(update={"analysis": spec.analysis.model_copy(update=update)})
 
 
-def _validity(spec: BeamSpec, wanted: Rescale, force: float) -> list[Finding]:
-    """Say how far Eq. 6 alone is off where beams stretch."""
-    target = math.copysign(wanted.force or 0.0, force)
-    if spec.fidelity == "inextensible" or abs(force / target - 1) <= CLOSE:
+def _validity(spec: BeamSpec, wanted: Rescale) -> list[Finding]:
+    """Say how far Eq. 6 alone is off where beams stretch: at the end of the window as given, times the size."""
+    if spec.fidelity == "inextensible" or (force := _force(spec)) is None:
         return []
-    reached = _force(_scaled(spec, wanted.free, (target / force) ** (1 / EXPONENTS[wanted.free])))
-    told = "" if reached is None else f": by it alone the force would be off by {100 * (reached / target - 1):+.2f} %"
-    return [finding("rescale_approximate", f"Eq. 6 is exact only for beams that do not stretch{told}; corrected")]
+    changed = changed_spec(spec, wanted)
+    predicted = force * _force_ratio(spec.mechanism, changed.mechanism)
+    if wanted.force is not None:
+        target = math.copysign(wanted.force, predicted)
+        changed = _scaled(changed, wanted.free, (target / predicted) ** (1 / EXPONENTS[wanted.free]))
+        predicted = target
+    reached = _force(changed)
+    if reached is not None and abs(reached / predicted - 1) <= CLOSE:
+        return []
+    told = (
+        "" if reached is None else f": by it alone the force would be off by {100 * (reached / predicted - 1):+.2g} %"
+    )
+    corrected = "; corrected" if wanted.force is not None else ""
+    return [finding("rescale_approximate", f"Eq. 6 is exact only for beams that do not stretch{told}{corrected}")]
+
+
+def _force_ratio(old: Mechanism, new: Mechanism) -> float:
+    """Return the force of one mechanism over that of another by Eq. 6: E b h^3 / L_x^2."""
+    moduli = [values_of(one.material).youngs_modulus for one in (new, old)]
+    widths = (new.width / old.width) ** EXPONENTS["width"]
+    thicknesses = (thickest(new.thickness) / thickest(old.thickness)) ** EXPONENTS["thickness"]
+    return float(moduli[0] / moduli[1] * widths * thicknesses * (size_of(new) / size_of(old)) ** EXPONENTS["size"])
 
 
 def _stress(spec: BeamSpec) -> list[Finding]:
