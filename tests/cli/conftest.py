@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import json
 import os
 import subprocess
@@ -14,6 +15,8 @@ import pytest
 
 COMMAND = Path(sys.executable).parent / "cfmkit"
 CONFIGS = Path(__file__).parents[2] / "configs"
+PR_CAPBSET_DROP = 24  # linux/prctl.h
+CAPABILITIES = (1, 2)  # CAP_DAC_OVERRIDE and CAP_DAC_READ_SEARCH of linux/capability.h
 
 
 @dataclass(frozen=True)
@@ -28,6 +31,15 @@ class Outcome:
     def document(self) -> dict[str, Any]:
         """Standard output as the one JSON document that it must be."""
         return json.loads(self.out)
+
+
+def as_a_user() -> None:
+    """Give up root's right to pass over file permissions, in the process that is about to become the command."""
+    if os.geteuid() == 0:
+        prctl = ctypes.CDLL(None, use_errno=True).prctl
+        for capability in CAPABILITIES:
+            if prctl(PR_CAPBSET_DROP, capability, 0, 0, 0):
+                raise OSError(ctypes.get_errno(), "cannot give up a capability")
 
 
 class Cli:
@@ -62,6 +74,12 @@ class Cli:
         pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE} | options
         environment = self.environment(**(env_more or {}))
         return subprocess.Popen([COMMAND, *arguments], cwd=self.folder, env=environment, **pipes)
+
+    def permitted(self, *arguments: str) -> Outcome:
+        """Run a command that may read and write what its owner may, root or not."""
+        process = self.start(*arguments, preexec_fn=as_a_user)
+        out, err = process.communicate(timeout=60)
+        return Outcome(process.returncode, out.decode(), err.decode())
 
     @staticmethod
     def environment(**more: str) -> dict[str, str]:
