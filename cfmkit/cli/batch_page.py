@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from rich.table import Table
 from rich.text import Text
 
-from cfmkit.cli.layout import paragraph, written
+from cfmkit.cli.layout import across, paragraph, written
 from cfmkit.cli.terminal import BAD, FAINT, GOOD, LABEL
 from cfmkit.errors import ExitCode
 from cfmkit.studies.batch import message, outcome
@@ -28,8 +28,7 @@ def show_batch(entries: Sequence[Entry], ending: Ending, terminal: Terminal) -> 
 
 
 def _page(entries: Sequence[Entry], ending: Ending, terminal: Terminal) -> Iterator[RenderableType]:
-    left, right = Text(message(entries), LABEL), f"{ending.seconds:.2f} s"
-    yield Text.assemble(left, " " * max(2, terminal.width - left.cell_len - len(right)), (right, FAINT))
+    yield across(Text(message(entries), LABEL), f"{ending.seconds:.2f} s", terminal.width)
     yield Text()
     yield _table(entries)
     yield Text()

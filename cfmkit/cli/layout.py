@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from cfmkit.cli.rows import Row
     from cfmkit.cli.runs import Outcome
     from cfmkit.cli.terminal import Terminal
+    from cfmkit.spec import Spec
 
 MARGIN = 9
 """Columns of the words that begin a paragraph: ``warning``, ``written``."""
@@ -64,11 +65,8 @@ def cure_command(outcome: Outcome, cure: str) -> str:
 def _header(outcome: Outcome, width: int) -> Text:
     spec = outcome.report.result.spec
     done = outcome.verb.done if outcome.report.result.status.usable else "tried"
-    left = Text.assemble((spec.family, LABEL), "  ", " ".join(spec.name.split()))
-    right = f"{done} in {outcome.seconds:.2f} s"
-    if left.cell_len + len(right) + 2 > width:
-        return left
-    return Text.assemble(left, " " * (width - left.cell_len - len(right)), (right, FAINT))
+    left, right = title(spec), f"{done} in {outcome.seconds:.2f} s"
+    return left if left.cell_len + len(right) + 2 > width else across(left, right, width)
 
 
 def _numbers(listed: Iterable[Row]) -> Table:
@@ -135,6 +133,16 @@ def _braced(names: Iterable[str], most: int | None) -> Iterator[str]:
         else:
             more = ["..."] if len(bases) > most else []
             yield f"{folder}/{{{','.join([*bases[:most], *more])}}}"
+
+
+def title(spec: Spec) -> Text:
+    """Return what a page is about: the family and the name, on one line."""
+    return Text.assemble((spec.family, LABEL), "  ", " ".join(spec.name.split()))
+
+
+def across(left: Text, right: str, width: int) -> Text:
+    """Return a line with one text at each of its ends."""
+    return Text.assemble(left, " " * max(2, width - left.cell_len - len(right)), (right, FAINT))
 
 
 def paragraph(word: str, text: str, width: int, style: str = LABEL) -> Iterator[Text]:

@@ -9,7 +9,7 @@ from rich.table import Table
 from rich.text import Text
 
 from cfmkit.cli.answer import Answer
-from cfmkit.cli.layout import paragraph, written
+from cfmkit.cli.layout import across, paragraph, title, written
 from cfmkit.cli.terminal import BAD, FAINT, GOOD, LABEL
 from cfmkit.errors import ExitCode
 from cfmkit.studies.sensitivity.output import as_json, exit_code, message, warnings
@@ -88,12 +88,11 @@ def _page(
 
 
 def _header(found: Findings, seconds: float, width: int) -> Text:
-    spec, evaluator = found.setup.study.spec, found.evaluator
+    evaluator = found.evaluator
     reused = sum(piece.records.reused for piece in evaluator.pieces)
     right = f"{found.setup.method}, {evaluator.count} samples in {seconds:.2f} s"
     right += f", {reused} from the journal" if reused else ""
-    left = Text.assemble((spec.family, LABEL), "  ", spec.name)
-    return Text.assemble(left, " " * max(2, width - left.cell_len - len(right)), (right, FAINT))
+    return across(title(found.setup.study.spec), right, width)
 
 
 def _yields(found: Findings, share: Yield) -> Table:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from rich.table import Table
 from rich.text import Text
 
-from cfmkit.cli.layout import paragraph, written
+from cfmkit.cli.layout import across, paragraph, title, written
 from cfmkit.cli.terminal import BAD, FAINT, GOOD, LABEL
 from cfmkit.errors import ExitCode
 
@@ -38,11 +38,10 @@ def _page(ending: Ending, terminal: Terminal) -> Iterator[RenderableType]:
 
 
 def _header(ending: Ending, width: int) -> Text:
-    spec, records = ending.records.work.study.spec, ending.records
+    records = ending.records
     reused = f", {records.reused} from the journal" if records.reused else ""
     right = f"{records.finished} points in {ending.seconds:.2f} s{reused}"
-    left = Text.assemble((spec.family, LABEL), "  ", spec.name)
-    return Text.assemble(left, " " * max(2, width - left.cell_len - len(right)), (right, FAINT))
+    return across(title(records.work.study.spec), right, width)
 
 
 def _numbers(ending: Ending, everything: bool) -> Table:
