@@ -170,22 +170,26 @@ def test_the_end_of_a_run_does_not_remove_the_lock_of_another(tmp_path):
     assert (tmp_path / lock.LOCK).read_bytes() == b"of another run"
 
 
-def _enter_and_leave(path, count):
+def _enter_and_leave(path, count, entered):
     for _ in range(count):
         try:
             with RunFolder(path) as folder:
                 folder.write("a.csv", str(os.getpid()).encode())
+                with entered.get_lock():
+                    entered.value += 1
         except FolderInUse:
             pass
 
 
 def test_runs_that_come_and_go_never_trip_over_each_other(tmp_path):
     context = multiprocessing.get_context("spawn")
-    workers = [context.Process(target=_enter_and_leave, args=(tmp_path / "a" / "out", 150)) for _ in range(3)]
+    entered = context.Value("i", 0)
+    workers = [context.Process(target=_enter_and_leave, args=(tmp_path / "a" / "out", 150, entered)) for _ in range(3)]
     for worker in workers:
         worker.start()
     for worker in workers:
         worker.join()
     assert [worker.exitcode for worker in workers] == [0, 0, 0]
+    assert entered.value > 0
     # A run that did not create the folder leaves it, so it may be there; but it is empty.
     assert listing(tmp_path) in ([], ["a"], ["a", "a/out"])
