@@ -155,6 +155,10 @@ def test_a_cure_is_a_change_that_the_spec_takes(path):
             assert cfmkit.load(path, [cure]) != spec
 
 
+def test_some_configuration_has_a_cure():
+    assert any(item.cures for path in CONFIGS for item in api.analyze(cfmkit.load(path)).warnings)
+
+
 @every_config
 def test_spec_and_curves_survive_the_way_to_another_process(path):
     result = api.analyze(cfmkit.load(path))
