@@ -138,7 +138,9 @@ def test_a_beam_that_names_the_material_of_the_mechanism_is_of_one_material():
     text = (CONFIGS / "beam_lan2010.yaml").read_text()
     material = text[text.index("{youngs_modulus") : text.index("}", text.index("{youngs_modulus")) + 1]
     text = text.replace(material, "pom-lan-2010").replace("b1: {", "b1: {material: pom-lan-2010, ")
-    cantilever(("analysis:", "design: {rescale: {force: 15 N}}\nanalysis:"), text=text)
+    spec = cantilever(("analysis:", "design: {rescale: {force: 15 N}}\nanalysis:"), text=text)
+    assert spec.mechanism.beams["b1"].material == spec.mechanism.material
+    assert spec.mechanism.beams["b2"].material is None
 
 
 def test_switches_choose_the_model_and_the_stress():
