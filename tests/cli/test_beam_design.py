@@ -42,7 +42,7 @@ def test_without_a_shape_the_blocking_limit_and_the_nearest_value_are_named(cli,
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ("design.optimise.free={q: {x: [0 mm, 1 mm]}}", "'q', which is not a node; nodes: a, b"),
+        ("design.optimise.free={q: {x: [0 mm, 1 mm]}}", "there is no node 'q'; nodes are a, b"),
         ("design.optimise.window=[6 mm, 20 mm]", "analysis.travel ends before"),
         ("design.optimise.objective=paper", "needs 'compare'"),
         ("design.rescale={force: 2 N}", "either 'rescale' or 'optimise'"),

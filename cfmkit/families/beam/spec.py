@@ -23,7 +23,7 @@ from cfmkit.families.beam.parts.spec import (
     checked_thickness,
     known_material,
 )
-from cfmkit.families.beam.shaping.spec import Optimise
+from cfmkit.families.beam.shaping.spec import Optimise, optimise_faults
 from cfmkit.families.beam.surface.spec import Surface
 from cfmkit.spec import Analysis, Displacement, Model, Spec, refuse
 from cfmkit.units import DIMENSIONS, Force, Length, Ratio, Torque
@@ -160,6 +160,13 @@ class BeamSpec(Spec):
     def _can_be_rescaled(self) -> Self:
         if obstacles := list(_rescale_faults(self)):
             refuse("BeamSpec", {("design", "rescale"): "; ".join(obstacles)})
+        return self
+
+    @model_validator(mode="after")
+    def _can_be_optimised(self) -> Self:
+        if self.design is not None and self.design.optimise is not None:
+            found = optimise_faults(self.design.optimise, self.mechanism)
+            refuse("BeamSpec", {("design", "optimise", *place): message for place, message in found})
         return self
 
     @property

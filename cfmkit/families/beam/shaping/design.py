@@ -48,8 +48,8 @@ def shaped(spec: BeamSpec, wanted: Optimise, run: Run) -> Design:
     run : Run
         Seed, progress, time budget, processes, notes.
     """
-    problem = fault_of(spec, wanted)
-    if problem:
+    if spec.extent < wanted.window[1] * (1 - 1e-12):
+        problem = "analysis.travel ends before design.optimise.window: let it reach the end of the window"
         return Design(None, Status.INVALID, problem)
     task = task_of(spec, wanted)
     plan = Plan(drawn=wanted.drawn, deadline=deadline_of(wanted.time_budget, run.time_budget))
@@ -70,27 +70,6 @@ def shaped(spec: BeamSpec, wanted: Optimise, run: Run) -> Design:
         notes=notes_of(task, audit, spread, held_by(task, found)),
         tables={"starts": lambda: starts_table(task, result)},
     )
-
-
-def fault_of(spec: BeamSpec, wanted: Optimise) -> str:
-    """Return what keeps the block from making sense with its mechanism; empty if nothing does."""
-    mechanism = spec.mechanism
-    if mechanism.drive.kind != "displacement":
-        return f"design.optimise needs a drive of kind 'displacement', not {mechanism.drive.kind!r}"
-    for name in wanted.free:
-        if name not in mechanism.nodes:
-            return f"design.optimise.free names {name!r}, which is not a node; nodes: {', '.join(mechanism.nodes)}"
-        ranges = (wanted.free[name].x, wanted.free[name].y)
-        if ranges == (None, None) and wanted.limits.envelope is None:
-            return f"design.optimise.free.{name} says no range: give 'x', 'y' or limits.envelope"
-    for name in wanted.beams or ():
-        if name not in mechanism.beams:
-            return f"design.optimise.beams names {name!r}, which is not a beam; beams: {', '.join(mechanism.beams)}"
-    if not wanted.free and (wanted.orders[-1] == 0 or wanted.beams == ()):
-        return "design.optimise leaves nothing to vary: name free nodes, or an order of the shapes above 0"
-    if spec.extent < wanted.window[1] * (1 - 1e-12):
-        return "analysis.travel ends before design.optimise.window: let it reach the end of the window"
-    return ""
 
 
 def task_of(spec: BeamSpec, wanted: Optimise) -> Task:
@@ -154,7 +133,7 @@ def _best(task: Task, result: Explored, spread: Spread, plan: Plan) -> tuple[Fou
     if not candidates:
         some = [one for one in result.found.values() if one is not None]
         if not some:
-            return _nothing(task, result)
+            return _nothing(result, plan)
         if plan.late():
             said = f"none of {len(some)} starts met all limits in the time allowed: give it more, or run again to go on"
             return Design(None, Status.INFEASIBLE, said)
@@ -185,10 +164,10 @@ def _best(task: Task, result: Explored, spread: Spread, plan: Plan) -> tuple[Fou
     return fallback
 
 
-def _nothing(task: Task, result: Explored) -> Design:
+def _nothing(result: Explored, plan: Plan) -> Design:
     if result.lost:
         return Design(None, Status.CRASHED, f"no start came to an end: {'; '.join(result.lost)}")
-    if result.missing:
+    if result.missing or plan.late():
         return Design(None, Status.INFEASIBLE, "the time budget ended before any start led to a design: give it more")
     said = (
         "no random network could be followed over the window without losing stability or crossing beams: "

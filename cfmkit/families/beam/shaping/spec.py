@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
 from cfmkit.spec import Model
 from cfmkit.units import Angle, Force, Length, Ratio, Time
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from cfmkit.families.beam.spec import Mechanism
 
 Range = tuple[Length, Length]
 PositiveLength = Annotated[Length, Field(gt=0)]
@@ -21,10 +26,7 @@ class Box(Model):
 
     @model_validator(mode="after")
     def _increases(self) -> Self:
-        for name in ("x", "y"):
-            low, high = getattr(self, name)
-            if not low < high:
-                raise ValueError(f"{name!r} must be increasing")
+        _check_increasing(self.x, self.y)
         return self
 
 
@@ -34,6 +36,18 @@ class FreeNode(Model):
     x: Range | None = Field(None, description="[left, right]; default: the envelope, if `y` is left out, too")
     y: Range | None = Field(None, description="[bottom, top]; default: the envelope, if `x` is left out, too")
 
+    @model_validator(mode="after")
+    def _increases(self) -> Self:
+        _check_increasing(self.x, self.y)
+        return self
+
+
+def _check_increasing(x: Range | None, y: Range | None) -> None:
+    """Refuse a range that ends before it begins."""
+    for name, given in (("x", x), ("y", y)):
+        if given is not None and not given[0] < given[1]:
+            raise ValueError(f"{name!r} must be increasing")
+
 
 class ForceWanted(Model):
     """The mean force over the window, of all copies together."""
@@ -41,6 +55,12 @@ class ForceWanted(Model):
     min: Annotated[Force, Field(gt=0)] | None = Field(None, description="at least so much")
     target: Annotated[Force, Field(gt=0)] | None = Field(None, description="so much, within `tolerance`")
     tolerance: Annotated[Ratio, Field(gt=0, lt=1)] = Field(0.01, description="share of the target")
+
+    @model_validator(mode="after")
+    def _can_both_hold(self) -> Self:
+        if self.min is not None and self.target is not None and self.target * (1 + self.tolerance) < self.min:
+            raise ValueError("'target' is below 'min'")
+        return self
 
 
 class ShapeLimits(Model):
@@ -104,3 +124,19 @@ class Optimise(Model):
         if self.objective == "paper" and self.compare is None:
             raise ValueError("'objective: paper' needs 'compare': the displacements [a, b]")
         return self
+
+
+def optimise_faults(wanted: Optimise, mechanism: Mechanism) -> Iterator[tuple[tuple[str | int, ...], str]]:
+    """Yield what keeps the block from making sense with its mechanism, each with its place below the block."""
+    if mechanism.drive.kind != "displacement":
+        yield (), f"needs a drive of kind 'displacement', not {mechanism.drive.kind!r}"
+    for name, node in wanted.free.items():
+        if name not in mechanism.nodes:
+            yield ("free", name), f"there is no node {name!r}; nodes are {', '.join(mechanism.nodes)}"
+        elif node.x is None and node.y is None and wanted.limits.envelope is None:
+            yield ("free", name), "no range is given: give 'x', 'y' or limits.envelope"
+    for index, name in enumerate(wanted.beams or ()):
+        if name not in mechanism.beams:
+            yield ("beams", index), f"there is no beam {name!r}; beams are {', '.join(mechanism.beams)}"
+    if not wanted.free and (wanted.orders[-1] == 0 or wanted.beams == ()):
+        yield (), "leaves nothing to vary: name free nodes, or an order of the shapes above 0"
