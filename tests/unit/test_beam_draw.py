@@ -70,3 +70,17 @@ def test_diagrams_say_that_beams_are_left_out():
     for name in ("reactions", "stress"):
         told = [text.get_text() for text in drawn(spec, name).findobj() if hasattr(text, "get_text")]
         assert any("the 6 largest of 8" in text for text in told)
+
+
+def test_forces_under_a_torque_are_those_along_x_and_y():
+    spec = cantilever(
+        ("{kind: displacement, node: tip, direction: -90 deg}", "{kind: rotation, node: tip}"),
+        ("travel: 100 mm", "travel: 20 deg"),
+        ("tip: {at: [400 mm, 0 mm]}", "tip: {at: [400 mm, 0 mm], support: roller, direction: 30 deg}"),
+    )
+    result = cfmkit.analyze(spec)
+    panels = figures(result)["reactions"]().axes
+    for ax, name, column in zip(panels, ("to the right", "upwards"), ("x", "y"), strict=True):
+        (line,) = [line for line in ax.lines if len(line.get_ydata()) > 2]
+        np.testing.assert_allclose(line.get_ydata(), result.curve.extra[f"beam_force_{column}"].values, atol=1e-9)
+        assert ax.get_ylabel() == f"{name} [N]"

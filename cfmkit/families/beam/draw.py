@@ -196,21 +196,21 @@ def _supports(solution: Solution, ax: Axes) -> None:
 def reactions(result: Result) -> Figure:
     """Return the force that each beam exerts on its last node, along the drive and across it [Lan, Fig. 8]."""
     solution: Solution = result.state
-    angle = solution.assembly.direction
-    if solution.spec.mechanism.drive.kind in ("rotation", "moment"):
-        angle = 0.0
+    turned = solution.spec.mechanism.drive.kind in ("rotation", "moment")
+    names = ("to the right", "upwards") if turned else ("against the drive", "across")
+    angle = np.pi if turned else solution.assembly.direction
     c, s = np.cos(angle), np.sin(angle)
     forces = {name: solution.beam_force(name) for name in solution.path.layout.network.beams}
     # against the drive: what holds the load counts as positive
     along = {name: -(force[:, 0] * c + force[:, 1] * s) for name, force in forces.items()}
-    across = {name: force[:, 1] * c - force[:, 0] * s for name, force in forces.items()}
+    across = {name: (force[:, 1] * c - force[:, 0] * s) * (-1 if turned else 1) for name, force in forces.items()}
     negligible = NOTHING * max(float(np.nanmax(np.abs(force[:, :2]))) for force in forces.values())
     along, across = ({name: _rounded(row, negligible) for name, row in rows.items()} for rows in (along, across))
     one = ", one copy" if solution.assembly.parallel > 1 else ""
     heading = Heading.of(result, f"force of each beam on its last node{one}{_left_out(forces)}")
     diagrams = [
-        Diagram(solution.motion, _motion(result), Scale("against the drive", "force"), _series(along)),
-        Diagram(solution.motion, _motion(result), Scale("across", "force"), _series(across)),
+        Diagram(solution.motion, _motion(result), Scale(names[0], "force"), _series(along)),
+        Diagram(solution.motion, _motion(result), Scale(names[1], "force"), _series(across)),
     ]
     return diagram_figure(heading, diagrams)
 
