@@ -123,6 +123,8 @@ class Optimise(Model):
             raise ValueError("'orders' must be increasing, e.g. [0, 1, 2]")
         if self.objective == "paper" and self.compare is None:
             raise ValueError("'objective: paper' needs 'compare': the displacements [a, b]")
+        if self.compare is not None and not self.compare[0] > self.compare[1] > 0:
+            raise ValueError("'compare' is [a, b] with a > b > 0")
         return self
 
 
