@@ -16,6 +16,7 @@ import numpy as np
 from lan_2010 import half
 
 from cfmkit.beams import CLAMPED, Beam, Control, Displacement, Network, Node, Polynomial, Section, guided, trace
+from cfmkit.beams.corotational import recheck
 from cfmkit.beams.layout import Layout
 
 
@@ -147,3 +148,19 @@ def test_a_v_beam_on_its_stable_branch_agrees_with_corotational_elements() -> No
     force = path.effort[path.at_asked]
     other = _compare(network, drive, 20, travel)
     np.testing.assert_allclose(force, other, atol=2e-4 * np.abs(force).max())
+
+
+def test_a_perfect_v_beam_on_its_bifurcated_branch_agrees_with_corotational_elements() -> None:
+    """The second opinion of the package: forces and stability there, and on the symmetric branch that is left."""
+    length, angle = 35e-3, np.radians(7)
+    nodes = {"wall": Node(0, 0, CLAMPED), "d": Node(length * np.cos(angle), length * np.sin(angle), guided(np.pi / 2))}
+    network = Network(nodes, {"v": Beam("wall", "d", Section(1477e6, 6e-3, THICK))})
+    drive = Displacement("d", -np.pi / 2, np.array([0.5e-3, 2e-3, 3e-3, 4e-3, 6e-3]))
+    stable = trace(network, drive, Control(tolerance=1e-9))
+    symmetric = trace(network, drive, Control(tolerance=1e-9, branch="primary"))
+    found, other = recheck(stable, elements=60), recheck(symmetric, elements=60)
+    force = stable.effort[stable.at_asked]
+    np.testing.assert_allclose(found.effort, force, atol=3e-5 * np.abs(force).max())
+    np.testing.assert_allclose(other.effort, symmetric.effort[symmetric.at_asked], atol=3e-5 * np.abs(force).max())
+    assert found.stable.all()
+    assert other.stable.tolist() == [True, False, False, False, True]
