@@ -20,7 +20,7 @@ TEXT = (CONFIGS / "beam_design_arch.yaml").read_text()
         ("{b: {y: [2 mm, 20 mm]}}", "{b: {y: [20 mm, 2 mm]}}", "free.b", "'y' must be increasing"),
         ("{b: {y: [2 mm, 20 mm]}}", "{c: {y: [2 mm, 20 mm]}}", "free.c", "there is no node 'c'; nodes are a, b"),
         ("{min: 0.4 N}", "{min: 0.4 N, target: 0.3 N}", "force", "'target' is below 'min'"),
-        ("starts: 2", "starts: 2\n    compare: [4 mm, 8 mm]", "", "'compare' is [a, b] with a > b > 0"),
+        ("starts: 2", "starts: 2\n    compare: [4 mm, 8 mm]", "compare", "must be [a, b] with a > b > 0"),
         ("starts: 2", "starts: 2\n    beams: [s, r]", "beams.1", "there is no beam 'r'; beams are s"),
     ],
 )  # fmt: skip
@@ -30,9 +30,9 @@ def test_nonsense_is_refused_at_its_place(old, new, path, words):
     with pytest.raises(SpecError) as caught:
         cfmkit.loads(text)
     (fault,) = caught.value.problems
-    assert fault.path == f"design.optimise.{path}".rstrip(".")
+    assert fault.path == f"design.optimise.{path}"
     assert words in fault.message
-    assert fault.line >= 20
+    assert fault.line > 20
 
 
 def test_nothing_that_may_vary_is_refused():

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from cfmkit.spec import Model
+from cfmkit.spec import Model, refuse
 from cfmkit.units import Angle, Force, Length, Ratio, Time
 
 if TYPE_CHECKING:
@@ -124,7 +124,7 @@ class Optimise(Model):
         if self.objective == "paper" and self.compare is None:
             raise ValueError("'objective: paper' needs 'compare': the displacements [a, b]")
         if self.compare is not None and not self.compare[0] > self.compare[1] > 0:
-            raise ValueError("'compare' is [a, b] with a > b > 0")
+            refuse("Optimise", {("compare",): "must be [a, b] with a > b > 0"})
         return self
 
 
