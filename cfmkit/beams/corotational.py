@@ -262,11 +262,11 @@ class _Elements:
         for name in self.layout.masters:
             u[self.layout.first[name] : self.layout.first[name] + 3] = path.motion(name)[index]
         sampler, scale = path.sampler, self.layout.scales.length
-        rest = np.empty(sampler.states.shape[1:])
+        rest = np.empty((1, *sampler.states.shape[1:]))
         from cfmkit.beams.kernels import entry
 
-        entry.states(sampler.model, path.solver.n_free, path.solver.unstressed(), 0.0, rest)
-        moved = sampler.states[index] - rest
+        entry.states(sampler.model, path.solver.n_free, path.solver.unstressed()[None], np.zeros(1), rest)
+        moved = sampler.states[index] - rest[0]
         first = 3 * len(self.layout.masters)
         for k, (beam, t) in enumerate(self.inner):
             rows = sampler.rows(beam)

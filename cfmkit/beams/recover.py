@@ -52,8 +52,7 @@ class Sampler:
         self.states = np.empty((len(points), count, 7))
         self.drive = points.drive
         self._rows: dict[int, Rows] = {}
-        for k in range(len(points)):
-            entry.states(self.model, solver.n_free, points.y[k], points.drive[k], self.states[k])
+        entry.states(self.model, solver.n_free, np.ascontiguousarray(points.y), points.drive, self.states)
 
     def rows(self, beam: int) -> Rows:
         """Return the rows of a beam in order; segment boundaries occur twice."""
@@ -125,9 +124,9 @@ class Sampler:
         )
         old = self.states[points, rows.index[start]]
         y = np.concatenate([np.zeros(3 * count), old[:, [X, Y, TURN, H, V, MOMENT]].ravel()])
-        out = np.empty((2 * count, 7))
-        entry.states(single, 0, y, 0.0, out)
-        return out[1::2]
+        out = np.empty((1, 2 * count, 7))
+        entry.states(single, 0, y[None], np.zeros(1), out)
+        return out[0, 1::2]
 
     def load(self, beam: int, points: Any) -> Any:
         """Return the line load on a beam at points (k,), (k, 2), dimensionless."""

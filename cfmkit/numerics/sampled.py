@@ -58,18 +58,18 @@ def _vertex(t: FloatArray, f: FloatArray, otherwise: FloatArray) -> FloatArray:
     return result
 
 
-def soft_least(values: FloatArray, sharpness: float) -> tuple[float, FloatArray]:
-    """Return a smooth lower bound of the least of some values, and its derivatives by them.
+def soft_least(values: FloatArray, sharpness: float) -> tuple[FloatArray, FloatArray]:
+    """Return smooth lower bounds (...) of the least of values (..., n) along the last axis, and their derivatives.
 
     -ln(sum(exp(-k v)))/k lies below the least by at most ln(n)/k.
 
     Examples
     --------
     >>> least, weights = soft_least(np.array([1.0, 2.0]), 50.0)
-    >>> round(least, 6), weights.round(6).tolist()
+    >>> float(least.round(6)), weights.round(6).tolist()
     (1.0, [1.0, 0.0])
     """
-    lowest = values.min()
-    powers = np.exp(-sharpness * (values - lowest))
-    total = powers.sum()
-    return float(lowest - np.log(total) / sharpness), powers / total
+    lowest = values.min(axis=-1)
+    powers = np.exp(-sharpness * (values - lowest[..., None]))
+    total = powers.sum(axis=-1)
+    return lowest - np.log(total) / sharpness, powers / total[..., None]

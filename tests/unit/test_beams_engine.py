@@ -135,11 +135,11 @@ def test_flow_derivatives_are_those_of_complex_steps() -> None:
         steps = np.eye(solver.size)[solver.n + 2 : solver.n + 6]  # start rotation, h, v, m of the first segment
         ends = []
         for step in steps:
-            out = np.empty((rows, 7), dtype=complex)
+            out = np.empty((1, rows, 7), dtype=complex)
             first = solver.model.segment_step[1]
             tilted = y + 1e-30j * step
-            entry.states(solver.model, solver.n_free, tilted, 0.0 + 0.0j, out)
-            ends.append(out[first].imag / 1e-30)
+            entry.states(solver.model, solver.n_free, tilted[None], np.zeros(1, dtype=complex), out)
+            ends.append(out[0, first].imag / 1e-30)
         ends = np.array(ends)  # rows: by rotation, h, v, m; columns: x, y, rotation, moment
         # after one segment: dq = A dq_a + B dp, dp_b = C dq_a + D dp with D the identity but for its last row
         last = np.eye(3)

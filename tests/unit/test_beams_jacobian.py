@@ -42,9 +42,9 @@ def unfolded(solver: Solver, free: np.ndarray, first: np.ndarray, drive: float) 
     parts, last = y[solver.n :].reshape(-1, 6), y[solver.n_free : solver.n].reshape(-1, 3)
     parts[m.beam_segment[:-1], :3], parts[m.beam_segment[:-1], 3:] = poses(solver, free, drive), first
     for _ in range(int(np.diff(m.beam_segment).max())):
-        states = np.empty((len(solver.cut.edges) + solver.n_segments, 7))
-        entry.states(m, solver.n_free, y, drive, states)
-        ends = states[m.segment_step[1:] + np.arange(solver.n_segments)][:, [0, 1, 2, 4, 5, 3]]
+        states = np.empty((1, len(solver.cut.edges) + solver.n_segments, 7))
+        entry.states(m, solver.n_free, y[None], np.array([drive]), states)
+        ends = states[0, m.segment_step[1:] + np.arange(solver.n_segments)][:, [0, 1, 2, 4, 5, 3]]
         inner = np.setdiff1d(np.arange(solver.n_segments), m.beam_segment[:-1])
         parts[inner] = ends[inner - 1]
     last[:] = ends[m.beam_segment[1:] - 1, 3:]

@@ -51,8 +51,9 @@ def _doors(stamp: str) -> tuple[Any, ...]:
         return 0, 0
 
     @door(stamp)
-    def states(m, n_free, y, drive, out):
-        return _states(m, n_free, y, drive, out)
+    def states(m, n_free, ys, drives, out):
+        for p in range(ys.shape[0]):
+            _states(m, n_free, ys[p], drives[p], out[p])
 
     @door(stamp)
     def slopes(m, tilt, n_free, ys, drives, outs, scratch):

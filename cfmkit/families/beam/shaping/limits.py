@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.beam.shaping.lengths import Length, lengths
 from cfmkit.families.beam.shaping.separation import Pair, pairs, separations
 from cfmkit.numerics.sampled import largest
 
@@ -17,6 +15,7 @@ if TYPE_CHECKING:
 
     from cfmkit.beams import Section
     from cfmkit.curves import FloatArray
+    from cfmkit.families.beam.shaping.lengths import Length
     from cfmkit.families.beam.shaping.poses import Poses
     from cfmkit.families.beam.shaping.response import Response
 
@@ -41,10 +40,10 @@ class View:
     start: float
     sloped: bool = False
 
-    @cached_property
+    @property
     def lengths(self) -> dict[str, Length]:
         """Lengths of all beams."""
-        return lengths(self.response.variables, self.response.x)
+        return self.response.lengths
 
     def rows(self, values: FloatArray, slopes: Callable[[], FloatArray], about: Callable[[], list[str]]) -> Rows:
         """Return rows; the derivatives are computed only if they are wanted."""

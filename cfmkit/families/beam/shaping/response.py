@@ -10,6 +10,7 @@ import numpy as np
 
 from cfmkit.beams import Control, Displacement, PathStatus, Taper, gradient, trace
 from cfmkit.errors import CfmError
+from cfmkit.families.beam.shaping.lengths import Length, lengths
 
 if TYPE_CHECKING:
     from cfmkit.beams import Path, Section
@@ -64,6 +65,11 @@ class Response:
     def keep(self) -> Any:
         """Indices of the poses on the path."""
         return self.path.at_asked
+
+    @cached_property
+    def lengths(self) -> dict[str, Length]:
+        """Lengths of all beams."""
+        return lengths(self.variables, self.x)
 
     @cached_property
     def state(self) -> State:

@@ -63,11 +63,11 @@ def separations(view: View, pair: Pair) -> tuple[FloatArray, Callable[[], FloatA
     dx, dy = a.x[shown][:, i] - b.x[shown][:, j], a.y[shown][:, i] - b.y[shown][:, j]
     distance = np.hypot(dx, dy) + 1e-12
     ratio = distance / required[i, j]
-    soft = [soft_least(row, SHARPNESS) for row in ratio]
+    soft, weights = soft_least(ratio, SHARPNESS)
 
     def slopes() -> FloatArray:
         by = {name: thinned(view.response.slopes.lines[name]) for name in pair.beams}
-        share = np.array([weights for _, weights in soft]) / required[i, j]
+        share = weights / required[i, j]
         out = []
         for q, pose in enumerate(shown):
             pull = np.stack([share[q] * dx[q] / distance[q], share[q] * dy[q] / distance[q]])
@@ -80,7 +80,7 @@ def separations(view: View, pair: Pair) -> tuple[FloatArray, Callable[[], FloatA
             out.append(total - np.tensordot(push, by_way[:, i, j], axes=(0, 1)))
         return np.array(out)
 
-    return np.array([value for value, _ in soft]) - 1.0, slopes
+    return soft - 1.0, slopes
 
 
 def thinned(line: Line) -> Line:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -116,7 +117,7 @@ class Task:
     compared: tuple[float, float] | None = None
     points: int = 17
 
-    @property
+    @cached_property
     def size(self) -> float:
         """The unit of length: the largest distance along an axis of coordinates that do not vary, and of ranges [m].
 
