@@ -175,8 +175,8 @@ def test_a_design_whose_exact_leaves_cannot_be_followed_is_refused_with_a_longer
     class Jumping(ExactSampler):
         """Leaves that jump where they are thick."""
 
-        def __init__(self, spec, end, back):
-            super().__init__(spec, end, back)
+        def __init__(self, spec, *arguments):
+            super().__init__(spec, *arguments)
             about = spec.mechanism.bistable
             if about.length * np.sin(about.angle) < 3.19 * about.thickness:
                 self.problem = "the leaves jump"
@@ -190,7 +190,7 @@ def test_a_design_whose_exact_leaves_cannot_be_followed_is_refused_with_a_longer
 
 def test_every_finding_is_explained_and_no_other_can_be_made():
     tested = {*CASES, "preload_out_of_range", "force_reversal", "unstable_branch", "stroke_unreachable"}
-    designs = {"too_thin", "envelope", "stress_unreachable"}  # the first two: test_vcfm_model.py
+    designs = {"too_thin", "envelope", "stress_unreachable"}  # the first two: test_vcfm_design.py
     assert tested | designs == set(FINDINGS)
     with pytest.raises(KeyError):
         finding("bad_luck", "")

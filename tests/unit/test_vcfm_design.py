@@ -1,0 +1,78 @@
+"""Designs of the vcfm family: limits, the exact pass, equivalent targets."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from vcfm_support import CONFIGS, TABLE_I
+
+import cfmkit
+from cfmkit import api
+from cfmkit.results import Status
+
+
+def designed(*changes, stem="vcfm_pla"):
+    return api.design(cfmkit.load(CONFIGS / f"{stem}.yaml", changes))
+
+
+LIMITS = {
+    "design.stroke=5.8 mm": ("stroke_unreachable", "design.stroke"),
+    "design.min_thickness=1.2 mm": ("too_thin", "design.stroke"),
+    "design.max_span=50 mm": ("envelope", "design.max_span"),
+    "design.max_width=8 mm": ("envelope", "design.max_width"),
+    "design.leaf_length=25 mm": ("yield", "design.leaf_length"),
+    "mechanism.bistable.half_beams=8": ("out_of_plane_buckling", "design.leaf_length"),
+}
+
+
+@pytest.mark.parametrize("change", LIMITS)
+def test_a_limit_is_named_and_the_nearest_feasible_value_works(change):
+    name, path = LIMITS[change]
+    more = ("design.min_thickness=0.5 mm",) if name == "stroke_unreachable" else ()
+    found = designed(change, *more)
+    assert found.status is Status.INFEASIBLE
+    assert found.warnings[0].name == name
+    assert set(found.nearest_feasible) == {path}
+    cured = designed(change, *more, f"{path}={found.nearest_feasible[path]}")
+    assert cured.status is Status.COMPLETE, cured.message
+
+
+def test_leaves_that_cannot_buckle_have_no_nearest_stroke():
+    found = designed("design.min_thickness=2 mm")
+    assert found.warnings[0].name == "too_thin"
+    assert "above 6.283 mm" in found.message
+    assert found.nearest_feasible == {}
+
+
+def test_a_design_without_strength_or_targets_is_invalid():
+    assert "allowable_stress" in designed("mechanism.material={youngs_modulus: 1477 MPa}").message
+    assert api.design(cfmkit.load(TABLE_I)).status is Status.INVALID
+
+
+def test_the_exact_pass_brings_the_exact_mean_to_the_target():
+    for refine, error in ((True, 2e-4), (False, 9e-3)):
+        found = designed(f"design.refine={str(refine).lower()}")
+        exact = api.analyze(found.spec.replace({"analysis.fidelity": "exact"}))
+        mean = api.evaluate(exact, ["force_mean"])["force_mean"].value
+        assert abs(mean / 11.15 - 1) < error
+        assert (abs(mean / 11.15 - 1) > 2e-3) is not refine
+
+
+def test_rise_and_preload_say_the_same():
+    one, other = (
+        designed("design={force: 11.15 N, adjustment: 5 N, stroke: 3.8 mm, rise: 4.265 mm}"),
+        designed("design={force: 11.15 N, adjustment: 5 N, stroke: 3.8 mm, preload: 1.9125560538116592 mm}"),
+    )
+    sizes = "mechanism.bistable.thickness", "mechanism.bistable.width", "mechanism.positive.width"
+    assert [one.spec.at(path) for path in sizes] == pytest.approx([other.spec.at(path) for path in sizes], rel=1e-9)
+
+
+def test_the_sizes_of_a_design_follow_its_targets_without_jumps():
+    """Targets 1e-9 apart: to which side the leaves buckle is open, and must not show."""
+    paths = "mechanism.bistable.width", "mechanism.positive.width"
+    found = []
+    for change in range(6):
+        preload = 1.9125560538116592 * (1 + 1e-9 * change)
+        spec = designed(f"design={{force: 11.15 N, adjustment: 5 N, stroke: 3.8 mm, preload: {preload!r} mm}}").spec
+        found.append([spec.at(path) for path in paths])
+    assert np.abs(np.diff(np.log(found), 2, axis=0)).max() < 1e-10
