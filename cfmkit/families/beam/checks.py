@@ -58,6 +58,8 @@ def _window(solution: Solution) -> Iterator[Finding]:
 
 def _closure(solution: Solution) -> Iterator[Finding]:
     """Say how each beam was fitted, or what it costs to force it."""
+    if moved := _moved(solution):
+        yield finding("closure_adjusted", f"nodes were moved to where the beams end: {', '.join(moved)}")
     beams = solution.path.layout.network.beams
     fits = {
         name: one
@@ -86,6 +88,18 @@ def _closure(solution: Solution) -> Iterator[Finding]:
         for name, one in fits.items()
     )
     yield finding("closure_adjusted", f"beams were turned and scaled to fit between their nodes: {told}")
+
+
+def _moved(solution: Solution) -> list[str]:
+    """Return the nodes that the closure "chain" moved, each with how far."""
+    if solution.spec.mechanism.closure != "chain":
+        return []
+    layout, found = solution.path.layout, []
+    for name, node in solution.spec.mechanism.nodes.items():
+        way = float(np.hypot(*(np.real(np.array(layout.position(name))) - node.at)))
+        if way > NEGLIGIBLE * layout.scales.length:
+            found.append(f"{name} by {format_short(way, 'length')}")
+    return found
 
 
 def _effort(solution: Solution) -> str:
