@@ -144,7 +144,9 @@ def _null_of(solver: Solver, spot: Spot, regular: Spot) -> FloatArray:
     matrix, _ = solver.tangent_at(spot.y, spot.drive)
     null = _null_vector(matrix * np.outer(balance, balance))
     direction = null * balance
-    direction *= np.sign(direction[np.argmax(np.abs(null))]) / np.linalg.norm(direction)
+    # in a symmetric network several entries are the largest: the first decides the side, not rounding
+    leading = np.flatnonzero(np.abs(null) > 0.99 * np.abs(null).max())[0]
+    direction *= np.sign(direction[leading]) / np.linalg.norm(direction)
     return np.asarray(direction)
 
 

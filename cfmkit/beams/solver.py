@@ -102,7 +102,7 @@ class Solver:
             np.zeros((2, 3)),
             np.zeros((self.n_beams, 6, 3, 3)),
             np.zeros((self.n_segments, 7, 3, 3)),
-            np.zeros((8, 12, 20)),
+            (np.zeros((8, 12, 20)), np.zeros((2, 3, 4)), np.zeros((3, 3))),
             np.zeros(self.size),
         )
 

@@ -18,6 +18,11 @@ def test_a_cubic_is_met_exactly(coefficients, place):
     assert value_at(X, np.polyval(coefficients, X), place) == pytest.approx(np.polyval(coefficients, place), abs=1e-10)
 
 
+@given(st.lists(st.floats(-1e3, 1e3), min_size=6, max_size=6), st.floats(0, 3.1))
+def test_one_place_gives_what_many_give(values, place):
+    assert value_at(X, np.array(values), place) == values_at(X, np.array(values), np.array([place]))[0]
+
+
 def test_the_error_falls_with_the_fourth_power_of_the_spacing():
     errors = []
     for count in (11, 21, 41):

@@ -62,7 +62,8 @@ def sweep(m, e, y, first_slot, drive, ends, rel, store, work):
     ends: poses of the two ends; first_slot: index in y of the beam's last force followed by that of its segments.
     Returns the change of the inertia by the eliminated unknowns and the smallest dM1/dM0 of a segment.
     """
-    out, drv = work[2, 3], work[2, 4]
+    room = work[0]
+    out, drv = room[2, 3], room[2, 4]
     grows = m.line_load[e, 1, 0] != 0.0 or m.line_load[e, 1, 1] != 0.0
     load = (
         m.line_load[e, 0, 0] + drive * m.line_load[e, 1, 0],
@@ -85,7 +86,7 @@ def sweep(m, e, y, first_slot, drive, ends, rel, store, work):
         if j == begin:
             y[at], y[at + 1], y[at + 2] = ends[0, 0], ends[0, 1], ends[0, 2]
         start = (y[at + 2], y[at + 3], y[at + 4], y[at + 5])
-        h, v = flow(m.table, m.width, steps, start, load, out, work)
+        h, v = flow(m.table, m.width, steps, start, load, out, room)
         if grows:
             _drive_column(m, e, steps, start, load, drv)
         if j + 1 < end:

@@ -35,8 +35,8 @@ def assemble(m, y, drive, n_free, h, residual, values, ends, rel, store, work):
     n_beams = m.beam_end.shape[0]
     n_dofs = values.shape[0]
     n = n_free + 3 * n_beams
-    w = work[4]
-    ja, jb, force = w[0:3, :4], w[3:6, :4], w[6]
+    room, jacobians, _ = work
+    ja, jb, force = jacobians[0], jacobians[1], room[4, 0]
     places, wires = places_of(m), wires_of(m)
     index, least = 0, 1.0
     add_loads(m, values, drive, h, residual, work)
@@ -207,7 +207,8 @@ def solve_each(m, n_free, ys, drives, limits, solved, scratch):
 @kernel
 def _unfold_all(m, n_free, n, ddrive, values, rel, store, dy, work):
     """Set the increments of the segments' unknowns from those of z (already in dy) and of the drive."""
-    dpose, jac, pose = work[7, 0], work[7, 1:4, :4], work[7, 4]
+    room, jacobians, _ = work
+    dpose, jac, pose = room[7, 0], jacobians[0], room[7, 1]
     places = places_of(m)
     for e in range(m.beam_end.shape[0]):
         ia = m.beam_end[e, 0]

@@ -68,7 +68,8 @@ def add_force(wires, h, residual, i, arm, jac, force):
 @kernel
 def add_loads(m, values, drive, h, residual, work):
     """Add the point loads, dead or turning with their node."""
-    pose, jac, force, column = work[5, 0], work[5, 1:4, :4], work[5, 4], work[5, 5]
+    room, jacobians, _ = work
+    pose, jac, force, column = room[5, 0], jacobians[0], room[5, 1], room[5, 2]
     n = h.shape[0] - 1
     places, wires = places_of(m), wires_of(m)
     for k in range(m.load_place.shape[0]):
@@ -131,9 +132,8 @@ def spring_law(kind, value, pa, pb, force, block):
 @kernel
 def add_springs(m, values, h, residual, work):
     """Add the springs; return their energy."""
-    w = work[6]
-    pa, pb, force, block = w[0], w[1], w[2], w[3:6, :3]
-    ja, jb = w[6:9, :4], w[9:12, :4]
+    room, jacobians, block = work
+    pa, pb, force, ja, jb = room[6, 0], room[6, 1], room[6, 2], jacobians[0], jacobians[1]
     places, wires = places_of(m), wires_of(m)
     energy = 0.0
     for k in range(m.spring_kind.shape[0]):

@@ -114,24 +114,18 @@ class ExactSampler:
         How far the shuttle goes [m].
     back : float
         How far it is pulled back at most, positive [m].
-    tolerance : float
-        Error of the force of the pushed leaves and of the spring allowed, relative to the largest of the path [1].
     """
 
-    def __init__(self, spec: VcfmSpec, end: float, back: float, tolerance: float = 1e-7) -> None:
+    def __init__(self, spec: VcfmSpec, end: float, back: float) -> None:
         """Trace leaf and spring."""
         about, preloads = spec.mechanism.bistable, spec.analysis.preloads
         network, back = leaf_network(spec), max(back, 0.02 * end)
         self.each = about.half_beams * (1.0 if about.guided else 0.5)
-        self.pushed = traced(
-            network, "shuttle", end, branch=spec.analysis.branch, imperfection=about.waviness, tolerance=tolerance
-        )
+        self.pushed = traced(network, "shuttle", end, branch=spec.analysis.branch, imperfection=about.waviness)
         self.pulled = traced(network, "shuttle", -back, tolerance=1e-6)
         self.chain = spring_chain(spec)
         ends = (max(preloads) + end, min(min(preloads) - back, -0.02 * end))
-        self.sides = [
-            traced(self.chain.network, self.chain.node, self.chain.travel * side, tolerance=tolerance) for side in ends
-        ]
+        self.sides = [traced(self.chain.network, self.chain.node, self.chain.travel * side) for side in ends]
         problems = [one.problem for one in (self.pushed, self.pulled, *self.sides)]
         self.problem = next((text for text in problems if text), "")
 

@@ -27,13 +27,6 @@ MIDDLE = 0.84
 
 RESCALES = 4
 
-ACCURATE = 1e-8
-"""Error allowed of the exact force that widths are fitted to [1].
-
-Leaves that buckle to one side are computed with other errors than their mirror image: allowed 1e-7, a width would tell
-in its eighth digit which of the two it was.
-"""
-
 
 def refined(spec: VcfmSpec, sizes: Sizes) -> Sizes:
     """Return the sizes with both widths corrected by the exact model, and leaves long enough for its stress.
@@ -85,7 +78,7 @@ def fit_widths(spec: VcfmSpec, sizes: Sizes) -> tuple[Sizes, tuple[float, float]
     full = target.preload_stroke if target else 0.0
     made = written(spec, sizes).replace({"analysis.preloads": (0.0, full), "analysis.branch": "stable"})
     back = -(rest_of(LawSampler(parts(made)), full, places) or 0.0)
-    sampler = ExactSampler(made, last, max(1.2 * back, 0.02 * last), ACCURATE)
+    sampler = ExactSampler(made, last, max(1.2 * back, 0.02 * last))
     if sampler.problem:
         raise Infeasible(
             finding("no_linear_region", f"the exact model does not confirm the design: {sampler.problem}"),
