@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.beams.events import Singular, leave, locate, pose_change
+from cfmkit.beams.events import Singular, leave, locate
 from cfmkit.beams.kernels.march import DONE, INERTIA, LONG, STALLED
 from cfmkit.beams.path import Event, PathStatus
 from cfmkit.beams.solver import FORCE_WEIGHT, Spot
@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 
 BEFORE_END = 1e-4  # share of the drive's range by which the end of a branch is passed over
 _LEGS = 60
+_CLEAR = 0.01  # share of the drive's range from a bifurcation at which the paths there are told apart
+LONGEST = 5  # which of a march's options is the longest step
+_BACK = 0.01  # share of the range in one step where the end of a branch is looked for backwards
 _FINEST = 1e-5  # share of the range below which a change of stability is not looked into with shorter steps
 _SAME = 1e-6  # largest difference of poses of two solutions that are one
 
@@ -58,8 +61,13 @@ def cross(run: Run) -> Spot | None:
     run.events.append(Event(kind, found.spot.drive * run.unit, found.before, found.after))
     if run.first is None and not found.fold and found.after > found.before:
         run.first = found
-    if found.fold or found.after <= found.before or run.control.branch == "primary":
+    if found.fold:
         return other
+    clear = _clear_of(run, found, one, other)
+    if found.after <= found.before or run.control.branch == "primary":
+        if clear is not other:
+            run.append(run.as_points(clear, -1))
+        return clear
     forward = float(np.sign(other.drive - one.drive))
     left = leave(run.fine, found, run.control.sign, forward)
     left = None if left is None else run.settled(run.fine.reduce(left))
@@ -71,8 +79,25 @@ def cross(run: Run) -> Spot | None:
     run.append(run.as_points(left, -1))
     run.entry = 0.5 * abs(left.drive - found.spot.drive)
     run.closed = False
-    run.end = _end_of_branch(run, other, found) if run.natural else None
+    run.end = _end_of_branch(run, clear, found) if run.natural else None
     return left
+
+
+def _clear_of(run: Run, found: Singular, one: Spot, other: Spot) -> Spot:
+    """Return a point behind a bifurcation from which the path can be followed on: `other` if it is far enough.
+
+    Beside a bifurcation the error of integration may lead to the path that crosses; on the fine mesh it does not.
+    """
+    ahead = np.abs(run.targets[run.asked() :] - other.drive)
+    room = min(_CLEAR * run.span, 0.5 * float(ahead.min(initial=np.inf)))
+    before = found.spot.drive - one.drive
+    if not run.natural or abs(other.drive - found.spot.drive) >= room or before == 0.0:
+        return other
+    place = other.drive + float(np.sign(other.drive - one.drive)) * room
+    guess = found.spot.y + (found.spot.y - one.y) * ((place - found.spot.drive) / before)
+    wide = run.fine.solve(guess, place)
+    near = None if wide is None or wide.unstable != found.after else run.settled(run.fine.reduce(wide))
+    return other if near is None else near
 
 
 def _not_beyond(run: Run, found: Singular, left: Spot, forward: float) -> Spot:
@@ -89,7 +114,7 @@ def _not_beyond(run: Run, found: Singular, left: Spot, forward: float) -> Spot:
     near = run.solver.solve(guess, found.spot.drive + forward * nearest)
     if near is None or near.unstable > left.unstable:
         return left
-    return near if pose_change(run.solver, near.y, start) > 0.3 * pose_change(run.solver, guess, start) else left
+    return near if run.solver.pose_change(near.y, start) > 0.3 * run.solver.pose_change(guess, start) else left
 
 
 def _no_branch(run: Run, found: Singular, other: Spot) -> Spot | None:
@@ -158,8 +183,8 @@ def rejoin(run: Run, spot: Spot) -> Spot | None:
     if end is None:
         run.status, run.message = PathStatus.LOST, "the path was lost"
         return None
-    apart = max(pose_change(run.solver, y, end.y) for y in run.points.y[-8:])
-    if pose_change(run.solver, spot.y, end.y) > 0.5 * apart:
+    apart = max(run.solver.pose_change(y, end.y) for y in run.points.y[-8:])
+    if run.solver.pose_change(spot.y, end.y) > 0.5 * apart:
         return spot
     run.closed = True
     sense = float(np.sign(end.drive - spot.drive))
@@ -183,7 +208,7 @@ def hop(run: Run, spot: Spot, asked: int) -> Spot | None:
         if wide is None or wide.unstable > spot.unstable:
             continue
         near = run.settled(run.fine.reduce(wide))
-        if near is None or pose_change(run.solver, near.y, spot.y) > 0.2 * np.sqrt(ahead / run.span) + 1e-3:
+        if near is None or run.solver.pose_change(near.y, spot.y) > 0.2 * np.sqrt(ahead / run.span) + 1e-3:
             continue
         back = run.fine.solve(wide.y, spot.drive - forward * ahead)
         found = None if back is None or back.unstable == wide.unstable else _place(run, wide, back)
@@ -195,6 +220,36 @@ def hop(run: Run, spot: Spot, asked: int) -> Spot | None:
         return near
     run.stop(STALLED)
     return None
+
+
+def close_behind(run: Run) -> bool:
+    """Find the end of the last branch by going back along the path that it joined; tell whether it was found.
+
+    Coming forward nothing changes there: branch and path are both stable. Going back the path loses its stability.
+    """
+    last = max(k for k, name in enumerate(run.branches) if name != "primary")
+    name = run.branches[last]
+    first = run.branches.index(name)
+    opening, spot = float(run.points.drive[first]), run.spot(-1)
+    sense = float(np.sign(opening - spot.drive))
+    options = run.options(spot, sense * _BACK * run.span)
+    options[LONGEST] = _BACK * run.span
+    code, points = run.solver.march(spot, np.array([opening]), options, run.control.most_points + 2)
+    if code != INERTIA or len(points) < 2:
+        return False
+    one, beyond = (run.fine.solve(run.fine.expand(points.y[k]), float(points.drive[k])) for k in (-2, -1))
+    found = None if one is None or beyond is None else _place(run, one, beyond)
+    if found is None or found.after <= found.before:
+        return False
+    if run.events[-1].kind == "unresolved":
+        run.events.pop()
+    run.events.append(Event("bifurcation", found.spot.drive * run.unit, found.after, found.before))
+    for index in range(first, len(run.branches)):
+        if (float(run.points.drive[index]) - found.spot.drive) * sense < 0:
+            run.branches[index] = "primary"
+        elif run.branches[index] == "primary":
+            run.branches[index] = name
+    return True
 
 
 def relabel(run: Run, primary: Run) -> None:
@@ -212,7 +267,7 @@ def relabel(run: Run, primary: Run) -> None:
             continue
         if number not in places or run.branches[index] == "primary":
             break
-        if pose_change(run.solver, run.points.y[index], primary.points.y[places[number]]) > _SAME:
+        if run.solver.pose_change(run.points.y[index], primary.points.y[places[number]]) > _SAME:
             break
         first = index
     if first > last:

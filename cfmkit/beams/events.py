@@ -179,22 +179,15 @@ def _leave(solver: ExpandedSolver, singular: Singular, sign: int, forward: float
     kick = _FIRST_KICK
     for _ in range(_KICKS):
         guess = solver.shifted(spot.y, spot.drive, sign * kick * singular.null)
-        moved = pose_change(solver, guess, spot.y)
+        moved = solver.pose_change(guess, spot.y)
         if not 0.3 * size <= moved <= size:
             kick *= 0.7 * size / moved if moved > 0 else 10.0
             continue
         near = solver.solve(guess, spot.drive, border, level + sign * kick)
-        if near is None or pose_change(solver, near.y, guess) > 0.5 * size:
+        if near is None or solver.pose_change(near.y, guess) > 0.5 * size:
             kick *= 0.5
             continue
         ahead = (near.drive - spot.drive) * forward > 0
         settled = solver.solve(near.y, near.drive)
         return settled if settled is not None and ahead and settled.unstable < singular.after else None
     return None
-
-
-def pose_change(solver: Solver, one: FloatArray, other: FloatArray) -> float:
-    """Return the largest difference of positions (in mean beam lengths) and rotations of two states."""
-    change = np.abs(one - other)
-    inner = change[solver.n :].reshape(-1, 6)[:, :3]
-    return float(max(inner.max(initial=0.0), change[: solver.n_free].max(initial=0.0)))

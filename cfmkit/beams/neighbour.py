@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.beams.events import pose_change
 from cfmkit.beams.layout import Layout
 from cfmkit.beams.path import Path, PathStatus
 from cfmkit.beams.solver import Points, Solver
@@ -61,7 +60,7 @@ def neighbouring(path: Path, network: Network, drive: Drive, largest_turn: float
     for number, (index, value) in enumerate(zip(known.tolist(), wanted.tolist(), strict=True)):
         guess = path.points.y[index] * factors
         spot = solver.solve(guess.copy(), value / solver.layout.scales.drive)
-        near = spot is not None and pose_change(solver, spot.y, guess) <= largest_turn
+        near = spot is not None and solver.pose_change(spot.y, guess) <= largest_turn
         # a segment beyond its own critical length (shortness below zero) counts its unstable directions wrongly
         if spot is None or not near or not spot.shortness > 0 or spot.unstable > int(path.points.info[index, 0]):
             missing.append(value)

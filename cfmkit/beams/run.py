@@ -26,6 +26,10 @@ _HOPS = 60  # decisions on one path
 _FINE_STEPS = 32  # of a beam, where singular points are looked for: half of them for a tolerance of
 _ROUGH = 1e-6
 _LOOSEST = 1e-7  # tolerance of Newton's method
+_NO_START = (
+    "no equilibrium to start from: lost at {:.3g} of the constant loads and displacements; "
+    "or nothing holds the network, or its springs are prestressed too far"
+)
 _SMALLEST = 1e-7  # shortest step as a share of the drive's range
 
 
@@ -75,13 +79,14 @@ class Run:
     def follow(self) -> None:
         """Trace from rest to the last point asked for, or to where it ends, and name the branches."""
         self._follow()
-        if self.natural and not self.closed and not self.too_long:
+        if self.natural and not self.closed and not self.too_long and not branches.close_behind(self):
             primary = Run(self.layout, self.mesh, replace(self.control, branch="primary"))
             primary.follow()
             branches.relabel(self, primary)
 
     def _follow(self) -> None:
-        spot, share = self.solver.rest()
+        spot, share, code = self.solver.rest()
+        self.too_long = code == LONG
         asked, hops, fresh = int(self.targets[0] == 0.0), 0, True
         while spot is not None and asked < len(self.targets) and hops < _HOPS:
             code, asked, spot = self._leg(spot, asked, fresh)
@@ -113,7 +118,7 @@ class Run:
             asked = self.asked()
         if not len(self.points):
             self.status = PathStatus.NO_START
-            self.message = f"no equilibrium under the constant loads: lost at {share:.3g} of them"
+            self.message = _NO_START.format(share)
         elif asked < len(self.targets):
             last = float(self.points.drive[-1]) * self.unit
             self.status, self.message = PathStatus.LOST, f"the path turned back and forth at {last:.6g}"

@@ -9,9 +9,10 @@ import numpy as np
 
 from cfmkit.beams.discretise import Mesh, assemble_model, grid, table
 from cfmkit.beams.kernels import entry
-from cfmkit.beams.kernels.march import DONE, INFO
+from cfmkit.beams.kernels.march import DONE, INFO, STALLED
 from cfmkit.beams.kernels.newton import SOLVED
 from cfmkit.beams.kernels.rk8 import WEIGHTS
+from cfmkit.beams.numbering import LINE, SLIDE, TURN
 
 if TYPE_CHECKING:
     from cfmkit.beams.kernels.model import Model
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
     from cfmkit.curves import FloatArray
 
 ITERATIONS = 16
+_TIGHT = 1e-12  # prestress of springs, in lengths or radians, that counts
+_LARGEST_CHANGE, _SMALLEST_SHARE = 0.35, 1e-3  # of poses in one step; of the prestress
 FORCE_WEIGHT = 1e-3  # of a dimensionless force in the arc length
 
 
@@ -162,25 +165,72 @@ class Solver:
         )
         return int(code), Points(y[:stored], drive[:stored], info[:stored])
 
-    def rest(self) -> tuple[Spot | None, float]:
-        """Return a place near the equilibrium that the drive starts from, or None and the share of the preload reached.
+    def rest(self) -> tuple[Spot | None, float, int]:
+        """Return a place near the equilibrium that the drive starts from, or None; the share of the preload; a code.
 
-        Places of segments are left at zero there: they follow linearly from all else.
+        Springs are tightened first, then all else that is constant is applied; the code is that of a march. Places of
+        segments are left at zero where nothing is done: they follow linearly from all else.
         """
-        zero = Spot(np.zeros(self.size), 0.0, np.zeros(self.n + 1))
-        if self.layout.network.loads or self.layout.base.any():
+        spot = Spot(np.zeros(self.size), 0.0, np.zeros(self.n + 1))
+        loaded = bool(self.layout.network.loads) or bool(self.layout.base.any())
+        model = self.ramp() if loaded else self.model
+        slack = _slack(model) if len(model.spring_kind) else None
+        if slack is not None and np.abs(slack - model.spring_value).max() > _TIGHT:
+            tightened = self._tightened(model, slack)
+            if tightened is None:
+                return None, 0.0, STALLED
+            spot = tightened
+        if loaded:
             options = march_options(self.tolerance, 0.25, 0.35, sense=1.0)
-            code, points = self._march(self.ramp(), zero, np.array([1.0]), options, 400)
+            code, points = self._march(model, spot, np.array([1.0]), options, 400)
             if code != DONE:
-                return None, float(points.drive[-1]) if len(points) else 0.0
-            zero = Spot(points.y[-1], 0.0, zero.tangent)
-        return zero, 1.0
+                return None, float(points.drive[-1]) if len(points) else 0.0, code
+            spot = Spot(points.y[-1], 0.0, spot.tangent)
+        return spot, 1.0, DONE
+
+    def _tightened(self, model: Model, slack: FloatArray) -> Spot | None:
+        """Return the equilibrium of a model at drive zero, its springs tightened step by step; or None."""
+        spot, taut = Spot(self.unstressed(), 0.0, np.zeros(self.n + 1)), model.spring_value
+        share, step = 0.0, 1.0
+        while share < 1.0:
+            ahead = min(1.0, share + step)
+            near = self._near(model._replace(spring_value=slack + ahead * (taut - slack)), spot.y)
+            if near is None or self.pose_change(near.y, spot.y) > _LARGEST_CHANGE:
+                step *= 0.5
+                if step < _SMALLEST_SHARE:
+                    return None
+                continue
+            share, spot = ahead, near
+        return spot
+
+    def _near(self, model: Model, y: FloatArray) -> Spot | None:
+        """Return the equilibrium of a model at drive zero."""
+        new, state, tangent = y.copy(), np.zeros(5), np.zeros(self.n + 1)
+        code, _ = entry.solve(model, self.n_free, new, state, self.unit, 0.0, self.limits, tangent, self.scratch)
+        return Spot(new, 0.0, tangent, int(state[1]), float(state[2]), float(state[3])) if code == SOLVED else None
+
+    def pose_change(self, one: FloatArray, other: FloatArray) -> float:
+        """Return the largest difference of positions (in mean beam lengths) and rotations of two states."""
+        change = np.abs(one - other)
+        inner = change[self.n :].reshape(-1, 6)[:, :3]
+        return float(max(inner.max(initial=0.0), change[: self.n_free].max(initial=0.0)))
 
     def solve_each(self, ys: FloatArray, drives: FloatArray) -> tuple[FloatArray, Any]:
         """Return the equilibria near ys (k, unknowns) at these drives (k,), and where there are any, (k,) bool."""
         new, solved = ys.copy(), np.empty(len(drives))
         entry.solve_each(self.model, self.n_free, new, drives, self.limits, solved, self.scratch)
         return new, solved > 0
+
+
+def _slack(model: Model) -> FloatArray:
+    """Return the values of springs that are relaxed before anything is done."""
+    value: FloatArray = model.spring_value.copy()
+    value[model.spring_kind == TURN, 1] = 0.0
+    value[model.spring_kind == SLIDE, 3] = 0.0
+    line = model.spring_kind == LINE
+    one, other = ((model.place_origin + model.place_arm)[model.spring_place[line, k]] for k in (0, 1))
+    value[line, 1] = np.hypot(*(other - one).T)
+    return value
 
 
 def march_options(

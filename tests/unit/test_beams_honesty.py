@@ -74,11 +74,20 @@ def test_a_path_within_its_tolerance_marks_every_point_accurate() -> None:
 def test_a_branch_s_end_that_was_stepped_over_is_noticed(
     monkeypatch: pytest.MonkeyPatch, travel: tuple[float, ...], on_branch: int
 ) -> None:
-    """Without a search for the end, long steps pass from the branch to the path that it joins."""
+    """Without a search for the end, long steps pass from the branch to the path that it joins; it is found behind."""
     monkeypatch.setattr(branches, "_end_of_branch", lambda run, other, found: None)
     path = trace(v_beam(), Displacement("d", DOWN, np.array(travel) * 1e-3))
     names = path.branch[path.at_asked]
     assert all(name.startswith("bifurcated") for name in names[:on_branch])
     assert all(name == "primary" for name in names[on_branch:])
+    assert path.events[-1].kind == "bifurcation"
+    assert path.events[-1].drive == pytest.approx(4.773454576e-3, rel=1e-7)  # as with the search for the end
+
+
+def test_an_end_that_is_not_found_behind_either_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(branches, "_end_of_branch", lambda run, other, found: None)
+    monkeypatch.setattr(branches, "close_behind", lambda run: False)
+    path = trace(v_beam(), Displacement("d", DOWN, np.array([4.0, 4.7, 5.0, 6.0]) * 1e-3))
+    assert path.branch[path.at_asked][2:].tolist() == ["primary", "primary"]
     assert path.events[-1].kind == "unresolved"
-    assert travel[on_branch - 1] < path.events[-1].drive * 1e3 <= travel[on_branch] * (1 + 1e-9)
+    assert 4.7e-3 < path.events[-1].drive <= 5.0e-3 * (1 + 1e-9)

@@ -1,0 +1,99 @@
+"""Starts under constant loads and prestress, points beside bifurcations, ends of branches on paths that turn back."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from cfmkit.beams import (
+    CLAMPED,
+    PINNED,
+    Beam,
+    Control,
+    CosineArch,
+    Displacement,
+    Network,
+    Node,
+    Path,
+    PathStatus,
+    PointLoad,
+    Section,
+    TorsionSpring,
+    guided,
+    trace,
+)
+
+UP = np.pi / 2
+SECTION = Section(2e9, 8e-3, 1e-3)
+
+
+def half_arch(ratio: float) -> tuple[Network, float]:
+    """Return half a clamped cosine arch whose rise is `ratio` times its thickness, and the rise [m]."""
+    rise = 2e-3
+    nodes = {"wall": Node(0, 0, CLAMPED), "middle": Node(0.1, rise, guided(UP))}
+    return Network(
+        nodes, {"half": Beam("wall", "middle", Section(1e9, 1e-2, rise / ratio), CosineArch(rise, 0.5))}
+    ), rise
+
+
+@pytest.mark.parametrize("ratio", [2.33, 4.0, 6.0, 10.0, 20.0])
+def test_the_end_of_a_branch_is_located_though_the_path_it_left_turns_back(ratio: float) -> None:
+    """The symmetric path between the bifurcations has limit points: the end is found by going back.
+
+    Closed form: two modes of a shallow arch, the second one straightened where its coefficient vanishes.
+    """
+    network, rise = half_arch(ratio)
+    path = trace(network, Displacement("middle", -UP, np.arange(0.02, 1.99, 0.02) * rise), Control(tolerance=1e-6))
+    root = np.sqrt((8 / 9) ** 2 + 6 * (np.pi**2 / 9 - 2 * np.pi**2 / (3 * ratio**2)))
+    end = 4 / 3 - (8 / 9 - root) / 3
+    assert [event.kind for event in path.events] == ["bifurcation", "bifurcation"]
+    assert path.events[1].drive / rise == pytest.approx(end, abs=1e-3)
+    names, where = path.branch[path.at_asked], path.drive[path.at_asked] / rise
+    assert (names[where > end + 0.01] == "primary").all()
+
+
+@pytest.mark.parametrize("force", [0.2, 0.24])
+def test_a_constant_load_on_a_segment_that_is_too_long_makes_the_mesh_finer(force: float) -> None:
+    """The toggle sways off at 0.257 N: until then there is an equilibrium."""
+    nodes = {"a": Node(0, 0, PINNED), "t": Node(0.1, 0.01), "b": Node(0.2, 0, PINNED)}
+    beams = {"x": Beam("a", "t", SECTION), "y": Beam("t", "b", SECTION)}
+    network = Network(nodes, beams, loads=(PointLoad("t", fy=-force),))
+    assert trace(network, Displacement("t", 0.0, np.array([1e-5]))).status is PathStatus.COMPLETE
+
+
+@pytest.mark.parametrize("loads", [(), (PointLoad("d", fy=1e-6),)])
+def test_a_spring_may_be_prestressed_by_a_large_turn(loads: tuple[PointLoad, ...]) -> None:
+    """A torsion spring of 0.05 N m/rad bends the end of a cantilever: the end moment is k (2 - turn)."""
+    nodes = {"a": Node(0, 0, CLAMPED), "d": Node(0.05, 0)}
+    springs = (TorsionSpring(None, "d", 0.05, 2.0),)
+    network = Network(nodes, {"x": Beam("a", "d", SECTION)}, springs=springs, loads=loads)
+    path = trace(network, Displacement("d", 0.0, np.array([-1e-4])), Control(tolerance=1e-9))
+    assert path.status is PathStatus.COMPLETE
+    turn = path.motion("d")[-1, 2]
+    assert path.end_force("x", 1)[-1, 2] == pytest.approx(0.05 * (2.0 - turn), rel=1e-6)
+
+
+def test_a_mechanism_that_nothing_holds_says_so() -> None:
+    nodes = {"a": Node(0, 0, PINNED), "b": Node(0.1, 0.0)}
+    network = Network(nodes, {"x": Beam("a", "b", SECTION)}, springs=(TorsionSpring("a", "b", 1.0, 0.1),))
+    path = trace(network, Displacement("b", 0.0, np.array([1e-3])))
+    assert path.status is PathStatus.NO_START
+    assert "nothing holds the network" in path.message
+
+
+@pytest.mark.parametrize("branch", ["primary", "stable"])
+@pytest.mark.parametrize("off", [1e-7, 1e-6, 1e-5])
+def test_a_point_beside_a_bifurcation_does_not_lead_to_the_path_that_crosses(off: float, branch: str) -> None:
+    rise = 0.02
+    nodes = {"a": Node(0, 0, PINNED), "t": Node(0.1, rise), "b": Node(0.2, 0, PINNED)}
+    beams = {"x": Beam("a", "t", SECTION, CosineArch(rise, 0.5)), "y": Beam("t", "b", SECTION, CosineArch(-rise, 0.5))}
+    network = Network(nodes, beams)
+
+    def pushed(points: list[float]) -> Path:
+        return trace(network, Displacement("t", -UP, np.array(points)), Control(branch=branch))  # type: ignore[arg-type]
+
+    place = pushed([1e-3, 5e-3]).events[0].drive
+    near, far = pushed([1e-3, place + off, 3e-3, 5e-3]), pushed([1e-3, 3e-3, 5e-3])
+    assert near.effort[-1] == pytest.approx(far.effort[-1], rel=1e-6)
+    assert [event.kind for event in near.events] == ["bifurcation"]
+    assert near.branch[-1][:10] == far.branch[-1][:10]
