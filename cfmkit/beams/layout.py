@@ -78,6 +78,21 @@ class Layout:
         """Return the reference position of a node [m]."""
         return self.network.nodes[node].x, self.network.nodes[node].y
 
+    def supported(self, node: str) -> int:
+        """Return the first degree of freedom of a node that support and drive can act on.
+
+        Raises
+        ------
+        cfmkit.errors.InputError
+            If there is no such node, or a link moves it.
+        """
+        if node in self.first:
+            return self.first[node]
+        if node in self.network.nodes:
+            master = self.network.master_of(node)
+            raise InputError(f"node {node!r} is moved by a link: what is held is its master, {master!r}")
+        raise InputError(f"{node!r} is not a node; nodes: {', '.join(self.network.nodes)}")
+
     def beam_end_at(self, name: str, side: int) -> tuple[Any, Any]:
         """Return the reference position of a beam's end [m]."""
         beam = self.network.beams[name]

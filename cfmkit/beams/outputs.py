@@ -64,7 +64,7 @@ def motion(g: Gradient, node: str) -> FloatArray:
 def reaction(g: Gradient, node: str) -> FloatArray:
     """Return the derivatives of the force and moment that support and drive exert on a node, (p, 3, k)."""
     layout = g.path.layout
-    first, scales = layout.first[node], layout.scales
+    first, scales = layout.supported(node), layout.scales
     force = -g.path.residual[g.points, first : first + 3]
     slopes = -g.held[:, first : first + 3]
     dx, dy = _turned(*_frame(g, node), (force[:, 0], slopes[:, 0]), (force[:, 1], slopes[:, 1]))

@@ -157,9 +157,15 @@ class Path:
         return read_only(np.stack([dx, dy, own], axis=-1))
 
     def reaction(self, node: str) -> FloatArray:
-        """Return force and moment that support and drive exert on a node, (n, 3) [N, N, N m]."""
+        """Return force and moment that support and drive exert on a node, (n, 3) [N, N, N m].
+
+        Raises
+        ------
+        cfmkit.errors.InputError
+            If a link moves the node.
+        """
         residual, scales = self._observed[1], self.layout.scales
-        first, frame = self.layout.first[node], self.layout.direction[node]
+        first, frame = self.layout.supported(node), self.layout.direction[node]
         c, s = np.cos(frame), np.sin(frame)
         a, b, moment = (-residual[:, first + k] for k in range(3))
         force = scales.force

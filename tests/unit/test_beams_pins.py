@@ -102,3 +102,13 @@ def test_gradients_go_through_pins() -> None:
         np.testing.assert_allclose(found.effort[:, k], (one.effort - other.effort)[path.at_asked] / (2 * h), rtol=1e-6)
         slope = (one.motion("p") - other.motion("p"))[path.at_asked] / (2 * h)
         np.testing.assert_allclose(found.motion["p"][:, :, k], slope, rtol=1e-6, atol=1e-6 * np.abs(slope).max())
+
+
+def test_no_support_acts_on_a_node_that_a_link_moves() -> None:
+    path = trace(pinned(), PUSH)
+    with pytest.raises(InputError, match="'p' is moved by a link: what is held is its master, 'b'"):
+        path.reaction("p")
+    with pytest.raises(InputError, match="'q' is not a node; nodes: a, b, p, c"):
+        path.reaction("q")
+    with pytest.raises(InputError, match="moved by a link"):
+        gradient(path, lambda x: pinned(x=x[0]), np.array([0.05])).reaction["p"]
