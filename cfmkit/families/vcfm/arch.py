@@ -18,12 +18,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cfmkit.families.vcfm.sbranch import BUCKLED, POLE
+
 if TYPE_CHECKING:
     from cfmkit.curves import FloatArray
     from cfmkit.families.vcfm.strip import Strip
 
-BUCKLED = np.pi**2
-_POLE = 20.190728556426629
 _LOOSE = 1e5  # tension down to z = -1e5: strains beyond anything that bends
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
 _PLACES = np.linspace(-1.0, 1.0, 41)
@@ -126,7 +126,7 @@ class CosineArch:
     @cached_property
     def _table(self) -> tuple[FloatArray, tuple[FloatArray, ...]]:
         """Loads z from strong tension up to the pole, and the shortening's coefficients there."""
-        z = _POLE - np.geomspace(_LOOSE, 1e-10, 4000)
+        z = POLE - np.geomspace(_LOOSE, 1e-10, 4000)
         return z, self._quadratic(z)
 
     def root(self, travel: FloatArray) -> FloatArray:
@@ -156,7 +156,7 @@ class CosineArch:
         return np.asarray(z)
 
     def _bent_curvature(self, z: FloatArray, travel: FloatArray) -> FloatArray:
-        q, k, c, g = (item[..., None] for item in self.waves(np.minimum(z, _POLE - 0.1), travel))
+        q, k, c, g = (item[..., None] for item in self.waves(np.minimum(z, POLE - 0.1), travel))
         wave = (np.pi / self.developed) ** 2 * np.cos(0.5 * np.pi * (1.0 + _PLACES))
         bend = np.real(-(c + 0.5 * self.strip.rise) * wave + g * k * np.sin(q * _PLACES))
         return np.asarray(np.abs(bend).max(axis=-1))

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.families.vcfm.arch import BUCKLED, CosineArch
+from cfmkit.families.vcfm.arch import CosineArch
 from cfmkit.families.vcfm.hybrid import HybridLeaf
-from cfmkit.families.vcfm.sbranch import POLE, axial_root, pose
+from cfmkit.families.vcfm.sbranch import BUCKLED, POLE, axial_root, pose
 from cfmkit.families.vcfm.truss import TrussLeaf
 from cfmkit.families.vcfm.vbeam import VBeam, critical_force
 
