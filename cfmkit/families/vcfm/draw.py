@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.curves import Curve
 from cfmkit.families.vcfm.model import rest_of
+from cfmkit.families.vcfm.preload import force_change, rest_shift
 from cfmkit.families.vcfm.scene import scene
 from cfmkit.families.vcfm.truss import TrussLeaf
 from cfmkit.families.vcfm.windows import longest_window
@@ -62,10 +65,10 @@ def figures(result: Result) -> dict[str, Callable[[], Figure]]:
 def force(result: Result) -> Figure:
     """Return the nominal curve with the requirement bands."""
     solution: Solution = result.state
-    flat = solution.parts.balance
-    level = float(np.asarray(solution.sampler.spring(np.array([flat + solution.nominal.preload]))[0])[0])
-    look = Look(levels=(Limit(level, f"the spring alone, at {value_text(flat, 'length')}"),), regions=_beyond(solution))
-    nominal = type(result)(**{**vars(result), "curves": result.curves[:1]})
+    flat = value_text(solution.parts.balance, "length")
+    level = Limit(solution.constant_force, f"the spring alone, at {flat}")
+    nominal = replace(result, curves=result.curves[:1])
+    look = Look(levels=(level,), regions=_beyond(solution))
     return loop_figure(nominal, look, "force over travel of the shuttle, from the as-made pose")
 
 
@@ -135,7 +138,7 @@ def _curves(result: Result, subject: str, shifted: bool) -> Figure:
     curves = []
     for curve, push in zip(result.curves, solution.pushes, strict=True):
         back = (push.rest or 0.0) if shifted else 0.0
-        curves.append(type(curve)(curve.motion - back, curve.effort, curve.branch, curve.stable, label=curve.label))
+        curves.append(Curve(curve.motion - back, curve.effort, curve.branch, curve.stable, label=curve.label))
     plot_curve(curves, ax, Look(arrows=False))
     for number, (push, window) in enumerate(zip(solution.pushes, solution.windows, strict=True)):
         if window is not None:
@@ -166,8 +169,8 @@ def adjustability(result: Result) -> Figure:
     grid = np.linspace(0.0, float(solution.nominal.travel[-1]), 241)
     rests = np.array([_shift(solution, float(preload), grid) for preload in over])
     nominal = float(np.interp(solution.nominal.preload, over, mean))
-    straight = nominal + one.positive_stiffness * (over - solution.nominal.preload)
-    by_rule = one.positive_stiffness * over / (one.positive_stiffness + one.first_stiffness)
+    straight = nominal + force_change(one.positive_stiffness, over - solution.nominal.preload)
+    by_rule = rest_shift(one.positive_stiffness, one.first_stiffness, over)
     x, first = Scale("preload", "length"), Scale("constant force", "force")
     forces = [Series(mean, "mean in the window", BLUE, prefer=0.4)]
     if np.abs(straight - mean).max() > 2e-3 * np.abs(mean).max():

@@ -107,6 +107,12 @@ class Solution:
         """The curve of the first preload."""
         return self.pushes[0]
 
+    @property
+    def constant_force(self) -> float:
+        """Force of the spring at the nominal preload where the leaves carry nothing [N]."""
+        place = np.array([self.parts.balance + self.nominal.preload])
+        return float(self.sampler.spring(place)[0][0])
+
     @cached_property
     def windows(self) -> tuple[tuple[float, float] | None, ...]:
         """Constant-force window of each curve [m]."""

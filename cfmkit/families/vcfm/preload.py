@@ -29,6 +29,6 @@ def rest_shift(positive_stiffness: Any, first_stiffness: Any, preload: Any) -> A
     return positive_stiffness * preload / (positive_stiffness + first_stiffness)
 
 
-def measured_stiffness_for(force: float, balance: float, preload: float = 0.0) -> float:
-    """Return the K_p that a force at the balance point needs [N/m]: the leaves carry nothing there."""
-    return force / (balance + preload)
+def measured_stiffness_for(force: float, balance: float) -> float:
+    """Return the K_p that a force at the balance point needs without preload [N/m]: the leaves carry nothing there."""
+    return force / balance

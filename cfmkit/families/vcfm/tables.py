@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.families.vcfm.parts import share_of, strip_of
+from cfmkit.families.vcfm.preload import measured_stiffness_for
 from cfmkit.families.vcfm.truss import TrussDiamond, TrussLeaf
 from cfmkit.tables import Table, TableColumn, border_column
 
@@ -120,7 +121,7 @@ def _readings(solution: Solution) -> Iterator[Reading]:
     if told is not None:
         yield Reading("measured stiffness, 2 half-beams", 2, told.positive_stiffness)
         yield Reading("twice the measured stiffness, 4 half-beams", 4, 2.0 * told.positive_stiffness)
-        needed = told.force / solution.parts.balance
+        needed = measured_stiffness_for(told.force, solution.parts.balance)
         yield Reading("the stiffness that the measured force needs, 4 half-beams", 4, needed)
 
 

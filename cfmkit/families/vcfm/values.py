@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.families.vcfm.tables import forces
 from cfmkit.results import Quantity
 
 if TYPE_CHECKING:
@@ -46,7 +47,7 @@ def values_of(solution: Solution) -> Mapping[str, Quantity]:
     one, strip = solution.character, solution.parts.strip
     low, high = one.linear
     nominal, window = solution.nominal, solution.windows[0]
-    force = _constant_force(solution)
+    force = solution.constant_force
     span = solution.window[1] - solution.window[0]
     numbers: dict[str, float | None] = {
         "positive_stiffness": one.positive_stiffness,
@@ -77,16 +78,9 @@ def _quantity(name: str, value: float | None) -> Quantity:
     return Quantity(value if known else None, *DEFINITIONS[name], reason="" if known else "there is none")
 
 
-def _constant_force(solution: Solution) -> float:
-    place = np.array([float(solution.parts.balance) + solution.nominal.preload])
-    return float(solution.sampler.spring(place)[0][0])
-
-
 def mean_force(solution: Solution, push: Push) -> float | None:
     """Return the mean force of a curve at even places of the solution's window [N]; None if it does not cover it."""
-    low, high = solution.window
-    places = np.linspace(low, high, 201)
-    force = np.interp(places, push.travel, push.force, left=np.nan, right=np.nan)
+    force = forces(solution, push)
     return float(force.mean()) if np.isfinite(force).all() else None
 
 
