@@ -125,7 +125,6 @@ class Slab:
             sizes = {name: column(f"{kind}.{name}", getattr(part, name)) for name in _SIZES}
             return Strip(**sizes, youngs_modulus=modulus, poisson_ratio=mechanism.material.poisson)
 
-        modulus = column("modulus", mechanism.material.modulus)
         side, leaf_strip = strip("spring", mechanism.positive), strip("leaf", mechanism.bistable)
         share, points = share_of(mechanism.positive), spec.analysis.points
         grid = spec.travel * (np.arange(points) / (points - 1.0))

@@ -22,6 +22,7 @@ from cfmkit.families.vcfm.limits import (
     shortest_leaf,
     thickness_for,
 )
+from cfmkit.families.vcfm.parts import share_of
 from cfmkit.families.vcfm.springs import Diamond
 from cfmkit.families.vcfm.strip import Strip
 from cfmkit.families.vcfm.vbeam import critical_force, onset_and_exit
@@ -130,8 +131,7 @@ def spring_side(spec: VcfmSpec, target: VcfmDesign, leaf: Strip) -> Strip:
     e, t, tilt = made.modulus, positive.thickness, positive.angle
     length = sqrt(3.0 * e * t * deflection * cos(tilt) / (made.allowable or 1.0))
     side = Strip(length, tilt, t, 1.0, e, made.poisson)
-    share = 0.5 if positive.loaded == "half" else 1.0
-    return replace(side, width=float(target.force / target.height / Diamond(side, share).stiffness))
+    return replace(side, width=float(target.force / target.height / Diamond(side, share_of(positive)).stiffness))
 
 
 def check_guide(spec: VcfmSpec) -> None:

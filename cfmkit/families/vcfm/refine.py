@@ -78,7 +78,7 @@ def fit_widths(spec: VcfmSpec, sizes: Sizes) -> tuple[Sizes, tuple[float, float]
     full = target.preload_stroke if target else 0.0
     made = written(spec, sizes).replace({"analysis.preloads": (0.0, full), "analysis.branch": "stable"})
     back = -(rest_of(LawSampler(parts(made)), full, places) or 0.0)
-    sampler = ExactSampler(made, last, max(1.2 * back, 0.02 * last))
+    sampler = ExactSampler(made, last, 1.2 * back)
     if sampler.problem:
         raise Infeasible(
             finding("no_linear_region", f"the exact model does not confirm the design: {sampler.problem}"),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import radians
+from math import radians, sin
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
@@ -229,7 +229,5 @@ class VcfmSpec(Spec):
     @property
     def travel(self) -> float:
         """How far the shuttle goes [m]."""
-        from math import sin
-
         leaf = self.mechanism.bistable
         return self.analysis.travel or 1.4 * leaf.length * sin(leaf.angle)
