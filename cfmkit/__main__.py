@@ -2,6 +2,6 @@
 
 import sys
 
-from cfmkit.cli.main import main
+from cfmkit.cli.main import entry
 
-sys.exit(main())
+sys.exit(entry())
