@@ -52,6 +52,11 @@ class CosineArch:
         return euler * (1.0 + euler / self.strip.axial - euler / self.strip.shear)
 
     @property
+    def balance(self) -> Any:
+        """Travel at which the arch carries nothing [m]: a third of the rise beyond its wall."""
+        return 4.0 / 3.0 * self.strip.rise
+
+    @property
     def negative_stiffness(self) -> Any:
         """Size of the negative stiffness of one leaf [N/m]."""
         return self.critical_force / self.strip.reach
@@ -89,7 +94,7 @@ class CosineArch:
     def force(self, travel: Any) -> FloatArray:
         """Return the force of one leaf along the motion [N], on the stable branch."""
         travel = np.asarray(travel, dtype=float)
-        line = self.critical_force * (4.0 / 3.0 * self.strip.rise - travel) / self.strip.reach
+        line = self.critical_force * (self.balance - travel) / self.strip.reach
         z = self.root(travel)
         q, _, _, g = self.waves(z, travel)
         slope = np.real(g * np.cos(q))
@@ -165,7 +170,7 @@ class CosineArch:
         """Return the slope of the free buckling wave [rad]: what the rest of the shape leaves of the shortening."""
         length, rise = self.developed, self.strip.rise
         a, c = np.pi / length, rise / 6.0
-        slope = (4.0 / 3.0 * rise - travel) / length
+        slope = (self.balance - travel) / length
         spent = 0.125 * (a * rise) ** 2 - 2.0 * self.critical_force / self.strip.axial
         square = 2.0 * (spent - 0.5 * (a * c) ** 2 - 1.5 * slope**2 + 16.0 / 3.0 * c * slope / length)
         return np.asarray(np.sqrt(np.maximum(square, 0.0)))
@@ -173,7 +178,7 @@ class CosineArch:
     def _buckled_curvature(self, travel: FloatArray) -> FloatArray:
         length, rise = self.developed, self.strip.rise
         a, c = np.pi / length, rise / 6.0
-        slope, phase = (4.0 / 3.0 * rise - travel) / length, np.pi * (1.0 + _PLACES)
+        slope, phase = (self.balance - travel) / length, np.pi * (1.0 + _PLACES)
         free = self.buckled_amplitude(travel)[..., None] * np.cos(phase)
         own = -(c + 0.5 * rise) * a * a * np.cos(0.5 * phase) + 2.0 * a * slope[..., None] * np.sin(phase)
         both = (np.abs(own + sign * 2.0 * a * free).max(axis=-1) for sign in (1.0, -1.0))

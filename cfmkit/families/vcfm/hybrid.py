@@ -37,6 +37,11 @@ class HybridLeaf:
     stiffening: Any = 4.0
 
     @property
+    def balance(self) -> Any:
+        """Travel at which the bar carries nothing [m]: flat; what the bent flexures still push with there is left out."""
+        return self.strip.rise
+
+    @property
     def pivot(self) -> Any:
         """Stiffness of a flexure as a pivot [N m/rad]."""
         return self.strip.bending / self.flexure

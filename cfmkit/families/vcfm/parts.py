@@ -69,7 +69,7 @@ class Parts:
     @property
     def balance(self) -> float:
         """Travel at which the leaves carry nothing, and the spring alone decides the force [m]."""
-        return float(self.strip.rise) * (4.0 / 3.0 if isinstance(self.leaf, CosineArch) else 1.0)
+        return float(self.leaf.balance)
 
 
 def strip_of(leaf: Positive | Bistable, made_of: Material) -> Strip:

@@ -59,7 +59,7 @@ def _cosine(leaf: CosineArch, travel: float) -> FloatArray:
     eta = np.linspace(-1.0, 1.0, POINTS)
     own = np.pi / length * np.cos(0.5 * np.pi * eta)
     if z >= BUCKLED:
-        slope = (4.0 / 3.0 * rise - travel) / length
+        slope = (float(leaf.balance) - travel) / length
         free = float(leaf.buckled_amplitude(at)[0])
         phase = np.pi * (1.0 + eta)
         turn = -rise / 6.0 * own + slope * (1.0 - np.cos(phase)) + free * np.sin(phase)

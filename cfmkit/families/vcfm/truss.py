@@ -45,6 +45,11 @@ class TrussLeaf:
         return self.strip.youngs_modulus * np.abs(s * u - 0.5 * u * u)
 
     @property
+    def balance(self) -> Any:
+        """Travel at which the bar carries nothing [m]: flat."""
+        return self.strip.rise
+
+    @property
     def first_stiffness(self) -> Any:
         """Stiffness as made [N/m]."""
         return self.strip.axial * np.sin(self.strip.angle) ** 2 / self.strip.length

@@ -94,6 +94,11 @@ class VBeam:
     strip: Strip
 
     @property
+    def balance(self) -> Any:
+        """Travel at which the leaf carries nothing [m]: flat, if it is buckled there."""
+        return self.strip.rise
+
+    @property
     def first_stiffness(self) -> Any:
         """Stiffness as made [N/m]."""
         return first_stiffness(self.strip)
