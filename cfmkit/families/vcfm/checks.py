@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import degrees, radians
+from math import degrees
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,6 +10,7 @@ import numpy as np
 from cfmkit.families.findings import mm, mpa, newton, percent, rate
 from cfmkit.families.vcfm.findings import finding
 from cfmkit.families.vcfm.preload import measured_stiffness_for
+from cfmkit.families.vcfm.sbranch import POLE
 from cfmkit.families.vcfm.springs import Diamond
 from cfmkit.families.vcfm.vbeam import (
     BISTABLE_ABOVE,
@@ -17,6 +18,7 @@ from cfmkit.families.vcfm.vbeam import (
     LINEAR_ABOVE,
     NEGATIVE_ABOVE,
     RELIABLE,
+    STEEP,
     VBeam,
 )
 
@@ -26,14 +28,11 @@ if TYPE_CHECKING:
     from cfmkit.families.vcfm.model import Push, Solution
     from cfmkit.results import Finding
 
-STEEP = radians(15)
-"""Angle of the leaves beyond which the closed forms are off by more than a few percent."""
-
 WAVY = 0.02
 """Waviness over thickness from which on the flatness suffers."""
 
-TURNING = 20.1907 / (4.0 * np.pi**2)
-"""Load at which a leaf buckles whose shuttle can turn, over that with a shuttle that cannot."""
+TURNING = POLE / (4.0 * np.pi**2)
+"""Load at which a leaf buckles whose shuttle can turn, over that with a shuttle that cannot; each in E I/L^2."""
 
 PRESSED, STRETCHED = 0.3, 0.12
 """Deflection of a diamond's leaf over its length beyond which its stiffness is off by more than 3 and 4 percent."""

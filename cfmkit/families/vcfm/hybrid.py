@@ -38,7 +38,7 @@ class HybridLeaf:
 
     @property
     def balance(self) -> Any:
-        """Travel at which the bar carries nothing [m]: flat; what the bent flexures still push with there is left out."""
+        """Travel at which the bar carries nothing [m]: flat. What the flexures still push with there is left out."""
         return self.strip.rise
 
     @property

@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import pi, radians, sin, sqrt
+from math import pi, sin, sqrt
 from typing import TYPE_CHECKING
 
 from cfmkit.families.findings import at_least, at_most, mm
 from cfmkit.families.refusals import Infeasible
 from cfmkit.families.vcfm.findings import finding
+from cfmkit.families.vcfm.vbeam import STEEP
 
 if TYPE_CHECKING:
     from cfmkit.families.vcfm.spec import VcfmDesign, VcfmSpec
     from cfmkit.families.vcfm.strip import Strip
-
-STEEPEST = radians(15)
-"""Largest angle of the leaves that the closed forms are designed with."""
 
 MARGIN = 1.01
 """On that where a leaf length is proposed: the exact model changes widths by less than a percent."""
@@ -98,7 +96,7 @@ def shortest_leaf(spec: VcfmSpec, target: VcfmDesign, thickness: float) -> float
     u = min(1.0, 2.0 / 3.0 * (1.0 + sqrt(1.0 - root * root)))
     bend = sqrt(4.0 * u - 2.0 * u * u - 4.0 / 3.0 * root * root)
     stressed = pi * rise * thickness * bend + pi**2 * thickness**2 / 3.0
-    return max(sqrt(made.modulus / (made.allowable or 1.0) * stressed), rise / sin(STEEPEST))
+    return max(sqrt(made.modulus / (made.allowable or 1.0) * stressed), rise / sin(STEEP))
 
 
 def check_room(target: VcfmDesign, sizes: Sizes) -> None:

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from math import radians
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -35,6 +36,9 @@ BISTABLE_ABOVE = 3.195
 
 FLAT_BUCKLED_ABOVE = 2.0 * np.pi / 3.0**0.5
 """Rise over thickness above which it is still buckled when flat, so that its force is zero there."""
+
+STEEP = radians(15)
+"""Angle of the leaves beyond which the closed forms are off by more than a few percent: none steeper is designed."""
 
 RELIABLE = 1.6
 """Travel over rise beyond which the S form is no longer to be trusted (0.07 N of 2.3 at 1.9 of [D], Table I)."""
