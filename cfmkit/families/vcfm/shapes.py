@@ -13,6 +13,7 @@ import numpy as np
 from cfmkit.families.vcfm.arch import CosineArch
 from cfmkit.families.vcfm.hybrid import HybridLeaf
 from cfmkit.families.vcfm.sbranch import BUCKLED, POLE, axial_root, pose
+from cfmkit.families.vcfm.springs import UShape
 from cfmkit.families.vcfm.truss import TrussLeaf
 from cfmkit.families.vcfm.vbeam import VBeam, critical_force
 
@@ -134,9 +135,7 @@ def u_chain(strip: Strip, radius: float, compression: float) -> FloatArray:
     middle = 0.5 * (s[1:] + s[:-1])
     turn_as_made = np.interp(middle, s, arc)
     x = np.concatenate([[0.0], np.cumsum(np.cos(turn_as_made) * np.diff(s))])
-    developed = length + 0.5 * half
-    centroid = (0.5 * length**2 + 0.5 * np.pi * length * radius + radius**2) / developed
-    second = length**3 / 3 + length**2 * np.pi * radius / 2 + 2 * length * radius**2 + np.pi * radius**3 / 4
+    developed, centroid, second = UShape(strip, radius).moments
     over_ei = 0.5 * compression / (second - centroid**2 * developed)  # force of one chain over EI
     curvature = -over_ei * (0.5 * (x[1:] + x[:-1]) - centroid)
     turn = np.concatenate([[0.0], np.cumsum(curvature * np.diff(s))])

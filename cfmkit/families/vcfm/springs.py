@@ -84,7 +84,8 @@ class UShape:
     share: Any = 1.0
 
     @property
-    def _moments(self) -> tuple[Any, Any, Any]:
+    def moments(self) -> tuple[Any, Any, Any]:
+        """S [m], xb [m] and I2 [m3] of half a chain."""
         length, radius = self.strip.length, self.radius
         developed = length + 0.5 * np.pi * radius
         centroid = (0.5 * length**2 + 0.5 * np.pi * length * radius + radius**2) / developed
@@ -94,7 +95,7 @@ class UShape:
     @property
     def stiffness(self) -> Any:
         """K_p as made [N/m]."""
-        developed, centroid, second = self._moments
+        developed, centroid, second = self.moments
         return self.share * self.strip.bending / (second - centroid**2 * developed)
 
     def force(self, compression: Any) -> Any:
@@ -103,7 +104,7 @@ class UShape:
 
     def stress(self, compression: Any) -> Any:
         """Return the largest bending stress [Pa]: at the clamped end or at the arc's apex."""
-        _, centroid, _ = self._moments
+        _, centroid, _ = self.moments
         arm = np.maximum(centroid, self.strip.length + self.radius - centroid)
         one_chain = 0.5 * self.stiffness / self.share * np.abs(compression)
         moment = one_chain * arm
