@@ -50,9 +50,7 @@ def leaf_network(spec: VcfmSpec) -> Network:
     if about.structure == "cosine":
         shape, mirrored = CosineArch(h, 0.5), CosineArch(-h, 0.5)  # type: ignore[assignment]
     if about.structure == "hybrid":
-        end, stiff = float(about.flexure_length or 0.0) / strip.length, (about.stiffening or 4.0) * strip.thickness
-        stations = np.array([0.0, end, end, 1.0 - end, 1.0 - end, 1.0])
-        thickness = Taper(stations, np.array([thickness, thickness, stiff, stiff, thickness, thickness]))
+        thickness = Taper(*(np.array(item) for item in about.profile))
     beams = {"leaf": Beam("wall", "shuttle", section(strip, thickness), shape)}
     if not about.guided:
         nodes["far wall"] = Node(2.0 * x, 0, CLAMPED)

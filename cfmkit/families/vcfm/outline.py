@@ -83,15 +83,10 @@ def _edge(spec: VcfmSpec, side: float, apex: Point) -> list[Item]:
         half = 0.5 * side * about.thickness
         points = np.column_stack([x - half * slope / stretch, y + half / stretch]) + np.array(apex)
         return [Smooth(points, np.column_stack([1.0 / stretch, slope / stretch]))]
-    thin = about.thickness
-    stations, heights = [0.0, 1.0], [thin, thin]
-    if about.structure == "hybrid":
-        end, thick = float(about.flexure_length or 0.0) / about.length, (about.stiffening or 4.0) * thin
-        stations, heights = [0.0, end, end, 1.0 - end, 1.0 - end, 1.0], [thin, thin, thick, thick, thin, thin]
     up = 0.5 * side * float(stretch[0])
     return [
         (apex[0] + share * float(x[-1]), apex[1] + share * float(y[-1]) + up * height)
-        for share, height in zip(stations, heights, strict=True)
+        for share, height in zip(*about.profile, strict=True)
     ]
 
 

@@ -107,5 +107,5 @@ def _springs(strip: Strip, positive: Positive, share: float) -> Spring:
 _LEAVES: dict[str, Callable[[Strip, Any], Leaf]] = {
     "v-beam": lambda strip, _about: VBeam(strip),
     "cosine": lambda strip, _about: CosineArch(strip),
-    "hybrid": lambda strip, about: HybridLeaf(strip, about.flexure_length, about.stiffening or 4.0),
+    "hybrid": lambda strip, about: HybridLeaf(strip, about.flexure_length, about.bar_ratio),
 }

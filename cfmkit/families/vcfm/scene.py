@@ -11,11 +11,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cfmkit.families.vcfm.outline import RIM
 from cfmkit.families.vcfm.shapes import bent_leaf, centre_line, u_chain
 
 if TYPE_CHECKING:
     from cfmkit.curves import FloatArray
     from cfmkit.families.vcfm.model import Solution
+    from cfmkit.families.vcfm.spec import Bistable
 
 MIRROR = np.array([-1.0, 1.0])
 
@@ -56,15 +58,12 @@ def band(line: FloatArray, thickness: Any) -> FloatArray:
     return np.concatenate([line + half, (line - half)[::-1]])
 
 
-def leaf_thickness(solution: Solution, count: int) -> Any:
-    """Return the thickness along a snap-through leaf [m]: a number, or that of a hybrid at `count` points."""
-    about = solution.spec.mechanism.bistable
-    if about.structure != "hybrid":
-        return about.thickness
+def leaf_thickness(about: Bistable, count: int) -> FloatArray:
+    """Return the thickness of a snap-through leaf at `count` even places of its length [m]."""
+    stations, heights = about.profile
     share = np.linspace(0.0, 1.0, count)
-    end = float(about.flexure_length or 0.0) / about.length
-    stiff = (share > end) & (share < 1.0 - end)
-    return np.where(stiff, (about.stiffening or 4.0) * about.thickness, about.thickness)
+    middle = (share > stations[1]) & (share < stations[-2])
+    return np.where(middle, max(heights), min(heights))
 
 
 def scene(solution: Solution, travel: float, preload: float) -> Scene:
@@ -74,7 +73,7 @@ def scene(solution: Solution, travel: float, preload: float) -> Scene:
     levels = -(-about.half_beams // 2)
     half, reach, rise = 0.5 * frame.shuttle_width, float(strip.reach), float(strip.rise)
     line = centre_line(solution.parts.leaf, travel)[::-1] * MIRROR + np.array([half + reach, -rise])
-    thickness = leaf_thickness(solution, len(line))
+    thickness = leaf_thickness(about, len(line))
     for level in range(levels):
         up = np.array([0.0, level * frame.spacing])
         one = band(line + up, thickness)
@@ -95,7 +94,7 @@ def scene(solution: Solution, travel: float, preload: float) -> Scene:
 def _add_spring(found: Scene, solution: Solution, top: float, compression: float) -> None:
     """Add the spring below the shuttle's lower end."""
     about, frame = solution.spec.mechanism.positive, solution.spec.mechanism.frame
-    half = 0.5 * frame.block
+    half, rim = 0.5 * frame.block, RIM * about.thickness
     if about.structure == "straight":
         _add_straight(found, solution, top, compression)
         return
@@ -107,9 +106,7 @@ def _add_spring(found: Scene, solution: Solution, top: float, compression: float
         height = 2.0 * float(lower[-1, 1]) + frame.corner
         lines = [lower, lower * np.array([1.0, -1.0]) + np.array([0.0, height])]
         x, y = lower[-1]
-        rim = 0.75 * about.thickness
         corners = [rectangle(x, y - rim, x + frame.block, y + frame.corner + rim)]
-    rim = 0.75 * about.thickness
     shift = np.array([half, top - frame.block - height])
     sides = (1.0,) if about.loaded == "half" else (1.0, -1.0)
     for side in sides:

@@ -103,6 +103,20 @@ class Bistable(Model):
         0.0, description="how far a leaf as made is off its shape, in the form in which it buckles; exact model only"
     )
 
+    @property
+    def bar_ratio(self) -> float:
+        """Thickness of a hybrid leaf's middle over that of its flexures."""
+        return self.stiffening or 4.0
+
+    @property
+    def profile(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Shares of the length and the thicknesses there [m]: two, or six with the steps of a hybrid leaf."""
+        thin = self.thickness
+        if self.structure != "hybrid":
+            return (0.0, 1.0), (thin, thin)
+        end, thick = float(self.flexure_length or 0.0) / self.length, self.bar_ratio * thin
+        return (0.0, end, end, 1.0 - end, 1.0 - end, 1.0), (thin, thin, thick, thick, thin, thin)
+
     @model_validator(mode="after")
     def _flexures_fit(self) -> Self:
         if self.structure == "hybrid" and self.flexure_length is None:
