@@ -36,6 +36,20 @@ def test_every_verb_explains_itself_and_every_option(cli, verb):
         assert option in done.out
 
 
+@pytest.mark.parametrize(
+    ("verb", "told"),
+    [
+        ("batch", "What to do with every spec; default: design where there is a block design, else analyze."),
+        ("batch", "Output folder; default: cfm-out/batch/."),
+        ("measure", "Output folder; default: cfm-out/DATA-measure/."),
+        ("sensitivity", "or Monte Carlo over tolerances; default: the spec's, else oat."),
+    ],
+)
+def test_the_help_names_the_defaults(cli, verb, told):
+    page = cli(verb, "--help", COLUMNS="200").out
+    assert told in " ".join(page.replace("│", " ").split())
+
+
 @pytest.mark.parametrize("verb", ["check", "new", "show", "schema", "export"])
 @pytest.mark.parametrize("option", ["--seed=1", "--no-plots", "--fidelity=x"])
 def test_a_verb_refuses_options_that_would_do_nothing(cli, cam, verb, option):

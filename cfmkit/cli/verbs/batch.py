@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from cfmkit.cli.answer import Answer
-from cfmkit.cli.options import Changing, Common, Fidelity, NoPlots, OutFolder, Quiet, Seed
+from cfmkit.cli.options import Changing, Common, Fidelity, NoPlots, Quiet, Seed
 from cfmkit.cli.studies import Jobs, Timeout
 from cfmkit.errors import ExitCode
 
@@ -34,9 +34,13 @@ VerbOption = Annotated[
     Literal["design", "analyze"] | None,
     typer.Option(
         "--verb",
-        help="What to do with every spec [default: design where there is a block design, else analyze].",
+        help="What to do with every spec; default: design where there is a block design, else analyze.",
         show_default=False,
     ),
+]
+BatchFolder = Annotated[
+    str | None,
+    typer.Option("-o", "--out", metavar="DIR", help="Output folder; default: cfm-out/batch/.", show_default=False),
 ]
 JUnit = Annotated[
     str | None,
@@ -50,7 +54,7 @@ class Options(Changing, Common):
     """Arguments and options."""
 
     specs: Specs
-    out: OutFolder = None
+    out: BatchFolder = None
     verb: VerbOption = None
     junit: JUnit = None
     fail_fast: FailFast = False

@@ -10,7 +10,7 @@ import typer
 
 from cfmkit.cli.answer import Answer
 from cfmkit.cli.measuring import Units, data_record
-from cfmkit.cli.options import Common, NoPlots, OutFolder, Quiet
+from cfmkit.cli.options import Common, NoPlots, Quiet
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -25,6 +25,12 @@ PLACE = 32
 DataFile = Annotated[
     str,
     typer.Argument(metavar="DATA.csv", help="Columns with displacement and force, perhaps time.", show_default=False),
+]
+MeasureFolder = Annotated[
+    str | None,
+    typer.Option(
+        "-o", "--out", metavar="DIR", help="Output folder; default: cfm-out/DATA-measure/.", show_default=False
+    ),
 ]
 WindowOption = Annotated[
     str | None,
@@ -53,7 +59,7 @@ class Options(Common):
     """Arguments and options."""
 
     data: DataFile
-    out: OutFolder = None
+    out: MeasureFolder = None
     units: Units = None
     window: WindowOption = None
     filter: Filter = None

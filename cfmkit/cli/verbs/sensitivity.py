@@ -26,8 +26,8 @@ Method = Annotated[
     Literal["oat", "local", "morris", "sobol", "tolerance"] | None,
     typer.Option(
         "--method",
-        help="One at a time, gradients, Morris screening, Sobol indices, or Monte Carlo over tolerances "
-        "; default: the spec's, else oat.",
+        help="One at a time, gradients, Morris screening, Sobol indices, or Monte Carlo over tolerances; "
+        "default: the spec's, else oat.",
         show_default=False,
     ),
 ]
