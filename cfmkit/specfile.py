@@ -186,8 +186,10 @@ def _similar(name: str) -> str:
     folder, base = os.path.split(name)
     if folder and not os.path.isdir(folder):
         return f" (nor a folder {shown(folder)})"
-    near = difflib.get_close_matches(base, _yaml_files(folder or "."), n=1)
-    return f"; did you mean {shown(os.path.join(folder, near[0]))!r}?" if near else ""
+    # without their endings: those are alike in any two names
+    files = {os.path.splitext(file)[0]: file for file in _yaml_files(folder or ".")}
+    near = difflib.get_close_matches(os.path.splitext(base)[0], files, n=1)
+    return f"; did you mean {shown(os.path.join(folder, files[near[0]]))!r}?" if near else ""
 
 
 def _inside(folder: str) -> str:

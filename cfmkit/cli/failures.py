@@ -96,4 +96,5 @@ def _of_the_parser(error: Any) -> str:
     message = " ".join(error.format_message().split()).rstrip(".")
     context = getattr(error, "ctx", None)
     command = context.command_path if context else "cfmkit"
-    return f"{message}; see '{command} --help'"
+    joint = " See" if message.endswith("?") else "; see"
+    return f"{message}{joint} '{command} --help'"

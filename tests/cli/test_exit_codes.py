@@ -213,6 +213,13 @@ def test_a_file_that_is_no_spec_gets_one_clear_line(cli, name, content, code, to
 def test_a_missing_file_is_compared_with_what_stands_there(cli, cam):
     assert "did you mean 'cam.yaml'?" in cli("analyze", "cm.yaml").err
     assert "nor a folder nowhere" in cli("analyze", "nowhere/cam.yaml").err
+    assert "did you mean" not in cli("analyze", "nosuch.yaml").err
+
+
+def test_an_unknown_verb_is_compared_with_those_there_are(cli):
+    done = cli("analyse", "cam.yaml")
+    assert done.code == 2
+    assert done.err == "error    there is no command 'analyse'; did you mean 'analyze'? See 'cfmkit --help'\n"
 
 
 needs_permissions = pytest.mark.skipif(
