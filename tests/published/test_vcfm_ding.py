@@ -251,7 +251,7 @@ def test_worked_designs_by_closed_forms_and_one_exact_pass(stem):
     digits = (5e-5, 5e-5, 5e-4, 5e-5, 5e-5, 5e-4, 5e-4)
     for value, wanted, digit in zip(found, closed, digits, strict=True):
         assert wanted is None or value == pytest.approx(wanted, abs=1.1 * digit)
-    after, (stress, _) = fit_widths(spec, sizes)
+    after, (stress, _) = fit_widths(spec, spec.design, sizes)
     assert (after.leaf.width / MM, after.side.width / MM) == pytest.approx(fitted, rel=2e-4)
     assert stress == pytest.approx(spec.mechanism.material.allowable, rel=2e-3)
 

@@ -78,7 +78,7 @@ def _attempt(spec: VcfmSpec) -> Design:
         if target.refine:
             from cfmkit.families.vcfm.refine import refined
 
-            sizes = refined(spec, sizes)
+            sizes = refined(spec, target, sizes)
             check_width(spec, target, sizes.leaf)
             check_room(target, sizes)
     except Infeasible as problem:
@@ -94,7 +94,7 @@ def closed_form(spec: VcfmSpec, target: VcfmDesign) -> Sizes:
     Infeasible
         With the constraint that cannot be met, and the nearest value that can.
     """
-    about, rise = spec.mechanism.material, target.height
+    about = spec.mechanism.material
     check_guide(spec)
     thickness = thickness_for(target)
     shortest = shortest_leaf(spec, target, thickness)
@@ -108,19 +108,18 @@ def closed_form(spec: VcfmSpec, target: VcfmDesign) -> Sizes:
             ),
             {"design.leaf_length": at_least(shortest)},
         )
-    leaf = sized_leaf(spec, rise, thickness, length)
+    leaf = sized_leaf(spec, target, thickness, length)
     sizes = Sizes(leaf, spring_side(spec, target, leaf), onset_and_exit(leaf))
     check_width(spec, target, leaf)
     check_room(target, sizes)
     return sizes
 
 
-def sized_leaf(spec: VcfmSpec, rise: float, thickness: float, length: float) -> Strip:
+def sized_leaf(spec: VcfmSpec, target: VcfmDesign, thickness: float, length: float) -> Strip:
     """Return a leaf as wide as the stiffness wants, F_c/h = n P_cr/X."""
-    made, target = spec.mechanism.material, spec.design
+    made, rise = spec.mechanism.material, target.height
     leaf = Strip(length, asin(rise / length), thickness, 1.0, made.modulus, made.poisson)
-    stiffness = target.force / rise if target else 0.0
-    width = stiffness * leaf.reach / (spec.mechanism.bistable.half_beams * float(critical_force(leaf)))
+    width = target.force / rise * leaf.reach / (spec.mechanism.bistable.half_beams * float(critical_force(leaf)))
     return replace(leaf, width=float(width))
 
 
@@ -152,7 +151,7 @@ def check_width(spec: VcfmSpec, target: VcfmDesign, leaf: Strip) -> None:
     if leaf.width >= SQUAT * leaf.thickness:
         return
     longer = leaf.length
-    while sized_leaf(spec, target.height, leaf.thickness, longer).width < MARGIN * SQUAT * leaf.thickness:
+    while sized_leaf(spec, target, leaf.thickness, longer).width < MARGIN * SQUAT * leaf.thickness:
         longer *= 1.002
     raise Infeasible(
         finding(

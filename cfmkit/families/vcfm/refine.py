@@ -20,7 +20,7 @@ from cfmkit.families.vcfm.samples import LawSampler
 from cfmkit.numerics.roots import bracketed_root
 
 if TYPE_CHECKING:
-    from cfmkit.families.vcfm.spec import VcfmSpec
+    from cfmkit.families.vcfm.spec import VcfmDesign, VcfmSpec
 
 MIDDLE = 0.84
 """Part of the linear region over which the widths are fitted to the force."""
@@ -28,7 +28,7 @@ MIDDLE = 0.84
 RESCALES = 4
 
 
-def refined(spec: VcfmSpec, sizes: Sizes) -> Sizes:
+def refined(spec: VcfmSpec, target: VcfmDesign, sizes: Sizes) -> Sizes:
     """Return the sizes with both widths corrected by the exact model, and leaves long enough for its stress.
 
     Raises
@@ -36,19 +36,18 @@ def refined(spec: VcfmSpec, sizes: Sizes) -> Sizes:
     Infeasible
         If the exact stress stays above the allowable one.
     """
-    made, target = spec.mechanism.material, spec.design
-    allowable = made.allowable or 0.0
+    allowable = spec.mechanism.material.allowable or 0.0
     for _ in range(RESCALES):
-        sizes, stresses = fit_widths(spec, sizes)
+        sizes, stresses = fit_widths(spec, target, sizes)
         over = [stress / allowable for stress in stresses]
-        if max(over) <= 1.0 + 1e-4 or target is None:
+        if max(over) <= 1.0 + 1e-4:
             return sizes
         # stress falls with the square of a length; a leaf that was given stays
         leaf, side = sizes.leaf, sizes.side
         if over[0] > 1.0 + 1e-4:
             if target.leaf_length is not None:
                 break
-            leaf = sized_leaf(spec, target.height, leaf.thickness, float(leaf.length) * sqrt(1.0005 * over[0]))
+            leaf = sized_leaf(spec, target, leaf.thickness, float(leaf.length) * sqrt(1.0005 * over[0]))
         if over[1] > 1.0 + 1e-4:
             longer = float(side.length) * sqrt(1.0005 * over[1])
             side = replace(side, length=longer, width=side.width * (longer / side.length) ** 3)
@@ -60,7 +59,7 @@ def refined(spec: VcfmSpec, sizes: Sizes) -> Sizes:
     )
 
 
-def fit_widths(spec: VcfmSpec, sizes: Sizes) -> tuple[Sizes, tuple[float, float]]:
+def fit_widths(spec: VcfmSpec, target: VcfmDesign, sizes: Sizes) -> tuple[Sizes, tuple[float, float]]:
     """Return the sizes with widths that make the exact force flattest, and the exact stress of leaves and spring [Pa].
 
     The fit is over the middle 84 % of the linear region, without preload; the stress of the leaves is the largest from
@@ -71,21 +70,20 @@ def fit_widths(spec: VcfmSpec, sizes: Sizes) -> tuple[Sizes, tuple[float, float]
     Infeasible
         If the exact leaves cannot be followed that far.
     """
-    target = spec.design
     first, last = sizes.linear
     middle, half = 0.5 * (first + last), 0.5 * MIDDLE * (last - first)
     places = np.linspace(middle - half, middle + half, 101)
-    full = target.preload_stroke if target else 0.0
+    full = target.preload_stroke
     made = written(spec, sizes).replace({"analysis.preloads": (0.0, full), "analysis.branch": "stable"})
     back = -(rest_of(LawSampler(parts(made)), full, places) or 0.0)
     sampler = ExactSampler(made, last, 1.2 * back)
     if sampler.problem:
         raise Infeasible(
             finding("no_linear_region", f"the exact model does not confirm the design: {sampler.problem}"),
-            followable_stroke(target.height, sizes.leaf) if target else {},
+            followable_stroke(target.height, sizes.leaf),
         )
     leaves, spring = sampler.leaves(places).force, sampler.spring(places)[0]
-    wanted = np.full(len(places), target.force if target else 0.0)
+    wanted = np.full(len(places), target.force)
     (wide, stiff), *_ = np.linalg.lstsq(np.column_stack([leaves, spring]), wanted, rcond=None)
     leaf, side = sizes.leaf, sizes.side
     fitted = Sizes(
