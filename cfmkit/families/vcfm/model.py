@@ -75,6 +75,12 @@ class Push:
         lowest = int(falls[0] + np.argmin(self.force[falls[0] :]))
         return float(self.travel[lowest]), float(self.force[lowest])
 
+    def largest_stress(self, end: float) -> tuple[float, float]:
+        """Return the largest stress of leaves and spring up to a travel [m], in Pa."""
+        before = self.travel <= end * (1 + 1e-9)
+        leaves, spring = (stress[before].max(initial=0.0) for stress in (self.leaves.stress, self.spring_stress))
+        return float(leaves), float(spring)
+
     def window(self, flatness: float) -> tuple[float, float] | None:
         """Return the longest stretch on which (max - min)/max of the force is within `flatness` [m]; None if none."""
         first, last = longest_window(self.force[None, :], flatness)

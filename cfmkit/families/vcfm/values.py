@@ -49,6 +49,7 @@ def values_of(solution: Solution) -> Mapping[str, Quantity]:
     nominal, window = solution.nominal, solution.windows[0]
     force = solution.constant_force
     span = solution.window[1] - solution.window[0]
+    leaves, spring = np.max([push.largest_stress(solution.window[1]) for push in solution.pushes], axis=0).tolist()
     numbers: dict[str, float | None] = {
         "positive_stiffness": one.positive_stiffness,
         "negative_stiffness": one.negative_stiffness,
@@ -67,8 +68,8 @@ def values_of(solution: Solution) -> Mapping[str, Quantity]:
         "rest_shift_max": max((abs(push.rest) for push in solution.pushes if push.rest is not None), default=None),
         "least_force": nominal.least[1] if nominal.least else None,
         "stiffness_mismatch": abs(one.positive_stiffness - one.negative_stiffness) * span / force if force else None,
-        "spring_stress_max": _largest(solution, "spring"),
-        "bistable_stress_max": _largest(solution, "leaves"),
+        "spring_stress_max": spring,
+        "bistable_stress_max": leaves,
     } | _adjustment(solution)
     return {name: _quantity(name, value) for name, value in numbers.items()}
 
@@ -95,11 +96,3 @@ def _adjustment(solution: Solution) -> dict[str, float | None]:
         return {"force_change_max": None, "force_per_preload": None}
     change, preload = max(changes, key=lambda pair: abs(pair[0]))
     return {"force_change_max": change, "force_per_preload": change / preload}
-
-
-def _largest(solution: Solution, which: str) -> float:
-    found = 0.0
-    for push in solution.pushes:
-        stress = push.spring_stress if which == "spring" else push.leaves.stress
-        found = max(found, float(stress[push.travel <= solution.window[1] * (1 + 1e-9)].max(initial=0.0)))
-    return found
