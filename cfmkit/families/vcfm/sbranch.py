@@ -34,6 +34,9 @@ BUCKLED = np.pi**2
 SERIES = 0.35
 """Below this |z| the closed forms cancel and the series is used."""
 
+NEWTON_STEPS = 60
+"""At most so many to find z."""
+
 _W = np.array(
     [
         6.0, -2 / 5, -2 / 175, -4 / 7875, -74 / 3031875, -236 / 197071875, -11012 / 186232921875, -6616 / 2261399765625,
@@ -128,7 +131,7 @@ def largest_curvature(z: FloatArray) -> FloatArray:
     return np.where(z > 0.25 * np.pi**2, inside, np.abs(end_curvature(z)))
 
 
-def axial_root(shortening: Any, turn: Any, stretch: Any, iterations: int = 60) -> FloatArray:
+def axial_root(shortening: Any, turn: Any, stretch: Any) -> FloatArray:
     """Return z with stretch z + turn^2 e(z) = shortening, element by element.
 
     Parameters
@@ -139,8 +142,6 @@ def axial_root(shortening: Any, turn: Any, stretch: Any, iterations: int = 60) -
         alpha [rad].
     stretch : array
         (t/L)^2/3 = 4 E I/(E A L^2).
-    iterations : int
-        At most so many Newton steps; from the right of the root of a convex function none overshoots.
     """
     parts = np.broadcast_arrays(*(np.asarray(item, dtype=float) for item in (shortening, np.square(turn), stretch)))
     shape = parts[0].shape
@@ -151,7 +152,7 @@ def axial_root(shortening: Any, turn: Any, stretch: Any, iterations: int = 60) -
     # at zero the function is bend/10 - m: its sign says on which side the root lies, and what bounds it from the right
     z = np.where(m < 0, free, np.where(0.1 * bend >= m, 0.0, np.minimum(free, bent)))
     z = np.minimum(z, POLE * (1.0 - 1e-9))
-    for _ in range(iterations):
+    for _ in range(NEWTON_STEPS):  # from the right of the root of a convex function none overshoots
         e, slope = compliance(z)
         step = (a * z + bend * e - m) / (a + bend * slope)
         z = np.minimum(z - step, POLE * (1.0 - 1e-12))
