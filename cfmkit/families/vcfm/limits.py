@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from cfmkit.families.findings import at_least, at_most, mm
 from cfmkit.families.refusals import Infeasible
 from cfmkit.families.vcfm.findings import finding
-from cfmkit.families.vcfm.vbeam import STEEP
+from cfmkit.families.vcfm.vbeam import STEEP, buckled_stress
 
 if TYPE_CHECKING:
     from cfmkit.families.vcfm.spec import VcfmDesign, VcfmSpec
@@ -94,8 +94,7 @@ def shortest_leaf(spec: VcfmSpec, target: VcfmDesign, thickness: float) -> float
     made, rise = spec.mechanism.material, target.height
     root = pi * thickness / rise
     u = min(1.0, 2.0 / 3.0 * (1.0 + sqrt(1.0 - root * root)))
-    bend = sqrt(4.0 * u - 2.0 * u * u - 4.0 / 3.0 * root * root)
-    stressed = pi * rise * thickness * bend + pi**2 * thickness**2 / 3.0
+    stressed = buckled_stress(rise, thickness, u)
     return max(sqrt(made.modulus / (made.allowable or 1.0) * stressed), rise / sin(STEEP))
 
 

@@ -5,8 +5,8 @@ times that of the real leaf, and it is nowhere straight.
 
 Reference
 ---------
-[D] B. Ding, X. Li, Y. Li, Robotica (2022), eq. 17-19. The formulas of eq. 15 and 19 are for one chain of the diamond,
-eq. 18 for one V: here they count the chains and leaves that are there.
+[D] B. Ding, X. Li, Y. Li, Robotica (2022), eq. 18 and 19. The formula of eq. 19 is for one chain of the diamond, eq. 18
+for one V: here they count the chains and leaves that are there.
 """
 
 from __future__ import annotations
@@ -90,18 +90,3 @@ class TrussDiamond:
         from cfmkit.families.vcfm.springs import leaf_stress
 
         return leaf_stress(self.strip, 0.5 * compression)
-
-
-def printed_diamond_stiffness(strip: Strip) -> Any:
-    """Return the stiffness that eq. 15 gives as printed, without the F_1 inside its bracket [N/m].
-
-    One chain, with half of the shear term: neither the right chain nor the right diamond.
-    """
-    bent = 2.0 * strip.reach**3 / (12.0 * strip.bending)
-    shear = 12.0 * (1.0 + strip.poisson_ratio) * strip.reach / (5.0 * strip.axial)
-    return 1.0 / (bent + shear)
-
-
-def printed_negative_stiffness(strip: Strip) -> Any:
-    """Return 33 E I/L^3 of one leaf [D, eq. 17], in N/m."""
-    return 33.0 * strip.bending / strip.length**3

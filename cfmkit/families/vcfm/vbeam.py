@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from math import radians
+from math import radians, sqrt
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -83,12 +83,14 @@ def first_stiffness(strip: Strip) -> Any:
     return strip.axial * s * s / strip.length + 12.0 * strip.bending * c * c / strip.length**3
 
 
-def stress_when_flat(strip: Strip) -> Any:
-    """Return the largest stress of the buckled leaf when flat, where it is highest [Pa]."""
-    t, length, rise = strip.thickness, strip.length, strip.rise
-    bend = np.sqrt(2.0 - 4.0 * np.pi**2 / (3.0 * strip.slenderness**2))
-    pressed = np.pi**2 * strip.youngs_modulus * t * t / (3.0 * length**2)
-    return np.pi * strip.youngs_modulus * rise * t / length**2 * bend + pressed
+def buckled_stress(rise: float, thickness: float, share: float) -> float:
+    """Return the largest stress of a buckled leaf at a share of the travel to its flat pose, times L^2/E [m2].
+
+    It is highest in the flat pose.
+    """
+    root = np.pi * thickness / rise
+    bend = sqrt(4.0 * share - 2.0 * share * share - 4.0 / 3.0 * root * root)
+    return float(np.pi * rise * thickness * bend + np.pi**2 * thickness**2 / 3.0)
 
 
 @dataclass(frozen=True)
