@@ -51,13 +51,13 @@ def kept(found: Found) -> tuple[float, float]:
 
 @pytest.mark.parametrize(("width", "ripple", "stroke", "share"), YARDSTICK)
 def test_nine_thicknesses_come_up_to_the_yardstick(width: float, ripple: float, stroke: float, share: float) -> None:
-    """Two rows stay 0.1 and 0.2 % below: the yardstick's strips have half a percent less force than they say."""
+    """Two rows stay 0.15 and 0.25 % below: the yardstick's strips have half a percent less force than they say."""
     found = found_for(width, ripple, 9)
     assert found.descent.ending is Ending.OPTIMUM
     assert found.program.stroke(found.descent.z) / MM >= share * stroke - 0.06
     deviation, stress = kept(found)
     assert deviation <= ripple + 5e-5
-    assert stress <= 42.5e6 * (1 + 2e-3)
+    assert stress <= 42.5e6 * (1 + 5e-5)
 
 
 @pytest.mark.parametrize(
@@ -86,12 +86,11 @@ def test_nine_thicknesses_beat_the_yardstick_at_its_own_force_band_and_stress(
 @pytest.mark.slow
 @pytest.mark.parametrize(("width", "ripple", "stroke", "share"), YARDSTICK)
 def test_seventeen_thicknesses_beat_the_yardstick(width: float, ripple: float, stroke: float, share: float) -> None:
-    """Between the samples of the search the stress is a little higher: `design` ends the stroke at its exact peak."""
     found = found_for(width, ripple, 17)
     assert found.program.stroke(found.descent.z) / MM > 1.1 * stroke
     deviation, stress = kept(found)
     assert deviation <= ripple + 5e-5
-    assert stress <= 42.5e6 * (1 + 5e-3)
+    assert stress <= 42.5e6 * (1 + 5e-5)
 
 
 def test_one_more_halving_of_the_intervals_beats_the_tightest_row() -> None:

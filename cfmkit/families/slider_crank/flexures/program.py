@@ -2,15 +2,16 @@
 
 The force is computed at Chebyshev points of the root of the travel, where it is smooth down to the steep start, and
 interpolated between them, so that the band is kept everywhere and not at a few points. The stress is looked at along
-the whole strip at the end of the travel, where it is largest. Derivatives by the thicknesses are exact (implicit
-differentiation); those of the force by the stroke too. The force is proportional to the width, the stress does not
-depend on it. Places of stations are differentiated by central differences.
+the whole strip, its peaks included, near the end of the travel: it is largest there. Derivatives by the thicknesses
+are exact (implicit differentiation); those of the force by the stroke too. The force is proportional to the width, the
+stress does not depend on it. Places of stations are differentiated by central differences.
 """
 
 from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,6 +21,7 @@ from cfmkit.beams.neighbour import drive_slope, neighbouring
 from cfmkit.errors import InputError
 from cfmkit.families.slider_crank.flexures.chain import SLIDER, STRIP
 from cfmkit.families.slider_crank.flexures.pressing import FIRST_STEP
+from cfmkit.families.slider_crank.flexures.strength import LAST, Watched, watched
 from cfmkit.numerics.barycentric import differentiation, interpolation
 
 if TYPE_CHECKING:
@@ -27,8 +29,8 @@ if TYPE_CHECKING:
     from cfmkit.curves import FloatArray
     from cfmkit.families.slider_crank.flexures.task import Form, Task
 
-POINTS, DENSE, SAMPLES = 12, 81, 8
-"""Where the force is computed, where its band is kept, and samples of the stress in each linear piece."""
+POINTS, DENSE = 12, 81
+"""Where the force is computed, and where its band is kept."""
 
 RMS_POINTS = 10
 """Points of the root mean square, even in the travel, its start left out [B, eq. 14]."""
@@ -47,13 +49,19 @@ class State:
         Its equilibria.
     force : (p,) array
         [N].
-    stress : (r,) array
-        Along the strip at the end [Pa].
+    watched : Watched
+        Where the stress is looked at.
     """
 
     path: Path
     force: FloatArray
-    stress: FloatArray
+    watched: Watched
+
+    @cached_property
+    def stress(self) -> FloatArray:
+        """Stress at the tops of the strip's pieces near the end of the travel, (r,) [Pa]."""
+        sections, last = self.path.sections(STRIP), self.path.at_asked[-LAST:]
+        return self.watched.stress(sections.bending_stress[last], sections.axial_stress[last])
 
 
 @dataclass
@@ -112,28 +120,9 @@ class StripProgram:
         if path is None:
             return None
         at = path.at_asked
-        stress = self._sampled(path) @ path.sections(STRIP).stress()[at[-1]]
-        found = State(path, path.effort[at], stress)
+        found = State(path, path.effort[at], watched(path, self.spots))
         self.known, self._last = path, (z.copy(), found)
         return found
-
-    def _sampled(self, path: Path) -> FloatArray:
-        """Return the matrix from the samples along a strip to those looked at: so many in every linear piece.
-
-        How finely a path is sampled depends on its mesh; how many constraints there are must not.
-        """
-        beam = path.layout.network.beams[STRIP]
-        breaks = np.unique(np.concatenate([beam.shape.course(1.0).breaks, beam.section.stations]))
-        breaks = breaks[np.append(True, np.diff(breaks) > 1e-12)]
-        place = np.interp(path.sections(STRIP).place[0], breaks, np.arange(len(breaks)))
-        wanted = np.linspace(0.0, len(breaks) - 1, SAMPLES * (len(breaks) - 1) + 1)
-        after = np.clip(np.searchsorted(place, wanted - 1e-9), 1, len(place) - 1)
-        gap = np.maximum(place[after] - place[after - 1], 1e-300)
-        share = np.clip((wanted - place[after - 1]) / gap, 0.0, 1.0)
-        matrix = np.zeros((len(wanted), len(place)))
-        rows = np.arange(len(wanted))
-        matrix[rows, after - 1], matrix[rows, after] = 1.0 - share, share
-        return matrix
 
     def _path(self, network: Network, travel: FloatArray) -> Path | None:
         """Return the equilibria near the last ones, else from rest."""
@@ -204,11 +193,8 @@ class StripProgram:
 
         inner = x[: form.count]
         force = [gradient(path, build, inner).effort]
-        last = gradient(path, build, inner, points=path.at_asked[-1:]).sections(STRIP)
-        sections = path.sections(STRIP)
-        end = path.at_asked[-1]
-        bend, pull = np.sign(sections.bending_stress[end])[:, None], np.sign(sections.axial_stress[end])[:, None]
-        stress = [self._sampled(path) @ (bend * last.bending_stress[0] + pull * last.axial_stress[0])]
+        last = gradient(path, build, inner, points=path.at_asked[-LAST:]).sections(STRIP)
+        stress = [state.watched.stress(last.bending_stress, last.axial_stress)]
         for k in range(form.count, form.count + form.placed):
             by = self._by_difference(z, k, state)
             force.append(by[0][:, None])
@@ -228,17 +214,19 @@ class StripProgram:
             path = neighbouring(state.path, self.network(moved), drive)
             if path.status is not PathStatus.COMPLETE:
                 return 0.0 * state.force, 0.0 * state.stress
-            sides.append((path.effort, self._sampled(path) @ path.sections(STRIP).stress()[-1]))
+            side = State(path, path.effort, watched(path, self.spots))
+            sides.append((side.force, side.stress))
         (low, weak), (high, strong) = sides
         return (high - low) / (2 * _NUDGE), (strong - weak) / (2 * _NUDGE)
 
     def _by_stroke(self, z: FloatArray, state: State) -> tuple[FloatArray, FloatArray]:
-        """Return the derivatives by the stroke in cm: all points move with it, the stress is that at the last."""
+        """Return the derivatives by the stroke in cm: all points move with it, and the stress with its point."""
         travel, at = self.travel(z), state.path.at_asked
-        stroke = self.stroke(z)
-        moves = np.sqrt(travel / stroke) * self.spots
-        sections, end = state.path.sections(STRIP), at[-1]
-        parts = (sections.bending_stress, sections.axial_stress)
-        by_spot = self._sampled(state.path) @ sum(np.sign(part[end]) * (self.slope[-1] @ part[at]) for part in parts)
-        by_travel = by_spot / (2.0 * np.sqrt(stroke) * (np.sqrt(stroke) - np.sqrt(self.task.start)))
-        return 0.01 * drive_slope(state.path) * moves, 0.01 * by_travel
+        first, last = np.sqrt(self.task.start), np.sqrt(self.stroke(z))
+        moves = np.sqrt(travel) / last * self.spots
+        by_travel = self.slope[-LAST:] * (self.spots / (2.0 * last * (last - first)))[-LAST:, None]
+        sections = state.path.sections(STRIP)
+        stress = state.watched.stress(
+            *(by_travel @ part[at] for part in (sections.bending_stress, sections.axial_stress))
+        )
+        return 0.01 * drive_slope(state.path) * moves, 0.01 * stress
