@@ -188,6 +188,13 @@ def test_an_exact_run_that_cannot_be_followed_is_partial_and_says_how_far_it_cam
     assert found.curve.motion[-1] < 5.8 * MM
 
 
+def test_a_spring_that_cannot_be_followed_is_named_with_its_own_compression():
+    found = analyzed("analysis.fidelity=exact", preloads="[0 mm, 120 mm]")
+    assert found.status is Status.PARTIAL
+    assert found.message.startswith("the spring was followed to 112.6 mm only: ")
+    assert len(found.curves) == 1
+
+
 def test_exact_forces_do_not_depend_on_the_number_of_points():
     few, many = (analyzed("analysis.fidelity=exact", f"analysis.points={n}") for n in (31, 481))
     at = np.interp(few.curve.motion, many.curve.motion, many.curve.force)

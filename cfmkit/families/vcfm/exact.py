@@ -12,15 +12,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cfmkit.families.findings import mm
 from cfmkit.families.vcfm.parts import share_of, strip_of
 from cfmkit.families.vcfm.samples import Character, Samples
 from cfmkit.families.vcfm.traced import traced
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from cfmkit.beams import Network
     from cfmkit.curves import FloatArray
     from cfmkit.families.vcfm.spec import VcfmSpec
     from cfmkit.families.vcfm.strip import Strip
+    from cfmkit.families.vcfm.traced import Traced
 
 DOWN = -0.5 * np.pi
 
@@ -124,8 +128,9 @@ class ExactSampler:
         self.chain = spring_chain(spec)
         ends = (max(preloads) + end, min(min(preloads) - back, -0.02 * end))
         self.sides = [traced(self.chain.network, self.chain.node, self.chain.travel * side) for side in ends]
-        problems = [one.problem for one in (self.pushed, self.pulled, *self.sides)]
-        self.problem = next((text for text in problems if text), "")
+        self.problem = _problem("leaves were", (self.pushed, self.pulled), 1.0) or _problem(
+            "spring was", self.sides, self.chain.travel
+        )
 
     def leaves(self, travel: FloatArray) -> Samples:
         """Return what all leaves do at some travels [m]; NaN beyond what was reached."""
@@ -168,3 +173,9 @@ class ExactSampler:
             self.each * first_stiffness,
             (first, last),
         )
+
+
+def _problem(subject: str, paths: Sequence[Traced], travel: float) -> str:
+    """Return how far a part was followed, in shares `travel` of its node, and why no farther; empty if to the end."""
+    short = next((one for one in paths if one.problem), None)
+    return "" if short is None else f"the {subject} followed to {mm(short.edges[-1] / travel)} only: {short.problem}"

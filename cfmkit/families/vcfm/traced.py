@@ -145,7 +145,7 @@ def _once(network: Network, node: str, places: FloatArray, control: dict[str, An
     reached = float(path.drive[kept[-1]]) if len(kept) else 0.0
     whole = abs(reached - places[-1]) <= 1e-9 * abs(places[-1])
     events = [event.drive for event in path.events if event.kind == "bifurcation"]
-    problem = "" if path.status is PathStatus.COMPLETE and whole else _words(path.message, reached)
+    problem = "" if path.status is PathStatus.COMPLETE and whole else path.message
     inner = tuple(sorted({round(event, 10) for event in events if 0 < sense * event < sense * reached}, key=abs))
     names = np.asarray(path.branch)[kept]
     first = 0 if len(kept) and path.drive[kept[0]] == 0 else 1  # the pose as made, where the path does not list it
@@ -166,7 +166,3 @@ def _forward(drive: FloatArray, accurate: Any) -> Any:
     """Return the indices of accurate points at which the drive is farther than ever before."""
     farthest = np.maximum.accumulate(np.concatenate([[-1e-30], drive[:-1]])) if len(drive) else drive
     return np.flatnonzero(accurate & (drive > farthest + 1e-15))
-
-
-def _words(message: str, reached: float) -> str:
-    return f"the leaves were followed to {1e3 * reached:.4g} mm only: {message}"
