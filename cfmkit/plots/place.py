@@ -2,7 +2,8 @@
 
 The axes are divided into cells of about half a millimetre. Every line, patch and
 text marks the cells it covers; a name goes to the place near its line where it
-covers fewest of them. One pass, no iteration, the same result every time.
+covers fewest of them, and where no other name and if possible no other line lies
+between the two. One pass, no iteration, the same result every time.
 """
 
 from __future__ import annotations
@@ -33,6 +34,9 @@ MARGIN = 1.5
 
 LEADER = 9.0
 """From this distance on a thin line leads from the name to its line [pt]."""
+
+SIGHT = 12
+"""So many places between a name and its line are looked at."""
 
 _SIDES = np.array([[0, 1], [0, -1], [1, 0], [-1, 0], [1, 1], [-1, 1], [1, -1], [-1, -1]], dtype=float)
 
@@ -127,9 +131,28 @@ def _best(ground: _Ground, label: Label, points: FloatArray, box: FloatArray) ->
         wanted = np.array(label.toward) / np.hypot(*label.toward)
         sides = _SIDES / np.hypot(_SIDES[:, 0], _SIDES[:, 1])[:, None]
         cost = cost + np.tile(np.repeat(25.0 * (1.0 - sides @ wanted), len(gaps)), len(points))
+    cost = cost + _between(ground, centers, box, np.repeat(points, len(offsets), axis=0))
     cost = cost + np.where(ground.holds(centers, box), 0.0, 1e6)
     center: FloatArray = centers[int(np.argmin(cost))]
     return center
+
+
+def _between(ground: _Ground, centers: FloatArray, box: FloatArray, anchors: FloatArray) -> FloatArray:
+    """Return what it costs that something lies between boxes and their anchors (n, 2) [pt]."""
+    starts = _edges(centers, box, anchors)
+    way = anchors - starts
+    length = np.hypot(way[:, 0], way[:, 1])
+    # the line that is named ends the way: its own cells are no obstacle
+    shares = np.linspace(0.0, 1.0, SIGHT) * np.maximum(1.0 - 2.0 * CELL / np.maximum(length, CELL), 0.0)[:, None]
+    places = starts[:, None, :] + shares[:, :, None] * way[:, None, :]
+    cost: FloatArray = 15.0 * ground.any_at(places, ground.taken) + 60.0 * ground.any_at(places, ground.named)
+    return cost
+
+
+def _edges(centers: FloatArray, box: FloatArray, anchors: FloatArray) -> FloatArray:
+    """Return the point of each box that is nearest to its anchor."""
+    edges: FloatArray = centers + np.clip(anchors - centers, -box / 2, box / 2)
+    return edges
 
 
 def _clear(ground: _Ground, center: FloatArray, box: FloatArray) -> None:
@@ -147,8 +170,7 @@ def _clear(ground: _Ground, center: FloatArray, box: FloatArray) -> None:
 def _lead(ground: _Ground, where: tuple[FloatArray, FloatArray, FloatArray], color: str) -> None:
     """Draw a thin line from the edge of a name's box to its anchor."""
     center, box, anchor = where
-    start = center + np.clip(anchor - center, -box / 2, box / 2)
-    ends = np.array([start, anchor]) / ground.extent
+    ends = np.array([_edges(center, box, anchor), anchor]) / ground.extent
     ground.ax.plot(
         ends[:, 0], ends[:, 1], transform=ground.ax.transAxes, color=color, linewidth=0.5, zorder=5, clip_on=False
     )
@@ -167,6 +189,7 @@ class _Ground:
         self.extent = np.array([box.width, box.height]) * self.scale
         self.shape = np.maximum(np.ceil(self.extent / CELL).astype(int), 1)
         self.taken = np.zeros(self.shape, dtype=np.int64)
+        self.named = np.zeros(self.shape, dtype=np.int64)
         self._mark_artists()
         self._sum()
 
@@ -183,7 +206,7 @@ class _Ground:
             if text.get_text():
                 box = text.get_window_extent()
                 low = (np.array([box.x0, box.y0]) - self.corner) * self.scale
-                self._fill(low, low + np.array([box.width, box.height]) * self.scale)
+                self._fill(low, low + np.array([box.width, box.height]) * self.scale, name=True)
 
     def _points(self, values: FloatArray, transform: Transform) -> FloatArray:
         points: FloatArray = (np.asarray(transform.transform(values)) - self.corner) * self.scale
@@ -223,17 +246,19 @@ class _Ground:
         cells = cells[((cells >= 0) & (cells < self.shape)).all(axis=1)]
         self.taken[cells[:, 0], cells[:, 1]] = 1
 
-    def _fill(self, low: FloatArray, high: FloatArray) -> None:
+    def _fill(self, low: FloatArray, high: FloatArray, name: bool = False) -> None:
         a = np.clip(np.floor(low / CELL).astype(int), 0, self.shape)
         b = np.clip(np.ceil(high / CELL).astype(int), 0, self.shape)
         self.taken[a[0] : b[0], a[1] : b[1]] = 1
+        if name:
+            self.named[a[0] : b[0], a[1] : b[1]] = 1
 
     def _sum(self) -> None:
         self.total = np.pad(self.taken.cumsum(axis=0).cumsum(axis=1), ((1, 0), (1, 0)))
 
     def occupy(self, center: FloatArray, box: FloatArray) -> None:
-        """Mark a box as taken."""
-        self._fill(center - box / 2, center + box / 2)
+        """Mark a box as taken by a name."""
+        self._fill(center - box / 2, center + box / 2, name=True)
         self._sum()
 
     def covered(self, centers: FloatArray, box: FloatArray) -> FloatArray:
@@ -244,6 +269,12 @@ class _Ground:
         count = total[b[:, 0], b[:, 1]] - total[a[:, 0], b[:, 1]] - total[b[:, 0], a[:, 1]] + total[a[:, 0], a[:, 1]]
         share: FloatArray = count / max(float(box[1]) / CELL, 1.0)
         return share
+
+    def any_at(self, places: FloatArray, cells: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Return for each row of places (n, m, 2) whether one of them lies in a marked cell."""
+        at = np.clip(np.floor(places / CELL).astype(int), 0, np.array(self.shape) - 1)
+        found: NDArray[np.bool_] = cells[at[..., 0], at[..., 1]].any(axis=1)
+        return found
 
     def holds(self, centers: FloatArray, box: FloatArray) -> NDArray[np.bool_]:
         """Return at which centres the box lies wholly in the axes."""

@@ -273,6 +273,21 @@ def test_a_name_stands_nearest_to_its_own_line():
     assert abs(ends[1].mean() - 6.0) < 1.0
 
 
+def test_no_leader_runs_through_another_name():
+    ax = axes()
+    ax.set_xlim(0, 10)
+    ax.set_ylim(0, 10)
+    end = np.array([[6.0, 5.0]])
+    ax.plot([0.0, 6.0], [5.0, 5.0])
+    texts = place_labels(ax, [Label(f"model {i}", "k", end, toward=(1.0, 0.0)) for i in range(3)])
+    leaders = [line for line in ax.lines if line.get_transform() == ax.transAxes]
+    assert len(leaders) == 2
+    for line in leaders:
+        ends = ax.transAxes.transform(line.get_xydata())
+        places = ends[0] + np.linspace(0.05, 1.0, 50)[:, None] * (ends[1] - ends[0])
+        assert not any(box.count_contains(places) for box in boxes_of(texts))
+
+
 def test_what_lies_outside_the_axes_gets_no_name():
     ax = axes()
     ax.set_xlim(0, 1)
