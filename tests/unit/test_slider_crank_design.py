@@ -54,14 +54,14 @@ def test_least_squares_holds_a_slope_too(caps, slope):
     from scipy.optimize import minimize
 
     from cfmkit.families.slider_crank.rates import least_squares
-    from cfmkit.families.slider_crank.targets import Task, plain_assembly
+    from cfmkit.families.slider_crank.targets import task_of
 
     design = {
         "torque": "2 N*mm", "angle": ("0.866 deg", "4.866 deg"), "objective": "least-squares",
         "stiffness": f"{2 * slope} N*mm/rad", "hold_stiffness": True, "max_rates": caps,
     }  # fmt: skip
     spec = config("li2019", design=design)
-    goal = Task(spec, plain_assembly(spec.mechanism, spec)).goal(spec.design.angle)
+    goal = task_of(spec).goal(spec.design.angle)
     found, (row, held) = least_squares(goal), goal.held
     scales = goal.scales()
     line = {"type": "eq", "fun": lambda at: row @ (at / scales) - held, "jac": lambda _: row / scales}

@@ -35,7 +35,7 @@ from cfmkit.families.slider_crank.solved import (
     nowhere,
     too_far,
 )
-from cfmkit.families.slider_crank.targets import DENSE, FREE, Task, plain_assembly, with_lengths
+from cfmkit.families.slider_crank.targets import DENSE, FREE, task_of, with_lengths
 from cfmkit.families.slider_crank.windows import widest
 from cfmkit.numerics.boxes import Axis, Lowest, lowest
 from cfmkit.results import Design, Status
@@ -43,6 +43,7 @@ from cfmkit.results import Design, Status
 if TYPE_CHECKING:
     from cfmkit.families.base import Run
     from cfmkit.families.slider_crank.spec import CrankDesign, SliderCrankSpec
+    from cfmkit.families.slider_crank.targets import Task
 
 
 HOPELESS = 0.5
@@ -90,8 +91,7 @@ def _searched(spec: SliderCrankSpec, wanted: CrankDesign, run: Run) -> tuple[Sol
     """Return the best design, and the search that led to its lengths."""
     axes = {name: _axis(name, getattr(wanted, name)) for name in FREE if getattr(wanted, name) is not None}
     if not axes:
-        task = Task(spec, plain_assembly(spec.mechanism, spec))
-        return solve(task), None
+        return solve(task_of(spec)), None
 
     count = 0
 
@@ -107,9 +107,7 @@ def _searched(spec: SliderCrankSpec, wanted: CrankDesign, run: Run) -> tuple[Sol
         text = "no lengths in the ranges given reach the window within the limits of the joints; widen the ranges"
         raise Infeasible(finding("infeasible_targets", text))
     place = even_best(spec, tuple(axes), found) if wanted.slack else found.place
-    lengths = dict(zip(axes, place, strict=True))
-    changed = with_lengths(spec, lengths)
-    return solve(Task(changed, plain_assembly(changed.mechanism, changed))), found
+    return solve(task_of(with_lengths(spec, dict(zip(axes, place, strict=True))))), found
 
 
 def _axis(name: str, ends: tuple[float, float]) -> Axis:
@@ -118,9 +116,8 @@ def _axis(name: str, ends: tuple[float, float]) -> Axis:
 
 def _height(spec: SliderCrankSpec, lengths: dict[str, float]) -> float:
     """Return what a choice of lengths is judged by: the deviation, or the width of the window with a minus."""
-    changed = with_lengths(spec, lengths)
     try:
-        task = Task(changed, plain_assembly(changed.mechanism, changed))
+        task = task_of(with_lengths(spec, lengths))
     except CannotBuild:
         return math.inf
     wanted = task.wanted

@@ -10,7 +10,7 @@ import numpy as np
 from cfmkit.bodies.slider_crank_springs import JOINTS
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.rates import preferred, ranges
-from cfmkit.families.slider_crank.targets import Task, plain_assembly, with_lengths
+from cfmkit.families.slider_crank.targets import FREE, task_of, with_lengths
 from cfmkit.units import format_short
 
 if TYPE_CHECKING:
@@ -44,8 +44,8 @@ def even_best(spec: SliderCrankSpec, names: tuple[str, ...], search: Lowest) -> 
     good = [place for place, value in search.profile if value <= search.value + wanted.slack]
 
     def rotation(place: tuple[float, ...]) -> float:
-        changed = with_lengths(spec, dict(zip(names, place, strict=True)))
-        return Task(changed, plain_assembly(changed.mechanism, changed)).rotation(wanted.window or (0.0, 0.0))
+        task = task_of(with_lengths(spec, dict(zip(names, place, strict=True))))
+        return task.rotation(wanted.window or (0.0, 0.0))
 
     return min([search.place, *good], key=rotation)
 
@@ -88,7 +88,7 @@ def _of_lengths(solved: Solved, search: Lowest | None) -> str:
     good = [place[0] for place, value in search.profile if value <= search.value + max(wanted.slack, NEGLIGIBLE)]
     if len(good) < 2:
         return ""
-    name = next(name for name in ("crank_length", "offset", "unloaded_offset") if getattr(wanted, name) is not None)
+    name = next(name for name in FREE if getattr(wanted, name) is not None)
     dimension = "angle" if name == "unloaded_offset" else "length"
     low, high = (format_short(end, dimension) for end in (min(good), max(good)))
     return f"{name.replace('_', ' ')} {low} to {high}"

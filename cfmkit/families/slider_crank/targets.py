@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.bodies.slider_crank_springs import JOINTS
-from cfmkit.families.slider_crank.build import Assembly, coupler_length
+from cfmkit.families.slider_crank.build import assemble
 from cfmkit.families.slider_crank.rates import Goal
 
 if TYPE_CHECKING:
     from cfmkit.curves import FloatArray
-    from cfmkit.families.slider_crank.spec import CrankDesign, Mechanism, SliderCrankSpec
+    from cfmkit.families.slider_crank.build import Assembly
+    from cfmkit.families.slider_crank.spec import CrankDesign, SliderCrankSpec
 
 FREE = ("crank_length", "offset", "unloaded_offset")
 """Lengths that a design may choose."""
@@ -36,7 +37,7 @@ class Task:
     spec : SliderCrankSpec
         With the lengths; its springs do not matter.
     assembly : Assembly
-        The same put together.
+        The same put together; its rates do not matter.
     """
 
     spec: SliderCrankSpec
@@ -138,20 +139,14 @@ def with_lengths(spec: SliderCrankSpec, lengths: dict[str, float]) -> SliderCran
     return spec.model_copy(update={"mechanism": spec.mechanism.model_copy(update=written)})
 
 
-def plain_assembly(mechanism: Mechanism, spec: SliderCrankSpec) -> Assembly:
-    """Return the mechanism put together for the drive of the design, whatever the analysis says.
+def task_of(spec: SliderCrankSpec) -> Task:
+    """Return the design of a specification, put together for its own drive, whatever the analysis says.
 
     Raises
     ------
     CannotBuild
-        If it cannot exist.
+        If the mechanism cannot exist.
     """
-    from cfmkit.families.slider_crank.build import linkage_of, side_of, unloaded_angle
-
     design = spec.design
     assert design is not None
-    coupler_length(mechanism)
-    linkage = linkage_of(mechanism)
-    unloaded = unloaded_angle(mechanism, linkage)
-    drive = "torque" if design.torque is not None else "force"
-    return Assembly(linkage, unloaded, np.zeros(4), drive, side_of(spec, linkage, unloaded))  # type: ignore[arg-type]
+    return Task(spec, replace(assemble(spec), drive="torque" if design.torque is not None else "force"))
