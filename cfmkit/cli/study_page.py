@@ -74,10 +74,12 @@ def _best(grid: Table, ending: Ending, everything: bool) -> None:
     )
     for path, value in best["values"].items():
         grid.add_row(Text(f"  {path}"), Text(value), Text())
+    dimensions = {one.name: one.dimension for one in ending.records.work.study.metrics}
     names = [best["by"], *(name for name in metrics if name != best["by"])]
     for name in names if everything else names[:MOST_METRICS]:
         if (value := metrics[name]["value"]) is not None:
-            grid.add_row(Text(f"  {_words(name)}"), Text(_quantity(value, metrics[name]["unit"])), Text())
+            told = _quantity(value, metrics[name]["unit"], dimensions[name])
+            grid.add_row(Text(f"  {_words(name)}"), Text(told), Text())
 
 
 def _among(best: dict[str, object]) -> str:
@@ -90,10 +92,13 @@ def _words(name: str) -> str:
     return name.replace("_", " ")
 
 
-def _quantity(value: float | str, unit: str) -> str:
+def _quantity(value: float | str, unit: str, dimension: str) -> str:
+    """Return a value in its border unit; of what has none, shares are percentages, counts and factors are not."""
     if isinstance(value, str):
         return value
-    return f"{100 * value:.4g} %" if unit == "1" else f"{value:.5g} {unit}"
+    if dimension == "ratio":
+        return f"{100 * value:.4g} %"
+    return f"{value:.5g}" if unit == "1" else f"{value:.5g} {unit}"
 
 
 def _bounds(one: dict[str, object]) -> str:

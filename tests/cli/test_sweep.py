@@ -6,6 +6,7 @@ import csv
 import json
 import os
 import random
+import re
 import signal
 import subprocess
 import time
@@ -290,3 +291,11 @@ def test_pictures_fit_the_number_of_parameters(cli, tmp_path, options, names):
     assert done.code == 0
     assert {path.name for path in (tmp_path / "out" / "figures").iterdir()} == names
     assert not (tmp_path / "out" / "curves.csv").exists()
+
+
+def test_of_numbers_without_a_unit_only_shares_are_percentages(cli):
+    config = CAM.with_name("slider_crank_li2019_bistable.yaml")
+    told = cli("sweep", str(config), "--vary", "mechanism.offset=[20 mm, 30 mm]", "-o", "out", "--no-plots", "-v").out
+    lines = {words[0]: words[1] for line in told.splitlines() if len(words := re.split(r"\s{2,}", line.strip())) == 2}
+    assert lines["stable positions"] == "2"
+    assert lines["torque ripple"].endswith(" %")
