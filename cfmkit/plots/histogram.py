@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.plots.rounding import is_level
 from cfmkit.plots.style import BAND, BLUE, INK, SMALL, TROUBLE, axes_mm, new_figure, styled
 from cfmkit.plots.text import axis_label
 from cfmkit.tables import border_values
@@ -57,7 +58,7 @@ def draw_histogram(found: Findings, number: int) -> Figure:
 def _edges(values: FloatArray) -> FloatArray:
     """Return the borders of the bins: as many as the square root of the number of parts, but not too many."""
     low, high = float(values.min()), float(values.max())
-    if high - low <= 1e-9 * max(abs(low), abs(high)):
+    if is_level(values):
         room = 0.01 * abs(low) or 0.5
         return np.array([low - room, low + room])
     return np.linspace(low, high, int(min(MOST_BINS, max(8, len(values) ** 0.5 + 1))) + 1)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from cfmkit.plots.marks import COLOURS, EMPTY, HATCH, edges, star, ticks
+from cfmkit.plots.rounding import is_level, levelled
 from cfmkit.plots.style import SMALL, axes_mm, new_figure, styled
 
 if TYPE_CHECKING:
@@ -33,7 +34,7 @@ def draw_map(found: Findings, metric: Scale) -> Figure:
     axes = axes_mm(figure, (18, 14, 92, 80))
     down, across = found.varied
     up, along = _places(down, found.shape[0], found.shape[1]), _places(across, found.shape[1], 1)
-    values = metric.values.reshape(found.shape)[np.ix_(up.order, along.order)]
+    values = levelled(metric.values).reshape(found.shape)[np.ix_(up.order, along.order)]
     meets = found.meets.reshape(found.shape)[np.ix_(up.order, along.order)]
     x, y = along.borders, up.borders
     axes.set_facecolor(EMPTY)
@@ -145,7 +146,7 @@ def _level_lines(axes: Axes, up: Places, across: Places, values: FloatArray) -> 
         return
     low, high = float(known.min()), float(known.max())
     levels = _between(low, high)
-    if high - low <= 1e-9 * max(abs(low), abs(high)) or not len(levels):
+    if is_level(known) or not len(levels):
         return
     x, y = across.positions, up.positions
     if len(known) == values.size:

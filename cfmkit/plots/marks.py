@@ -32,7 +32,11 @@ def edges(centers: FloatArray) -> FloatArray:
 
 
 def ticks(axis: Any, parameter: Scale) -> None:
-    """Name the places on an axis that stand for words."""
+    """Name the places on an axis that stand for words; between whole numbers of things there is none."""
+    from matplotlib.ticker import MaxNLocator
+
+    if parameter.dimension == "count" and np.array_equal(parameter.values, np.round(parameter.values), equal_nan=True):
+        axis.set_major_locator(MaxNLocator("auto", integer=True, min_n_ticks=1))
     if parameter.words:
         axis.set_ticks(range(len(parameter.words)), labels=list(parameter.words))
 

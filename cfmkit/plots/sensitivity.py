@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.plots.histogram import draw_histogram
+from cfmkit.plots.rounding import levelled
 from cfmkit.plots.style import BLUE, GREY, INK, LINES, SMALL, VERMILLION, axes_mm, new_figure, styled
 from cfmkit.tables import border_values
 
@@ -176,11 +177,12 @@ def draw_oat(found: Findings, number: int) -> Figure:
     figure = new_figure(190, room + 24)
     curves, bars = (axes_mm(figure, (left, 14, width, room)) for left, width in ((18, 72), (132, 52)))
     figure.text(0.02, 1.0 - 2.0 / (room + 24), _title(found, metric), va="top", weight="bold")
-    nominal = float(border_values(setup.nominal.values[number], metric.dimension))
+    every_output = np.empty((len(swings), 0)) if found.outputs is None else found.outputs[:, :, number]
+    shown = levelled(border_values(np.append(setup.nominal.values[number], every_output), metric.dimension))
+    nominal, outputs = float(shown[0]), shown[1:].reshape(every_output.shape)
     bars.axvline(nominal, color=GREY, linewidth=0.8)
     for row, k in enumerate(order):
-        outputs = found.outputs[k, :, number] if found.outputs is not None else np.empty(0)
-        values = border_values(outputs, metric.dimension)
+        values = outputs[k]
         where = np.linspace(0.0, 1.0, len(values))
         colour = LINES[row % len(LINES)]
         every = max(1, len(values) // 10)

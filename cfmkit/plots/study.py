@@ -13,6 +13,7 @@ import numpy as np
 from cfmkit.plots.maps import draw_map
 from cfmkit.plots.marks import COLOURS, EMPTY, HATCH, edges, star, ticks
 from cfmkit.plots.panels import draw_panels, fit_panels
+from cfmkit.plots.rounding import is_level, levelled
 from cfmkit.plots.style import BLUE, GREY, INK, SMALL, VERMILLION, axes_mm, new_figure, styled
 
 if TYPE_CHECKING:
@@ -105,16 +106,17 @@ def draw_metric(found: Findings, metric: Scale) -> Figure:
     axes = axes_mm(figure, (28, 13, 86, 56) if metric.words else (18, 13, 96, 56))
     (parameter,) = found.varied
     order = np.argsort(parameter.values, kind="stable")
-    x, y = parameter.values[order], metric.values[order]
+    x, y = parameter.values[order], levelled(metric.values)[order]
     axes.plot(x, y, color=BLUE, marker="o" if len(x) <= 60 else "", markersize=3)
     _hatch_spans(axes, x, found.meets[order])
     axes.set(xlabel=parameter.label, ylabel="" if metric.words else metric.label)
+    axes.ticklabel_format(axis="y", useOffset=True)
     ticks(axes.xaxis, parameter)
     ticks(axes.yaxis, metric)
     if metric.words:
         axes.set_title(metric.label, fontsize=SMALL, loc="left")
     if found.best is not None:
-        star(axes, parameter.values[found.best], metric.values[found.best])
+        star(axes, parameter.values[found.best], levelled(metric.values)[found.best])
     return figure
 
 
@@ -151,7 +153,7 @@ def draw_parallel(found: Findings) -> Figure:
 def _share(scale: Scale) -> FloatArray:
     """Return where the values lie between the smallest and the largest of them; in the middle if they are the same."""
     known = scale.values[np.isfinite(scale.values)]
-    if not len(known) or known.max() - known.min() <= 1e-9 * np.abs(known).max():
+    if is_level(scale.values):
         return np.where(np.isfinite(scale.values), 0.5, np.nan)
     share: FloatArray = (scale.values - known.min()) / (known.max() - known.min())
     return share
@@ -164,7 +166,7 @@ def _parallel_axes(axes: Axes, scales: Sequence[Scale]) -> None:
         if not len(known):
             continue
         ends = ((0.0, known.min()), (1.0, known.max()))
-        for height, value in ends if np.ptp(known) > 1e-9 * np.abs(known).max() else ends[1:]:
+        for height, value in ends if not is_level(known) else ends[1:]:
             text = scale.words[int(value)] if scale.words else f"{value:.4g}"
             below = height == 0.0
             place = (k, -0.02 if below else 1.02)

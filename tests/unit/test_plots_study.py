@@ -135,3 +135,35 @@ def test_what_is_constant_but_for_rounding_is_one_place_on_its_axis():
     (draw,) = figures(Findings(varied, (almost,), (), np.ones(20, bool))).values()
     axes = draw().axes[0]
     assert {line.get_ydata()[3] for line in axes.lines if len(line.get_ydata()) == 4} == {0.5}
+
+
+def _one_metric(values, dimension):
+    x = Scale("a.b", "length", np.linspace(1.0, 2.0, len(values)))
+    (draw,) = figures(Findings((x,), (Scale("m", dimension, values),), x.values.shape, x.values > 0, 0)).values()
+    figure = draw()
+    figure.canvas.draw()
+    return figure, figure.axes[0]
+
+
+@pytest.mark.parametrize("size", [1e-12, -1e-12, 1e-7, 1e-5])
+def test_a_metric_that_hardly_varies_has_tick_labels_inside_the_picture(size):
+    figure, axes = _one_metric(0.0527913404921 * (1 + size * np.sin(np.arange(9.0))), "ratio")
+    left = min(label.get_window_extent().x0 for label in axes.yaxis.get_ticklabels() if label.get_text())
+    assert left > axes.yaxis.label.get_window_extent().x1
+    assert axes.yaxis.label.get_window_extent().x0 >= 0
+    assert figure.bbox.x1 >= axes.bbox.x1
+
+
+def test_a_metric_that_varies_by_rounding_only_is_a_level_line_on_an_axis_of_its_own_size():
+    _, axes = _one_metric(0.0527913404921 * (1 + 1e-12 * np.sin(np.arange(9.0))), "ratio")
+    assert len(set(axes.lines[0].get_ydata())) == 1
+    assert np.ptp(axes.get_ylim()) > 1e-3
+    noise = 1.0 + 1e-13 * np.arange(20.0)
+    (draw,) = figures(found(2, (5, 4), metric=noise)).values()
+    assert np.ptp(draw().axes[0].collections[0].get_array()) == 0
+
+
+def test_a_count_has_whole_numbers_on_its_axis():
+    for values in (np.array([2.0, 3.0, 2.0]), np.array([2.0, 2.0, 2.0])):
+        _, axes = _one_metric(values, "count")
+        assert all(float(tick).is_integer() for tick in axes.get_yticks())
