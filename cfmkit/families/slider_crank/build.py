@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -53,6 +53,16 @@ class Assembly:
         if self.drive == "torque":
             return along_crank(self.linkage, self.unloaded, motion)
         return along_slider(self.linkage, self.unloaded, self.side, motion)
+
+    @property
+    def motion_name(self) -> Literal["angle", "travel"]:
+        """What the motion is called in a specification and among the values."""
+        return "angle" if self.drive == "torque" else "travel"
+
+    @property
+    def dimension(self) -> Literal["angle", "length"]:
+        """Dimension of the motion."""
+        return "angle" if self.drive == "torque" else "length"
 
     @property
     def start(self) -> float:

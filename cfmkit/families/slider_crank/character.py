@@ -83,9 +83,9 @@ class Character:
         """The effort on the grid and at its turning points, as one of one curves."""
         units = self.assembly.units(self.grid)
         rates = self.assembly.rates
-        cut = monotone(self.grid, _weighed(rates, units.effort), _weighed(rates, units.stiffness))
+        cut = monotone(self.grid, _summed(rates, units.effort), _summed(rates, units.stiffness))
         # The cubics say where to look; the values are those of the closed form.
-        return Monotone(cut.place, _weighed(rates, self.assembly.units(cut.place[0]).effort))
+        return Monotone(cut.place, _summed(rates, self.assembly.units(cut.place[0]).effort))
 
     @cached_property
     def grid(self) -> FloatArray:
@@ -94,7 +94,7 @@ class Character:
         if self.assembly.drive == "force":  # the force runs like the square root of the travel from the stretched place
             share = share**2
         places = self.low + (self.high - self.low) * share
-        effort = _weighed(self.assembly.rates, self.assembly.units(places).effort)[0]
+        effort = _summed(self.assembly.rates, self.assembly.units(places).effort)[0]
         grid: FloatArray = places[np.isfinite(effort)]
         return grid
 
@@ -120,11 +120,11 @@ class Character:
 
     def effort(self, motion: float) -> float:
         """Return torque [N m] or force [N] at one place."""
-        return float(_weighed(self.assembly.rates, self.assembly.units(np.array([motion])).effort)[0, 0])
+        return float(_summed(self.assembly.rates, self.assembly.units(np.array([motion])).effort)[0, 0])
 
     def stiffness(self, motion: float) -> float:
         """Return the slope of the effort at one place [N m/rad or N/m]."""
-        return float(_weighed(self.assembly.rates, self.assembly.units(np.array([motion])).stiffness)[0, 0])
+        return float(_summed(self.assembly.rates, self.assembly.units(np.array([motion])).stiffness)[0, 0])
 
     def energy(self, motion: float) -> float:
         """Return the energy in the springs at one place [J]."""
@@ -194,7 +194,7 @@ class Character:
         return bracketed_root(excess, float(outside), float(inner))
 
 
-def _weighed(rates: FloatArray, unit: FloatArray) -> FloatArray:
+def _summed(rates: FloatArray, unit: FloatArray) -> FloatArray:
     """Return the sum over the springs that are there, (1, n)."""
     there = rates > 0.0
     if not there.any():

@@ -9,6 +9,7 @@ import numpy as np
 
 from cfmkit.bodies.slider_crank_springs import JOINTS
 from cfmkit.families.findings import deg, mm, newton
+from cfmkit.families.slider_crank.build import TURN
 from cfmkit.families.slider_crank.classes import BISTABLE, BOUNDARY, SNAPS, TRISTABLE
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.units import format_short
@@ -20,8 +21,6 @@ if TYPE_CHECKING:
     from cfmkit.families.slider_crank.spec import SliderCrankSpec
     from cfmkit.results import Finding
 
-TURN = 2.0 * math.pi
-
 RUN_IN = 0.02
 """An unloaded position nearer than this to the stretched one [rad] is meant to be stretched, nearly."""
 
@@ -30,13 +29,13 @@ def findings_of(spec: SliderCrankSpec, solution: Solution) -> tuple[Finding, ...
     """Return everything that the user must know."""
     if not solution.assembly.rates.any():
         return (finding("no_spring", "no spring has a rate: the mechanism moves freely; set 'mechanism.springs'"),)
-    own = _of_torque(spec, solution) if solution.assembly.drive == "torque" else _of_force(spec, solution)
+    own = _of_torque(solution) if solution.assembly.drive == "torque" else _of_force(spec, solution)
     return (*_of_class(solution), *own, *_of_band(spec, solution), *_of_limits(spec, solution))
 
 
 def place(solution: Solution, motion: float) -> str:
     """Return a place of the motion as the user reads it."""
-    return deg(motion) if solution.assembly.drive == "torque" else mm(motion)
+    return format_short(motion, solution.assembly.dimension)
 
 
 def _of_class(solution: Solution) -> Iterator[Finding]:
@@ -68,7 +67,7 @@ def _restless(solution: Solution) -> bool:
     return assembly.drive == "torque" and not assembly.rates[:3].any() and assembly.linkage.knee(assembly.unloaded) == 0
 
 
-def _of_torque(spec: SliderCrankSpec, solution: Solution) -> Iterator[Finding]:
+def _of_torque(solution: Solution) -> Iterator[Finding]:
     assembly, found = solution.assembly, solution.character
     turns = found.high - found.low >= TURN * (1 - 1e-9)
     wound = [name for name, rate in zip(JOINTS[:2], assembly.rates, strict=False) if rate > 0.0]
@@ -119,7 +118,7 @@ def _of_force(spec: SliderCrankSpec, solution: Solution) -> Iterator[Finding]:
             "leave 'analysis.side' out for the side on which they are relaxed",
         )
     elif abs(knee) < RUN_IN and solution.motion[0] <= 0.0 <= solution.motion[-1]:
-        yield from _run_in(solution, knee)
+        yield from _run_in(solution)
     low = assembly.reach[0]
     span = solution.character.high - solution.character.low
     if abs(knee) >= RUN_IN and solution.character.low < low + 0.01 * span and low < -1e-9 * span:
@@ -130,7 +129,7 @@ def _of_force(spec: SliderCrankSpec, solution: Solution) -> Iterator[Finding]:
         )
 
 
-def _run_in(solution: Solution, knee: float) -> Iterator[Finding]:
+def _run_in(solution: Solution) -> Iterator[Finding]:
     """Yield how far the force needs to come up: to 95 % of what it is in the middle of the motion."""
     motion = np.geomspace(1e-9, 1.0, 400) * float(solution.motion[-1])
     force = solution.assembly.rates @ solution.assembly.units(motion).effort

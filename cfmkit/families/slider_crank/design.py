@@ -180,16 +180,15 @@ def _written(solved: Solved) -> SliderCrankSpec:
     mechanism = spec.mechanism.model_copy(update={"springs": springs})
     if any(getattr(wanted, name) is not None for name in ("crank_length", "offset")):
         mechanism = solved.task.spec.mechanism.model_copy(update={"springs": springs})
-    drive = "torque" if wanted.torque is not None else "force"
-    name = "reference_angle" if drive == "torque" else "reference_travel"
-    written = {"drive": drive, name: _reference(solved)} | _seen(solved)
+    assembly = solved.task.assembly
+    written = {"drive": assembly.drive, f"reference_{assembly.motion_name}": _reference(solved)} | _seen(solved)
     analysis = spec.analysis.model_copy(update=written)
     return spec.model_copy(update={"mechanism": mechanism, "analysis": analysis})
 
 
 def _seen(solved: Solved) -> dict[str, tuple[float, float]]:
     """Return the motion of the analysis, if it has to be another one to show all of the window."""
-    name = "angle" if solved.task.wanted.torque is not None else "travel"
+    name = solved.task.assembly.motion_name
     asked: tuple[float, float] | None = getattr(solved.task.spec.analysis, name)
     low, high = asked or default_motion(solved.task.assembly)
     if low <= solved.window[0] and solved.window[1] <= high:

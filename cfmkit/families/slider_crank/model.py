@@ -21,9 +21,9 @@ from cfmkit.bodies.slider_crank_springs import JOINTS
 from cfmkit.curves import Column, Curve, FloatArray
 from cfmkit.families.findings import deg, mm
 from cfmkit.families.refusals import CannotBuild, no_result
-from cfmkit.families.slider_crank.build import assemble, default_motion, resolve
+from cfmkit.families.slider_crank.build import TURN, assemble, default_motion, resolve
 from cfmkit.families.slider_crank.character import Character, Equilibrium
-from cfmkit.families.slider_crank.checks import TURN, findings_of
+from cfmkit.families.slider_crank.checks import findings_of
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.reactions import reactions
 from cfmkit.families.slider_crank.values import values_of
@@ -162,7 +162,7 @@ def target_of(spec: SliderCrankSpec) -> float | None:
 
 def asked_motion(spec: SliderCrankSpec, assembly: Assembly) -> tuple[float, float]:
     """Return the motion that the analysis asks for [rad or m]."""
-    asked = spec.analysis.angle if assembly.drive == "torque" else spec.analysis.travel
+    asked: tuple[float, float] | None = getattr(spec.analysis, assembly.motion_name)
     return asked or default_motion(assembly)
 
 
@@ -231,8 +231,7 @@ def reference_motion(spec: SliderCrankSpec, assembly: Assembly) -> float:
 
 def _as_run(spec: SliderCrankSpec, assembly: Assembly) -> SliderCrankSpec:
     """Return the spec with what the analysis fell back on written out."""
-    name = "angle" if assembly.drive == "torque" else "travel"
-    written = {name: asked_motion(spec, assembly), "fidelity": "prb"}
+    written = {assembly.motion_name: asked_motion(spec, assembly), "fidelity": "prb"}
     return spec.model_copy(update={"analysis": spec.analysis.model_copy(update=written)})
 
 

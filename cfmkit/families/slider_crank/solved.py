@@ -49,8 +49,7 @@ def check_reach(task: Task, window: tuple[float, float]) -> None:
     slack = 1e-9 * (window[1] - window[0])
     if window[0] >= first - slack and window[1] <= last + slack:
         return
-    dimension = "angle" if task.assembly.drive == "torque" else "length"
-    ends = [format_short(end, dimension) for end in (*window, first, last)]
+    ends = [format_short(end, task.assembly.dimension) for end in (*window, first, last)]
     text = (
         f"the window {ends[0]} to {ends[1]} is not reached: linkage and limits of the joints allow {ends[2]} to "
         f"{ends[3]}; ask for less, or change the lengths"
@@ -102,10 +101,8 @@ def too_far(task: Task, deviation: float) -> tuple[Finding, dict[str, str]]:
     text = f"the best springs are off by {percent(deviation)}, and {percent(wanted.tolerance or 0)} are allowed"
     found = widest(task, wanted.tolerance or 0.0)
     if found is not None:
-        name = "angle" if task.assembly.drive == "torque" else "travel"
-        dimension = "angle" if name == "angle" else "length"
-        low, high = (format_short(end, dimension) for end in (found.low, found.high))
-        nearest[f"design.{name}"] = f"[{low}, {high}]"
+        low, high = (format_short(end, task.assembly.dimension) for end in (found.low, found.high))
+        nearest[f"design.{task.assembly.motion_name}"] = f"[{low}, {high}]"
         text += f"; a window that keeps it is {low} to {high}"
     return finding("infeasible_targets", text), nearest
 
@@ -148,7 +145,7 @@ def not_proven(solved: Solved) -> Finding:
 
 
 def _place(solved: Solved, motion: float) -> str:
-    return format_short(motion, "angle" if solved.task.assembly.drive == "torque" else "length")
+    return format_short(motion, solved.task.assembly.dimension)
 
 
 def message(solved: Solved) -> str:

@@ -106,7 +106,7 @@ Pairs = tuple[tuple[str, float | None], ...]
 
 def _positions(solution: Solution) -> Pairs:
     """Return drop and equilibria."""
-    found, place = solution.character, "angle" if solution.assembly.drive == "torque" else "travel"
+    found, place = solution.character, solution.assembly.motion_name
     unstable, stable = solution.nearest(False), solution.nearest(True)
     return (
         ("stiffness_drop", found.drop),
@@ -121,7 +121,7 @@ def _positions(solution: Solution) -> Pairs:
 def _band(solution: Solution) -> Pairs:
     """Return the constant band around the reference."""
     drive, found = solution.assembly.drive, solution.character
-    name = "constant_angle" if drive == "torque" else "constant_travel"
+    name = f"constant_{solution.assembly.motion_name}"
     low, high = solution.band or (None, None)
     width = None if low is None or high is None else high - low
     inside = found.low <= solution.reference <= found.high
