@@ -11,6 +11,8 @@ from cfmkit.plots.style import GREY, MM, NORMAL, SMALL, TROUBLE, styled
 from cfmkit.units import border_unit, format_short
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from matplotlib.axes import Axes
     from matplotlib.axis import Axis
     from matplotlib.figure import Figure
@@ -23,6 +25,9 @@ POLE = 3.0
 
 LEFT = 3.0
 """Distance of headings from the edge of the print [mm]."""
+
+KEY_GAP = 3.0
+"""Between the entries of a colour key [mm]."""
 
 
 def axis_label(name: str, dimension: str) -> str:
@@ -92,6 +97,19 @@ def _write_line(figure: Figure, down_mm: float, parts: tuple[str, str], look: di
         excess = (extent - room) / extent * len(first + last)
         first = first[: max(len(first) - 1 - max(int(0.8 * excess), 1), 1)].rstrip()
         text.set_text(f"{first}…{last}")
+
+
+@styled
+def color_key(figure: Figure, corner_mm: tuple[float, float], entries: Sequence[tuple[str, str]]) -> None:
+    """Write texts in their colours side by side from the lower left corner [mm], no farther than the print reaches."""
+    width, height = figure.get_size_inches() / MM
+    left, bottom = corner_mm
+    for text, color in entries:
+        written = figure.text(left / width, bottom / height, text, size=SMALL, color=color, ha="left", va="bottom")
+        left += written.get_window_extent().width / figure.dpi / MM + KEY_GAP
+        if left - KEY_GAP > width - LEFT:
+            written.remove()
+            return
 
 
 def plain_ticks(axis: Axis) -> None:

@@ -57,6 +57,16 @@ def test_links_and_springs_are_drawn_and_links_move_with_their_node():
     assert len(by_gid(figure, "rigid-")) == 1 + len(poses)
 
 
+def test_a_key_above_the_shapes_gives_each_pose_its_displacement_and_colour():
+    figure = drawn(config("beam_lan2010", "analysis.points=9"), "shapes")
+    key = [text for text in figure.texts if text.get_text().endswith(" mm")]
+    assert [text.get_text() for text in key] == ["4.5 mm", "9 mm", "13.5 mm", "18 mm"]
+    poses = list(dict.fromkeys(line.get_color() for line in by_gid(figure, "pose-")))
+    assert [text.get_color() for text in key] == poses
+    (ax,) = figure.axes
+    assert not any(text.get_window_extent().overlaps(ax.get_window_extent()) for text in key)
+
+
 def test_a_link_keeps_its_length_and_turns_with_its_node():
     path = cfmkit.analyze(cantilever(text=ARMED)).state.path
     (line,) = rigid_parts(path, len(path) - 1)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.families.beam.build import mirror_axis
-from cfmkit.families.beam.posed import bent, place, rigid_parts, spring_lines
+from cfmkit.families.beam.posed import bent, rigid_parts, spring_lines
 from cfmkit.families.beam.strips import mirrored, strips
 from cfmkit.families.beam.surface.ride import ride
 from cfmkit.families.beam.values import window_of
@@ -19,8 +19,9 @@ from cfmkit.plots.curves import Look
 from cfmkit.plots.diagram import Diagram, Limit, Region, Scale, Series, diagram_figure
 from cfmkit.plots.loop import loop_figure
 from cfmkit.plots.place import place_labels
+from cfmkit.plots.rounding import vanishing
 from cfmkit.plots.style import GREY, INK, LINES, TROUBLE, VERMILLION, axes_mm, new_figure, styled
-from cfmkit.plots.text import Heading, value_text, write_heading
+from cfmkit.plots.text import Heading, color_key, value_text, write_heading
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -34,14 +35,14 @@ if TYPE_CHECKING:
     from cfmkit.results import Result
 
 POSES = 5
+KEY_MM = 5.0
+"""Room for the key of the poses above the axes [mm]."""
+
 MOST_BEAMS = 6
 """So many beams have lines of their own: those with the largest force or stress."""
 
 SAME = 1e-4
 """Lines closer than this share of their size are one."""
-
-NOTHING = 1e-9
-"""Forces below this share of the largest are rounding: they are drawn as zero."""
 
 
 def figures(result: Result) -> dict[str, Callable[[], Figure]]:
@@ -87,7 +88,7 @@ def shapes(result: Result) -> Figure:
     width, height = box[2] - box[0], box[3] - box[1]
     scale = min(138.0 / width, 110.0 / height)
     heading = Heading.of(result, "shapes to scale, as cut and on the way")
-    figure = new_figure(160.0, height * scale + 16.0 + heading.height_mm)
+    figure = new_figure(160.0, height * scale + 16.0 + KEY_MM + heading.height_mm)
     write_heading(figure, heading)
     room = (17.0 + 0.5 * (138.0 - width * scale), 12.0, width * scale, height * scale)
     ax = axes_mm(figure, room)
@@ -98,33 +99,41 @@ def shapes(result: Result) -> Figure:
     for number, line in enumerate(springs):
         ends = [(float(x), float(y)) for x, y in line]
         parts.spring(ax, ends[0], ends[1], 0.02 * max(width, height), f"spring-{number}")
-    labels = _poses(solution, ax, drawn)
+    peak = _poses(solution, ax, drawn)
+    motion = f"{result.curve.motion_name}:"
+    color_key(figure, (17.0, 12.0 + height * scale + 2.0), [(motion, INK), *_key(solution, list(drawn))])
     _supports(solution, ax)
     parts.to_scale(ax, box)
     ax.set_ylabel("y [mm]")
-    place_labels(ax, [*labels, *_names(solution)])
+    place_labels(ax, [peak, *_names(solution)])
     return figure
 
 
-def _poses(solution: Solution, ax: Axes, drawn: dict[int, list[FloatArray]]) -> list[Label]:
-    """Draw the bent beams of each pose; return their names, to stand at the driven node."""
+def _colors(count: int) -> list[str]:
+    """Return the colours of poses, from the first to the last."""
     from matplotlib import colormaps
     from matplotlib.colors import to_hex
 
+    return [to_hex(colormaps["viridis"](share)) for share in np.linspace(0.8, 0.0, count)]
+
+
+def _key(solution: Solution, poses: list[int]) -> list[tuple[str, str]]:
+    """Return what the motion is in each pose, and its colour."""
     kind = "angle" if solution.spec.mechanism.drive.kind in ("rotation", "moment") else "length"
-    found = []
-    for share, (pose, lines) in zip(np.linspace(0.8, 0.0, len(drawn)), drawn.items(), strict=True):
-        color = to_hex(colormaps["viridis"](share))
+    told = (value_text(float(solution.motion[pose]), kind) for pose in poses)
+    return list(zip(told, _colors(len(poses)), strict=True))
+
+
+def _poses(solution: Solution, ax: Axes, drawn: dict[int, list[FloatArray]]) -> Label:
+    """Draw the bent beams of each pose, and mark the largest stress; return the name of the mark."""
+    for color, (pose, lines) in zip(_colors(len(drawn)), drawn.items(), strict=True):
         for number, line in enumerate(lines):
             parts.edge(ax, line, f"pose-{pose}-{number}", color=color, linewidth=1.2, zorder=2.5)
         point = int(solution.keep[pose])
         for number, line in enumerate(_both(solution, rigid_parts(solution.path, point))):
             parts.edge(ax, line, f"rigid-{pose}-{number}", color=color, linewidth=0.7, linestyle="--", zorder=2.4)
-        moved = place(solution.path, solution.assembly.driven, point)
-        text = value_text(float(solution.motion[pose]), kind)
-        found.append(parts.part_name(text, [tuple(moved)], (-1.0, 0.3), color))
     index = int(np.argmax(np.where(np.isfinite(solution.stress), solution.stress, -np.inf)))
-    return [*found, _peak(solution, ax, index)]
+    return _peak(solution, ax, index)
 
 
 def _peak(solution: Solution, ax: Axes, index: int) -> Label:
@@ -204,8 +213,8 @@ def reactions(result: Result) -> Figure:
     # against the drive: what holds the load counts as positive
     along = {name: -(force[:, 0] * c + force[:, 1] * s) for name, force in forces.items()}
     across = {name: (force[:, 1] * c - force[:, 0] * s) * (-1 if turned else 1) for name, force in forces.items()}
-    negligible = NOTHING * max(float(np.nanmax(np.abs(force[:, :2]))) for force in forces.values())
-    along, across = ({name: _rounded(row, negligible) for name, row in rows.items()} for rows in (along, across))
+    size = max(float(np.nanmax(np.abs(force[:, :2]))) for force in forces.values())
+    along, across = ({name: vanishing(row, size) for name, row in rows.items()} for rows in (along, across))
     one = ", one copy" if solution.assembly.parallel > 1 else ""
     heading = Heading.of(result, f"force of each beam on its last node{one}{_left_out(forces)}")
     diagrams = [
@@ -213,10 +222,6 @@ def reactions(result: Result) -> Figure:
         Diagram(solution.motion, _motion(result), Scale(names[1], "force"), _series(across)),
     ]
     return diagram_figure(heading, diagrams)
-
-
-def _rounded(values: FloatArray, negligible: float) -> FloatArray:
-    return np.where(np.abs(values) <= negligible, 0.0, values)
 
 
 def _left_out(beams: Mapping[str, object]) -> str:
