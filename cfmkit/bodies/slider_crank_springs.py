@@ -193,7 +193,7 @@ def along_slider(linkage: Linkage, unloaded: float, side: int, travel: FloatArra
 
 @dataclass(frozen=True)
 class _SliderState:
-    """Places on the slider's way: knee angle, x, q and the derivatives of the crank's and the coupler's shares."""
+    """Places on the slider's way: knee angle, x, and q of the four joints."""
 
     knee: FloatArray
     position: FloatArray
@@ -219,13 +219,9 @@ class _SliderPath:
         gap = beyond * (link.stretched_position + position)
         share = np.sqrt(gap / (4.0 * link.crank * link.coupler))
         knee = self.side * 2.0 * np.arcsin(np.minimum(share, 1.0))
-        return self.state(knee, position, travel)
-
-    def state(self, knee: FloatArray, position: FloatArray, travel: FloatArray) -> _SliderState:
-        """Return the state with a knee angle and the place of the slider that goes with it."""
-        e = self.linkage.offset
+        e = link.offset
         view = np.arctan2(e * travel, position * self.x0 + e * e)  # how far the direction from A to C has turned
-        phi, chi = _shares(self.linkage, knee)
+        phi, chi = _shares(link, knee)
         turn = np.stack([view + phi - self.phi0, self.start - knee, view - (chi - self.chi0), -travel])
         return _SliderState(knee, position, turn)
 

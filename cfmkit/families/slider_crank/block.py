@@ -14,13 +14,20 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.bodies.slider_crank_springs import JOINTS
-from cfmkit.errors import CfmError
 from cfmkit.families.base import BlockAnswer
+from cfmkit.families.refusals import CannotBuild
 from cfmkit.families.slider_crank.block_bands import edges, linear_band
 from cfmkit.families.slider_crank.block_metrics import CURVE, PLAIN, of_curve
 from cfmkit.families.slider_crank.build import assemble, resolve
 from cfmkit.families.slider_crank.classes import Classified, classify
-from cfmkit.families.slider_crank.model import asked_motion, reference_motion, target_of, window_of
+from cfmkit.families.slider_crank.model import (
+    RATES,
+    asked_motion,
+    efforts_inside,
+    reference_motion,
+    target_of,
+    window_of,
+)
 from cfmkit.numerics.extrema import Monotone, sharpened
 
 if TYPE_CHECKING:
@@ -34,10 +41,8 @@ if TYPE_CHECKING:
     from cfmkit.families.slider_crank.build import Assembly
     from cfmkit.families.slider_crank.spec import SliderCrankSpec
 
-VARIED = {f"mechanism.springs.{name}": row for row, name in enumerate(JOINTS)}
-"""What this model can vary, besides the number of legs, and the row it is here."""
-
 LEGS = "mechanism.legs"
+"""What this model can vary besides `RATES`."""
 
 SLAB = 400_000
 """Values that are worked on together: few enough to stay in a processor's cache."""
@@ -56,7 +61,7 @@ def analyze_block(spec: SliderCrankSpec, block: Block) -> BlockAnswer | None:
     block : Block
         The variants and the measures.
     """
-    base = _base(spec) if set(block.values) <= {*VARIED, LEGS} else None
+    base = _base(spec) if set(block.values) <= {*RATES, LEGS} else None
     if base is None or not all(base.knows(measure) for measure in block.measures):
         return None
     rates, done = _rates(spec, block)
@@ -77,8 +82,8 @@ def _rates(spec: SliderCrankSpec, block: Block) -> tuple[FloatArray, NDArray[np.
     springs = spec.mechanism.springs
     rates = np.tile([getattr(springs, name) for name in JOINTS], (block.size, 1)).astype(np.float64)
     for path, values in block.values.items():
-        if path in VARIED:
-            rates[:, VARIED[path]] = np.asarray(values, dtype=np.float64)
+        if path in RATES:
+            rates[:, RATES[path]] = np.asarray(values, dtype=np.float64)
     legs = np.asarray(block.values.get(LEGS, np.full(block.size, spec.mechanism.legs)), dtype=np.float64)
     done = np.isfinite(rates).all(axis=1) & (rates >= 0.0).all(axis=1) & rates.any(axis=1)
     done &= (rates[rates > 0].min(initial=1.0) >= 1e-30) & (rates <= 1e30).all(axis=1) & (legs >= 1) & (legs <= 1000)
@@ -148,11 +153,7 @@ class Base:
 
     def inside(self, window: tuple[float, float] | None) -> FloatArray:
         """Return the unit efforts in a window, (4, k), with interpolated ends."""
-        if window is None:
-            return self.units.effort
-        between = self.motion[(self.motion > window[0]) & (self.motion < window[1])]
-        places = np.concatenate([[window[0]], between, [window[1]]])
-        return np.stack([np.interp(places, self.motion, row) for row in self.units.effort])
+        return efforts_inside(self.motion, self.units, window)
 
 
 def _fits(name: str, drive: str) -> bool:
@@ -164,14 +165,15 @@ def _fits(name: str, drive: str) -> bool:
 
 def _base(spec: SliderCrankSpec) -> Base | None:
     """Return what a block shares; None where the linkage cannot be built, or does not reach all of the motion."""
-    if any(getattr(spec.mechanism, name, None) is not None for name in ("flexures", "beam", "limits")):
+    mechanism = spec.mechanism
+    if any(part is not None for part in (mechanism.flexures, mechanism.beam, mechanism.limits)):
         return None
     if spec.analysis.fidelity not in (None, "prb"):
         return None
     try:
         spec = resolve(spec)
         assembly = assemble(spec)
-    except CfmError:
+    except CannotBuild:
         return None
     low, high = asked_motion(spec, assembly)
     first, last = assembly.reach

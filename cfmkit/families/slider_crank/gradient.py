@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.bodies.slider_crank_springs import JOINTS
-from cfmkit.errors import CfmError
+from cfmkit.families.refusals import CannotBuild
 from cfmkit.families.slider_crank.build import assemble, resolve
-from cfmkit.families.slider_crank.model import reference_motion, solve, window_of
+from cfmkit.families.slider_crank.model import RATES, efforts_inside, reference_motion, solve, window_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -21,8 +20,6 @@ if TYPE_CHECKING:
     from cfmkit.curves import FloatArray
     from cfmkit.families.slider_crank.model import Solution
     from cfmkit.families.slider_crank.spec import SliderCrankSpec
-
-ROWS = {f"mechanism.springs.{name}": row for row, name in enumerate(JOINTS)}
 
 
 def gradient(spec: SliderCrankSpec, paths: Sequence[str]) -> dict[str, dict[str, float]]:
@@ -40,11 +37,11 @@ def gradient(spec: SliderCrankSpec, paths: Sequence[str]) -> dict[str, dict[str,
     try:
         spec = resolve(spec)
         solution, short = solve(spec, assemble(spec))
-    except CfmError:
+    except CannotBuild:
         return {}
     if short or not solution.assembly.rates.any():
         return {}
-    known = {path: ROWS[path] for path in paths if path in ROWS}
+    known = {path: RATES[path] for path in paths if path in RATES}
     legs = spec.mechanism.legs
     slopes = dict(_slopes(spec, solution))
     return {name: {path: legs * float(by[row]) for path, row in known.items()} for name, by in slopes.items()}
@@ -53,7 +50,7 @@ def gradient(spec: SliderCrankSpec, paths: Sequence[str]) -> dict[str, dict[str,
 def _slopes(spec: SliderCrankSpec, solution: Solution) -> Iterator[tuple[str, FloatArray]]:
     """Yield each metric with its derivatives by the four total rates."""
     drive, assembly = solution.assembly.drive, solution.assembly
-    unit = _inside(spec, solution)
+    unit = efforts_inside(solution.motion, solution.units, window_of(spec))
     effort = assembly.rates @ unit
     sign = -1.0 if effort.mean() < 0 else 1.0
     high, low = unit[:, int(np.argmax(sign * effort))], unit[:, int(np.argmin(sign * effort))]
@@ -74,12 +71,3 @@ def _slopes(spec: SliderCrankSpec, solution: Solution) -> Iterator[tuple[str, Fl
         at = assembly.units(np.array([assembly.stretched]))
         yield "stretched_torque", at.effort[:, 0]
         yield "stretched_stiffness", at.stiffness[:, 0]
-
-
-def _inside(spec: SliderCrankSpec, solution: Solution) -> FloatArray:
-    """Return the unit efforts in the window, with interpolated ends, (4, n)."""
-    window, motion = window_of(spec), solution.motion
-    if window is None:
-        return solution.units.effort
-    places = np.concatenate([[window[0]], motion[(motion > window[0]) & (motion < window[1])], [window[1]]])
-    return np.stack([np.interp(places, motion, row) for row in solution.units.effort])

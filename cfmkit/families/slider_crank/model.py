@@ -37,6 +37,10 @@ if TYPE_CHECKING:
     from cfmkit.results import Finding
 
 
+RATES = {f"mechanism.springs.{name}": row for row, name in enumerate(JOINTS)}
+"""Where a specification has the rates, and the rows of the springs."""
+
+
 @dataclass(frozen=True)
 class Solution:
     """A solved mechanism, as the checks, the scalar values and the pictures need it.
@@ -195,6 +199,15 @@ def window_of(spec: SliderCrankSpec) -> tuple[float, float] | None:
     """Return the window in which the effort is wanted constant, if the analysis states one [rad or m]."""
     window = spec.analysis.window
     return None if window is None else (float(window[0]), float(window[1]))
+
+
+def efforts_inside(motion: FloatArray, units: UnitCurves, window: tuple[float, float] | None) -> FloatArray:
+    """Return the unit efforts in a window with interpolated ends, (4, k); without a window all of them."""
+    if window is None:
+        return units.effort
+    between = motion[(motion > window[0]) & (motion < window[1])]
+    places = np.concatenate([[window[0]], between, [window[1]]])
+    return np.stack([np.interp(places, motion, row) for row in units.effort])
 
 
 def _shortfall(assembly: Assembly, asked: tuple[float, float], reach: tuple[float, float]) -> Finding | None:
