@@ -159,7 +159,7 @@ def draw_gains(found: Findings) -> Figure:
     figure, axes = _bar_axes(len(order), f"{found.setup.study.spec.name}: {told}; which tolerance to tighten first")
     _draw_bars(axes, lines, order, (BLUE, "", 0.0, 0.6))
     _rows(axes, [lines[k].parameter for k in order])
-    axes.set_xlabel("change of the yield when the tolerance is halved [1], with 95 % interval")
+    axes.set_xlabel("change of the yield when the tolerance is halved [1], 95 % interval")
     return figure
 
 

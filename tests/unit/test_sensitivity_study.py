@@ -13,7 +13,7 @@ from cfmkit import families
 from cfmkit.errors import ExitCode, SpecError, UsageError
 from cfmkit.families import family
 from cfmkit.plots.sensitivity import figures, short
-from cfmkit.plots.style import png
+from cfmkit.plots.style import MM, png
 from cfmkit.studies.engine import run
 from cfmkit.studies.sensitivity.evaluation import Evaluator
 from cfmkit.studies.sensitivity.methods import METHODS, carry_out
@@ -63,6 +63,18 @@ def test_pictures_are_drawn_whatever_failed_and_their_bytes_repeat(method, param
         picture = png(draw())
         assert picture == png(draw()), name
         assert len(picture) > 5000
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_labels_of_axes_stay_clear_of_the_edges_of_the_picture(method):
+    for name, draw in figures(study(method)).items():
+        figure = draw()
+        figure.canvas.draw()
+        room = 4.0 * MM * figure.dpi
+        for axes in figure.axes:
+            box = axes.xaxis.label.get_window_extent()
+            assert room <= box.x0, name
+            assert box.x1 <= figure.bbox.x1 - room, name
 
 
 @pytest.mark.parametrize("method", ["oat", "morris", "sobol", "tolerance"])
