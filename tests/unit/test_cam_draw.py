@@ -120,6 +120,16 @@ def test_rollers_touch_the_cam_at_the_contact_and_never_enter_it(name):
         assert on_line == pytest.approx(radius, abs=6e-5 + offset * solution.states.on_corner[index])
 
 
+@pytest.mark.parametrize("name", ["published", "no undercut", "other roller"])
+def test_the_name_of_the_roller_path_stands_beside_the_cam_not_on_it(name):
+    figure = figures(solved(name))["mechanism"]()
+    ax = figure.axes[-1]
+    (text,) = [text for text in ax.texts if text.get_text().split() == ["roller", "path"]]
+    (plate,) = [artist for artist in ax.get_children() if artist.get_gid() == "plate"]
+    outline = plate.get_path().transformed(plate.get_transform())
+    assert not outline.intersects_bbox(text.get_window_extent())
+
+
 @pytest.mark.parametrize("name", GEOMETRY)
 def test_braces_have_their_length_and_meet_in_the_slider_at_its_travel(name):
     result = solved(name)

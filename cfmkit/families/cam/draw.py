@@ -154,7 +154,7 @@ def _names_of_parts(solution: Solution, index: int, view: Scene) -> list[Label]:
         parts.part_name("F", [pin + np.array([0.0, 0.06 * height])], (1.0, 0.0), VERMILLION),
         parts.part_name("slider", [pin], (-1.0, 0.2)),
         parts.part_name("brace", pin + np.linspace(0.2, 0.8, 20)[:, None] * (roller - pin), (1.0, 0.5)),
-        parts.part_name("roller", parts.ring(here.roller, radius, 25), (0.3, -1.0)),
+        parts.part_name("roller", parts.ring(here.roller, radius, 25), (0.0, -1.0)),
         parts.part_name("spring" if number == 1 else f"{number} springs", spring, (0.0, -1.0), ORANGE),
     ]
 
@@ -162,7 +162,7 @@ def _names_of_parts(solution: Solution, index: int, view: Scene) -> list[Label]:
 def _names_of_lines(_solution: Solution, _index: int, view: Scene) -> list[Label]:
     return [
         parts.part_name("cam", view.flank[len(view.flank) // 2 :] * np.array([0.4, 0.9]), (0.0, -1.0)),
-        parts.part_name("roller path", view.path, (1.0, -0.4), BLUE, prefer=0.1),
+        parts.part_name("roller\npath", view.path[: len(view.path) // 4], (0.5, -1.0), BLUE, prefer=0.1),
     ]
 
 
