@@ -1,6 +1,7 @@
 """``--set mechanism.springs.0=2 N/mm``: one value of a specification from the command line.
 
-The value is read exactly as in a file; lists and blocks in flow style only.
+The value is read exactly as in a file; lists and blocks in flow style only. A key that has dots itself stands in
+quotes: ``--set 'sensitivity.parameters."mechanism.roller_radius"={normal: 0.1 mm}'``.
 """
 
 from __future__ import annotations
@@ -30,6 +31,10 @@ class Option:
         return "--set " + dotted(self.path)
 
 
+_PART = r"""(?:\s*"[^"]+"\s*|\s*'[^']+'\s*|[^."'=]+)"""
+_OPTION = re.compile(rf"({_PART}(?:\.{_PART})*)=(.*)", re.DOTALL)
+
+
 class NoSuchPlace(Exception):
     """There is no place in the tree where the value could go."""
 
@@ -42,14 +47,19 @@ def parse_option(text: str) -> Option:
     cfmkit.errors.UsageError
         If there is no ``=``, no path or no value.
     """
-    path, equals, value = text.partition("=")
-    parts = tuple(part.strip() for part in path.split("."))
+    found = _OPTION.fullmatch(text)
+    path, equals, value = (found[1], "=", found[2]) if found else text.partition("=")
+    parts = [part.strip() for part in re.findall(_PART, path)] if found else []
     example = "write e.g. --set mechanism.springs.count=2"
     if not equals or not value.strip():
         raise UsageError(f"--set {shown(text)}: no value; {example}")
-    if not all(parts) or len(parts) > DEEPEST:
+    if not all(parts) or not 0 < len(parts) <= DEEPEST:
         raise UsageError(f"--set {shown(text)}: {shown(path)} is not a dotted path; {example}")
-    return _read_value(parts, value.strip())
+    return _read_value(tuple(_unquoted(part) for part in parts), value.strip())
+
+
+def _unquoted(part: str) -> str:
+    return part[1:-1] if part[0] in "\"'" else part
 
 
 def _read_value(path: tuple[str, ...], text: str) -> Option:

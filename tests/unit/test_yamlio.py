@@ -263,11 +263,42 @@ def test_a_wrong_option_is_told_as_the_option(option: str, words: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "option", ["", "=", "a", "a=", "=1", "a..b=1", ".a=1", "a b", ".=1", "a.b.=2", "a." * 40 + "a=1"]
+    "option",
+    [
+        "",
+        "=",
+        "a",
+        "a=",
+        "=1",
+        "a..b=1",
+        ".a=1",
+        "a b",
+        ".=1",
+        "a.b.=2",
+        "a." * 40 + "a=1",
+        "a.'b=1",
+        '""=1',
+        "a.'b'c=1",
+    ],
 )
 def test_a_malformed_option_is_a_usage_error(option: str) -> None:
     with pytest.raises(UsageError, match=r"^--set .*; write e\.g\. --set mechanism\.springs\.count=2$"):
         read_document(GOOD, "x").set(option)
+
+
+PARAMETERS = GOOD + "sensitivity: {parameters: {mechanism.width: [1 mm, 2 mm], mechanism.count: [1, 2]}}\n"
+
+
+@pytest.mark.parametrize("quote", ["'", '"'])
+def test_a_key_with_dots_is_reached_in_quotes(quote: str) -> None:
+    width = f"{quote}mechanism.width{quote}"
+    given = bound(
+        PARAMETERS, f"sensitivity.parameters.{width}=[3 mm, 4 mm]", f"sensitivity . parameters.{width}.0=2 mm"
+    )
+    assert given.sensitivity is not None
+    assert given.sensitivity.parameters == {"mechanism.width": ("2 mm", "4 mm"), "mechanism.count": ("1", "2")}
+    option = f"sensitivity.parameters.{quote}a=b.c{quote}=0"
+    assert complaint(PARAMETERS, option).startswith("--set sensitivity.parameters.'a=b.c'")
 
 
 def test_file_and_option_problems_come_together_the_file_first() -> None:
