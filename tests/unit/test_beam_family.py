@@ -7,7 +7,9 @@ import pytest
 from beam_support import MM, at, cantilever, config, solved, value
 
 import cfmkit
+from cfmkit.beams import Section, Taper
 from cfmkit.errors import DataError
+from cfmkit.families.beam.build import thickest_of
 from cfmkit.results import Status
 
 GUIDED = ("tip: {at: [400 mm, 0 mm]}", "tip: {at: [400 mm, 0 mm], support: parallel}")
@@ -183,6 +185,12 @@ def test_gaps_are_between_surfaces_and_shrink_on_the_way():
     thin = solved("beam_lan2010_thin")
     assert value(thin, "gap_min_moving") - value(result, "gap_min_moving") == pytest.approx(0.15 * MM, abs=1e-9)
     assert value(result, "gap_min_moving") < value(result, "gap_min")
+
+
+@pytest.mark.parametrize("thickness", [(1.0, 2.0, 1.0, 1.0), (1.0, 1.0, 2.0, 1.0)])
+def test_a_beam_is_as_thick_as_on_the_thicker_side_of_a_step(thickness):
+    section = Section(1e9, 10 * MM, Taper(np.array([0.0, 0.5, 0.5, 1.0]), np.array(thickness) * MM))
+    assert thickest_of(section) == 2.0 * MM
 
 
 def test_what_cannot_be_cut_is_told():

@@ -144,7 +144,8 @@ def thickest(thickness: Thickness) -> float:
 
 def thickest_of(section: engine.Section) -> float:
     """Return the largest thickness of a section as the engine has it [m]."""
-    return max(float(np.real(section.thickness_at(place, place))) for place in section.stations)
+    thickness = section.thickness
+    return float(thickness if isinstance(thickness, float | int) else np.max(thickness.values))
 
 
 def _node(node: NodeSpec) -> engine.Node:

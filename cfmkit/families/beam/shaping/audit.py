@@ -14,7 +14,7 @@ import numpy as np
 
 from cfmkit.beams import Control, Displacement, Network, PathStatus, trace
 from cfmkit.beams.batch import trace_many
-from cfmkit.families.beam.shaping.limits import thickest
+from cfmkit.families.beam.build import thickest_of
 from cfmkit.families.beam.shaping.separation import pairs
 
 if TYPE_CHECKING:
@@ -196,7 +196,7 @@ def _least_gap(task: Task, path: Path) -> float | None:
 
 def _gap(task: Task, path: Path, pair: Pair) -> float:
     sections = [task.network.beams[name].section for name in pair.beams]
-    thickness = 0.5 * sum(thickest(section) for section in sections)
+    thickness = 0.5 * sum(thickest_of(section) for section in sections)
     wanted = thickness + (task.limits.clearance or 0.0)
     least = np.inf
     for pose in path.at_asked:

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.families.beam.build import thickest_of
 from cfmkit.families.beam.shaping.goals import Flattest
-from cfmkit.families.beam.shaping.limits import thickest
 from cfmkit.families.beam.shaping.program import Shaping
 from cfmkit.families.beam.shaping.search import VIOLATION, Found, Plan, met
 from cfmkit.families.beam.shaping.variables import Variables
@@ -115,7 +115,7 @@ def _force(task: Task, slack: float) -> dict[str, str]:
 
 
 def _clearance(task: Task, slack: float) -> dict[str, str]:
-    thick = max(thickest(beam.section) for beam in task.network.beams.values())
+    thick = max(thickest_of(beam.section) for beam in task.network.beams.values())
     gap = ((task.limits.clearance or 0.0) + thick) * (1 - slack) - thick
     return {"design.optimise.limits.clearance": f"at most {format_short(max(0.0, gap), 'length')}"}
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.families.beam.build import thickest_of
 from cfmkit.families.beam.shaping.separation import Pair, pairs, separations
 from cfmkit.numerics.sampled import largest
 
@@ -117,7 +118,7 @@ def slenderness(view: View) -> list[Rows]:
     if task.limits.slenderness is None:
         return []
     many = view.lengths
-    least = np.array([task.limits.slenderness * thickest(view.section(name)) for name in many])
+    least = np.array([task.limits.slenderness * thickest_of(view.section(name)) for name in many])
     values = np.array([one.length for one in many.values()]) / least - 1.0
     slopes = np.array([one.by_length for one in many.values()]) / least[:, None]
     return [view.rows(values, lambda: slopes, lambda: list(many))]
@@ -193,9 +194,3 @@ LIMITS: dict[str, Callable[[View], list[Rows]]] = {
     "force": force,
 }
 """All limits by name."""
-
-
-def thickest(section: Section) -> float:
-    """Return the largest thickness of a section [m]."""
-    thickness = section.thickness
-    return float(thickness if isinstance(thickness, float | int) else np.max(thickness.values))

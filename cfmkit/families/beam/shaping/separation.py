@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cfmkit.families.beam.build import thickest_of
 from cfmkit.families.beam.shaping.response import Line
 from cfmkit.numerics.sampled import soft_least
 
@@ -98,9 +99,7 @@ def _compared(pair: Pair, way: FloatArray, count: int) -> Any:
 
 def _wanted(view: View, pair: Pair) -> float:
     """Return the gap of the centre lines [m]: that of the surfaces and half the thickness of both beams."""
-    from cfmkit.families.beam.shaping.limits import thickest
-
-    thickness = sum(0.5 * thickest(view.section(name)) for name in pair.beams)
+    thickness = sum(0.5 * thickest_of(view.section(name)) for name in pair.beams)
     return float((view.response.variables.task.limits.clearance or 0.0) + thickness)
 
 

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.families.beam.build import thickest_of
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
@@ -40,11 +42,9 @@ def sound(variables: Variables, x: FloatArray) -> bool:
 
 
 def _least_chord(variables: Variables, network: Network) -> float:
-    from cfmkit.families.beam.shaping.limits import thickest
-
     slenderness = variables.task.limits.slenderness
     if slenderness is not None:
-        return slenderness * max(thickest(beam.section) for beam in network.beams.values())
+        return slenderness * max(thickest_of(beam.section) for beam in network.beams.values())
     return _LEAST_CHORD * float(np.mean([abs(b - a) for a, b in (_chord(network, name) for name in network.beams)]))
 
 
