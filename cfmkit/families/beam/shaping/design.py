@@ -60,14 +60,15 @@ def shaped(spec: BeamSpec, wanted: Optimise, run: Run) -> Design:
     if isinstance(best, Design):
         return replace(best, tables={"starts": lambda: starts_table(task, result)})
     found, audit = best
+    held = held_by(task, found)
     return Design(
         written(spec, task, found),
         Status.COMPLETE,
         _told(task, found, result),
-        active_bounds=held_by(task, found),
+        active_bounds=held,
         warnings=_warnings(task, found, audit, result),
-        values=values_of(audit, spread),
-        notes=notes_of(task, audit, spread, held_by(task, found)),
+        values=values_of(audit),
+        notes=notes_of(audit, spread, held),
         tables={"starts": lambda: starts_table(task, result)},
     )
 

@@ -34,7 +34,7 @@ def lengths(variables: Variables, x: FloatArray) -> dict[str, Length]:
     network = variables.build(x)
     shaped = variables.task.shaped
     return {
-        name: _of_polynomial(variables, x, network, name) if name in shaped else _of_any(variables, x, network, name)
+        name: _of_polynomial(variables, x, network, name) if name in shaped else _of_any(variables, network, name)
         for name in network.beams
     }
 
@@ -56,7 +56,7 @@ def _of_polynomial(variables: Variables, x: FloatArray, network: Network, name: 
     return Length(chord / ratio, ratio, by_chord / ratio - chord / ratio**2 * by_ratio, by_ratio)
 
 
-def _of_any(variables: Variables, x: FloatArray, network: Network, name: str) -> Length:
+def _of_any(variables: Variables, network: Network, name: str) -> Length:
     """Return the length of any other beam; derivatives by complex steps of the places of its nodes."""
     beam, reach = network.beams[name], _reach(network, name)
     length = float(np.real(fit(beam, (reach.real, reach.imag)).length))

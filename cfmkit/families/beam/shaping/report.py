@@ -33,7 +33,7 @@ DEFINITIONS = {
 }
 
 
-def values_of(audit: Audit, spread: Spread) -> Mapping[str, Quantity]:
+def values_of(audit: Audit) -> Mapping[str, Quantity]:
     """Return the audit by name."""
     bands, ranges = audit.bands, audit.ranges
     numbers: dict[str, float | None] = {
@@ -53,12 +53,12 @@ def values_of(audit: Audit, spread: Spread) -> Mapping[str, Quantity]:
     return {name: Quantity(value, *DEFINITIONS[name]) for name, value in numbers.items()}
 
 
-def notes_of(task: Task, audit: Audit, spread: Spread, held: tuple[str, ...]) -> tuple[tuple[str, str], ...]:
+def notes_of(audit: Audit, spread: Spread, held: tuple[str, ...]) -> tuple[tuple[str, str], ...]:
     """Return the paragraphs of the page."""
-    return tuple(note for note in (_audit(task, audit), _tolerances(audit, spread), _held(held)) if note[1])
+    return tuple(note for note in (_audit(audit), _tolerances(audit, spread), _held(held)) if note[1])
 
 
-def _audit(task: Task, audit: Audit) -> tuple[str, str]:
+def _audit(audit: Audit) -> tuple[str, str]:
     parts = [
         "stable all the way" if audit.stable else "not stable all the way",
         "no crossings" if not audit.crossings else f"beams cross at {audit.crossings} poses",
