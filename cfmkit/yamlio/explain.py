@@ -54,6 +54,12 @@ class _Error:
             return isinstance(node, dict | tuple | bool) or (isinstance(node, str) and not re.match(" *[-+.0-9]", node))
         return self.kind.endswith("_type") or self.kind in ("int_from_float", "literal_error", "enum")
 
+    @property
+    def echo(self) -> bool:
+        """Whether something has too few items only because pydantic does not count those that are wrong themselves."""
+        node = self.trace.node
+        return self.kind == "too_short" and isinstance(node, tuple | dict) and len(node) >= self.context["min_length"]
+
 
 def spec_error(error: ValidationError, model: type[BaseModel], tree: Any) -> SpecError:
     """Return a pydantic error about values that come from no file, with the paths that are wrong."""
@@ -76,7 +82,7 @@ def explain(error: ValidationError, model: type[BaseModel], tree: Any) -> list[C
         _Error(line["type"], trace(model, tree, line["loc"]), line.get("ctx", {}), line["msg"])
         for line in error.errors(include_url=False, include_input=False)[:MOST_EXPLAINED]
     ]
-    complaints = [_complaint(line) for line in _meant(lines, 0)]
+    complaints = [_complaint(line) for line in _meant([line for line in lines if not line.echo], 0)]
     return _without_echoes(list(dict.fromkeys(complaints)))
 
 

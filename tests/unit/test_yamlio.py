@@ -286,6 +286,15 @@ def test_a_malformed_option_is_a_usage_error(option: str) -> None:
         read_document(GOOD, "x").set(option)
 
 
+def test_a_list_whose_items_are_wrong_is_not_too_short_as_well() -> None:
+    assert complaint(GOOD, "mechanism.links=[5]").splitlines() == [
+        "--set mechanism.links: mechanism.links.0: 5 does not fit here; a block with length is needed"
+    ]
+    assert (
+        complaint(GOOD, "mechanism.links=[]") == "--set mechanism.links: the list has 0 items; at least 1 must be there"
+    )
+
+
 PARAMETERS = GOOD + "sensitivity: {parameters: {mechanism.width: [1 mm, 2 mm], mechanism.count: [1, 2]}}\n"
 
 
