@@ -9,7 +9,7 @@ from beam_support import MM, at, cantilever, config, solved, value
 import cfmkit
 from cfmkit.beams import Section, Taper
 from cfmkit.errors import DataError
-from cfmkit.families.beam.build import thickest_of
+from cfmkit.families.beam.build import thickest_of, thinnest_of
 from cfmkit.results import Status
 
 GUIDED = ("tip: {at: [400 mm, 0 mm]}", "tip: {at: [400 mm, 0 mm], support: parallel}")
@@ -191,6 +191,21 @@ def test_gaps_are_between_surfaces_and_shrink_on_the_way():
 def test_a_beam_is_as_thick_as_on_the_thicker_side_of_a_step(thickness):
     section = Section(1e9, 10 * MM, Taper(np.array([0.0, 0.5, 0.5, 1.0]), np.array(thickness) * MM))
     assert thickest_of(section) == 2.0 * MM
+
+
+@pytest.mark.parametrize("thickness", [(2.0, 1.0, 2.0, 2.0), (2.0, 2.0, 1.0, 2.0)])
+def test_a_beam_is_as_thin_as_on_the_thinner_side_of_a_step(thickness):
+    section = Section(1e9, 10 * MM, Taper(np.array([0.0, 0.5, 0.5, 1.0]), np.array(thickness) * MM))
+    assert thinnest_of(section) == 1.0 * MM
+
+
+def test_slenderness_is_that_of_the_thickest_place_of_a_taper():
+    """Thick ends and a thin middle: three pieces, of which the middle one says nothing of the others."""
+    taper = "[[0, 3 mm], [0.2, 1 mm], [0.8, 1 mm], [1, 3 mm]]"
+    even = value(solved("beam_cantilever"), "slenderness_min")
+    thickness = config("beam_cantilever").mechanism.thickness
+    tapered = value(solved("beam_cantilever", f"mechanism.thickness={taper}"), "slenderness_min")
+    assert tapered == pytest.approx(even * thickness / (3 * MM))
 
 
 def test_what_cannot_be_cut_is_told():

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.beams import PathStatus
-from cfmkit.families.beam.build import thickest_of
+from cfmkit.families.beam.build import thickest_of, thinnest_of
 from cfmkit.families.beam.findings import finding
 from cfmkit.families.beam.values import window_of, within
 from cfmkit.families.beam.words import drive_text, in_units
@@ -202,7 +202,7 @@ def _gaps(solution: Solution) -> Iterator[Finding]:
             f"than can be cut ({format_short(least, 'length')})",
         )
     for name, beam in solution.path.layout.network.beams.items():
-        thinnest = min(float(np.real(beam.section.thickness_at(place, place))) for place in beam.section.stations)
+        thinnest = thinnest_of(beam.section)
         if thinnest < part.min_feature:
             yield finding(
                 "feature_small",

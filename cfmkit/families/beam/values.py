@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cfmkit.families.beam.build import thickest_of
 from cfmkit.numerics.cubic import bisect, crossing, first_extreme, value_at
 from cfmkit.results import Quantity
 
@@ -132,15 +133,13 @@ def _closure(solution: Solution) -> dict[str, float | None]:
     fits = solution.path.fits
     own = [name for name, beam in solution.path.layout.network.beams.items() if getattr(beam.shape, "length", None)]
     beams = solution.path.layout.network.beams
-    thickest = {
-        name: float(np.real(beam.section.thickness_at(beam.section.stations, 0.5)).max())
-        for name, beam in beams.items()
-    }
     return {
         "closure_rotation_max": max((abs(float(np.real(fits[name].rotation))) for name in own), default=0.0),
         "closure_scale_max": max((abs(float(np.real(fits[name].scale)) - 1) for name in own), default=0.0),
         "closure_gap_max": max((fits[name].gap for name in own), default=0.0),
-        "slenderness_min": min(float(np.real(fits[name].length)) / thickest[name] for name in beams),
+        "slenderness_min": min(
+            float(np.real(fits[name].length)) / thickest_of(beam.section) for name, beam in beams.items()
+        ),
     }
 
 
