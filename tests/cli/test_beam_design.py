@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -37,6 +38,7 @@ def test_without_a_shape_the_blocking_limit_and_the_nearest_value_are_named(cli,
     assert done.code == 4
     assert "meets all limits; the best misses force (least mean: missed by" in said
     assert "feasible design.optimise.force.min = at most" in said
+    assert re.search(r"missed by \d[\d.]* %", said)
 
 
 @pytest.mark.parametrize(

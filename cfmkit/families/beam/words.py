@@ -16,6 +16,17 @@ _LENGTH = re.compile(rf"{_NUMBER} m\b")
 _DIMENSIONS = {"displacement": "length", "rotation": "angle", "force": "force", "moment": "torque"}
 
 
+def percent(share: float) -> str:
+    """Return a share as a reader wants it, to three digits.
+
+    Examples
+    --------
+    >>> percent(0.025512)
+    '2.55 %'
+    """
+    return format_short(share, "ratio", 3)
+
+
 def drive_text(assembly: Assembly, value: float) -> str:
     """Return a value of the drive [SI, of one copy] as the user reads it, of all copies together."""
     kind = assembly.spec.mechanism.drive.kind

@@ -18,6 +18,7 @@ from cfmkit.families.beam.shaping.report import notes_of, starts_table, values_o
 from cfmkit.families.beam.shaping.search import Found, Plan, improved, widened
 from cfmkit.families.beam.shaping.task import Coordinate, Limits, Task
 from cfmkit.families.beam.shaping.variables import Variables
+from cfmkit.families.beam.words import percent
 from cfmkit.results import Design, Finding, Status
 from cfmkit.store import stable_hash
 
@@ -149,10 +150,10 @@ def _best(task: Task, result: Explored, spread: Spread, plan: Plan) -> tuple[Fou
     if task.objective == "range" and first.objective > task.half_band:
         flattest = min((one for _, one in candidates), key=lambda one: one.objective)
         said = (
-            f"no shape of {len(result.found)} starts keeps the force within +-{task.half_band:.2%} over the window "
-            f"asked for; the flattest keeps it within +-{flattest.objective:.2%}"
+            f"no shape of {len(result.found)} starts keeps the force within ± {percent(task.half_band)} over the "
+            f"window asked for; the flattest keeps it within ± {percent(flattest.objective)}"
         )
-        nearest = {"design.optimise.half_band": f"at least {1.02 * flattest.objective:.2%}"}
+        nearest = {"design.optimise.half_band": f"at least {percent(1.02 * flattest.objective)}"}
         return Design(None, Status.INFEASIBLE, said, nearest_feasible=nearest)
     fallback = None
     for _, one in candidates[:AUDITED]:
@@ -224,7 +225,7 @@ def _told(task: Task, found: Found, result: Explored) -> str:
     reused = f", {result.reused} from the journal" if result.reused else ""
     left = f", {result.missing} not done in the time" if result.missing else ""
     share = 1 - found.start / task.window[1]
-    reached = f"force within +-{found.objective:.2%} over {share:.1%} of the travel"
+    reached = f"force within ± {percent(found.objective)} over {percent(share)} of the travel"
     if task.objective == "paper":
         reached = f"F(a)/F(b) - 1 = {found.objective:.3f}"
     return (
@@ -249,7 +250,7 @@ def _warnings(task: Task, found: Found, audit: Audit, result: Explored) -> tuple
                 "objective_ill_posed",
                 f"F(a)/F(b) - 1 = {found.objective:.3f} is bounded by nothing but the limits: a force that falls from "
                 f"b to a is rewarded; over the window the half band is "
-                + (f"{audit.half_band:.1%}" if audit.half_band is not None else "not known"),
+                + (percent(audit.half_band) if audit.half_band is not None else "not known"),
                 "design.optimise.objective=ripple",
             )
         )

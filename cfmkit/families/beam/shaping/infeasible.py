@@ -12,6 +12,7 @@ from cfmkit.families.beam.shaping.goals import Flattest
 from cfmkit.families.beam.shaping.program import Shaping
 from cfmkit.families.beam.shaping.search import VIOLATION, Found, Plan, met
 from cfmkit.families.beam.shaping.variables import Variables
+from cfmkit.families.beam.words import percent
 from cfmkit.units import format_short
 
 if TYPE_CHECKING:
@@ -81,7 +82,7 @@ def missed_by(task: Task, found: Found) -> dict[str, str]:
         if rows is not None and rows.values.min(initial=0.0) < -VIOLATION:
             at = int(rows.values.argmin())
             worst.append((float(rows.values[at]), name, rows.about()[at]))
-    return {name: f"{about}: missed by {-value:.1%}" for value, name, about in sorted(worst)}
+    return {name: f"{about}: missed by {percent(-value)}" for value, name, about in sorted(worst)}
 
 
 def held_by(task: Task, found: Found, close: float = 2e-3) -> tuple[str, ...]:

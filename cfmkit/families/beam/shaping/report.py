@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.families.beam.words import percent
 from cfmkit.results import Quantity
 from cfmkit.units import format_short
 
@@ -64,11 +65,10 @@ def _audit(audit: Audit) -> tuple[str, str]:
         "no crossings" if not audit.crossings else f"beams cross at {audit.crossings} poses",
     ]
     if audit.half_band is not None:
-        parts.append(
-            f"force +-{audit.half_band:.2%} over the window, within 5 % over {audit.strict or 0:.1%} of the way"
-        )
+        strict = percent(audit.strict or 0.0)
+        parts.append(f"force ± {percent(audit.half_band)} over the window, within 5 % over {strict} of the way")
     if audit.stiff is not None:
-        parts.append(f"with stretching and shear +-{audit.stiff:.2%} and {audit.strict_stiff or 0:.1%}")
+        parts.append(f"with stretching and shear ± {percent(audit.stiff)} and {percent(audit.strict_stiff or 0.0)}")
     if audit.stress is not None:
         parts.append(f"bending stress up to {format_short(audit.stress, 'stress')}")
     if audit.gap is not None:
@@ -80,11 +80,12 @@ def _tolerances(audit: Audit, spread: Spread) -> tuple[str, str]:
     if not len(audit.bands):
         return "spread", ""
     lost = f"; {audit.lost} cannot be followed to the end" if audit.lost else ""
+    band, band_p90 = (percent(float(np.quantile(audit.bands, share))) for share in (0.5, 0.9))
+    kept, kept_p90 = (percent(float(np.quantile(audit.ranges, share))) for share in (0.5, 0.1))
     return "spread", (
         f"nodes off by {format_short(spread.nodes, 'length')} and coefficients by {spread.coefficients:g} rad "
-        f"(standard deviations, {spread.samples} networks): force +-{np.median(audit.bands):.2%} in the median, "
-        f"+-{np.quantile(audit.bands, 0.9):.2%} in nine of ten; within 5 % over {np.median(audit.ranges):.1%} of the "
-        f"way in the median, {np.quantile(audit.ranges, 0.1):.1%} in nine of ten{lost}"
+        f"(standard deviations, {spread.samples} networks): force ± {band} in the median, "
+        f"± {band_p90} in nine of ten; within 5 % over {kept} of the way in the median, {kept_p90} in nine of ten{lost}"
     )
 
 
