@@ -45,7 +45,12 @@ class Status(Enum):
     @property
     def exit_code(self) -> ExitCode:
         """The exit code of a run that ended so, before requirements are looked at."""
-        codes = {Status.COMPLETE: ExitCode.OK, Status.PARTIAL: ExitCode.PARTIAL, Status.INVALID: ExitCode.INVALID}
+        codes = {
+            Status.COMPLETE: ExitCode.OK,
+            Status.PARTIAL: ExitCode.PARTIAL,
+            Status.INVALID: ExitCode.INVALID,
+            Status.CRASHED: ExitCode.BUG,
+        }
         return codes.get(self, ExitCode.NO_SOLUTION)
 
 

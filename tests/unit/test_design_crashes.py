@@ -1,0 +1,52 @@
+"""A fault of the program in the starts of a design is told as one, never as targets that cannot be met."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+import cfmkit
+from cfmkit import api
+from cfmkit.cli.verbs.design import compute
+from cfmkit.errors import ExitCode
+from cfmkit.families.base import Run
+from cfmkit.families.beam.shaping import multistart
+from cfmkit.families.slider_crank.flexures import search
+from cfmkit.results import Status
+from cfmkit.studies.executors import Lost, serial
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+CONFIGS = Path(__file__).parents[2] / "configs"
+FAULT = "a bug in cfmkit: ZeroDivisionError: division by zero"
+
+
+def all_lost(work: Any, jobs: Iterator[int], stopping: Callable[[], bool]) -> Iterator[tuple[int, Lost]]:
+    """Do no job: the process of each died."""
+    for job in jobs:
+        yield job, Lost(Status.CRASHED, FAULT)
+
+
+def broken(*_: Any, **__: Any) -> Any:
+    raise ZeroDivisionError
+
+
+def test_a_design_all_of_whose_starts_crash_ends_as_a_bug() -> None:
+    report = compute(cfmkit.load(CONFIGS / "beam_design_arch.yaml"), Run(executor=all_lost))
+    assert report.exit_code is ExitCode.BUG
+    assert report.message == f"no start came to an end: {FAULT}"
+
+
+@pytest.mark.parametrize(
+    ("name", "module", "function"),
+    [("beam_design_arch", multistart, "searched"), ("slider_crank_taper_design", search, "descend")],
+)
+def test_a_fault_in_the_process_itself_is_not_swallowed(
+    name: str, module: Any, function: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, function, broken)
+    with pytest.raises(ZeroDivisionError):
+        api.design(cfmkit.load(CONFIGS / f"{name}.yaml"), Run(executor=serial))
