@@ -59,6 +59,12 @@ def test_what_does_not_hold_is_not_said(name):
     assert name not in names(analyzed(*changes))
 
 
+def test_what_is_measured_of_hybrid_leaves_is_not_held_against_a_force_that_they_add_to():
+    hybrid = ("mechanism.bistable.structure=hybrid", "mechanism.bistable.flexure_length=5 mm")
+    assert "measured_contradiction" in names(analyzed())
+    assert "measured_contradiction" not in names(analyzed(*hybrid))
+
+
 def test_travel_beyond_the_closed_forms_is_told():
     told = message(analyzed("analysis.travel=7.2 mm"), "theory_range")
     assert "beyond 1.6 times the rise (6.825 mm)" in told

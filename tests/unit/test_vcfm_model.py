@@ -145,7 +145,12 @@ def test_every_size_that_a_block_varies_is_one_of_the_spec():
 
 @pytest.mark.parametrize(
     "changes",
-    [["analysis.fidelity=exact"], ["mechanism.bistable.structure=cosine"], ["analysis.preloads=[1 mm]"]],
+    [
+        ["analysis.fidelity=exact"],
+        ["mechanism.bistable.structure=cosine"],
+        ["analysis.preloads=[1 mm]"],
+        ["mechanism.bistable.flexure_length=16 mm"],
+    ],
 )
 def test_what_has_no_closed_form_over_arrays_is_left_to_the_model_of_one(changes):
     block = Block({"mechanism.bistable.width": np.array([5e-3, 6e-3])}, (Measure("force_mean", (2e-3, 4e-3)),), 2)

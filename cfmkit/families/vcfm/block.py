@@ -73,6 +73,7 @@ def _applies(spec: VcfmSpec, block: Block) -> bool:
     plain = (
         analysis.fidelity in ("truss", "analytic")
         and (mechanism.positive.structure, mechanism.bistable.structure) == ("diamond", "v-beam")
+        and mechanism.bistable.flexure_length is None  # which bounds the length
         and analysis.preloads[0] == 0
         and analysis.travel is not None
     )

@@ -38,7 +38,7 @@ class HybridLeaf:
 
     @property
     def balance(self) -> Any:
-        """Travel at which the bar carries nothing [m]: flat. What the flexures still push with there is left out."""
+        """Travel at which the line between its ends is flat [m]; unlike in other leaves some force is left there."""
         return self.strip.rise
 
     @property
