@@ -27,17 +27,15 @@ NOT_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 """Characters that XML 1.0 cannot hold, not even escaped."""
 
 
-def junit(entries: Sequence[Entry], name: str = "cfmkit batch") -> bytes:
+def junit(entries: Sequence[Entry]) -> bytes:
     """Return the XML document.
 
     Parameters
     ----------
     entries : sequence of Entry
         Every specification of the batch.
-    name : str
-        Of the whole.
     """
-    root = Element("testsuites", name=name)
+    root = Element("testsuites", name="cfmkit batch")
     for entry in entries:
         root.append(_suite(entry))
     _count(root, list(root))

@@ -83,7 +83,7 @@ class Yield:
     count: int
 
 
-def yield_of(met: NDArray[np.bool_], failed: NDArray[np.bool_], policy: Policy, level: float = LEVEL) -> Yield:
+def yield_of(met: NDArray[np.bool_], failed: NDArray[np.bool_], policy: Policy) -> Yield:
     """Return the share of samples that are good.
 
     Parameters
@@ -94,8 +94,6 @@ def yield_of(met: NDArray[np.bool_], failed: NDArray[np.bool_], policy: Policy, 
         Whether nobody knows.
     policy : {"fail", "resample", "bound"}
         What a failed sample means.
-    level : float
-        Confidence.
     """
     count, unknown = len(met), int(failed.sum())
     good = int((met & ~failed).sum())
@@ -104,12 +102,12 @@ def yield_of(met: NDArray[np.bool_], failed: NDArray[np.bool_], policy: Policy, 
         return Yield(float("nan"), gap, gap, good, unknown, count)
     ends = good, good + unknown
     value = (ends[0] + ends[1]) / (2.0 * count)
-    score = wilson(ends[0], count, level)[0], wilson(ends[1], count, level)[1]
-    exact = clopper_pearson(ends[0], count, level)[0], clopper_pearson(ends[1], count, level)[1]
+    score = wilson(ends[0], count)[0], wilson(ends[1], count)[1]
+    exact = clopper_pearson(ends[0], count)[0], clopper_pearson(ends[1], count)[1]
     return Yield(value, score, exact, good, unknown, count)
 
 
-def yield_gains(met: NDArray[np.bool_], failed: NDArray[np.bool_], policy: Policy, level: float = LEVEL) -> Index:
+def yield_gains(met: NDArray[np.bool_], failed: NDArray[np.bool_], policy: Policy) -> Index:
     """Return how much the yield gains when each group is tightened.
 
     Parameters
@@ -118,8 +116,6 @@ def yield_gains(met: NDArray[np.bool_], failed: NDArray[np.bool_], policy: Polic
         As drawn, then tightened. Under ``bound`` a failed sample is a bad part.
     policy : {"fail", "resample", "bound"}
         What a failed sample means.
-    level : float
-        Confidence.
     """
     count = len(met)
     gains = []
@@ -129,7 +125,7 @@ def yield_gains(met: NDArray[np.bool_], failed: NDArray[np.bool_], policy: Polic
             continue
         before, after = met[:, 0] & ~failed[:, 0], met[:, group] & ~failed[:, group]
         gained, lost = int((after & ~before).sum()), int((before & ~after).sum())
-        gains.append(((gained - lost) / count, *paired_difference(gained, lost, count, level)))
+        gains.append(((gained - lost) / count, *paired_difference(gained, lost, count)))
     value, low, high = np.array(gains, dtype=np.float64).reshape(-1, 3).T
     return Index(YIELD_GAIN, value, low, high)
 
