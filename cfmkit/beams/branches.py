@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.beams.events import Singular, leave, locate
-from cfmkit.beams.kernels.march import DONE, INERTIA, LONG, STALLED
+from cfmkit.beams.kernels.march import DONE, INERTIA, STALLED
 from cfmkit.beams.path import Event, PathStatus
 from cfmkit.beams.solver import FORCE_WEIGHT, Spot
 
@@ -50,11 +50,8 @@ def cross(run: Run) -> Spot | None:
     )
     if found is None or one is None:
         before, after = (int(run.points.info[k, 0]) for k in (-2, -1))
-        ahead = abs(float(run.points.drive[-1] - run.points.drive[-2]))
-        if run.natural and after > before and ahead > _FINEST * run.span:
-            run.drop_last()  # it may lie on another path: a sharp corner was passed in one step
-            run.entry = 0.25 * ahead
-            return run.spot(-1)
+        if after > before and _too_far(run):
+            return _again(run)
         run.events.append(Event("unresolved", other.drive * run.unit, before, after))
         return other
     kind = "limit point" if found.fold else "bifurcation"
@@ -71,6 +68,10 @@ def cross(run: Run) -> Spot | None:
     forward = float(np.sign(other.drive - one.drive))
     left = leave(run.fine, found, run.control.sign, forward)
     left = None if left is None else run.settled(run.fine.reduce(left))
+    if left is None and _too_far(run):
+        run.events.pop()
+        run.first = None if run.first is found else run.first
+        return _again(run)
     if left is None:
         return _no_branch(run, found, other)
     run.drop_last()
@@ -117,6 +118,18 @@ def _not_beyond(run: Run, found: Singular, left: Spot, forward: float) -> Spot:
     return near if run.solver.pose_change(near.y, start) > 0.3 * run.solver.pose_change(guess, start) else left
 
 
+def _too_far(run: Run) -> bool:
+    """Tell whether the last step may have passed a sharp corner, and ended on another path."""
+    return run.natural and abs(float(run.points.drive[-1] - run.points.drive[-2])) > _FINEST * run.span
+
+
+def _again(run: Run) -> Spot:
+    """Take the last point back; return the one before, to go on from there in shorter steps."""
+    run.entry = 0.25 * abs(float(run.points.drive[-1] - run.points.drive[-2]))
+    run.drop_last()
+    return run.spot(-1)
+
+
 def _no_branch(run: Run, found: Singular, other: Spot) -> Spot | None:
     """Handle a bifurcation without a stable branch nearby: the mechanism jumps there."""
     if run.control.through_folds:
@@ -149,7 +162,6 @@ def _end_of_branch(run: Run, other: Spot, found: Singular) -> BranchEnd | None:
         step = float(np.sign(ahead[0] - start.drive)) * 0.02 * run.span
         options = run.options(start, step)
         code, points = run.solver.march(start, ahead, options, run.control.most_points + len(ahead))
-        run.too_long |= code == LONG
         if code != INERTIA:
             run.closed = code == DONE
             return None
@@ -223,9 +235,10 @@ def hop(run: Run, spot: Spot, asked: int) -> Spot | None:
 
 
 def close_behind(run: Run) -> bool:
-    """Find the end of the last branch by going back along the path that it joined; tell whether it was found.
+    """Find the end of the last branch by going back along the path that it joined; tell whether that is settled.
 
-    Coming forward nothing changes there: branch and path are both stable. Going back the path loses its stability.
+    Coming forward nothing changes there: branch and path are both stable. Going back the path loses its stability; a
+    branch that has not ended is stable back to where it opens.
     """
     last = max(k for k, name in enumerate(run.branches) if name != "primary")
     name = run.branches[last]
@@ -235,6 +248,8 @@ def close_behind(run: Run) -> bool:
     options = run.options(spot, sense * _BACK * run.span)
     options[LONGEST] = _BACK * run.span
     code, points = run.solver.march(spot, np.array([opening]), options, run.control.most_points + 2)
+    if code == DONE and run.solver.pose_change(points.y[-1], run.points.y[first]) <= _SAME:
+        return True
     if code != INERTIA or len(points) < 2:
         return False
     one, beyond = (run.fine.solve(run.fine.expand(points.y[k]), float(points.drive[k])) for k in (-2, -1))

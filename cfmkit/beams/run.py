@@ -40,6 +40,7 @@ class Run:
     layout: Layout
     mesh: Mesh
     control: Control
+    to_first: bool = False  # whether the first bifurcation ends it
     status: PathStatus = PathStatus.COMPLETE
     message: str = ""
     events: list[Event] = field(default_factory=list)
@@ -110,7 +111,7 @@ class Run:
             else:
                 self.stop(code)
                 return
-            if following is None:
+            if following is None or (self.to_first and self.first is not None):
                 return
             spot = following
             if self.too_long:

@@ -44,20 +44,23 @@ def trace(network: Network, drive: Drive, control: Control | None = None) -> Pat
     from cfmkit.beams.imperfection import imperfect
 
     perfect = replace(control, imperfection=0.0)
-    bent, name = imperfect(_solved(network, drive, replace(perfect, branch="primary")), control.imperfection)
+    bent, name = imperfect(_solved(network, drive, replace(perfect, branch="primary"), True), control.imperfection)
     path = _solved(bent, drive, perfect).path()
     branch = path.branch if bent is network else np.where(path.branch == "primary", "imperfect", path.branch)
     return replace(path, imperfection=name, branch=read_only(branch, np.str_))
 
 
-def _solved(network: Network, drive: Drive, control: Control) -> Run:
-    """Return the run on the first mesh that reaches the tolerance, or on the last that is tried."""
+def _solved(network: Network, drive: Drive, control: Control, to_first: bool = False) -> Run:
+    """Return the run on the first mesh that reaches the tolerance, or on the last that is tried.
+
+    to_first: only as far as the first bifurcation.
+    """
     from cfmkit.beams.run import Run  # loads the compiler
 
     layout = Layout(network, drive)
     mesh = first_mesh(control.tolerance)
     for round_ in range(_ROUNDS):
-        run = Run(layout, mesh, control)
+        run = Run(layout, mesh, control, to_first)
         run.follow()
         if run.too_long and round_ < _ROUNDS - 1:
             early = run.asked() < _EARLY * len(drive.points)

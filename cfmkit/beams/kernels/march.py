@@ -14,6 +14,7 @@ a segment is too long for its load; no room for more points; the drive left its 
 
 KEPT = 6  # points that the extrapolation uses
 SHORT = 0.25  # dM1/dM0 of a segment below which it must be split
+SECANT = 0.25  # of the last step: shorter ones go along the tangent, from which the secants of long ones differ
 INFO = 6  # unstable directions, index of the asked point or -1, parameter, iterations, d(drive)/ds, shortness
 
 
@@ -166,10 +167,16 @@ def march(m, n_free, y, drive, tangent, targets, options, out_y, out_drive, out_
         code, iterations = solve(m, n_free, new, state, border, goal, (options[0], options[1]), new_tangent, scratch)
         moved, missed = _changes(new, old, n_free, n), _changes(new, guess, n_free, n)
         near = moved <= turn and (count == 1 or missed <= 0.4 * moved + 1e-7)
-        if code != SOLVED or not near or not (natural or _forward(border, new_tangent)):
+        lost = state[1] - index if options[10] > 0.5 and natural else 0.0
+        # past one bifurcation the next ones are near, and loads that no segment bears: first the first one
+        unborne = state[2] < SHORT and (lost > 0.0 or (natural and count == 1))
+        passed = (lost > 1.0 or state[1] < min(index, 0.0) or unborne) and abs(ahead) > 4.0 * smallest
+        if code != SOLVED or passed or not near or not (natural or _forward(border, new_tangent)):
             step = 0.5 * ahead if natural else 0.5 * step
             if abs(step) < smallest:
                 return STALLED, stored
+            if count > 1 and abs(step) < SECANT * abs(times[0] - times[1]):
+                count = 1
             continue
         if state[2] < SHORT:
             return LONG, stored
