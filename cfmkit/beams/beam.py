@@ -7,13 +7,14 @@ that it does, and reports by how much; "raw" keeps shape and length and forces t
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import cached_property
 from numbers import Number
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from cfmkit.beams.section import Taper
 from cfmkit.beams.shapes import STRAIGHT, Course, Shape, direction
 from cfmkit.errors import InputError
 
@@ -23,6 +24,10 @@ if TYPE_CHECKING:
 Joint = Literal["rigid", "pin"]
 Closure = Literal["rotscale", "raw"]
 
+SAME = 1e-12
+"""Parameters of a shape that differ by less count as one place."""
+
+_SLIGHT = 1e-9  # [rad] an angle that is no corner; [1] a share of the complex step that is rounding
 _PANELS = 8
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(12)
 GAUSS = (
@@ -154,16 +159,16 @@ def fit(beam: Beam, reach: Any) -> Fit:
     if not np.real(distance) > 0:
         raise InputError(f"the ends of the beam {beam.start}-{beam.end} coincide")
     course = beam.shape.course(distance)
-    (cx, cy), length = _integral(course, 0.0, 1.0)
+    (cx, cy), length = _integral(course)
     own = (cx * cx + cy * cy) ** 0.5
     if not np.real(own) > 1e-9 * np.real(length):
         raise InputError(f"the shape of the beam {beam.start}-{beam.end} returns to its start: it cannot be fitted")
     gap = float(np.hypot(np.real(dx - cx), np.real(dy - cy)))
     if beam.closure == "raw":
-        return Fit(0.0, 1.0, gap, length, course)
+        return _in_place(Fit(0.0, 1.0, gap, length, course), beam)
     rotation = direction(dx * cx + dy * cy, dy * cx - dx * cy)
     scale = distance / own
-    return Fit(rotation, scale, gap, length * scale, course)
+    return _in_place(Fit(rotation, scale, gap, length * scale, course), beam)
 
 
 def same_value(one: Any, other: Any) -> bool:
@@ -181,19 +186,68 @@ def same_value(one: Any, other: Any) -> bool:
     return bool(np.array_equal(one, other)) if isinstance(one, np.ndarray) else bool(one == other)
 
 
-def _integral(course: Course, start: float, stop: float) -> tuple[tuple[Any, Any], Any]:
-    """Return the integrals of (cos, sin) of the angle and of the speed between two parameters."""
-    inner = course.breaks[(course.breaks > start) & (course.breaks < stop)]
-    edges = np.concatenate([[start], inner, [stop]])
+def _in_place(fitted: Fit, beam: Beam) -> Fit:
+    """Return a fit over a parameter in which complex steps move neither the shape's breaks nor the section's stations.
+
+    A grid has its edges there (`cfmkit.beams.discretise`). A station keeps its fraction of the arc length: where the
+    arc length changes along the shape's own parameter t, it moves there by dt = -d(arc) / (d(arc)/dt).
+    """
+    breaks = np.real(fitted.course.breaks)
+    if np.iscomplexobj(fitted.course.breaks):
+        fitted = replace(fitted, course=fitted.course.over(breaks, fitted.course.breaks))
+    stations = beam.section.stations[1:-1]
+    if fitted.course.uniform or not len(stations) or not np.iscomplexobj(fitted.length):
+        return fitted
+    marks, steps = breaks, np.zeros(len(breaks))
+    for station in stations.tolist():
+        t = fitted.parameter(station)
+        step = float(-np.imag(fitted.arc(t)) * np.real(fitted.length) / np.real(fitted.speed(t, t)))
+        k = int(np.searchsorted(marks, t - SAME))
+        if marks[k] > t + SAME:
+            marks, steps = np.insert(marks, k, t), np.insert(steps, k, step)
+        elif not _has_corner(fitted.course, t):
+            steps[k] = step
+        elif _has_step(beam.section, station) and abs(step) > _SLIGHT * _change(fitted.course):
+            raise InputError(
+                f"a corner of the beam {beam.start}-{beam.end} moves along it, past a step of its thickness: "
+                "no derivative there"
+            )
+    return replace(fitted, course=fitted.course.over(marks, marks + 1j * steps))
+
+
+def _has_corner(course: Course, t: float) -> bool:
+    """Tell whether the angle jumps at the break at t; the ends count as corners."""
+    k = int(np.abs(course.breaks - t).argmin())
+    if k in (0, len(course.breaks) - 1):
+        return True
+    before, after = 0.5 * (course.breaks[k - 1 : k + 1] + course.breaks[k : k + 2])
+    return bool(abs(np.real(course.angle(t, after) - course.angle(t, before))) > _SLIGHT)
+
+
+def _has_step(section: Section, station: float) -> bool:
+    """Tell whether the thickness jumps at a station."""
+    given = section.thickness
+    return isinstance(given, Taper) and bool(np.ptp(given.values[given.stations == station].real) > 0)
+
+
+def _change(course: Course) -> float:
+    """Return by how much complex steps change angle and, relatively, speed at the middles of a course's pieces."""
+    middles = (0.5 * (course.breaks[1:] + course.breaks[:-1])).tolist()
+    angles = [abs(np.imag(course.angle(t, t))) for t in middles]
+    return float(max(*angles, *(abs(np.imag(course.speed(t, t)) / np.real(course.speed(t, t))) for t in middles)))
+
+
+def _integral(course: Course) -> tuple[tuple[Any, Any], Any]:
+    """Return the integrals of (cos, sin) of the angle and of the speed over a whole course."""
     x: Any = 0.0
     y: Any = 0.0
     length: Any = 0.0
-    for left, right in itertools.pairwise(edges):
+    for left, right in itertools.pairwise(course.breaks):
         panels = np.linspace(left, right, _PANELS + 1)
         half = 0.5 * (panels[1] - panels[0])
         t = ((panels[:-1] + half)[:, None] + half * _NODES).ravel()
         weights = np.tile(half * _WEIGHTS, _PANELS)
-        inside = 0.5 * (left + right)
+        inside = float(np.real(0.5 * (left + right)))
         speed, angle = course.speed(t, inside) * weights, course.angle(t, inside)
         x = x + (speed * np.cos(angle)).sum()
         y = y + (speed * np.sin(angle)).sum()

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cfmkit.beams.beam import SAME
 from cfmkit.beams.kernels.model import TABLE_COLUMNS, Model
 from cfmkit.beams.kernels.rk8 import NODES, STAGES
 from cfmkit.beams.numbering import LINE, SLIDE, TURN
@@ -94,7 +95,7 @@ def grid(layout: Layout, mesh: Mesh) -> Grid:
         fitted = layout.fits[name]
         stations = [fitted.parameter(float(u)) for u in beam.section.stations[1:-1]]
         marks = np.unique(np.concatenate([fitted.course.breaks, stations]))
-        marks = marks[np.concatenate([[True], np.diff(marks) > 1e-12])]
+        marks = marks[np.concatenate([[True], np.diff(marks) > SAME])]
         breaks.append((marks, np.real(fitted.arc(marks))))
     cut = _cut(breaks, mesh)
     inside = cut.middle.copy()

@@ -25,12 +25,37 @@ AngleLaw = Callable[[Any, float], Any]  # (t, a place inside the piece) -> angle
 
 @dataclass(frozen=True)
 class Course:
-    """A shape made for a chord: angle [rad] and speed ds/dt [m] over t, smooth between `breaks`."""
+    """A shape made for a chord: angle [rad] and speed ds/dt [m] over t, smooth between `breaks`.
+
+    Complex steps of a shape may move its breaks, which are then complex (see `Course.over`).
+    """
 
     angle: AngleLaw
     speed: AngleLaw
-    breaks: FloatArray
+    breaks: Any
     uniform: bool  # whether t is the fraction of the arc length
+
+    def over(self, marks: FloatArray, moved: Any) -> Course:
+        """Return the course over another parameter, of which this one is a piecewise-linear function.
+
+        Parameters
+        ----------
+        marks : (n,) array
+            Ends of the linear pieces, increasing from 0 to 1: the breaks of the course returned.
+        moved : (n,) complex array
+            This course's parameters there: the marks plus imaginary steps.
+        """
+        steps = np.imag(moved)
+        rates = 1 + 1j * np.diff(steps) / np.diff(marks)
+
+        def own(t: Any) -> Any:
+            return t + 1j * np.interp(np.real(t), marks, steps)
+
+        def speed(t: Any, inside: float) -> Any:
+            piece = np.searchsorted(marks, inside, side="right") - 1
+            return self.speed(own(t), inside) * rates[min(int(piece), len(rates) - 1)]
+
+        return Course(lambda t, inside: self.angle(own(t), inside), speed, read_only(marks), False)
 
 
 @dataclass(frozen=True)
@@ -114,19 +139,14 @@ class Polyline:
         lengths = (steps[:, 0] ** 2 + steps[:, 1] ** 2) ** 0.5
         angles = direction(steps[:, 0], steps[:, 1])
         angles += np.unwrap(angles.real) - angles.real
-        breaks = np.concatenate([[0.0], np.cumsum(lengths.real) / lengths.real.sum()])
+        length = lengths.sum()
+        breaks = np.concatenate([[0.0], np.cumsum(lengths) / length])
         breaks[-1] = 1.0
-        speeds = lengths / np.diff(breaks)  # one number, but for complex steps: there the corners keep their t
 
-        def piece(inside: float) -> int:
-            return min(int(np.searchsorted(breaks, inside, side="right")) - 1, len(angles) - 1)
+        def angle(t: Any, inside: float) -> Any:
+            return angles[min(int(np.searchsorted(breaks.real, inside, side="right")) - 1, len(angles) - 1)] + 0.0 * t
 
-        return Course(
-            lambda t, inside: angles[piece(inside)] + 0.0 * t,
-            lambda t, inside: speeds[piece(inside)] + 0.0 * t,
-            read_only(breaks),
-            speeds.dtype.kind != "c",
-        )
+        return Course(angle, lambda t, inside: length + 0.0 * t, read_only(breaks, breaks.dtype), True)
 
 
 @dataclass(frozen=True)
@@ -159,7 +179,7 @@ class Spline:
             v = velocity(t, inside)
             return (v[..., 0] ** 2 + v[..., 1] ** 2) ** 0.5
 
-        return Course(angle, speed, read_only(knots.real), False)
+        return Course(angle, speed, read_only(knots, knots.dtype), False)
 
 
 def _spline_velocity(knots: Any, points: Any) -> AngleLaw:
@@ -170,7 +190,7 @@ def _spline_velocity(knots: Any, points: Any) -> AngleLaw:
     gap, n = np.diff(knots), len(knots)
     slope = np.diff(points, axis=0) / gap[:, None]
     if n == 2:
-        return lambda t, inside: slope[0] * (gap[0] / gap[0].real) + 0.0 * np.asarray(t)[..., None]
+        return lambda t, inside: slope[0] + 0.0 * np.asarray(t)[..., None]
     a, b = np.zeros((n, n), dtype=slope.dtype), np.zeros((n, 2), dtype=slope.dtype)
     for i in range(1, n - 1):
         a[i, i - 1 : i + 2] = gap[i], 2 * (gap[i - 1] + gap[i]), gap[i - 1]
@@ -193,9 +213,8 @@ def _spline_velocity(knots: Any, points: Any) -> AngleLaw:
         at = np.real(t)
         i = np.clip(np.searchsorted(knots.real, at, side="right") - 1, 0, n - 2)
         i = np.where((at >= knots.real[own] - _NEAR) & (at <= knots.real[own + 1] + _NEAR), own, i)
-        u = ((t - knots.real[i]) / gap.real[i])[..., None]  # of the piece: for complex steps too
-        found = 6 * u * (1 - u) * slope[i] + (1 - u) * (1 - 3 * u) * ends[i] + u * (3 * u - 2) * ends[i + 1]
-        return found * (gap[i] / gap.real[i])[..., None]
+        u = ((t - knots[i]) / gap[i])[..., None]
+        return 6 * u * (1 - u) * slope[i] + (1 - u) * (1 - 3 * u) * ends[i] + u * (3 * u - 2) * ends[i + 1]
 
     return velocity
 
