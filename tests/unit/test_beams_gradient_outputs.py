@@ -70,6 +70,8 @@ def zoo(x: Any) -> Network:
     """A network in which everything varies."""
     section = Section(x[21] * 2e9, x[24] * 1e-3, Taper(np.array([0, 0.5, 1]), np.array([1.0, x[2], 1.2]) * 1e-3), True)
     plain = Section(x[21] * 2e9, 8e-3, 1e-3, axial=True, shear=True, poisson_ratio=x[22])
+    steps = Taper(np.array([0, 0.3, 0.3, 0.8, 1]), np.array([1.2, 1.1, 0.8, 0.9, 1.0]) * 1e-3)
+    stepped = Section(x[21] * 2e9, 8e-3, steps, axial=True, shear=True, poisson_ratio=x[22])
     nodes = {
         "a": Node(0, 0, Support(True, True, True, displacement=(0.0, x[16], 0.0))),
         "b": Node(x[0], x[1]),
@@ -81,10 +83,10 @@ def zoo(x: Any) -> Network:
     }
     beams = {
         "ab": Beam("a", "b", section, Polynomial((0.0, x[23])), end_offset=(x[4], x[5])),
-        "bc": Beam("bb", "c", plain, CosineArch(x[18]), end_joint="pin"),
+        "bc": Beam("bb", "c", stepped, CosineArch(x[18]), end_joint="pin"),
         "bd": Beam("b", "d", section),
         "be": Beam("b", "e", plain, Polyline(np.array([[0.0, 0.0], [0.03, x[19]], [0.07, 0.03]]))),
-        "bf": Beam("bb", "f", plain, Spline(np.array([[0.0, 0.0], [0.03, x[20]], [0.05, 0.012], [0.085, 0.0]]))),
+        "bf": Beam("bb", "f", stepped, Spline(np.array([[0.0, 0.0], [0.03, x[20]], [0.05, 0.012], [0.085, 0.0]]))),
     }
     springs = (
         LineSpring("b", "d", x[6], x[7]),
