@@ -141,13 +141,29 @@ class Fit:
         """Return t at a fraction of the arc length."""
         if self.course.uniform or fraction in (0.0, 1.0):
             return fraction
-        from cfmkit.numerics.roots import bracketed_root
+        if fraction not in self._parameters:
+            from cfmkit.numerics.roots import bracketed_root
 
-        return bracketed_root(lambda t: float(np.real(self.arc(t))) - fraction, 0.0, 1.0)
+            self._parameters[fraction] = bracketed_root(lambda t: float(np.real(self.arc(t))) - fraction, 0.0, 1.0)
+        return self._parameters[fraction]
+
+    @cached_property
+    def _parameters(self) -> dict[float, float]:
+        """Parameters that were asked for, by the fraction."""
+        return {}
 
 
-def fit(beam: Beam, reach: Any) -> Fit:
-    """Return the beam's shape fitted to the vector `reach` between its ends, a complex pair (dx, dy) [m].
+def fit(beam: Beam, reach: Any, known: Fit | None = None) -> Fit:
+    """Return the beam's shape fitted to the vector `reach` between its ends, (dx, dy) [m].
+
+    Parameters
+    ----------
+    beam : Beam
+        May hold complex steps.
+    reach : (float, float)
+        May hold them too.
+    known : Fit, optional
+        The same fit without complex steps: it may know the parameters of the stations.
 
     Raises
     ------
@@ -165,10 +181,10 @@ def fit(beam: Beam, reach: Any) -> Fit:
         raise InputError(f"the shape of the beam {beam.start}-{beam.end} returns to its start: it cannot be fitted")
     gap = float(np.hypot(np.real(dx - cx), np.real(dy - cy)))
     if beam.closure == "raw":
-        return _in_place(Fit(0.0, 1.0, gap, length, course), beam)
+        return _in_place(Fit(0.0, 1.0, gap, length, course), beam, known)
     rotation = direction(dx * cx + dy * cy, dy * cx - dx * cy)
     scale = distance / own
-    return _in_place(Fit(rotation, scale, gap, length * scale, course), beam)
+    return _in_place(Fit(rotation, scale, gap, length * scale, course), beam, known)
 
 
 def same_value(one: Any, other: Any) -> bool:
@@ -186,21 +202,23 @@ def same_value(one: Any, other: Any) -> bool:
     return bool(np.array_equal(one, other)) if isinstance(one, np.ndarray) else bool(one == other)
 
 
-def _in_place(fitted: Fit, beam: Beam) -> Fit:
+def _in_place(fitted: Fit, beam: Beam, known: Fit | None) -> Fit:
     """Return a fit over a parameter in which complex steps move neither the shape's breaks nor the section's stations.
 
     A grid has its edges there (`cfmkit.beams.discretise`). A station keeps its fraction of the arc length: where the
     arc length changes along the shape's own parameter t, it moves there by dt = -d(arc) / (d(arc)/dt).
     """
+    if not np.iscomplexobj(fitted.length):
+        return fitted
     breaks = np.real(fitted.course.breaks)
     if np.iscomplexobj(fitted.course.breaks):
         fitted = replace(fitted, course=fitted.course.over(breaks, fitted.course.breaks))
     stations = beam.section.stations[1:-1]
-    if fitted.course.uniform or not len(stations) or not np.iscomplexobj(fitted.length):
+    if fitted.course.uniform or not len(stations):
         return fitted
     marks, steps = breaks, np.zeros(len(breaks))
     for station in stations.tolist():
-        t = fitted.parameter(station)
+        t = (known or fitted).parameter(station)
         step = float(-np.imag(fitted.arc(t)) * np.real(fitted.length) / np.real(fitted.speed(t, t)))
         k = int(np.searchsorted(marks, t - SAME))
         if marks[k] > t + SAME:

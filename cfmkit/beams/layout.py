@@ -115,7 +115,7 @@ class Layout:
         if own is not None:
             return own
         (xa, ya), (xb, yb) = self._ends(name)
-        return fit(beam, (xb - xa, yb - ya))
+        return fit(beam, (xb - xa, yb - ya), None if known is None else known.fits[name])
 
     def _ends(self, name: str) -> Any:
         return self.beam_end_at(name, 0), self.beam_end_at(name, 1)
