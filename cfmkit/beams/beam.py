@@ -205,21 +205,23 @@ def same_value(one: Any, other: Any) -> bool:
 def _in_place(fitted: Fit, beam: Beam, known: Fit | None) -> Fit:
     """Return a fit over a parameter in which complex steps move neither the shape's breaks nor the section's stations.
 
-    A grid has its edges there (`cfmkit.beams.discretise`). A station keeps its fraction of the arc length: where the
-    arc length changes along the shape's own parameter t, it moves there by dt = -d(arc) / (d(arc)/dt).
+    A grid has its edges there (`cfmkit.beams.discretise`). A station keeps its fraction u of the arc length: where the
+    arc length changes along the shape's own parameter t, or u does, it moves there by dt = (du - d(arc)) / (d(arc)/dt).
     """
-    if not np.iscomplexobj(fitted.length):
+    thickness = beam.section.thickness
+    if not (np.iscomplexobj(fitted.length) or (isinstance(thickness, Taper) and np.iscomplexobj(thickness.stations))):
         return fitted
     breaks = np.real(fitted.course.breaks)
     if np.iscomplexobj(fitted.course.breaks):
         fitted = replace(fitted, course=fitted.course.over(breaks, fitted.course.breaks))
     stations = beam.section.stations[1:-1]
-    if fitted.course.uniform or not len(stations):
+    if not len(stations) or (fitted.course.uniform and not np.iscomplexobj(thickness.stations)):  # type: ignore[union-attr]
         return fitted
     marks, steps = breaks, np.zeros(len(breaks))
     for station in stations.tolist():
         t = (known or fitted).parameter(station)
-        step = float(-np.imag(fitted.arc(t)) * np.real(fitted.length) / np.real(fitted.speed(t, t)))
+        ahead = _station_step(beam, station) - np.imag(fitted.arc(t))
+        step = float(ahead * np.real(fitted.length) / np.real(fitted.speed(t, t)))
         k = int(np.searchsorted(marks, t - SAME))
         if marks[k] > t + SAME:
             marks, steps = np.insert(marks, k, t), np.insert(steps, k, step)
@@ -227,7 +229,7 @@ def _in_place(fitted: Fit, beam: Beam, known: Fit | None) -> Fit:
             steps[k] = step
         elif _has_step(beam.section, station) and abs(step) > _SLIGHT * _change(fitted.course):
             raise InputError(
-                f"a corner of the beam {beam.start}-{beam.end} moves along it, past a step of its thickness: "
+                f"a corner of the beam {beam.start}-{beam.end} and a step of its thickness move past each other: "
                 "no derivative there"
             )
     return replace(fitted, course=fitted.course.over(marks, marks + 1j * steps))
@@ -245,7 +247,19 @@ def _has_corner(course: Course, t: float) -> bool:
 def _has_step(section: Section, station: float) -> bool:
     """Tell whether the thickness jumps at a station."""
     given = section.thickness
-    return isinstance(given, Taper) and bool(np.ptp(given.values[given.stations == station].real) > 0)
+    return isinstance(given, Taper) and bool(np.ptp(given.values[given.stations.real == station].real) > 0)
+
+
+def _station_step(beam: Beam, station: float) -> float:
+    """Return the imaginary step of a station of a taper."""
+    given: Any = beam.section.thickness
+    steps = np.imag(given.stations[np.real(given.stations) == station])
+    if np.ptp(steps) > 0:
+        raise InputError(
+            f"both stations of a step in the thickness of the beam {beam.start}-{beam.end} must move alike: "
+            "no derivative there"
+        )
+    return float(steps[0])
 
 
 def _change(course: Course) -> float:

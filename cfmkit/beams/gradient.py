@@ -156,7 +156,8 @@ def gradient(path: Path, build: Callable[[Any], Network], variables: Any, points
     Raises
     ------
     cfmkit.errors.InputError
-        If a variable changes how the network is made up, or the tangent is singular at a point.
+        If a variable changes how the network is made up, moves a corner of a beam and a step of its thickness past
+        each other, or moves one side of a step only; or the tangent is singular at a point.
     """
     from cfmkit.beams.kernels import entry
     from cfmkit.beams.tilt import Tilts

@@ -36,20 +36,20 @@ class Taper:
 
     def __post_init__(self) -> None:
         """Freeze and check the arrays."""
-        object.__setattr__(self, "stations", read_only(self.stations))
-        values = np.asarray(self.values)
-        object.__setattr__(self, "values", read_only(values, values.dtype if values.dtype.kind == "c" else float))
+        for name in ("stations", "values"):
+            given = np.asarray(getattr(self, name))
+            object.__setattr__(self, name, read_only(given, given.dtype if given.dtype.kind == "c" else float))
         s = self.stations
         if s.ndim != 1 or s.shape != self.values.shape or len(s) < 2:
             raise InputError("a taper needs as many values as stations, at least two of each")
-        if s[0] != 0 or s[-1] != 1 or (np.diff(s) < 0).any():
+        if s[0] != 0 or s[-1] != 1 or (np.diff(s.real) < 0).any():
             raise InputError("the stations of a taper must go from 0 to 1 and never back")
         if not (self.values.real > 0).all():
             raise InputError("every thickness of a taper must be positive")
 
     def at(self, place: Any, inside: float) -> Any:
         """Return the thickness at places of the linear piece that holds the place `inside`."""
-        i = int(np.clip(np.searchsorted(self.stations, inside, side="right") - 1, 0, len(self.stations) - 2))
+        i = int(np.clip(np.searchsorted(self.stations.real, inside, side="right") - 1, 0, len(self.stations) - 2))
         left, right = self.stations[i], self.stations[i + 1]
         share = (place - left) / (right - left)
         return self.values[i] * (1 - share) + self.values[i + 1] * share
@@ -96,7 +96,7 @@ class Section:
     def stations(self) -> FloatArray:
         """Places where the thickness has a kink or a step, ends included (fractions of the arc length)."""
         if isinstance(self.thickness, Taper):
-            return read_only(np.unique(self.thickness.stations))
+            return read_only(np.unique(self.thickness.stations.real))
         return read_only([0.0, 1.0])
 
     def thickness_at(self, place: Any, inside: float) -> Any:

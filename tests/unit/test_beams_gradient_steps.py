@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 FINE = Control(tolerance=1e-11)
 DOWN = Displacement("d", -np.pi / 2, np.array([3e-3]))
-STATIONS = np.array([0, 0.3, 0.3, 0.8, 1])
+STATIONS = np.array([0, 0.3, 0.3, 0.75, 1])
 THICKNESS = {
     "constant": 1e-3,
     "steps": Taper(STATIONS, np.array([1.2, 1.1, 0.8, 0.9, 1.0]) * 1e-3),
@@ -69,11 +69,15 @@ SHAPES: dict[str, Callable[[Any], Any]] = {
 
 
 def one_beam(shape: Callable[[Any], Any], thickness: Any, closure: Any = "rotscale") -> Callable[[Any], Network]:
-    """A beam by size of the shape, place of its end, thickness."""
+    """A beam by factors: on the size of its shape, the place of its end, its thickness, its first station."""
 
     def build(x: Any) -> Network:
         given = thickness
-        given = Taper(given.stations, given.values * x[2]) if isinstance(given, Taper) else given * x[2]
+        if isinstance(given, Taper):
+            stations = given.stations * np.where(given.stations == given.stations[1], x[3], 1)
+            given = Taper(stations, given.values * x[2])
+        else:
+            given = given * x[2]
         nodes = {"a": Node(0, 0, CLAMPED), "d": Node(0.1 * x[1], 0.02, guided(np.pi / 2))}
         return Network(nodes, {"ad": Beam("a", "d", Section(2e9, 8e-3, given, shear=True), shape(x[0]), closure)})
 
@@ -91,7 +95,7 @@ def difference(output: Callable[[Any], Any], x: Any, which: int, step: float = 1
 @pytest.mark.parametrize("closure", ["rotscale", "raw"])
 def test_derivatives_of_tables_are_those_of_tables_on_grids_that_move(shape: str, thickness: str, closure: Any) -> None:
     """A complex step leaves the grid where it is: angles, lengths and compliances of all stages of steps count."""
-    build, x = one_beam(SHAPES[shape], THICKNESS[thickness], closure), np.array([1.0, 1.05, 1.0])
+    build, x = one_beam(SHAPES[shape], THICKNESS[thickness], closure), np.array([1.0, 1.05, 1.0, 1.0])
     known = Layout(build(x), DOWN)
     cut = grid(known, Mesh())
 
@@ -113,7 +117,7 @@ def test_derivatives_of_tables_are_those_of_tables_on_grids_that_move(shape: str
 
 @pytest.mark.parametrize("shape", SHAPES)
 def test_derivatives_of_a_stepped_beam_are_those_of_differences(shape: str) -> None:
-    build, x = one_beam(SHAPES[shape], THICKNESS["steps"]), np.ones(3)
+    build, x = one_beam(SHAPES[shape], THICKNESS["steps"]), np.ones(4)
     found = gradient(trace(build(x), DOWN, FINE), build, x)
     asked = {
         "effort": (found.effort[0], lambda p: p.effort[-1]),
@@ -129,7 +133,7 @@ def test_derivatives_of_a_stepped_beam_are_those_of_differences(shape: str) -> N
         return np.concatenate([np.ravel(output(path)) for _, output in asked.values()])
 
     sizes = np.cumsum([slopes[..., 0].size for slopes, _ in asked.values()])
-    for which in range(2):
+    for which in (0, 1, 3):
         wanted = np.split(difference(outputs, x, which), sizes[:-1])
         for (name, (slopes, _)), want in zip(asked.items(), wanted, strict=True):
             off = np.abs(slopes[..., which].ravel() - want).max()
@@ -138,7 +142,7 @@ def test_derivatives_of_a_stepped_beam_are_those_of_differences(shape: str) -> N
 
 def knot_of_the_curve() -> float:
     """The fraction of the arc length at the first inner knot of a spline."""
-    fitted = Layout(one_beam(curve, 1e-3)(np.ones(3)), DOWN).fits["ad"]
+    fitted = Layout(one_beam(curve, 1e-3)(np.ones(4)), DOWN).fits["ad"]
     return float(fitted.arc(fitted.course.breaks[1]))
 
 
@@ -154,7 +158,7 @@ def test_a_station_may_lie_where_smooth_pieces_of_the_shape_meet(shape: Any, sta
     """A step of the thickness at a knot of a spline, or its kink at either: each moves as it does alone."""
     u = station()
     build = one_beam(shape, Taper(np.array([0, u, u, 1]), np.array([1.0, 1.2, after, 1.0]) * 1e-3))
-    x = np.ones(3)
+    x = np.ones(4)
     found = gradient(trace(build(x), DOWN, FINE), build, x).effort[0]
     for which in range(3):
         want = difference(lambda values: trace(build(values), DOWN, FINE).effort[-1], x, which)
@@ -166,12 +170,23 @@ def test_a_corner_that_moves_past_a_step_is_refused_and_one_that_stays_with_it_i
         def shape(r: Any) -> Polyline:
             return Polyline(np.array([[0, 0], [0.05, 0.01], [0.1, 0]]) + np.array([[0, 0], way, [0, 0]]) * (r - 1))
 
-        return one_beam(shape, Taper(np.array([0, 0.5, 0.5, 1]), np.array([1, 1, 0.8, 0.8]) * 1e-3)), np.ones(3)
+        build = one_beam(shape, Taper(np.array([0, 0.5, 0.5, 1]), np.array([1, 1, 0.8, 0.8]) * 1e-3))
+        return lambda x: build([x[0], 1.0, 1.0, 1.0]), np.ones(1)
 
     build, x = built([0.01, 0.0])
-    with pytest.raises(InputError, match="past a step"):
+    with pytest.raises(InputError, match="past each other"):
         gradient(trace(build(x), DOWN), build, x)
     build, x = built([0.0, 0.01])
     found = gradient(trace(build(x), DOWN, FINE), build, x).effort[0, 0]
     want = difference(lambda values: trace(build(values), DOWN, FINE).effort[-1], x, 0)
     assert found == pytest.approx(want, rel=1e-6)
+
+
+def test_a_step_of_the_thickness_is_moved_as_a_whole() -> None:
+    def build(x: Any) -> Network:
+        steps = Taper(np.array([0, 0.5, x[0], 1]), np.array([1, 1, 0.8, 0.8]) * 1e-3)
+        return one_beam(corner, steps)(np.ones(4))
+
+    x = np.array([0.5])
+    with pytest.raises(InputError, match="must move alike"):
+        gradient(trace(build(x), DOWN), build, x)
