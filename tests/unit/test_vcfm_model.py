@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 from vcfm_support import CONFIGS, MM, analyzed, leaf, table_i
@@ -196,7 +198,9 @@ def test_an_exact_run_that_cannot_be_followed_is_partial_and_says_how_far_it_cam
 def test_a_spring_that_cannot_be_followed_is_named_with_its_own_compression():
     found = analyzed("analysis.fidelity=exact", preloads="[0 mm, 120 mm]")
     assert found.status is Status.PARTIAL
-    assert found.message.startswith("the spring was followed to 112.6 mm only: ")
+    told = re.match(r"the spring was followed to ([\d.]+) mm only: ", found.message)
+    assert told is not None, found.message
+    assert 105 < float(told[1]) < 120  # nearly taut: twice the travel of its middle node
     assert len(found.curves) == 1
 
 
