@@ -58,7 +58,7 @@ def asked(path: Path) -> Asked:
 
 
 def trace_many(
-    networks: Iterable[Network],
+    networks: Iterable[Network | Callable[[], Network]],
     drive: Drive,
     control: Control | None = None,
     collect: Callable[[Path], Any] = asked,
@@ -68,8 +68,10 @@ def trace_many(
 
     Parameters
     ----------
-    networks : iterable of Network
-        Taken one by one, or as they are needed by several processes: however many there are, few are kept.
+    networks : iterable of Network, or of functions that return one
+        Taken one by one, or as they are needed by several processes: however many there are, few are kept. Functions
+        (a `functools.partial` of what builds the network, importable for several workers) are called where the network
+        is traced, which leaves less to do for the process that gives out the work.
     drive : Displacement, Rotation or Loading
         What is done to each.
     control : Control, optional
@@ -93,20 +95,22 @@ def trace_many(
             yield from waiting.popleft().result()
 
 
-def _chunks(networks: Iterable[Network]) -> Iterator[list[Network]]:
+def _chunks(networks: Iterable[Network | Callable[[], Network]]) -> Iterator[list[Network | Callable[[], Network]]]:
     """Yield the networks in lists of at most `_CHUNK`."""
     source = iter(networks)
     while chunk := list(islice(source, _CHUNK)):
         yield chunk
 
 
-def _outcomes(networks: list[Network], one: Callable[[Network], Outcome]) -> list[Outcome]:
+def _outcomes(networks: list[Any], one: Callable[[Any], Outcome]) -> list[Outcome]:
     return [one(network) for network in networks]
 
 
-def _outcome(network: Network, drive: Drive, control: Control | None, collect: Callable[[Path], Any]) -> Outcome:
+def _outcome(
+    network: Network | Callable[[], Network], drive: Drive, control: Control | None, collect: Callable[[Path], Any]
+) -> Outcome:
     try:
-        path = trace(network, drive, control)
+        path = trace(network() if callable(network) else network, drive, control)
     except CfmError as error:
         return Outcome("INVALID", str(error), None)
     return Outcome(path.status.name, path.message, collect(path))

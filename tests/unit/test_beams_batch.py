@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,6 +20,11 @@ DRIVE = Displacement("d", -np.pi / 2, np.array([1e-3, 2e-3]))
 def bent(sweep: float, height: float = 0.03) -> Network:
     nodes = {"a": Node(0, 0, CLAMPED), "d": Node(0.05, height, guided(np.pi / 2))}
     return Network(nodes, {"x": Beam("a", "d", Section(2e9, 1e-2, 1e-3), arc(sweep))})
+
+
+def standing(height: float) -> Network:
+    nodes = {"a": Node(0, 0, CLAMPED), "d": Node(0.05, height, guided(np.pi / 2))}
+    return Network(nodes, {"x": Beam("a", "d", Section(2e9, 1e-2, height / 30))})
 
 
 def test_a_batch_gives_each_network_its_own_curve_in_order() -> None:
@@ -43,6 +49,16 @@ def test_two_processes_give_the_same_as_one() -> None:
     one, two = (list(trace_many(networks, DRIVE, workers=w)) for w in (1, 2))
     for a, b in zip(one, two, strict=True):
         np.testing.assert_array_equal(a.value.effort, b.value.effort)
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_functions_are_called_for_networks_where_they_are_traced(workers: int) -> None:
+    heights = [0.03, 0.0, 0.02]  # the second one cannot be built
+    found = list(trace_many([partial(standing, h) for h in heights], DRIVE, workers=workers))
+    assert [outcome.status for outcome in found] == ["COMPLETE", "INVALID", "COMPLETE"]
+    assert "thickness must be positive" in found[1].message
+    path = trace(standing(0.03), DRIVE)
+    np.testing.assert_array_equal(found[0].value.effort, path.effort[path.at_asked])
 
 
 @pytest.mark.parametrize(("workers", "most"), [(1, 1), (2, 9 * 32)])
