@@ -41,7 +41,7 @@ def _doors(stamp: str) -> tuple[Any, ...]:
         if task == SOLVE:
             return _solve(m, n_free, a[0], d, b, one, (options[0], options[1]), c, scratch)
         if task == MARCH:
-            return _follow(m, n_free, f, one, c, b, options, a, d, e, scratch)
+            return _follow(m, n_free, f, one, c, b, options, (a, d, e), scratch)
         if task == EACH:
             _each(m, n_free, a, d, (options[0], options[1]), b, scratch)
         elif task == TANGENT:

@@ -77,7 +77,8 @@ def _border(natural, tangent, weight, n_free, border):
 
 
 @kernel
-def _store(k, y, state, row, out_y, out_drive, out_info):
+def _store(k, y, state, row, outs):
+    out_y, out_drive, out_info = outs
     copy(out_y[k], y)
     out_drive[k] = state[0]
     out_info[k, 0], out_info[k, 1], out_info[k, 2] = state[1], row[0], row[1]
@@ -129,15 +130,42 @@ def _forward(border, tangent):
     return along > 0.0
 
 
+@kernel
+def _store_start(y, state, tangent, sense, row, outs):
+    """Store the equilibrium that a path starts from, and give its tangent a sense; row: see `_store`."""
+    n = tangent.shape[0] - 1
+    row[0], row[1], row[3] = -1.0, 0.0, tangent[n]
+    _store(0, y, state, row, outs)
+    for i in range(n + 1):
+        tangent[i] *= sense
+
+
+@kernel
+def _longer(moved, missed, turn, count, landing):
+    """Tell whether the next step may be longer."""
+    well = missed < 0.1 * moved + (1e-9 if landing else 0.0)
+    return well and (landing or (count > 2 and moved < 0.5 * turn))
+
+
+@kernel
+def _passed(state, index, count, natural, watched):
+    """Tell whether a step has gone past more than one loss of stability, or into loads that its segments do not bear.
+
+    Behind one bifurcation the next ones are near: the first one is to be met first, by shorter steps.
+    """
+    lost = state[1] - index if watched and natural else 0.0
+    unborne = state[2] < SHORT and (lost > 0.0 or (natural and count == 1))
+    return lost > 1.0 or state[1] < min(index, 0.0) or unborne
+
+
 @maker
-def march(m, n_free, y, drive, tangent, targets, options, out_y, out_drive, out_info, scratch):
+def march(m, n_free, y, drive, tangent, targets, options, outs, scratch):
     """Follow the path from (y, drive) through the targets.
 
     options: tolerance, iterations, natural (1) or arc length (0), first, smallest and largest step, largest change of
     a pose in a step, weight of forces in the arc length, lowest and highest drive, whether to stop where the
-    inertia changes, inertia at the start, sense. A sense of 1 or -1 says that the start is near an equilibrium: it is
-    solved for and stored first, with the tangent in that sense; 0: it is one. Returns why the march ended and the
-    number of points stored.
+    inertia changes, inertia at the start, sense. A sense of 1 or -1 says that the start is only near an equilibrium,
+    which is solved for and stored first. Returns why the march ended and the number of points stored.
     """
     natural, step, smallest, greatest, turn = options[2] > 0.5, options[3], options[4], options[5], options[6]
     n, size = tangent.shape[0] - 1, y.shape[0]
@@ -148,17 +176,14 @@ def march(m, n_free, y, drive, tangent, targets, options, out_y, out_drive, out_
     t, stored, asked, index = (drive if natural else 0.0), 0, 0, options[11]
     if options[12] != 0.0:
         state[0] = drive
-        code, iterations = solve(m, n_free, y, state, unit, drive, (options[0], options[1]), tangent, scratch)
+        code, row[2] = solve(m, n_free, y, state, unit, drive, (options[0], options[1]), tangent, scratch)
         if code != SOLVED:
             return NO_START, 0
-        row[0], row[1], row[2], row[3] = -1.0, 0.0, float(iterations), tangent[n]
-        _store(0, y, state, row, out_y, out_drive, out_info)
+        _store_start(y, state, tangent, 1.0 if natural else options[12], row, outs)
         stored, index = 1, state[1]
-        for i in range(n + 1):
-            tangent[i] *= 1.0 if natural else options[12]
     count = _remember(times, past, 0, t, y, drive)
     while asked < targets.shape[0]:
-        if stored + targets.shape[0] - asked + 1 >= out_y.shape[0]:
+        if stored + targets.shape[0] - asked + 1 >= outs[0].shape[0]:
             return FULL, stored
         old = past[0]
         _border(natural, tangent, options[7], n_free, border)
@@ -167,10 +192,7 @@ def march(m, n_free, y, drive, tangent, targets, options, out_y, out_drive, out_
         code, iterations = solve(m, n_free, new, state, border, goal, (options[0], options[1]), new_tangent, scratch)
         moved, missed = _changes(new, old, n_free, n), _changes(new, guess, n_free, n)
         near = moved <= turn and (count == 1 or missed <= 0.4 * moved + 1e-7)
-        lost = state[1] - index if options[10] > 0.5 and natural else 0.0
-        # past one bifurcation the next ones are near, and loads that no segment bears: first the first one
-        unborne = state[2] < SHORT and (lost > 0.0 or (natural and count == 1))
-        passed = (lost > 1.0 or state[1] < min(index, 0.0) or unborne) and abs(ahead) > 4.0 * smallest
+        passed = _passed(state, index, count, natural, options[10] > 0.5) and abs(ahead) > 4.0 * smallest
         if code != SOLVED or passed or not near or not (natural or _forward(border, new_tangent)):
             step = 0.5 * ahead if natural else 0.5 * step
             if abs(step) < smallest:
@@ -181,17 +203,13 @@ def march(m, n_free, y, drive, tangent, targets, options, out_y, out_drive, out_
         if state[2] < SHORT:
             return LONG, stored
         if not natural:
-            outs = (out_y, out_drive, out_info)
             asked, stored = _between(m, n_free, old, new, state, targets, asked, stored, options, outs, unit, scratch)
             if asked >= targets.shape[0]:
                 return DONE, stored
-        row[0], row[1], row[2], row[3] = -1.0, t + ahead, float(iterations), new_tangent[n]
-        if landing:
-            row[0] = float(asked)
-            asked += 1
-        _store(stored, new, state, row, out_y, out_drive, out_info)
-        stored += 1
         t += ahead
+        row[0], row[1], row[2], row[3] = (float(asked) if landing else -1.0), t, float(iterations), new_tangent[n]
+        _store(stored, new, state, row, outs)
+        stored, asked = stored + 1, asked + (1 if landing else 0)
         count = _remember(times, past, count, t, new, state[0])
         copy(tangent, new_tangent)
         if options[10] > 0.5 and state[1] != index:
@@ -199,7 +217,7 @@ def march(m, n_free, y, drive, tangent, targets, options, out_y, out_drive, out_
         index = state[1]
         if state[0] < options[8] or state[0] > options[9]:
             return OUTSIDE, stored
-        if missed < 0.1 * moved + (1e-9 if landing else 0.0) and (landing or (count > 2 and moved < 0.5 * turn)):
+        if _longer(moved, missed, turn, count, landing):
             step = np.sign(step) * min(greatest, 1.6 * abs(step))
     return DONE, stored
 
@@ -232,7 +250,7 @@ def _between(m, n_free, old, new, state, targets, asked, stored, options, outs, 
         n = unit.shape[0] - 1
         if code == SOLVED and _changes(y, new, n_free, n) <= 1.5 * _changes(new, old, n_free, n) + 1e-7:
             row[0], row[1], row[2], row[3] = float(k), -1.0, float(iterations), (1.0 if rising else -1.0)
-            _store(stored, y, s, row, outs[0], outs[1], outs[2])
+            _store(stored, y, s, row, outs)
             stored += 1
             if k == n_all - 1:
                 return n_all, stored
