@@ -126,14 +126,23 @@ class Solver:
         return assemble_model(self.layout, self.cut, self.table, ramp=True)
 
     def solve(
-        self, y: FloatArray, drive: float, border: FloatArray | None = None, target: float | None = None
+        self,
+        y: FloatArray,
+        drive: float,
+        border: FloatArray | None = None,
+        target: float | None = None,
+        model: Model | None = None,
     ) -> Spot | None:
-        """Return the equilibrium near (y, drive) where border . (z, drive) = target; at this drive by default."""
+        """Return the equilibrium near (y, drive) where border . (z, drive) = target; at this drive by default.
+
+        `model`: other values than the network's own.
+        """
+        m = self.model if model is None else model
         new, state, tangent = y.copy(), np.zeros(5), np.zeros(self.n + 1)
         state[0] = drive
         border = self.unit if border is None else border
         goal = drive if target is None else target
-        code, _ = entry.solve(self.model, self.n_free, new, state, border, goal, self.limits, tangent, self.scratch)
+        code, _ = entry.solve(m, self.n_free, new, state, border, goal, self.limits, tangent, self.scratch)
         if code != SOLVED:
             return None
         return Spot(new, float(state[0]), tangent, int(state[1]), float(state[2]), float(state[3]))
@@ -194,7 +203,7 @@ class Solver:
         share, step = 0.0, 1.0
         while share < 1.0:
             ahead = min(1.0, share + step)
-            near = self._near(model._replace(spring_value=slack + ahead * (taut - slack)), spot.y)
+            near = self.solve(spot.y, 0.0, model=model._replace(spring_value=slack + ahead * (taut - slack)))
             if near is None or self.pose_change(near.y, spot.y) > _LARGEST_CHANGE:
                 step *= 0.5
                 if step < _SMALLEST_SHARE:
@@ -202,12 +211,6 @@ class Solver:
                 continue
             share, spot = ahead, near
         return spot
-
-    def _near(self, model: Model, y: FloatArray) -> Spot | None:
-        """Return the equilibrium of a model at drive zero."""
-        new, state, tangent = y.copy(), np.zeros(5), np.zeros(self.n + 1)
-        code, _ = entry.solve(model, self.n_free, new, state, self.unit, 0.0, self.limits, tangent, self.scratch)
-        return Spot(new, 0.0, tangent, int(state[1]), float(state[2]), float(state[3])) if code == SOLVED else None
 
     def pose_change(self, one: FloatArray, other: FloatArray) -> float:
         """Return the largest difference of positions (in mean beam lengths) and rotations of two states."""
