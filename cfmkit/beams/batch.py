@@ -10,6 +10,8 @@ from itertools import islice
 from multiprocessing import get_context
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from cfmkit.beams.tracing import trace
 from cfmkit.errors import CfmError
 
@@ -22,7 +24,7 @@ if TYPE_CHECKING:
     from cfmkit.beams.path import Path
     from cfmkit.curves import FloatArray
 
-_CHUNK, _AHEAD = 32, 4  # networks sent at once; chunks for each process that are on their way
+_CHUNK, _AHEAD = 64, 2  # networks sent at once; chunks for each process that are on their way
 
 
 @dataclass(frozen=True)
@@ -86,13 +88,13 @@ def trace_many(
         yield from map(one, networks)
         return
     with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
-        waiting: deque[Future[list[Outcome]]] = deque()
+        waiting: deque[Future[_Packed]] = deque()
         for chunk in _chunks(networks):
             waiting.append(pool.submit(_outcomes, chunk, one))
             if len(waiting) > _AHEAD * workers:
-                yield from waiting.popleft().result()
+                yield from waiting.popleft().result().outcomes()
         while waiting:
-            yield from waiting.popleft().result()
+            yield from waiting.popleft().result().outcomes()
 
 
 def _chunks(networks: Iterable[Network | Callable[[], Network]]) -> Iterator[list[Network | Callable[[], Network]]]:
@@ -102,8 +104,34 @@ def _chunks(networks: Iterable[Network | Callable[[], Network]]) -> Iterator[lis
         yield chunk
 
 
-def _outcomes(networks: list[Any], one: Callable[[Any], Outcome]) -> list[Outcome]:
-    return [one(network) for network in networks]
+@dataclass(frozen=True)
+class _Packed:
+    """Outcomes on their way from a process: `Asked` as rows of three arrays for all, which are quicker to send."""
+
+    said: list[tuple[str, str]]
+    values: list[Any]
+    arrays: tuple[FloatArray, FloatArray, Any] | None
+
+    def outcomes(self) -> Iterator[Outcome]:
+        """Yield the outcomes."""
+        end = 0
+        for (status, message), value in zip(self.said, self.values, strict=True):
+            if self.arrays is not None and value is not None:
+                begin, end = end, end + value
+                value = Asked(*(array[begin:end] for array in self.arrays))
+            yield Outcome(status, message, value)
+
+
+def _outcomes(networks: list[Any], one: Callable[[Any], Outcome]) -> _Packed:
+    found = [one(network) for network in networks]
+    said, values = [(each.status, each.message) for each in found], [each.value for each in found]
+    rows = [value for value in values if value is not None]
+    if not rows or not all(type(row) is Asked for row in rows):
+        return _Packed(said, values, None)
+    all_rows = zip(*((row.drive, row.effort, row.stable) for row in rows), strict=True)
+    drive, effort, stable = (np.concatenate(same) for same in all_rows)
+    lengths = [None if value is None else len(value.drive) for value in values]
+    return _Packed(said, lengths, (drive, effort, stable))
 
 
 def _outcome(

@@ -8,7 +8,20 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from cfmkit.beams import CLAMPED, Beam, Control, Displacement, Network, Node, PathStatus, Section, arc, guided, trace
+from cfmkit.beams import (
+    CLAMPED,
+    Beam,
+    Control,
+    Displacement,
+    Network,
+    Node,
+    Path,
+    PathStatus,
+    Section,
+    arc,
+    guided,
+    trace,
+)
 from cfmkit.beams.batch import trace_many
 
 if TYPE_CHECKING:
@@ -61,7 +74,20 @@ def test_functions_are_called_for_networks_where_they_are_traced(workers: int) -
     np.testing.assert_array_equal(found[0].value.effort, path.effort[path.at_asked])
 
 
-@pytest.mark.parametrize(("workers", "most"), [(1, 1), (2, 9 * 32)])
+def last_effort(path: Path) -> float:
+    return float(path.effort[-1])
+
+
+def test_what_a_function_collects_comes_from_processes_as_it_is() -> None:
+    found = list(trace_many([bent(0.3), bent(2 * np.pi), bent(0.5)], DRIVE, collect=last_effort, workers=2))
+    assert [outcome.value for outcome in found] == [
+        last_effort(trace(bent(0.3), DRIVE)),
+        None,
+        last_effort(trace(bent(0.5), DRIVE)),
+    ]
+
+
+@pytest.mark.parametrize(("workers", "most"), [(1, 1), (2, 5 * 64)])
 def test_networks_are_taken_as_they_are_needed(workers: int, most: int) -> None:
     """Endlessly many networks do not fill the memory."""
     taken = 0
