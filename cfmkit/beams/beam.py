@@ -37,6 +37,9 @@ GAUSS = (
 """Places and weights of the quadrature over a whole smooth beam, parameter from 0 to 1."""
 
 
+_JOINTS = ("rigid", "pin")
+
+
 @dataclass(frozen=True)
 class Beam:
     """A beam from node `start` to node `end`.
@@ -71,9 +74,9 @@ class Beam:
         """Check the choices."""
         if self.closure not in ("rotscale", "raw"):
             raise InputError(f"closure must be 'rotscale' or 'raw', got {self.closure!r}")
-        for joint in (self.start_joint, self.end_joint):
-            if joint not in ("rigid", "pin"):
-                raise InputError(f"a joint is 'rigid' or 'pin', got {joint!r}")
+        if self.start_joint not in _JOINTS or self.end_joint not in _JOINTS:
+            wrong = self.end_joint if self.start_joint in _JOINTS else self.start_joint
+            raise InputError(f"a joint is 'rigid' or 'pin', got {wrong!r}")
         if self.start == self.end:
             raise InputError(f"a beam needs two different nodes, got {self.start!r} twice")
 

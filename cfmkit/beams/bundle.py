@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from cfmkit.beams.beam import Beam
     from cfmkit.beams.network import Network
     from cfmkit.beams.section import Section
+    from cfmkit.curves import FloatArray
 
 
 class Bundle:
@@ -40,6 +41,7 @@ class Bundle:
         self.names, self.beams = list(network.beams), list(network.beams.values())
         plain = [k for k, beam in enumerate(self.beams) if is_plain(beam)]
         self.plain = plain
+        self._compliances: Any = None
         self.others = [] if len(plain) == len(self.beams) else [k for k in range(len(self.beams)) if k not in plain]
         if plain:
             self._fit_plain(ends, beam_end if not self.others else beam_end[plain])
@@ -50,16 +52,17 @@ class Bundle:
         given = [shape.coefficients or (0.0,) for shape in shapes]
         most = max(map(len, given))
         c = np.array([(*own, *(0.0,) * (most - len(own))) for own in given]) + 0.0
-        reach = ends[beam_end[:, 1]] - ends[beam_end[:, 0]]
-        dx, dy = reach[:, 0], reach[:, 1]
-        distance = (dx * dx + dy * dy) ** 0.5
+        both = ends[beam_end]
+        reach = both[:, 1] - both[:, 0]
+        dx, dy = reach.T
+        distance = np.sqrt(dx * dx + dy * dy)
         if most == 1:
             cx, cy = np.cos(c[:, 0]), np.sin(c[:, 0])
             own = np.ones(len(beams))
         else:
             angle = c @ powers(most)
             cx, cy = np.cos(angle) @ GAUSS[1], np.sin(angle) @ GAUSS[1]
-            own = (cx * cx + cy * cy) ** 0.5
+            own = np.sqrt(cx * cx + cy * cy)
         self._check(distance, own)
         nominal = [shape.length for shape in shapes]
         first = distance
@@ -73,8 +76,9 @@ class Bundle:
             rotation, self.scale = np.where(raw, 0.0, rotation), np.where(raw, 1.0, self.scale)
             self.length = np.where(raw, first, self.length)
         self.rotation = rotation
-        self.coefficients = np.concatenate([c[:, :1] + rotation[:, None], c[:, 1:]], axis=1)
-        self._set_rigidities([beam.section for beam in beams])
+        self.coefficients = c if c.dtype == rotation.dtype else c + 0j
+        self.coefficients[:, 0] += rotation
+        self._set_rigidities()
 
     @property
     def gap(self) -> Any:
@@ -82,17 +86,20 @@ class Bundle:
         first, cx, cy = self.drawn
         return np.hypot(np.real(self.reach[:, 0] - first * cx), np.real(self.reach[:, 1] - first * cy))
 
-    def _set_rigidities(self, sections: list[Section]) -> None:
+    def _set_rigidities(self) -> None:
         """Set bending rigidities and the compliances of stretching and shearing, as `Section.rigidities` has them."""
+        sections = [self.beams[k].section for k in self.plain]
+        known = {id(section): _rigidities(section) for section in sections}
+        self.bending, self.stretch, self.slip = np.array([known[id(section)] for section in sections]).T
+
+    @property
+    def sections(self) -> Any:
+        """Young's modulus, width, thickness, axial, shear, Poisson's ratio and shear factor, (7, plain)."""
         values = [
             (s.youngs_modulus, s.width, s.thickness, s.axial, s.shear, s.poisson_ratio, s.shear_factor)
-            for s in sections
+            for s in (self.beams[k].section for k in self.plain)
         ]
-        self.sections = np.array(values).T
-        young, width, thickness, axial, shear, poisson, factor = self.sections
-        pull = young * width * thickness
-        self.bending = pull * thickness * thickness / 12
-        self.stretch, self.slip = axial / pull, shear * 2 * (1 + poisson) / (factor * pull)
+        return np.array(values).T
 
     def _check(self, distance: Any, own: Any) -> None:
         """Refuse beams without length, and shapes that return to their start."""
@@ -119,8 +126,7 @@ class Bundle:
 
     def sizes(self, fits: dict[str, Fit] | None) -> tuple[Any, Any]:
         """Return the lengths of all beams and the bending rigidities at their middles, real."""
-        none = np.empty(0)
-        lengths, middles = (np.real(self.length), np.real(self.bending)) if self.plain else (none, none)
+        lengths, middles = (self.length.real, self.bending.real) if self.plain else (np.empty(0), np.empty(0))
         if fits is None:
             return lengths, middles
         others = [self.beams[k] for k in self.others]
@@ -128,22 +134,32 @@ class Bundle:
         stiff = [float(np.real(beam.section.rigidities(np.array([0.5]), 0.5)[0][0])) for beam in others]
         return np.append(lengths, far), np.append(middles, stiff)
 
-    def table(self, powers: Any, units: Any) -> Any:
-        """Return the table of the plain beams at n places of the arc, (plain, n, 5), in units (5,).
+    def table(self, powers: Any, units: FloatArray) -> Any:
+        """Return the table of the plain beams at n places of the arc, (plain, n, 5), in units (4,) of all but angles.
 
         powers (m, n): of the places; see `cfmkit.beams.kernels.model.Model` for what the table holds.
         """
-        g = self.length
-        kind = np.result_type(self.coefficients, self.bending)
+        if self._compliances is None:
+            g = self.length
+            self._compliances = np.array([g, g / self.bending, g * self.stretch, g * self.slip]).T * units
+        kind = (self.coefficients if self.coefficients.dtype.kind == "c" else self._compliances).dtype
         out = np.empty((len(self.plain), powers.shape[1], 5), dtype=kind)
         np.matmul(self.coefficients, powers, out=out[:, :, 0])
-        out[:, :, 1:] = (np.array([g, g / self.bending, g * self.stretch, g * self.slip]).T * units[1:])[:, None]
+        out[:, :, 1:] = self._compliances[:, None]
         return out
 
 
 def is_plain(beam: Beam) -> bool:
     """Tell whether a beam has a polynomial angle and one thickness."""
     return isinstance(beam.shape, Polynomial) and not isinstance(beam.section.thickness, Taper)
+
+
+def _rigidities(s: Section) -> tuple[Any, Any, Any]:
+    """Return bending rigidity and the compliances of stretching and shearing of a section of one thickness."""
+    thickness: Any = s.thickness
+    pull = s.youngs_modulus * s.width * thickness
+    slip = 2 * (1 + s.poisson_ratio) / (s.shear_factor * pull) if s.shear else 0.0
+    return pull * thickness * thickness / 12, s.axial / pull, slip
 
 
 @lru_cache(maxsize=32)

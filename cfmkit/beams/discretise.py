@@ -29,7 +29,7 @@ class Mesh:
 
     def finer(self) -> Mesh:
         """Return the mesh with twice the steps."""
-        return replace(self, steps=2 * self.steps)
+        return Mesh(self.segments, 2 * self.steps)
 
     def shorter(self) -> Mesh:
         """Return the mesh with twice the segments."""
@@ -147,11 +147,10 @@ def table(layout: Layout, cut: Grid, known: Any = None) -> Any:
     `known` is the table of the layout that this one took fits over from: the rows of beams that are neither plain nor
     changed are taken over too.
     """
-    bundle, scales = layout.bundle, layout.scales
-    units = np.array([1.0, 1 / scales.length, scales.rigidity / scales.length, *[scales.force / scales.length] * 2])
+    bundle, units = layout.bundle, layout.units
     plain: Any = None
     if bundle.plain:
-        plain = bundle.table(cut.powers(bundle.coefficients.shape[1], bundle.plain[0]), units)
+        plain = bundle.table(cut.powers(bundle.coefficients.shape[1], bundle.plain[0]), units[1:])
         plain = plain.reshape(len(bundle.plain), -1, STAGES, TABLE_COLUMNS)
     if not bundle.others:
         return plain.reshape(-1, STAGES, TABLE_COLUMNS)
@@ -237,7 +236,7 @@ def assemble_model(layout: Layout, cut: Grid, values: Any, ramp: bool = False) -
 def _held(layout: Layout) -> tuple[Any, Any]:
     """Return the held values and those that the drive moves, dimensionless."""
     base, rate = layout.base, np.zeros(layout.dof_count)
-    if base.any():
+    if layout.held:
         base = base.copy()
         for first in layout.first.values():
             base[first : first + 2] /= layout.scales.length
@@ -250,6 +249,8 @@ def _held(layout: Layout) -> tuple[Any, Any]:
 def _loads(layout: Layout) -> Any:
     """Return the point loads, dimensionless: constant and per unit of the drive."""
     scales, rows = layout.scales, layout.load_values
+    if not rows:
+        return np.zeros((0, 2, 3))
     value: list[list[tuple[Any, ...]]] = [[(0.0, 0.0, 0.0), (0.0, 0.0, 0.0)] for _ in rows]
     for k, (when, (fx, fy, moment)) in enumerate(rows):
         unit = scales.drive if when == 1 else 1.0
@@ -269,6 +270,8 @@ def _line_loads(layout: Layout) -> Any:
 def _springs(layout: Layout) -> Any:
     """Return the springs' dimensionless values."""
     scales, rows = layout.scales, layout.spring_values
+    if not rows:
+        return np.zeros((0, 4))
     line, turn, length = scales.force / scales.length, scales.moment, scales.length
     units = {LINE: (line, length, 1.0, 1.0), TURN: (turn, 1.0, 1.0, 1.0), SLIDE: (line, 1.0, 1.0, length)}
     kinds = layout.plan.spring_kind.tolist()

@@ -7,6 +7,7 @@ from rest (zero, which need not be among them). `Control` says how the path is f
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import isfinite
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -108,7 +109,7 @@ class Control:
             raise InputError("branch is 'stable', 'primary' or 'stop', sign 1 or -1")
         if not (self.largest_turn > 0 and self.most_points >= 2):
             raise InputError("largest_turn must be positive and most_points at least 2")
-        if not np.isfinite(self.imperfection):
+        if not isfinite(self.imperfection):
             raise InputError(f"the imperfection must be a finite length, got {self.imperfection}")
         if self.first_step is not None and not 0 < self.first_step <= 1:
             raise InputError(f"first_step must be above 0 and at most 1, got {self.first_step}")

@@ -66,6 +66,7 @@ class _Search:
         chord = np.append(weights * (other.y - one.y)[: solver.n], other.drive - one.drive)
         self.border = solver.unit if natural else chord
         self.start, self.stop = self._level(one), self._level(other)
+        self.own = not solver.model.load_follows.any()  # whether the tangent is symmetric
         self.samples = [(0.0, self._measure(one), one), (1.0, self._measure(other), other)]
         self.low, self.high = self.samples[0][:2], self.samples[1][:2]
         self.scale = max(abs(self.low[1]), abs(self.high[1]))
@@ -75,7 +76,8 @@ class _Search:
 
     def _measure(self, spot: Spot) -> float:
         """Return the size of the tangent's determinant: positive with the inertia of the first end, else negative."""
-        size = self._size(spot.y, spot.drive)
+        known = self.own and not np.isnan(spot.log_size)
+        size = math.exp(spot.log_size) if known else self._size(spot.y, spot.drive)
         return size if spot.unstable == self.one.unstable else -size
 
     def _size(self, y: FloatArray, drive: float) -> float:

@@ -39,20 +39,43 @@ class Gradient:
         What was differentiated.
     points : (p,) int array
         Indices of the points.
-    unknowns : (p, unknowns, k) array
-        Derivatives of everything that was solved for, dimensionless.
-    push : (p, k) array
-        Derivatives of the force on what the drive moves, dimensionless, where no force turns with its node.
     tilts, tilt : Tilts, Tilt
         How the network and its arrays change.
     """
 
     path: Path
     points: Any
-    unknowns: FloatArray
-    push: FloatArray
     tilts: Tilts
     tilt: Tilt
+
+    @property
+    def unknowns(self) -> FloatArray:
+        """Derivatives of everything that was solved for, (p, unknowns, k), dimensionless."""
+        return self._all[0]
+
+    @cached_property
+    def push(self) -> FloatArray:
+        """Derivatives of the force on what the drive moves, (p, k), dimensionless, where no force turns with its node.
+
+        They are ready with the unknowns; without them they take less time.
+        """
+        return self._all[1] if "_all" in vars(self) else self._slopes(0)[1]
+
+    @cached_property
+    def _all(self) -> tuple[FloatArray, FloatArray]:
+        return self._slopes(self.path.solver.size)
+
+    def _slopes(self, size: int) -> tuple[FloatArray, FloatArray]:
+        """Return derivatives of the unknowns, (p, size, k), none if the size is zero, and of the force, (p, k)."""
+        from cfmkit.beams.kernels import entry
+
+        s, count = self.path.solver, len(self.tilts)
+        unknowns = np.empty((len(self.points) if size else 0, size, count))
+        push = np.empty((len(self.points), count))
+        ys, drives = self.path.points.y[self.points], self.path.points.drive[self.points]
+        if not entry.slopes(s.model, self.tilt, s.n_free, ys, drives, (unknowns, push), s.scratch):
+            raise InputError("the tangent is singular at a point of the path: no derivative there")
+        return unknowns, push
 
     @cached_property
     def effort(self) -> FloatArray:
@@ -157,18 +180,12 @@ def gradient(path: Path, build: Callable[[Any], Network], variables: Any, points
     ------
     cfmkit.errors.InputError
         If a variable changes how the network is made up, moves a corner of a beam and a step of its thickness past
-        each other, or moves one side of a step only; or the tangent is singular at a point.
+        each other, or moves one side of a step only. Outputs raise it where the tangent is singular at a point.
     """
-    from cfmkit.beams.kernels import entry
     from cfmkit.beams.tilt import Tilts
 
     solver = path.solver
     tilts = Tilts(path.layout, build, variables)
     tilt = tilts.arrays(solver.model, solver.cut)
     chosen = np.asarray(path.at_asked if points is None else points, dtype=np.int64)
-    unknowns = np.empty((len(chosen), solver.size, len(tilts)))
-    push = np.empty((len(chosen), len(tilts)))
-    ys, drives = path.points.y[chosen], path.points.drive[chosen]
-    if not entry.slopes(solver.model, tilt, solver.n_free, ys, drives, (unknowns, push), solver.scratch):
-        raise InputError("the tangent is singular at a point of the path: no derivative there")
-    return Gradient(path, read_only(chosen, np.int64), unknowns, push, tilts, tilt)
+    return Gradient(path, read_only(chosen, np.int64), tilts, tilt)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from math import exp, log
-from statistics import fmean
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,7 +13,7 @@ from cfmkit.beams.beam import Fit, fit, same_value
 from cfmkit.beams.bundle import Bundle
 from cfmkit.beams.drive import Displacement, Drive, Rotation
 from cfmkit.beams.network import LineSpring, Network, PointLoad, SlideSpring, Spring, TorsionSpring
-from cfmkit.beams.numbering import GROUND, NOWHERE
+from cfmkit.beams.numbering import NOWHERE
 from cfmkit.beams.plan import driven, plan_of
 from cfmkit.errors import InputError
 
@@ -149,9 +149,16 @@ class Layout:
     def _given(self, when: int) -> tuple[LoadOn, ...]:
         return self.network.loads if when == 0 else self.drive.loads  # type: ignore[union-attr]
 
+    @cached_property
+    def units(self) -> Any:
+        """Factors that make the columns of a table dimensionless, (5,): angle, speed and speed times compliances."""
+        length, force = self.scales.length, self.scales.force
+        return np.array([1.0, 1 / length, self.scales.rigidity / length, force / length, force / length])
+
     def _scales(self) -> Scales:
         lengths, middles = self.bundle.sizes(self.fits if self.bundle.others else None)
-        length, rigidity = fmean(lengths.tolist()), exp(fmean(map(log, middles.tolist())))
+        length = sum(lengths.tolist()) / len(lengths)
+        rigidity = exp(sum(map(log, middles.tolist())) / len(middles))
         return Scales(length, rigidity, self._drive_unit(length, rigidity))
 
     def _drive_unit(self, length: float, rigidity: float) -> float:
@@ -165,7 +172,7 @@ class Layout:
         for load in self.drive.loads:
             self.network.check_load(load)
             if isinstance(load, PointLoad):
-                fx, fy, moment = float(np.real(load.fx)), float(np.real(load.fy)), float(np.real(load.moment))
+                fx, fy, moment = load.fx.real, load.fy.real, load.moment.real
                 sizes.append(max((fx * fx + fy * fy) ** 0.5 / force, abs(moment) / (force * length)))
             else:
                 sizes.append(float(np.hypot(np.real(load.wx), np.real(load.wy))) * length / force)
@@ -196,10 +203,11 @@ class Layout:
         """Return cos and sin of the frames of the attachments' masters."""
         if not any(self.direction.values()):
             return self.plan.level
-        names = list(self.network.nodes)
-        turns = np.array([self.direction.get(name, 0.0) for name in names])[self.plan.place_master]
-        turns = np.where(self.plan.place_master == GROUND, 0.0, turns)
-        return np.stack([np.cos(turns), np.sin(turns)], axis=1)
+        given = [self.direction.get(name, 0.0) for name in self.network.nodes]
+        turns = np.array([*given, 0.0])[self.plan.place_master]  # GROUND is the last
+        frames = np.empty((len(turns), 2), turns.dtype)
+        frames[:, 0], frames[:, 1] = np.cos(turns), np.sin(turns)
+        return frames
 
     def _ground(self, number: int) -> tuple[Any, Any]:
         """Return where a spring is held [m]."""
@@ -214,6 +222,7 @@ class Layout:
         for name in self.masters:
             first = self.first[name]
             base[first : first + 3] = self.network.nodes[name].support.displacement
+        self.held = any(base)  # whether any is held away from where it rests
         return np.array(base)
 
     def _spring(self, spring: Spring) -> tuple[Any, Any, Any, Any]:

@@ -7,6 +7,7 @@ and change such shapes and sections, and nothing else, the changes of the fits a
 from __future__ import annotations
 
 from dataclasses import dataclass
+from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,6 +15,7 @@ import numpy as np
 from cfmkit.beams.beam import GAUSS
 from cfmkit.beams.bundle import is_plain, powers
 from cfmkit.beams.kernels.model import Tilt
+from cfmkit.beams.kernels.rk8 import STAGES
 from cfmkit.beams.numbering import NOWHERE
 
 if TYPE_CHECKING:
@@ -25,6 +27,7 @@ if TYPE_CHECKING:
     from cfmkit.curves import FloatArray
 
 NO_OFFSET = (0.0, 0.0)  # an end without offset
+_SAME = attrgetter("start", "end", "start_joint", "end_joint", "closure", "section.axial", "section.shear")
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,13 +65,12 @@ class PlainTilt:
         layout, count = self.layout, len(self.origin)
         beams, steps = self.coefficients.shape[1], len(cut.edges) // self.coefficients.shape[1]
         touched = self.coefficients.any(axis=2) | self.sections.any(axis=2) | (self.rotation != 0) | (self.length != 0)
-        places = cut.stages(slice(0, steps))
-        rest = self._compliances()
+        powers, rest = cut.powers(self.coefficients.shape[2], 0)[:, : steps * STAGES].T, self._compliances()
         own = [np.arange(count) if every else np.flatnonzero(touched[:, e]) for e in range(beams)]
         blocks = []
         for e, variables in enumerate(own):
-            block = np.empty((len(places), 5, len(variables)))
-            block[:, 0] = self.angle(e, places)[:, variables]
+            block = np.empty((len(powers), 5, len(variables)))
+            block[:, 0] = powers @ self.coefficients[variables, e].T + self.rotation[variables, e]
             block[:, 1:] = rest[variables, e].T
             blocks.append(block.ravel())
         first = np.cumsum([0, *map(len, own)])
@@ -80,7 +82,7 @@ class PlainTilt:
             variable=np.concatenate(own),
             first=first,
             table=np.concatenate(blocks),
-            begin=first[:-1] * (len(places) * 5),
+            begin=first[:-1] * (len(powers) * 5),
             moves=shifts.any(axis=1),
             shifts=shifts,
             touches=(touched | shifts[:, layout.beam_end].any(axis=2)).T,
@@ -101,16 +103,15 @@ class PlainTilt:
         by = self.sections
         stiff = by[..., 0] / young + by[..., 1] / width + by[..., 2] / thickness
         longer = self.length / bundle.length
-        bend, pull = longer - stiff - 2 * by[..., 2] / thickness, longer - stiff
+        pull = longer - stiff
         slide = pull + by[..., 5] / (1 + poisson) - by[..., 6] / factor
         g, force = bundle.length / scales.length, scales.force
-        parts = [
-            g * longer,
-            g * scales.rigidity / bundle.bending * bend,
-            g * force * bundle.stretch * pull,
-            g * force * bundle.slip * slide,
-        ]
-        return np.stack(parts, axis=-1)
+        out = np.empty((*longer.shape, 4))
+        out[..., 0] = g * longer
+        out[..., 1] = g * scales.rigidity / bundle.bending * (pull - 2 * by[..., 2] / thickness)
+        out[..., 2] = g * force * bundle.stretch * pull
+        out[..., 3] = g * force * bundle.slip * slide
+        return out
 
 
 def plain_tilt(layout: Layout, built: list[tuple[Network, Drive]], step: float) -> PlainTilt | None:
@@ -118,7 +119,8 @@ def plain_tilt(layout: Layout, built: list[tuple[Network, Drive]], step: float) 
     if layout.bundle.others or layout.network.springs or not built:
         return None
     usual = [_make_up(beam) for beam in layout.network.beams.values()]
-    if not all(_alike(layout, usual, network, drive) for network, drive in built):
+    fitted = all(beam.closure == "rotscale" for beam in layout.network.beams.values())
+    if not fitted or not all(_alike(layout, usual, network, drive) for network, drive in built):
         return None
     networks = [network for network, _ in built]
     where = np.array([[(node.x, node.y) for node in network.nodes.values()] for network in networks]).imag / step
@@ -132,19 +134,18 @@ def plain_tilt(layout: Layout, built: list[tuple[Network, Drive]], step: float) 
     shapes: list[list[Any]] = [[beam.shape for beam in network.beams.values()] for network in networks]
     given = [[shape.coefficients for shape in row] for row in shapes]
     coefficients = np.array([[(*c, *(0.0,) * (most - len(c))) for c in row] for row in given]).imag / step
-    sections = np.array(
-        [
-            [
-                (s.youngs_modulus, s.width, s.thickness, 0.0, 0.0, s.poisson_ratio, s.shear_factor)
-                for s in (b.section for b in network.beams.values())
-            ]
-            for network in networks
-        ]
-    )
+    sections = np.array([_sections(network) for network in networks])
     ends = origin + arm
     reach = ends[:, plan.beam_end[:, 1]] - ends[:, plan.beam_end[:, 0]]
     rotation, length = _fits(layout, coefficients, reach)
     return PlainTilt(layout, origin, arm, coefficients, sections.imag / step, rotation, length)
+
+
+def _sections(network: Network) -> list[tuple[Any, ...]]:
+    """Return what `PlainTilt.sections` has, of one network."""
+    given = [beam.section for beam in network.beams.values()]
+    known = {id(s): (s.youngs_modulus, s.width, s.thickness, 0.0, 0.0, s.poisson_ratio, s.shear_factor) for s in given}
+    return [known[id(s)] for s in given]
 
 
 def _alike(layout: Layout, usual: list[Any], network: Network, drive: Drive) -> bool:
@@ -161,18 +162,12 @@ def _alike(layout: Layout, usual: list[Any], network: Network, drive: Drive) -> 
     if not all(one.support is other.support or one.support == other.support for one, other in supports):
         return False
     beams = network.beams.values()
-    return all(map(_is_fitted, beams)) and list(map(_make_up, beams)) == usual
-
-
-def _is_fitted(beam: Beam) -> bool:
-    return beam.closure == "rotscale" and is_plain(beam)
+    return list(map(_make_up, beams)) == usual
 
 
 def _make_up(beam: Beam) -> tuple[Any, ...]:
     """Return what no variable may change of a beam."""
-    offsets = beam.start_offset != NO_OFFSET, beam.end_offset != NO_OFFSET
-    section = beam.section.axial, beam.section.shear
-    return beam.start, beam.end, beam.start_joint, beam.end_joint, beam.closure, offsets, section
+    return (*_SAME(beam), is_plain(beam), beam.start_offset != NO_OFFSET, beam.end_offset != NO_OFFSET)
 
 
 def _offsets(networks: list[Network], beam: int, side: int) -> FloatArray:
@@ -193,8 +188,8 @@ def _fits(layout: Layout, coefficients: FloatArray, reach: FloatArray) -> tuple[
     along = d / distance[:, None]
     v = powers(coefficients.shape[2])
     angle = bundle.coefficients @ v
-    turn = (coefficients @ v) * GAUSS[1]
-    cx, cy = -(turn * np.sin(angle)).sum(axis=2), (turn * np.cos(angle)).sum(axis=2)
+    turned = np.array([-np.sin(angle), np.cos(angle)]) * GAUSS[1] @ v.T
+    cx, cy = np.einsum("kbm,sbm->skb", coefficients, turned)
     longer = (reach * along).sum(axis=2)
     aside = (reach[..., 1] * along[:, 0] - reach[..., 0] * along[:, 1]) / distance
     own = distance / bundle.length

@@ -6,6 +6,7 @@ freedom once.
 
 from __future__ import annotations
 
+import math
 from collections import OrderedDict
 from typing import TYPE_CHECKING, Any
 
@@ -50,8 +51,8 @@ def driven(network: Network, drive: Drive) -> tuple[str, int, float] | None:
         (support.across, support.along, 1, np.pi / 2),
     ):
         if not held and other and same_direction(drive.direction, support.direction + turn):
-            sense = float(np.sign(np.cos(np.real(drive.direction) - np.real(support.direction) - turn)))
-            return drive.node, offset, sense
+            along = math.cos(drive.direction.real - support.direction.real - turn)
+            return drive.node, offset, math.copysign(1.0, along)
     direction = np.degrees(np.real(drive.direction))
     raise InputError(f"node {drive.node!r} cannot be moved along {direction:.6g} deg: it is held")
 

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cfmkit.beams import branches
+from cfmkit.beams.accuracy import errors, largest_force
 from cfmkit.beams.discretise import Mesh
 from cfmkit.beams.expanded import ExpandedSolver
 from cfmkit.beams.kernels.march import DONE, FULL, INERTIA, INFO, LONG, NO_START, OUTSIDE, STALLED
 from cfmkit.beams.path import Event, Path, PathStatus
 from cfmkit.beams.solver import Points, Solver, Spot, march_options
-from cfmkit.curves import read_only
 
 if TYPE_CHECKING:
     from cfmkit.beams.drive import Control
@@ -23,8 +23,7 @@ if TYPE_CHECKING:
     from cfmkit.curves import FloatArray
 
 _HOPS = 60  # decisions on one path
-_FINE_STEPS = 32  # of a beam, where singular points are looked for: half of them for a tolerance of
-_ROUGH = 1e-6
+_FINE_STEPS = ((1e-5, 8), (1e-6, 16), (0.0, 32))  # of a beam, where singular points are looked for, by the tolerance
 _LOOSEST = 1e-7  # tolerance of Newton's method
 _NO_START = (
     "no equilibrium to start from: lost at {:.3g} of the constant loads and displacements; "
@@ -58,7 +57,9 @@ class Run:
         self.targets = self.layout.drive.points / self.layout.scales.drive
         self.points: Points = Points(np.empty((0, self.solver.size)), np.empty(0), np.empty((0, INFO)))
         self.branches: list[str] = []
-        self.span = float(np.ptp(np.append(self.targets, 0.0)))
+        values: list[float] = self.targets.tolist()
+        self.low, self.high = min(0.0, *values), max(0.0, *values)
+        self.span = self.high - self.low
         self.natural = not self.control.through_folds
 
     @property
@@ -73,7 +74,7 @@ class Run:
         Integration forward breaks the symmetry of a beam by its error, and that acts on a bifurcation as an
         imperfection does: singular points are looked for where that error is rounding.
         """
-        whole = _FINE_STEPS if self.control.tolerance < _ROUGH else _FINE_STEPS // 2
+        whole = next(steps for limit, steps in _FINE_STEPS if self.control.tolerance >= limit)
         steps = max(-(-whole // self.mesh.segments), 2 * self.mesh.steps)
         return ExpandedSolver(self.layout, Mesh(self.mesh.segments, steps), 1e-11)
 
@@ -136,7 +137,7 @@ class Run:
 
     def append(self, points: Points) -> None:
         """Add points to the path, on the present branch."""
-        self.points = self.points.joined(points)
+        self.points = self.points.joined(points) if len(self.points) else points
         self.branches += [self.branch] * len(points)
 
     def spot(self, index: int) -> Spot:
@@ -160,10 +161,10 @@ class Run:
         left, numbers = self._left(spot, asked)
         options = self.options(spot, self._first_step(spot, asked))
         if fresh:
-            options[-1] = np.sign(self.targets[np.flatnonzero(self.targets)[0]])
+            options[-1] = np.sign(next(value for value in self.targets if value))
         room = max(len(left) + 3, self.control.most_points - len(self.points))
         code, points = self.solver.march(spot, left, options, room)
-        if self.natural:
+        if numbers is not None:
             points.info[:, 1] = numbers[points.info[:, 1].astype(int)]
         if fresh and asked:
             points.info[:1, 1] = 0
@@ -172,13 +173,13 @@ class Run:
             spot = self.spot(-1) if code == STALLED else self.last(points)
         return code, self.asked(), spot
 
-    def _left(self, spot: Spot, asked: int) -> tuple[FloatArray, FloatArray]:
-        """Return the values of the drive still to be reached and the numbers of those that were asked for.
+    def _left(self, spot: Spot, asked: int) -> tuple[FloatArray, FloatArray | None]:
+        """Return the values of the drive still to be reached and the numbers of those that were asked for, if others.
 
         A branch that is known to end is followed to just before its end. The last number stands for no number.
         """
-        if not self.natural:
-            return self.targets, np.append(np.arange(len(self.targets)), -1)
+        if not self.natural or (asked == 0 and self.end is None):
+            return self.targets, None
         left, numbers = self.targets[asked:], np.arange(asked, len(self.targets))
         if self.end is not None:
             sense = np.sign(self.end.drive - spot.drive)
@@ -203,7 +204,6 @@ class Run:
 
     def options(self, spot: Spot, step: float) -> FloatArray:
         """Return the options of a march from a point."""
-        low, high = min(0.0, float(self.targets.min())), max(0.0, float(self.targets.max()))
         return march_options(
             self.solver.tolerance,
             step,
@@ -211,7 +211,7 @@ class Run:
             self.natural,
             _SMALLEST * self.span,
             self.span if self.natural else 1.0,
-            (low - 0.5 * self.span, high + 0.5 * self.span),
+            (self.low - 0.5 * self.span, self.high + 0.5 * self.span),
             spot.unstable,
         )
 
@@ -239,44 +239,13 @@ class Run:
         else:
             self.status, self.message = PathStatus.LOST, f"no step converged {where}"
 
-    def estimate(self) -> float:
-        """Return the largest of `errors` at up to three points: middle, last, and where the forces are largest."""
-        count = len(self.points)
-        if not count:
-            return 0.0
-        hardest = int(np.abs(self.points.y[:, self.solver.n_free : self.solver.n]).max(axis=1).argmax())
-        return float(self.errors({count // 2, count - 1, hardest}).max())
-
-    def errors(self, indices: Any) -> FloatArray:
-        """Return the difference to a mesh of twice the steps at points: forces and positions, relative to the path.
-
-        Infinite where the finer mesh has no equilibrium nearby.
-        """
-        tolerance = max(self.solver.tolerance, 0.02 * self.control.tolerance)
-        fine = Solver(self.layout, self.mesh.finer(), tolerance, self.solver)
-        n, free = self.solver.n, self.solver.n_free
-        scale = max(1e-12, float(np.abs(self.points.y[:, free:n]).max()))
-        chosen = np.array(sorted(indices))
-        ys, drives = self.points.y[chosen], self.points.drive[chosen]
-        near, solved = fine.solve_each(ys, drives)
-        moved, far = drives.copy(), 0.1 * max(1.0, scale)
-        for k in np.flatnonzero(~solved | (np.abs(near - ys).max(axis=1) > far)):
-            border = self.spot(int(chosen[k])).tangent
-            level = float(border[:-1] @ ys[k, :n] + border[-1] * drives[k])
-            across = fine.solve(ys[k], float(drives[k]), border, level)  # where the path turns back
-            there = across is not None and np.abs(across.y - ys[k]).max() <= far
-            near[k], moved[k] = (across.y, across.drive) if there and across is not None else (np.inf, np.inf)
-        change = np.abs(near - ys)
-        pose, force = change[:, :free].max(axis=1, initial=0.0), change[:, free:n].max(axis=1) / scale
-        found: FloatArray = np.maximum(np.maximum(pose, force), np.abs(moved - drives))
-        return found
-
     def path(self) -> Path:
         """Return the outcome; where the tolerance is not reached, every point is judged by itself."""
         accurate = np.ones(len(self.points), dtype=bool)
         if not self.error <= self.control.tolerance:
-            accurate = self.errors(range(len(self.points))) <= self.control.tolerance
+            accurate = errors(self, range(len(self.points)), float(largest_force(self).max())) <= self.control.tolerance
             self._say_inaccurate(int((~accurate).sum()))
+        accurate.setflags(write=False)
         return Path(
             solver=self.solver,
             points=self.points,
@@ -285,7 +254,7 @@ class Run:
             message=self.message or self.status.value,
             events=tuple(self.events),
             error=self.error,
-            accurate=read_only(accurate, np.bool_),
+            accurate=accurate,
         )
 
     def _say_inaccurate(self, count: int) -> None:

@@ -85,8 +85,9 @@ class Section:
 
     def __post_init__(self) -> None:
         """Check the values."""
-        for name in ("youngs_modulus", "width", "shear_factor"):
-            _positive(name, getattr(self, name))
+        _positive("youngs_modulus", self.youngs_modulus)
+        _positive("width", self.width)
+        _positive("shear_factor", self.shear_factor)
         if not isinstance(self.thickness, Taper):
             _positive("thickness", self.thickness)
         if not -1 < self.poisson_ratio.real < 0.5 + 1e-12:

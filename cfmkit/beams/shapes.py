@@ -221,6 +221,8 @@ def _spline_velocity(knots: Any, points: Any) -> AngleLaw:
 
 def direction(x: Any, y: Any) -> Any:
     """Return the angles of vectors [rad], also where complex steps make them complex."""
+    if isinstance(x, np.ndarray) and x.dtype.kind == y.dtype.kind == "f":
+        return np.arctan2(y, x)
     rough = np.arctan2(np.real(y), np.real(x))
     c, s = np.cos(rough), np.sin(rough)
     return rough + np.arctan((y * c - x * s) / (x * c + y * s))

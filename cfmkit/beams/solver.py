@@ -53,7 +53,10 @@ class Points:
 
 @dataclass
 class Spot:
-    """One equilibrium: unknowns, drive, tangent, number of unstable directions, shortness measure, last increment."""
+    """One equilibrium: unknowns, drive, tangent, number of unstable directions, shortness measure, last increment.
+
+    log_size is the logarithm of the size of the determinant of d(residual)/dz.
+    """
 
     y: FloatArray
     drive: float
@@ -61,6 +64,7 @@ class Spot:
     unstable: int = 0
     shortness: float = 1.0
     increment: float = 0.0
+    log_size: float = np.nan
 
 
 class Solver:
@@ -78,7 +82,8 @@ class Solver:
         self.n_segments = len(self.cut.segment_step) - 1
         self.n = self.n_free + 3 * self.n_beams
         self.size = self.n + 6 * self.n_segments
-        self.scratch = self._scratch()
+        alike = like is not None and like.mesh.segments == mesh.segments
+        self.scratch: tuple[Any, ...] = like.scratch if like is not None and alike else self._scratch()
         self.limits = np.array([tolerance, float(ITERATIONS)])
         self.unit = np.zeros(self.n + 1)
         self.unit[-1] = 1.0
@@ -105,7 +110,7 @@ class Solver:
             np.zeros((2, 3)),
             np.zeros((self.n_beams, 6, 3, 3)),
             np.zeros((self.n_segments, 7, 3, 3)),
-            (np.zeros((8, 12, 20)), np.zeros((2, 3, 4)), np.zeros((3, 3))),
+            (np.zeros((11, 12, 20)), np.zeros((2, 3, 4)), np.zeros((3, 3)), np.zeros((self.n_segments, 22))),
             np.zeros(self.size),
         )
 
@@ -138,14 +143,15 @@ class Solver:
         `model`: other values than the network's own.
         """
         m = self.model if model is None else model
-        new, state, tangent = y.copy(), np.zeros(5), np.zeros(self.n + 1)
-        state[0] = drive
+        new, state, tangent = y.copy(), np.zeros(6), np.zeros(self.n + 1)
+        state[0], state[5] = drive, 1.0
         border = self.unit if border is None else border
         goal = drive if target is None else target
         code, _ = entry.solve(m, self.n_free, new, state, border, goal, self.limits, tangent, self.scratch)
         if code != SOLVED:
             return None
-        return Spot(new, float(state[0]), tangent, int(state[1]), float(state[2]), float(state[3]))
+        at, unstable, shortness, increment, _, log_size = state.tolist()
+        return Spot(new, at, tangent, int(unstable), shortness, increment, log_size)
 
     def tangent_at(self, y: FloatArray, drive: float) -> tuple[FloatArray, FloatArray]:
         """Return the tangent by the unknowns z, symmetrised, and by the drive."""
@@ -181,7 +187,7 @@ class Solver:
         segments are left at zero where nothing is done: they follow linearly from all else.
         """
         spot = Spot(np.zeros(self.size), 0.0, np.zeros(self.n + 1))
-        loaded = bool(self.layout.network.loads) or bool(self.layout.base.any())
+        loaded = bool(self.layout.network.loads) or self.layout.held
         model = self.ramp() if loaded else self.model
         slack = _slack(model) if len(model.spring_kind) else None
         if slack is not None and np.abs(slack - model.spring_value).max() > _TIGHT:

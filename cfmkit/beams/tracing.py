@@ -55,7 +55,8 @@ def _solved(network: Network, drive: Drive, control: Control, to_first: bool = F
 
     to_first: only as far as the first bifurcation.
     """
-    from cfmkit.beams.run import Run  # loads the compiler
+    from cfmkit.beams.accuracy import estimate  # loads the compiler, as does Run
+    from cfmkit.beams.run import Run
 
     layout = Layout(network, drive)
     mesh = first_mesh(control.tolerance)
@@ -66,7 +67,7 @@ def _solved(network: Network, drive: Drive, control: Control, to_first: bool = F
             early = run.asked() < _EARLY * len(drive.points)
             mesh = mesh.shorter().shorter() if early else mesh.shorter()
             continue
-        run.error = run.estimate()
+        run.error = estimate(run)
         if run.error <= control.tolerance or round_ == _ROUNDS - 1:
             break
         mesh = mesh.finer()
@@ -75,6 +76,6 @@ def _solved(network: Network, drive: Drive, control: Control, to_first: bool = F
 
 def first_mesh(tolerance: float) -> Mesh:
     """Return the mesh that is tried first for a tolerance."""
-    if tolerance >= 2e-5:
-        return Mesh(2, 1)
+    if tolerance >= 4e-6:
+        return Mesh(2 if tolerance >= 2e-5 else 3, 1)
     return Mesh(2, 2 if tolerance >= 1e-7 else 4)

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from cfmkit.beams import CLAMPED, Beam, Displacement, Network, Node, Section, Taper, gradient, trace
-from cfmkit.beams.kernels import dense, entry
-from cfmkit.beams.kernels.rk8 import COUPLING, NODES, WEIGHTS
+from cfmkit.beams.kernels import dense, entry, predictor
+from cfmkit.beams.kernels.rk8 import COUPLING, NODES, SHARES, SOURCES, STAGES, TERMS, WEIGHTS
 
-_count, _solve = dense.positive_count, dense.lu_solve
+_count, _solve, _predict = dense.positive_count, dense.lu_solve, predictor._predict
 
 
 @numba.njit
@@ -25,6 +25,27 @@ def count_of(a):  # type: ignore[no-untyped-def]
 @numba.njit
 def solve_with(a, b):  # type: ignore[no-untyped-def]
     return _solve(a, b)
+
+
+@numba.njit
+def foretell(times, past, slopes, natural, t, y):  # type: ignore[no-untyped-def]
+    _predict(times, past, slopes, times.shape[0], natural, t, y)
+
+
+@pytest.mark.parametrize(("natural", "degree"), [(True, 5), (False, 2)])
+def test_the_next_point_is_foretold_exactly_where_the_path_is_a_polynomial(natural: bool, degree: int) -> None:
+    """Three points with their slopes hold a polynomial of degree 5, without them one of degree 2."""
+    course = np.polynomial.Polynomial(np.random.default_rng(0).standard_normal(degree + 1))
+    times, found = np.array([1.0, 0.7, 0.2]), np.empty(1)
+    foretell(times, course(times)[:, None], course.deriv()(times)[:, None], natural, 1.3, found)
+    assert found[0] == pytest.approx(course(1.3), rel=1e-12)
+
+
+def test_the_short_lists_of_the_runge_kutta_method_hold_all_its_coefficients() -> None:
+    for i, row in enumerate([*COUPLING, WEIGHTS]):
+        full = np.zeros(STAGES)
+        full[SOURCES[i, : TERMS[i]]] = SHARES[i, : TERMS[i]]
+        np.testing.assert_array_equal(full, row)
 
 
 def test_compiled_code_is_kept_under_the_digest_of_all_kernels() -> None:

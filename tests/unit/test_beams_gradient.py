@@ -81,3 +81,10 @@ def test_force_is_proportional_to_the_modulus_and_the_gradient_knows() -> None:
     found = gradient(path, lan, LAN)
     assert found.effort[0, 13] * LAN[13] == pytest.approx(path.effort[-1], rel=1e-9)
     np.testing.assert_allclose(found.motion["n3"][:, :, 13], 0, atol=1e-12)
+
+
+def test_efforts_are_the_same_with_all_unknowns_and_without_them() -> None:
+    path = trace(lan(LAN), Displacement("n5", -np.pi / 2, np.array([2e-3, 6e-3])), FINE)
+    alone, last = gradient(path, lan, LAN), gradient(path, lan, LAN)
+    assert last.unknowns.shape == (2, path.points.y.shape[1], len(LAN))
+    np.testing.assert_allclose(alone.effort, last.effort, rtol=1e-9)

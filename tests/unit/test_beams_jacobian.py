@@ -85,3 +85,21 @@ def test_the_jacobian_at_random_states_is_the_derivative_of_the_residuals(seed: 
         )
         scale = np.abs(jacobian).max(axis=1) * np.abs(change).max()
         np.testing.assert_allclose((jacobian @ change) / scale, slope / scale, atol=2e-8)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_the_size_of_the_determinant_that_a_solution_brings_is_that_of_its_tangent(seed: int) -> None:
+    """By Cramer's rule from the factors of the bordered system, whatever the border is."""
+    net = network(seed, follower=False)
+    solver = Solver(Layout(net, drives(net, seed)[0]), Mesh(3, 1), 1e-12)
+    start, _, _ = solver.rest()
+    assert start is not None
+    found = solver.solve(start.y, 0.02)
+    assert found is not None
+    expected = np.linalg.slogdet(solver.tangent_at(found.y, found.drive)[0])[1]
+    assert found.log_size == pytest.approx(expected, abs=1e-6)
+    border = np.random.default_rng(seed).standard_normal(solver.n + 1)
+    level = border[:-1] @ found.y[: solver.n] + border[-1] * found.drive
+    other = solver.solve(found.y, found.drive, border, level)
+    assert other is not None
+    assert other.log_size == pytest.approx(expected, abs=1e-6)

@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from cfmkit.beams.kernels.compiler import inlined, kernel, maker
-from cfmkit.beams.kernels.flow import flow, plain_flow
+from cfmkit.beams.kernels.flow import FORCE, flow, plain_flow
 
 E, F, E2, G, C_D, SMALL = 0, 1, 2, 3, 4, 5  # blocks of a relation; C_D: c in columns 0, 1
 BEFORE = 6  # of what is kept of a segment: E2 before it; its SMALL[2, 0] and E2[:, 2] hold the segment's own turns
@@ -55,20 +55,42 @@ def _drive_column(m, e, steps, start, load, dp):
     dp[3], dp[4], dp[5] = last[4].imag / h, last[5].imag / h, last[1].imag / h
 
 
-@kernel
+@inlined
+def _start_of(m, j, e, y, n, drive):
+    """Return rotation, h, v and M at the start of segment j, which is on beam e, and the line load on it."""
+    at = n + 6 * j
+    wx = m.line_load[e, 0, 0] + drive * m.line_load[e, 1, 0]
+    wy = m.line_load[e, 0, 1] + drive * m.line_load[e, 1, 1]
+    return (y[at + 2], y[at + 3], y[at + 4], y[at + 5]), (wx, wy)
+
+
+@inlined
+def flows(m, y, n, drive, work):
+    """Integrate over all segments, two at a time; their outcomes go into the work space."""
+    room, outs = work[0], work[3]
+    count, first, j, e = m.segment_step.shape[0] - 1, m.segment_step, 0, 0
+    while j < count:
+        while m.beam_segment[e + 1] <= j:
+            e += 1
+        k, other, steps = j, e, first[j + 1] - first[j]
+        if j + 1 < count and first[j + 2] - first[j + 1] == steps:
+            k = j + 1
+            while m.beam_segment[other + 1] <= k:
+                other += 1
+        (one, a), (two, b) = _start_of(m, j, e, y, n, drive), _start_of(m, k, other, y, n, drive)
+        flow(m.table, m.width, (first[j], first[k], steps), (one, two), (a, b), (outs[j], outs[k]), room)
+        j, e = k + 1, other
+
+
+@inlined
 def sweep(m, e, y, first_slot, drive, ends, rel, store, work):
-    """Set the relation `rel` of beam e and keep in `store` what `unfold` needs.
+    """Set the relation `rel` of beam e from its segments' outcomes and keep in `store` what `unfold` needs.
 
     ends: poses of the two ends; first_slot: index in y of the beam's last force followed by that of its segments.
     Returns the change of the inertia by the eliminated unknowns and the smallest dM1/dM0 of a segment.
     """
-    room = work[0]
-    out, drv = room[2, 3], room[2, 4]
+    drv, outs = work[0][2, 4], work[3]
     grows = m.line_load[e, 1, 0] != 0.0 or m.line_load[e, 1, 1] != 0.0
-    load = (
-        m.line_load[e, 0, 0] + drive * m.line_load[e, 1, 0],
-        m.line_load[e, 0, 1] + drive * m.line_load[e, 1, 1],
-    )
     for k in range(6):
         for i in range(3):
             for j in range(3):
@@ -81,14 +103,11 @@ def sweep(m, e, y, first_slot, drive, ends, rel, store, work):
     index, least = 0, 1.0
     begin, end = m.beam_segment[e], m.beam_segment[e + 1]
     for j in range(begin, end):
-        at = first_slot[1] + 6 * j
-        steps = (m.segment_step[j], m.segment_step[j + 1])
-        if j == begin:
-            y[at], y[at + 1], y[at + 2] = ends[0, 0], ends[0, 1], ends[0, 2]
-        start = (y[at + 2], y[at + 3], y[at + 4], y[at + 5])
-        h, v = flow(m.table, m.width, steps, start, load, out, room)
+        at, out = first_slot[1] + 6 * j, outs[j]
+        h, v = out[FORCE], out[FORCE + 1]
         if grows:
-            _drive_column(m, e, steps, start, load, drv)
+            start, load = _start_of(m, j, e, y, first_slot[1], drive)
+            _drive_column(m, e, (m.segment_step[j], m.segment_step[j + 1]), start, load, drv)
         if j + 1 < end:
             qx, qy, qr = y[at + 6], y[at + 7], y[at + 8]
             ph, pv, pm = y[at + 9], y[at + 10], y[at + 11]
@@ -176,22 +195,25 @@ def _propagate(rel, store, n, out, rq, drv):
         rel[E2, r, 2] = last * k2
 
 
-@kernel
-def unfold(m, e, first_slot, store, dqa, dpb, ddrive, dy):
-    """Set the increments of all segments' unknowns of beam e from those at its ends."""
+@inlined
+def unfold(m, e, first_slot, store, dqa, dpb, errors, ddrive, dy):
+    """Set the increments of all segments' unknowns of beam e from those at its ends.
+
+    errors: share of the segments' closure errors that they take away, 1 for Newton's step and 0 for a derivative.
+    """
     begin, end = m.beam_segment[e], m.beam_segment[e + 1]
     n0, n1, n2 = dpb[0], dpb[1], dpb[2]
     for j in range(end - 1, begin - 1, -1):
-        last = store[j, E2, 2, 0] + store[j, E2, 2, 1] * ddrive
+        last = store[j, E2, 2, 0] * errors + store[j, E2, 2, 1] * ddrive
         last += store[j, SMALL, 0, 0] * n0 + store[j, SMALL, 0, 1] * n1 + store[j, SMALL, 0, 2] * n2
         for r in range(3):
             last += store[j, SMALL, 1, r] * dqa[r]
-        n0 += store[j, E2, 0, 0] + store[j, E2, 0, 1] * ddrive
-        n1 += store[j, E2, 1, 0] + store[j, E2, 1, 1] * ddrive
+        n0 += store[j, E2, 0, 0] * errors + store[j, E2, 0, 1] * ddrive
+        n1 += store[j, E2, 1, 0] * errors + store[j, E2, 1, 1] * ddrive
         n2 = last
         at = first_slot[1] + 6 * j
         for r in range(3):
-            dq = store[j, C_D, r, 0] + store[j, C_D, r, 1] * ddrive
+            dq = store[j, C_D, r, 0] * errors + store[j, C_D, r, 1] * ddrive
             for i in range(3):
                 dq += store[j, E, r, i] * dqa[i]
             dq += store[j, F, r, 0] * n0 + store[j, F, r, 1] * n1 + store[j, F, r, 2] * n2
@@ -199,4 +221,4 @@ def unfold(m, e, first_slot, store, dqa, dpb, ddrive, dy):
         dy[at + 3], dy[at + 4], dy[at + 5] = n0, n1, n2
 
 
-__all__ = ["BEFORE", "C_D", "E2", "SMALL", "E", "F", "G", "np", "places_of", "pose_of", "sweep", "unfold"]
+__all__ = ["BEFORE", "C_D", "E2", "SMALL", "E", "F", "G", "flows", "np", "places_of", "pose_of", "sweep", "unfold"]

@@ -15,7 +15,6 @@ from cfmkit.beams.kernels.compiler import inlined, kernel, maker
 from cfmkit.beams.kernels.dense import clear, lu_solve
 from cfmkit.beams.kernels.flow_slopes import flow_slopes, work_space
 from cfmkit.beams.kernels.force_slopes import (
-    beam_slopes,
     load_slopes,
     pose_slope,
     spring_slopes,
@@ -23,7 +22,7 @@ from cfmkit.beams.kernels.force_slopes import (
     value_changes,
     value_slopes,
 )
-from cfmkit.beams.kernels.newton import all_values, assemble
+from cfmkit.beams.kernels.newton import assemble
 from cfmkit.beams.kernels.rk8 import STAGES
 
 
@@ -72,7 +71,7 @@ def _chain_slopes(m, tilt, e, ends, store, c, d, parts):
                 c[k, r] = moved + (c[k, r] if r < 2 else 0.0)
 
 
-@kernel
+@inlined
 def _unfold_slopes(m, e, k, n, store, parts, dqa, dpb, dy):
     """Set the derivatives of the unknowns of all segments of beam e by variable k."""
     n0, n1, n2 = dpb[0], dpb[1], dpb[2]
@@ -182,7 +181,8 @@ def slopes(m, tilt, n_free, ys, drives, out, pushes, scratch):
     """Set the derivatives of the unknowns at points by all variables; tell whether every tangent is regular.
 
     out (points, unknowns, k); pushes (points, k): derivatives of the force on what the drive moves, in the drive's
-    sense, where the tangent is symmetric (no force turns with its node).
+    sense, where the tangent is symmetric (no force turns with its node). If `out` has no points, only those are set:
+    one solution for the force (the adjoint) takes the place of one for each variable.
     """
     h, _, _, residual, values, ends, rel, store, work, _ = scratch
     n, count, beams = h.shape[0] - 1, tilt.moves.shape[0], m.beam_end.shape[0]
@@ -197,8 +197,9 @@ def slopes(m, tilt, n_free, ys, drives, out, pushes, scratch):
     dofs, pose, others = values.shape[0], np.zeros(7), m.load_place.shape[0] + m.spring_kind.shape[0] > 0
     room = (np.zeros(dofs), np.zeros(dofs), np.zeros((12, 7)), pose)
     frames, matrix, rhs, dpb = np.empty((beams, 2, 4)), np.empty((n, n)), np.empty((n, count)), np.empty(3)
+    whole, adjoint = out.shape[0] > 0, np.empty((n, 1))
     for p in range(ys.shape[0]):
-        y, drive, dy, push = ys[p], drives[p], out[p], pushes[p]
+        y, drive, push = ys[p], drives[p], pushes[p]
         assemble(m, y, drive, n_free, h, residual, values, ends, rel, store, work)
         _frames(m, values, pose, frames)
         clear(rhs)
@@ -217,11 +218,18 @@ def slopes(m, tilt, n_free, ys, drives, out, pushes, scratch):
             if others and tilt.moves[k]:
                 _other_sides(m, tilt, k, drive, values, rhs, push, room)
         for i in range(n):
+            adjoint[i, 0] = h[i, n]
             for j in range(n):
                 matrix[i, j] = h[i, j]
-        if not lu_solve(matrix, rhs):
+        if not lu_solve(matrix, rhs if whole else adjoint):
             return False
-        _spread_out(m, tilt, drive, n_free, (values, frames, h), (store, parts), rhs, dy, push, (room[0], pose, dpb))
+        if whole:
+            inside = (room[0], pose, dpb)
+            _spread_out(m, tilt, drive, n_free, (values, frames, h), (store, parts), rhs, out[p], push, inside)
+            continue
+        for i in range(n):
+            for k in range(count):
+                push[k] += adjoint[i, 0] * rhs[i, k]
     return True
 
 
@@ -240,61 +248,3 @@ def _spread_out(m, tilt, drive, n_free, state, chains, dz, dy, push, work):
             for r in range(3):
                 dpb[r] = dz[n_free + 3 * e + r, k]
             _unfold_slopes(m, e, k, n, store, parts, pose, dpb, dy)
-
-
-@maker
-def held_slopes(m, tilt, n_free, ys, drives, dys, out):
-    """Set the derivatives of the forces on all degrees of freedom and of the springs' energy, (points, dofs + 1, k).
-
-    The forces are those of `cfmkit.beams.kernels.observe.forces`.
-    """
-    count, beams, dofs = tilt.moves.shape[0], m.beam_end.shape[0], m.slot.shape[0]
-    n = n_free + 3 * beams
-    values, dvalues, force, w = np.empty(dofs), np.empty(dofs), np.empty(dofs), np.zeros((12, 7))
-    dstart, dend = np.empty((beams, 3)), np.empty((beams, 3))
-    for p in range(ys.shape[0]):
-        y, drive, dy = ys[p], drives[p], dys[p]
-        all_values(m, y, drive, values)
-        for k in range(count):
-            value_slopes(m, tilt, k, drive, dy, dvalues)
-            for i in range(dofs):
-                force[i] = 0.0
-            for e in range(beams):
-                for r in range(3):
-                    dstart[e, r], dend[e, r] = dy[n + 6 * m.beam_segment[e] + 3 + r, k], dy[n_free + 3 * e + r, k]
-            load_slopes(m, tilt, k, values, dvalues, drive, w, force)
-            out[p, dofs, k] = spring_slopes(m, tilt, k, values, dvalues, w, force)
-            beam_slopes(m, tilt, k, y, n_free, values, dvalues, dstart, dend, w, force)
-            for i in range(dofs):
-                out[p, i, k] = force[i]
-
-
-@maker
-def row_slopes(m, tilt, n_free, y, drive, dy, out):
-    """Set the derivatives of the states at the step boundaries of all segments at one point by all variables.
-
-    `tilt` pairs every beam with every variable. out (steps + segments, 7 k): phi, M, X, Y,
-    energy, h, v, each by all variables.
-    """
-    n, count = n_free + 3 * m.beam_end.shape[0], dy.shape[1]
-    state, work = np.zeros(9 * count), work_space(count)
-    row = 0
-    for e in range(m.beam_end.shape[0]):
-        load = (
-            m.line_load[e, 0, 0] + drive * m.line_load[e, 1, 0],
-            m.line_load[e, 0, 1] + drive * m.line_load[e, 1, 1],
-        )
-        begin = m.segment_step[m.beam_segment[e]]
-        for j in range(m.beam_segment[e], m.beam_segment[e + 1]):
-            o, first, last = n + 6 * j, m.segment_step[j], m.segment_step[j + 1]
-            for k in range(count):
-                state[k], state[count + k] = dy[o + 2, k], dy[o + 5, k]
-                state[2 * count + k], state[3 * count + k], state[4 * count + k] = dy[o, k], dy[o + 1, k], 0.0
-                state[5 * count + k], state[6 * count + k] = dy[o + 3, k], dy[o + 4, k]
-                for r in range(2):
-                    state[(7 + r) * count + k] = tilt.line[k, e, 0, r] + drive * tilt.line[k, e, 1, r]
-            start = (y[o + 2], y[o + 3], y[o + 4], y[o + 5])
-            at = tilt.begin[e] + (first - begin) * STAGES * 5 * count
-            rows = out[row : row + last - first + 1]
-            flow_slopes(m.table, m.width, (first, last), start, load, tilt.table, at, state, rows, work)
-            row += last - first + 1

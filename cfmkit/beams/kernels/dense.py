@@ -95,8 +95,9 @@ def _eliminate_one(a, k):
     inverse = 1.0 / a[k, k]
     for i in range(k + 1, n):
         factor = a[i, k] * inverse
-        for j in range(k + 1, n):
-            a[i, j] -= factor * a[k, j]
+        if factor != 0.0:
+            for j in range(k + 1, n):
+                a[i, j] -= factor * a[k, j]
 
 
 @kernel
@@ -105,10 +106,11 @@ def _eliminate_two(a, k):
     p, q, r = a[k, k], a[k, k + 1], a[k + 1, k + 1]
     det = p * r - q * q
     for i in range(k + 2, n):
-        x = (a[i, k] * r - a[i, k + 1] * q) / det
-        y = (a[i, k + 1] * p - a[i, k] * q) / det
-        for j in range(k + 2, n):
-            a[i, j] -= x * a[k, j] + y * a[k + 1, j]
+        u, v = a[i, k], a[i, k + 1]
+        if u != 0.0 or v != 0.0:
+            x, y = (u * r - v * q) / det, (v * p - u * q) / det
+            for j in range(k + 2, n):
+                a[i, j] -= x * a[k, j] + y * a[k + 1, j]
 
 
 @kernel

@@ -18,12 +18,13 @@ from cfmkit.beams.kernels import columns as _columns
 from cfmkit.beams.kernels import march as _march
 from cfmkit.beams.kernels import newton as _newton
 from cfmkit.beams.kernels import observe as _observe
+from cfmkit.beams.kernels import output_slopes as _outputs
 from cfmkit.beams.kernels.compiler import door
 
 _follow, _solve, _each = _march.march, _newton.solve, _newton.solve_each
 _forces, _states = _observe.forces, _observe.states
 _tangent = _observe.tangent
-_slopes, _row_slopes, _held_slopes = _columns.slopes, _columns.row_slopes, _columns.held_slopes
+_slopes, _row_slopes, _held_slopes = _columns.slopes, _outputs.row_slopes, _outputs.held_slopes
 
 
 def digest() -> str:

@@ -15,10 +15,12 @@ from __future__ import annotations
 import numpy as np
 
 from cfmkit.beams.kernels.compiler import inlined, kernel, maker
-from cfmkit.beams.kernels.rk8 import COUPLING, NODES, STAGES, WEIGHTS
+from cfmkit.beams.kernels.rk8 import COUPLING, NODES, SHARES, SOURCES, STAGES, TERMS, WEIGHTS
 
 COLUMNS = 5  # the state itself, then its derivatives by the start's rotation, h, v and M
 SLOPE, PLACE, AT = 0, 1, 2  # of the work space: slopes of (phi, M), slopes of (X, Y), in AT: (phi, M), (X, Y), stage
+FIRST, SECOND = 0, 8  # where the work spaces of two segments begin
+FORCE = 20  # of a segment's outcome: h and v at its end; before them what `flow` says
 
 
 @inlined
@@ -40,9 +42,9 @@ def sincos(x):
 
 
 @inlined
-def _slopes(table, step, i, h, v, w):
+def _slopes(table, step, i, h, v, w, o):
     """Set the slopes of (phi, M) and (X, Y) with their derivatives at stage i of a step."""
-    s, c = sincos(table[step, i, 0] + w[AT, 2, 0])
+    s, c = sincos(table[step, i, 0] + w[o + AT, 2, 0])
     bend, pull, slide = table[step, i, 2], table[step, i, 3], table[step, i, 4]
     normal, shear = h * c + v * s, v * c - h * s
     stretch, slip = table[step, i, 1] + pull * normal, slide * shear
@@ -51,80 +53,103 @@ def _slopes(table, step, i, h, v, w):
     xphi, yphi = -yp + p * c - q * s, xp + p * s + q * c
     mphi = yphi * h - xphi * v
     for k in range(5):
-        w[SLOPE, i, k] = bend * w[AT, 2, 5 + k]
+        w[o + SLOPE, i, k] = bend * w[o + AT, 2, 5 + k]
     for k in range(1, 5):
-        d = w[AT, 2, k]
-        w[SLOPE, i, 5 + k], w[PLACE, i, k], w[PLACE, i, 5 + k] = mphi * d, xphi * d, yphi * d
-    w[SLOPE, i, 5], w[PLACE, i, 0], w[PLACE, i, 5] = yp * h - xp * v, xp, yp
+        d = w[o + AT, 2, k]
+        w[o + SLOPE, i, 5 + k], w[o + PLACE, i, k], w[o + PLACE, i, 5 + k] = mphi * d, xphi * d, yphi * d
+    w[o + SLOPE, i, 5], w[o + PLACE, i, 0], w[o + PLACE, i, 5] = yp * h - xp * v, xp, yp
     hh, hv, vv = pull * c * c + slide * s * s, (pull - slide) * c * s, pull * s * s + slide * c * c
-    w[PLACE, i, 2] += hh
-    w[PLACE, i, 7] += hv
-    w[SLOPE, i, 7] += yp + hv * h - hh * v
-    w[PLACE, i, 3] += hv
-    w[PLACE, i, 8] += vv
-    w[SLOPE, i, 8] += -xp + vv * h - hv * v
+    w[o + PLACE, i, 2] += hh
+    w[o + PLACE, i, 7] += hv
+    w[o + SLOPE, i, 7] += yp + hv * h - hh * v
+    w[o + PLACE, i, 3] += hv
+    w[o + PLACE, i, 8] += vv
+    w[o + SLOPE, i, 8] += -xp + vv * h - hv * v
 
 
 @inlined
-def _combine(i, length, w):
+def _combine(i, length, w, o):
     """Set phi, M and their derivatives at stage i (sums in registers: this is where most of the time goes)."""
     a = b = c = d = e = f = g = h = p = q = 0.0
-    for j in range(i):
-        x = COUPLING[i, j]
-        if x != 0.0:
-            a += x * w[SLOPE, j, 0]
-            b += x * w[SLOPE, j, 1]
-            c += x * w[SLOPE, j, 2]
-            d += x * w[SLOPE, j, 3]
-            e += x * w[SLOPE, j, 4]
-            f += x * w[SLOPE, j, 5]
-            g += x * w[SLOPE, j, 6]
-            h += x * w[SLOPE, j, 7]
-            p += x * w[SLOPE, j, 8]
-            q += x * w[SLOPE, j, 9]
-    w[AT, 2, 0], w[AT, 2, 1] = w[AT, 0, 0] + length * a, w[AT, 0, 1] + length * b
-    w[AT, 2, 2], w[AT, 2, 3] = w[AT, 0, 2] + length * c, w[AT, 0, 3] + length * d
-    w[AT, 2, 4], w[AT, 2, 5] = w[AT, 0, 4] + length * e, w[AT, 0, 5] + length * f
-    w[AT, 2, 6], w[AT, 2, 7] = w[AT, 0, 6] + length * g, w[AT, 0, 7] + length * h
-    w[AT, 2, 8], w[AT, 2, 9] = w[AT, 0, 8] + length * p, w[AT, 0, 9] + length * q
+    for n in range(TERMS[i]):
+        x, j = SHARES[i, n], SOURCES[i, n]
+        a += x * w[o + SLOPE, j, 0]
+        b += x * w[o + SLOPE, j, 1]
+        c += x * w[o + SLOPE, j, 2]
+        d += x * w[o + SLOPE, j, 3]
+        e += x * w[o + SLOPE, j, 4]
+        f += x * w[o + SLOPE, j, 5]
+        g += x * w[o + SLOPE, j, 6]
+        h += x * w[o + SLOPE, j, 7]
+        p += x * w[o + SLOPE, j, 8]
+        q += x * w[o + SLOPE, j, 9]
+    w[o + AT, 2, 0], w[o + AT, 2, 1] = w[o + AT, 0, 0] + length * a, w[o + AT, 0, 1] + length * b
+    w[o + AT, 2, 2], w[o + AT, 2, 3] = w[o + AT, 0, 2] + length * c, w[o + AT, 0, 3] + length * d
+    w[o + AT, 2, 4], w[o + AT, 2, 5] = w[o + AT, 0, 4] + length * e, w[o + AT, 0, 5] + length * f
+    w[o + AT, 2, 6], w[o + AT, 2, 7] = w[o + AT, 0, 6] + length * g, w[o + AT, 0, 7] + length * h
+    w[o + AT, 2, 8], w[o + AT, 2, 9] = w[o + AT, 0, 8] + length * p, w[o + AT, 0, 9] + length * q
+
+
+@inlined
+def _begin(start, w, o):
+    for k in range(10):
+        w[o + AT, 0, k], w[o + AT, 1, k] = 0.0, 0.0
+    w[o + AT, 0, 0], w[o + AT, 0, 5] = start[0], start[3]
+    w[o + AT, 0, 1], w[o + AT, 0, 9] = 1.0, 1.0
+
+
+@inlined
+def _advance(length, w, o):
+    for i in range(STAGES):
+        weight = length * WEIGHTS[i]
+        if weight != 0.0:
+            for k in range(10):
+                w[o + AT, 0, k] += weight * w[o + SLOPE, i, k]
+                w[o + AT, 1, k] += weight * w[o + PLACE, i, k]
+
+
+@inlined
+def _end(h, v, w, o, out):
+    for k in range(10):
+        out[k], out[10 + k] = w[o + AT, 0, k], w[o + AT, 1, k]
+    out[FORCE], out[FORCE + 1] = h, v
 
 
 @kernel
-def flow(table, width, steps, start, load, out, w):
-    """Integrate over the steps [first, last) of a segment, with derivatives.
+def flow(table, width, steps, starts, loads, outs, w):
+    """Integrate over two segments with derivatives, side by side: each waits for its own results half of the time.
 
-    start: rotation, h, v, M at the segment's start; load: the line load's (wx, wy); w: work space.
-    out (20): phi, M, X, Y in rows of 5: value, then derivatives by rotation, h, v, M. X and Y count from the start.
-    Returns the force (h, v) at the end.
+    steps: the first of each and how many both have; starts: rotation, h, v, M at the start of each; loads: (wx, wy)
+    of the line load on each; w: work space. The outcome of each goes to its row of outs (2 of 22): phi, M, X, Y in
+    rows of 5: value, then derivatives by rotation, h, v, M; then the force h, v at the end. X and Y count from the
+    start.
     """
-    loaded = load[0] != 0.0 or load[1] != 0.0
-    for k in range(10):
-        w[AT, 0, k], w[AT, 1, k] = 0.0, 0.0
-    w[AT, 0, 0], w[AT, 0, 5] = start[0], start[3]
-    w[AT, 0, 1], w[AT, 0, 9] = 1.0, 1.0
-    h, v = start[1], start[2]
-    for step in range(steps[0], steps[1]):
-        length = width[step]
+    (one, other), (a, b) = starts, loads
+    loaded = a[0] != 0.0 or a[1] != 0.0 or b[0] != 0.0 or b[1] != 0.0
+    _begin(one, w, FIRST)
+    _begin(other, w, SECOND)
+    h, v, hh, vv = one[1], one[2], other[1], other[2]
+    for step in range(steps[2]):
+        p, q = steps[0] + step, steps[1] + step
+        length, far = width[p], width[q]
         for i in range(STAGES):
-            _combine(i, length, w)
-            fx, fy = h, v
+            _combine(i, length, w, FIRST)
+            _combine(i, far, w, SECOND)
             if loaded:
-                run = _run(table, step, length, i)
-                fx, fy = h - load[0] * run, v - load[1] * run
-            _slopes(table, step, i, fx, fy, w)
-        for i in range(STAGES):
-            weight = length * WEIGHTS[i]
-            if weight != 0.0:
-                for k in range(10):
-                    w[AT, 0, k] += weight * w[SLOPE, i, k]
-                    w[AT, 1, k] += weight * w[PLACE, i, k]
+                run, way = _run(table, p, length, i), _run(table, q, far, i)
+                _slopes(table, p, i, h - a[0] * run, v - a[1] * run, w, FIRST)
+                _slopes(table, q, i, hh - b[0] * way, vv - b[1] * way, w, SECOND)
+            else:
+                _slopes(table, p, i, h, v, w, FIRST)
+                _slopes(table, q, i, hh, vv, w, SECOND)
+        _advance(length, w, FIRST)
+        _advance(far, w, SECOND)
         if loaded:
-            run = _run(table, step, length, STAGES)
-            h -= load[0] * run
-            v -= load[1] * run
-    for k in range(10):
-        out[k], out[10 + k] = w[AT, 0, k], w[AT, 1, k]
-    return h, v
+            run, way = _run(table, p, length, STAGES), _run(table, q, far, STAGES)
+            h, v = h - a[0] * run, v - a[1] * run
+            hh, vv = hh - b[0] * way, vv - b[1] * way
+    _end(h, v, w, FIRST, outs[0])
+    _end(hh, vv, w, SECOND, outs[1])
 
 
 @kernel
@@ -188,4 +213,4 @@ def _plain_slopes(row, phi, moment, force, out):
     out[4] = 0.5 * (row[2] * moment * moment + row[3] * normal * normal + row[4] * shear * shear)
 
 
-__all__ = ["COLUMNS", "NODES", "STAGES", "flow", "plain_flow"]
+__all__ = ["COLUMNS", "FORCE", "NODES", "STAGES", "flow", "plain_flow"]

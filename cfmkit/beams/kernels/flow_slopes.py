@@ -10,7 +10,7 @@ import numpy as np
 
 from cfmkit.beams.kernels.compiler import inlined, kernel, maker
 from cfmkit.beams.kernels.flow import sincos
-from cfmkit.beams.kernels.rk8 import COUPLING, STAGES, WEIGHTS
+from cfmkit.beams.kernels.rk8 import COUPLING, SHARES, SOURCES, STAGES, TERMS, WEIGHTS
 
 ROWS = 7  # phi, M, X, Y, strain energy, h, v
 
@@ -42,11 +42,11 @@ def flow_slopes(table, width, steps, start, load, changes, at, state, rows, work
             place = _combined(table, step, width[step], i, start, load, (changes, o), state, base, slope, now, count)
             _stage(table, step, i, place, (changes, o + i * 5 * count), now, base, slope, count)
         start = _combined(table, step, width[step], STAGES, start, load, (changes, o), state, base, slope, now, count)
-        for j in range(STAGES):
-            w = width[step] * WEIGHTS[j]
-            if w != 0.0:
-                for q in range(2 * count, 5 * count):
-                    state[q] += w * slope[j, q]
+        for q in range(2 * count, 5 * count):
+            total = 0.0
+            for n in range(TERMS[STAGES]):
+                total += SHARES[STAGES, n] * slope[SOURCES[STAGES, n], q]
+            state[q] += width[step] * total
         for q in range(2 * count):
             state[q], state[5 * count + q] = now[q], now[2 * count + q]
     if keep:
@@ -61,15 +61,15 @@ def _combined(table, step, width, i, start, load, changed, state, base, slope, n
     Returns phi, h, v and M there.
     """
     phi, moment, h, v = start[0], start[3], start[1], start[2]
+    for n in range(TERMS[i]):
+        j, w = SOURCES[i, n], width * SHARES[i, n]
+        phi += w * base[j, 0]
+        moment += w * base[j, 1]
     for q in range(2 * count):
-        now[q], now[2 * count + q] = state[q], state[5 * count + q]
-    for j in range(i):
-        w = width * (WEIGHTS[j] if i == STAGES else COUPLING[i, j])
-        if w != 0.0:
-            phi += w * base[j, 0]
-            moment += w * base[j, 1]
-            for q in range(2 * count):
-                now[q] += w * slope[j, q]
+        total = 0.0
+        for n in range(TERMS[i]):
+            total += SHARES[i, n] * slope[SOURCES[i, n], q]
+        now[q], now[2 * count + q] = state[q] + width * total, state[5 * count + q]
     if load[0] != 0.0 or load[1] != 0.0:
         run = _run(table, step, width, i, changed, now, count)
         h, v = h - load[0] * run, v - load[1] * run

@@ -9,7 +9,7 @@ from cfmkit.beams.kernels.compiler import inlined, kernel
 from cfmkit.beams.kernels.springs import LINE, TURN, spring_law
 
 
-@kernel
+@inlined
 def value_slopes(m, tilt, k, drive, dz, values):
     """Set the derivatives of all degrees of freedom: dz of the free ones, the held ones as prescribed."""
     for i in range(values.shape[0]):
@@ -17,14 +17,14 @@ def value_slopes(m, tilt, k, drive, dz, values):
         values[i] = dz[slot, k] if slot >= 0 else tilt.base[k, i] + drive * tilt.rate[k, i]
 
 
-@kernel
+@inlined
 def value_changes(m, tilt, k, drive, values):
     """Set the derivatives of all degrees of freedom at unchanged unknowns."""
     for i in range(values.shape[0]):
         values[i] = 0.0 if m.slot[i] >= 0 else tilt.base[k, i] + drive * tilt.rate[k, i]
 
 
-@kernel
+@inlined
 def turned_force(m, tilt, k, i, pose, fx, fy, out):
     """Set the changes that an unchanged force at a place makes as its frame and arm turn; pose: see `pose_slope`."""
     dc, ds = tilt.frame[k, i, 0], tilt.frame[k, i, 1]

@@ -6,74 +6,18 @@ import numpy as np
 
 from cfmkit.beams.kernels.compiler import kernel, maker
 from cfmkit.beams.kernels.dense import copy
-from cfmkit.beams.kernels.newton import SOLVED, solve
+from cfmkit.beams.kernels.newton import SOLVED, all_slopes, solve
+from cfmkit.beams.kernels.predictor import KEPT, KEPT_WITH_SLOPES, MISSED, aim, changes, misses, remember, set_border
 
 DONE, STALLED, INERTIA, LONG, FULL, OUTSIDE, NO_START = range(7)
 """Why a march ended: all asked points reached; the smallest step failed; the number of unstable directions changed;
 a segment is too long for its load; no room for more points; the drive left its range; no equilibrium to start from."""
 
-KEPT = 6  # points that the extrapolation uses
 SHORT = 0.25  # dM1/dM0 of a segment below which it must be split
 SECANT = 0.25  # of the last step: shorter ones go along the tangent, from which the secants of long ones differ
+STRETCH = 1.3  # factor on a step that lands on an asked value: rather than a short one after it
+AGAIN = 1e-5  # change of a pose between two solutions of one point
 INFO = 6  # unstable directions, index of the asked point or -1, parameter, iterations, d(drive)/ds, shortness
-
-
-@kernel
-def _predict(times, past, count, t, y):
-    """Extrapolate the kept points (newest first) to t by their polynomial."""
-    for k in range(y.shape[0]):
-        y[k] = 0.0
-    for i in range(count):
-        weight = 1.0
-        for j in range(count):
-            if j != i:
-                weight *= (t - times[j]) / (times[i] - times[j])
-        for k in range(y.shape[0]):
-            y[k] += weight * past[i, k]
-
-
-@kernel
-def _remember(times, past, count, t, y, drive):
-    """Put a point in front of the kept ones; return how many there are."""
-    for i in range(KEPT - 1, 0, -1):
-        times[i] = times[i - 1]
-        copy(past[i], past[i - 1])
-    times[0] = t
-    for k in range(y.shape[0]):
-        past[0, k] = y[k]
-    past[0, y.shape[0]] = drive
-    return min(count + 1, KEPT)
-
-
-@kernel
-def _changes(y, other, n_free, n):
-    """Return the largest difference of the poses of two states."""
-    change = 0.0
-    for i in range(y.shape[0]):
-        if i < n_free or (i >= n and (i - n) % 6 < 3):
-            change = max(change, abs(y[i] - other[i]))
-    return change
-
-
-@kernel
-def _border(natural, tangent, weight, n_free, border):
-    """Set the bordering row: the drive itself, or the weighted tangent."""
-    n = border.shape[0] - 1
-    for i in range(n + 1):
-        border[i] = 0.0
-    if natural:
-        border[n] = 1.0
-        return
-    norm = tangent[n] * tangent[n]
-    for i in range(n):
-        w = 1.0 if i < n_free else weight
-        border[i] = w * tangent[i]
-        norm += w * tangent[i] * tangent[i]
-    border[n] = tangent[n]
-    scale = 1.0 / np.sqrt(norm)
-    for i in range(n + 1):
-        border[i] *= scale
-        tangent[i] *= scale
 
 
 @kernel
@@ -86,36 +30,12 @@ def _store(k, y, state, row, outs):
 
 
 @kernel
-def _aim(y, state, border, tangent, paths, natural, goal, ahead):
-    """Set the first guess of the next point; return the right side of the bordering row.
-
-    paths: times, kept points, how many, present parameter. In natural steps the right side is the drive's value.
-    """
-    times, past, count, t, guess = paths
-    n, size = border.shape[0] - 1, y.shape[0]
-    _predict(times, past, count, t + ahead, guess)
-    if count == 1:
-        for i in range(n):
-            guess[i] += tangent[i] * ahead
-        guess[size] += tangent[n] * ahead
-    copy(y, guess)
-    if natural:
-        state[0] = goal
-        return goal
-    state[0] = guess[size]
-    level = border[n] * past[0, size] + ahead
-    for i in range(n):
-        level += border[i] * past[0, i]
-    return level
-
-
-@kernel
 def _next_step(natural, step, old, targets, asked):
     """Return the advance to the next point, whether it lands on an asked value, and that value of the drive."""
     if not natural:
         return abs(step), False, 0.0
     left = targets[asked] - old
-    if abs(left) <= abs(step) * 1.0001:
+    if abs(left) <= STRETCH * abs(step):
         return left, True, targets[asked]
     ahead = step if left * step > 0.0 else -step
     return ahead, False, old + ahead
@@ -131,13 +51,31 @@ def _forward(border, tangent):
 
 
 @kernel
-def _store_start(y, state, tangent, sense, row, outs):
-    """Store the equilibrium that a path starts from, and give its tangent a sense; row: see `_store`."""
-    n = tangent.shape[0] - 1
-    row[0], row[1], row[3] = -1.0, 0.0, tangent[n]
-    _store(0, y, state, row, outs)
-    for i in range(n + 1):
-        tangent[i] *= sense
+def _begin(m, n_free, y, drive, natural, spaces, options, outs, scratch):
+    """Solve for the start where it is only near an equilibrium, and store it; in natural steps set the slopes there.
+
+    Returns how many points are stored, -1 where there is no start, and whether the slopes are known. The tangent gets
+    the path's sense.
+    """
+    state, unit, row, new, tangent, slope = spaces
+    n, fresh = unit.shape[0] - 1, options[12] != 0.0
+    if not (natural or fresh):
+        return 0, False
+    copy(new, y)
+    state[0] = drive
+    code, row[2] = solve(m, n_free, new, state, unit, drive, (options[0], options[1]), tangent, scratch)
+    if fresh:
+        if code != SOLVED:
+            return -1, False
+        copy(y, new)
+        row[0], row[1], row[3] = -1.0, 0.0, tangent[n]
+        _store(0, y, state, row, outs)
+        for i in range(n + 1):
+            tangent[i] *= 1.0 if natural else options[12]
+    known = natural and code == SOLVED and changes(new, y, n_free, n) < AGAIN
+    if known:
+        all_slopes(m, n_free, tangent, slope, scratch)
+    return (1 if fresh else 0), known
 
 
 @kernel
@@ -169,29 +107,31 @@ def march(m, n_free, y, drive, tangent, targets, options, outs, scratch):
     """
     natural, step, smallest, greatest, turn = options[2] > 0.5, options[3], options[4], options[5], options[6]
     n, size = tangent.shape[0] - 1, y.shape[0]
-    times, past = np.zeros(KEPT), np.zeros((KEPT, size + 1))
-    guess, new, state, row = np.empty(size + 1), np.empty(size), np.zeros(5), np.empty(4)
+    kept = (np.zeros(KEPT), np.zeros((KEPT, size + 1)), np.zeros((KEPT, size + 1)))
+    times, past, slopes = kept
+    guess, new, state, row, slope = np.empty(size + 1), np.empty(size), np.zeros(6), np.empty(4), np.zeros(size + 1)
     border, new_tangent, unit = np.empty(n + 1), np.empty(n + 1), np.zeros(n + 1)
     unit[n] = 1.0
-    t, stored, asked, index = (drive if natural else 0.0), 0, 0, options[11]
-    if options[12] != 0.0:
-        state[0] = drive
-        code, row[2] = solve(m, n_free, y, state, unit, drive, (options[0], options[1]), tangent, scratch)
-        if code != SOLVED:
-            return NO_START, 0
-        _store_start(y, state, tangent, 1.0 if natural else options[12], row, outs)
-        stored, index = 1, state[1]
-    count = _remember(times, past, 0, t, y, drive)
+    spaces = (state, unit, row, new, tangent, slope)
+    stored, known = _begin(m, n_free, y, drive, natural, spaces, options, outs, scratch)
+    if stored < 0:
+        return NO_START, 0
+    t, asked, index = (drive if natural else 0.0), 0, (state[1] if stored == 1 else options[11])
+    most = KEPT_WITH_SLOPES if natural else KEPT
+    count = remember(kept, 0, t, y, drive, slope, most)
     while asked < targets.shape[0]:
         if stored + targets.shape[0] - asked + 1 >= outs[0].shape[0]:
             return FULL, stored
         old = past[0]
-        _border(natural, tangent, options[7], n_free, border)
+        set_border(natural, tangent, options[7], n_free, border)
         ahead, landing, goal = _next_step(natural, step, old[size], targets, asked)
-        goal = _aim(new, state, border, tangent, (times, past, count, t, guess), natural, goal, ahead)
+        goal = aim(new, state, border, tangent, (kept, count, t, guess), natural, goal, ahead)
         code, iterations = solve(m, n_free, new, state, border, goal, (options[0], options[1]), new_tangent, scratch)
-        moved, missed = _changes(new, old, n_free, n), _changes(new, guess, n_free, n)
-        near = moved <= turn and (count == 1 or missed <= 0.4 * moved + 1e-7)
+        moved, missed = changes(new, old, n_free, n), changes(new, guess, n_free, n)
+        if natural and code == SOLVED:
+            all_slopes(m, n_free, new_tangent, slope, scratch)
+        bent = misses(old, new, slopes[0], slope, ahead, n_free, n) if known else 0.0
+        near = moved <= turn and max(bent, missed if count > 1 else 0.0) <= MISSED * moved + 1e-7
         passed = _passed(state, index, count, natural, options[10] > 0.5) and abs(ahead) > 4.0 * smallest
         if code != SOLVED or passed or not near or not (natural or _forward(border, new_tangent)):
             step = 0.5 * ahead if natural else 0.5 * step
@@ -210,7 +150,8 @@ def march(m, n_free, y, drive, tangent, targets, options, outs, scratch):
         row[0], row[1], row[2], row[3] = (float(asked) if landing else -1.0), t, float(iterations), new_tangent[n]
         _store(stored, new, state, row, outs)
         stored, asked = stored + 1, asked + (1 if landing else 0)
-        count = _remember(times, past, count, t, new, state[0])
+        count = remember(kept, count if known or not natural else 0, t, new, state[0], slope, most)
+        known = natural
         copy(tangent, new_tangent)
         if options[10] > 0.5 and state[1] != index:
             return INERTIA, stored
@@ -231,7 +172,7 @@ def _between(m, n_free, old, new, state, targets, asked, stored, options, outs, 
     """
     size = new.shape[0]
     n_all = targets.shape[0]
-    y, s = np.empty(size), np.zeros(5)
+    y, s = np.empty(size), np.zeros(6)
     row, tangent = np.empty(4), np.empty(unit.shape[0])
     before, after = old[size], state[0]
     rising = after > before
@@ -248,7 +189,7 @@ def _between(m, n_free, old, new, state, targets, asked, stored, options, outs, 
         s[0] = value
         code, iterations = solve(m, n_free, y, s, unit, value, (options[0], options[1]), tangent, scratch)
         n = unit.shape[0] - 1
-        if code == SOLVED and _changes(y, new, n_free, n) <= 1.5 * _changes(new, old, n_free, n) + 1e-7:
+        if code == SOLVED and changes(y, new, n_free, n) <= 1.5 * changes(new, old, n_free, n) + 1e-7:
             row[0], row[1], row[2], row[3] = float(k), -1.0, float(iterations), (1.0 if rising else -1.0)
             _store(stored, y, s, row, outs)
             stored += 1

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from cfmkit.beams.kernels.chain import C_D, E2, SMALL, E, F, G, places_of, pose_of, sweep, unfold
-from cfmkit.beams.kernels.compiler import kernel, maker
+from cfmkit.beams.kernels.chain import C_D, E2, SMALL, E, F, G, flows, places_of, pose_of, sweep, unfold
+from cfmkit.beams.kernels.compiler import inlined, kernel, maker
 from cfmkit.beams.kernels.dense import clear, copy_matrix, lu_solve, positive_count
-from cfmkit.beams.kernels.springs import add_block, add_force, add_loads, add_springs, jacobian, wires_of
+from cfmkit.beams.kernels.springs import acts, add_block, add_force, add_loads, add_springs, jacobian, wires_of
 
 SOLVED, SINGULAR, DIVERGED, SLOW = 0, 1, 2, 3
 LARGEST_TURN = 1.0  # longest Newton step [rad or lengths]: longer ones are shortened, not refused
@@ -35,12 +35,17 @@ def assemble(m, y, drive, n_free, h, residual, values, ends, rel, store, work):
     n_beams = m.beam_end.shape[0]
     n_dofs = values.shape[0]
     n = n_free + 3 * n_beams
-    room, jacobians, _ = work
+    room, jacobians, _, _ = work
     ja, jb, force = jacobians[0], jacobians[1], room[4, 0]
     places, wires = places_of(m), wires_of(m)
     index, least = 0, 1.0
     add_loads(m, values, drive, h, residual, work)
     add_springs(m, values, h, residual, work)
+    for e in range(n_beams):
+        pose_of(places, values, m.beam_end[e, 0], ends[0])
+        at = n + 6 * m.beam_segment[e]
+        y[at], y[at + 1], y[at + 2] = ends[0, 0], ends[0, 1], ends[0, 2]
+    flows(m, y, n, drive, work)
     for e in range(n_beams):
         ia, ib = m.beam_end[e, 0], m.beam_end[e, 1]
         arm_a, arm_b = pose_of(places, values, ia, ends[0]), pose_of(places, values, ib, ends[1])
@@ -65,28 +70,31 @@ def assemble(m, y, drive, n_free, h, residual, values, ends, rel, store, work):
     return index, least
 
 
-@kernel
+@inlined
 def _couple(m, h, e, last, ia, ib, ja, jb, rel):
     """Add the blocks between a beam's last force and the degrees of freedom of its ends."""
-    n = h.shape[0] - 1
+    n, wires = h.shape[0] - 1, wires_of(m)
     for a in range(4):
         da, db = m.place_dof[ia, a], m.place_dof[ib, a]
         row_a, row_b = m.slot[da], m.slot[db]
-        for r in range(3):
-            start, closure = 0.0, 0.0
-            for s in range(3):
-                start += ja[s, a] * rel[E2, s, r]
-                closure += rel[E, r, s] * ja[s, a]
-            if row_a >= 0:
-                h[row_a, last + r] += start
-                h[last + r, row_a] += closure
-            else:
-                h[last + r, n] += closure * m.rate[da]
-            if row_b >= 0:
-                h[row_b, last + r] -= jb[r, a]
-                h[last + r, row_b] -= jb[r, a]
-            else:
-                h[last + r, n] -= jb[r, a] * m.rate[db]
+        if acts(wires, da):
+            for r in range(3):
+                start, closure = 0.0, 0.0
+                for s in range(3):
+                    start += ja[s, a] * rel[E2, s, r]
+                    closure += rel[E, r, s] * ja[s, a]
+                if row_a >= 0:
+                    h[row_a, last + r] += start
+                    h[last + r, row_a] += closure
+                else:
+                    h[last + r, n] += closure * m.rate[da]
+        if acts(wires, db):
+            for r in range(3):
+                if row_b >= 0:
+                    h[row_b, last + r] -= jb[r, a]
+                    h[last + r, row_b] -= jb[r, a]
+                else:
+                    h[last + r, n] -= jb[r, a] * m.rate[db]
         if row_a >= 0:
             for s in range(3):
                 h[row_a, n] += ja[s, a] * rel[SMALL, s, 1]
@@ -149,12 +157,25 @@ def largest(dy, y, n_free, n):
 
 
 @kernel
+def _log_determinant(factors, advance):
+    """Return the logarithm of the size of the Jacobian's determinant from the factors of the bordered system.
+
+    advance: the drive per unit along the border, which by Cramer's rule is the ratio of the two determinants.
+    """
+    total = np.log(abs(advance))
+    for i in range(factors.shape[0]):
+        total += np.log(abs(factors[i, i]))
+    return total
+
+
+@kernel
 def solve(m, n_free, y, state, border, target, limits, tangent, scratch):
     """Newton's method for equilibrium with border . (z, drive) = target; y and state[0] (the drive) are updated.
 
     limits: (tolerance, most iterations). On return tangent holds d(z, drive) per unit along the border and
     state[1:4] the number of unstable directions, the shortness measure and the last increment. state[4] carries from
-    one solution to the next how the increment follows from the square of the one before.
+    one solution to the next how the increment follows from the square of the one before. If state[5] is not zero, it
+    is set to the logarithm of the size of the determinant of d(residual)/dz.
     Returns a code and the number of iterations.
     """
     h, h2, rhs, residual, values, ends, rel, store, work, dy = scratch
@@ -168,7 +189,7 @@ def solve(m, n_free, y, state, border, target, limits, tangent, scratch):
             return SINGULAR, iteration
         for i in range(n):
             dy[i] = rhs[i, 0]
-        _unfold_all(m, n_free, n, rhs[n, 0], values, rel, store, dy, work)
+        _unfold_all(m, n_free, 1.0, rhs[n, 0], dy, scratch)
         pose, force = largest(dy, y, n_free, n)
         if not (np.isfinite(pose) and np.isfinite(force)):
             return DIVERGED, iteration
@@ -183,6 +204,8 @@ def solve(m, n_free, y, state, border, target, limits, tangent, scratch):
         if share == 1.0 and (growth * size * size < limits[0] or size < 1e-2 * limits[0]):
             for i in range(n + 1):
                 tangent[i] = rhs[i, 1]
+            if state[5] != 0.0:
+                state[5] = _log_determinant(h2, tangent[n])
             state[1] = tangent_index(h, n_free, index, h2)
             state[2], state[3] = least, size
             return SOLVED, iteration + 1
@@ -196,7 +219,7 @@ def solve(m, n_free, y, state, border, target, limits, tangent, scratch):
 def solve_each(m, n_free, ys, drives, limits, solved, scratch):
     """Solve for the equilibria near (ys, drives) at these drives; solved (points,) is set to one where it worked."""
     n = scratch[0].shape[0] - 1
-    state, tangent, unit = np.zeros(5), np.empty(n + 1), np.zeros(n + 1)
+    state, tangent, unit = np.zeros(6), np.empty(n + 1), np.zeros(n + 1)
     unit[n] = 1.0
     for p in range(ys.shape[0]):
         state[0], state[4] = drives[p], 0.0
@@ -205,10 +228,11 @@ def solve_each(m, n_free, ys, drives, limits, solved, scratch):
 
 
 @kernel
-def _unfold_all(m, n_free, n, ddrive, values, rel, store, dy, work):
-    """Set the increments of the segments' unknowns from those of z (already in dy) and of the drive."""
-    room, jacobians, _ = work
-    dpose, jac, pose = room[7, 0], jacobians[0], room[7, 1]
+def _unfold_all(m, n_free, errors, ddrive, dy, scratch):
+    """Set the increments of the segments' unknowns from those of z (already in dy) and of the drive; see `unfold`."""
+    h, _, _, _, values, _, _, store, work, _ = scratch
+    room, jacobians, _, _ = work
+    n, dpose, jac, pose = h.shape[0] - 1, room[7, 0], jacobians[0], room[7, 1]
     places = places_of(m)
     for e in range(m.beam_end.shape[0]):
         ia = m.beam_end[e, 0]
@@ -222,7 +246,17 @@ def _unfold_all(m, n_free, n, ddrive, values, rel, store, dy, work):
                 change = dy[slot] if slot >= 0 else m.rate[d] * ddrive
                 dpose[r] += jac[r, a] * change
         last = n_free + 3 * e
-        unfold(m, e, (n_free, n), store, dpose, dy[last : last + 3], ddrive, dy)
+        unfold(m, e, (n_free, n), store, dpose, dy[last : last + 3], errors, ddrive, dy)
 
 
-__all__ = ["DIVERGED", "SINGULAR", "SLOW", "SOLVED", "all_values", "assemble", "solve", "solve_each"]
+@kernel
+def all_slopes(m, n_free, tangent, slope, scratch):
+    """Set the derivatives of all unknowns and of the drive from those of z and the drive, after `solve`."""
+    n = tangent.shape[0] - 1
+    for i in range(n):
+        slope[i] = tangent[i]
+    _unfold_all(m, n_free, 0.0, tangent[n], slope, scratch)
+    slope[slope.shape[0] - 1] = tangent[n]
+
+
+__all__ = ["DIVERGED", "SINGULAR", "SLOW", "SOLVED", "all_slopes", "all_values", "assemble", "solve", "solve_each"]

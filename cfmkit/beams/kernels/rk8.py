@@ -105,3 +105,16 @@ WEIGHTS = np.array(
     ]
 )
 """Weights of the slopes in the step."""
+
+TERMS = np.array([*(COUPLING != 0.0).sum(axis=1), (WEIGHTS != 0.0).sum()])
+"""How many earlier slopes enter a stage, and in the last place the step."""
+
+SOURCES = np.zeros((STAGES + 1, STAGES), dtype=np.int64)
+"""Which they are."""
+
+SHARES = np.zeros((STAGES + 1, STAGES))
+"""With which weight each does."""
+
+for _i, _row in enumerate([*COUPLING, WEIGHTS]):
+    SOURCES[_i, : TERMS[_i]] = np.flatnonzero(_row)
+    SHARES[_i, : TERMS[_i]] = _row[_row != 0.0]

@@ -30,6 +30,12 @@ def wires_of(m):
 
 
 @inlined
+def acts(wires, i):
+    """Tell whether a degree of freedom moves: freely or with the drive."""
+    return wires[1][i] >= 0 or wires[2][i] != 0.0
+
+
+@inlined
 def add_entry(wires, h, i, j, value):
     """Add d(residual i)/d(dof j) to the system; driven degrees of freedom go to the drive's column."""
     _, slots, rates = wires
@@ -45,15 +51,18 @@ def add_entry(wires, h, i, j, value):
 @kernel
 def add_block(wires, h, i, j, left, block, right):
     """Add left^T block right for the degrees of freedom of attachments i and j."""
-    dofs = wires[0]
+    dofs, slots, _ = wires
     for b in range(4):
+        if not acts(wires, dofs[j, b]):
+            continue
         p = q = t = 0.0
         for s in range(3):
             p += block[0, s] * right[s, b]
             q += block[1, s] * right[s, b]
             t += block[2, s] * right[s, b]
         for a in range(4):
-            add_entry(wires, h, dofs[i, a], dofs[j, b], left[0, a] * p + left[1, a] * q + left[2, a] * t)
+            if slots[dofs[i, a]] >= 0:
+                add_entry(wires, h, dofs[i, a], dofs[j, b], left[0, a] * p + left[1, a] * q + left[2, a] * t)
 
 
 @kernel
@@ -68,7 +77,7 @@ def add_force(wires, h, residual, i, arm, jac, force):
 @kernel
 def add_loads(m, values, drive, h, residual, work):
     """Add the point loads, dead or turning with their node."""
-    room, jacobians, _ = work
+    room, jacobians, _, _ = work
     pose, jac, force, column = room[5, 0], jacobians[0], room[5, 1], room[5, 2]
     n = h.shape[0] - 1
     places, wires = places_of(m), wires_of(m)
@@ -132,7 +141,7 @@ def spring_law(kind, value, pa, pb, force, block):
 @kernel
 def add_springs(m, values, h, residual, work):
     """Add the springs; return their energy."""
-    room, jacobians, block = work
+    room, jacobians, block, _ = work
     pa, pb, force, ja, jb = room[6, 0], room[6, 1], room[6, 2], jacobians[0], jacobians[1]
     places, wires = places_of(m), wires_of(m)
     energy = 0.0

@@ -88,9 +88,10 @@ class Response:
         """
         try:
             found = gradient(self.path, self.variables.build, self.x)
+            rows, effort = found.rows, found.effort  # in this order: with the rows the efforts are known
         except (CfmError, np.linalg.LinAlgError):
             raise NoAnswer from None
-        return State(found.effort * self.variables.task.copies, self._lines(np.moveaxis(found.rows, 2, 0)))
+        return State(effort * self.variables.task.copies, self._lines(np.moveaxis(rows, 2, 0)))
 
     def _lines(self, states: FloatArray) -> dict[str, Line]:
         """Return the beams from dimensionless states (7, p, rows, ...)."""

@@ -1,0 +1,58 @@
+"""How accurate the points of a path are: the same equilibria on a mesh with half the step."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.beams.solver import Solver
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from cfmkit.beams.run import Run
+    from cfmkit.curves import FloatArray
+
+
+def largest_force(run: Run) -> FloatArray:
+    """Return the largest dimensionless force or moment at the end of a beam at every point."""
+    forces: FloatArray = np.abs(run.points.y[:, run.solver.n_free : run.solver.n]).max(axis=1)
+    return forces
+
+
+def estimate(run: Run) -> float:
+    """Return the largest of `errors` at up to three points: middle, last, and where the forces are largest."""
+    count = len(run.points)
+    if not count:
+        return 0.0
+    forces = largest_force(run)
+    hardest = int(forces.argmax())
+    return float(errors(run, {count // 2, count - 1, hardest}, float(forces[hardest])).max())
+
+
+def errors(run: Run, indices: Iterable[int], largest: float) -> FloatArray:
+    """Return the difference to a mesh of twice the steps at points: forces and positions, relative to the path.
+
+    `largest` is the path's largest force. Infinite where the finer mesh has no equilibrium nearby.
+    """
+    tolerance = max(run.solver.tolerance, 0.02 * run.control.tolerance)
+    fine = Solver(run.layout, run.mesh.finer(), tolerance, run.solver)
+    n, free = run.solver.n, run.solver.n_free
+    scale = max(1e-12, largest)
+    chosen = np.array(sorted(indices))
+    ys, drives = run.points.y[chosen], run.points.drive[chosen]
+    near, solved = fine.solve_each(ys, drives)
+    change, far, moved = np.abs(near - ys), 0.1 * max(1.0, scale), np.zeros(len(drives))
+    sure = solved.all() and change.max() <= far
+    for k in () if sure else np.flatnonzero(~solved | (change.max(axis=1) > far)):
+        border = run.spot(int(chosen[k])).tangent
+        level = float(border[:-1] @ ys[k, :n] + border[-1] * drives[k])
+        across = fine.solve(ys[k], float(drives[k]), border, level)  # where the path turns back
+        there = across is not None and np.abs(across.y - ys[k]).max() <= far
+        change[k], moved[k] = np.inf, np.inf
+        if there and across is not None:
+            change[k], moved[k] = np.abs(across.y - ys[k]), abs(across.drive - drives[k])
+    change[:, free:n] /= scale
+    found: FloatArray = np.maximum(change[:, :n].max(axis=1), moved)
+    return found
