@@ -1,6 +1,6 @@
 """Settings of all tests: property tests try the same examples in every run, unless a search for new ones is asked for.
 
-``CFMKIT_TEST_SEARCH=1 python -m pytest`` draws new examples.
+``CFMKIT_TEST_SEARCH=1 pytest`` draws new examples.
 """
 
 from __future__ import annotations

@@ -1,5 +1,8 @@
 """What the tests of the output folder have in common."""
 
+import os
+
+from cfmkit.errors import FolderInUse
 from cfmkit.store import RunFolder
 
 INFO = {"arguments": ["design", "cam.yaml"], "seed": 0, "status": "complete", "exit_code": 0}
@@ -21,3 +24,15 @@ def listing(path):
 def one_line(error):
     text = str(error.value)
     return "\n" not in text and len(text) < 700
+
+
+def enter_and_leave(path, count, entered):
+    """Begin and end runs over and over; count those that found the folder free."""
+    for _ in range(count):
+        try:
+            with RunFolder(path) as folder:
+                folder.write("a.csv", str(os.getpid()).encode())
+                with entered.get_lock():
+                    entered.value += 1
+        except FolderInUse:
+            pass

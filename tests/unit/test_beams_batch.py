@@ -7,19 +7,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+from batch_networks import bent, last_effort, standing
 
 from cfmkit.beams import (
-    CLAMPED,
-    Beam,
     Control,
     Displacement,
     Network,
-    Node,
-    Path,
     PathStatus,
-    Section,
-    arc,
-    guided,
     trace,
 )
 from cfmkit.beams.batch import trace_many
@@ -28,16 +22,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 DRIVE = Displacement("d", -np.pi / 2, np.array([1e-3, 2e-3]))
-
-
-def bent(sweep: float, height: float = 0.03) -> Network:
-    nodes = {"a": Node(0, 0, CLAMPED), "d": Node(0.05, height, guided(np.pi / 2))}
-    return Network(nodes, {"x": Beam("a", "d", Section(2e9, 1e-2, 1e-3), arc(sweep))})
-
-
-def standing(height: float) -> Network:
-    nodes = {"a": Node(0, 0, CLAMPED), "d": Node(0.05, height, guided(np.pi / 2))}
-    return Network(nodes, {"x": Beam("a", "d", Section(2e9, 1e-2, height / 30))})
 
 
 def test_a_batch_gives_each_network_its_own_curve_in_order() -> None:
@@ -72,10 +56,6 @@ def test_functions_are_called_for_networks_where_they_are_traced(workers: int) -
     assert "thickness must be positive" in found[1].message
     path = trace(standing(0.03), DRIVE)
     np.testing.assert_array_equal(found[0].value.effort, path.effort[path.at_asked])
-
-
-def last_effort(path: Path) -> float:
-    return float(path.effort[-1])
 
 
 def test_what_a_function_collects_comes_from_processes_as_it_is() -> None:

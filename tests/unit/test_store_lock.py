@@ -8,7 +8,7 @@ import threading
 from types import SimpleNamespace
 
 import pytest
-from store_support import INFO, listing, one_line, run
+from store_support import INFO, enter_and_leave, listing, one_line, run
 
 from cfmkit.errors import FolderInUse, OutputError
 from cfmkit.store import RunFolder, disk, lock
@@ -170,21 +170,10 @@ def test_the_end_of_a_run_does_not_remove_the_lock_of_another(tmp_path):
     assert (tmp_path / lock.LOCK).read_bytes() == b"of another run"
 
 
-def _enter_and_leave(path, count, entered):
-    for _ in range(count):
-        try:
-            with RunFolder(path) as folder:
-                folder.write("a.csv", str(os.getpid()).encode())
-                with entered.get_lock():
-                    entered.value += 1
-        except FolderInUse:
-            pass
-
-
 def test_runs_that_come_and_go_never_trip_over_each_other(tmp_path):
     context = multiprocessing.get_context("spawn")
     entered = context.Value("i", 0)
-    workers = [context.Process(target=_enter_and_leave, args=(tmp_path / "a" / "out", 150, entered)) for _ in range(3)]
+    workers = [context.Process(target=enter_and_leave, args=(tmp_path / "a" / "out", 150, entered)) for _ in range(3)]
     for worker in workers:
         worker.start()
     for worker in workers:
