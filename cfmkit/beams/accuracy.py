@@ -6,8 +6,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.beams.solver import Solver
-
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
@@ -37,7 +35,7 @@ def errors(run: Run, indices: Iterable[int], largest: float) -> FloatArray:
     `largest` is the path's largest force. Infinite where the finer mesh has no equilibrium nearby.
     """
     tolerance = max(run.solver.tolerance, 0.02 * run.control.tolerance)
-    fine = Solver(run.layout, run.mesh.finer(), tolerance, run.solver)
+    fine = run.solver.finer(tolerance)
     n, free = run.solver.n, run.solver.n_free
     scale = max(1e-12, largest)
     chosen = np.array(sorted(indices))

@@ -70,9 +70,9 @@ class Spot:
 class Solver:
     """Equilibria of a layout on a mesh. Holds work space: not for two threads at once."""
 
-    def __init__(self, layout: Layout, mesh: Mesh, tolerance: float = 1e-11, like: Solver | None = None) -> None:
-        """Build the arrays; what does not depend on the mesh is taken over from a solver of the same layout."""
-        self.layout, self.mesh, self.tolerance, self.like = layout, mesh, tolerance, like
+    def __init__(self, layout: Layout, mesh: Mesh, tolerance: float = 1e-11) -> None:
+        """Build the arrays."""
+        self.layout, self.mesh, self.tolerance = layout, mesh, tolerance
         self.cut = grid(layout, mesh)
         self.table = table(layout, self.cut)
         self.model: Model = self._build()
@@ -82,19 +82,24 @@ class Solver:
         self.n_segments = len(self.cut.segment_step) - 1
         self.n = self.n_free + 3 * self.n_beams
         self.size = self.n + 6 * self.n_segments
-        alike = like is not None and like.mesh.segments == mesh.segments
-        self.scratch: tuple[Any, ...] = like.scratch if like is not None and alike else self._scratch()
+        self.scratch = self._scratch()
         self.limits = np.array([tolerance, float(ITERATIONS)])
         self.unit = np.zeros(self.n + 1)
         self.unit[-1] = 1.0
 
+    def finer(self, tolerance: float) -> Solver:
+        """Return a solver with twice as many steps in every segment; the two share their work space."""
+        fine = object.__new__(type(self))  # `copy` takes its time
+        vars(fine).update(vars(self))
+        fine.mesh, fine.tolerance = self.mesh.finer(), tolerance
+        fine.cut = cut = grid(self.layout, fine.mesh)
+        fine.table = table(self.layout, cut)
+        fine.model = self.model._replace(table=fine.table, width=cut.width, segment_step=cut.segment_step)
+        fine.limits = np.array([tolerance, float(ITERATIONS)])
+        return fine
+
     def _build(self) -> Model:
-        if self.like is None:
-            return assemble_model(self.layout, self.cut, self.table)
-        cut = self.cut
-        return self.like.model._replace(
-            table=self.table, width=cut.width, segment_step=cut.segment_step, beam_segment=cut.beam_segment
-        )
+        return assemble_model(self.layout, self.cut, self.table)
 
     def _count_free(self) -> int:
         return self.layout.plan.n_free
