@@ -67,6 +67,8 @@ class _Search:
         self.border = solver.unit if natural else chord
         self.start, self.stop = self._level(one), self._level(other)
         self.own = not solver.model.load_follows.any()  # whether the tangent is symmetric
+        largest = max(self._log_size(one), self._log_size(other))
+        self.log_unit = largest if math.isfinite(largest) else 0.0  # sizes in this unit: of many beams they overflow
         self.samples = [(0.0, self._measure(one), one), (1.0, self._measure(other), other)]
         self.low, self.high = self.samples[0][:2], self.samples[1][:2]
         self.scale = max(abs(self.low[1]), abs(self.high[1]))
@@ -76,14 +78,19 @@ class _Search:
 
     def _measure(self, spot: Spot) -> float:
         """Return the size of the tangent's determinant: positive with the inertia of the first end, else negative."""
-        known = self.own and not np.isnan(spot.log_size)
-        size = math.exp(spot.log_size) if known else self._size(spot.y, spot.drive)
+        size = self._size(spot)
         return size if spot.unstable == self.one.unstable else -size
 
-    def _size(self, y: FloatArray, drive: float) -> float:
+    def _size(self, spot: Spot) -> float:
         """Return the size of the tangent's determinant."""
-        matrix, _ = self.solver.tangent_at(y, drive)
-        return float(np.exp(np.linalg.slogdet(matrix)[1]))
+        return math.exp(self._log_size(spot) - self.log_unit)
+
+    def _log_size(self, spot: Spot) -> float:
+        """Return the logarithm of that size, which a solution brings along where the tangent is symmetric."""
+        if self.own and not math.isnan(spot.log_size):
+            return spot.log_size
+        matrix, _ = self.solver.tangent_at(spot.y, spot.drive)
+        return float(np.linalg.slogdet(matrix)[1])
 
     def closer(self, middle: bool) -> bool:
         """Shrink the bracket once; tell whether to go on."""
@@ -95,7 +102,7 @@ class _Search:
             share = guess if low + 1e-3 * (high - low) < guess < high - 1e-3 * (high - low) else share
         y, drive = self._guess(share)
         loose = self.close > _CLOSE and len(self.samples) > 2
-        if loose and self._size(y, drive) < self.close * self.scale:
+        if loose and self._size(Spot(y, drive, self.border)) < self.close * self.scale:
             return False  # near enough: solving there, where no system is regular, would take long
         near = self.solver.solve(y, drive, self.border, self.start + share * (self.stop - self.start))
         if near is None:
