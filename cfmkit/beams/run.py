@@ -137,7 +137,7 @@ class Run:
 
     def append(self, points: Points) -> None:
         """Add points to the path, on the present branch."""
-        self.points = self.points.joined(points) if len(self.points) else points
+        self.points = self.points.joined(points)  # also the first: what a march returns are views of far more room
         self.branches += [self.branch] * len(points)
 
     def spot(self, index: int) -> Spot:
@@ -174,9 +174,10 @@ class Run:
         return code, self.asked(), spot
 
     def _left(self, spot: Spot, asked: int) -> tuple[FloatArray, FloatArray | None]:
-        """Return the values of the drive still to be reached and the numbers of those that were asked for, if others.
+        """Return the values of the drive still to be reached and their numbers among those asked for.
 
-        A branch that is known to end is followed to just before its end. The last number stands for no number.
+        No numbers where these are all that were asked for. A branch that is known to end is followed to just before its
+        end. The last number stands for no number.
         """
         if not self.natural or (asked == 0 and self.end is None):
             return self.targets, None

@@ -123,3 +123,9 @@ def test_a_bifurcation_is_found_however_large_or_small_the_determinant_is(
     found = trace(network, drive, control).events
     assert [event.kind for event in usual] == [event.kind for event in found] == ["bifurcation"]
     assert found[0].drive == pytest.approx(usual[0].drive, rel=1e-9)
+
+
+def test_a_path_keeps_no_more_memory_than_its_points_take() -> None:
+    network, rise = half_arch(4.0)
+    points = trace(network, Displacement("middle", -UP, [0.1 * rise])).points
+    assert all(part.base is None or part.base.nbytes == part.nbytes for part in points.parts)
