@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from cfmkit.beams.beam import Beam
 
 
-_NONE = (0.0, 0.0, 0.0)
+_NONE = (0.0, 0.0, 0.0)  # not displaced
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class Support:
 
     def __post_init__(self) -> None:
         """Refuse displacements of motions that are free."""
-        if self.displacement == _NONE:
+        if tuple(self.displacement) == _NONE:
             return
         for held, value, name in zip(
             (self.along, self.across, self.rotation), self.displacement, ("along", "across", "rotation"), strict=True
@@ -247,4 +247,5 @@ def _ends(spring: Spring) -> list[str]:
 
 def same_direction(one: float, other: float) -> bool:
     """Tell whether two directions [rad] are parallel, in either sense."""
-    return abs(math.sin(one.real - other.real)) < 1e-12
+    between = one.real - other.real
+    return math.isfinite(between) and abs(math.sin(between)) < 1e-12

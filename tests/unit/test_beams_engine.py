@@ -375,6 +375,11 @@ def test_a_cosine_arch_fits_its_span_exactly() -> None:
         (lambda: trace(frame(), Displacement("a", 0.0, [1.0])), "it is held"),
         (lambda: trace(frame(), Displacement("bb", 0.0, [1.0])), "cannot be driven"),
         (lambda: trace(frame(), Displacement("d", 0.3, [1.0])), "it is held"),
+        (lambda: trace(frame(), Displacement("d", np.inf, [1.0])), "cannot be moved along inf deg"),
+        (lambda: Network({"z": Node(0, 0)}, {"x": Beam("a", "z", Section(1, 1, 1))}), "'a', which is not a node"),
+        (lambda: Beam("a", "b", Section(1, 1, 1), start_joint="hinge"), "got 'hinge'"),
+        (lambda: Beam("a", "b", Section(1, 1, 1), end_joint="hinge"), "got 'hinge'"),
+        (lambda: Support(True, True, displacement=np.array([0.0, 0.0, 1.0])), "rotation is given"),
     ],
 )
 def test_what_cannot_be_is_refused_with_a_reason(make: object, message: str) -> None:
