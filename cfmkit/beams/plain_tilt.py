@@ -15,7 +15,6 @@ import numpy as np
 from cfmkit.beams.beam import GAUSS
 from cfmkit.beams.bundle import is_plain, powers
 from cfmkit.beams.kernels.model import Tilt
-from cfmkit.beams.kernels.rk8 import STAGES
 from cfmkit.beams.numbering import NOWHERE
 
 if TYPE_CHECKING:
@@ -63,14 +62,14 @@ class PlainTilt:
     def arrays(self, cut: Grid, every: bool) -> Tilt:
         """Return the derivatives of the model's arrays; with `every` each beam is paired with every variable."""
         layout, count = self.layout, len(self.origin)
-        beams, steps = self.coefficients.shape[1], len(cut.edges) // self.coefficients.shape[1]
+        beams = self.coefficients.shape[1]
         touched = self.coefficients.any(axis=2) | self.sections.any(axis=2) | (self.rotation != 0) | (self.length != 0)
-        powers, rest = cut.powers(self.coefficients.shape[2], 0)[:, : steps * STAGES].T, self._compliances()
+        places, rest = cut.powers(self.coefficients.shape[2], 0).T, self._compliances()
         own = [np.arange(count) if every else np.flatnonzero(touched[:, e]) for e in range(beams)]
         blocks = []
         for e, variables in enumerate(own):
-            block = np.empty((len(powers), 5, len(variables)))
-            block[:, 0] = powers @ self.coefficients[variables, e].T + self.rotation[variables, e]
+            block = np.empty((len(places), 5, len(variables)))
+            block[:, 0] = places @ self.coefficients[variables, e].T + self.rotation[variables, e]
             block[:, 1:] = rest[variables, e].T
             blocks.append(block.ravel())
         first = np.cumsum([0, *map(len, own)])
@@ -82,7 +81,7 @@ class PlainTilt:
             variable=np.concatenate(own),
             first=first,
             table=np.concatenate(blocks),
-            begin=first[:-1] * (len(powers) * 5),
+            begin=first[:-1] * (len(places) * 5),
             moves=shifts.any(axis=1),
             shifts=shifts,
             touches=(touched | shifts[:, layout.beam_end].any(axis=2)).T,

@@ -24,6 +24,8 @@ from cfmkit.beams import (
     guided,
     trace,
 )
+from cfmkit.beams.kernels import entry
+from cfmkit.errors import InputError
 
 FINE = Control(tolerance=1e-11)
 LAN = np.array([1.877, 3.05, 1.244, 2.40, 1.3092, -1.5707, -0.7560, 1.5707, 0.3013, 1.5707, 0.226, -1.148, 1.0, 2.0])
@@ -88,3 +90,14 @@ def test_efforts_are_the_same_with_all_unknowns_and_without_them() -> None:
     alone, last = gradient(path, lan, LAN), gradient(path, lan, LAN)
     assert last.unknowns.shape == (2, path.points.y.shape[1], len(LAN))
     np.testing.assert_allclose(alone.effort, last.effort, rtol=1e-9)
+
+
+@pytest.mark.parametrize("output", ["effort", "unknowns", "rows"])
+def test_a_singular_tangent_is_told_where_a_derivative_is_asked_for(
+    output: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = trace(lan(LAN), Displacement("n5", -np.pi / 2, np.array([2e-3])), Control(tolerance=1e-5))
+    found = gradient(path, lan, LAN)
+    monkeypatch.setattr(entry, "slopes", lambda *_: False)
+    with pytest.raises(InputError, match="singular"):
+        getattr(found, output)
