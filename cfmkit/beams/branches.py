@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -46,7 +46,7 @@ def cross(run: Run) -> Spot | None:
     found = (
         None
         if one is None or beyond is None
-        else locate(run.fine, one, beyond, run.natural, run.control.tolerance, fold)
+        else locate(run.fine, one, beyond, run.natural, 0.0 if run.to_first else run.control.tolerance, fold)
     )
     if found is None or one is None:
         before, after = (int(run.points.info[k, 0]) for k in (-2, -1))
@@ -202,7 +202,7 @@ def rejoin(run: Run, spot: Spot) -> Spot | None:
     sense = float(np.sign(end.drive - spot.drive))
     start = run.solver.solve(end.beyond.y, end.drive + sense * room(run, end.drive, sense))
     if start is None or start.unstable > end.after:
-        start = end.beyond
+        start = run.settled(end.beyond) or replace(end.beyond, tangent=run.solver.unit.copy())
     run.events.append(Event("bifurcation", end.drive * run.unit, end.before, end.after))
     run.branch = "primary"
     run.append(run.as_points(start, -1))

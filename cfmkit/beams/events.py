@@ -66,7 +66,8 @@ class _Search:
         chord = np.append(weights * (other.y - one.y)[: solver.n], other.drive - one.drive)
         self.border = solver.unit if natural else chord
         self.start, self.stop = self._level(one), self._level(other)
-        self.own = not solver.model.load_follows.any()  # whether the tangent is symmetric
+        # Newton's method knows the determinant before its last step, and without the tangent's symmetric part
+        self.known = close > _CLOSE and not solver.model.load_follows.any()
         largest = max(self._log_size(one), self._log_size(other))
         self.log_unit = largest if math.isfinite(largest) else 0.0  # sizes in this unit: of many beams they overflow
         self.samples = [(0.0, self._measure(one), one), (1.0, self._measure(other), other)]
@@ -86,8 +87,8 @@ class _Search:
         return math.exp(self._log_size(spot) - self.log_unit)
 
     def _log_size(self, spot: Spot) -> float:
-        """Return the logarithm of that size, which a solution brings along where the tangent is symmetric."""
-        if self.own and not math.isnan(spot.log_size):
+        """Return the logarithm of that size, which a solution may bring along."""
+        if self.known and not math.isnan(spot.log_size):
             return spot.log_size
         matrix, _ = self.solver.tangent_at(spot.y, spot.drive)
         return float(np.linalg.slogdet(matrix)[1])
@@ -162,7 +163,11 @@ def _null_of(solver: Solver, spot: Spot, regular: Spot) -> FloatArray:
 def _null_vector(matrix: FloatArray) -> FloatArray:
     """Return the eigenvector of a nearly singular matrix by inverse iteration."""
     shift = 1e-14 * float(np.abs(matrix).max())
-    inverse = np.linalg.inv(matrix + shift * np.eye(len(matrix)))
+    try:
+        inverse = np.linalg.inv(matrix + shift * np.eye(len(matrix)))
+    except np.linalg.LinAlgError:  # singular to the last bit
+        values, vectors = np.linalg.eigh(matrix)
+        return np.asarray(vectors[:, np.abs(values).argmin()])
     null = inverse[:, np.abs(inverse).max(axis=0).argmax()]
     for _ in range(3):
         null = inverse @ (null / np.linalg.norm(null))

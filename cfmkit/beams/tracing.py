@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 _EARLY = 0.1  # share of the points: segments that are too long before it are cut in four
 _ROUNDS = 8  # meshes tried before giving up on the tolerance
+_STARTS = 2  # of them for another mesh on which nothing bears the constant loads
 
 
 def trace(network: Network, drive: Drive, control: Control | None = None) -> Path:
@@ -55,7 +56,8 @@ def _solved(network: Network, drive: Drive, control: Control, to_first: bool = F
 
     to_first: only as far as the first bifurcation.
     """
-    from cfmkit.beams.accuracy import estimate  # loads the compiler, as does Run
+    from cfmkit.beams.accuracy import estimate  # loads the compiler, as do the next two
+    from cfmkit.beams.path import PathStatus
     from cfmkit.beams.run import Run
 
     layout = Layout(network, drive)
@@ -66,6 +68,9 @@ def _solved(network: Network, drive: Drive, control: Control, to_first: bool = F
         if run.too_long and round_ < _ROUNDS - 1:
             early = run.asked() < _EARLY * len(drive.points)
             mesh = mesh.shorter().shorter() if early else mesh.shorter()
+            continue
+        if run.status is PathStatus.NO_START and round_ < _STARTS:
+            mesh = mesh.shorter()
             continue
         run.error = estimate(run)
         if run.error <= control.tolerance or round_ == _ROUNDS - 1:

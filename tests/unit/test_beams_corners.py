@@ -1,0 +1,66 @@
+"""V-beams asked for points next to their bifurcations, loosely and tightly, and starts on coarse meshes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from beam_networks import drives, network
+
+from cfmkit.beams import CLAMPED, Beam, Control, Displacement, Network, Node, Path, PathStatus, Section, guided, trace
+
+LENGTH = 35e-3
+
+
+def pressed(angle: float, thickness: float, points: Any, **control: Any) -> Path:
+    nodes = {
+        "wall": Node(0, 0, CLAMPED),
+        "d": Node(LENGTH * np.cos(angle), LENGTH * np.sin(angle), guided(np.pi / 2)),
+    }
+    leaf = Network(nodes, {"v": Beam("wall", "d", Section(1477e6, 6e-3, thickness))})
+    return trace(leaf, Displacement("d", -np.pi / 2, np.asarray(points)), Control(**control))
+
+
+def test_a_path_returns_to_its_primary_path_in_one_step_to_its_only_point() -> None:
+    """A leaf of a twelfth of its rise: the end of its branch is passed over."""
+    angle = 0.0796134409080207
+    path = pressed(angle, 2.3904131510924884e-4, [5.051286820682658e-3], tolerance=1.0623860005428965e-6, sign=-1)
+    assert path.status is PathStatus.COMPLETE
+    assert path.stable.all()
+    assert path.branch[-1] == "primary"
+
+
+@pytest.mark.parametrize("tolerance", [1e-6, 1e-8])
+@pytest.mark.parametrize("slenderness", [3.4, 5.0, 9.0])
+def test_bifurcations_are_placed_as_tightly_as_the_tolerance_asks(slenderness: float, tolerance: float) -> None:
+    angle = np.radians(7)
+    rise = LENGTH * np.sin(angle)
+    thickness = rise / slenderness
+    some, many = (np.linspace(0, 1.9 * rise, count + 1)[1:] for count in (20, 60))
+    path = pressed(angle, thickness, some, tolerance=tolerance)
+    exact = pressed(angle, thickness, many, tolerance=1e-11, largest_turn=0.1)
+    places, truth = ([event.drive / rise for event in one.events] for one in (path, exact))
+    assert len(truth) == 2
+    assert places == pytest.approx(truth, rel=0, abs=tolerance)
+
+
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-4, 4.65e-5, 1e-5])
+def test_a_stated_imperfection_does_not_depend_on_the_tolerance(tolerance: float) -> None:
+    """Away from the bifurcation no direction is singular: beside it the mode was that of another shape."""
+    angle, points = 0.043669063665053666, [6.1176e-4, 1.22353e-3, 1.83529e-3]
+    loose, tight = (
+        pressed(angle, 1.718747248202898e-4, points, tolerance=limit, imperfection=8.164652e-5)
+        for limit in (tolerance, 1e-9)
+    )
+    assert loose.imperfection == tight.imperfection
+    forces = [path.effort[path.at_asked] for path in (loose, tight)]
+    np.testing.assert_allclose(forces[0], forces[1], rtol=0, atol=3 * tolerance * np.abs(forces[1]).max())
+
+
+@pytest.mark.parametrize("tolerance", [1e-3, 4.9e-6, 1e-6])
+def test_a_mesh_too_coarse_for_the_constant_loads_is_refined(tolerance: float) -> None:
+    held = network(102, True)
+    path = trace(held, Displacement("d", drives(held, 102)[0].direction, np.array([5e-4, 1e-3])), Control(tolerance))
+    assert path.status is PathStatus.COMPLETE
+    assert path.error <= tolerance
