@@ -72,9 +72,11 @@ class Run:
         """The same segments with many more steps.
 
         Integration forward breaks the symmetry of a beam by its error, and that acts on a bifurcation as an
-        imperfection does: singular points are looked for where that error is rounding.
+        imperfection does: singular points are looked for where that error is rounding. A mode that is added to the
+        shapes is sampled here at the ends of the steps.
         """
-        whole = next(steps for limit, steps in _FINE_STEPS if self.control.tolerance >= limit)
+        tolerance = 0.0 if self.to_first else self.control.tolerance
+        whole = next(steps for limit, steps in _FINE_STEPS if tolerance >= limit)
         steps = max(-(-whole // self.mesh.segments), 2 * self.mesh.steps)
         return ExpandedSolver(self.layout, Mesh(self.mesh.segments, steps), 1e-11)
 

@@ -8,7 +8,20 @@ import numpy as np
 import pytest
 from beam_networks import drives, network
 
-from cfmkit.beams import CLAMPED, Beam, Control, Displacement, Network, Node, Path, PathStatus, Section, guided, trace
+from cfmkit.beams import (
+    CLAMPED,
+    Beam,
+    Control,
+    CosineArch,
+    Displacement,
+    Network,
+    Node,
+    Path,
+    PathStatus,
+    Section,
+    guided,
+    trace,
+)
 
 LENGTH = 35e-3
 
@@ -20,6 +33,26 @@ def pressed(angle: float, thickness: float, points: Any, **control: Any) -> Path
     }
     leaf = Network(nodes, {"v": Beam("wall", "d", Section(1477e6, 6e-3, thickness))})
     return trace(leaf, Displacement("d", -np.pi / 2, np.asarray(points)), Control(**control))
+
+
+@pytest.mark.parametrize(
+    ("angle", "thickness", "off", "tolerance"),
+    [
+        (0.16564239, 6.755719e-4, -3e-7, 9e-7),
+        (0.32094386, 1.2854059e-3, 9e-7, 4.3e-5),
+        (0.242028, 2.0692e-3, -4e-6, 3e-4),
+    ],
+)
+def test_a_point_beside_a_bifurcation_does_not_end_the_path(
+    angle: float, thickness: float, off: float, tolerance: float
+) -> None:
+    rise = LENGTH * np.sin(angle)
+    end = 1.9 * rise
+    place = pressed(angle, thickness, np.linspace(0, end, 21)[1:]).events[0].drive + off * rise
+    path = pressed(angle, thickness, [place, end], tolerance=tolerance)
+    assert path.status is PathStatus.COMPLETE
+    assert path.stable.all()
+    assert path.drive[path.at_asked] == pytest.approx([place, end], rel=1e-12)
 
 
 def test_a_path_returns_to_its_primary_path_in_one_step_to_its_only_point() -> None:
@@ -58,9 +91,50 @@ def test_a_stated_imperfection_does_not_depend_on_the_tolerance(tolerance: float
     np.testing.assert_allclose(forces[0], forces[1], rtol=0, atol=3 * tolerance * np.abs(forces[1]).max())
 
 
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-4, 1.7e-5, 1e-6])
+def test_the_mode_of_an_arch_is_sampled_finely_at_any_tolerance(tolerance: float) -> None:
+    half, rise = 0.06, 0.012
+    nodes = {"a": Node(0, 0, CLAMPED), "t": Node(half, rise), "b": Node(2 * half, 0, CLAMPED)}
+    section = Section(2e9, 8e-3, rise / 12)
+    beams = {
+        "x": Beam("a", "t", section, CosineArch(rise, 0.5)),
+        "y": Beam("t", "b", section, CosineArch(-rise, 0.5)),
+    }
+    drive = Displacement("t", -np.pi / 2, np.linspace(0, 1.2 * rise, 7)[1:])
+    loose, tight = (
+        trace(Network(nodes, beams), drive, Control(limit, imperfection=3e-5)) for limit in (tolerance, 1e-9)
+    )
+    assert "buckling mode" in loose.imperfection
+    turns = [np.abs(path.motion("t")[path.at_asked, 2]) for path in (loose, tight)]
+    np.testing.assert_allclose(turns[0], turns[1], rtol=0, atol=tolerance)
+
+
 @pytest.mark.parametrize("tolerance", [1e-3, 4.9e-6, 1e-6])
 def test_a_mesh_too_coarse_for_the_constant_loads_is_refined(tolerance: float) -> None:
     held = network(102, True)
     path = trace(held, Displacement("d", drives(held, 102)[0].direction, np.array([5e-4, 1e-3])), Control(tolerance))
     assert path.status is PathStatus.COMPLETE
     assert path.error <= tolerance
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_the_side_of_a_branch_does_not_depend_on_the_mesh(sign: Any) -> None:
+    """Where no node moves in the mode, by the moment at the clamp; else by the node's rotation."""
+    angle, rise, half = np.radians(7), 0.006, 0.03
+    nodes = {"a": Node(0, 0, CLAMPED), "t": Node(half, rise), "b": Node(2 * half, 0, CLAMPED)}
+    section = Section(2e9, 8e-3, rise / 10)
+    beams = {
+        "x": Beam("a", "t", section, CosineArch(rise, 0.5)),
+        "y": Beam("t", "b", section, CosineArch(-rise, 0.5)),
+    }
+    down = Displacement("t", -np.pi / 2, np.linspace(0, 1.0 * rise, 7)[1:])
+    moments, turns = [], []
+    for tolerance in (1e-3, 1e-5, 5e-6, 1e-6, 1e-8):
+        leaf = pressed(angle, 1e-3, [1e-3, 2e-3], tolerance=tolerance, sign=sign)
+        moments.append(leaf.end_force("v", 1)[leaf.at_asked[-1], 2])
+        arch = trace(Network(nodes, beams), down, Control(tolerance=tolerance, sign=sign))
+        turns.append(arch.motion("t")[arch.at_asked[-1], 2])
+    assert moments == pytest.approx([-0.01141 * sign] * 5, rel=1e-2)
+    assert abs(turns[0]) > 0.05
+    assert turns == pytest.approx([turns[-1]] * 5, rel=1e-2)
