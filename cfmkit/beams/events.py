@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 _SEARCHES = 40
 _CLOSE = 1e-5  # share of the determinant at the ends that is near enough to interpolate the rest: the smallest,
 _LOOSE = 10.0  # and in units of the tolerance
+_MOVED = 1e-3  # share of a mode's largest change of a pose from which a node counts as moved
 _FIRST_KICK, _KICK, _KICKS = 1e-3, 0.06, 16  # how far from a bifurcation its branch is entered [rad]
 
 
@@ -36,7 +37,13 @@ class Singular:
 
 
 def locate(
-    solver: Solver, one: Spot, other: Spot, natural: bool, tolerance: float, fold: bool = False, vector: bool = True
+    solver: ExpandedSolver,
+    one: Spot,
+    other: Spot,
+    natural: bool,
+    tolerance: float,
+    fold: bool = False,
+    vector: bool = True,
 ) -> Singular | None:
     """Return the singular point between two neighbouring equilibria with different inertia; its null vector if wanted.
 
@@ -146,7 +153,7 @@ class _Search:
         return Spot(np.asarray(y), drive, chosen[0][2].tangent)
 
 
-def _null_of(solver: Solver, spot: Spot, regular: Spot) -> FloatArray:
+def _null_of(solver: ExpandedSolver, spot: Spot, regular: Spot) -> FloatArray:
     """Return the null vector in the scaling that balances the tangent at a regular point nearby."""
     balance, sizes = np.ones(solver.n), np.abs(solver.tangent_at(regular.y, regular.drive)[0])
     for _ in range(8):
@@ -154,10 +161,20 @@ def _null_of(solver: Solver, spot: Spot, regular: Spot) -> FloatArray:
     matrix, _ = solver.tangent_at(spot.y, spot.drive)
     null = _null_vector(matrix * np.outer(balance, balance))
     direction = null * balance
-    # in a symmetric network several entries are the largest: the first decides the side, not rounding
-    leading = np.flatnonzero(np.abs(null) > 0.99 * np.abs(null).max())[0]
-    direction *= np.sign(direction[leading]) / np.linalg.norm(direction)
-    return np.asarray(direction)
+    direction /= np.linalg.norm(direction)
+    return np.asarray(direction * _side(solver, direction))
+
+
+def _side(solver: ExpandedSolver, direction: FloatArray) -> float:
+    """Return the sign that gives a null vector its side: by unknowns that every mesh has, those of nodes if they move.
+
+    In a symmetric network several are the largest: the first decides, not rounding.
+    """
+    moved, forces = direction[: solver.plain_free], direction[solver.n_free : solver.n].reshape(-1, 3)[solver.lasts]
+    poses = np.abs(direction[: solver.n_free]).max(initial=0.0)
+    shown = moved if np.abs(moved).max(initial=0.0) > _MOVED * poses else forces.ravel()
+    leading = np.flatnonzero(np.abs(shown) > 0.99 * np.abs(shown).max())[0]
+    return -float(np.sign(shown[leading]))  # by choice: any sign would do, as long as it stays
 
 
 def _null_vector(matrix: FloatArray) -> FloatArray:
