@@ -256,9 +256,12 @@ def close_behind(run: Run) -> bool:
     found = None if one is None or beyond is None else _place(run, one, beyond)
     if found is None or found.after <= found.before:
         return False
-    if run.events[-1].kind == "unresolved":
+    closing = Event("bifurcation", found.spot.drive * run.unit, found.after, found.before)
+    told = run.events[-1]  # by `hop`
+    same = abs(told.drive - closing.drive) < BEFORE_END * run.span * run.unit and told.after == closing.after
+    if told.kind == "unresolved" or (same and told.before == closing.before):
         run.events.pop()
-    run.events.append(Event("bifurcation", found.spot.drive * run.unit, found.after, found.before))
+    run.events.append(closing)
     for index in range(first, len(run.branches)):
         if (float(run.points.drive[index]) - found.spot.drive) * sense < 0:
             run.branches[index] = "primary"
