@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.beams import branches
+from cfmkit.beams import branches, corners
 from cfmkit.beams.accuracy import errors, largest_force
 from cfmkit.beams.discretise import Mesh
 from cfmkit.beams.expanded import ExpandedSolver
@@ -109,8 +109,8 @@ class Run:
                 following = branches.cross(self)
             elif code == DONE:
                 following = branches.rejoin(self, spot)
-            elif code == STALLED and self.natural and self.branch != "primary":
-                following = branches.hop(self, spot, asked)
+            elif code == STALLED and self.natural and len(self.points):
+                following = (corners.past if self.branch == "primary" else branches.hop)(self, spot, asked)
             else:
                 self.stop(code)
                 return

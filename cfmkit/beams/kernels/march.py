@@ -7,7 +7,17 @@ import numpy as np
 from cfmkit.beams.kernels.compiler import kernel, maker
 from cfmkit.beams.kernels.dense import copy
 from cfmkit.beams.kernels.newton import SOLVED, all_slopes, solve
-from cfmkit.beams.kernels.predictor import KEPT, KEPT_WITH_SLOPES, MISSED, aim, changes, misses, remember, set_border
+from cfmkit.beams.kernels.predictor import (
+    KEPT,
+    KEPT_WITH_SLOPES,
+    MISSED,
+    aim,
+    changes,
+    misses,
+    pulls,
+    remember,
+    set_border,
+)
 
 DONE, STALLED, INERTIA, LONG, FULL, OUTSIDE, NO_START = range(7)
 """Why a march ended: all asked points reached; the smallest step failed; the number of unstable directions changed;
@@ -16,6 +26,9 @@ a segment is too long for its load; no room for more points; the drive left its 
 SHORT = 0.25  # dM1/dM0 of a segment below which it must be split
 SECANT = 0.25  # of the last step: shorter ones go along the tangent, from which the secants of long ones differ
 STRETCH = 1.3  # factor on a step that lands on an asked value: rather than a short one after it
+CREEPING = 5e-5  # share of the drive's bounds that is a short step
+CREEPS, TAUT = 400, 100.0  # short steps in a row that are enough; change of forces for one of poses that counts for ten
+NOISE = 30.0  # how far off a guess may be where points are solved to a tolerance of one
 AGAIN = 1e-5  # change of a pose between two solutions of one point
 INFO = 6  # unstable directions, index of the asked point or -1, parameter, iterations, d(drive)/ds, shortness
 
@@ -79,9 +92,9 @@ def _begin(m, n_free, y, drive, natural, spaces, options, outs, scratch):
 
 
 @kernel
-def _longer(moved, missed, turn, count, landing):
-    """Tell whether the next step may be longer."""
-    well = missed < 0.1 * moved + (1e-9 if landing else 0.0)
+def _longer(moved, missed, turn, count, landing, tolerance):
+    """Tell whether the next step may be longer; the guess has the errors of the points that it comes from, enlarged."""
+    well = missed < 0.1 * moved + NOISE * tolerance
     return well and (landing or (count > 2 and moved < 0.5 * turn))
 
 
@@ -118,7 +131,7 @@ def march(m, n_free, y, drive, tangent, targets, options, outs, scratch):
         return NO_START, 0
     t, asked, index = (drive if natural else 0.0), 0, (state[1] if stored == 1 else options[11])
     most = KEPT_WITH_SLOPES if natural else KEPT
-    count = remember(kept, 0, t, y, drive, slope, most)
+    count, slow = remember(kept, 0, t, y, drive, slope, most), 0
     while asked < targets.shape[0]:
         if stored + targets.shape[0] - asked + 1 >= outs[0].shape[0]:
             return FULL, stored
@@ -142,6 +155,10 @@ def march(m, n_free, y, drive, tangent, targets, options, outs, scratch):
             continue
         if state[2] < SHORT:
             return LONG, stored
+        creeps = natural and not landing and abs(ahead) < CREEPING * (options[9] - options[8])
+        slow = slow + (10 if pulls(new, old, n_free, n) > TAUT * moved else 1) if creeps else 0
+        if slow > CREEPS:
+            return STALLED, stored
         if not natural:
             asked, stored = _between(m, n_free, old, new, state, targets, asked, stored, options, outs, unit, scratch)
             if asked >= targets.shape[0]:
@@ -158,7 +175,7 @@ def march(m, n_free, y, drive, tangent, targets, options, outs, scratch):
         index = state[1]
         if state[0] < options[8] or state[0] > options[9]:
             return OUTSIDE, stored
-        if _longer(moved, missed, turn, count, landing):
+        if _longer(moved, missed, turn, count, landing, options[0]):
             step = np.sign(step) * min(greatest, 1.6 * abs(step))
     return DONE, stored
 

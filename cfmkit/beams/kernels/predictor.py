@@ -57,6 +57,15 @@ def changes(y, other, n_free, n):
 
 
 @kernel
+def pulls(y, other, n_free, n):
+    """Return the largest change of a force at the end of a beam, relative to the largest force."""
+    change, largest = 0.0, 0.0
+    for i in range(n_free, n):
+        change, largest = max(change, abs(y[i] - other[i])), max(largest, abs(y[i]))
+    return change / largest if largest > 0.0 else 0.0
+
+
+@kernel
 def misses(old, new, one, other, ahead, n_free, n):
     """Return by how much the mean slope misses the largest change of a pose: a lot where another path was met."""
     most = 0.0

@@ -1,0 +1,72 @@
+"""Corners of a path at its bifurcations: the error of integration rounds them off, too sharply to be followed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.beams.branches import cross
+from cfmkit.beams.kernels.march import STALLED
+
+if TYPE_CHECKING:
+    from cfmkit.beams.run import Run
+    from cfmkit.beams.solver import Spot
+
+_BACK = 30  # points looked at before the place where a march stalled
+_NEAR = 1e-4  # share of the drive's range from which the next point asked for is solved for on the fine mesh
+
+
+def past(run: Run, spot: Spot, asked: int) -> Spot | None:
+    """Go past a bifurcation where the march along the primary path stalled; end the path where there is none.
+
+    On the fine mesh the path is followed up to a point asked for just before the bifurcation, then across it.
+    """
+    goal = float(run.targets[asked])
+    if abs(goal - spot.drive) <= _NEAR * run.span:
+        there = _beside(run, spot, goal)
+        if there is not None and there.unstable == spot.unstable:
+            run.append(run.as_points(there, asked))
+            return there
+    start = _before(run) if run.control.branch != "stop" else None
+    if start is not None:
+        forward = float(np.sign(goal - start.drive))
+        for power in range(-6, -2):
+            near = _beside(run, start, spot.drive + forward * 10.0**power * run.span)
+            if near is not None and near.unstable > start.unstable:
+                run.append(run.as_points(near, -1))
+                told = len(run.events)
+                following = cross(run)
+                if run.events[told:] and run.events[-1].kind == "unresolved":
+                    run.events.pop()
+                    run.drop_last()
+                    break
+                return following
+    run.stop(STALLED)
+    return None
+
+
+def _before(run: Run) -> Spot | None:
+    """Return the last point that is before the bifurcation on the fine mesh too; those after it are taken back."""
+    for back in range(1, min(len(run.points), _BACK) + 1):
+        wide = run.fine_spot(-back)
+        if wide is not None and wide.unstable == int(run.points.info[-back, 0]):
+            for _ in range(back - 1):
+                run.drop_last()
+            return run.spot(-1)
+        if run.points.info[-back, 1] >= 0:
+            return None
+    return None
+
+
+def _beside(run: Run, spot: Spot, drive: float) -> Spot | None:
+    """Return the equilibrium of the fine mesh at a drive, if it is near, solved on this mesh if that is possible."""
+    wide = run.fine.solve(run.fine.expand(spot.y), drive)
+    if wide is None:
+        return None
+    reduced = run.fine.reduce(wide)
+    limit = 0.2 * np.sqrt(abs(drive - spot.drive) / run.span) + 1e-3
+    if run.solver.pose_change(reduced.y, spot.y) > limit:
+        return None
+    return run.settled(reduced) or replace(reduced, tangent=run.solver.unit.copy())
