@@ -220,7 +220,7 @@ def hop(run: Run, spot: Spot, asked: int) -> Spot | None:
         if wide is None or wide.unstable > spot.unstable:
             continue
         near = run.settled(run.fine.reduce(wide))
-        if near is None or run.solver.pose_change(near.y, spot.y) > 0.2 * np.sqrt(ahead / run.span) + 1e-3:
+        if near is None or run.solver.pose_change(near.y, spot.y) > run.reach(ahead):
             continue
         back = run.fine.solve(wide.y, spot.drive - forward * ahead)
         found = None if back is None or back.unstable == wide.unstable else _place(run, wide, back)

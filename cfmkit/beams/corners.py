@@ -66,7 +66,6 @@ def _beside(run: Run, spot: Spot, drive: float) -> Spot | None:
     if wide is None:
         return None
     reduced = run.fine.reduce(wide)
-    limit = 0.2 * np.sqrt(abs(drive - spot.drive) / run.span) + 1e-3
-    if run.solver.pose_change(reduced.y, spot.y) > limit:
+    if run.solver.pose_change(reduced.y, spot.y) > run.reach(abs(drive - spot.drive)):
         return None
     return run.settled(reduced) or replace(reduced, tangent=run.solver.unit.copy())

@@ -158,6 +158,10 @@ class Run:
         """Return a stored point, solved again on the fine mesh."""
         return self.fine.solve(self.fine.expand(self.points.y[index]), float(self.points.drive[index]))
 
+    def reach(self, ahead: float) -> float:
+        """Return how far poses may change beside a bifurcation as the drive goes on: branches open like its root."""
+        return 0.2 * float(np.sqrt(ahead / self.span)) + 1e-3
+
     def _leg(self, spot: Spot, asked: int, fresh: bool) -> tuple[int, int, Spot]:
         """March once; return why it ended, the points done and the last spot. A fresh start is yet to be solved for."""
         left, numbers = self._left(spot, asked)

@@ -221,4 +221,4 @@ def unfold(m, e, first_slot, store, dqa, dpb, errors, ddrive, dy):
         dy[at + 3], dy[at + 4], dy[at + 5] = n0, n1, n2
 
 
-__all__ = ["BEFORE", "C_D", "E2", "SMALL", "E", "F", "G", "flows", "np", "places_of", "pose_of", "sweep", "unfold"]
+__all__ = ["BEFORE", "C_D", "E2", "SMALL", "E", "F", "G", "flows", "places_of", "pose_of", "sweep", "unfold"]

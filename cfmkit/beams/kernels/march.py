@@ -34,12 +34,13 @@ INFO = 6  # unstable directions, index of the asked point or -1, parameter, iter
 
 
 @kernel
-def _store(k, y, state, row, outs):
+def _store(k, y, state, asked, t, iterations, along, outs):
+    """Store point k; asked: index of its value, -1 for none; t: parameter; along: d(drive)/ds."""
     out_y, out_drive, out_info = outs
     copy(out_y[k], y)
     out_drive[k] = state[0]
-    out_info[k, 0], out_info[k, 1], out_info[k, 2] = state[1], row[0], row[1]
-    out_info[k, 3], out_info[k, 4], out_info[k, 5] = row[2], row[3], state[2]
+    out_info[k, 0], out_info[k, 1], out_info[k, 2] = state[1], asked, t
+    out_info[k, 3], out_info[k, 4], out_info[k, 5] = iterations, along, state[2]
 
 
 @kernel
@@ -70,19 +71,18 @@ def _begin(m, n_free, y, drive, natural, spaces, options, outs, scratch):
     Returns how many points are stored, -1 where there is no start, and whether the slopes are known. The tangent gets
     the path's sense.
     """
-    state, unit, row, new, tangent, slope = spaces
+    state, unit, new, tangent, slope = spaces
     n, fresh = unit.shape[0] - 1, options[12] != 0.0
     if not (natural or fresh):
         return 0, False
     copy(new, y)
     state[0] = drive
-    code, row[2] = solve(m, n_free, new, state, unit, drive, (options[0], options[1]), tangent, scratch)
+    code, iterations = solve(m, n_free, new, state, unit, drive, (options[0], options[1]), tangent, scratch)
     if fresh:
         if code != SOLVED:
             return -1, False
         copy(y, new)
-        row[0], row[1], row[3] = -1.0, 0.0, tangent[n]
-        _store(0, y, state, row, outs)
+        _store(0, y, state, -1, 0.0, iterations, tangent[n], outs)
         for i in range(n + 1):
             tangent[i] *= 1.0 if natural else options[12]
     known = natural and code == SOLVED and changes(new, y, n_free, n) < AGAIN
@@ -96,6 +96,21 @@ def _longer(moved, missed, turn, count, landing, tolerance):
     """Tell whether the next step may be longer; the guess has the errors of the points that it comes from, enlarged."""
     well = missed < 0.1 * moved + NOISE * tolerance
     return well and (landing or (count > 2 and moved < 0.5 * turn))
+
+
+@kernel
+def _creeps(slow, ahead, moved, new, old, options, n_free, n):
+    """Count the short steps in a row, those tenfold in which only forces grow: a path drawn taut gets no further."""
+    if abs(ahead) >= CREEPING * (options[9] - options[8]):
+        return 0
+    return slow + (10 if pulls(new, old, n_free, n) > TAUT * moved else 1)
+
+
+@kernel
+def _refused(code, moved, missed, bent, turn, count):
+    """Tell whether a step led to no equilibrium, too far, or off what the points before it or its slopes foretell."""
+    off = max(bent, missed if count > 1 else 0.0)
+    return code != SOLVED or not (moved <= turn and off <= MISSED * moved + 1e-7)
 
 
 @kernel
@@ -116,17 +131,17 @@ def march(m, n_free, y, drive, tangent, targets, options, outs, scratch):
     options: tolerance, iterations, natural (1) or arc length (0), first, smallest and largest step, largest change of
     a pose in a step, weight of forces in the arc length, lowest and highest drive, whether to stop where the
     inertia changes, inertia at the start, sense. A sense of 1 or -1 says that the start is only near an equilibrium,
-    which is solved for and stored first. Returns why the march ended and the number of points stored.
+    which is solved for and stored first. A step that lands on a target may be longer than the largest by STRETCH.
+    Returns why the march ended and the number of points stored.
     """
     natural, step, smallest, greatest, turn = options[2] > 0.5, options[3], options[4], options[5], options[6]
     n, size = tangent.shape[0] - 1, y.shape[0]
     kept = (np.zeros(KEPT), np.zeros((KEPT, size + 1)), np.zeros((KEPT, size + 1)))
     times, past, slopes = kept
-    guess, new, state, row, slope = np.empty(size + 1), np.empty(size), np.zeros(6), np.empty(4), np.zeros(size + 1)
+    guess, new, state, slope = np.empty(size + 1), np.empty(size), np.zeros(6), np.zeros(size + 1)
     border, new_tangent, unit = np.empty(n + 1), np.empty(n + 1), np.zeros(n + 1)
     unit[n] = 1.0
-    spaces = (state, unit, row, new, tangent, slope)
-    stored, known = _begin(m, n_free, y, drive, natural, spaces, options, outs, scratch)
+    stored, known = _begin(m, n_free, y, drive, natural, (state, unit, new, tangent, slope), options, outs, scratch)
     if stored < 0:
         return NO_START, 0
     t, asked, index = (drive if natural else 0.0), 0, (state[1] if stored == 1 else options[11])
@@ -144,9 +159,9 @@ def march(m, n_free, y, drive, tangent, targets, options, outs, scratch):
         if natural and code == SOLVED:
             all_slopes(m, n_free, new_tangent, slope, scratch)
         bent = misses(old, new, slopes[0], slope, ahead, n_free, n) if known else 0.0
-        near = moved <= turn and max(bent, missed if count > 1 else 0.0) <= MISSED * moved + 1e-7
+        refused = _refused(code, moved, missed, bent, turn, count)
         passed = _passed(state, index, count, natural, options[10] > 0.5) and abs(ahead) > 4.0 * smallest
-        if code != SOLVED or passed or not near or not (natural or _forward(border, new_tangent)):
+        if refused or passed or not (natural or _forward(border, new_tangent)):
             step = 0.5 * ahead if natural else 0.5 * step
             if abs(step) < smallest:
                 return STALLED, stored
@@ -155,8 +170,7 @@ def march(m, n_free, y, drive, tangent, targets, options, outs, scratch):
             continue
         if state[2] < SHORT:
             return LONG, stored
-        creeps = natural and not landing and abs(ahead) < CREEPING * (options[9] - options[8])
-        slow = slow + (10 if pulls(new, old, n_free, n) > TAUT * moved else 1) if creeps else 0
+        slow = _creeps(slow, ahead, moved, new, old, options, n_free, n) if natural and not landing else 0
         if slow > CREEPS:
             return STALLED, stored
         if not natural:
@@ -164,8 +178,7 @@ def march(m, n_free, y, drive, tangent, targets, options, outs, scratch):
             if asked >= targets.shape[0]:
                 return DONE, stored
         t += ahead
-        row[0], row[1], row[2], row[3] = (float(asked) if landing else -1.0), t, float(iterations), new_tangent[n]
-        _store(stored, new, state, row, outs)
+        _store(stored, new, state, asked if landing else -1, t, iterations, new_tangent[n], outs)
         stored, asked = stored + 1, asked + (1 if landing else 0)
         count = remember(kept, count if known or not natural else 0, t, new, state[0], slope, most)
         known = natural
@@ -190,7 +203,7 @@ def _between(m, n_free, old, new, state, targets, asked, stored, options, outs, 
     size = new.shape[0]
     n_all = targets.shape[0]
     y, s = np.empty(size), np.zeros(6)
-    row, tangent = np.empty(4), np.empty(unit.shape[0])
+    tangent = np.empty(unit.shape[0])
     before, after = old[size], state[0]
     rising = after > before
     first = 0 if (rising == (targets[n_all - 1] > targets[0]) or n_all == 1) else n_all - 1
@@ -207,8 +220,7 @@ def _between(m, n_free, old, new, state, targets, asked, stored, options, outs, 
         code, iterations = solve(m, n_free, y, s, unit, value, (options[0], options[1]), tangent, scratch)
         n = unit.shape[0] - 1
         if code == SOLVED and changes(y, new, n_free, n) <= 1.5 * changes(new, old, n_free, n) + 1e-7:
-            row[0], row[1], row[2], row[3] = float(k), -1.0, float(iterations), (1.0 if rising else -1.0)
-            _store(stored, y, s, row, outs)
+            _store(stored, y, s, k, -1.0, iterations, 1.0 if rising else -1.0, outs)
             stored += 1
             if k == n_all - 1:
                 return n_all, stored
