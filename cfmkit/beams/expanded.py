@@ -22,7 +22,7 @@ class ExpandedSolver(Solver):
     """Equilibria with the inside of the beams among the global unknowns; slower, and regular in more cases."""
 
     def _build(self) -> Model:
-        plain = assemble_model(self.layout, self.cut, self.table)
+        plain = assemble_model(self.layout, self.cut, self.table, self.ramped)
         self.plain_free = self.layout.plan.n_free
         segments = len(plain.segment_step) - 1
         firsts, begins = plain.beam_segment[:-1], np.zeros(segments, dtype=np.bool_)

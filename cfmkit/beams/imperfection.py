@@ -30,7 +30,7 @@ def imperfect(run: Run, size: float) -> tuple[Network, str]:
 
     `run` has followed the primary path of the perfect network.
     """
-    network = run.layout.network
+    network, run = run.layout.network, run.ramp or run
     if run.first is None:
         return network, "none: the perfect path has no bifurcation"
     rotation, reach = _mode(run.fine, run.first)
@@ -45,8 +45,9 @@ def imperfect(run: Run, size: float) -> tuple[Network, str]:
         beams[name] = replace(beam, shape=Bent(beam.shape, tuple(turn.coef.tolist())))
         row += len(t)
     place = run.first.spot.drive * run.unit
+    where = f"under {100 * place:.4g} % of the constant loads" if run.ramped else f"at {place:.6g}"
     bent = Network(network.nodes, beams, network.links, network.springs, network.loads)
-    return bent, f"{size:.6g} m of the buckling mode at {place:.6g}"
+    return bent, f"{size:.6g} m of the buckling mode {where}"
 
 
 def _mode(solver: ExpandedSolver, singular: Singular) -> tuple[FloatArray, float]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.beams import branches, corners
+from cfmkit.beams import branches, corners, preload
 from cfmkit.beams.accuracy import errors, largest_force
 from cfmkit.beams.discretise import Mesh
 from cfmkit.beams.expanded import ExpandedSolver
@@ -40,6 +40,7 @@ class Run:
     mesh: Mesh
     control: Control
     to_first: bool = False  # whether the first bifurcation ends it
+    ramped: bool = False  # whether a share of everything constant takes the place of the drive
     status: PathStatus = PathStatus.COMPLETE
     message: str = ""
     events: list[Event] = field(default_factory=list)
@@ -48,13 +49,15 @@ class Run:
     end: branches.BranchEnd | None = None
     error: float = np.inf  # as estimated
     first: Singular | None = None  # the first bifurcation at which stability is lost
+    ramp: Run | None = None  # the run to the constant loads, if that has the first bifurcation
     closed: bool = True  # no branch, or its end is known, or it is known to have none before the last point asked for
     entry: float = np.inf  # first step on a branch that was just entered
 
     def __post_init__(self) -> None:
         """Build the solver."""
-        self.solver = Solver(self.layout, self.mesh, min(_LOOSEST, 1e-3 * self.control.tolerance))
-        self.targets = self.layout.drive.points / self.layout.scales.drive
+        tolerance = min(_LOOSEST, 1e-3 * self.control.tolerance)
+        self.solver = Solver(self.layout, self.mesh, tolerance, self.ramped)
+        self.targets = np.ones(1) if self.ramped else self.layout.drive.points / self.layout.scales.drive
         self.points: Points = Points(np.empty((0, self.solver.size)), np.empty(0), np.empty((0, INFO)))
         self.branches: list[str] = []
         values: list[float] = self.targets.tolist()
@@ -65,7 +68,7 @@ class Run:
     @property
     def unit(self) -> float:
         """SI value of one unit of the drive."""
-        return self.layout.scales.drive
+        return 1.0 if self.ramped else self.layout.scales.drive
 
     @cached_property
     def fine(self) -> ExpandedSolver:
@@ -78,19 +81,26 @@ class Run:
         tolerance = 0.0 if self.to_first else self.control.tolerance
         whole = next(steps for limit, steps in _FINE_STEPS if tolerance >= limit)
         steps = max(-(-whole // self.mesh.segments), 2 * self.mesh.steps)
-        return ExpandedSolver(self.layout, Mesh(self.mesh.segments, steps), 1e-11)
+        return ExpandedSolver(self.layout, Mesh(self.mesh.segments, steps), 1e-11, self.ramped)
 
     def follow(self) -> None:
         """Trace from rest to the last point asked for, or to where it ends, and name the branches."""
         self._follow()
         if self.natural and not self.closed and not self.too_long and not branches.close_behind(self):
-            primary = Run(self.layout, self.mesh, replace(self.control, branch="primary"))
+            primary = Run(self.layout, self.mesh, replace(self.control, branch="primary"), ramped=self.ramped)
             primary.follow()
             branches.relabel(self, primary)
 
+    def under_constant_loads(self) -> Run:
+        """Return a run from nothing to everything constant in the place of the drive."""
+        control = replace(self.control, through_folds=False, first_step=None)
+        return Run(self.layout, self.mesh, control, self.to_first, ramped=True)
+
     def _follow(self) -> None:
-        spot, share, code = self.solver.rest()
+        spot, share, code = preload.start(self)
         self.too_long = code == LONG
+        if spot is None and code == DONE:
+            return
         asked, hops, fresh = int(self.targets[0] == 0.0), 0, True
         while spot is not None and asked < len(self.targets) and hops < _HOPS:
             code, asked, spot = self._leg(spot, asked, fresh)

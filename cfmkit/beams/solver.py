@@ -9,7 +9,7 @@ import numpy as np
 
 from cfmkit.beams.discretise import Mesh, assemble_model, grid, table
 from cfmkit.beams.kernels import entry
-from cfmkit.beams.kernels.march import DONE, INFO, STALLED
+from cfmkit.beams.kernels.march import INFO
 from cfmkit.beams.kernels.newton import SOLVED
 from cfmkit.beams.kernels.rk8 import WEIGHTS
 from cfmkit.beams.numbering import LINE, SLIDE, TURN
@@ -68,11 +68,14 @@ class Spot:
 
 
 class Solver:
-    """Equilibria of a layout on a mesh. Holds work space: not for two threads at once."""
+    """Equilibria of a layout on a mesh. Holds work space: not for two threads at once.
 
-    def __init__(self, layout: Layout, mesh: Mesh, tolerance: float = 1e-11) -> None:
+    `ramped`: a factor on all constant loads and displacements takes the place of the drive.
+    """
+
+    def __init__(self, layout: Layout, mesh: Mesh, tolerance: float = 1e-11, ramped: bool = False) -> None:
         """Build the arrays."""
-        self.layout, self.mesh, self.tolerance = layout, mesh, tolerance
+        self.layout, self.mesh, self.tolerance, self.ramped = layout, mesh, tolerance, ramped
         self.cut = grid(layout, mesh)
         self.table = table(layout, self.cut)
         self.model: Model = self._build()
@@ -99,7 +102,7 @@ class Solver:
         return fine
 
     def _build(self) -> Model:
-        return assemble_model(self.layout, self.cut, self.table)
+        return assemble_model(self.layout, self.cut, self.table, self.ramped)
 
     def _count_free(self) -> int:
         return self.layout.plan.n_free
@@ -131,10 +134,6 @@ class Solver:
         y[self.n :].reshape(-1, 6)[:, :2] = np.stack([starts.real, starts.imag], axis=1)
         return y
 
-    def ramp(self) -> Model:
-        """Return the arrays with a factor on all constant loads and displacements in the place of the drive."""
-        return assemble_model(self.layout, self.cut, self.table, ramp=True)
-
     def solve(
         self,
         y: FloatArray,
@@ -164,16 +163,16 @@ class Solver:
         h = self.scratch[0][: self.n]
         return 0.5 * (h[:, : self.n] + h[:, : self.n].T), h[:, self.n].copy()
 
-    def march(self, spot: Spot, targets: FloatArray, options: FloatArray, room: int) -> tuple[int, Points]:
-        """Follow the path from `spot`; return why the march ended and its points."""
-        return self._march(self.model, spot, targets, options, room)
-
-    def _march(
-        self, model: Model, spot: Spot, targets: FloatArray, options: FloatArray, room: int
+    def march(
+        self, spot: Spot, targets: FloatArray, options: FloatArray, room: int, model: Model | None = None
     ) -> tuple[int, Points]:
+        """Follow the path from `spot`; return why the march ended and its points.
+
+        `model`: other values than the network's own.
+        """
         y, drive, info = np.empty((room, self.size)), np.empty(room), np.empty((room, INFO))
         code, stored = entry.march(
-            model,
+            self.model if model is None else model,
             self.n_free,
             spot.y.copy(),
             spot.drive,
@@ -185,28 +184,15 @@ class Solver:
         )
         return int(code), Points(y[:stored], drive[:stored], info[:stored])
 
-    def rest(self) -> tuple[Spot | None, float, int]:
-        """Return a place near the equilibrium that the drive starts from, or None; the share of the preload; a code.
+    def tightened(self, model: Model) -> Spot | None:
+        """Return a place near the equilibrium at drive zero, where nothing but springs may be prestressed; or None.
 
-        Springs are tightened first, then all else that is constant is applied; the code is that of a march. Places of
-        segments are left at zero where nothing is done: they follow linearly from all else.
+        Places of segments are left at zero where nothing is done: they follow linearly from all else.
         """
-        spot = Spot(np.zeros(self.size), 0.0, np.zeros(self.n + 1))
-        loaded = bool(self.layout.network.loads) or self.layout.held
-        model = self.ramp() if loaded else self.model
         slack = _slack(model) if len(model.spring_kind) else None
-        if slack is not None and np.abs(slack - model.spring_value).max() > _TIGHT:
-            tightened = self._tightened(model, slack)
-            if tightened is None:
-                return None, 0.0, STALLED
-            spot = tightened
-        if loaded:
-            options = march_options(self.tolerance, 0.25, 0.35, sense=1.0)
-            code, points = self._march(model, spot, np.array([1.0]), options, 400)
-            if code != DONE:
-                return None, float(points.drive[-1]) if len(points) else 0.0, code
-            spot = Spot(points.y[-1], 0.0, spot.tangent)
-        return spot, 1.0, DONE
+        if slack is None or np.abs(slack - model.spring_value).max() <= _TIGHT:
+            return Spot(np.zeros(self.size), 0.0, np.zeros(self.n + 1))
+        return self._tightened(model, slack)
 
     def _tightened(self, model: Model, slack: FloatArray) -> Spot | None:
         """Return the equilibrium of a model at drive zero, its springs tightened step by step; or None."""

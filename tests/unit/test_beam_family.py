@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 from beam_support import MM, at, cantilever, config, solved, value
@@ -150,6 +152,37 @@ def test_the_mirror_image_of_a_stack_that_bifurcates_has_its_layers_swapped():
     np.testing.assert_allclose(one.curve.force, other.curve.force, atol=1e-5)
     first, second = (item.state.path.motion("n5")[item.state.keep, 1][-1] for item in (one, other))
     assert abs(first - second) > 1 * MM
+
+
+def test_a_column_overloaded_from_the_start_is_buckled_and_told_so():
+    """The curve begins on the stable branch, and the finding says under which share of the loads it opens."""
+    text = """
+cfmkit: 1
+family: beam
+name: column
+mechanism:
+  material: {youngs_modulus: 2 GPa}
+  thickness: 1 mm
+  width: 8 mm
+  nodes:
+    foot: {at: [0 mm, 0 mm], support: clamped}
+    top: {at: [0 mm, 100 mm]}
+  beams:
+    column: {start: foot, end: top}
+  loads:
+    - {kind: point, node: top, fy: -0.4 N}
+  drive: {kind: force, node: top, direction: 0 deg}
+analysis: {force: 0.01 N, points: 5}
+"""
+    one, other = (cfmkit.analyze(cfmkit.loads(text.replace("points: 5", more))) for more in ("points: 5", MIRRORED))
+    euler = np.pi**2 * 2e9 * 8e-3 * 1e-9 / 12 / (4 * 0.1**2)
+    share = float(re.search(r"under ([\d.]+) % of the constant loads", warned(one)["bifurcation"])[1])
+    assert share == pytest.approx(100 * euler / 0.4, abs=0.05)
+    assert one.curve.stable.all()
+    assert one.curve.motion[0] == pytest.approx(-other.curve.motion[0], rel=1e-3)
+
+
+MIRRORED = "points: 5, other_side: true"
 
 
 # --- what is reported -------------------------------------------------------------------------------------

@@ -92,7 +92,7 @@ def test_the_size_of_the_determinant_that_a_solution_brings_is_that_of_its_tange
     """By Cramer's rule from the factors of the bordered system, whatever the border is."""
     net = network(seed, follower=False)
     solver = Solver(Layout(net, drives(net, seed)[0]), Mesh(3, 1), 1e-12)
-    start, _, _ = solver.rest()
+    start = solver.tightened(solver.model)
     assert start is not None
     found = solver.solve(start.y, 0.02)
     assert found is not None

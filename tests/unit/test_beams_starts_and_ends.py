@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
+from scipy.special import ellipk
 
 from cfmkit.beams import (
     CLAMPED,
@@ -15,12 +17,14 @@ from cfmkit.beams import (
     Control,
     CosineArch,
     Displacement,
+    Loading,
     Network,
     Node,
     Path,
     PathStatus,
     PointLoad,
     Section,
+    Support,
     TorsionSpring,
     guided,
     trace,
@@ -129,3 +133,61 @@ def test_a_path_keeps_no_more_memory_than_its_points_take() -> None:
     network, rise = half_arch(4.0)
     points = trace(network, Displacement("middle", -UP, [0.1 * rise])).points
     assert all(part.base is None or part.base.nbytes == part.nbytes for part in points.parts)
+
+
+LENGTH, RIGIDITY = 0.1, 2e9 * 8e-3 * 1e-9 / 12
+EULER = np.pi**2 * RIGIDITY / (4 * LENGTH**2)  # of a column clamped at its foot, free at its top
+
+
+def pressed(ratio: float, section: Section = SECTION) -> Network:
+    """Return a column under a constant load of so many times Euler's."""
+    nodes = {"foot": Node(0, 0, CLAMPED), "top": Node(LENGTH, 0)}
+    return Network(nodes, {"column": Beam("foot", "top", section)}, loads=(PointLoad("top", fx=-ratio * EULER),))
+
+
+@pytest.mark.parametrize(("sign", "ratio"), [(1, 1.05), (-1, 1.2), (1, 2.0), (1, 6.0)])
+def test_constant_loads_beyond_a_bifurcation_start_on_its_stable_branch(sign: int, ratio: float) -> None:
+    """The elastica; S. P. Timoshenko and J. M. Gere, Theory of Elastic Stability, 1961, sec. 2.7, k = sin(angle/2)."""
+    rigid = Section(2e9, 8e-3, 1e-3, axial=False)
+    drive = Loading((PointLoad("top", fy=-sign * 1e-9 * EULER),), np.array([0.5, 1.0]))
+    path = trace(pressed(ratio, rigid), drive, Control(tolerance=1e-9, sign=sign))  # type: ignore[arg-type]
+    k = brentq(lambda k: ellipk(k * k) / (np.pi / 2) - np.sqrt(ratio), 1e-9, 1 - 1e-12)
+    turn = path.motion("top")[0, 2]
+    assert path.status is PathStatus.COMPLETE
+    assert path.stable.all()
+    assert abs(turn) == pytest.approx(2 * np.arcsin(k), rel=1e-6)
+    assert path.motion("top")[0, 1] * sign < 0
+    assert [(e.kind, e.before, e.after) for e in path.events] == [("bifurcation under constant loads", 0, 1)]
+    assert path.events[0].drive * ratio == pytest.approx(1.0, rel=1e-7)
+    assert set(path.branch) == {f"bifurcated under {100 / ratio:.4g} % of the constant loads, sign {sign:+d}"}
+
+
+def test_constant_loads_beyond_a_bifurcation_as_the_control_says() -> None:
+    """Straight on, unstable; nowhere, since stability is lost before the drive begins; bent by an imperfection."""
+    drive = Loading((PointLoad("top", fy=0.01 * EULER),), np.array([0.5, 1.0]))
+    primary = trace(pressed(1.5), drive, Control(tolerance=1e-6, branch="primary"))
+    assert primary.status is PathStatus.COMPLETE
+    assert (primary.unstable == 1).all()
+    stopped = trace(pressed(1.5), drive, Control(tolerance=1e-6, branch="stop"))
+    assert (stopped.status, len(stopped)) == (PathStatus.JUMPS, 0)
+    assert "of the constant loads" in stopped.message
+    assert trace(pressed(0.9), drive, Control(tolerance=1e-6, branch="stop")).status is PathStatus.COMPLETE
+    one, other = (trace(pressed(1.5), drive, Control(tolerance=1e-6, imperfection=size)) for size in (1e-6, -1e-6))
+    assert one.stable.all()
+    assert other.stable.all()
+    assert one.imperfection == "1e-06 m of the buckling mode under 66.67 % of the constant loads"
+    assert one.motion("top")[0, 1] * other.motion("top")[0, 1] < 0
+
+
+def test_a_displacement_held_from_the_start_beyond_a_bifurcation() -> None:
+    """A guided column shortened by its support, then driven sideways at its middle: buckled from the start."""
+    short = Support(True, True, True, displacement=(-2e-3, 0.0, 0.0))
+    nodes = {"foot": Node(0, 0, CLAMPED), "middle": Node(0.05, 0), "top": Node(0.1, 0, short)}
+    beams = {"one": Beam("foot", "middle", SECTION), "two": Beam("middle", "top", SECTION)}
+    drive = Loading((PointLoad("middle", fy=1e-9),), np.array([1.0]))
+    paths = [trace(Network(nodes, beams), drive, Control(tolerance=1e-7, sign=sign)) for sign in (1, -1)]
+    rises = [path.motion("middle")[0, 1] for path in paths]
+    assert all(path.stable.all() for path in paths)
+    assert rises[0] == pytest.approx(-rises[1], rel=1e-4)
+    # shallow: y = h (1 - cos(2 pi x / L)) / 2 is longer than its span by (pi h)^2 / (4 L)
+    assert abs(rises[0]) == pytest.approx(2 / np.pi * np.sqrt(2e-3 * 0.1), rel=0.03)

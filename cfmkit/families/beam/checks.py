@@ -10,7 +10,7 @@ from cfmkit.beams import PathStatus
 from cfmkit.families.beam.build import thickest_of, thinnest_of
 from cfmkit.families.beam.findings import finding
 from cfmkit.families.beam.values import window_of, within
-from cfmkit.families.beam.words import drive_text, in_units
+from cfmkit.families.beam.words import drive_text, in_units, percent
 from cfmkit.units import format_short
 
 if TYPE_CHECKING:
@@ -114,6 +114,10 @@ def _events(solution: Solution) -> Iterator[Finding]:
             more = f" and {len(places) - 6} more" if len(places) > 6 else ""
             tail = _after(solution) if kind == "bifurcation" else ""
             yield finding(name, f"{kind}{'s' if len(places) > 1 else ''} at {', '.join(places[:6])}{more}{tail}")
+    shares = [percent(event.drive) for event in path.events if event.kind == "bifurcation under constant loads"]
+    if shares:
+        tail = "; nothing stable was found beyond" if not path.stable[:1].all() else _after(solution)
+        yield finding("bifurcation", f"bifurcation under {', '.join(shares)} of the constant loads{tail}")
 
 
 def _after(solution: Solution) -> str:

@@ -1,0 +1,73 @@
+"""The start of a path: springs are tightened, then everything constant is applied, along a stable branch if possible.
+
+Constant loads may lie beyond a bifurcation. The path to them is then followed as any other is, with a share of them
+in the place of the drive; what happens on it is told as happening "under constant loads", with that share.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.beams.discretise import assemble_model
+from cfmkit.beams.kernels.march import DONE, LONG, STALLED
+from cfmkit.beams.path import Event, PathStatus
+from cfmkit.beams.solver import Spot, march_options
+
+if TYPE_CHECKING:
+    from cfmkit.beams.run import Run
+
+_ROOM = 400  # points on the way to the constant loads
+_STEP, _TURN = 0.25, 0.35  # first step, as a share of them; largest change of a pose in a step
+
+
+def start(run: Run) -> tuple[Spot | None, float, int]:
+    """Return a place near the equilibrium that the drive starts from, or None; the share of the preload; a code.
+
+    The code is that of a march. None with the code DONE: the path ends before it begins, as the run then says.
+    """
+    solver, layout = run.solver, run.layout
+    if run.ramped or not (layout.network.loads or layout.held):
+        spot = solver.tightened(solver.model)
+        return (spot, 1.0, DONE) if spot is not None else (None, 0.0, STALLED)
+    model = assemble_model(layout, solver.cut, solver.table, ramp=True)
+    spot = solver.tightened(model)
+    if spot is None:
+        return None, 0.0, STALLED
+    indifferent = run.control.branch == "primary" and not run.to_first
+    for watch in (None,) if indifferent else (0, None):
+        options = march_options(solver.tolerance, _STEP, _TURN, watch=watch, sense=1.0)
+        code, points = solver.march(spot, np.array([1.0]), options, _ROOM, model)
+        if watch is None or code in (DONE, LONG):
+            break
+        found = _along(run)
+        if found is not None:
+            return found
+    if code != DONE:
+        return None, float(points.drive[-1]) if len(points) else 0.0, code
+    return Spot(points.y[-1], 0.0, spot.tangent), 1.0, DONE
+
+
+def _along(run: Run) -> tuple[Spot | None, float, int] | None:
+    """Follow the path to the constant loads through its bifurcations; None where that leads nowhere."""
+    ramp = run.under_constant_loads()
+    ramp.follow()
+    if ramp.too_long:
+        return None, 0.0, LONG
+    run.events += [Event(f"{one.kind} under constant loads", one.drive, one.before, one.after) for one in ramp.events]
+    if run.to_first and ramp.first is not None:
+        run.ramp = ramp
+        return None, 1.0, DONE
+    if run.control.branch == "stop" and ramp.status is PathStatus.JUMPS:
+        run.status = PathStatus.JUMPS
+        share = float(ramp.points.drive[-1])
+        run.message = f"stability is lost under {100 * share:.3g} % of the constant loads: the path ends there"
+        return None, share, DONE
+    if ramp.status is not PathStatus.COMPLETE:
+        return None
+    if ramp.branch != "primary":
+        share = next(one.drive for one in reversed(ramp.events) if one.after > one.before)
+        run.branch = f"bifurcated under {100 * share:.4g} % of the constant loads, sign {run.control.sign:+d}"
+    last = ramp.last(ramp.points)
+    return Spot(last.y, 0.0, last.tangent), 1.0, DONE
