@@ -1,39 +1,22 @@
-"""Decisions where stability changes: stay on the path, leave it for a stable branch, come back to it."""
+"""Decisions where stability changes: stay on the path, or leave it for a stable branch; `branch_ends` has the rest."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.beams.branch_ends import end_of_branch
 from cfmkit.beams.events import Singular, leave, locate
-from cfmkit.beams.kernels.march import DONE, INERTIA, STALLED
 from cfmkit.beams.path import Event, PathStatus
 from cfmkit.beams.solver import FORCE_WEIGHT, Spot
 
 if TYPE_CHECKING:
     from cfmkit.beams.run import Run
-    from cfmkit.curves import FloatArray
 
-BEFORE_END = 1e-4  # share of the drive's range by which the end of a branch is passed over
-_LEGS = 60
 _CLEAR = 0.01  # share of the drive's range from a bifurcation at which the paths there are told apart
-LONGEST = 5  # which of a march's options is the longest step
-_BACK = 0.01  # share of the range in one step where the end of a branch is looked for backwards
+_SAME_PLACE = 1e-4  # share of the drive's range within which two searches found one bifurcation
 _FINEST = 1e-5  # share of the range below which a change of stability is not looked into with shorter steps
-_SAME = 1e-6  # largest difference of poses of two solutions that are one
-
-
-@dataclass(frozen=True)
-class BranchEnd:
-    """Where a path that was left for a branch becomes stable again: drive, state, an equilibrium beyond, inertia."""
-
-    drive: float
-    y: FloatArray
-    beyond: Spot
-    before: int
-    after: int
 
 
 def cross(run: Run) -> Spot | None:
@@ -52,8 +35,12 @@ def cross(run: Run) -> Spot | None:
         before, after = (int(run.points.info[k, 0]) for k in (-2, -1))
         if after > before and _too_far(run):
             return _again(run)
-        run.events.append(Event("unresolved", other.drive * run.unit, before, after))
-        return other
+        found = _found_before(run, other, before, after)
+        if found is None:
+            run.events.append(Event("unresolved", other.drive * run.unit, before, after))
+            return other
+        run.events.append(Event("bifurcation", found.spot.drive * run.unit, before, after))
+        return _no_branch(run, found, other)
     kind = "limit point" if found.fold else "bifurcation"
     run.events.append(Event(kind, found.spot.drive * run.unit, found.before, found.after))
     if run.first is None and not found.fold and found.after > found.before:
@@ -68,9 +55,10 @@ def cross(run: Run) -> Spot | None:
     forward = float(np.sign(other.drive - one.drive))
     left = leave(run.fine, found, run.control.sign, forward)
     left = None if left is None else run.settled(run.fine.reduce(left))
-    if left is None and _too_far(run):
+    if left is None and _too_far(run) and not _sure(run, one, other, found):
         run.events.pop()
         run.first = None if run.first is found else run.first
+        run.without_branch = found
         return _again(run)
     if left is None:
         return _no_branch(run, found, other)
@@ -80,7 +68,7 @@ def cross(run: Run) -> Spot | None:
     run.append(run.as_points(left, -1))
     run.entry = 0.5 * abs(left.drive - found.spot.drive)
     run.closed = False
-    run.end = _end_of_branch(run, clear, found) if run.natural else None
+    run.end = end_of_branch(run, clear, found) if run.natural else None
     return left
 
 
@@ -99,6 +87,28 @@ def _clear_of(run: Run, found: Singular, one: Spot, other: Spot) -> Spot:
     wide = run.fine.solve(guess, place)
     near = None if wide is None or wide.unstable != found.after else run.settled(run.fine.reduce(wide))
     return other if near is None else near
+
+
+def _found_before(run: Run, other: Spot, before: int, after: int) -> Singular | None:
+    """Return the bifurcation that longer steps found here, without a stable branch; of short ones it may lie outside.
+
+    The fine mesh puts it beside where this one has it, by the error of integration.
+    """
+    known = run.without_branch
+    if known is None or not _known(run, other.drive, _CLEAR):
+        return None
+    return known if (known.before, known.after) == (before, after) else None
+
+
+def _known(run: Run, place: float, share: float = _SAME_PLACE) -> bool:
+    """Tell whether a bifurcation without a stable branch was found before near a drive, within a share of its range."""
+    known = run.without_branch
+    return known is not None and abs(known.spot.drive - place) <= share * run.span
+
+
+def _sure(run: Run, one: Spot, other: Spot, found: Singular) -> bool:
+    """Tell whether a bifurcation was found before and now between points so near that its branch would be found too."""
+    return abs(other.drive - one.drive) <= _SAME_PLACE * run.span and _known(run, found.spot.drive)
 
 
 def _not_beyond(run: Run, found: Singular, left: Spot, forward: float) -> Spot:
@@ -147,151 +157,3 @@ def _point_along(run: Run, spot: Spot) -> None:
     weights = np.append(np.where(np.arange(n) < run.solver.n_free, 1.0, FORCE_WEIGHT), 1.0)
     if float((weights * came) @ spot.tangent) < 0:
         spot.tangent *= -1.0
-
-
-def _end_of_branch(run: Run, other: Spot, found: Singular) -> BranchEnd | None:
-    """Return where the path that was left becomes stable again: there the branch may rejoin it."""
-
-    start = other
-    for _ in range(_LEGS):
-        ahead = run.targets[run.asked() :]
-        ahead = ahead[(ahead - start.drive) * np.sign(run.targets[-1] - start.drive) > 1e-9 * run.span]
-        if not len(ahead):
-            run.closed = True
-            return None
-        step = float(np.sign(ahead[0] - start.drive)) * 0.02 * run.span
-        options = run.options(start, step)
-        code, points = run.solver.march(start, ahead, options, run.control.most_points + len(ahead))
-        if code != INERTIA:
-            run.closed = code == DONE
-            return None
-        earlier = points.take([-2]) if len(points) > 1 else run.as_points(start, -1)
-        start = run.last(points)
-        if start.unstable <= found.before:
-            break
-    one = run.fine.solve(run.fine.expand(earlier.y[-1]), float(earlier.drive[-1]))
-    beyond = run.fine.solve(run.fine.expand(points.y[-1]), float(points.drive[-1]))
-    closing = None if one is None or beyond is None else _place(run, one, beyond)
-    if closing is None or beyond is None:
-        return None
-    reduced = run.fine.reduce
-    return BranchEnd(closing.spot.drive, reduced(closing.spot).y, reduced(beyond), closing.before, closing.after)
-
-
-def _place(run: Run, one: Spot, other: Spot) -> Singular | None:
-    """Return the singular point between two equilibria, without its null vector."""
-    return locate(run.fine, one, other, True, run.control.tolerance, vector=False)
-
-
-def room(run: Run, place: float, sense: float) -> float:
-    """Return how far from a bifurcation to go on, in one sense: not beyond the next point asked for."""
-    ahead = (run.targets - place) * sense
-    return 0.5 * float(min(2.0 * BEFORE_END * run.span, ahead[ahead > 0].min(initial=np.inf)))
-
-
-def rejoin(run: Run, spot: Spot) -> Spot | None:
-    """Go back to the path that the branch left, if the branch has come close to it; else go on along the branch."""
-    end, run.end = run.end, None
-    if end is None:
-        run.status, run.message = PathStatus.LOST, "the path was lost"
-        return None
-    apart = max(run.solver.pose_change(y, end.y) for y in run.points.y[-8:])
-    if run.solver.pose_change(spot.y, end.y) > 0.5 * apart:
-        return spot
-    run.closed = True
-    sense = float(np.sign(end.drive - spot.drive))
-    start = run.solver.solve(end.beyond.y, end.drive + sense * room(run, end.drive, sense))
-    if start is None or start.unstable > end.after:
-        start = run.settled(end.beyond) or replace(end.beyond, tangent=run.solver.unit.copy())
-    run.events.append(Event("bifurcation", end.drive * run.unit, end.before, end.after))
-    run.branch = "primary"
-    run.append(run.as_points(start, -1))
-    return start
-
-
-def hop(run: Run, spot: Spot, asked: int) -> Spot | None:
-    """Step over the end of a branch onto the path that it joins there: a small change for a small advance."""
-    if run.end is not None and abs(run.end.drive - spot.drive) <= BEFORE_END * run.span:
-        return rejoin(run, spot)
-    forward = float(np.sign(run.targets[asked] - spot.drive))
-    for power in range(-6, -1):
-        ahead = 10.0**power * run.span
-        wide = run.fine.solve(run.fine.expand(spot.y), spot.drive + forward * ahead)
-        if wide is None or wide.unstable > spot.unstable:
-            continue
-        near = run.settled(run.fine.reduce(wide))
-        if near is None or run.solver.pose_change(near.y, spot.y) > run.reach(ahead):
-            continue
-        back = run.fine.solve(wide.y, spot.drive - forward * ahead)
-        found = None if back is None or back.unstable == wide.unstable else _place(run, wide, back)
-        place, before = (spot.drive, near.unstable) if found is None else (found.spot.drive, found.after)
-        kind = "unresolved" if found is None else "bifurcation"
-        run.events.append(Event(kind, place * run.unit, before, near.unstable))
-        run.branch = "primary"
-        run.append(run.as_points(near, -1))
-        return near
-    run.stop(STALLED)
-    return None
-
-
-def close_behind(run: Run) -> bool:
-    """Find the end of the last branch by going back along the path that it joined; tell whether that is settled.
-
-    Coming forward nothing changes there: branch and path are both stable. Going back the path loses its stability; a
-    branch that has not ended is stable back to where it opens.
-    """
-    last = max(k for k, name in enumerate(run.branches) if name != "primary")
-    name = run.branches[last]
-    first = run.branches.index(name)
-    opening, spot = float(run.points.drive[first]), run.spot(-1)
-    sense = float(np.sign(opening - spot.drive))
-    options = run.options(spot, sense * _BACK * run.span)
-    options[LONGEST] = _BACK * run.span
-    code, points = run.solver.march(spot, np.array([opening]), options, run.control.most_points + 2)
-    if code == DONE and run.solver.pose_change(points.y[-1], run.points.y[first]) <= _SAME:
-        return True
-    if code != INERTIA or len(points) < 2:
-        return False
-    one, beyond = (run.fine.solve(run.fine.expand(points.y[k]), float(points.drive[k])) for k in (-2, -1))
-    found = None if one is None or beyond is None else _place(run, one, beyond)
-    if found is None or found.after <= found.before:
-        return False
-    closing = Event("bifurcation", found.spot.drive * run.unit, found.after, found.before)
-    told = run.events[-1]  # by `hop`
-    same = abs(told.drive - closing.drive) < BEFORE_END * run.span * run.unit and told.after == closing.after
-    if told.kind == "unresolved" or (same and told.before == closing.before):
-        run.events.pop()
-    run.events.append(closing)
-    for index in range(first, len(run.branches)):
-        if (float(run.points.drive[index]) - found.spot.drive) * sense < 0:
-            run.branches[index] = "primary"
-        elif run.branches[index] == "primary":
-            run.branches[index] = name
-    return True
-
-
-def relabel(run: Run, primary: Run) -> None:
-    """Give the points of a branch that lie on the primary path its name: the end of the branch was stepped over.
-
-    `primary` is the same network followed without leaving the primary path. Where exactly the branch ended is not
-    known then: the event says so.
-    """
-    places = {int(number): k for k, number in enumerate(primary.points.info[:, 1]) if number >= 0}
-    last = max(k for k, name in enumerate(run.branches) if name != "primary")
-    first = last + 1
-    for index in range(last, 0, -1):
-        number = int(run.points.info[index, 1])
-        if number < 0:
-            continue
-        if number not in places or run.branches[index] == "primary":
-            break
-        if run.solver.pose_change(run.points.y[index], primary.points.y[places[number]]) > _SAME:
-            break
-        first = index
-    if first > last:
-        return
-    before, after = (int(run.points.info[k, 0]) for k in (first - 1, first))
-    if last + 1 < len(run.branches):  # the hop onto the primary path came too late
-        run.events.pop()
-    run.events.append(Event("unresolved", float(run.points.drive[first]) * run.unit, before, after))
-    run.branches[first:] = ["primary"] * (len(run.points) - first)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from enum import Enum
 from functools import cached_property
@@ -144,18 +145,22 @@ class Path:
 
     def motion(self, node: str) -> FloatArray:
         """Return displacement and rotation of a node, (n, 3) [m, m, rad]."""
-        values, scales = self._observed[0], self.layout.scales
+        values, length = self._observed[0], self.layout.scales.length
         master = self.layout.network.master_of(node)
         first = self.layout.first[master]
         frame = self.layout.direction[master]
-        c, s = np.cos(frame), np.sin(frame)
+        c, s = math.cos(frame) * length, math.sin(frame) * length
         a, b = values[:, first], values[:, first + 1]
-        own, turn = values[:, self.layout.plan.turn[node]], values[:, self.layout.plan.swing[node]]
+        moved = np.empty((len(self), 3))
+        moved[:, 0], moved[:, 1], moved[:, 2] = c * a - s * b, s * a + c * b, values[:, self.layout.plan.turn[node]]
         (x, y), (mx, my) = self.layout.position(node), self.layout.position(master)
         ax, ay = x - mx, y - my
-        dx = (c * a - s * b) * scales.length + np.cos(turn) * ax - np.sin(turn) * ay - ax
-        dy = (s * a + c * b) * scales.length + np.sin(turn) * ax + np.cos(turn) * ay - ay
-        return read_only(np.stack([dx, dy, own], axis=-1))
+        if ax != 0 or ay != 0:
+            swing = values[:, self.layout.plan.swing[node]]
+            less, across = np.cos(swing) - 1.0, np.sin(swing)
+            moved[:, 0] += less * ax - across * ay
+            moved[:, 1] += across * ax + less * ay
+        return read_only(moved)
 
     def reaction(self, node: str) -> FloatArray:
         """Return force and moment that support and drive exert on a node, (n, 3) [N, N, N m].
@@ -189,7 +194,10 @@ class Path:
                 total += self._line_work(load)
                 continue
             moved = self.motion(load.node)
-            c, s = (np.cos(moved[:, 2]), np.sin(moved[:, 2])) if load.follows else (1.0, 0.0)
+            if not load.follows:
+                total += moved @ np.array([load.fx, load.fy, load.moment])
+                continue
+            c, s = np.cos(moved[:, 2]), np.sin(moved[:, 2])
             fx, fy = c * load.fx - s * load.fy, s * load.fx + c * load.fy
             total += fx * moved[:, 0] + fy * moved[:, 1] + load.moment * moved[:, 2]
         return total

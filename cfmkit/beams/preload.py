@@ -59,13 +59,15 @@ def _along(run: Run) -> tuple[Spot | None, float, int] | None:
     if run.to_first and ramp.first is not None:
         run.ramp = ramp
         return None, 1.0, DONE
-    if run.control.branch == "stop" and ramp.status is PathStatus.JUMPS:
-        run.status = PathStatus.JUMPS
-        share = float(ramp.points.drive[-1])
-        run.message = f"stability is lost under {100 * share:.3g} % of the constant loads: the path ends there"
+    if ramp.status is PathStatus.JUMPS and not run.control.through_folds:
+        run.status, share = PathStatus.JUMPS, float(ramp.points.drive[-1])
+        lost = f"stability is lost under {100 * share:.3g} % of the constant loads"
+        stop = run.control.branch == "stop"
+        run.message = f"{lost}: {'the path ends there' if stop else 'it jumps there, no stable equilibrium is near'}"
         return None, share, DONE
     if ramp.status is not PathStatus.COMPLETE:
-        return None
+        ended = ramp.branch != "primary" and not run.control.through_folds
+        return (None, float(ramp.points.drive[-1]), STALLED) if ended else None
     if ramp.branch != "primary":
         share = next(one.drive for one in reversed(ramp.events) if one.after > one.before)
         run.branch = f"bifurcated under {100 * share:.4g} % of the constant loads, sign {run.control.sign:+d}"

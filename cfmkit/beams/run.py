@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.beams import branches, corners, preload
+from cfmkit.beams import branch_ends, branches, corners, preload
 from cfmkit.beams.accuracy import errors, largest_force
 from cfmkit.beams.discretise import Mesh
 from cfmkit.beams.expanded import ExpandedSolver
@@ -46,10 +46,11 @@ class Run:
     events: list[Event] = field(default_factory=list)
     branch: str = "primary"
     too_long: bool = False
-    end: branches.BranchEnd | None = None
+    end: branch_ends.BranchEnd | None = None
     error: float = np.inf  # as estimated
     first: Singular | None = None  # the first bifurcation at which stability is lost
     ramp: Run | None = None  # the run to the constant loads, if that has the first bifurcation
+    without_branch: Singular | None = None  # the last bifurcation behind which no stable branch was found yet
     closed: bool = True  # no branch, or its end is known, or it is known to have none before the last point asked for
     entry: float = np.inf  # first step on a branch that was just entered
 
@@ -86,10 +87,10 @@ class Run:
     def follow(self) -> None:
         """Trace from rest to the last point asked for, or to where it ends, and name the branches."""
         self._follow()
-        if self.natural and not self.closed and not self.too_long and not branches.close_behind(self):
+        if self.natural and not self.closed and not self.too_long and not branch_ends.close_behind(self):
             primary = Run(self.layout, self.mesh, replace(self.control, branch="primary"), ramped=self.ramped)
             primary.follow()
-            branches.relabel(self, primary)
+            branch_ends.relabel(self, primary)
 
     def under_constant_loads(self) -> Run:
         """Return a run from nothing to everything constant in the place of the drive."""
@@ -118,9 +119,10 @@ class Run:
             if code == INERTIA:
                 following = branches.cross(self)
             elif code == DONE:
-                following = branches.rejoin(self, spot)
+                following = branch_ends.rejoin(self, spot)
             elif code == STALLED and self.natural and len(self.points):
-                following = (corners.past if self.branch == "primary" else branches.hop)(self, spot, asked)
+                following = None if self.branch == "primary" else branch_ends.hop(self, spot, asked)
+                following = following or corners.past(self, spot, asked)
             else:
                 self.stop(code)
                 return
@@ -200,7 +202,7 @@ class Run:
         left, numbers = self.targets[asked:], np.arange(asked, len(self.targets))
         if self.end is not None:
             sense = np.sign(self.end.drive - spot.drive)
-            last = self.end.drive - sense * branches.room(self, self.end.drive, -sense)
+            last = self.end.drive - sense * branch_ends.room(self, self.end.drive, -sense)
             inside = np.logical_and.accumulate((last - left) * sense > 0)
             if not inside.all():
                 left, numbers = np.append(left[inside], last), np.append(numbers[inside], -1)

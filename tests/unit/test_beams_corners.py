@@ -14,10 +14,12 @@ from cfmkit.beams import (
     Control,
     CosineArch,
     Displacement,
+    Loading,
     Network,
     Node,
     Path,
     PathStatus,
+    PointLoad,
     Section,
     guided,
     trace,
@@ -138,3 +140,26 @@ def test_the_side_of_a_branch_does_not_depend_on_the_mesh(sign: Any) -> None:
     assert moments == pytest.approx([-0.01141 * sign] * 5, rel=1e-2)
     assert abs(turns[0]) > 0.05
     assert turns == pytest.approx([turns[-1]] * 5, rel=1e-2)
+
+
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8])
+@pytest.mark.parametrize("steps", [4, 10, 17])
+def test_a_truss_of_stiff_beams_jumps_where_they_buckle_whatever_the_tolerance(tolerance: float, steps: int) -> None:
+    """Two beams that do not stretch hold the apex; they buckle as columns clamped at one end and pinned at the other.
+
+    N = 20.1907 EI / L^2 (tan u = u); there is no stable equilibrium near.
+    """
+    angle, length, stiff = np.radians(8), 0.05, Section(2e9, 8e-3, 1e-3, axial=False)
+    across, up = length * np.cos(angle), length * np.sin(angle)
+    nodes = {"left": Node(-across, 0, CLAMPED), "apex": Node(0, up), "right": Node(across, 0, CLAMPED)}
+    beams = {"one": Beam("left", "apex", stiff), "two": Beam("right", "apex", stiff)}
+    root = 4.493409457909064
+    force = 2 * np.sin(angle) * root**2 * 2e9 * 8e-3 * 1e-9 / 12 / length**2
+    drive = Loading((PointLoad("apex", fy=-force),), np.linspace(0.0, 1.5, steps + 1)[1:])
+    path = trace(Network(nodes, beams), drive, Control(tolerance=tolerance))
+    assert path.status is PathStatus.JUMPS
+    assert path.stable.all()
+    assert [(event.kind, event.before, event.after) for event in path.events] == [("bifurcation", 0, 1)]
+    assert path.events[0].drive == pytest.approx(1.0, rel=10 * tolerance)
+    assert path.drive[-1] <= 1.0 + 10 * tolerance
+    assert len(path.at_asked) == int((drive.points < 1.0).sum())
