@@ -26,7 +26,10 @@ def estimate(run: Run) -> float:
         return 0.0
     forces = largest_force(run)
     hardest = int(forces.argmax())
-    return float(errors(run, {count // 2, count - 1, hardest}, float(forces[hardest])).max())
+    chosen = {count // 2, count - 1, hardest}
+    if run.pinned:  # at a bifurcation no mesh is near another
+        chosen = {k for k in chosen if float(run.points.drive[k]) not in run.pinned} or {0}
+    return float(errors(run, chosen, float(forces[hardest])).max())
 
 
 def errors(run: Run, indices: Iterable[int], largest: float) -> FloatArray:

@@ -7,18 +7,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.beams.events import Singular, locate
+from cfmkit.beams import beside
 from cfmkit.beams.kernels.march import DONE, INERTIA
 from cfmkit.beams.path import Event, PathStatus
+from cfmkit.beams.solver import LONGEST
 
 if TYPE_CHECKING:
+    from cfmkit.beams.events import Singular
     from cfmkit.beams.run import Run
     from cfmkit.beams.solver import Spot
     from cfmkit.curves import FloatArray
 
 BEFORE_END = 1e-4  # share of the drive's range by which the end of a branch is passed over
 _LEGS = 60
-LONGEST = 5  # which of a march's options is the longest step
 _BACK = 0.01  # share of the range in one step where the end of a branch is looked for backwards
 _SAME = 1e-6  # largest difference of poses of two solutions that are one
 
@@ -45,8 +46,9 @@ def end_of_branch(run: Run, other: Spot, found: Singular) -> BranchEnd | None:
             run.closed = True
             return None
         step = float(np.sign(ahead[0] - start.drive)) * 0.02 * run.span
+        marks = np.append(0.5 * (ahead[1:] + ahead[:-1]), ahead[-1])  # a point asked for may lie at the end
         options = run.options(start, step)
-        code, points = run.solver.march(start, ahead, options, run.control.most_points + len(ahead))
+        code, points = run.solver.march(start, marks, options, run.control.most_points + len(marks))
         if code != INERTIA:
             run.closed = code == DONE
             return None
@@ -65,13 +67,13 @@ def end_of_branch(run: Run, other: Spot, found: Singular) -> BranchEnd | None:
 
 def _place(run: Run, one: Spot, other: Spot) -> Singular | None:
     """Return the singular point between two equilibria, without its null vector."""
-    return locate(run.fine, one, other, True, run.control.tolerance, vector=False)
+    return beside.located(run, one, other, vector=False)
 
 
 def room(run: Run, place: float, sense: float) -> float:
-    """Return how far from a bifurcation to go on, in one sense: not beyond the next point asked for."""
+    """Return how far from a bifurcation to go on, in one sense: not beyond the next point asked for away from it."""
     ahead = (run.targets - place) * sense
-    return 0.5 * float(min(2.0 * BEFORE_END * run.span, ahead[ahead > 0].min(initial=np.inf)))
+    return 0.5 * float(min(2.0 * BEFORE_END * run.span, ahead[ahead > beside.BESIDE * run.span].min(initial=np.inf)))
 
 
 def rejoin(run: Run, spot: Spot) -> Spot | None:
@@ -89,6 +91,7 @@ def rejoin(run: Run, spot: Spot) -> Spot | None:
     if start is None or start.unstable > end.after:
         start = run.settled(end.beyond) or replace(end.beyond, tangent=run.solver.unit.copy())
     run.events.append(Event("bifurcation", end.drive * run.unit, end.before, end.after))
+    beside.closing(run, end, spot)
     run.branch = "primary"
     run.append(run.as_points(start, -1))
     return start

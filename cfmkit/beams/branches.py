@@ -6,34 +6,40 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.beams import beside
+from cfmkit.beams.beside import BESIDE
 from cfmkit.beams.branch_ends import end_of_branch
-from cfmkit.beams.events import Singular, leave, locate
+from cfmkit.beams.events import Singular, leave
 from cfmkit.beams.path import Event, PathStatus
 from cfmkit.beams.solver import FORCE_WEIGHT, Spot
+from cfmkit.beams.steady import steadier
 
 if TYPE_CHECKING:
     from cfmkit.beams.run import Run
 
 _CLEAR = 0.01  # share of the drive's range from a bifurcation at which the paths there are told apart
 _SAME_PLACE = 1e-4  # share of the drive's range within which two searches found one bifurcation
+_SLIGHT = 1e-3  # share of a determinant that is hardly any
 _FINEST = 1e-5  # share of the range below which a change of stability is not looked into with shorter steps
 
 
 def cross(run: Run) -> Spot | None:
     """Handle a change of inertia between the last two points; return where to go on, None to stop."""
-    other = run.spot(-1)
     one, beyond = run.fine_spot(-2), run.fine_spot(-1)
+    if run.natural and len(run.points) > 2 and _beside(run, -2, one, beyond):
+        one = _without_last_but_one(run)
+    if run.natural and _beside(run, -1, beyond, one):
+        beyond = _behind_the_last(run)
+        if beyond is None and steadier(run, 1):
+            return run.spot(-1)
+    other = run.spot(-1)
     _point_along(run, other)
     senses = np.sign(run.points.info[-2:, 4])
     fold = not run.natural and bool(senses[0] != senses[1])
-    found = (
-        None
-        if one is None or beyond is None
-        else locate(run.fine, one, beyond, run.natural, 0.0 if run.to_first else run.control.tolerance, fold)
-    )
+    found = None if one is None or beyond is None else beside.located(run, one, beyond, fold)
     if found is None or one is None:
         before, after = (int(run.points.info[k, 0]) for k in (-2, -1))
-        if after > before and _too_far(run):
+        if after > before and _too_far(run) and not run.stuck:
             return _again(run)
         found = _found_before(run, other, before, after)
         if found is None:
@@ -45,16 +51,60 @@ def cross(run: Run) -> Spot | None:
     run.events.append(Event(kind, found.spot.drive * run.unit, found.before, found.after))
     if run.first is None and not found.fold and found.after > found.before:
         run.first = found
-    if found.fold:
-        return other
+    return other if found.fold else _parted(run, found, one, other)
+
+
+def _beside(run: Run, index: int, spot: Spot | None, other: Spot | None) -> bool:
+    """Tell whether one of the last two points lies at the bifurcation between them, for the fine mesh.
+
+    It has another inertia there than on this mesh, or hardly any determinant compared with the other one.
+    """
+    if spot is None or spot.unstable != int(run.points.info[index, 0]):
+        return True
+    if other is None:
+        return False
+    share = min(0.5 * BESIDE * run.span / abs(other.drive - spot.drive), _SLIGHT)
+    return not spot.log_size - other.log_size > np.log(share)
+
+
+def _without_last_but_one(run: Run) -> Spot | None:
+    """Take back a point beside a bifurcation, where meshes differ in what is stable; return the one before it."""
+    last, name = run.points.take([-1]), run.branches[-1]
+    run.drop_last()
+    run.drop_last()
+    if last.info[0, 1] > run.asked():
+        last.info[0, 1] = -1.0  # the point taken back is to be done first
+    before = run.fine_spot(-1)
+    run.append(last)
+    run.branches[-1] = name
+    return before
+
+
+def _behind_the_last(run: Run) -> Spot | None:
+    """Replace the last point, beside a bifurcation, by one behind it if there is one; return it on the fine mesh."""
+    last, name = run.points.take([-1]), run.branches[-1]
+    run.drop_last()
+    if beside.behind(run, float(last.drive[0])):
+        return run.fine_spot(-1)
+    run.append(last)
+    run.branches[-1] = name
+    return None
+
+
+def _parted(run: Run, found: Singular, one: Spot, other: Spot) -> Spot | None:
+    """Go on behind a bifurcation between `one` and the last point `other`, where the control says; None to stop."""
     clear = _clear_of(run, found, one, other)
     if found.after <= found.before or run.control.branch == "primary":
+        last = run.points.take([-1])
+        run.drop_last()
+        beside.opening(run, found, one, None, run.branch)
+        run.append(last)
         if clear is not other:
             run.append(run.as_points(clear, -1))
         return clear
     forward = float(np.sign(other.drive - one.drive))
-    left = leave(run.fine, found, run.control.sign, forward)
-    left = None if left is None else run.settled(run.fine.reduce(left))
+    wide = leave(run.fine, found, run.control.sign, forward)
+    left = None if wide is None else run.settled(run.fine.reduce(wide))
     if left is None and _too_far(run) and not _sure(run, one, other, found):
         run.events.pop()
         run.first = None if run.first is found else run.first
@@ -63,8 +113,11 @@ def cross(run: Run) -> Spot | None:
     if left is None:
         return _no_branch(run, found, other)
     run.drop_last()
+    name = f"bifurcated at {found.spot.drive * run.unit:.6g}, sign {run.control.sign:+d}"
+    if run.natural:
+        beside.opening(run, found, one, wide, name)
     left = _not_beyond(run, found, left, forward)
-    run.branch = f"bifurcated at {found.spot.drive * run.unit:.6g}, sign {run.control.sign:+d}"
+    run.branch = name
     run.append(run.as_points(left, -1))
     run.entry = 0.5 * abs(left.drive - found.spot.drive)
     run.closed = False
@@ -107,8 +160,12 @@ def _known(run: Run, place: float, share: float = _SAME_PLACE) -> bool:
 
 
 def _sure(run: Run, one: Spot, other: Spot, found: Singular) -> bool:
-    """Tell whether a bifurcation was found before and now between points so near that its branch would be found too."""
-    return abs(other.drive - one.drive) <= _SAME_PLACE * run.span and _known(run, found.spot.drive)
+    """Tell whether a bifurcation was found before and now between points so near that its branch would be found too.
+
+    Or as near as steps lead.
+    """
+    near = run.stuck or abs(other.drive - one.drive) <= _SAME_PLACE * run.span
+    return near and _known(run, found.spot.drive)
 
 
 def _not_beyond(run: Run, found: Singular, left: Spot, forward: float) -> Spot:
@@ -136,6 +193,7 @@ def _too_far(run: Run) -> bool:
 def _again(run: Run) -> Spot:
     """Take the last point back; return the one before, to go on from there in shorter steps."""
     run.entry = 0.25 * abs(float(run.points.drive[-1] - run.points.drive[-2]))
+    run.come_by(float(run.points.drive[-2]), float(run.points.drive[-1]))
     run.drop_last()
     return run.spot(-1)
 

@@ -24,6 +24,7 @@ def past(run: Run, spot: Spot, asked: int) -> Spot | None:
     On the fine mesh the path is followed up to a point asked for just before the bifurcation, then across it.
     """
     goal = float(run.targets[asked])
+    run.come_by(spot.drive)
     if abs(goal - spot.drive) <= _NEAR * run.span:
         there = _beside(run, spot, goal)
         if there is not None and there.unstable == spot.unstable:

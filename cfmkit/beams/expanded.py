@@ -63,6 +63,14 @@ class ExpandedSolver(Solver):
         last[self.lasts] = y[self.plain_free : self.plain_free + 3 * beams].reshape(-1, 3)
         return np.concatenate([y[: self.plain_free], moved.ravel(), last.ravel(), parts.ravel()])
 
+    def spread(self, tangent: FloatArray) -> FloatArray:
+        """Return a tangent or bordering row of a plain solver in the place of these unknowns, zero for all others."""
+        whole, beams = np.zeros(self.n + 1), len(self.lasts)
+        whole[: self.plain_free], whole[-1] = tangent[: self.plain_free], tangent[-1]
+        ends = whole[self.n_free : self.n].reshape(-1, 3)
+        ends[self.lasts] = tangent[self.plain_free : self.plain_free + 3 * beams].reshape(-1, 3)
+        return whole
+
     def reduce(self, spot: Spot) -> Spot:
         """Return an equilibrium with the unknowns of a plain solver; its tangent is not kept."""
         forces = spot.y[self.n_free : self.n].reshape(-1, 3)[self.lasts]

@@ -6,6 +6,7 @@ in the place of the drive; what happens on it is told as happening "under consta
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -51,7 +52,8 @@ def start(run: Run) -> tuple[Spot | None, float, int]:
 
 def _along(run: Run) -> tuple[Spot | None, float, int] | None:
     """Follow the path to the constant loads through its bifurcations; None where that leads nowhere."""
-    ramp = run.under_constant_loads()
+    control = replace(run.control, through_folds=False, first_step=None)
+    ramp = type(run)(run.layout, run.mesh, control, run.to_first, ramped=True)
     ramp.follow()
     if ramp.too_long:
         return None, 0.0, LONG

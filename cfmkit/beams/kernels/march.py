@@ -19,9 +19,10 @@ from cfmkit.beams.kernels.predictor import (
     set_border,
 )
 
-DONE, STALLED, INERTIA, LONG, FULL, OUTSIDE, NO_START = range(7)
+DONE, STALLED, INERTIA, LONG, FULL, OUTSIDE, NO_START, DENIED = range(8)
 """Why a march ended: all asked points reached; the smallest step failed; the number of unstable directions changed;
-a segment is too long for its load; no room for more points; the drive left its range; no equilibrium to start from."""
+a segment is too long for its load; no room for more points; the drive left its range; no equilibrium to start from;
+an asked value was tried for so often in vain that it may lie at a bifurcation."""
 
 SHORT = 0.25  # dM1/dM0 of a segment below which it must be split
 SECANT = 0.25  # of the last step: shorter ones go along the tangent, from which the secants of long ones differ
@@ -130,9 +131,9 @@ def march(m, n_free, y, drive, tangent, targets, options, outs, scratch):
 
     options: tolerance, iterations, natural (1) or arc length (0), first, smallest and largest step, largest change of
     a pose in a step, weight of forces in the arc length, lowest and highest drive, whether to stop where the
-    inertia changes, inertia at the start, sense. A sense of 1 or -1 says that the start is only near an equilibrium,
-    which is solved for and stored first. A step that lands on a target may be longer than the largest by STRETCH.
-    Returns why the march ended and the number of points stored.
+    inertia changes, inertia at the start, sense, how often a landing on a target may be refused. A sense of 1 or -1
+    says that the start is only near an equilibrium, which is solved for and stored first. A step that lands on a
+    target may be longer than the largest by STRETCH. Returns why the march ended and the number of points stored.
     """
     natural, step, smallest, greatest, turn = options[2] > 0.5, options[3], options[4], options[5], options[6]
     n, size = tangent.shape[0] - 1, y.shape[0]
@@ -146,7 +147,7 @@ def march(m, n_free, y, drive, tangent, targets, options, outs, scratch):
         return NO_START, 0
     t, asked, index = (drive if natural else 0.0), 0, (state[1] if stored == 1 else options[11])
     most = KEPT_WITH_SLOPES if natural else KEPT
-    count, slow = remember(kept, 0, t, y, drive, slope, most), 0
+    count, slow, denied = remember(kept, 0, t, y, drive, slope, most), 0, 0
     while asked < targets.shape[0]:
         if stored + targets.shape[0] - asked + 1 >= outs[0].shape[0]:
             return FULL, stored
@@ -162,9 +163,9 @@ def march(m, n_free, y, drive, tangent, targets, options, outs, scratch):
         refused = _refused(code, moved, missed, bent, turn, count)
         passed = _passed(state, index, count, natural, options[10] > 0.5) and abs(ahead) > 4.0 * smallest
         if refused or passed or not (natural or _forward(border, new_tangent)):
-            step = 0.5 * ahead if natural else 0.5 * step
-            if abs(step) < smallest:
-                return STALLED, stored
+            step, denied = (0.5 * ahead if natural else 0.5 * step), denied + (1 if landing else 0)
+            if abs(step) < smallest or denied >= options[13]:
+                return (STALLED if abs(step) < smallest else DENIED), stored
             if count > 1 and abs(step) < SECANT * abs(times[0] - times[1]):
                 count = 1
             continue
@@ -179,7 +180,7 @@ def march(m, n_free, y, drive, tangent, targets, options, outs, scratch):
                 return DONE, stored
         t += ahead
         _store(stored, new, state, asked if landing else -1, t, iterations, new_tangent[n], outs)
-        stored, asked = stored + 1, asked + (1 if landing else 0)
+        stored, asked, denied = stored + 1, asked + (1 if landing else 0), (0 if landing else denied)
         count = remember(kept, count if known or not natural else 0, t, new, state[0], slope, most)
         known = natural
         copy(tangent, new_tangent)

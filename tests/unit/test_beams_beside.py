@@ -1,0 +1,91 @@
+"""Points asked for at bifurcations, on both ends of a branch; the solver with nothing eliminated."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from beam_networks import drives, network
+
+from cfmkit.beams import CLAMPED, Beam, Control, Displacement, Network, Node, Path, PathStatus, Section, guided, trace
+from cfmkit.beams.discretise import Mesh
+from cfmkit.beams.layout import Layout
+from cfmkit.beams.solver import Solver, march_options
+from cfmkit.beams.steady import SteadySolver
+
+LENGTH, ANGLE = 35e-3, np.radians(8)
+RISE = LENGTH * np.sin(ANGLE)
+REGULAR = np.linspace(0.05, 2.1, 15) * RISE
+
+
+def pressed(points: Any, tolerance: float, branch: Any = "stable") -> Path:
+    """Return the path of half a V-beam as slender as it needs to be to buckle on its way."""
+    nodes = {"wall": Node(0, 0, CLAMPED), "d": Node(LENGTH * np.cos(ANGLE), RISE, guided(np.pi / 2))}
+    leaf = Network(nodes, {"v": Beam("wall", "d", Section(1477e6, 6e-3, 7e-4))})
+    return trace(leaf, Displacement("d", -np.pi / 2, np.sort(points)), Control(tolerance=tolerance, branch=branch))
+
+
+@pytest.fixture(scope="module")
+def exact() -> Path:
+    path = pressed(REGULAR, 1e-10)
+    assert [event.kind for event in path.events] == ["bifurcation", "bifurcation"]
+    return path
+
+
+@pytest.mark.parametrize("which", [0, 1])
+@pytest.mark.parametrize("tolerance", [1e-4, 1e-6, 1e-8])
+@pytest.mark.parametrize("off", [0.0, 1e-12, -1e-10, 1e-9, -1e-8, 1e-7, -1e-6, 3e-6, -1e-5, 1e-4, -1e-3])
+def test_a_point_at_the_begin_or_the_end_of_a_branch(exact: Path, which: int, tolerance: float, off: float) -> None:
+    """It is there, the path goes on as without it, and both bifurcations are found where they are."""
+    place = exact.events[which].drive
+    path = pressed(np.append(REGULAR, place + off * RISE), tolerance)
+    assert path.status is PathStatus.COMPLETE, path.message
+    assert path.stable.all()
+    assert path.asked[path.at_asked].tolist() == list(range(16))
+    assert path.drive[path.at_asked] == pytest.approx(np.sort(np.append(REGULAR, place + off * RISE)), rel=1e-12)
+    assert [(e.kind, e.before, e.after) for e in path.events] == [("bifurcation", 0, 1), ("bifurcation", 1, 0)]
+    assert [e.drive for e in path.events] == pytest.approx([e.drive for e in exact.events], abs=tolerance * RISE)
+    usual = np.isin(path.drive[path.at_asked].round(12), REGULAR.round(12))
+    found, expected = path.effort[path.at_asked], exact.effort[exact.at_asked]
+    np.testing.assert_allclose(found[usual], expected, rtol=0, atol=10 * tolerance * np.abs(expected).max())
+    aside = place + (1e-3 if which else -1e-3) * RISE  # on the path without a branch
+    near = pressed([aside, RISE] if which == 0 else [*REGULAR[:9], aside], 1e-8)
+    here = float(near.effort[np.abs(near.drive - aside).argmin()])
+    assert found[~usual] == pytest.approx([here], abs=0.03 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("off", [0.0, -1e-9, 1e-9, 1e-6])
+def test_a_point_at_a_bifurcation_of_a_path_that_goes_straight_on(exact: Path, off: float) -> None:
+    path = pressed(np.append(REGULAR, exact.events[0].drive + off * RISE), 1e-6, "primary")
+    assert path.status is PathStatus.COMPLETE, path.message
+    assert path.asked[path.at_asked].tolist() == list(range(16))
+    assert [(e.kind, e.before, e.after) for e in path.events] == [("bifurcation", 0, 1), ("bifurcation", 1, 0)]
+
+
+@pytest.mark.parametrize("seed", [1, 3, 4, 5, 6, 8, 10])
+def test_nothing_eliminated_leads_to_the_same_equilibria(seed: int) -> None:
+    """Solutions, tangents, borders, marches and finer meshes, in the unknowns of the plain solver."""
+    net = network(seed, follower=False)
+    plain = Solver(Layout(net, drives(net, seed)[0]), Mesh(2, 2), 1e-12)
+    steady = SteadySolver(plain)
+    start = plain.tightened(plain.model)
+    assert start is not None
+    one, other = (solver.solve(start.y, 0.02) for solver in (plain, steady))
+    assert one is not None
+    assert other is not None
+    np.testing.assert_allclose(other.y, one.y, rtol=0, atol=1e-9 * np.abs(one.y).max())
+    np.testing.assert_allclose(other.tangent, one.tangent, rtol=0, atol=1e-7 * np.abs(one.tangent).max())
+    assert (other.unstable, other.shortness) == (one.unstable, pytest.approx(one.shortness))
+    border = np.random.default_rng(seed).standard_normal(plain.n + 1)
+    level = float(border[:-1] @ one.y[: plain.n] + border[-1] * one.drive)
+    across = steady.solve(one.y, 0.021, border, level)
+    assert across is not None
+    assert across.drive == pytest.approx(one.drive, abs=1e-7)
+    options = march_options(1e-12, 0.01, 0.35, sense=1.0)
+    paths = [solver.march(start, np.array([0.02, 0.04]), options, 200)[1] for solver in (plain, steady)]
+    np.testing.assert_allclose(paths[1].y[-1], paths[0].y[-1], rtol=0, atol=1e-9 * np.abs(one.y).max())
+    fine, solved = steady.finer(1e-12).solve_each(one.y[None], np.array([0.02]))
+    again, _ = plain.finer(1e-12).solve_each(one.y[None], np.array([0.02]))
+    assert solved.all()
+    np.testing.assert_allclose(fine, again, rtol=0, atol=1e-9 * np.abs(one.y).max())
