@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from cfmkit.curves import FloatArray
 
 BESIDE = 1e-5  # share of the drive's range
-_SIDES = 2.0  # units of the tolerance, as a share of the range, from which it is sure on which side a point lies
+_SIDES = 4.0  # units of the tolerance, as a share of the range, from which it is sure on which side a point lies
 _OFF, _LEAST = 0.3, 1e-6  # how far the solution may be from where it is foretold: as a share of its change, at least
 
 

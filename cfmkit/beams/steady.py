@@ -22,16 +22,18 @@ if TYPE_CHECKING:
     from cfmkit.curves import FloatArray
 
 
+_TAUT = 1e3  # largest dimensionless force: tension makes elimination steadier
 _SHORT = 1e-4  # share of the drive's range that is a short step
 
 
 def steadier(run: Run, wrong: int = 0) -> bool:
-    """Let a run go on with nothing eliminated; False where it does so already, or is only judged.
+    """Let a run go on with nothing eliminated; False where it does so already, is only judged, or drawn taut.
 
     The last points that are `wrong` are taken back, and short steps before: what they led to may be a limit point, not
     to be jumped over.
     """
-    if isinstance(run.solver, SteadySolver) or run.control.branch == "stop":
+    taut = np.abs(run.points.y[-1, run.solver.n_free : run.solver.n]).max() > _TAUT
+    if taut or isinstance(run.solver, SteadySolver) or run.control.branch == "stop":
         return False
     run.solver = SteadySolver(run.solver)
     for _ in range(wrong):

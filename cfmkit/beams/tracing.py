@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 _EARLY = 0.1  # share of the points: segments that are too long before it are cut in four
 _ROUNDS = 8  # meshes tried before giving up on the tolerance
+_GAIN = 0.005  # share of the drive's range that is some
 _STARTS = 2  # of them for another mesh on which nothing bears the constant loads
 
 
@@ -57,15 +58,19 @@ def _solved(network: Network, drive: Drive, control: Control, to_first: bool = F
     to_first: only as far as the first bifurcation.
     """
     from cfmkit.beams.accuracy import estimate  # loads the compiler, as do the next two
+    from cfmkit.beams.kernels.march import STALLED
     from cfmkit.beams.path import PathStatus
     from cfmkit.beams.run import Run
 
     layout = Layout(network, drive)
-    mesh = first_mesh(control.tolerance)
+    mesh, before = first_mesh(control.tolerance), None
     for round_ in range(_ROUNDS):
         run = Run(layout, mesh, control, to_first)
         run.follow()
-        if run.too_long and round_ < _ROUNDS - 1:
+        if run.too_long and before is not None and not _further(run, before):
+            run.stop(STALLED)
+        elif run.too_long and round_ < _ROUNDS - 1:
+            before = run
             early = run.asked() < _EARLY * len(drive.points)
             mesh = mesh.shorter().shorter() if early else mesh.shorter()
             continue
@@ -77,6 +82,13 @@ def _solved(network: Network, drive: Drive, control: Control, to_first: bool = F
             break
         mesh = mesh.finer()
     return run
+
+
+def _further(run: Run, before: Run) -> bool:
+    """Tell whether shorter segments lead any further: a path drawn taut is followed by them just nearer to its end."""
+    if not (len(run.points) and len(before.points)) or run.asked() != before.asked():
+        return True
+    return abs(float(run.points.drive[-1] - before.points.drive[-1])) > _GAIN * run.span
 
 
 def first_mesh(tolerance: float) -> Mesh:
