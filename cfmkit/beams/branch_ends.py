@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 BEFORE_END = 1e-4  # share of the drive's range by which the end of a branch is passed over
 _LEGS = 60
 _BACK = 0.01  # share of the range in one step where the end of a branch is looked for backwards
+_CLEAR = 0.01  # share of the drive's range behind the end of a branch where nothing leads back onto it
 _SAME = 1e-6  # largest difference of poses of two solutions that are one
 
 
@@ -116,9 +117,24 @@ def hop(run: Run, spot: Spot, asked: int) -> Spot | None:
         kind = "unresolved" if found is None else "bifurcation"
         run.events.append(Event(kind, place * run.unit, before, near.unstable))
         run.branch = "primary"
+        near = _clear(run, wide, forward * ahead) or near
         run.append(run.as_points(near, -1))
         return near
     return None
+
+
+def _clear(run: Run, wide: Spot, ahead: float) -> Spot | None:
+    """Return a point further along the path of the fine mesh: beside the end of a branch steps lead back onto it."""
+    left = np.abs(run.targets[run.asked() :] - wide.drive)
+    away = float(np.sign(ahead)) * min(_CLEAR * run.span, 0.5 * float(left.min(initial=np.inf)))
+    second = run.fine.solve(wide.y, wide.drive + ahead)
+    if second is None or abs(away) < 2 * abs(ahead):
+        return None
+    third = run.fine.solve(wide.y + (second.y - wide.y) * (away / ahead), wide.drive + away)
+    if third is None or third.unstable != wide.unstable:
+        return None
+    moved = run.solver.pose_change(run.fine.reduce(third).y, run.fine.reduce(wide).y)
+    return run.settled(run.fine.reduce(third)) if moved <= run.reach(abs(away)) else None
 
 
 def close_behind(run: Run) -> bool:
