@@ -6,6 +6,7 @@ a bifurcation: there the null vector points along the path that crosses.
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -22,18 +23,23 @@ _SEARCHES = 40
 _CLOSE = 1e-5  # share of the determinant at the ends that is near enough to interpolate the rest: the smallest,
 _LOOSE = 10.0  # and in units of the tolerance
 _MOVED = 1e-3  # share of a mode's largest change of a pose from which a node counts as moved
+_AROUND = 16  # directions in which branches are looked for where two modes are critical at once
 _FIRST_KICK, _KICK, _KICKS = 1e-3, 0.06, 16  # how far from a bifurcation its branch is entered [rad]
 
 
 @dataclass(frozen=True)
 class Singular:
-    """A singular point: the equilibrium, its null vector and which kind it is."""
+    """A singular point: the equilibrium, its null vector and which kind it is.
+
+    `others` holds more null vectors, (n, k), where several modes are critical at once; `null` is one of them.
+    """
 
     spot: Spot
     null: FloatArray
     fold: bool
     before: int
     after: int
+    others: FloatArray | None = None
 
 
 def locate(
@@ -59,9 +65,11 @@ def locate(
             break
     if not search.near_enough():
         return None
-    spot = search.interpolated()
-    null = _null_of(solver, spot, one) if vector else np.zeros(solver.n)
-    return Singular(spot, null, fold, one.unstable, other.unstable)
+    spot, many = search.interpolated(), abs(other.unstable - one.unstable)
+    if not vector:
+        return Singular(spot, np.zeros(solver.n), fold, one.unstable, other.unstable)
+    nulls = _nulls_of(solver, spot, one, max(1, many))
+    return Singular(spot, nulls[:, 0], fold, one.unstable, other.unstable, nulls[:, 1:] if many > 1 else None)
 
 
 class _Search:
@@ -153,16 +161,24 @@ class _Search:
         return Spot(np.asarray(y), drive, chosen[0][2].tangent)
 
 
-def _null_of(solver: ExpandedSolver, spot: Spot, regular: Spot) -> FloatArray:
-    """Return the null vector in the scaling that balances the tangent at a regular point nearby."""
+def _nulls_of(solver: ExpandedSolver, spot: Spot, regular: Spot, count: int) -> FloatArray:
+    """Return null vectors (n, count) in the scaling that balances the tangent at a regular point nearby."""
     balance, sizes = np.ones(solver.n), np.abs(solver.tangent_at(regular.y, regular.drive)[0])
     for _ in range(8):
         balance /= np.sqrt((sizes * balance).max(axis=1) * balance)
     matrix, _ = solver.tangent_at(spot.y, spot.drive)
-    null = _null_vector(matrix * np.outer(balance, balance))
-    direction = null * balance
-    direction /= np.linalg.norm(direction)
-    return np.asarray(direction * _side(solver, direction))
+    balanced = matrix * np.outer(balance, balance)
+    if count == 1:
+        columns = [_null_vector(balanced)]
+    else:
+        values, vectors = np.linalg.eigh(balanced)
+        columns = list(vectors[:, np.abs(values).argsort()[:count]].T)
+    found = []
+    for null in columns:
+        direction = null * balance
+        direction /= np.linalg.norm(direction)
+        found.append(direction * _side(solver, direction))
+    return np.array(found).T
 
 
 def _side(solver: ExpandedSolver, direction: FloatArray) -> float:
@@ -170,11 +186,16 @@ def _side(solver: ExpandedSolver, direction: FloatArray) -> float:
 
     In a symmetric network several are the largest: the first decides, not rounding.
     """
-    moved, forces = direction[: solver.plain_free], direction[solver.n_free : solver.n].reshape(-1, 3)[solver.lasts]
-    poses = np.abs(direction[: solver.n_free]).max(initial=0.0)
-    shown = moved if np.abs(moved).max(initial=0.0) > _MOVED * poses else forces.ravel()
+    shown = _shown(solver, direction)
     leading = np.flatnonzero(np.abs(shown) > 0.99 * np.abs(shown).max())[0]
     return -float(np.sign(shown[leading]))  # by choice: any sign would do, as long as it stays
+
+
+def _shown(solver: ExpandedSolver, direction: FloatArray) -> FloatArray:
+    """Return the entries of a change of z that every mesh has: those of nodes if they move, else of last forces."""
+    moved, forces = direction[: solver.plain_free], direction[solver.n_free : solver.n].reshape(-1, 3)[solver.lasts]
+    poses = np.abs(direction[: solver.n_free]).max(initial=0.0)
+    return moved if np.abs(moved).max(initial=0.0) > _MOVED * poses else forces.ravel()
 
 
 def _null_vector(matrix: FloatArray) -> FloatArray:
@@ -197,24 +218,53 @@ def leave(solver: ExpandedSolver, singular: Singular, sign: int, forward: float)
     `sign` says which of the two mirror images; `forward` is the sense in which the drive goes. None if the branch
     leads backwards (the bifurcation is subcritical) or is not more stable.
     """
+    if singular.others is None:
+        return _entered(solver, singular, sign * singular.null, forward)
+    found: list[tuple[int, tuple[float, ...], Spot]] = []
+    for direction in _directions(np.column_stack([singular.null, singular.others])):
+        spot = _entered(solver, singular, direction, forward)
+        if spot is not None:
+            change = _shown(solver, spot.y[: solver.n] - singular.spot.y[: solver.n])
+            order = tuple((sign * np.round(change / np.abs(change).max(), 1)).tolist())
+            found.append((spot.unstable, order, spot))
+    return min(found, key=lambda one: one[:2])[2] if found else None
+
+
+def _directions(nulls: FloatArray) -> FloatArray:
+    """Return directions (k, n) all around a space of null vectors."""
+    many = nulls.shape[1]
+    if many == 2:
+        turns = 2 * np.pi * np.arange(_AROUND) / _AROUND
+        shares = np.stack([np.cos(turns), np.sin(turns)], axis=1)
+    else:
+        shares = np.array([one for one in itertools.product((-1.0, 0.0, 1.0), repeat=min(many, 4)) if any(one)])
+        shares /= np.linalg.norm(shares, axis=1)[:, None]
+    found: FloatArray = shares @ nulls[:, : shares.shape[1]].T
+    return found
+
+
+def _entered(solver: ExpandedSolver, singular: Singular, direction: FloatArray, forward: float) -> Spot | None:
+    """Return an equilibrium on the branch that a null vector points along."""
     # leaves that lie almost flat have branches shorter than the usual entry
-    found = (_leave(solver, singular, sign, forward, size) for size in (_KICK, 0.25 * _KICK, 0.06 * _KICK))
+    found = (_leave(solver, singular, direction, forward, size) for size in (_KICK, 0.25 * _KICK, 0.06 * _KICK))
     return next((spot for spot in found if spot is not None), None)
 
 
-def _leave(solver: ExpandedSolver, singular: Singular, sign: int, forward: float, size: float) -> Spot | None:
+def _leave(
+    solver: ExpandedSolver, singular: Singular, direction: FloatArray, forward: float, size: float
+) -> Spot | None:
     """Return an equilibrium on the branch that is about `size` [rad] away from the bifurcation."""
     spot = singular.spot
-    border = np.append(singular.null, 0.0)
-    level = float(singular.null @ spot.y[: solver.n])
+    border = np.append(direction, 0.0)
+    level = float(direction @ spot.y[: solver.n])
     kick = _FIRST_KICK
     for _ in range(_KICKS):
-        guess = solver.shifted(spot.y, spot.drive, sign * kick * singular.null)
+        guess = solver.shifted(spot.y, spot.drive, kick * direction)
         moved = solver.pose_change(guess, spot.y)
         if not 0.3 * size <= moved <= size:
             kick *= 0.7 * size / moved if moved > 0 else 10.0
             continue
-        near = solver.solve(guess, spot.drive, border, level + sign * kick)
+        near = solver.solve(guess, spot.drive, border, level + kick)
         if near is None or solver.pose_change(near.y, guess) > 0.5 * size:
             kick *= 0.5
             continue

@@ -89,3 +89,36 @@ def test_nothing_eliminated_leads_to_the_same_equilibria(seed: int) -> None:
     again, _ = plain.finer(1e-12).solve_each(one.y[None], np.array([0.02]))
     assert solved.all()
     np.testing.assert_allclose(fine, again, rtol=0, atol=1e-9 * np.abs(one.y).max())
+
+
+def whole(points: Any, **control: Any) -> Path:
+    """Return the path of both halves with a shuttle that neither turns nor moves aside."""
+    across = LENGTH * np.cos(ANGLE)
+    nodes = {
+        "left": Node(-across, 0, CLAMPED),
+        "d": Node(0, RISE, guided(np.pi / 2)),
+        "right": Node(across, 0, CLAMPED),
+    }
+    leaf = Section(1477e6, 6e-3, 7e-4)
+    beams = {"one": Beam("left", "d", leaf), "two": Beam("right", "d", leaf)}
+    return trace(Network(nodes, beams), Displacement("d", -np.pi / 2, points), Control(**control))
+
+
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-5, 1e-7])
+@pytest.mark.parametrize("sign", [1, -1])
+def test_where_two_modes_are_critical_at_once_both_leaves_buckle(exact: Path, sign: int, tolerance: float) -> None:
+    """Two equal leaves on one shuttle: with one of them straight the equilibrium is not stable."""
+    path = whole(REGULAR, tolerance=tolerance, sign=sign)
+    assert path.status is PathStatus.COMPLETE
+    assert path.stable.all()
+    assert [(e.kind, e.before, e.after) for e in path.events] == [("bifurcation", 0, 2), ("bifurcation", 2, 0)]
+    found, half = path.effort[path.at_asked], exact.effort[exact.at_asked]
+    np.testing.assert_allclose(found, 2 * half, rtol=0, atol=10 * tolerance * np.abs(half).max())
+
+
+def test_the_sign_mirrors_the_forms_of_both_leaves() -> None:
+    one, other = (whole(REGULAR[:6], tolerance=1e-6, sign=sign) for sign in (1, -1))
+    for leaf in ("one", "two"):
+        moments = [path.end_force(leaf, 1)[path.at_asked[-1], 2] for path in (one, other)]
+        middle = 0.5 * (moments[0] + moments[1])
+        assert abs(moments[0] - moments[1]) > 10 * abs(middle)
