@@ -27,8 +27,12 @@ _OFF, _LEAST = 0.3, 1e-6  # how far the solution may be from where it is foretol
 
 
 def located(run: Run, one: Spot, other: Spot, fold: bool = False, vector: bool = True) -> Singular | None:
-    """Return the singular point between two equilibria: as exactly as the tolerance asks, or a point asked for."""
-    tolerance = 0.0 if run.to_first else run.control.tolerance
+    """Return the singular point between two equilibria: as exactly as the tolerance asks, or a point asked for.
+
+    Or more modes than one, whose null vectors are to span the right space.
+    """
+    several = abs(other.unstable - one.unstable) > 1
+    tolerance = 0.0 if run.to_first or several else run.control.tolerance
     found = locate(run.fine, one, other, run.natural, tolerance, fold, vector)
     if found is None or np.abs(run.targets - found.spot.drive).min() > _SIDES * tolerance * run.span:
         return found
@@ -49,21 +53,21 @@ def count(run: Run, place: float, start: float) -> int:
 def behind(run: Run, goal: float) -> bool:
     """Add a point behind a bifurcation at the drive `goal`, to which no step led; False where there is none.
 
-    The path is foretold from its last two points, and compared as far behind that drive as they are before it.
+    The path is foretold from its last two points, on the fine mesh, and compared as far behind that drive as they are
+    before it.
     """
-    wide = run.fine_spot(-1) if len(run.points) > 1 else None
-    if wide is None or wide.unstable != int(run.points.info[-1, 0]):
+    wide, early = (run.fine_spot(k) if len(run.points) > 1 else None for k in (-1, -2))
+    if wide is None or early is None or wide.unstable != int(run.points.info[-1, 0]) or wide.drive == early.drive:
         return False
-    last, before = float(run.points.drive[-1]), float(run.points.drive[-2])
-    away = np.abs(run.targets - goal)[(run.targets - goal) * (goal - last) > 0]
+    away = np.abs(run.targets - goal)[(run.targets - goal) * (goal - wide.drive) > 0]
     gap = 0.5 * float(away[away > BESIDE * run.span].min(initial=np.inf))
-    place = goal + float(np.sign(goal - last)) * min(abs(goal - last), gap)
-    guess = run.points.y[-1] + (run.points.y[-1] - run.points.y[-2]) * ((place - last) / (last - before))
-    found = run.fine.solve(run.fine.expand(guess), place)
+    place = goal + float(np.sign(goal - wide.drive)) * min(abs(goal - wide.drive), gap)
+    guess = wide.y + (wide.y - early.y) * ((place - wide.drive) / (wide.drive - early.drive))
+    found = run.fine.solve(guess, place)
     if found is None or found.unstable == wide.unstable:
         return False
     reduced = run.fine.reduce(found)
-    if run.solver.pose_change(reduced.y, guess) > run.reach(abs(place - last)):
+    if run.fine.pose_change(found.y, guess) > run.reach(abs(place - wide.drive)):
         return False
     run.append(run.as_points(run.settled(reduced) or replace(reduced, tangent=run.solver.unit.copy()), -1))
     return True

@@ -132,11 +132,16 @@ def _clear_of(run: Run, found: Singular, one: Spot, other: Spot) -> Spot:
     """
     ahead = np.abs(run.targets[run.asked() :] - other.drive)
     room = min(_CLEAR * run.span, 0.5 * float(ahead.min(initial=np.inf)))
-    before = found.spot.drive - one.drive
-    if not run.natural or abs(other.drive - found.spot.drive) >= room or before == 0.0:
+    if not run.natural or abs(other.drive - found.spot.drive) >= room:
+        return other
+    far = np.abs(run.points.drive - found.spot.drive) >= 0.1 * room  # from nearer the path would be foretold badly
+    behind = np.flatnonzero(far[:-1])[-1:].tolist()
+    early = (run.fine_spot(behind[0]) if behind and behind[0] < len(far) - 2 else None) or one
+    before = found.spot.drive - early.drive
+    if before == 0.0:
         return other
     place = other.drive + float(np.sign(other.drive - one.drive)) * room
-    guess = found.spot.y + (found.spot.y - one.y) * ((place - found.spot.drive) / before)
+    guess = found.spot.y + (found.spot.y - early.y) * ((place - found.spot.drive) / before)
     wide = run.fine.solve(guess, place)
     near = None if wide is None or wide.unstable != found.after else run.settled(run.fine.reduce(wide))
     return other if near is None else near

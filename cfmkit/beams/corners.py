@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.beams import beside
 from cfmkit.beams.branches import cross
 from cfmkit.beams.kernels.march import STALLED
 
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
     from cfmkit.beams.run import Run
     from cfmkit.beams.solver import Spot
 
+_WELL = 3e-3  # share of the drive's range that is well before a corner
 _BACK = 30  # points looked at before the place where a march stalled
 _NEAR = 1e-4  # share of the drive's range from which the next point asked for is solved for on the fine mesh
 
@@ -44,8 +46,23 @@ def past(run: Run, spot: Spot, asked: int) -> Spot | None:
                     run.drop_last()
                     break
                 return following
+    if run.control.branch != "stop" and not run.stuck and _taken_back(run, spot.drive):
+        return cross(run)
     run.stop(STALLED)
     return None
+
+
+def _taken_back(run: Run, place: float) -> bool:
+    """Take the path back to well before a place, and add a point behind it, if there is a bifurcation between."""
+    points, names = run.points, list(run.branches)
+    last = len(names) - 1
+    while last > 1 and names[last - 1] == names[-1] and abs(float(points.drive[last]) - place) < _WELL * run.span:
+        last -= 1
+    run.points, run.branches = points.take(slice(0, last + 1)), names[: last + 1]
+    if beside.behind(run, place):
+        return True
+    run.points, run.branches = points, names
+    return False
 
 
 def _before(run: Run) -> Spot | None:

@@ -23,6 +23,7 @@ _SEARCHES = 40
 _CLOSE = 1e-5  # share of the determinant at the ends that is near enough to interpolate the rest: the smallest,
 _LOOSE = 10.0  # and in units of the tolerance
 _MOVED = 1e-3  # share of a mode's largest change of a pose from which a node counts as moved
+_TURNS = 5  # of inverse iteration
 _AROUND = 16  # directions in which branches are looked for where two modes are critical at once
 _FIRST_KICK, _KICK, _KICKS = 1e-3, 0.06, 16  # how far from a bifurcation its branch is entered [rad]
 
@@ -163,22 +164,15 @@ class _Search:
 
 def _nulls_of(solver: ExpandedSolver, spot: Spot, regular: Spot, count: int) -> FloatArray:
     """Return null vectors (n, count) in the scaling that balances the tangent at a regular point nearby."""
-    balance, sizes = np.ones(solver.n), np.abs(solver.tangent_at(regular.y, regular.drive)[0])
+    ordinary, _ = solver.tangent_at(regular.y, regular.drive)
+    balance, sizes = np.ones(solver.n), np.abs(ordinary)
     for _ in range(8):
         balance /= np.sqrt((sizes * balance).max(axis=1) * balance)
     matrix, _ = solver.tangent_at(spot.y, spot.drive)
-    balanced = matrix * np.outer(balance, balance)
-    if count == 1:
-        columns = [_null_vector(balanced)]
-    else:
-        values, vectors = np.linalg.eigh(balanced)
-        columns = list(vectors[:, np.abs(values).argsort()[:count]].T)
-    found = []
-    for null in columns:
-        direction = null * balance
-        direction /= np.linalg.norm(direction)
-        found.append(direction * _side(solver, direction))
-    return np.array(found).T
+    scales = np.outer(balance, balance)
+    found = _null_vectors(matrix * scales, ordinary * scales, count) * balance[:, None]
+    found /= np.linalg.norm(found, axis=0)
+    return np.array([null * _side(solver, null) for null in found.T]).T
 
 
 def _side(solver: ExpandedSolver, direction: FloatArray) -> float:
@@ -198,18 +192,21 @@ def _shown(solver: ExpandedSolver, direction: FloatArray) -> FloatArray:
     return moved if np.abs(moved).max(initial=0.0) > _MOVED * poses else forces.ravel()
 
 
-def _null_vector(matrix: FloatArray) -> FloatArray:
-    """Return the eigenvector of a nearly singular matrix by inverse iteration."""
+def _null_vectors(matrix: FloatArray, regular: FloatArray, count: int) -> FloatArray:
+    """Return vectors (n, count) that a nearly singular matrix shrinks most compared with a regular one near it.
+
+    Inverse iteration. Compared: a slender beam hardly stretches, so that its force has a small eigenvalue everywhere.
+    """
     shift = 1e-14 * float(np.abs(matrix).max())
     try:
-        inverse = np.linalg.inv(matrix + shift * np.eye(len(matrix)))
+        grown = np.linalg.inv(matrix + shift * np.eye(len(matrix))) @ regular
     except np.linalg.LinAlgError:  # singular to the last bit
         values, vectors = np.linalg.eigh(matrix)
-        return np.asarray(vectors[:, np.abs(values).argmin()])
-    null = inverse[:, np.abs(inverse).max(axis=0).argmax()]
-    for _ in range(3):
-        null = inverse @ (null / np.linalg.norm(null))
-    return np.asarray(null / np.linalg.norm(null))
+        return np.asarray(vectors[:, np.abs(values).argsort()[:count]])
+    nulls = grown[:, np.abs(grown).max(axis=0).argsort()[::-1][:count]]
+    for _ in range(_TURNS):
+        nulls = grown @ np.linalg.qr(nulls)[0]
+    return np.asarray(np.linalg.qr(nulls)[0])
 
 
 def leave(solver: ExpandedSolver, singular: Singular, sign: int, forward: float) -> Spot | None:

@@ -22,8 +22,14 @@ if TYPE_CHECKING:
     from cfmkit.curves import FloatArray
 
 
-_TAUT = 1e3  # largest dimensionless force: tension makes elimination steadier
+_TAUT = 1e3  # largest dimensionless force of beams that are not drawn taut
 _SHORT = 1e-4  # share of the drive's range that is a short step
+
+
+def taut(run: Run) -> bool:
+    """Tell whether a path has come to where a beam is drawn taut: eliminating is steady there, and forces soar."""
+    forces = run.points.y[-1:, run.solver.n_free : run.solver.n]
+    return bool(np.abs(forces).max(initial=0.0) > _TAUT)
 
 
 def steadier(run: Run, wrong: int = 0) -> bool:
@@ -32,8 +38,7 @@ def steadier(run: Run, wrong: int = 0) -> bool:
     The last points that are `wrong` are taken back, and short steps before: what they led to may be a limit point, not
     to be jumped over.
     """
-    taut = np.abs(run.points.y[-1, run.solver.n_free : run.solver.n]).max() > _TAUT
-    if taut or isinstance(run.solver, SteadySolver) or run.control.branch == "stop":
+    if taut(run) or isinstance(run.solver, SteadySolver) or run.control.branch == "stop":
         return False
     run.solver = SteadySolver(run.solver)
     for _ in range(wrong):

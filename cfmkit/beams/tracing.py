@@ -86,7 +86,9 @@ def _solved(network: Network, drive: Drive, control: Control, to_first: bool = F
 
 def _further(run: Run, before: Run) -> bool:
     """Tell whether shorter segments lead any further: a path drawn taut is followed by them just nearer to its end."""
-    if not (len(run.points) and len(before.points)) or run.asked() != before.asked():
+    from cfmkit.beams.steady import taut
+
+    if not taut(run) or not len(before.points) or run.asked() != before.asked():
         return True
     return abs(float(run.points.drive[-1] - before.points.drive[-1])) > _GAIN * run.span
 
