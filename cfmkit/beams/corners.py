@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.beams import beside
+from cfmkit.beams import beside, endings
 from cfmkit.beams.branches import cross
 from cfmkit.beams.kernels.march import STALLED
 
@@ -48,7 +48,7 @@ def past(run: Run, spot: Spot, asked: int) -> Spot | None:
                 return following
     if run.control.branch != "stop" and not run.stuck and _taken_back(run, spot.drive):
         return cross(run)
-    run.stop(STALLED)
+    endings.stop(run, STALLED)
     return None
 
 

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.beams import beside, branch_ends, branches, corners, preload
+from cfmkit.beams import beside, branch_ends, branches, corners, endings, preload
 from cfmkit.beams.accuracy import errors, largest_force
 from cfmkit.beams.discretise import Mesh
 from cfmkit.beams.expanded import ExpandedSolver
-from cfmkit.beams.kernels.march import DENIED, DONE, FULL, INERTIA, INFO, LONG, NO_START, OUTSIDE, STALLED
+from cfmkit.beams.kernels.march import DENIED, DONE, INERTIA, INFO, LONG, NO_START, STALLED
 from cfmkit.beams.path import Event, Path, PathStatus
 from cfmkit.beams.solver import SENSE, TRIES, Points, Solver, Spot, march_options
 from cfmkit.beams.steady import steadier
@@ -26,10 +26,6 @@ if TYPE_CHECKING:
 _HOPS = 60  # decisions on one path
 _FINE_STEPS = ((1e-5, 8), (1e-6, 16), (0.0, 32))  # of a beam, where singular points are looked for, by the tolerance
 _LOOSEST = 1e-7  # tolerance of Newton's method
-_NO_START = (
-    "no equilibrium to start from: lost at {:.3g} of the constant loads and displacements; "
-    "or nothing holds the network, or its springs are prestressed too far"
-)
 _TRIES = 6  # to land on a point asked for, before a bifurcation is looked for there
 _SMALLEST = 1e-7  # shortest step as a share of the drive's range
 
@@ -117,8 +113,7 @@ class Run:
                 return
             spot, asked = following, self.asked()
         if not len(self.points):
-            self.status = PathStatus.NO_START
-            self.message = _NO_START.format(share)
+            endings.no_start(self, share)
         elif asked < len(self.targets):
             last = float(self.points.drive[-1]) * self.unit
             self.status, self.message = PathStatus.LOST, f"the path turned back and forth at {last:.6g}"
@@ -142,7 +137,7 @@ class Run:
                 return self.spot(-1)
             joined = None if self.branch == "primary" else branch_ends.hop(self, spot, asked)
             return joined or corners.past(self, spot, asked)
-        self.stop(code)
+        endings.stop(self, code)
         return None
 
     def come_by(self, *place: float) -> None:
@@ -252,31 +247,12 @@ class Run:
         self.points = self.points.take(slice(0, -1))
         self.branches.pop()
 
-    def stop(self, code: int) -> None:
-        """Set the status of a march that ended early."""
-        where = f"at {float(self.points.drive[-1]) * self.unit:.6g}" if len(self.points) else "at rest"
-        if code == LONG:
-            self.too_long = True
-            self.status, self.message = PathStatus.LOST, f"a segment is too long for its load {where}"
-        elif code == FULL:
-            self.status, self.message = PathStatus.FULL, f"stopped after {len(self.points)} points {where}"
-        elif code == OUTSIDE:
-            self.status, self.message = PathStatus.OUTSIDE, f"the drive left its range {where}"
-        elif self.natural:
-            self.status = PathStatus.LIMIT_POINT
-            self.message = (
-                f"the drive cannot go on {where}: a limit point, or a turn too sharp to follow; "
-                "follow the path by its arc length (through_folds)"
-            )
-        else:
-            self.status, self.message = PathStatus.LOST, f"no step converged {where}"
-
     def path(self) -> Path:
         """Return the outcome; where the tolerance is not reached, every point is judged by itself."""
         accurate = np.ones(len(self.points), dtype=bool)
         if not self.error <= self.control.tolerance:
             accurate = errors(self, range(len(self.points)), float(largest_force(self).max())) <= self.control.tolerance
-            self._say_inaccurate(int((~accurate).sum()))
+            endings.inaccurate(self, int((~accurate).sum()))
         accurate.setflags(write=False)
         return Path(
             solver=self.solver,
@@ -288,13 +264,3 @@ class Run:
             error=self.error,
             accurate=accurate,
         )
-
-    def _say_inaccurate(self, count: int) -> None:
-        """Say so in the message, and in the status unless that already says why the path ended."""
-        limit = self.control.tolerance
-        share = f"{count} of {len(self.points)} points"
-        text = f"the tolerance of {limit:.3g} was not reached: error {self.error:.3g}, {share}"
-        if self.status is PathStatus.COMPLETE:
-            self.status, self.message = PathStatus.INACCURATE, text
-        else:
-            self.message = f"{self.message}; {text}"

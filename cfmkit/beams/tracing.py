@@ -57,6 +57,7 @@ def _solved(network: Network, drive: Drive, control: Control, to_first: bool = F
 
     to_first: only as far as the first bifurcation.
     """
+    from cfmkit.beams import endings
     from cfmkit.beams.accuracy import estimate  # loads the compiler, as do the next two
     from cfmkit.beams.kernels.march import STALLED
     from cfmkit.beams.path import PathStatus
@@ -68,7 +69,7 @@ def _solved(network: Network, drive: Drive, control: Control, to_first: bool = F
         run = Run(layout, mesh, control, to_first)
         run.follow()
         if run.too_long and before is not None and not _further(run, before):
-            run.stop(STALLED)
+            endings.stop(run, STALLED)
         elif run.too_long and round_ < _ROUNDS - 1:
             before = run
             early = run.asked() < _EARLY * len(drive.points)

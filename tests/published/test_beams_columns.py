@@ -111,3 +111,25 @@ def test_a_column_is_loaded_with_its_critical_load_and_more(
     assert path.events[0].drive == pytest.approx(1.0, rel=max(tolerance, 1e-9))
     found = -path.motion("b")[path.at_asked, 0] / LENGTH
     np.testing.assert_allclose(found, [approach_under(one) for one in ratios], atol=10 * tolerance)
+
+
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-5, 1e-8])
+@pytest.mark.parametrize("slender", [3.0, 10.0, 30.0, 100.0, 300.0])
+@pytest.mark.parametrize("axial", [False, True])
+def test_a_cantilever_in_strong_tension_bends_in_a_boundary_layer(
+    slender: float, tolerance: float, axial: bool
+) -> None:
+    """EI y'' + P (L - x) = T (y_end - y), clamped and small: y_end = P (L - tanh(kL) / k) / T, k^2 = T / EI."""
+    young, width, thickness = 2e11, 8e-3, 1e-4
+    rigidity = young * width * thickness**3 / 12
+    tension = rigidity * (slender / LENGTH) ** 2
+    nodes = {"a": Node(0, 0, CLAMPED), "b": Node(LENGTH, 0)}
+    beams = {"x": Beam("a", "b", Section(young, width, thickness, axial=axial))}
+    pull = Network(nodes, beams, loads=(PointLoad("b", fx=tension),))
+    aside = 1e-4 * tension
+    path = trace(pull, Loading((PointLoad("b", fy=aside),), np.array([0.5, 1.0])), Control(tolerance=tolerance))
+    assert path.status is PathStatus.COMPLETE, path.message
+    strain = tension / (young * width * thickness) if axial else 0.0
+    expected = aside / tension * (LENGTH - LENGTH * np.tanh(slender) / slender)
+    found = path.motion("b")[path.at_asked, 1]
+    np.testing.assert_allclose(found, [0.5 * expected, expected], rtol=1e-6 + 2 * tolerance + 3 * strain)

@@ -200,7 +200,7 @@ def test_a_spring_that_cannot_be_followed_is_named_with_its_own_compression():
     assert found.status is Status.PARTIAL
     told = re.match(r"the spring was followed to ([\d.]+) mm only: ", found.message)
     assert told is not None, found.message
-    assert 60 < float(told[1]) < 499  # taut at 60 mm, twice the travel of its middle node; then it can only be torn
+    assert 60 < float(told[1]) < 499  # drawn straight, it can only be torn
     assert len(found.curves) == 1
 
 
