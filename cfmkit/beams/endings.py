@@ -17,7 +17,7 @@ _NO_START = (
     "or nothing holds the network, or its springs are prestressed too far"
 )
 _RIGID = "the drive cannot move the network from rest: it is rigid, or nothing holds the network"
-_SINGULAR = 1e13  # condition of a tangent that is singular but for rounding
+_SINGULAR = 1e10  # condition of a tangent that is singular but for rounding
 
 
 def no_start(run: Run, share: float) -> None:

@@ -213,18 +213,18 @@ def leave(solver: ExpandedSolver, singular: Singular, sign: int, forward: float)
     """Return an equilibrium on the branch that crosses at a bifurcation, on the stable side of it.
 
     `sign` says which of the two mirror images; `forward` is the sense in which the drive goes. None if the branch
-    leads backwards (the bifurcation is subcritical) or is not more stable.
+    leads backwards (the bifurcation is subcritical) or is less stable than the path before it.
     """
     if singular.others is None:
         return _entered(solver, singular, sign * singular.null, forward)
-    found: list[tuple[int, tuple[float, ...], Spot]] = []
+    found: list[tuple[tuple[float, ...], Spot]] = []
     for direction in _directions(np.column_stack([singular.null, singular.others])):
         spot = _entered(solver, singular, direction, forward)
         if spot is not None:
             change = _shown(solver, spot.y[: solver.n] - singular.spot.y[: solver.n])
             order = tuple((sign * np.round(change / np.abs(change).max(), 1)).tolist())
-            found.append((spot.unstable, order, spot))
-    return min(found, key=lambda one: one[:2])[2] if found else None
+            found.append((order, spot))
+    return min(found, key=lambda one: one[0])[1] if found else None
 
 
 def _directions(nulls: FloatArray) -> FloatArray:
@@ -267,5 +267,5 @@ def _leave(
             continue
         ahead = (near.drive - spot.drive) * forward > 0
         settled = solver.solve(near.y, near.drive)
-        return settled if settled is not None and ahead and settled.unstable < singular.after else None
+        return settled if settled is not None and ahead and settled.unstable <= singular.before else None
     return None

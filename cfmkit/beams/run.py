@@ -184,7 +184,8 @@ class Run:
         """March once; return why it ended, the points done and the last spot. A fresh start is yet to be solved for."""
         left, numbers = self._left(spot, asked)
         options = self.options(spot, self._first_step(spot, asked))
-        options[TRIES] = np.inf if self.patient or not self.natural else _TRIES
+        patient = self.patient or not self.natural or self.control.branch == "stop"
+        options[TRIES] = np.inf if patient else _TRIES
         self.patient = False
         if fresh:
             options[SENSE] = np.sign(next(value for value in self.targets if value))
