@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from cfmkit.beams.run import Run
+    from cfmkit.beams.solver import Solver
     from cfmkit.curves import FloatArray
 
 
@@ -44,16 +45,25 @@ def errors(run: Run, indices: Iterable[int], largest: float) -> FloatArray:
     chosen = np.array(sorted(indices))
     ys, drives = run.points.y[chosen], run.points.drive[chosen]
     near, solved = fine.solve_each(ys, drives)
-    change, far, moved = np.abs(near - ys), 0.1 * max(1.0, scale), np.zeros(len(drives))
-    sure = solved.all() and change.max() <= far
-    for k in () if sure else np.flatnonzero(~solved | (change.max(axis=1) > far)):
+    change, far = np.abs(near - ys), 0.1 * max(1.0, scale)
+    moved: Any = 0.0
+    if not (solved.all() and change.max() <= far):
+        moved = np.zeros(len(drives))
+        _across(run, fine, chosen, ~solved | (change.max(axis=1) > far), (ys, drives, change, moved, far))
+    change[:, free:n] /= scale
+    found: FloatArray = np.maximum(change[:, :n].max(axis=1), moved)
+    return found
+
+
+def _across(run: Run, fine: Solver, chosen: Any, lost: Any, arrays: tuple[Any, ...]) -> None:
+    """Set the differences at points that have no equilibrium nearby at their own drive: where the path turns back."""
+    ys, drives, change, moved, far = arrays
+    n = run.solver.n
+    for k in np.flatnonzero(lost):
         border = run.spot(int(chosen[k])).tangent
         level = float(border[:-1] @ ys[k, :n] + border[-1] * drives[k])
-        across = fine.solve(ys[k], float(drives[k]), border, level)  # where the path turns back
+        across = fine.solve(ys[k], float(drives[k]), border, level)
         there = across is not None and np.abs(across.y - ys[k]).max() <= far
         change[k], moved[k] = np.inf, np.inf
         if there and across is not None:
             change[k], moved[k] = np.abs(across.y - ys[k]), abs(across.drive - drives[k])
-    change[:, free:n] /= scale
-    found: FloatArray = np.maximum(change[:, :n].max(axis=1), moved)
-    return found

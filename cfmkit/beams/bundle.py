@@ -69,7 +69,8 @@ class Bundle:
         if any(nominal):
             first = np.array([d if one is None else one for d, one in zip(distance, nominal, strict=True)])
         self.reach, self.drawn = reach, (first, cx, cy)
-        rotation = direction(dx * cx + dy * cy, dy * cx - dx * cy)
+        turned = most > 1 or c.any()
+        rotation = direction(dx * cx + dy * cy, dy * cx - dx * cy) if turned else direction(dx, dy)
         self.length, self.scale = distance / own, distance / (own * first)
         if any(beam.closure == "raw" for beam in beams):
             raw = np.array([beam.closure == "raw" for beam in beams])

@@ -157,7 +157,8 @@ class Run:
 
     def append(self, points: Points) -> None:
         """Add points to the path, on the present branch."""
-        self.points = self.points.joined(points)  # also the first: what a march returns are views of far more room
+        # what a march returns are views of far more room
+        self.points = self.points.joined(points) if len(self.points) else points.copied()
         self.branches += [self.branch] * len(points)
 
     def spot(self, index: int) -> Spot:

@@ -42,6 +42,10 @@ class Points:
         """Return these points followed by others."""
         return Points(*(np.concatenate(pair) for pair in zip(self.parts, other.parts, strict=True)))
 
+    def copied(self) -> Points:
+        """Return the points in arrays of their own."""
+        return Points(self.y.copy(), self.drive.copy(), self.info.copy())
+
     def take(self, keep: Any) -> Points:
         """Return the points that `keep` selects."""
         return Points(*(part[keep] for part in self.parts))
