@@ -84,7 +84,7 @@ def main() -> None:
         theirs, ours = [], []
         for _ in range(6):
             theirs.append(best(lambda count=count: exudyn_cantilever(exudyn, count), 5))
-            ours.append(best(lambda control=control: trace(cantilever(), drive, control), 20))
+            ours.append(best(lambda control=control: trace(cantilever(), drive, control).effort, 20))
         ratio = min(theirs) / min(ours)
         print(
             f"exudyn cantilever {count} elements {min(theirs):6.2f} ms  error {error:.1e}; "
