@@ -128,7 +128,7 @@ def _clear(run: Run, wide: Spot, ahead: float) -> Spot | None:
     left = np.abs(run.targets[run.asked() :] - wide.drive)
     away = float(np.sign(ahead)) * min(_CLEAR * run.span, 0.5 * float(left.min(initial=np.inf)))
     second = run.fine.solve(wide.y, wide.drive + ahead)
-    if second is None or abs(away) < 2 * abs(ahead):
+    if second is None or ahead == 0.0 or abs(away) < 2 * abs(ahead):
         return None
     third = run.fine.solve(wide.y + (second.y - wide.y) * (away / ahead), wide.drive + away)
     if third is None or third.unstable != wide.unstable:

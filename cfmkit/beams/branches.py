@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from cfmkit.beams import beside
 from cfmkit.beams.beside import BESIDE
 from cfmkit.beams.branch_ends import end_of_branch
-from cfmkit.beams.events import Singular, leave
+from cfmkit.beams.events import Singular, leave, with_nulls
 from cfmkit.beams.path import Event, PathStatus
 from cfmkit.beams.solver import FORCE_WEIGHT, Spot
 from cfmkit.beams.steady import steadier
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
 
 _CLEAR = 0.01  # share of the drive's range from a bifurcation at which the paths there are told apart
 _SAME_PLACE = 1e-4  # share of the drive's range within which two searches found one bifurcation
+_TOGETHER = (1e-4, 1e-3, 1e-2)  # shares of the drive's range within which bifurcations are near each other
 _SLIGHT = 1e-3  # share of a determinant that is hardly any
 _FINEST = 1e-5  # share of the range below which a change of stability is not looked into with shorter steps
 
@@ -43,7 +45,8 @@ def cross(run: Run) -> Spot | None:
             return _again(run)
         found = _found_before(run, other, before, after)
         if found is None:
-            run.events.append(Event("unresolved", other.drive * run.unit, before, after))
+            if min(before, after) >= 0:  # a count below zero is that of rounding
+                run.events.append(Event("unresolved", other.drive * run.unit, before, after))
             return other
         run.events.append(Event("bifurcation", found.spot.drive * run.unit, before, after))
         return _no_branch(run, found, other)
@@ -52,6 +55,32 @@ def cross(run: Run) -> Spot | None:
     if run.first is None and not found.fold and found.after > found.before:
         run.first = found
     return other if found.fold else _parted(run, found, one, other)
+
+
+def _left_together(run: Run, found: Singular, one: Spot, forward: float) -> Spot | None:
+    """Return an equilibrium on the branch beyond several bifurcations that are near each other; see `leave`.
+
+    Behind the first of them alone nothing is stable for long.
+    """
+    early = _well_before(run, found, _CLEAR * run.span)
+    for start, share in itertools.product((one, early), _TOGETHER):
+        if start is None or not run.natural or found.spot.drive == start.drive:
+            continue
+        place = found.spot.drive + forward * share * run.span
+        ratio = (place - found.spot.drive) / (found.spot.drive - start.drive)
+        beyond = run.fine.solve(found.spot.y + (found.spot.y - start.y) * ratio, place)
+        many = 0 if beyond is None else beyond.unstable - found.before
+        if many >= max(2, found.after - found.before):
+            wide = leave(run.fine, with_nulls(run.fine, found, start, many), run.control.sign, forward)
+            if wide is not None:
+                return wide
+    return None
+
+
+def _well_before(run: Run, found: Singular, room: float) -> Spot | None:
+    """Return the last point but two or earlier that is so far before a bifurcation, on the fine mesh."""
+    far = np.flatnonzero(np.abs(run.points.drive[:-2] - found.spot.drive) >= room)
+    return run.fine_spot(int(far[-1])) if len(far) else None
 
 
 def _beside(run: Run, index: int, spot: Spot | None, other: Spot | None) -> bool:
@@ -103,7 +132,7 @@ def _parted(run: Run, found: Singular, one: Spot, other: Spot) -> Spot | None:
             run.append(run.as_points(clear, -1))
         return clear
     forward = float(np.sign(other.drive - one.drive))
-    wide = leave(run.fine, found, run.control.sign, forward)
+    wide = leave(run.fine, found, run.control.sign, forward) or _left_together(run, found, one, forward)
     left = None if wide is None else run.settled(run.fine.reduce(wide))
     if left is None and _too_far(run) and not _sure(run, one, other, found):
         run.events.pop()
@@ -134,9 +163,7 @@ def _clear_of(run: Run, found: Singular, one: Spot, other: Spot) -> Spot:
     room = min(_CLEAR * run.span, 0.5 * float(ahead.min(initial=np.inf)))
     if not run.natural or abs(other.drive - found.spot.drive) >= room:
         return other
-    far = np.abs(run.points.drive - found.spot.drive) >= 0.1 * room  # from nearer the path would be foretold badly
-    behind = np.flatnonzero(far[:-1])[-1:].tolist()
-    early = (run.fine_spot(behind[0]) if behind and behind[0] < len(far) - 2 else None) or one
+    early = _well_before(run, found, 0.1 * room) or one  # from nearer the path would be foretold badly
     before = found.spot.drive - early.drive
     if before == 0.0:
         return other

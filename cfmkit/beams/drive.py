@@ -86,7 +86,7 @@ class Control:
     first_step : float or None
         First step as a fraction of the drive's range; found from the points unless given.
     most_points : int
-        At most so many points.
+        At most so many points besides those asked for.
     imperfection : float
         Bend the unloaded beams by so much [m] in the form of the buckling mode at the first bifurcation of the
         perfect path, to either side by its sign; 0: perfect. `Path.imperfection` names what was done.

@@ -17,14 +17,23 @@ _NO_START = (
     "or nothing holds the network, or its springs are prestressed too far"
 )
 _RIGID = "the drive cannot move the network from rest: it is rigid, or nothing holds the network"
+_CRITICAL = (
+    "no equilibrium to start from: the constant loads and displacements are just critical, or too large for the mesh; "
+    "or nothing holds the network, or its springs are prestressed too far"
+)
 _SINGULAR = 1e10  # condition of a tangent that is singular but for rounding
 
 
 def no_start(run: Run, share: float) -> None:
     """Set the status of a path without any point; `share` of the constant loads was reached."""
+    text = _CRITICAL if share == 1.0 else _NO_START.format(share)
+    run.status, run.message = PathStatus.NO_START, text if _loaded(run) else _RIGID
+
+
+def _loaded(run: Run) -> bool:
+    """Tell whether anything is done to a network before the drive begins."""
     network = run.layout.network
-    loaded = network.loads or run.layout.held or network.springs
-    run.status, run.message = PathStatus.NO_START, _NO_START.format(share) if loaded else _RIGID
+    return bool(network.loads or run.layout.held or network.springs)
 
 
 def stop(run: Run, code: int) -> None:
@@ -39,7 +48,7 @@ def stop(run: Run, code: int) -> None:
         run.status, run.message = PathStatus.OUTSIDE, f"the drive left its range {where}"
     elif len(run.points) == 1 and _rigid(run):
         run.drop_last()
-        run.status, run.message = PathStatus.NO_START, _RIGID
+        run.status, run.message = PathStatus.NO_START, _CRITICAL if _loaded(run) else _RIGID
     elif run.natural:
         run.status = PathStatus.LIMIT_POINT
         run.message = (

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -71,6 +71,12 @@ def locate(
         return Singular(spot, np.zeros(solver.n), fold, one.unstable, other.unstable)
     nulls = _nulls_of(solver, spot, one, max(1, many))
     return Singular(spot, nulls[:, 0], fold, one.unstable, other.unstable, nulls[:, 1:] if many > 1 else None)
+
+
+def with_nulls(solver: ExpandedSolver, singular: Singular, regular: Spot, count: int) -> Singular:
+    """Return a singular point with so many vectors that its tangent shrinks most, some only nearly to nothing."""
+    nulls = _nulls_of(solver, singular.spot, regular, count)
+    return replace(singular, null=nulls[:, 0], others=nulls[:, 1:])
 
 
 class _Search:

@@ -190,7 +190,7 @@ class Run:
         self.patient = False
         if fresh:
             options[SENSE] = np.sign(next(value for value in self.targets if value))
-        room = max(len(left) + 3, self.control.most_points - len(self.points))
+        room = max(len(left) + 3, self.control.most_points + len(self.targets) - len(self.points))
         code, points = self.solver.march(spot, left, options, room)
         if numbers is not None:
             points.info[:, 1] = numbers[points.info[:, 1].astype(int)]

@@ -104,8 +104,9 @@ def ranges(solution: Solution) -> dict[str, float | None]:
     start = crossing(x, force / nominal, 1 - BAND) if nominal else None
     if start is not None and start <= end and end > 0:
         numbers |= {"range_start": start, "range_fraction": (end - start) / end}
-        strict = strict_start(x, force, end)
-        numbers |= {"strict_range_start": strict, "strict_range_fraction": (end - strict) / end}
+        if value_at(x, force, end) > 0:  # else no band lies around the force there
+            strict = strict_start(x, force, end)
+            numbers |= {"strict_range_start": strict, "strict_range_fraction": (end - strict) / end}
     return numbers
 
 
