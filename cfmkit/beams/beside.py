@@ -31,6 +31,8 @@ def located(run: Run, one: Spot, other: Spot, fold: bool = False, vector: bool =
 
     Or more modes than one, whose null vectors are to span the right space.
     """
+    if one.unstable == other.unstable:
+        return None
     several = abs(other.unstable - one.unstable) > 1
     tolerance = 0.0 if run.to_first or several else run.control.tolerance
     found = locate(run.fine, one, other, run.natural, tolerance, fold, vector)

@@ -21,14 +21,15 @@ if TYPE_CHECKING:
 _CLEAR = 0.01  # share of the drive's range from a bifurcation at which the paths there are told apart
 _SAME_PLACE = 1e-4  # share of the drive's range within which two searches found one bifurcation
 _TOGETHER = (1e-4, 1e-3, 1e-2)  # shares of the drive's range within which bifurcations are near each other
+_TIMES = 12  # that one point may be taken back
 _SLIGHT = 1e-3  # share of a determinant that is hardly any
 _FINEST = 1e-5  # share of the range below which a change of stability is not looked into with shorter steps
 
 
 def cross(run: Run) -> Spot | None:
     """Handle a change of inertia between the last two points; return where to go on, None to stop."""
-    one, beyond = run.fine_spot(-2), run.fine_spot(-1)
-    if run.natural and len(run.points) > 2 and _beside(run, -2, one, beyond):
+    one, beyond = run.fine_spot(_last_step_before(run)), run.fine_spot(-1)
+    if run.natural and len(run.points) > 2 and _beside(run, -2, one, beyond) and _may_be_taken_back(run):
         one = _without_last_but_one(run)
     if run.natural and _beside(run, -1, beyond, one):
         beyond = _behind_the_last(run)
@@ -45,8 +46,9 @@ def cross(run: Run) -> Spot | None:
             return _again(run)
         found = _found_before(run, other, before, after)
         if found is None:
-            if min(before, after) >= 0:  # a count below zero is that of rounding
-                run.events.append(Event("unresolved", other.drive * run.unit, before, after))
+            event = Event("unresolved", other.drive * run.unit, before, after)
+            if min(before, after) >= 0 and event not in run.events:  # a count below zero is that of rounding
+                run.events.append(event)
             return other
         run.events.append(Event("bifurcation", found.spot.drive * run.unit, before, after))
         return _no_branch(run, found, other)
@@ -81,6 +83,24 @@ def _well_before(run: Run, found: Singular, room: float) -> Spot | None:
     """Return the last point but two or earlier that is so far before a bifurcation, on the fine mesh."""
     far = np.flatnonzero(np.abs(run.points.drive[:-2] - found.spot.drive) >= room)
     return run.fine_spot(int(far[-1])) if len(far) else None
+
+
+def _last_step_before(run: Run) -> int:
+    """Return the index of the point that the last step began at: along the arc there are points asked for between."""
+    index = -2
+    while not run.natural and -index < len(run.points) and run.points.info[index, 2] == -1.0:
+        index -= 1
+    return index
+
+
+def _may_be_taken_back(run: Run) -> bool:
+    """Tell whether the last point but one was not taken back several times before."""
+    for time in range(_TIMES):
+        place = (float(run.points.drive[-2]), 0.0, float(time))
+        if place not in run.visited:
+            run.visited.add(place)
+            return True
+    return False
 
 
 def _beside(run: Run, index: int, spot: Spot | None, other: Spot | None) -> bool:
@@ -127,6 +147,8 @@ def _parted(run: Run, found: Singular, one: Spot, other: Spot) -> Spot | None:
         last = run.points.take([-1])
         run.drop_last()
         beside.opening(run, found, one, None, run.branch)
+        if last.info[0, 1] < run.asked():
+            last.info[0, 1] = -1.0  # it has just been added
         run.append(last)
         if clear is not other:
             run.append(run.as_points(clear, -1))

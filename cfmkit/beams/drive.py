@@ -119,6 +119,8 @@ def _points(points: FloatArray) -> FloatArray:
     array = read_only(np.atleast_1d(np.asarray(points, dtype=float)))
     if array.ndim != 1 or len(array) == 0 or not np.isfinite(array).all():
         raise InputError("a drive needs a list of finite points")
+    if (np.diff(array) == 0).any():
+        raise InputError("the points of a drive must differ from one to the next")
     if not array.any():
         raise InputError("a drive needs a point other than zero")
     return array

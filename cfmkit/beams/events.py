@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 _SEARCHES = 40
 _CLOSE = 1e-5  # share of the determinant at the ends that is near enough to interpolate the rest: the smallest,
 _LOOSE = 10.0  # and in units of the tolerance
+_OUTSIDE = 0.1  # of a bracket: one end may lie at the singular point, on either side
 _MOVED = 1e-3  # share of a mode's largest change of a pose from which a node counts as moved
 _TURNS = 5  # of inverse iteration
 _AROUND = 16  # directions in which branches are looked for where two modes are critical at once
@@ -83,7 +84,7 @@ class _Search:
     """A bracket around a singular point on the path between two equilibria."""
 
     def __init__(self, solver: Solver, one: Spot, other: Spot, natural: bool, close: float) -> None:
-        self.solver, self.one, self.other, self.close = solver, one, other, close
+        self.solver, self.one, self.other, self.close, self.natural = solver, one, other, close, natural
         weights = np.where(np.arange(solver.n) < solver.n_free, 1.0, FORCE_WEIGHT)
         chord = np.append(weights * (other.y - one.y)[: solver.n], other.drive - one.drive)
         self.border = solver.unit if natural else chord
@@ -165,6 +166,10 @@ class _Search:
         chosen, weights = self._nearest()
         y = sum(w * c[2].y for w, c in zip(weights, chosen, strict=True))
         drive = float(sum(w * c[2].drive for w, c in zip(weights, chosen, strict=True)))
+        low, high = sorted((self.one.drive, self.other.drive))
+        out = max(low - drive, drive - high)
+        if self.natural and out > _OUTSIDE * (high - low):  # samples too unlike each other
+            return chosen[0][2]
         return Spot(np.asarray(y), drive, chosen[0][2].tangent)
 
 

@@ -63,8 +63,8 @@ def _along(run: Run) -> tuple[Spot | None, float, int] | None:
         return None, 1.0, DONE
     if ramp.status is PathStatus.JUMPS and not run.control.through_folds:
         run.status, share = PathStatus.JUMPS, float(ramp.points.drive[-1])
-        lost = f"stability is lost under {100 * share:.3g} % of the constant loads"
         stop = run.control.branch == "stop"
+        lost = f"stability is lost {'before' if stop else 'under'} {100 * share:.3g} % of the constant loads"
         run.message = f"{lost}: {'the path ends there' if stop else 'it jumps there, no stable equilibrium is near'}"
         return None, share, DONE
     if ramp.status is not PathStatus.COMPLETE:

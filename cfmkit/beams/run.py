@@ -27,6 +27,7 @@ _HOPS = 60  # decisions on one path
 _FINE_STEPS = ((1e-5, 8), (1e-6, 16), (0.0, 32))  # of a beam, where singular points are looked for, by the tolerance
 _LOOSEST = 1e-7  # tolerance of Newton's method
 _TRIES = 6  # to land on a point asked for, before a bifurcation is looked for there
+_NEARBY = 0.01  # share of the drive's range
 _SMALLEST = 1e-7  # shortest step as a share of the drive's range
 
 
@@ -51,7 +52,7 @@ class Run:
     without_branch: Singular | None = None  # the last bifurcation behind which no stable branch was found yet
     pinned: list[float] = field(default_factory=list)  # points asked for at bifurcations that were not marched to
     visited: set[tuple[float, ...]] = field(default_factory=set)  # where the path was taken up again
-    stuck: bool = False  # whether it was taken up there before
+    again_at: float = np.nan  # where it was taken up for the second time
     patient: bool = False  # whether a point asked for may be tried for as often as it takes
     closed: bool = True  # no branch, or its end is known, or it is known to have none before the last point asked for
     entry: float = np.inf  # first step on a branch that was just entered
@@ -142,8 +143,13 @@ class Run:
 
     def come_by(self, *place: float) -> None:
         """Take note of a place where the path is taken up again: the second time it does not get past it."""
-        self.stuck = place in self.visited
+        self.again_at = place[0] if place in self.visited else np.nan
         self.visited.add(place)
+
+    @property
+    def stuck(self) -> bool:
+        """Whether the path was taken up for the second time near where it is."""
+        return bool(abs(float(self.points.drive[-1]) - self.again_at) <= _NEARBY * self.span)
 
     def asked(self) -> int:
         """Return the number of points asked for that are done."""
@@ -224,7 +230,8 @@ class Run:
 
     def _first_step(self, spot: Spot, asked: int) -> float:
         if self.control.first_step is not None:
-            return self.control.first_step * self.span
+            step, self.entry = min(self.control.first_step * self.span, self.entry), np.inf
+            return step if not self.natural else float(np.copysign(step, self.targets[asked] - spot.drive))
         if not self.natural:
             return 0.02 * min(self.span, 1.0)
         ahead = float(self.targets[asked] - spot.drive)

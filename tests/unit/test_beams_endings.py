@@ -100,7 +100,7 @@ def test_a_path_that_goes_far_behind_its_start_has_left_its_range() -> None:
 
 
 def test_a_path_keeps_to_its_number_of_points() -> None:
-    path = trace(strip(), Displacement("t", UP, np.linspace(1e-3, 0.05, 20)), Control(most_points=12))
+    path = trace(strip(), Displacement("t", UP, np.linspace(1e-3, 0.05, 20)), Control(most_points=2))
     assert path.status is PathStatus.FULL
     assert 1 < len(path) <= 22
     assert len(path.at_asked) < 20
