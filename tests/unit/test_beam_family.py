@@ -185,6 +185,29 @@ analysis: {force: 0.01 N, points: 5}
 MIRRORED = "points: 5, other_side: true"
 
 
+def test_a_curve_that_ends_with_a_negative_force_has_no_strict_range():
+    text = """
+cfmkit: 1
+family: beam
+mechanism:
+  material: {youngs_modulus: 1477 MPa}
+  thickness: 0.7 mm
+  width: 6 mm
+  axial: true
+  nodes:
+    wall: {at: [-34.659 mm, 0 mm], support: clamped}
+    d: {at: [0 mm, 4.871 mm], support: guided, direction: 90 deg}
+  beams:
+    v: {start: wall, end: d}
+  drive: {kind: displacement, node: d, direction: -90 deg}
+analysis: {travel: 5.5 mm, points: 51}
+"""
+    result = cfmkit.analyze(cfmkit.loads(text))
+    assert result.status is Status.COMPLETE
+    assert result.curve.force[-1] < 0
+    assert result.values["strict_range_fraction"].value is None
+
+
 # --- what is reported -------------------------------------------------------------------------------------
 
 

@@ -13,16 +13,20 @@ from cfmkit.beams.discretise import Mesh
 from cfmkit.beams.layout import Layout
 from cfmkit.beams.solver import Solver, march_options
 from cfmkit.beams.steady import SteadySolver
+from cfmkit.errors import InputError
 
 LENGTH, ANGLE = 35e-3, np.radians(8)
 RISE = LENGTH * np.sin(ANGLE)
 REGULAR = np.linspace(0.05, 2.1, 15) * RISE
 
 
-def pressed(points: Any, tolerance: float, branch: Any = "stable") -> Path:
+LEAF = Section(1477e6, 6e-3, 7e-4)
+
+
+def pressed(points: Any, tolerance: float, branch: Any = "stable", section: Section = LEAF) -> Path:
     """Return the path of half a V-beam as slender as it needs to be to buckle on its way."""
     nodes = {"wall": Node(0, 0, CLAMPED), "d": Node(LENGTH * np.cos(ANGLE), RISE, guided(np.pi / 2))}
-    leaf = Network(nodes, {"v": Beam("wall", "d", Section(1477e6, 6e-3, 7e-4))})
+    leaf = Network(nodes, {"v": Beam("wall", "d", section)})
     return trace(leaf, Displacement("d", -np.pi / 2, np.sort(points)), Control(tolerance=tolerance, branch=branch))
 
 
@@ -91,7 +95,7 @@ def test_nothing_eliminated_leads_to_the_same_equilibria(seed: int) -> None:
     np.testing.assert_allclose(fine, again, rtol=0, atol=1e-9 * np.abs(one.y).max())
 
 
-def whole(points: Any, **control: Any) -> Path:
+def whole(points: Any, sections: Any = (LEAF, LEAF), **control: Any) -> Path:
     """Return the path of both halves with a shuttle that neither turns nor moves aside."""
     across = LENGTH * np.cos(ANGLE)
     nodes = {
@@ -99,8 +103,7 @@ def whole(points: Any, **control: Any) -> Path:
         "d": Node(0, RISE, guided(np.pi / 2)),
         "right": Node(across, 0, CLAMPED),
     }
-    leaf = Section(1477e6, 6e-3, 7e-4)
-    beams = {"one": Beam("left", "d", leaf), "two": Beam("right", "d", leaf)}
+    beams = {"one": Beam("left", "d", sections[0]), "two": Beam("right", "d", sections[1])}
     return trace(Network(nodes, beams), Displacement("d", -np.pi / 2, points), Control(**control))
 
 
@@ -122,3 +125,45 @@ def test_the_sign_mirrors_the_forms_of_both_leaves() -> None:
         moments = [path.end_force(leaf, 1)[path.at_asked[-1], 2] for path in (one, other)]
         middle = 0.5 * (moments[0] + moments[1])
         assert abs(moments[0] - moments[1]) > 10 * abs(middle)
+
+
+@pytest.mark.parametrize("off", [3e-6, 6e-6, 1e-5, 1.5e-5, 2e-5])
+@pytest.mark.parametrize("which", [0, 1])
+@pytest.mark.parametrize("branch", ["stable", "primary"])
+def test_every_point_asked_for_has_its_number_once(exact: Path, branch: Any, which: int, off: float) -> None:
+    path = pressed(np.append(REGULAR, exact.events[which].drive + off * RISE), 1e-6, branch)
+    assert path.status is PathStatus.COMPLETE, path.message
+    assert path.asked[path.at_asked].tolist() == list(range(16))
+
+
+@pytest.mark.parametrize("tolerance", [1e-5, 1e-7])
+@pytest.mark.parametrize("factor", [1 + 1e-4, 1 + 3e-4, 1 + 1e-3, 1.01])
+def test_leaves_that_are_nearly_equal_buckle_one_after_the_other(factor: float, tolerance: float) -> None:
+    """As the sum of two half beams, which do not act on each other."""
+    sections = [Section(1477e6, 6e-3, 7e-4 * one) for one in (1.0, factor)]
+    path = whole(REGULAR, sections, tolerance=tolerance)
+    assert path.status is PathStatus.COMPLETE, path.message
+    assert path.stable.all()
+    halves = [pressed(REGULAR, 1e-9, section=section) for section in sections]
+    expected = sum(half.effort[half.at_asked] for half in halves)
+    np.testing.assert_allclose(path.effort[path.at_asked], expected, rtol=0, atol=10 * tolerance * expected.max())
+
+
+def test_a_given_first_step_does_not_keep_a_bifurcation_from_being_found() -> None:
+    nodes = {"wall": Node(0, 0, CLAMPED), "d": Node(LENGTH * np.cos(ANGLE), RISE, guided(np.pi / 2))}
+    leaf = Network(nodes, {"v": Beam("wall", "d", LEAF)})
+    for step in (0.3, 0.1, 0.01):
+        path = trace(leaf, Displacement("d", -np.pi / 2, REGULAR), Control(tolerance=1e-6, first_step=step))
+        assert path.status is PathStatus.COMPLETE
+        assert path.stable.all()
+        assert len(path.events) == 2
+
+
+def test_a_drive_that_stands_still_is_refused() -> None:
+    with pytest.raises(InputError, match="must differ from one to the next"):
+        Displacement("d", 0.0, np.array([1e-3, 1e-3, 2e-3]))
+
+
+def test_as_many_points_as_asked_for_are_always_allowed() -> None:
+    path = pressed(np.linspace(0.05, 2.1, 2500) * RISE, 1e-5)
+    assert path.status is PathStatus.COMPLETE, path.message
