@@ -95,12 +95,9 @@ def _last_step_before(run: Run) -> int:
 
 def _may_be_taken_back(run: Run) -> bool:
     """Tell whether the last point but one was not taken back several times before."""
-    for time in range(_TIMES):
-        place = (float(run.points.drive[-2]), 0.0, float(time))
-        if place not in run.visited:
-            run.visited.add(place)
-            return True
-    return False
+    place = (float(run.points.drive[-2]), np.inf)
+    run.visited[place] += 1
+    return run.visited[place] <= _TIMES
 
 
 def _beside(run: Run, index: int, spot: Spot | None, other: Spot | None) -> bool:

@@ -71,7 +71,7 @@ def _along(run: Run) -> tuple[Spot | None, float, int] | None:
         ended = ramp.branch != "primary" and not run.control.through_folds
         return (None, float(ramp.points.drive[-1]), STALLED) if ended else None
     if ramp.branch != "primary":
-        share = next(one.drive for one in reversed(ramp.events) if one.after > one.before)
+        share = next((one.drive for one in reversed(ramp.events) if one.after > one.before), 1.0)
         run.branch = f"bifurcated under {100 * share:.4g} % of the constant loads, sign {run.control.sign:+d}"
     last = ramp.last(ramp.points)
     return Spot(last.y, 0.0, last.tangent), 1.0, DONE

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -51,7 +52,7 @@ class Run:
     ramp: Run | None = None  # the run to the constant loads, if that has the first bifurcation
     without_branch: Singular | None = None  # the last bifurcation behind which no stable branch was found yet
     pinned: list[float] = field(default_factory=list)  # points asked for at bifurcations that were not marched to
-    visited: set[tuple[float, ...]] = field(default_factory=set)  # where the path was taken up again
+    visited: Counter[tuple[float, ...]] = field(default_factory=Counter)  # how often it was taken up again, and where
     again_at: float = np.nan  # where it was taken up for the second time
     patient: bool = False  # whether a point asked for may be tried for as often as it takes
     closed: bool = True  # no branch, or its end is known, or it is known to have none before the last point asked for
@@ -144,7 +145,7 @@ class Run:
     def come_by(self, *place: float) -> None:
         """Take note of a place where the path is taken up again: the second time it does not get past it."""
         self.again_at = place[0] if place in self.visited else np.nan
-        self.visited.add(place)
+        self.visited[place] += 1
 
     @property
     def stuck(self) -> bool:

@@ -43,18 +43,18 @@ def steadier(run: Run, wrong: int = 0) -> bool:
     run.solver = SteadySolver(run.solver)
     for _ in range(wrong):
         run.drop_last()
-    while len(run.points) > 2 and run.branches[-2] == run.branch and 0.0 < _last_step(run) < _SHORT * run.span:
-        if _event_between(run):
-            break
+    while _may_be_shorter(run):
         run.drop_last()
     run.entry = 0.5 * _last_step(run)
     return True
 
 
-def _event_between(run: Run) -> bool:
-    """Tell whether something that was told lies between the last two points."""
+def _may_be_shorter(run: Run) -> bool:
+    """Tell whether a path ends with a short step on its branch, in which nothing happened that was told."""
+    if len(run.points) < 3 or run.branches[-2] != run.branch or not 0.0 < _last_step(run) < _SHORT * run.span:
+        return False
     low, high = sorted(run.points.drive[-2:].tolist())
-    return any(low <= event.drive / run.unit <= high for event in run.events)
+    return not any(low <= event.drive / run.unit <= high for event in run.events)
 
 
 def _last_step(run: Run) -> float:
