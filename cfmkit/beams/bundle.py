@@ -82,6 +82,11 @@ class Bundle:
         self._set_rigidities()
 
     @property
+    def curved(self) -> bool:
+        """Whether any beam is known not to be straight before it is loaded, or may not be."""
+        return bool(self.others) or self.coefficients.shape[1] > 1
+
+    @property
     def gap(self) -> Any:
         """Distances between the far ends of the shapes as given and their nodes, (plain,) [m]."""
         first, cx, cy = self.drawn

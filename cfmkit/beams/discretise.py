@@ -31,9 +31,9 @@ class Mesh:
         """Return the mesh with twice the steps."""
         return Mesh(self.segments, 2 * self.steps)
 
-    def shorter(self) -> Mesh:
-        """Return the mesh with twice the segments."""
-        return Mesh(2 * self.segments, max(1, self.steps // 2) if self.steps > 1 else 1)
+    def shorter(self, times: int = 2) -> Mesh:
+        """Return a mesh with so many times the segments and about as many steps."""
+        return Mesh(times * self.segments, -(-self.steps // times))
 
 
 @dataclass(frozen=True)

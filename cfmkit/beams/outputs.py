@@ -21,12 +21,10 @@ if TYPE_CHECKING:
 
 def _values(g: Gradient, dof: int) -> tuple[FloatArray, FloatArray]:
     """Return a degree of freedom (p,) and its derivatives (p, k), dimensionless."""
-    m, drive = g.path.solver.model, g.path.points.drive[g.points]
-    slot = int(m.slot[dof])
+    slot, known = int(g.path.solver.model.slot[dof]), g.path.value(dof)[g.points]
     if slot >= 0:
-        return g.path.points.y[g.points, slot], g.unknowns[:, slot]
-    held = g.tilt.base[:, dof] + drive[:, None] * g.tilt.rate[:, dof]
-    return m.base[dof] + drive * m.rate[dof], held
+        return known, g.unknowns[:, slot]
+    return known, g.tilt.base[:, dof] + g.path.points.drive[g.points][:, None] * g.tilt.rate[:, dof]
 
 
 def _turned(frame: float, by: FloatArray, a: Any, b: Any) -> tuple[FloatArray, FloatArray]:

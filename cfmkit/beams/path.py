@@ -129,34 +129,40 @@ class Path:
         return self.layout.fits
 
     @cached_property
-    def _observed(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def _observed(self) -> tuple[FloatArray, FloatArray]:
         from cfmkit.beams.kernels import entry
 
-        s, dofs = self.solver, self.layout.dof_count
-        out = np.empty((len(self), 2 * dofs + 1))
+        s, out = self.solver, np.empty((len(self), self.layout.dof_count + 1))
         if len(self):
             entry.forces(s.model, s.n_free, np.ascontiguousarray(self.points.y), self.points.drive, out, s.scratch)
-        return out[:, :dofs], out[:, dofs : 2 * dofs], out[:, -1]
+        return out[:, :-1], out[:, -1]
 
     @property
     def residual(self) -> FloatArray:
         """Forces of loads, springs and beams on every degree of freedom at every point, dimensionless."""
-        return self._observed[1]
+        return self._observed[0]
+
+    def value(self, dof: int) -> FloatArray:
+        """Return the values of a degree of freedom, free or held, at every point, dimensionless."""
+        m = self.solver.model
+        slot = int(m.slot[dof])
+        known: FloatArray = self.points.y[:, slot] if slot >= 0 else m.base[dof] + self.points.drive * m.rate[dof]
+        return known
 
     def motion(self, node: str) -> FloatArray:
         """Return displacement and rotation of a node, (n, 3) [m, m, rad]."""
-        values, length = self._observed[0], self.layout.scales.length
+        length, plan = self.layout.scales.length, self.layout.plan
         master = self.layout.network.master_of(node)
         first = self.layout.first[master]
         frame = self.layout.direction[master]
         c, s = math.cos(frame) * length, math.sin(frame) * length
-        a, b = values[:, first], values[:, first + 1]
+        a, b = self.value(first), self.value(first + 1)
         moved = np.empty((len(self), 3))
-        moved[:, 0], moved[:, 1], moved[:, 2] = c * a - s * b, s * a + c * b, values[:, self.layout.plan.turn[node]]
+        moved[:, 0], moved[:, 1], moved[:, 2] = c * a - s * b, s * a + c * b, self.value(plan.turn[node])
         (x, y), (mx, my) = self.layout.position(node), self.layout.position(master)
         ax, ay = x - mx, y - my
         if ax != 0 or ay != 0:
-            swing = values[:, self.layout.plan.swing[node]]
+            swing = self.value(plan.swing[node])
             less, across = np.cos(swing) - 1.0, np.sin(swing)
             moved[:, 0] += less * ax - across * ay
             moved[:, 1] += across * ax + less * ay
@@ -170,7 +176,7 @@ class Path:
         cfmkit.errors.InputError
             If a link moves the node.
         """
-        residual, scales = self._observed[1], self.layout.scales
+        residual, scales = self.residual, self.layout.scales
         first, frame = self.layout.supported(node), self.layout.direction[node]
         c, s = np.cos(frame), np.sin(frame)
         a, b, moment = (-residual[:, first + k] for k in range(3))
@@ -185,7 +191,7 @@ class Path:
             return read_only(self._load_displacement(drive))
         dof, sense = self.layout.driven  # type: ignore[misc]
         unit = scales.moment if dof == self.layout.first[drive.node] + 2 else scales.force
-        return read_only(-self._observed[1][:, dof] * sense * unit)
+        return read_only(-self.residual[:, dof] * sense * unit)
 
     def _load_displacement(self, drive: Loading) -> FloatArray:
         total = np.zeros(len(self))
@@ -232,7 +238,7 @@ class Path:
     @cached_property
     def energy(self) -> FloatArray:
         """Strain energy of beams and springs at every point [J]."""
-        return read_only((self.sampler.energy() + self._observed[2]) * self.layout.scales.moment)
+        return read_only((self.sampler.energy() + self._observed[1]) * self.layout.scales.moment)
 
     def shape(self, beam: str, point: int) -> FloatArray:
         """Return the deformed centre line of a beam at one point, (k, 2) [m]."""

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from cfmkit.beams.path import Path
     from cfmkit.beams.run import Run
 
-_EARLY = 0.1  # share of the points: segments that are too long before it are cut in four
+_EARLY = 0.1  # share of the points: segments that are too long before it are cut in four, later in two
 _ROUNDS = 8  # meshes tried before giving up on the tolerance
 _GAIN = 0.005  # share of the drive's range that is some
 _STARTS = 3  # of them for another mesh on which nothing bears the constant loads
@@ -64,7 +64,7 @@ def _solved(network: Network, drive: Drive, control: Control, to_first: bool = F
     from cfmkit.beams.run import Run
 
     layout = Layout(network, drive)
-    mesh, before = first_mesh(control.tolerance), None
+    mesh, before = first_mesh(layout, control.tolerance), None
     for round_ in range(_ROUNDS):
         run = Run(layout, mesh, control, to_first)
         run.follow()
@@ -72,8 +72,7 @@ def _solved(network: Network, drive: Drive, control: Control, to_first: bool = F
             endings.stop(run, STALLED)
         elif run.too_long and round_ < _ROUNDS - 1:
             before = run
-            early = run.asked() < _EARLY * len(drive.points)
-            mesh = mesh.shorter().shorter() if early else mesh.shorter()
+            mesh = mesh.shorter(4 if run.asked() < _EARLY * len(drive.points) else 2)
             continue
         if run.status is PathStatus.NO_START and round_ < _STARTS:
             mesh = mesh.shorter()
@@ -94,8 +93,8 @@ def _further(run: Run, before: Run) -> bool:
     return abs(float(run.points.drive[-1] - before.points.drive[-1])) > _GAIN * run.span
 
 
-def first_mesh(tolerance: float) -> Mesh:
-    """Return the mesh that is tried first for a tolerance."""
+def first_mesh(layout: Layout, tolerance: float) -> Mesh:
+    """Return the mesh that is tried first for a tolerance: straight beams need fewer segments than curved ones."""
     if tolerance >= 4e-6:
-        return Mesh(2 if tolerance >= 2e-5 else 3, 1)
+        return Mesh(3 if tolerance < 2e-5 and layout.bundle.curved else 2, 1)
     return Mesh(2, 2 if tolerance >= 1e-7 else 4)

@@ -41,7 +41,7 @@ def strip() -> Network:
 def rough(monkeypatch: pytest.MonkeyPatch) -> Path:
     """Return a path on one mesh that is too coarse for the tolerance."""
     monkeypatch.setattr(tracing, "_ROUNDS", 1)
-    monkeypatch.setattr(tracing, "first_mesh", lambda tolerance: Mesh(2, 1))
+    monkeypatch.setattr(tracing, "first_mesh", lambda layout, tolerance: Mesh(2, 1))
     return trace(strip(), BENDING, Control(tolerance=1e-10))
 
 

@@ -117,7 +117,7 @@ def march(
 
 
 def forces(m: Any, n_free: int, ys: Any, drives: Any, out: Any, scratch: Any) -> None:
-    """Set values, residual forces and spring energy at points; see `cfmkit.beams.kernels.observe.forces`."""
+    """Set residual forces and spring energy at points; see `cfmkit.beams.kernels.observe.forces`."""
     _real(FORCES, m, n_free, 0.0, drives, (ys, drives, drives, drives, out, drives), scratch)
 
 

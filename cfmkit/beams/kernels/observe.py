@@ -13,7 +13,7 @@ STATE = 7  # x, y, rotation, moment, h, v, strain energy since the segment's sta
 
 @kernel
 def forces(m, n_free, ys, drives, out, scratch):
-    """Set degrees of freedom, residual forces on them and the springs' energy, side by side, at solved points.
+    """Set residual forces on the degrees of freedom and the springs' energy, side by side, at solved points.
 
     The forces of beams are those at the ends that the solution has.
     """
@@ -28,7 +28,7 @@ def forces(m, n_free, ys, drives, out, scratch):
         for i in range(residual.shape[0]):
             residual[i] = 0.0
         add_loads(m, values, drives[p], h, residual, work)
-        out[p, 2 * n] = add_springs(m, values, h, residual, work)
+        out[p, n] = add_springs(m, values, h, residual, work)
         for e in range(beams):
             own, last = n_free + 3 * beams + 6 * m.beam_segment[e] + 3, n_free + 3 * e
             for side in range(2):
@@ -39,7 +39,7 @@ def forces(m, n_free, ys, drives, out, scratch):
                     force[r] = y[own + r] if side == 0 else -y[last + r]
                 add_force(wires, h, residual, i, arm, jac, force)
         for i in range(n):
-            out[p, i], out[p, n + i] = values[i], residual[i]
+            out[p, i] = residual[i]
 
 
 @kernel
