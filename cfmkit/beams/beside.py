@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 BESIDE = 1e-5  # share of the drive's range
 _SIDES = 4.0  # units of the tolerance, as a share of the range, from which it is sure on which side a point lies
+_LOOSEST = 1e-4  # tolerance to which a bifurcation is located: a point asked for near it would be in doubt
 _OFF, _LEAST = 0.3, 1e-6  # how far the solution may be from where it is foretold: as a share of its change, at least
 
 
@@ -34,7 +35,7 @@ def located(run: Run, one: Spot, other: Spot, fold: bool = False, vector: bool =
     if one.unstable == other.unstable:
         return None
     several = abs(other.unstable - one.unstable) > 1
-    tolerance = 0.0 if run.to_first or several else run.control.tolerance
+    tolerance = 0.0 if run.to_first or several else min(run.control.tolerance, _LOOSEST)
     found = locate(run.fine, one, other, run.natural, tolerance, fold, vector)
     if found is None or np.abs(run.targets - found.spot.drive).min() > _SIDES * tolerance * run.span:
         return found

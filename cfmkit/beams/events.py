@@ -216,8 +216,15 @@ def _null_vectors(matrix: FloatArray, regular: FloatArray, count: int) -> FloatA
         return np.asarray(vectors[:, np.abs(values).argsort()[:count]])
     nulls = grown[:, np.abs(grown).max(axis=0).argsort()[::-1][:count]]
     for _ in range(_TURNS):
-        nulls = grown @ np.linalg.qr(nulls)[0]
-    return np.asarray(np.linalg.qr(nulls)[0])
+        nulls = grown @ _orthonormal(nulls)
+    return _orthonormal(nulls)
+
+
+def _orthonormal(vectors: FloatArray) -> FloatArray:
+    """Return orthonormal vectors (n, k) that span what some independent ones do."""
+    if vectors.shape[1] == 1:
+        return np.asarray(vectors / np.linalg.norm(vectors))
+    return np.asarray(np.linalg.qr(vectors)[0])
 
 
 def leave(solver: ExpandedSolver, singular: Singular, sign: int, forward: float) -> Spot | None:
