@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 _EARLY = 0.1  # share of the points: segments that are too long before it are cut in four, later in two
 _ROUNDS = 8  # meshes tried before giving up on the tolerance
 _GAIN = 0.005  # share of the drive's range that is some
-_STARTS = 3  # of them for another mesh on which nothing bears the constant loads
+_STARTS = 4  # of them for another mesh on which nothing bears the constant loads
 
 
 def trace(network: Network, drive: Drive, control: Control | None = None) -> Path:
