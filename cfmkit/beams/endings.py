@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 _NO_START = (
     "no equilibrium to start from: lost at {:.3g} of the constant loads and displacements; "
-    "or nothing holds the network, or its springs are prestressed too far"
+    "or nothing holds the network, the drive cannot move it, or its springs are prestressed too far"
 )
 _RIGID = "the drive cannot move the network from rest: it is rigid, or nothing holds the network"
 _CRITICAL = (

@@ -46,6 +46,7 @@ class Run:
     events: list[Event] = field(default_factory=list)
     branch: str = "primary"
     too_long: bool = False
+    share: float = 1.0  # of the constant loads and displacements that was reached
     end: branch_ends.BranchEnd | None = None
     error: float = np.inf  # as estimated
     first: Singular | None = None  # the first bifurcation at which stability is lost
@@ -97,7 +98,7 @@ class Run:
             branch_ends.relabel(self, primary)
 
     def _follow(self) -> None:
-        spot, share, code = preload.start(self)
+        spot, self.share, code = preload.start(self)
         self.too_long = code == LONG
         if spot is None and code == DONE:
             return
@@ -115,7 +116,7 @@ class Run:
                 return
             spot, asked = following, self.asked()
         if not len(self.points):
-            endings.no_start(self, share)
+            endings.no_start(self, self.share)
         elif asked < len(self.targets):
             last = float(self.points.drive[-1]) * self.unit
             self.status, self.message = PathStatus.LOST, f"the path turned back and forth at {last:.6g}"

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 
 _EARLY = 0.1  # share of the points: segments that are too long before it are cut in four, later in two
 _ROUNDS = 8  # meshes tried before giving up on the tolerance
-_GAIN = 0.005  # share of the drive's range that is some
-_STARTS = 4  # of them for another mesh on which nothing bears the constant loads
+_GAIN = 0.005  # share of the drive's range, or of the constant loads, that is some
+_STARTS = 4  # of them where nothing bears the constant loads, if each bears more of them than the one before
 
 
 def trace(network: Network, drive: Drive, control: Control | None = None) -> Path:
@@ -64,7 +64,7 @@ def _solved(network: Network, drive: Drive, control: Control, to_first: bool = F
     from cfmkit.beams.run import Run
 
     layout = Layout(network, drive)
-    mesh, before = first_mesh(layout, control.tolerance), None
+    mesh, before, borne = first_mesh(layout, control.tolerance), None, -1.0
     for round_ in range(_ROUNDS):
         run = Run(layout, mesh, control, to_first)
         run.follow()
@@ -74,8 +74,8 @@ def _solved(network: Network, drive: Drive, control: Control, to_first: bool = F
             before = run
             mesh = mesh.shorter(4 if run.asked() < _EARLY * len(drive.points) else 2)
             continue
-        if run.status is PathStatus.NO_START and round_ < _STARTS:
-            mesh = mesh.shorter()
+        if run.status is PathStatus.NO_START and round_ < _STARTS and run.share > borne + _GAIN:
+            mesh, borne = mesh.shorter(), run.share
             continue
         run.error = estimate(run)
         if run.error <= control.tolerance or round_ == _ROUNDS - 1:
