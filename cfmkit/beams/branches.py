@@ -47,7 +47,8 @@ def cross(run: Run) -> Spot | None:
         found = _found_before(run, other, before, after)
         if found is None:
             event = Event("unresolved", other.drive * run.unit, before, after)
-            if min(before, after) >= 0 and event not in run.events:  # a count below zero is that of rounding
+            told = before == after or event in run.events
+            if min(before, after) >= 0 and not told:  # a count below zero is that of rounding
                 run.events.append(event)
             return other
         run.events.append(Event("bifurcation", found.spot.drive * run.unit, before, after))

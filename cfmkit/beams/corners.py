@@ -60,6 +60,9 @@ def _taken_back(run: Run, place: float) -> bool:
         last -= 1
     run.points, run.branches = points.take(slice(0, last + 1)), names[: last + 1]
     if beside.behind(run, place):
+        far, here = points.drive[[-1, last]] * run.unit
+        while run.events and min(far, here) < run.events[-1].drive <= max(far, here):  # it is passed again
+            run.events.pop()
         return True
     run.points, run.branches = points, names
     return False

@@ -8,6 +8,8 @@ the ends, P = (2 K(k)/pi)^2 P_cr and the ends approach by 2 (1 - E(k)/K(k)) L.
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 from scipy.optimize import brentq
@@ -111,6 +113,32 @@ def test_a_column_is_loaded_with_its_critical_load_and_more(
     assert path.events[0].drive == pytest.approx(1.0, rel=max(tolerance, 1e-9))
     found = -path.motion("b")[path.at_asked, 0] / LENGTH
     np.testing.assert_allclose(found, [approach_under(one) for one in ratios], atol=10 * tolerance)
+
+
+@pytest.mark.parametrize("seed", range(200))
+def test_a_column_of_pieces_is_loaded_with_multiples_of_its_critical_load_at_random(seed: int) -> None:
+    """One of the points asked for lies at the bifurcation or near it; pieces may run either way."""
+    rng = np.random.default_rng(seed)
+    kind = str(rng.choice(list(ENDS)))
+    cuts = np.sort(rng.choice([0.1, 0.25, 1 / 3, 0.4, 0.5, 2 / 3, 0.75], int(rng.integers(0, 3)), replace=False))
+    whole, critical = loaded(kind, None)
+    names = ["a", *(f"m{number}" for number in range(len(cuts))), "b"]
+    nodes = dict(whole.nodes) | {name: Node(cut * LENGTH, 0) for name, cut in zip(names[1:-1], cuts, strict=True)}
+    ways = [pair if rng.integers(2) else pair[::-1] for pair in itertools.pairwise(names)]
+    section = whole.beams["x"].section
+    network = Network(nodes, {f"{one}{other}": Beam(one, other, section) for one, other in ways})
+    beside = 1.0 + rng.choice([0.0, 1e-9, -1e-9, 1e-6, -1e-6, 1e-4, 1e-3, 0.02])
+    ratios = np.sort(np.append(rng.uniform(0.2, 2, int(rng.integers(1, 6))), beside))
+    tolerance = 10 ** rng.uniform(-8, -3)
+    path = trace(network, Loading((PointLoad("b", fx=-critical),), ratios), Control(tolerance=tolerance))
+    assert path.status is PathStatus.COMPLETE, path.message
+    assert path.stable.all()
+    told = [event.kind for event in path.events]
+    assert told == ["bifurcation"] or (not told and ratios.max() <= 1 + 1e-5)
+    found = -path.motion("b")[path.at_asked, 0] / LENGTH
+    sure = np.abs(ratios - 1) > 1e-5
+    expected = np.array([approach_under(one) for one in ratios])
+    np.testing.assert_allclose(found[sure], expected[sure], atol=20 * tolerance)
 
 
 @pytest.mark.parametrize("tolerance", [1e-3, 1e-5, 1e-8])
