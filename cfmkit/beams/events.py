@@ -96,6 +96,7 @@ class _Search:
         self.samples = [(0.0, self._measure(one), one), (1.0, self._measure(other), other)]
         self.low, self.high = self.samples[0][:2], self.samples[1][:2]
         self.scale = max(abs(self.low[1]), abs(self.high[1]))
+        self.foretold = False  # whether the samples foretell where the determinant is hardly any
 
     def _level(self, spot: Spot) -> float:
         return float(self.border[:-1] @ spot.y[: self.solver.n] + self.border[-1] * spot.drive)
@@ -127,7 +128,8 @@ class _Search:
         y, drive = self._guess(share)
         loose = self.close > _CLOSE and len(self.samples) > 2
         if loose and self._size(Spot(y, drive, self.border)) < self.close * self.scale:
-            return False  # near enough: solving there, where no system is regular, would take long
+            self.foretold = True  # near enough: solving there, where no system is regular, would take long
+            return False
         near = self.solver.solve(y, drive, self.border, self.start + share * (self.stop - self.start))
         if near is None:
             return False
@@ -159,7 +161,7 @@ class _Search:
 
     def near_enough(self) -> bool:
         """Tell whether the determinant has come down to a small share of what it is at the ends."""
-        return min(abs(sample[1]) for sample in self.samples) < 0.05 * self.scale
+        return self.foretold or min(abs(sample[1]) for sample in self.samples) < 0.05 * self.scale
 
     def interpolated(self) -> Spot:
         """Return the point where the determinant vanishes, from the samples nearest to it."""

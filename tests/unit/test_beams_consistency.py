@@ -67,3 +67,26 @@ def test_an_arch_fares_alike_at_every_tolerance(seed: int) -> None:
     largest = np.abs(efforts[-1]).max()
     for tolerance, effort in zip(TOLERANCES, efforts, strict=True):
         np.testing.assert_allclose(effort, efforts[-1], rtol=0, atol=20 * tolerance * largest + 1e-12)
+
+
+def leaf(rng: Any) -> tuple[Network, Displacement]:
+    """Return half a V-beam, slender enough to buckle, and a drive that presses it through."""
+    angle = np.radians(rng.uniform(2, 20))
+    rise = 35e-3 * np.sin(angle)
+    nodes = {"w": Node(0, 0, CLAMPED), "d": Node(35e-3 * np.cos(angle), rise, guided(np.pi / 2))}
+    beams = {"v": Beam("w", "d", Section(1477e6, 6e-3, rise / rng.uniform(3, 15)))}
+    points = np.linspace(0, rng.uniform(0.5, 2.3), int(rng.integers(4, 40)))[1:] * rise
+    return Network(nodes, beams), Displacement("d", -np.pi / 2, points)
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_a_leaf_kept_on_its_path_meets_the_same_bifurcations_at_every_tolerance(seed: int) -> None:
+    network, drive = leaf(np.random.default_rng(seed))
+    loose, usual, exact = (
+        trace(network, drive, Control(tolerance=tolerance, branch="primary")) for tolerance in (1e-3, 1e-4, 1e-8)
+    )
+    for path in (loose, usual):
+        assert path.status is exact.status
+        assert [(e.kind, e.before, e.after) for e in path.events] == [(e.kind, e.before, e.after) for e in exact.events]
+        places = [event.drive for event in path.events]
+        assert places == pytest.approx([event.drive for event in exact.events], abs=3e-4 * float(drive.points[-1]))
