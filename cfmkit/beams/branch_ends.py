@@ -160,10 +160,10 @@ def close_behind(run: Run) -> bool:
     if found is None or found.after <= found.before:
         return False
     closing = Event("bifurcation", found.spot.drive * run.unit, found.after, found.before)
-    told = run.events[-1]  # by `hop`
-    same = abs(told.drive - closing.drive) < BEFORE_END * run.span * run.unit and told.after == closing.after
-    if told.kind == "unresolved" or (same and told.before == closing.before):
-        run.events.pop()
+    for told in run.events[-1:]:  # by `hop`
+        same = abs(told.drive - closing.drive) < BEFORE_END * run.span * run.unit and told.after == closing.after
+        if told.kind == "unresolved" or (same and told.before == closing.before):
+            run.events.pop()
     run.events.append(closing)
     for index in range(first, len(run.branches)):
         if (float(run.points.drive[index]) - found.spot.drive) * sense < 0:

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from cfmkit.beams.layout import Layout
     from cfmkit.curves import FloatArray
 
+PRESTRESS, LOADS = "prestress", "constant loads"  # what may be applied before the drive begins
+
 
 @dataclass(frozen=True)
 class Mesh:
@@ -191,25 +193,29 @@ def _si_table(layout: Layout, name: str, cut: Grid, steps: Any) -> Any:
     return np.concatenate(blocks)
 
 
-def model(layout: Layout, mesh: Mesh, ramp: bool = False) -> Model:
-    """Return the network's arrays.
-
-    With `ramp` the drive takes the place of a factor on everything constant (held displacements, constant loads):
-    at one it is the state from which the real drive starts.
-    """
+def model(layout: Layout, mesh: Mesh, ramp: str = "") -> Model:
+    """Return the network's arrays; see `assemble_model`."""
     cut = grid(layout, mesh)
     return assemble_model(layout, cut, table(layout, cut), ramp)
 
 
-def assemble_model(layout: Layout, cut: Grid, values: Any, ramp: bool = False) -> Model:
-    """Return the network's arrays for given tables."""
+def assemble_model(layout: Layout, cut: Grid, values: Any, ramp: str = "") -> Model:
+    """Return the network's arrays for given tables.
+
+    `ramp` names what a share of takes the place of the drive, at one the whole of it: the PRESTRESS of springs while
+    nothing else acts, or the LOADS, constant ones and held displacements, while the springs are tight.
+    """
     scales, plan, places = layout.scales, layout.plan, layout.places
     base, rate = _held(layout)
-    load_value, line = _loads(layout), _line_loads(layout)
+    load_value, line, spring_value = _loads(layout), _line_loads(layout), _springs(layout)
+    spring_rate = np.zeros(len(spring_value))
     if ramp:
-        base, rate = np.zeros_like(base), base
+        base, rate = np.zeros_like(base), base if ramp == LOADS else np.zeros_like(base)
         load_value[:, 1], load_value[:, 0] = load_value[:, 0], 0.0
         line[:, 1], line[:, 0] = line[:, 0], 0.0
+    if ramp == PRESTRESS:
+        load_value[:], line[:] = 0.0, 0.0
+        spring_value, spring_rate = _relaxed(layout, spring_value)
     return Model(
         table=values,
         width=cut.width,
@@ -229,7 +235,8 @@ def assemble_model(layout: Layout, cut: Grid, values: Any, ramp: bool = False) -
         load_follows=plan.load_follows,
         spring_place=plan.spring_place,
         spring_kind=plan.spring_kind,
-        spring_value=_springs(layout),
+        spring_value=spring_value,
+        spring_rate=spring_rate,
     )
 
 
@@ -279,3 +286,15 @@ def _springs(layout: Layout) -> Any:
         [own / unit for own, unit in zip(row, units[kind], strict=True)] for row, kind in zip(rows, kinds, strict=True)
     ]
     return np.array(value).reshape(len(rows), 4)
+
+
+def _relaxed(layout: Layout, tight: Any) -> tuple[Any, FloatArray]:
+    """Return the values of springs that carry nothing at rest, and what is added to be tight (springs,)."""
+    plan, value = layout.plan, tight.copy()
+    kinds = plan.spring_kind
+    value[kinds == TURN, 1] = 0.0
+    value[kinds == SLIDE, 3] = 0.0
+    line = kinds == LINE
+    one, other = ((layout.places.origin + layout.places.arm)[plan.spring_place[line, k]] for k in (0, 1))
+    value[line, 1] = np.hypot(*(other - one).T) / layout.scales.length
+    return value, (tight - value).sum(axis=1)

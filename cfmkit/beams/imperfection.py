@@ -45,7 +45,7 @@ def imperfect(run: Run, size: float) -> tuple[Network, str]:
         beams[name] = replace(beam, shape=Bent(beam.shape, tuple(turn.coef.tolist())))
         row += len(t)
     place = run.first.spot.drive * run.unit
-    where = f"under {100 * place:.4g} % of the constant loads" if run.ramped else f"at {place:.6g}"
+    where = f"under {100 * place:.4g} % of the {run.ramped}" if run.ramped else f"at {place:.6g}"
     bent = Network(network.nodes, beams, network.links, network.springs, network.loads)
     return bent, f"{size:.6g} m of the buckling mode {where}"
 

@@ -41,7 +41,7 @@ class Event:
     """Something on the path: a limit point, a bifurcation, or a change of stability that was not resolved.
 
     `drive` is where (SI); `before` and `after` count the unstable directions on both sides. What is passed before the
-    drive begins is told first: its kind ends in "under constant loads", and `drive` is their share [1].
+    drive begins is told first: its kind ends in "under prestress" or "under constant loads", `drive` is the share [1].
     """
 
     kind: str

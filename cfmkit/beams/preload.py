@@ -1,7 +1,8 @@
 """The start of a path: springs are tightened, then everything constant is applied, along a stable branch if possible.
 
-Constant loads may lie beyond a bifurcation. The path to them is then followed as any other is, with a share of them
-in the place of the drive; what happens on it is told as happening "under constant loads", with that share.
+Prestress and constant loads may lie beyond a bifurcation. The path to them is then followed as any other is, with a
+share of them in the place of the drive; what happens on it is told as happening "under prestress" or "under constant
+loads", with that share.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.beams.discretise import assemble_model
+from cfmkit.beams.discretise import LOADS, PRESTRESS, assemble_model
 from cfmkit.beams.kernels.march import DONE, LONG, STALLED
 from cfmkit.beams.path import Event, PathStatus
 from cfmkit.beams.solver import Spot, march_options
@@ -28,21 +29,30 @@ def start(run: Run) -> tuple[Spot | None, float, int]:
 
     The code is that of a march. None with the code DONE: the path ends before it begins, as the run then says.
     """
-    solver, layout = run.solver, run.layout
-    if run.ramped or not (layout.network.loads or layout.held):
-        spot = solver.tightened(solver.model)
-        return (spot, 1.0, DONE) if spot is not None else (None, 0.0, STALLED)
-    model = assemble_model(layout, solver.cut, solver.table, ramp=True)
-    spot = solver.tightened(model)
-    if spot is None:
-        return None, 0.0, STALLED
-    indifferent = run.control.branch == "primary" and not run.to_first
+    if run.begin is not None:
+        return run.begin, 1.0, DONE
+    network, indifferent = run.layout.network, run.control.branch == "primary" and not run.to_first
+    spot = run.solver.tightened()
+    if (spot is None or spot.unstable > 0) and not indifferent:
+        found = _along(run, PRESTRESS, run.solver.rest())
+        if found is not None and found[0] is None:
+            return found
+        spot = spot if found is None else found[0]
+    if spot is None or not (network.loads or run.layout.held):
+        return spot, float(spot is not None), DONE if spot is not None else STALLED
+    return _loaded(run, spot, indifferent)
+
+
+def _loaded(run: Run, spot: Spot, indifferent: bool) -> tuple[Spot | None, float, int]:
+    """Apply the constant loads and displacements to a network at rest, its springs tight; see `start`."""
+    solver = run.solver
+    model = assemble_model(run.layout, solver.cut, solver.table, LOADS)
     for watch in (None,) if indifferent else (0, None):
         options = march_options(solver.tolerance, _STEP, _TURN, watch=watch, sense=1.0)
         code, points = solver.march(spot, np.array([1.0]), options, _ROOM, model)
         if watch is None or code in (DONE, LONG):
             break
-        found = _along(run)
+        found = _along(run, LOADS, spot)
         if found is not None:
             return found
     if code != DONE:
@@ -50,28 +60,33 @@ def start(run: Run) -> tuple[Spot | None, float, int]:
     return Spot(points.y[-1], 0.0, spot.tangent), 1.0, DONE
 
 
-def _along(run: Run) -> tuple[Spot | None, float, int] | None:
-    """Follow the path to the constant loads through its bifurcations; None where that leads nowhere."""
+def _along(run: Run, what: str, begin: Spot) -> tuple[Spot | None, float, int] | None:
+    """Follow the path to the prestress or the loads through its bifurcations; None where that leads nowhere."""
     control = replace(run.control, through_folds=False, first_step=None)
-    ramp = type(run)(run.layout, run.mesh, control, run.to_first, ramped=True)
+    ramp = type(run)(run.layout, run.mesh, control, run.to_first, what, begin, branch=run.branch)
+    ramp.closed = run.branch == "primary"
     ramp.follow()
     if ramp.too_long:
         return None, 0.0, LONG
-    run.events += [Event(f"{one.kind} under constant loads", one.drive, one.before, one.after) for one in ramp.events]
+    run.events += [Event(f"{one.kind} under {what}", one.drive, one.before, one.after) for one in ramp.events]
     if run.to_first and ramp.first is not None:
         run.ramp = ramp
         return None, 1.0, DONE
     if ramp.status is PathStatus.JUMPS and not run.control.through_folds:
         run.status, share = PathStatus.JUMPS, float(ramp.points.drive[-1])
         stop = run.control.branch == "stop"
-        lost = f"stability is lost {'before' if stop else 'under'} {100 * share:.3g} % of the constant loads"
+        lost = f"stability is lost {'before' if stop else 'under'} {100 * share:.3g} % of the {what}"
         run.message = f"{lost}: {'the path ends there' if stop else 'it jumps there, no stable equilibrium is near'}"
         return None, share, DONE
     if ramp.status is not PathStatus.COMPLETE:
         ended = ramp.branch != "primary" and not run.control.through_folds
         return (None, float(ramp.points.drive[-1]), STALLED) if ended else None
-    if ramp.branch != "primary":
+    name = ramp.branches[-1]
+    if name == "primary":
+        run.branch = name
+    elif name != run.branch:
         share = next((one.drive for one in reversed(ramp.events) if one.after > one.before), 1.0)
-        run.branch = f"bifurcated under {100 * share:.4g} % of the constant loads, sign {run.control.sign:+d}"
+        run.branch = f"bifurcated under {100 * share:.4g} % of the {what}, sign {run.control.sign:+d}"
+    run.closed = run.branch == "primary"
     last = ramp.last(ramp.points)
     return Spot(last.y, 0.0, last.tangent), 1.0, DONE

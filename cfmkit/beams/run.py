@@ -40,7 +40,8 @@ class Run:
     mesh: Mesh
     control: Control
     to_first: bool = False  # whether the first bifurcation ends it
-    ramped: bool = False  # whether a share of everything constant takes the place of the drive
+    ramped: str = ""  # what a share of takes the place of the drive: see `cfmkit.beams.discretise.assemble_model`
+    begin: Spot | None = None  # near the equilibrium where it starts, if that is known
     status: PathStatus = PathStatus.COMPLETE
     message: str = ""
     events: list[Event] = field(default_factory=list)
@@ -50,7 +51,7 @@ class Run:
     end: branch_ends.BranchEnd | None = None
     error: float = np.inf  # as estimated
     first: Singular | None = None  # the first bifurcation at which stability is lost
-    ramp: Run | None = None  # the run to the constant loads, if that has the first bifurcation
+    ramp: Run | None = None  # the run to the prestress or the constant loads, if that has the first bifurcation
     without_branch: Singular | None = None  # the last bifurcation behind which no stable branch was found yet
     pinned: list[float] = field(default_factory=list)  # points asked for at bifurcations that were not marched to
     visited: Counter[tuple[float, ...]] = field(default_factory=Counter)  # how often it was taken up again, and where
@@ -93,7 +94,8 @@ class Run:
         """Trace from rest to the last point asked for, or to where it ends, and name the branches."""
         self._follow()
         if self.natural and not self.closed and not self.too_long and not branch_ends.close_behind(self):
-            primary = Run(self.layout, self.mesh, replace(self.control, branch="primary"), ramped=self.ramped)
+            control = replace(self.control, branch="primary")
+            primary = Run(self.layout, self.mesh, control, ramped=self.ramped, begin=self.begin)
             primary.follow()
             branch_ends.relabel(self, primary)
 

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.beams.discretise import Mesh, assemble_model, grid, table
+from cfmkit.beams.discretise import PRESTRESS, Mesh, assemble_model, grid, table
 from cfmkit.beams.kernels import entry
 from cfmkit.beams.kernels.march import INFO
 from cfmkit.beams.kernels.newton import SOLVED
 from cfmkit.beams.kernels.rk8 import WEIGHTS
-from cfmkit.beams.numbering import LINE, SLIDE, TURN
 
 if TYPE_CHECKING:
     from cfmkit.beams.kernels.model import Model
@@ -75,10 +74,10 @@ class Spot:
 class Solver:
     """Equilibria of a layout on a mesh. Holds work space: not for two threads at once.
 
-    `ramped`: a factor on all constant loads and displacements takes the place of the drive.
+    `ramped`: what a share of takes the place of the drive; see `cfmkit.beams.discretise.assemble_model`.
     """
 
-    def __init__(self, layout: Layout, mesh: Mesh, tolerance: float = 1e-11, ramped: bool = False) -> None:
+    def __init__(self, layout: Layout, mesh: Mesh, tolerance: float = 1e-11, ramped: str = "") -> None:
         """Build the arrays."""
         self.layout, self.mesh, self.tolerance, self.ramped = layout, mesh, tolerance, ramped
         self.cut = grid(layout, mesh)
@@ -189,30 +188,30 @@ class Solver:
         )
         return int(code), Points(y[:stored], drive[:stored], info[:stored])
 
-    def tightened(self, model: Model) -> Spot | None:
-        """Return a place near the equilibrium at drive zero, where nothing but springs may be prestressed; or None.
+    def rest(self) -> Spot:
+        """Return a place near the equilibrium at rest, while nothing is done.
 
-        Places of segments are left at zero where nothing is done: they follow linearly from all else.
+        Places of segments are left at zero: they follow linearly from all else.
         """
-        slack = _slack(model) if len(model.spring_kind) else None
-        if slack is None or np.abs(slack - model.spring_value).max() <= _TIGHT:
-            return Spot(np.zeros(self.size), 0.0, np.zeros(self.n + 1))
-        return self._tightened(model, slack)
+        return Spot(np.zeros(self.size), 0.0, np.zeros(self.n + 1))
 
-    def _tightened(self, model: Model, slack: FloatArray) -> Spot | None:
-        """Return the equilibrium of a model at drive zero, its springs tightened step by step; or None."""
-        spot, taut = Spot(self.unstressed(), 0.0, np.zeros(self.n + 1)), model.spring_value
-        share, step = 0.0, 1.0
-        while share < 1.0:
-            ahead = min(1.0, share + step)
-            near = self.solve(spot.y, 0.0, model=model._replace(spring_value=slack + ahead * (taut - slack)))
+    def tightened(self) -> Spot | None:
+        """Return a place near the equilibrium while nothing acts but springs that may be prestressed; or None."""
+        if not self.layout.network.springs:
+            return self.rest()
+        model = assemble_model(self.layout, self.cut, self.table, PRESTRESS)
+        if np.abs(model.spring_rate).max() <= _TIGHT:
+            return self.rest()
+        spot, step = Spot(self.unstressed(), 0.0, np.zeros(self.n + 1)), 1.0
+        while spot.drive < 1.0:
+            near = self.solve(spot.y, min(1.0, spot.drive + step), model=model)
             if near is None or self.pose_change(near.y, spot.y) > _LARGEST_CHANGE:
                 step *= 0.5
                 if step < _SMALLEST_SHARE:
                     return None
                 continue
-            share, spot = ahead, near
-        return spot
+            spot = near
+        return replace(spot, drive=0.0)
 
     def pose_change(self, one: FloatArray, other: FloatArray) -> float:
         """Return the largest difference of positions (in mean beam lengths) and rotations of two states."""
@@ -225,17 +224,6 @@ class Solver:
         new, solved = ys.copy(), np.empty(len(drives))
         entry.solve_each(self.model, self.n_free, new, drives, self.limits, solved, self.scratch)
         return new, solved > 0
-
-
-def _slack(model: Model) -> FloatArray:
-    """Return the values of springs that are relaxed before anything is done."""
-    value: FloatArray = model.spring_value.copy()
-    value[model.spring_kind == TURN, 1] = 0.0
-    value[model.spring_kind == SLIDE, 3] = 0.0
-    line = model.spring_kind == LINE
-    one, other = ((model.place_origin + model.place_arm)[model.spring_place[line, k]] for k in (0, 1))
-    value[line, 1] = np.hypot(*(other - one).T)
-    return value
 
 
 def march_options(

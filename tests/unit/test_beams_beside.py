@@ -73,7 +73,7 @@ def test_nothing_eliminated_leads_to_the_same_equilibria(seed: int) -> None:
     net = network(seed, follower=False)
     plain = Solver(Layout(net, drives(net, seed)[0]), Mesh(2, 2), 1e-12)
     steady = SteadySolver(plain)
-    start = plain.tightened(plain.model)
+    start = plain.tightened()
     assert start is not None
     one, other = (solver.solve(start.y, 0.02) for solver in (plain, steady))
     assert one is not None

@@ -116,7 +116,7 @@ def spring_slopes(m, tilt, k, values, dvalues, w, out):
         pose_of(places, values, j, pb)
         pose_slope(m, tilt, k, i, values, dvalues, sa)
         pose_slope(m, tilt, k, j, values, dvalues, sb)
-        spring_law(m.spring_kind[q], m.spring_value[q], pa, pb, force, block)
+        spring_law(m.spring_kind[q], m.spring_value[q], 0.0, pa, pb, force, block)
         for r in range(3):
             gap[r] = pb[r] - pa[r]
             dforce[r] = 0.0

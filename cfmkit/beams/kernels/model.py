@@ -55,6 +55,8 @@ class Model(NamedTuple):
         (n,) int attachment; (n, 2, 3) (constant, per unit of the drive) x (fx, fy, m); (n,) bool.
     spring_place, spring_kind, spring_value :
         (n, 2) int attachments; (n,) int; (n, 4) values, see `cfmkit.beams.kernels.springs`.
+    spring_rate : (n,) array
+        Change of the free length, angle or gap per unit of the drive.
     """
 
     table: FloatArray
@@ -76,6 +78,7 @@ class Model(NamedTuple):
     spring_place: IntArray
     spring_kind: IntArray
     spring_value: FloatArray
+    spring_rate: FloatArray
 
 
 class Tilt(NamedTuple):

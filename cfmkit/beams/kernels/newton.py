@@ -40,7 +40,7 @@ def assemble(m, y, drive, n_free, h, residual, values, ends, rel, store, work):
     places, wires = places_of(m), wires_of(m)
     index, least = 0, 1.0
     add_loads(m, values, drive, h, residual, work)
-    add_springs(m, values, h, residual, work)
+    add_springs(m, values, drive, h, residual, work)
     for e in range(n_beams):
         pose_of(places, values, m.beam_end[e, 0], ends[0])
         at = n + 6 * m.beam_segment[e]

@@ -28,7 +28,7 @@ def forces(m, n_free, ys, drives, out, scratch):
         for i in range(residual.shape[0]):
             residual[i] = 0.0
         add_loads(m, values, drives[p], h, residual, work)
-        out[p, n] = add_springs(m, values, h, residual, work)
+        out[p, n] = add_springs(m, values, drives[p], h, residual, work)
         for e in range(beams):
             own, last = n_free + 3 * beams + 6 * m.beam_segment[e] + 3, n_free + 3 * e
             for side in range(2):

@@ -108,24 +108,27 @@ def _turn(force, angle):
 
 
 @kernel
-def spring_law(kind, value, pa, pb, force, block):
-    """Set the force on place b and its derivative by the pose of b (that by a is opposite); return the energy."""
+def spring_law(kind, value, more, pa, pb, force, block):
+    """Set the force on place b and its derivative by the pose of b (that by a is opposite); return the energy.
+
+    more: what is added to the free length, angle or gap.
+    """
     clear(block)
     force[0] = force[1] = force[2] = 0.0
     k = value[0]
     if kind == TURN:
-        gap = pb[2] - pa[2] - value[1]
+        gap = pb[2] - pa[2] - value[1] - more
         force[2] = -k * gap
         block[2, 2] = -k
         return 0.5 * k * gap * gap
     dx, dy = pb[0] - pa[0], pb[1] - pa[1]
     if kind == SLIDE:
         ex, ey = value[1], value[2]
-        gap = dx * ex + dy * ey - value[3]
+        gap = dx * ex + dy * ey - value[3] - more
         across = 0.0
     else:
         length = np.sqrt(dx * dx + dy * dy)
-        gap = length - value[1]
+        gap = length - value[1] - more
         if length > 0.0:
             ex, ey, across = dx / length, dy / length, k * gap / length
         else:
@@ -139,7 +142,30 @@ def spring_law(kind, value, pa, pb, force, block):
 
 
 @kernel
-def add_springs(m, values, h, residual, work):
+def _tighten(wires, h, places, jacobians, kind, value, rate, poses):
+    """Add to the drive's column what a spring does whose free length, angle or gap changes at a rate."""
+    dofs, slots, _ = wires
+    ex = ey = turn = 0.0
+    if kind == TURN:
+        turn = 1.0
+    elif kind == SLIDE:
+        ex, ey = value[1], value[2]
+    else:
+        dx, dy = poses[1][0] - poses[0][0], poses[1][1] - poses[0][1]
+        length = np.sqrt(dx * dx + dy * dy)
+        if length > 0.0:
+            ex, ey = dx / length, dy / length
+    pull, n = value[0] * rate, h.shape[0] - 1
+    for side in range(2):
+        jac, sign = jacobians[side], 1.0 if side == 1 else -1.0
+        for a in range(4):
+            row = slots[dofs[places[side], a]]
+            if row >= 0:
+                h[row, n] += sign * pull * (jac[0, a] * ex + jac[1, a] * ey + jac[2, a] * turn)
+
+
+@kernel
+def add_springs(m, values, drive, h, residual, work):
     """Add the springs; return their energy."""
     room, jacobians, block, _ = work
     pa, pb, force, ja, jb = room[6, 0], room[6, 1], room[6, 2], jacobians[0], jacobians[1]
@@ -150,7 +176,10 @@ def add_springs(m, values, h, residual, work):
         arm_a, arm_b = pose_of(places, values, i, pa), pose_of(places, values, j, pb)
         jacobian(m.place_frame, i, arm_a, ja)
         jacobian(m.place_frame, j, arm_b, jb)
-        energy += spring_law(m.spring_kind[k], m.spring_value[k], pa, pb, force, block)
+        value, rate = m.spring_value[k], m.spring_rate[k]
+        energy += spring_law(m.spring_kind[k], value, drive * rate, pa, pb, force, block)
+        if rate != 0.0:
+            _tighten(wires, h, m.spring_place[k], (ja, jb), m.spring_kind[k], value, rate, (pa, pb))
         add_force(wires, h, residual, j, arm_b, jb, force)
         for r in range(3):
             force[r] = -force[r]

@@ -114,10 +114,11 @@ def _events(solution: Solution) -> Iterator[Finding]:
             more = f" and {len(places) - 6} more" if len(places) > 6 else ""
             tail = _after(solution) if kind == "bifurcation" else ""
             yield finding(name, f"{kind}{'s' if len(places) > 1 else ''} at {', '.join(places[:6])}{more}{tail}")
-    shares = [percent(event.drive) for event in path.events if event.kind == "bifurcation under constant loads"]
-    if shares:
-        tail = "; nothing stable was found beyond" if not path.stable[:1].all() else _after(solution)
-        yield finding("bifurcation", f"bifurcation under {', '.join(shares)} of the constant loads{tail}")
+    for what in ("prestress", "constant loads"):
+        shares = [percent(event.drive) for event in path.events if event.kind == f"bifurcation under {what}"]
+        if shares:
+            tail = "; nothing stable was found beyond" if not path.stable[:1].all() else _after(solution)
+            yield finding("bifurcation", f"bifurcation under {', '.join(shares)} of the {what}{tail}")
 
 
 def _after(solution: Solution) -> str:

@@ -1,0 +1,128 @@
+"""Prestressed springs and constant loads beyond a bifurcation: the path starts on the stable branch and says so.
+
+A column, clamped at its foot, is pressed by a tendon from its top to its foot. The force goes through the foot, so that
+the column bends as one with two pinned ends does: it buckles at four times Euler's load, and its foot, where it is
+clamped, is inclined to the tendon as such a column's end is.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+from scipy.special import ellipe, ellipk
+
+from cfmkit.beams import (
+    CLAMPED,
+    Beam,
+    Control,
+    Displacement,
+    LineSpring,
+    Loading,
+    Network,
+    Node,
+    Path,
+    PathStatus,
+    PointLoad,
+    Section,
+    SlideSpring,
+    trace,
+)
+
+LENGTH, RIGIDITY = 0.1, 2e9 * 8e-3 * 1e-9 / 12
+EULER = np.pi**2 * RIGIDITY / (4 * LENGTH**2)  # of a column clamped at its foot, free at its top
+STIFF = 50 * EULER / LENGTH  # of the tendon
+RIGID = Section(2e9, 8e-3, 1e-3, axial=False)
+NODES = {"foot": Node(0, 0, CLAMPED), "top": Node(LENGTH, 0)}
+
+
+def column(springs: Any, loads: Any = ()) -> Network:
+    return Network(NODES, {"column": Beam("foot", "top", RIGID)}, springs=springs, loads=loads)
+
+
+def tendon(ratio: float, pull: float = 0.0, **control: Any) -> Path:
+    """Return the path under a tendon of so many times Euler's load and a constant pull at the top, pushed sideways."""
+    springs = (LineSpring("top", None, STIFF, LENGTH - ratio * EULER / STIFF),)
+    loads = (PointLoad("top", fx=pull * EULER),) if pull else ()
+    push = Loading((PointLoad("top", fy=-1e-9 * EULER),), np.array([0.5, 1.0]))
+    return trace(column(springs, loads), push, Control(**control))
+
+
+def bent(ratio: float) -> tuple[float, float]:
+    """Return the length of a buckled column's tendon [m] and its angle to the foot: the elastica of two pinned ends."""
+
+    def chord(m: float) -> float:
+        return float(LENGTH * (2 * ellipe(m) / ellipk(m) - 1))
+
+    def excess(m: float) -> float:
+        return float(RIGIDITY * (2 * ellipk(m) / LENGTH) ** 2 - STIFF * (chord(m) - LENGTH) - ratio * EULER)
+
+    m = brentq(excess, 1e-12, 0.8, xtol=1e-15)
+    return chord(m), 2 * np.arcsin(np.sqrt(m))
+
+
+@pytest.mark.parametrize(("sign", "ratio"), [(1, 4.02), (-1, 5.0), (1, 8.0)])
+def test_prestress_beyond_a_bifurcation_starts_on_its_stable_branch(sign: Any, ratio: float) -> None:
+    path = tendon(ratio, tolerance=1e-9, sign=sign)
+    chord, angle = bent(ratio)
+    x, y, turn = path.motion("top")[0]
+    assert path.status is PathStatus.COMPLETE
+    assert path.stable.all()
+    assert abs(turn) == pytest.approx(2 * angle, rel=1e-6)
+    assert (LENGTH + x, abs(y)) == pytest.approx((chord * np.cos(angle), chord * np.sin(angle)), rel=1e-6)
+    assert y * sign < 0
+    assert [(e.kind, e.before, e.after) for e in path.events] == [("bifurcation under prestress", 0, 1)]
+    assert path.events[0].drive * ratio == pytest.approx(4.0, rel=1e-7)
+    assert set(path.branch) == {f"bifurcated under {400 / ratio:.4g} % of the prestress, sign {sign:+d}"}
+
+
+def test_a_prestressed_spring_of_fixed_direction_buckles_a_column_as_a_dead_load_does() -> None:
+    """The elastica; S. P. Timoshenko and J. M. Gere, Theory of Elastic Stability, 1961, sec. 2.7, m = sin^2(turn/2)."""
+    springs = (SlideSpring("top", 0.0, STIFF, -1.5 * EULER / STIFF),)
+    path = trace(column(springs), Displacement("top", np.pi / 2, np.array([1e-9])), Control(tolerance=1e-9))
+    assert path.events == ()  # the drive holds the top
+    push = Loading((PointLoad("top", fy=1e-9 * EULER),), np.array([1.0]))
+    path = trace(column(springs), push, Control(tolerance=1e-9))
+
+    def short(m: float) -> float:
+        return float(LENGTH * (2 - 2 * ellipe(m) / ellipk(m)))
+
+    m = brentq(lambda m: RIGIDITY * (ellipk(m) / LENGTH) ** 2 + STIFF * short(m) - 1.5 * EULER, 1e-12, 0.8)
+    assert [event.kind for event in path.events] == ["bifurcation under prestress"]
+    assert path.motion("top")[0, 0] == pytest.approx(-short(m), rel=1e-6)
+    assert abs(path.motion("top")[0, 2]) == pytest.approx(2 * np.arcsin(np.sqrt(m)), rel=1e-6)
+
+
+def test_prestress_beyond_a_bifurcation_as_the_control_says() -> None:
+    """Straight on, unstable; nowhere, since stability is lost before the drive begins; bent by an imperfection."""
+    primary = tendon(5.0, branch="primary")
+    assert (primary.unstable == 1).all()
+    assert primary.events == ()
+    stopped = tendon(5.0, branch="stop")
+    assert (stopped.status, len(stopped)) == (PathStatus.JUMPS, 0)
+    assert "of the prestress" in stopped.message
+    assert tendon(3.9, branch="stop").status is PathStatus.COMPLETE
+    one, other = (tendon(5.0, imperfection=size) for size in (1e-6, -1e-6))
+    assert one.stable.all()
+    assert other.stable.all()
+    assert one.imperfection == "1e-06 m of the buckling mode under 80 % of the prestress"
+    assert one.motion("top")[0, 1] == pytest.approx(-other.motion("top")[0, 1])
+
+
+@pytest.mark.parametrize("pull", [0.4, 1.0, 1.5, 2.0])
+def test_constant_loads_may_straighten_what_prestress_has_bent(pull: float) -> None:
+    """The branch ends under the constant loads, where the straight column is stable.
+
+    Under a tendon T and a pull N its deflection is that of a beam-column: N/T = tan(qL)/(qL), q^2 = (T - N)/EI.
+    """
+    path = tendon(5.0, pull)
+    needed = brentq(lambda n: n / 5 - np.tan(0.5 * np.pi * np.sqrt(5 - n)) / (0.5 * np.pi * np.sqrt(5 - n)), 0, 0.9)
+    assert path.status is PathStatus.COMPLETE
+    assert path.stable.all()
+    closed = path.events[1]
+    assert (closed.kind, closed.before, closed.after) == ("bifurcation under constant loads", 1, 0)
+    assert closed.drive * pull == pytest.approx(needed, rel=1e-6)
+    assert set(path.branch) == {"primary"}
+    assert np.abs(path.motion("top")[:, 1]).max() < 1e-7 * LENGTH
