@@ -16,17 +16,21 @@ import numpy as np
 from cfmkit.beams.solver import FORCE_WEIGHT, Solver, Spot
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from cfmkit.beams.expanded import ExpandedSolver
     from cfmkit.curves import FloatArray
 
 _SEARCHES = 40
 _CLOSE = 1e-5  # share of the determinant at the ends that is near enough to interpolate the rest: the smallest,
 _LOOSE = 10.0  # and in units of the tolerance
+_NOTHING = 1e-6  # share of a determinant that is rounding
 _OUTSIDE = 0.1  # of a bracket: one end may lie at the singular point, on either side
 _MOVED = 1e-3  # share of a mode's largest change of a pose from which a node counts as moved
 _TURNS = 5  # of inverse iteration
 _AROUND = 16  # directions in which branches are looked for where two modes are critical at once
-_FIRST_KICK, _KICK, _KICKS = 1e-3, 0.06, 16  # how far from a bifurcation its branch is entered [rad]
+_SIZES = (0.06, 0.015, 0.0036)  # how far from a bifurcation its branch is entered [rad]
+_FIRST_KICK, _KICKS = 1e-3, 16  # change of the unknowns that is tried first, and how often
 
 
 @dataclass(frozen=True)
@@ -70,7 +74,9 @@ def locate(
     spot, many = search.interpolated(), abs(other.unstable - one.unstable)
     if not vector:
         return Singular(spot, np.zeros(solver.n), fold, one.unstable, other.unstable)
-    nulls = _nulls_of(solver, spot, one, max(1, many))
+    (_, first, _), (_, last, _) = search.samples[:2]
+    regular = one if abs(first) > _NOTHING * abs(last) else other  # a path may begin at its singular point
+    nulls = _nulls_of(solver, spot, regular, max(1, many))
     return Singular(spot, nulls[:, 0], fold, one.unstable, other.unstable, nulls[:, 1:] if many > 1 else None)
 
 
@@ -236,10 +242,10 @@ def leave(solver: ExpandedSolver, singular: Singular, sign: int, forward: float)
     leads backwards (the bifurcation is subcritical) or is less stable than the path before it.
     """
     if singular.others is None:
-        return _entered(solver, singular, sign * singular.null, forward)
+        return entered(solver, singular, sign * singular.null, forward)
     found: list[tuple[tuple[float, ...], Spot]] = []
     for direction in _directions(np.column_stack([singular.null, singular.others])):
-        spot = _entered(solver, singular, direction, forward)
+        spot = entered(solver, singular, direction, forward)
         if spot is not None:
             change = _shown(solver, spot.y[: solver.n] - singular.spot.y[: solver.n])
             order = tuple((sign * np.round(change / np.abs(change).max(), 1)).tolist())
@@ -260,11 +266,20 @@ def _directions(nulls: FloatArray) -> FloatArray:
     return found
 
 
-def _entered(solver: ExpandedSolver, singular: Singular, direction: FloatArray, forward: float) -> Spot | None:
-    """Return an equilibrium on the branch that a null vector points along."""
-    # leaves that lie almost flat have branches shorter than the usual entry
-    found = (_leave(solver, singular, direction, forward, size) for size in (_KICK, 0.25 * _KICK, 0.06 * _KICK))
-    return next((spot for spot in found if spot is not None), None)
+def entered(
+    solver: ExpandedSolver,
+    singular: Singular,
+    direction: FloatArray,
+    forward: float,
+    sizes: Sequence[float] = _SIZES,
+    reach: float = math.inf,
+) -> Spot | None:
+    """Return an equilibrium on the branch that a null vector points along, at most so far ahead; the first there is.
+
+    `sizes` [rad] are the distances tried: leaves that lie almost flat have branches shorter than the usual one.
+    """
+    found = (_leave(solver, singular, direction, forward, size) for size in sizes)
+    return next((s for s in found if s is not None and abs(s.drive - singular.spot.drive) <= reach), None)
 
 
 def _leave(

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.beams.discretise import LOADS, PRESTRESS, assemble_model
-from cfmkit.beams.kernels.march import DONE, LONG, STALLED
+from cfmkit.beams.kernels.march import DONE, LONG, SHORT, STALLED
 from cfmkit.beams.path import Event, PathStatus
 from cfmkit.beams.solver import Spot, march_options
 
@@ -33,6 +33,8 @@ def start(run: Run) -> tuple[Spot | None, float, int]:
         return run.begin, 1.0, DONE
     network, indifferent = run.layout.network, run.control.branch == "primary" and not run.to_first
     spot = run.solver.tightened()
+    if spot is not None and spot.shortness < SHORT:
+        return None, 0.0, LONG
     if (spot is None or spot.unstable > 0) and not indifferent:
         found = _along(run, PRESTRESS, run.solver.rest())
         if found is not None and found[0] is None:
@@ -81,12 +83,12 @@ def _along(run: Run, what: str, begin: Spot) -> tuple[Spot | None, float, int] |
     if ramp.status is not PathStatus.COMPLETE:
         ended = ramp.branch != "primary" and not run.control.through_folds
         return (None, float(ramp.points.drive[-1]), STALLED) if ended else None
-    name = ramp.branches[-1]
+    whole = int(np.flatnonzero(ramp.points.info[:, 1] == 0)[0])  # behind it there may be the entry of a branch
+    name = ramp.branches[whole]
     if name == "primary":
         run.branch = name
     elif name != run.branch:
         share = next((one.drive for one in reversed(ramp.events) if one.after > one.before), 1.0)
         run.branch = f"bifurcated under {100 * share:.4g} % of the {what}, sign {run.control.sign:+d}"
     run.closed = run.branch == "primary"
-    last = ramp.last(ramp.points)
-    return Spot(last.y, 0.0, last.tangent), 1.0, DONE
+    return Spot(ramp.points.y[whole], 0.0, run.solver.unit.copy()), 1.0, DONE

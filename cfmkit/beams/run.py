@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.beams import beside, branch_ends, branches, corners, endings, preload
+from cfmkit.beams import beside, branch_ends, branches, corners, critical, endings, preload
 from cfmkit.beams.accuracy import errors, largest_force
 from cfmkit.beams.discretise import Mesh
 from cfmkit.beams.expanded import ExpandedSolver
@@ -93,7 +93,8 @@ class Run:
     def follow(self) -> None:
         """Trace from rest to the last point asked for, or to where it ends, and name the branches."""
         self._follow()
-        if self.natural and not self.closed and not self.too_long and not branch_ends.close_behind(self):
+        left = set(self.branches) - {"primary"}
+        if left and self.natural and not self.closed and not self.too_long and not branch_ends.close_behind(self):
             control = replace(self.control, branch="primary")
             primary = Run(self.layout, self.mesh, control, ramped=self.ramped, begin=self.begin)
             primary.follow()
@@ -111,9 +112,9 @@ class Run:
             hops += 1
             if code == DONE and asked == len(self.targets):
                 return
-            if code == NO_START:
-                break
             following = self._taken_up(code, spot, asked)
+            if following is None and not len(self.points):
+                break
             if following is None or self.too_long or (self.to_first and self.first is not None):
                 return
             spot, asked = following, self.asked()
@@ -125,6 +126,10 @@ class Run:
 
     def _taken_up(self, code: int, spot: Spot, asked: int) -> Spot | None:
         """Return where to go on after a march that ended early, at `spot`; None to stop."""
+        if code in (NO_START, STALLED):
+            away = critical.left(self, spot)
+            if away is not None or code == NO_START:
+                return away
         if code == INERTIA and self.control.branch == "stop":
             self.status = PathStatus.JUMPS
             last = float(self.points.drive[-1]) * self.unit

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.optimize import brentq
-from scipy.special import ellipe, ellipk
+from scipy.special import ellipe, ellipk, ellipkinc
 
 from cfmkit.beams import (
     CLAMPED,
@@ -126,3 +126,60 @@ def test_constant_loads_may_straighten_what_prestress_has_bent(pull: float) -> N
     assert closed.drive * pull == pytest.approx(needed, rel=1e-6)
     assert set(path.branch) == {"primary"}
     assert np.abs(path.motion("top")[:, 1]).max() < 1e-7 * LENGTH
+
+
+def pressed(ratio: float, push: PointLoad, points: Any, **control: Any) -> Path:
+    """Return the path of a column under a constant load of so many times Euler's that is pushed in addition."""
+    network = column((), (PointLoad("top", fx=-ratio * EULER),))
+    return trace(network, Loading((push,), np.array(points)), Control(**control))
+
+
+def turn_at_top(ratio: float, across: float) -> float:
+    """Return the rotation of a column's top under a load along and one across it, in units of Euler's: the elastica.
+
+    The load's angle to the column is b; with m = sin^2(t/2), t the angle of the top to the load, it bends over the
+    length L: sqrt(R/EI) L = K(m) - F(asin(sin(b/2)/sqrt(m)), m).
+    """
+    b = np.arctan2(across, ratio)
+    size = np.hypot(ratio, across) ** 0.5 * np.pi / 2
+
+    def excess(t: float) -> float:
+        m = np.sin(t / 2) ** 2
+        return float(ellipk(m) - ellipkinc(np.arcsin(np.sin(b / 2) / np.sqrt(m)), m) - size)
+
+    return float(brentq(excess, b * (1 + 1e-9), 3.0, xtol=1e-14) - b)
+
+
+@pytest.mark.parametrize("tolerance", [1e-4, 1e-9])
+@pytest.mark.parametrize("off", [0.0, -1e-7, -1e-9, -1e-12, 1e-12, 1e-9, 1e-8])
+def test_a_column_under_just_its_critical_load_bends_with_the_cube_root_of_a_push(off: float, tolerance: float) -> None:
+    path = pressed(1 + off, PointLoad("top", fy=-1e-3 * EULER), [0.0, 0.01, 0.5, 1.0], tolerance=tolerance)
+    assert path.status is PathStatus.COMPLETE, path.message
+    assert path.stable.all()
+    assert path.asked[path.at_asked].tolist() == [0, 1, 2, 3]
+    expected = [turn_at_top(1 + off, 1e-3 * share) for share in (0.01, 0.5, 1.0)]
+    assert -path.motion("top")[path.at_asked[1:], 2] == pytest.approx(expected, rel=10 * tolerance)
+    assert [event.kind for event in path.events if event.drive < 1] in ([], ["bifurcation under constant loads"])
+
+
+@pytest.mark.parametrize("off", [0.0, -1e-12, 1e-9])
+def test_a_column_under_just_its_critical_load_may_be_relieved_or_pressed_further(off: float) -> None:
+    relieved = pressed(1 + off, PointLoad("top", fx=EULER), [0.05, 0.2])
+    assert relieved.status is PathStatus.COMPLETE
+    assert set(relieved.branch) == {"primary"}
+    assert np.abs(relieved.motion("top")[-1, 1:]).max() < 1e-9
+    further = [pressed(1 + off, PointLoad("top", fx=-EULER), [0.05, 0.2], sign=sign) for sign in (1, -1)]
+    assert all(path.status is PathStatus.COMPLETE for path in further)
+    assert all(path.stable.all() for path in further)
+    m = brentq(lambda m: (ellipk(m) * 2 / np.pi) ** 2 - 1.2, 1e-9, 0.9)
+    turns = [path.motion("top")[-1, 2] for path in further]
+    assert turns == pytest.approx([-2 * np.arcsin(np.sqrt(m)), 2 * np.arcsin(np.sqrt(m))], rel=1e-6)
+
+
+@pytest.mark.parametrize("tolerance", [1e-5, 1e-7, 1e-9])
+def test_prestress_that_is_just_critical_has_a_start(tolerance: float) -> None:
+    """Half a pinned column is a critical cantilever: a mesh of halves is too coarse."""
+    path = tendon(4.0, tolerance=tolerance)
+    assert path.status is PathStatus.COMPLETE, path.message
+    assert path.stable.all()
+    assert path.motion("top")[-1, 1] < 0
