@@ -95,8 +95,7 @@ class _Search:
         chord = np.append(weights * (other.y - one.y)[: solver.n], other.drive - one.drive)
         self.border = solver.unit if natural else chord
         self.start, self.stop = self._level(one), self._level(other)
-        # Newton's method knows the determinant before its last step, and without the tangent's symmetric part
-        self.known = close > _CLOSE and not solver.model.load_follows.any()
+        self.known = close > _CLOSE  # Newton's method knows the determinant before its last step
         largest = max(self._log_size(one), self._log_size(other))
         self.log_unit = largest if math.isfinite(largest) else 0.0  # sizes in this unit: of many beams they overflow
         self.samples = [(0.0, self._measure(one), one), (1.0, self._measure(other), other)]
@@ -220,8 +219,7 @@ def _null_vectors(matrix: FloatArray, regular: FloatArray, count: int) -> FloatA
     try:
         grown = np.linalg.inv(matrix + shift * np.eye(len(matrix))) @ regular
     except np.linalg.LinAlgError:  # singular to the last bit
-        values, vectors = np.linalg.eigh(matrix)
-        return np.asarray(vectors[:, np.abs(values).argsort()[:count]])
+        return np.asarray(np.linalg.svd(matrix)[2][-count:].T)
     nulls = grown[:, np.abs(grown).max(axis=0).argsort()[::-1][:count]]
     for _ in range(_TURNS):
         nulls = grown @ _orthonormal(nulls)

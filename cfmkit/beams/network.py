@@ -128,7 +128,11 @@ Spring = LineSpring | TorsionSpring | SlideSpring
 
 @dataclass(frozen=True)
 class PointLoad:
-    """A force [N] and moment [N m] at a node. One that `follows` turns with the node; else it keeps its direction."""
+    """A force [N] and moment [N m] at a node. One that `follows` turns with the node; else it keeps its direction.
+
+    Under loads that follow a path is called unstable where it diverges. Whether it flutters, which depends on masses,
+    is not judged.
+    """
 
     node: str
     fx: float = 0.0

@@ -105,12 +105,16 @@ class Path:
 
     @cached_property
     def unstable(self) -> Any:
-        """Number of unstable directions while the drive is held."""
+        """Number of unstable directions while the drive is held.
+
+        Under loads that follow they are those of the tangent's symmetric part, less one where its determinant, which
+        decides on divergence, does not agree.
+        """
         return read_only(self.points.info[:, 0], np.int64)
 
     @property
     def stable(self) -> Any:
-        """Whether the equilibrium is stable while the drive is held."""
+        """Whether the equilibrium is stable while the drive is held; under loads that follow: does not diverge."""
         return read_only(self.unstable == 0, np.bool_)
 
     @cached_property

@@ -162,10 +162,10 @@ class Solver:
         return Spot(new, at, tangent, int(unstable), shortness, increment, log_size)
 
     def tangent_at(self, y: FloatArray, drive: float) -> tuple[FloatArray, FloatArray]:
-        """Return the tangent by the unknowns z, symmetrised, and by the drive."""
+        """Return the tangent by the unknowns z and by the drive; under loads that follow it is not symmetric."""
         entry.tangent(self.model, self.n_free, y.copy(), drive, self.scratch)
         h = self.scratch[0][: self.n]
-        return 0.5 * (h[:, : self.n] + h[:, : self.n].T), h[:, self.n].copy()
+        return h[:, : self.n].copy(), h[:, self.n].copy()
 
     def march(
         self, spot: Spot, targets: FloatArray, options: FloatArray, room: int, model: Model | None = None

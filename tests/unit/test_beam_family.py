@@ -185,6 +185,33 @@ analysis: {force: 0.01 N, points: 5}
 MIRRORED = "points: 5, other_side: true"
 
 
+def test_a_spring_tightened_beyond_a_bifurcation_and_loads_that_follow_are_told():
+    """A tendon from the top of a column to its foot buckles it at four times Euler's load."""
+    text = """
+cfmkit: 1
+family: beam
+mechanism:
+  material: {youngs_modulus: 2 GPa}
+  thickness: 1 mm
+  width: 8 mm
+  nodes:
+    foot: {at: [0 mm, 0 mm], support: clamped}
+    top: {at: [0 mm, 100 mm]}
+  beams:
+    column: {start: foot, end: top}
+  springs:
+    tendon: {kind: line, start: top, end: foot, stiffness: 100 N/m, free_length: 80 mm}
+  drive: {kind: force, node: top, direction: 0 deg, follows: true}
+analysis: {force: 0.001 N, points: 5}
+"""
+    result = cfmkit.analyze(cfmkit.loads(text))
+    euler = np.pi**2 * 2e9 * 8e-3 * 1e-9 / 12 / (4 * 0.1**2)
+    share = float(re.search(r"under ([\d.]+) % of the prestress", warned(result)["bifurcation"])[1])
+    assert share == pytest.approx(100 * 4 * euler / 2.0, abs=0.05)
+    assert "does not diverge" in warned(result)["flutter_not_judged"]
+    assert "flutter_not_judged" not in warned(cfmkit.analyze(cfmkit.loads(text.replace(", follows: true", ""))))
+
+
 def test_a_curve_that_ends_with_a_negative_force_has_no_strict_range():
     text = """
 cfmkit: 1

@@ -91,7 +91,7 @@ def test_the_jacobian_at_random_states_is_the_derivative_of_the_residuals(seed: 
 @pytest.mark.parametrize("seed", range(6))
 def test_the_size_of_the_determinant_that_a_solution_brings_is_that_of_its_tangent(seed: int) -> None:
     """By Cramer's rule from the factors of the bordered system, whatever the border is."""
-    net = network(seed, follower=False)
+    net = network(seed)
     solver = Solver(Layout(net, drives(net, seed)[0]), Mesh(3, 1), 1e-12)
     start = solver.tightened()
     assert start is not None

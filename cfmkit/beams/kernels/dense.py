@@ -34,20 +34,21 @@ def clear(target):
 
 @kernel
 def lu_solve(a, b):
-    """Overwrite the columns of `b` with the solution of a x = b; tell whether `a` is regular.
+    """Overwrite the columns of `b` with the solution of a x = b, and `a` with its factors.
 
-    `a` is overwritten by its factors.
+    Returns 1 or -1 for an even or odd number of exchanged rows, 0 where `a` is not regular.
     """
     n = a.shape[0]
-    columns = b.shape[1]
+    columns, exchanged = b.shape[1], 1
     for k in range(n):
         pivot, largest = k, abs(a[k, k])
         for i in range(k + 1, n):
             if abs(a[i, k]) > largest:
                 pivot, largest = i, abs(a[i, k])
         if not largest > 0.0:
-            return False
+            return 0
         if pivot != k:
+            exchanged = -exchanged
             for j in range(k, n):
                 a[k, j], a[pivot, j] = a[pivot, j], a[k, j]
             for j in range(columns):
@@ -66,7 +67,7 @@ def lu_solve(a, b):
             for i in range(k + 1, n):
                 value -= a[k, i] * b[i, j]
             b[k, j] = value / a[k, k]
-    return True
+    return exchanged
 
 
 @kernel

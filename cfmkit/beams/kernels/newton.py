@@ -169,6 +169,35 @@ def _log_determinant(factors, advance):
 
 
 @kernel
+def _any(flags):
+    count = 0
+    for k in range(flags.shape[0]):
+        count += flags[k]
+    return count > 0
+
+
+@kernel
+def _negative(factors, exchanged, advance):
+    """Tell whether the Jacobian's determinant is negative; see `_log_determinant`."""
+    negative = (exchanged < 0) != (advance < 0.0)
+    for i in range(factors.shape[0]):
+        if factors[i, i] < 0.0:
+            negative = not negative
+    return negative
+
+
+@kernel
+def _divergent(unstable, directions, negative):
+    """Return the number of unstable directions under loads that follow, whose Jacobian is not symmetric.
+
+    Its symmetric part loses its definiteness before the determinant vanishes, where the network diverges: the count
+    is odd only if the determinant says so. directions: as many as there are, those that were eliminated left out.
+    """
+    odd = ((directions - int(unstable)) % 2 == 1) != negative
+    return unstable - 1.0 if odd and unstable > 0.0 else unstable
+
+
+@kernel
 def solve(m, n_free, y, state, border, target, limits, tangent, scratch):
     """Newton's method for equilibrium with border . (z, drive) = target; y and state[0] (the drive) are updated.
 
@@ -185,7 +214,8 @@ def solve(m, n_free, y, state, border, target, limits, tangent, scratch):
         index, least = assemble(m, y, state[0], n_free, h, residual, values, ends, rel, store, work)
         right_sides(m, residual, h, y, state[0], n_free, border, target, rhs)
         copy_matrix(h2, h)
-        if not lu_solve(h2, rhs):
+        exchanged = lu_solve(h2, rhs)
+        if exchanged == 0:
             return SINGULAR, iteration
         for i in range(n):
             dy[i] = rhs[i, 0]
@@ -206,7 +236,11 @@ def solve(m, n_free, y, state, border, target, limits, tangent, scratch):
                 tangent[i] = rhs[i, 1]
             if state[5] != 0.0:
                 state[5] = _log_determinant(h2, tangent[n])
+            follows = _any(m.load_follows)
+            negative = follows and _negative(h2, exchanged, tangent[n])
             state[1] = tangent_index(h, n_free, index, h2)
+            if follows:
+                state[1] = _divergent(state[1], n_free + index, negative)
             state[2], state[3] = least, size
             return SOLVED, iteration + 1
         before = size

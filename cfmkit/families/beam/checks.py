@@ -139,6 +139,11 @@ def _stability(solution: Solution) -> Iterator[Finding]:
             f"{int(bad.sum())} of {len(bad)} points are not stable while the drive is held, from "
             f"{format_short(float(x.min()), dimension)} to {format_short(float(x.max()), dimension)}",
         )
+    if solution.path.solver.model.load_follows.any():
+        yield finding(
+            "flutter_not_judged",
+            "forces turn with their node: what is called stable does not diverge; flutter depends on masses",
+        )
 
 
 def _accuracy(solution: Solution) -> Iterator[Finding]:
