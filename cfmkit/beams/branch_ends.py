@@ -36,9 +36,11 @@ class BranchEnd:
     after: int
 
 
-def end_of_branch(run: Run, other: Spot, found: Singular) -> BranchEnd | None:
-    """Return where the path that was left becomes stable again: there the branch may rejoin it."""
+def end_of_branch(run: Run, other: Spot, before: int) -> BranchEnd | None:
+    """Return where the path that was left becomes stable again: there the branch may rejoin it.
 
+    `other` is on that path, `before` the number of its unstable directions before it was left.
+    """
     start = other
     for _ in range(_LEGS):
         ahead = run.targets[run.asked() :]
@@ -46,8 +48,10 @@ def end_of_branch(run: Run, other: Spot, found: Singular) -> BranchEnd | None:
         if not len(ahead):
             run.closed = True
             return None
-        step = float(np.sign(ahead[0] - start.drive)) * 0.02 * run.span
-        marks = np.append(0.5 * (ahead[1:] + ahead[:-1]), ahead[-1])  # a point asked for may lie at the end
+        sense = float(np.sign(ahead[0] - start.drive))
+        margin = 2.0 * max(beside.BESIDE, min(run.control.tolerance, _CLEAR))  # on this mesh the end may lie behind
+        step, behind = 0.02 * sense * run.span, ahead[-1] + margin * sense * run.span
+        marks = np.append(0.5 * (ahead[1:] + ahead[:-1]), behind)  # a point asked for may lie at the end
         options = run.options(start, step)
         code, points = run.solver.march(start, marks, options, run.control.most_points + len(marks))
         if code != INERTIA:
@@ -55,7 +59,7 @@ def end_of_branch(run: Run, other: Spot, found: Singular) -> BranchEnd | None:
             return None
         earlier = points.take([-2]) if len(points) > 1 else run.as_points(start, -1)
         start = run.last(points)
-        if start.unstable <= found.before:
+        if start.unstable <= before:
             break
     one = run.fine.solve(run.fine.expand(earlier.y[-1]), float(earlier.drive[-1]))
     beyond = run.fine.solve(run.fine.expand(points.y[-1]), float(points.drive[-1]))

@@ -170,7 +170,7 @@ def _parted(run: Run, found: Singular, one: Spot, other: Spot) -> Spot | None:
     run.append(run.as_points(left, -1))
     run.entry = 0.5 * abs(left.drive - found.spot.drive)
     run.closed = False
-    run.end = end_of_branch(run, clear, found) if run.natural else None
+    run.end = end_of_branch(run, clear, found.before) if run.natural else None
     return left
 
 

@@ -12,12 +12,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.beams import branch_ends
 from cfmkit.beams.discretise import LOADS, PRESTRESS, assemble_model
 from cfmkit.beams.kernels.march import DONE, LONG, SHORT, STALLED
 from cfmkit.beams.path import Event, PathStatus
 from cfmkit.beams.solver import Spot, march_options
 
 if TYPE_CHECKING:
+    from cfmkit.beams.branch_ends import BranchEnd
     from cfmkit.beams.run import Run
 
 _ROOM = 400  # points on the way to the constant loads
@@ -83,12 +85,19 @@ def _along(run: Run, what: str, begin: Spot) -> tuple[Spot | None, float, int] |
     if ramp.status is not PathStatus.COMPLETE:
         ended = ramp.branch != "primary" and not run.control.through_folds
         return (None, float(ramp.points.drive[-1]), STALLED) if ended else None
-    whole = int(np.flatnonzero(ramp.points.info[:, 1] == 0)[0])  # behind it there may be the entry of a branch
-    name = ramp.branches[whole]
+    name = ramp.branches[-1]
     if name == "primary":
         run.branch = name
     elif name != run.branch:
         share = next((one.drive for one in reversed(ramp.events) if one.after > one.before), 1.0)
         run.branch = f"bifurcated under {100 * share:.4g} % of the {what}, sign {run.control.sign:+d}"
     run.closed = run.branch == "primary"
-    return Spot(ramp.points.y[whole], 0.0, run.solver.unit.copy()), 1.0, DONE
+    return Spot(ramp.points.y[-1], 0.0, run.solver.unit.copy()), 1.0, DONE
+
+
+def end_of_branch(run: Run) -> BranchEnd | None:
+    """Return where the branch ends on which a path starts: where the straight way there becomes stable again."""
+    primary = type(run)(run.layout, run.mesh, replace(run.control, branch="primary"))
+    spot = run.solver.tightened() if run.ramped else start(primary)[0]
+    other = None if spot is None else run.solver.solve(spot.y, 0.0)
+    return None if other is None or other.unstable == 0 else branch_ends.end_of_branch(run, other, 0)

@@ -105,13 +105,15 @@ class Run:
         self.too_long = code == LONG
         if spot is None and code == DONE:
             return
+        if self.natural and self.branch != "primary":
+            self.end = preload.end_of_branch(self)
         asked, hops, fresh = int(self.targets[0] == 0.0), 0, True
         while spot is not None and asked < len(self.targets) and hops < _HOPS:
             code, asked, spot = self._leg(spot, asked, fresh)
             fresh = False
             hops += 1
             if code == DONE and asked == len(self.targets):
-                return
+                break
             following = self._taken_up(code, spot, asked)
             if following is None and not len(self.points):
                 break
@@ -120,7 +122,10 @@ class Run:
             spot, asked = following, self.asked()
         if not len(self.points):
             endings.no_start(self, self.share)
-        elif asked < len(self.targets):
+        elif asked == len(self.targets):
+            while self.natural and self.points.info[-1, 1] < 0.0:
+                self.drop_last()
+        else:
             last = float(self.points.drive[-1]) * self.unit
             self.status, self.message = PathStatus.LOST, f"the path turned back and forth at {last:.6g}"
 

@@ -67,6 +67,19 @@ def test_a_point_at_a_bifurcation_of_a_path_that_goes_straight_on(exact: Path, o
     assert [(e.kind, e.before, e.after) for e in path.events] == [("bifurcation", 0, 1), ("bifurcation", 1, 0)]
 
 
+@pytest.mark.parametrize("which", [0, 1])
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-5, 1e-7, 1e-9])
+def test_the_last_point_may_lie_at_an_end_of_a_branch(exact: Path, which: int, tolerance: float) -> None:
+    """The path ends with it, although its end is found only from a little further on."""
+    places = [event.drive for event in exact.events]
+    path = pressed([0.5 * places[0], *([RISE] * which), places[which]], tolerance)
+    assert path.status is PathStatus.COMPLETE, path.message
+    assert path.error <= tolerance
+    assert path.stable.all()
+    assert path.drive[-1] == places[which]
+    assert [e.drive for e in path.events] == pytest.approx(places[: which + 1], abs=tolerance * RISE)
+
+
 @pytest.mark.parametrize("seed", [1, 3, 4, 5, 6, 8, 10])
 def test_nothing_eliminated_leads_to_the_same_equilibria(seed: int) -> None:
     """Solutions, tangents, borders, marches and finer meshes, in the unknowns of the plain solver."""
