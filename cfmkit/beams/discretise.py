@@ -207,15 +207,14 @@ def assemble_model(layout: Layout, cut: Grid, values: Any, ramp: str = "") -> Mo
     """
     scales, plan, places = layout.scales, layout.plan, layout.places
     base, rate = _held(layout)
-    load_value, line, spring_value = _loads(layout), _line_loads(layout), _springs(layout)
-    spring_rate = np.zeros(len(spring_value))
+    load_value, line, springs = _loads(layout), _line_loads(layout), _springs(layout)
     if ramp:
         base, rate = np.zeros_like(base), base if ramp == LOADS else np.zeros_like(base)
         load_value[:, 1], load_value[:, 0] = load_value[:, 0], 0.0
         line[:, 1], line[:, 0] = line[:, 0], 0.0
     if ramp == PRESTRESS:
         load_value[:], line[:] = 0.0, 0.0
-        spring_value, spring_rate = _relaxed(layout, spring_value)
+        springs = _relaxed(layout, springs)
     return Model(
         table=values,
         width=cut.width,
@@ -235,8 +234,7 @@ def assemble_model(layout: Layout, cut: Grid, values: Any, ramp: str = "") -> Mo
         load_follows=plan.load_follows,
         spring_place=plan.spring_place,
         spring_kind=plan.spring_kind,
-        spring_value=spring_value,
-        spring_rate=spring_rate,
+        spring_value=springs,
     )
 
 
@@ -278,18 +276,19 @@ def _springs(layout: Layout) -> Any:
     """Return the springs' dimensionless values."""
     scales, rows = layout.scales, layout.spring_values
     if not rows:
-        return np.zeros((0, 4))
+        return np.zeros((0, 5))
     line, turn, length = scales.force / scales.length, scales.moment, scales.length
     units = {LINE: (line, length, 1.0, 1.0), TURN: (turn, 1.0, 1.0, 1.0), SLIDE: (line, 1.0, 1.0, length)}
     kinds = layout.plan.spring_kind.tolist()
     value = [
-        [own / unit for own, unit in zip(row, units[kind], strict=True)] for row, kind in zip(rows, kinds, strict=True)
+        [*(own / unit for own, unit in zip(row, units[kind], strict=True)), 0.0]
+        for row, kind in zip(rows, kinds, strict=True)
     ]
-    return np.array(value).reshape(len(rows), 4)
+    return np.array(value)
 
 
-def _relaxed(layout: Layout, tight: Any) -> tuple[Any, FloatArray]:
-    """Return the values of springs that carry nothing at rest, and what is added to be tight (springs,)."""
+def _relaxed(layout: Layout, tight: Any) -> Any:
+    """Return the values of springs that carry nothing at rest and are tight at a drive of one."""
     plan, value = layout.plan, tight.copy()
     kinds = plan.spring_kind
     value[kinds == TURN, 1] = 0.0
@@ -297,4 +296,5 @@ def _relaxed(layout: Layout, tight: Any) -> tuple[Any, FloatArray]:
     line = kinds == LINE
     one, other = ((layout.places.origin + layout.places.arm)[plan.spring_place[line, k]] for k in (0, 1))
     value[line, 1] = np.hypot(*(other - one).T) / layout.scales.length
-    return value, (tight - value).sum(axis=1)
+    value[:, 4] = (tight - value).sum(axis=1)
+    return value

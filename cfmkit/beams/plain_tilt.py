@@ -90,7 +90,7 @@ class PlainTilt:
             frame=np.zeros(self.origin.shape),
             base=none,
             rate=none,
-            spring=np.zeros((count, springs, 4)),
+            spring=np.zeros((count, springs, 5)),
             load=np.zeros((count, loads, 2, 3)),
             line=np.zeros((count, beams, 2, 2)),
         )

@@ -200,7 +200,7 @@ class Solver:
         if not self.layout.network.springs:
             return self.rest()
         model = assemble_model(self.layout, self.cut, self.table, PRESTRESS)
-        if np.abs(model.spring_rate).max() <= _TIGHT:
+        if np.abs(model.spring_value[:, 4]).max() <= _TIGHT:
             return self.rest()
         spot, step = Spot(self.unstressed(), 0.0, np.zeros(self.n + 1)), 1.0
         while spot.drive < 1.0:

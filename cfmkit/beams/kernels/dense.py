@@ -34,21 +34,20 @@ def clear(target):
 
 @kernel
 def lu_solve(a, b):
-    """Overwrite the columns of `b` with the solution of a x = b, and `a` with its factors.
+    """Overwrite the columns of `b` with the solution of a x = b; tell whether `a` is regular.
 
-    Returns 1 or -1 for an even or odd number of exchanged rows, 0 where `a` is not regular.
+    `a` is overwritten by its factors.
     """
     n = a.shape[0]
-    columns, exchanged = b.shape[1], 1
+    columns = b.shape[1]
     for k in range(n):
         pivot, largest = k, abs(a[k, k])
         for i in range(k + 1, n):
             if abs(a[i, k]) > largest:
                 pivot, largest = i, abs(a[i, k])
         if not largest > 0.0:
-            return 0
+            return False
         if pivot != k:
-            exchanged = -exchanged
             for j in range(k, n):
                 a[k, j], a[pivot, j] = a[pivot, j], a[k, j]
             for j in range(columns):
@@ -67,7 +66,27 @@ def lu_solve(a, b):
             for i in range(k + 1, n):
                 value -= a[k, i] * b[i, j]
             b[k, j] = value / a[k, k]
-    return exchanged
+    return True
+
+
+@kernel
+def negative_determinant(a):
+    """Tell whether a matrix (overwritten) has a negative determinant."""
+    n, negative = a.shape[0], False
+    for k in range(n):
+        pivot = k
+        for i in range(k + 1, n):
+            if abs(a[i, k]) > abs(a[pivot, k]):
+                pivot = i
+        if pivot != k:
+            negative = not negative
+            for j in range(k, n):
+                a[k, j], a[pivot, j] = a[pivot, j], a[k, j]
+        if a[k, k] < 0.0:
+            negative = not negative
+        if a[k, k] != 0.0:
+            _eliminate_one(a, k)
+    return negative
 
 
 @kernel

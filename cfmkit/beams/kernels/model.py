@@ -54,9 +54,7 @@ class Model(NamedTuple):
     load_place, load_value, load_follows :
         (n,) int attachment; (n, 2, 3) (constant, per unit of the drive) x (fx, fy, m); (n,) bool.
     spring_place, spring_kind, spring_value :
-        (n, 2) int attachments; (n,) int; (n, 4) values, see `cfmkit.beams.kernels.springs`.
-    spring_rate : (n,) array
-        Change of the free length, angle or gap per unit of the drive.
+        (n, 2) int attachments; (n,) int; (n, 5) values, see `cfmkit.beams.kernels.springs`.
     """
 
     table: FloatArray
@@ -78,7 +76,6 @@ class Model(NamedTuple):
     spring_place: IntArray
     spring_kind: IntArray
     spring_value: FloatArray
-    spring_rate: FloatArray
 
 
 class Tilt(NamedTuple):
@@ -102,7 +99,7 @@ class Tilt(NamedTuple):
         Whether it changes a beam's table or line load, or shifts one of its ends.
     origin, arm, frame : (k, places, 2) arrays
     base, rate : (k, dofs) arrays
-    spring : (k, springs, 4) array
+    spring : (k, springs, 5) array
     load : (k, loads, 2, 3) array
     line : (k, beams, 2, 2) array
     """

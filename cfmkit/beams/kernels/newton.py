@@ -6,7 +6,7 @@ import numpy as np
 
 from cfmkit.beams.kernels.chain import C_D, E2, SMALL, E, F, G, flows, places_of, pose_of, sweep, unfold
 from cfmkit.beams.kernels.compiler import inlined, kernel, maker
-from cfmkit.beams.kernels.dense import clear, copy_matrix, lu_solve, positive_count
+from cfmkit.beams.kernels.dense import clear, copy_matrix, lu_solve, negative_determinant, positive_count
 from cfmkit.beams.kernels.springs import acts, add_block, add_force, add_loads, add_springs, jacobian, wires_of
 
 SOLVED, SINGULAR, DIVERGED, SLOW = 0, 1, 2, 3
@@ -169,32 +169,20 @@ def _log_determinant(factors, advance):
 
 
 @kernel
-def _any(flags):
-    count = 0
-    for k in range(flags.shape[0]):
-        count += flags[k]
-    return count > 0
-
-
-@kernel
-def _negative(factors, exchanged, advance):
-    """Tell whether the Jacobian's determinant is negative; see `_log_determinant`."""
-    negative = (exchanged < 0) != (advance < 0.0)
-    for i in range(factors.shape[0]):
-        if factors[i, i] < 0.0:
-            negative = not negative
-    return negative
-
-
-@kernel
-def _divergent(unstable, directions, negative):
-    """Return the number of unstable directions under loads that follow, whose Jacobian is not symmetric.
+def _divergent(m, h, unstable, directions, scratch):
+    """Return the number of unstable directions where loads may follow, and the Jacobian need not be symmetric.
 
     Its symmetric part loses its definiteness before the determinant vanishes, where the network diverges: the count
     is odd only if the determinant says so. directions: as many as there are, those that were eliminated left out.
     """
-    odd = ((directions - int(unstable)) % 2 == 1) != negative
-    return unstable - 1.0 if odd and unstable > 0.0 else unstable
+    count, n = 0, h.shape[0] - 1
+    for k in range(m.load_follows.shape[0]):
+        count += m.load_follows[k]
+    if count == 0:
+        return unstable
+    copy_matrix(scratch, h)
+    negative = negative_determinant(scratch[:n, :n])
+    return unstable - 1 if ((directions - unstable) % 2 == 1) != negative else unstable
 
 
 @kernel
@@ -214,8 +202,7 @@ def solve(m, n_free, y, state, border, target, limits, tangent, scratch):
         index, least = assemble(m, y, state[0], n_free, h, residual, values, ends, rel, store, work)
         right_sides(m, residual, h, y, state[0], n_free, border, target, rhs)
         copy_matrix(h2, h)
-        exchanged = lu_solve(h2, rhs)
-        if exchanged == 0:
+        if not lu_solve(h2, rhs):
             return SINGULAR, iteration
         for i in range(n):
             dy[i] = rhs[i, 0]
@@ -236,11 +223,9 @@ def solve(m, n_free, y, state, border, target, limits, tangent, scratch):
                 tangent[i] = rhs[i, 1]
             if state[5] != 0.0:
                 state[5] = _log_determinant(h2, tangent[n])
-            follows = _any(m.load_follows)
-            negative = follows and _negative(h2, exchanged, tangent[n])
             state[1] = tangent_index(h, n_free, index, h2)
-            if follows:
-                state[1] = _divergent(state[1], n_free + index, negative)
+            if m.load_follows.shape[0] > 0 and state[1] > 0.0:
+                state[1] = _divergent(m, h, int(state[1]), n_free + index, h2)
             state[2], state[3] = least, size
             return SOLVED, iteration + 1
         before = size

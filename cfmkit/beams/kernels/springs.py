@@ -10,7 +10,8 @@ from cfmkit.beams.kernels.dense import clear
 
 LINE, TURN, SLIDE = 0, 1, 2
 """Kinds: along the line between two places (stiffness, free length), between two rotations (stiffness, free
-angle), along a fixed direction (stiffness, cos, sin, free gap)."""
+angle), along a fixed direction (stiffness, cos, sin, free gap). The last of five values is what is added to the free
+length, angle or gap per unit of the drive."""
 
 
 @kernel
@@ -142,8 +143,8 @@ def spring_law(kind, value, more, pa, pb, force, block):
 
 
 @kernel
-def _tighten(wires, h, places, jacobians, kind, value, rate, poses):
-    """Add to the drive's column what a spring does whose free length, angle or gap changes at a rate."""
+def _tighten(wires, h, places, jacobians, kind, value, poses):
+    """Add to the drive's column what a spring does whose free length, angle or gap changes with it."""
     dofs, slots, _ = wires
     ex = ey = turn = 0.0
     if kind == TURN:
@@ -155,7 +156,7 @@ def _tighten(wires, h, places, jacobians, kind, value, rate, poses):
         length = np.sqrt(dx * dx + dy * dy)
         if length > 0.0:
             ex, ey = dx / length, dy / length
-    pull, n = value[0] * rate, h.shape[0] - 1
+    pull, n = value[0] * value[4], h.shape[0] - 1
     for side in range(2):
         jac, sign = jacobians[side], 1.0 if side == 1 else -1.0
         for a in range(4):
@@ -176,10 +177,10 @@ def add_springs(m, values, drive, h, residual, work):
         arm_a, arm_b = pose_of(places, values, i, pa), pose_of(places, values, j, pb)
         jacobian(m.place_frame, i, arm_a, ja)
         jacobian(m.place_frame, j, arm_b, jb)
-        value, rate = m.spring_value[k], m.spring_rate[k]
-        energy += spring_law(m.spring_kind[k], value, drive * rate, pa, pb, force, block)
-        if rate != 0.0:
-            _tighten(wires, h, m.spring_place[k], (ja, jb), m.spring_kind[k], value, rate, (pa, pb))
+        value = m.spring_value[k]
+        energy += spring_law(m.spring_kind[k], value, drive * value[4], pa, pb, force, block)
+        if value[4] != 0.0:
+            _tighten(wires, h, m.spring_place[k], (ja, jb), m.spring_kind[k], value, (pa, pb))
         add_force(wires, h, residual, j, arm_b, jb, force)
         for r in range(3):
             force[r] = -force[r]
