@@ -101,7 +101,7 @@ def closing(run: Run, end: BranchEnd, spot: Spot) -> None:
     for _ in range(count(run, end.drive, spot.drive)):
         value = float(run.targets[run.asked()])
         if (value - end.drive) * (end.beyond.drive - end.drive) > 0:
-            share = (value - end.drive) / (end.beyond.drive - end.drive)
+            run.branch, share = end.onto, (value - end.drive) / (end.beyond.drive - end.drive)
             _add(run, end.y, share * (end.beyond.y - end.y), value, end.after)
         else:
             share = np.sqrt((value - end.drive) / (spot.drive - end.drive))

@@ -22,36 +22,42 @@ BEFORE_END = 1e-4  # share of the drive's range by which the end of a branch is 
 _LEGS = 60
 _BACK = 0.01  # share of the range in one step where the end of a branch is looked for backwards
 _CLEAR = 0.01  # share of the drive's range behind the end of a branch where nothing leads back onto it
+_ROUNDING = 1e-9  # share of the drive's range by which a point at the end of a branch may seem to lie behind it
 _SAME = 1e-6  # largest difference of poses of two solutions that are one
 
 
 @dataclass(frozen=True)
 class BranchEnd:
-    """Where a path that was left for a branch becomes stable again: drive, state, an equilibrium beyond, inertia."""
+    """Where a branch joins the path that was left for it: at its begin, or where that path becomes stable again.
+
+    Drive and state, an equilibrium of that path beyond, its inertia on this side and beyond, its name.
+    """
 
     drive: float
     y: FloatArray
     beyond: Spot
     before: int
     after: int
+    onto: str
 
 
-def end_of_branch(run: Run, other: Spot, before: int) -> BranchEnd | None:
+def end_of_branch(run: Run, other: Spot, before: int, sense: float, onto: str) -> BranchEnd | None:
     """Return where the path that was left becomes stable again: there the branch may rejoin it.
 
-    `other` is on that path, `before` the number of its unstable directions before it was left.
+    `other` is on that path, `before` the number of its unstable directions before it was left, `sense` that in which
+    the drive goes on, `onto` its name.
     """
     start = other
     for _ in range(_LEGS):
-        ahead = run.targets[run.asked() :]
-        ahead = ahead[(ahead - start.drive) * np.sign(run.targets[-1] - start.drive) > 1e-9 * run.span]
+        ahead = sense * np.unique(sense * run.targets[run.asked() :])  # the drive may turn
+        ahead = ahead[(ahead - start.drive) * sense > 1e-9 * run.span]
         if not len(ahead):
             run.closed = True
             return None
-        sense = float(np.sign(ahead[0] - start.drive))
         margin = 2.0 * max(beside.BESIDE, min(run.control.tolerance, _CLEAR))  # on this mesh the end may lie behind
         step, behind = 0.02 * sense * run.span, ahead[-1] + margin * sense * run.span
-        marks = np.append(0.5 * (ahead[1:] + ahead[:-1]), behind)  # a point asked for may lie at the end
+        wide = np.abs(np.diff(ahead)) > margin * run.span  # points asked for, even several, may lie at the end
+        marks = np.append(0.5 * (ahead[1:] + ahead[:-1])[wide], behind)
         options = run.options(start, step)
         code, points = run.solver.march(start, marks, options, run.control.most_points + len(marks))
         if code != INERTIA:
@@ -66,8 +72,13 @@ def end_of_branch(run: Run, other: Spot, before: int) -> BranchEnd | None:
     closing = None if one is None or beyond is None else _place(run, one, beyond)
     if closing is None or beyond is None:
         return None
+    return end_at(run, closing, beyond, onto)
+
+
+def end_at(run: Run, place: Singular, beyond: Spot, onto: str) -> BranchEnd:
+    """Return the end of a branch at a singular point of the path that it joins; spots are of the fine mesh."""
     reduced = run.fine.reduce
-    return BranchEnd(closing.spot.drive, reduced(closing.spot).y, reduced(beyond), closing.before, closing.after)
+    return BranchEnd(place.spot.drive, reduced(place.spot).y, reduced(beyond), place.before, place.after, onto)
 
 
 def _place(run: Run, one: Spot, other: Spot) -> Singular | None:
@@ -82,29 +93,41 @@ def room(run: Run, place: float, sense: float) -> float:
 
 
 def rejoin(run: Run, spot: Spot) -> Spot | None:
-    """Go back to the path that the branch left, if the branch has come close to it; else go on along the branch."""
-    end, run.end = run.end, None
+    """Go back to the path that the branch left, if the branch has come close to it; else go on along the branch.
+
+    A drive that turns back there stays on the branch.
+    """
+    end, run.toward = run.toward, None
     if end is None:
         run.status, run.message = PathStatus.LOST, "the path was lost"
         return None
     apart = max(run.solver.pose_change(y, end.y) for y in run.points.y[-8:])
     if run.solver.pose_change(spot.y, end.y) > 0.5 * apart:
+        run.ends = tuple(one for one in run.ends if one is not end)
         return spot
-    run.closed = True
     sense = float(np.sign(end.drive - spot.drive))
+    near = beside.count(run, end.drive, spot.drive)
+    turn = run.targets[run.asked() :][: near + 1]
+    if near < len(turn) and ((turn - end.drive) * sense <= _ROUNDING * run.span).all():
+        name = run.branch
+        beside.closing(run, end, spot)
+        run.branch = name
+        return spot
+    run.closed, run.ends = True, ()
     start = run.solver.solve(end.beyond.y, end.drive + sense * room(run, end.drive, sense))
     if start is None or start.unstable > end.after:
         start = run.settled(end.beyond) or replace(end.beyond, tangent=run.solver.unit.copy())
     run.events.append(Event("bifurcation", end.drive * run.unit, end.before, end.after))
     beside.closing(run, end, spot)
-    run.branch = "primary"
+    run.branch = end.onto
     run.append(run.as_points(start, -1))
     return start
 
 
 def hop(run: Run, spot: Spot, asked: int) -> Spot | None:
     """Step over the end of a branch onto the path that it joins there: a small change for a small advance; or None."""
-    if run.end is not None and abs(run.end.drive - spot.drive) <= BEFORE_END * run.span:
+    run.toward = next((end for end in run.ends if abs(end.drive - spot.drive) <= BEFORE_END * run.span), None)
+    if run.toward is not None:
         return rejoin(run, spot)
     forward = float(np.sign(run.targets[asked] - spot.drive))
     for power in range(-6, -1):

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cfmkit.beams import beside
 from cfmkit.beams.beside import BESIDE
-from cfmkit.beams.branch_ends import end_of_branch
+from cfmkit.beams.branch_ends import end_at, end_of_branch
 from cfmkit.beams.events import Singular, leave, with_nulls
 from cfmkit.beams.path import Event, PathStatus
 from cfmkit.beams.solver import FORCE_WEIGHT, Spot
@@ -151,7 +152,7 @@ def _parted(run: Run, found: Singular, one: Spot, other: Spot) -> Spot | None:
         if clear is not other:
             run.append(run.as_points(clear, -1))
         return clear
-    forward = float(np.sign(other.drive - one.drive))
+    forward, onto = float(np.sign(other.drive - one.drive)), run.branch
     wide = leave(run.fine, found, run.control.sign, forward) or _left_together(run, found, one, forward)
     left = None if wide is None else run.settled(run.fine.reduce(wide))
     if left is None and _too_far(run) and not _sure(run, one, other, found):
@@ -170,7 +171,12 @@ def _parted(run: Run, found: Singular, one: Spot, other: Spot) -> Spot | None:
     run.append(run.as_points(left, -1))
     run.entry = 0.5 * abs(left.drive - found.spot.drive)
     run.closed = False
-    run.end = end_of_branch(run, clear, found.before) if run.natural else None
+    if run.natural:
+        ending = end_of_branch(run, clear, found.before, forward, onto)
+        run.ends = (
+            end_at(run, replace(found, before=found.after, after=found.before), one, onto),
+            *([ending] if ending else []),
+        )
     return left
 
 
@@ -225,7 +231,7 @@ def _not_beyond(run: Run, found: Singular, left: Spot, forward: float) -> Spot:
 
     Away from a bifurcation a branch opens like the square root of the distance.
     """
-    ahead = (run.targets[run.asked() :] - found.spot.drive) * forward
+    ahead = (run.targets[run.asked() :][:1] - found.spot.drive) * forward
     reach, nearest = (left.drive - found.spot.drive) * forward, 0.5 * ahead[ahead > 0].min(initial=np.inf)
     if not (run.natural and 2.0 * nearest < reach):
         return left

@@ -100,8 +100,9 @@ class _Search:
         self.log_unit = largest if math.isfinite(largest) else 0.0  # sizes in this unit: of many beams they overflow
         self.samples = [(0.0, self._measure(one), one), (1.0, self._measure(other), other)]
         self.low, self.high = self.samples[0][:2], self.samples[1][:2]
-        self.scale = max(abs(self.low[1]), abs(self.high[1]))
         self.foretold = False  # whether the samples foretell where the determinant is hardly any
+        less, self.scale = sorted((abs(self.low[1]), abs(self.high[1])))
+        self.goal = self.close * max(math.sqrt(less * self.scale), _CLOSE * self.scale)
 
     def _level(self, spot: Spot) -> float:
         return float(self.border[:-1] @ spot.y[: self.solver.n] + self.border[-1] * spot.drive)
@@ -132,7 +133,7 @@ class _Search:
             share = guess if low + 1e-3 * (high - low) < guess < high - 1e-3 * (high - low) else share
         y, drive = self._guess(share)
         loose = self.close > _CLOSE and len(self.samples) > 2
-        if loose and self._size(Spot(y, drive, self.border)) < self.close * self.scale:
+        if loose and self._size(Spot(y, drive, self.border)) < self.goal:
             self.foretold = True  # near enough: solving there, where no system is regular, would take long
             return False
         near = self.solver.solve(y, drive, self.border, self.start + share * (self.stop - self.start))
@@ -144,7 +145,7 @@ class _Search:
             self.low, self.high = (share, value), (high, f_high if middle else 0.5 * f_high)
         else:
             self.high, self.low = (share, value), (low, f_low if middle else 0.5 * f_low)
-        return abs(value) > self.close * self.scale and self.high[0] - self.low[0] > 1e-13
+        return abs(value) > self.goal and self.high[0] - self.low[0] > 1e-13
 
     def _guess(self, share: float) -> tuple[FloatArray, float]:
         """Return unknowns and drive at a share, interpolated between the nearest samples."""

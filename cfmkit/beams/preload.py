@@ -100,4 +100,7 @@ def end_of_branch(run: Run) -> BranchEnd | None:
     primary = type(run)(run.layout, run.mesh, replace(run.control, branch="primary"))
     spot = run.solver.tightened() if run.ramped else start(primary)[0]
     other = None if spot is None else run.solver.solve(spot.y, 0.0)
-    return None if other is None or other.unstable == 0 else branch_ends.end_of_branch(run, other, 0)
+    sense = float(np.sign(next(value for value in run.targets if value)))
+    if other is None or other.unstable == 0:
+        return None
+    return branch_ends.end_of_branch(run, other, 0, sense, "primary")

@@ -48,7 +48,8 @@ class Run:
     branch: str = "primary"
     too_long: bool = False
     share: float = 1.0  # of the constant loads and displacements that was reached
-    end: branch_ends.BranchEnd | None = None
+    ends: tuple[branch_ends.BranchEnd, ...] = ()  # of the branch that it is on
+    toward: branch_ends.BranchEnd | None = None  # the one that it is marching to
     error: float = np.inf  # as estimated
     first: Singular | None = None  # the first bifurcation at which stability is lost
     ramp: Run | None = None  # the run to the prestress or the constant loads, if that has the first bifurcation
@@ -106,7 +107,8 @@ class Run:
         if spot is None and code == DONE:
             return
         if self.natural and self.branch != "primary":
-            self.end = preload.end_of_branch(self)
+            ending = preload.end_of_branch(self)
+            self.ends = (ending,) if ending else ()
         asked, hops, fresh = int(self.targets[0] == 0.0), 0, True
         while spot is not None and asked < len(self.targets) and hops < _HOPS:
             code, asked, spot = self._leg(spot, asked, fresh)
@@ -224,18 +226,20 @@ class Run:
     def _left(self, spot: Spot, asked: int) -> tuple[FloatArray, FloatArray | None]:
         """Return the values of the drive still to be reached and their numbers among those asked for.
 
-        No numbers where these are all that were asked for. A branch that is known to end is followed to just before its
-        end. The last number stands for no number.
+        No numbers where these are all that were asked for. A branch is followed to just before an end that is known.
+        The last number stands for no number.
         """
-        if not self.natural or (asked == 0 and self.end is None):
+        self.toward = None
+        if not self.natural or (asked == 0 and not self.ends):
             return self.targets, None
         left, numbers = self.targets[asked:], np.arange(asked, len(self.targets))
-        if self.end is not None:
-            sense = np.sign(self.end.drive - spot.drive)
-            last = self.end.drive - sense * branch_ends.room(self, self.end.drive, -sense)
-            inside = np.logical_and.accumulate((last - left) * sense > 0)
-            if not inside.all():
-                left, numbers = np.append(left[inside], last), np.append(numbers[inside], -1)
+        for end in self.ends:
+            sense = np.sign(end.drive - spot.drive)
+            last = end.drive - sense * branch_ends.room(self, end.drive, -sense)
+            beyond = np.flatnonzero((left - last) * sense >= 0)
+            if len(beyond):
+                left, numbers = np.append(left[: beyond[0]], last), np.append(numbers[: beyond[0]], -1)
+                self.toward = end
         return left, np.append(numbers, -1)
 
     def last(self, points: Points) -> Spot:

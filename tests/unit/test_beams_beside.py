@@ -25,9 +25,14 @@ LEAF = Section(1477e6, 6e-3, 7e-4)
 
 def pressed(points: Any, tolerance: float, branch: Any = "stable", section: Section = LEAF) -> Path:
     """Return the path of half a V-beam as slender as it needs to be to buckle on its way."""
+    return turned(np.sort(points), tolerance, branch, section)
+
+
+def turned(points: Any, tolerance: float, branch: Any = "stable", section: Section = LEAF) -> Path:
+    """Return the path of the same half, pressed and released."""
     nodes = {"wall": Node(0, 0, CLAMPED), "d": Node(LENGTH * np.cos(ANGLE), RISE, guided(np.pi / 2))}
     leaf = Network(nodes, {"v": Beam("wall", "d", section)})
-    return trace(leaf, Displacement("d", -np.pi / 2, np.sort(points)), Control(tolerance=tolerance, branch=branch))
+    return trace(leaf, Displacement("d", -np.pi / 2, points), Control(tolerance=tolerance, branch=branch))
 
 
 @pytest.fixture(scope="module")
@@ -78,6 +83,52 @@ def test_the_last_point_may_lie_at_an_end_of_a_branch(exact: Path, which: int, t
     assert path.stable.all()
     assert path.drive[-1] == places[which]
     assert [e.drive for e in path.events] == pytest.approx(places[: which + 1], abs=tolerance * RISE)
+
+
+@pytest.mark.parametrize("tolerance", [1e-4, 1e-7, 1e-9])
+@pytest.mark.parametrize(
+    ("points", "changes"),
+    [
+        ((1, 0.06, 1), "+-+"),
+        ((1, "begin", 1), "+"),
+        ((1, "end", 1), "+"),
+        ((1, "just before", 0.5), "+-+"),
+        ((1, 2.1, 1, 0.03), "+-+-"),
+        ((1, 2.1, 1, 2.1), "+-+-"),
+    ],
+)
+def test_a_drive_that_turns_back_leaves_a_branch_by_either_end(
+    exact: Path, points: Any, changes: str, tolerance: float
+) -> None:
+    """Where it turns at an end it stays on the branch. What is met is the same both ways."""
+    begin, end = (event.drive / RISE for event in exact.events)
+    named = {"begin": begin, "end": end, "just before": begin - 1e-6}
+    places = [named.get(point, point) for point in points]
+    path = turned(np.array(places) * RISE, tolerance)
+    assert path.status is PathStatus.COMPLETE, path.message
+    assert path.asked[path.at_asked].tolist() == list(range(len(places)))
+    assert path.stable.all()
+    assert "".join("+" if event.after else "-" for event in path.events) == changes
+    nearest = [min(abs(event.drive - place * RISE) for place in (begin, end)) for event in path.events]
+    assert max(nearest) < tolerance * 2.1 * RISE
+    for p, name in zip(places, path.branch[path.at_asked], strict=True):
+        assert p in (begin, end) or (name == "primary") == (not begin < p < end)
+    alike = [path.effort[path.at_asked[k]] for k, p in enumerate(places) if p == 1]
+    assert alike == pytest.approx([alike[0]] * len(alike), rel=100 * tolerance)
+
+
+@pytest.mark.parametrize("tolerance", [1e-4, 1e-7, 1e-9])
+@pytest.mark.parametrize("offs", [(-1e-7, 0.0), (0.0, 1e-7), (-1e-7, 1e-7), (-1e-6, -1e-7, 0.0, 1e-7, 1e-6)])
+@pytest.mark.parametrize("behind", [(), (2.1,)])
+def test_points_next_to_each_other_at_the_end_of_a_branch(
+    exact: Path, offs: Any, behind: Any, tolerance: float
+) -> None:
+    end = exact.events[1].drive / RISE
+    path = pressed(np.array([1.0, *(end + off for off in offs), *behind]) * RISE, tolerance)
+    assert path.status is PathStatus.COMPLETE, path.message
+    assert path.asked[path.at_asked].tolist() == list(range(1 + len(offs) + len(behind)))
+    assert path.stable.all()
+    assert [(event.kind, event.after) for event in path.events] == [("bifurcation", 1), ("bifurcation", 0)]
 
 
 @pytest.mark.parametrize("seed", [1, 3, 4, 5, 6, 8, 10])
