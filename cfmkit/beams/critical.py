@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 _NEAR = 1e-4  # share of the drive's range in which there is nothing but the start
 _SIZES = (0.06 * 0.25 ** np.arange(4)).tolist()  # how far from the start the path is entered [rad]
+_BEFORE = 0.9  # share of the way to the first point asked for up to which it is
 _STRAIGHT = 1e-3  # share of the way to the first point asked for after which a path that goes straight on is met
 
 
@@ -67,7 +68,8 @@ def _sides(run: Run, start: Spot, goal: float) -> list[Spot | None]:
     at = with_nulls(fine, at, Spot(fine.unstressed(), 0.0, fine.unit), 1)
     senses = (run.control.sign, -run.control.sign)
     for size in _SIZES:
-        found = [entered(fine, at, s * at.null, float(np.sign(goal)), (size,), 0.9 * abs(goal)) for s in senses]
+        found = [entered(fine, at, sense * at.null, float(np.sign(goal)), (size,)) for sense in senses]
+        found = [one if one is not None and abs(one.drive) < _BEFORE * abs(goal) else None for one in found]
         if any(found):
             return found
     return [None, None]

@@ -271,14 +271,11 @@ def entered(
     direction: FloatArray,
     forward: float,
     sizes: Sequence[float] = _SIZES,
-    reach: float = math.inf,
 ) -> Spot | None:
-    """Return an equilibrium on the branch that a null vector points along, at most so far ahead; the first there is.
-
-    `sizes` [rad] are the distances tried: leaves that lie almost flat have branches shorter than the usual one.
-    """
+    """Return an equilibrium on the branch that a null vector points along, one of some sizes [rad] away from it."""
+    # leaves that lie almost flat have branches shorter than the usual entry
     found = (_leave(solver, singular, direction, forward, size) for size in sizes)
-    return next((s for s in found if s is not None and abs(s.drive - singular.spot.drive) <= reach), None)
+    return next((spot for spot in found if spot is not None), None)
 
 
 def _leave(
