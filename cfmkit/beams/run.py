@@ -28,6 +28,7 @@ _HOPS = 60  # decisions on one path
 _FINE_STEPS = ((1e-5, 8), (1e-6, 16), (0.0, 32))  # of a beam, where singular points are looked for, by the tolerance
 _LOOSEST = 1e-7  # tolerance of Newton's method
 _TRIES = 6  # to land on a point asked for, before a bifurcation is looked for there
+_SHORT_OF = 0.2  # share of the way to the end of a branch that is left where the way is short
 _NEARBY = 0.01  # share of the drive's range
 _SMALLEST = 1e-7  # shortest step as a share of the drive's range
 
@@ -133,7 +134,8 @@ class Run:
 
     def _taken_up(self, code: int, spot: Spot, asked: int) -> Spot | None:
         """Return where to go on after a march that ended early, at `spot`; None to stop."""
-        if code in (NO_START, STALLED):
+        steadies = code == INERTIA and bool(self.points.info[-1, 0] < self.points.info[-2, 0])
+        if code in (NO_START, STALLED) or (steadies and self.control.branch == "stable"):
             away = critical.left(self, spot)
             if away is not None or code == NO_START:
                 return away
@@ -235,7 +237,8 @@ class Run:
         left, numbers = self.targets[asked:], np.arange(asked, len(self.targets))
         for end in self.ends:
             sense = np.sign(end.drive - spot.drive)
-            last = end.drive - sense * branch_ends.room(self, end.drive, -sense)
+            before = min(branch_ends.room(self, end.drive, -sense), _SHORT_OF * abs(end.drive - spot.drive))
+            last = end.drive - sense * before
             beyond = np.flatnonzero((left - last) * sense >= 0)
             if len(beyond):
                 left, numbers = np.append(left[: beyond[0]], last), np.append(numbers[: beyond[0]], -1)
