@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 _EARLY = 0.1  # share of the points: segments that are too long before it are cut in four, later in two
 _ROUNDS = 8  # meshes tried before giving up on the tolerance
 _GAIN = 0.005  # share of the drive's range, or of the constant loads, that is some
+_SURE = 1e-3  # error of a path that ends early from which on that may be the mesh's fault
 _STARTS = 4  # of them where nothing bears the constant loads, if each bears more of them than the one before
 
 
@@ -78,7 +79,8 @@ def _solved(network: Network, drive: Drive, control: Control, to_first: bool = F
             mesh, borne = mesh.shorter(), run.share
             continue
         run.error = estimate(run)
-        if run.error <= control.tolerance or round_ == _ROUNDS - 1:
+        limit = control.tolerance if run.status is PathStatus.COMPLETE else min(control.tolerance, _SURE)
+        if run.error <= limit or round_ == _ROUNDS - 1:
             break
         mesh = mesh.finer()
     return run

@@ -125,6 +125,25 @@ def test_an_inextensible_arc_is_pulled_until_it_is_taut() -> None:
     assert path.drive[-1] == pytest.approx(straight, rel=0.1)
 
 
+@pytest.mark.parametrize("tolerance", [0.1, 0.05, 1e-3])
+def test_a_path_does_not_end_where_its_mesh_is_too_coarse_for_a_beam_drawn_taut(tolerance: float) -> None:
+    """A leaf pulled off its wall, and a clamped beam pushed sideways: forces only grow, there is no limit point."""
+    leaf = Network(
+        {"w": Node(0, 0, CLAMPED), "d": Node(0.0347, 4.87e-3, guided(UP))},
+        {"x": Beam("w", "d", Section(1477e6, 6e-3, 7e-4))},
+    )
+    section = Section(2e11, 8e-3, 3.46e-3)
+    nodes = {"a": Node(0, 0, CLAMPED), "m": Node(0.04, 0), "b": Node(0.1, 0, CLAMPED)}
+    beam = Network(nodes, {"x": Beam("a", "m", section), "y": Beam("m", "b", section)})
+    for network, drive in (
+        (leaf, Displacement("d", UP, np.linspace(0.1, 1, 10) * 4.87e-3)),
+        (beam, Displacement("m", UP, np.linspace(2e-3, 0.02, 10))),
+    ):
+        path, fine = (trace(network, drive, Control(tolerance=one)) for one in (tolerance, 1e-7))
+        assert path.status is PathStatus.COMPLETE, path.message
+        assert path.effort[-1] == pytest.approx(fine.effort[-1], rel=tolerance)
+
+
 @pytest.mark.parametrize("workers", [1, 2])
 def test_a_batch_keeps_what_each_path_reached_and_why_it_ended(workers: int) -> None:
     """Among them a network that cannot exist and one with a place that is not a number."""
