@@ -54,7 +54,7 @@ def _loaded(run: Run, spot: Spot, indifferent: bool) -> tuple[Spot | None, float
     for watch in (None,) if indifferent else (0, None):
         options = march_options(solver.tolerance, _STEP, _TURN, watch=watch, sense=1.0)
         code, points = solver.march(spot, np.array([1.0]), options, _ROOM, model)
-        if watch is None or code in (DONE, LONG):
+        if code in (DONE, LONG) or (watch is None and not indifferent):
             break
         found = _along(run, LOADS, spot)
         if found is not None:

@@ -198,3 +198,19 @@ def test_a_branch_under_constant_loads_ends_where_the_drive_relieves_them(tolera
         assert path.events[1].drive == pytest.approx(0.5, abs=tolerance)
         assert path.branch[0].startswith("bifurcated under 66.67 %")
         assert points[-1] == 0.5 or path.branch[-1] == "primary"
+
+
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-4, 1e-7])
+def test_a_column_bent_by_little_is_pressed_far_beyond_its_critical_load(tolerance: float) -> None:
+    """Without leaving the path it turns sharply near that load: the coarse mesh needs as much patience as the drive."""
+    nodes = {"foot": NODES["foot"], "middle": Node(0.5 * LENGTH, 0), "top": NODES["top"]}
+    section = Section(2e9, 8e-3, 1e-3)
+    beams = {"one": Beam("foot", "middle", section), "two": Beam("middle", "top", section)}
+    springs = (LineSpring("top", None, EULER / LENGTH, ground=(1.5 * LENGTH, 0.0)),)
+    bent = Network(nodes, beams, springs=springs, loads=(PointLoad("top", fx=-4.16 * EULER),))
+    push = Loading((PointLoad("top", fy=0.5 * EULER),), np.array([0.2, 0.5]))
+    path, fine = (
+        trace(bent, push, Control(tolerance=t, branch="primary", imperfection=1e-4)) for t in (tolerance, 1e-9)
+    )
+    assert path.status is PathStatus.COMPLETE, path.message
+    assert path.motion("top")[-1] == pytest.approx(fine.motion("top")[-1], rel=10 * tolerance)
