@@ -29,7 +29,7 @@ _OUTSIDE = 0.1  # of a bracket: one end may lie at the singular point, on either
 _MOVED = 1e-3  # share of a mode's largest change of a pose from which a node counts as moved
 _TURNS = 5  # of inverse iteration
 _AROUND = 16  # directions in which branches are looked for where two modes are critical at once
-_SIZES = (0.06, 0.015, 0.0036)  # how far from a bifurcation its branch is entered [rad]
+_SIZES = (0.06, 0.015, 0.0036)  # how far from a bifurcation its branch is entered [rad]: some are short
 _FIRST_KICK, _KICKS = 1e-3, 16  # change of the unknowns that is tried first, and how often
 
 
@@ -74,8 +74,7 @@ def locate(
     spot, many = search.interpolated(), abs(other.unstable - one.unstable)
     if not vector:
         return Singular(spot, np.zeros(solver.n), fold, one.unstable, other.unstable)
-    (_, first, _), (_, last, _) = search.samples[:2]
-    regular = one if abs(first) > _NOTHING * abs(last) else other  # a path may begin at its singular point
+    regular = one if abs(search.samples[0][1]) > _NOTHING * search.scale else other  # a path may begin just there
     nulls = _nulls_of(solver, spot, regular, max(1, many))
     return Singular(spot, nulls[:, 0], fold, one.unstable, other.unstable, nulls[:, 1:] if many > 1 else None)
 
@@ -273,7 +272,6 @@ def entered(
     sizes: Sequence[float] = _SIZES,
 ) -> Spot | None:
     """Return an equilibrium on the branch that a null vector points along, one of some sizes [rad] away from it."""
-    # leaves that lie almost flat have branches shorter than the usual entry
     found = (_leave(solver, singular, direction, forward, size) for size in sizes)
     return next((spot for spot in found if spot is not None), None)
 
