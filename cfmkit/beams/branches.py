@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -11,17 +10,17 @@ import numpy as np
 from cfmkit.beams import beside
 from cfmkit.beams.beside import BESIDE
 from cfmkit.beams.branch_ends import end_at, end_of_branch
-from cfmkit.beams.events import Singular, leave, with_nulls
+from cfmkit.beams.descent import alone, left_behind, well_before
 from cfmkit.beams.path import Event, PathStatus
 from cfmkit.beams.solver import FORCE_WEIGHT, Spot
 from cfmkit.beams.steady import steadier
 
 if TYPE_CHECKING:
+    from cfmkit.beams.events import Singular
     from cfmkit.beams.run import Run
 
 _CLEAR = 0.01  # share of the drive's range from a bifurcation at which the paths there are told apart
 _SAME_PLACE = 1e-4  # share of the drive's range within which two searches found one bifurcation
-_TOGETHER = (1e-4, 1e-3, 1e-2)  # shares of the drive's range within which bifurcations are near each other
 _TIMES = 12  # that one point may be taken back
 _SLIGHT = 1e-3  # share of a determinant that is hardly any
 _FINEST = 1e-5  # share of the range below which a change of stability is not looked into with shorter steps
@@ -54,37 +53,14 @@ def cross(run: Run) -> Spot | None:
             return other
         run.events.append(Event("bifurcation", found.spot.drive * run.unit, before, after))
         return _no_branch(run, found, other)
+    if run.natural and found.after - found.before > 1:
+        found = alone(run, found, one)
+        other = run.spot(-1)
     kind = "limit point" if found.fold else "bifurcation"
     run.events.append(Event(kind, found.spot.drive * run.unit, found.before, found.after))
     if run.first is None and not found.fold and found.after > found.before:
         run.first = found
     return other if found.fold else _parted(run, found, one, other)
-
-
-def _left_together(run: Run, found: Singular, one: Spot, forward: float) -> Spot | None:
-    """Return an equilibrium on the branch beyond several bifurcations that are near each other; see `leave`.
-
-    Behind the first of them alone nothing is stable for long.
-    """
-    early = _well_before(run, found, _CLEAR * run.span)
-    for start, share in itertools.product((one, early), _TOGETHER):
-        if start is None or not run.natural or found.spot.drive == start.drive:
-            continue
-        place = found.spot.drive + forward * share * run.span
-        ratio = (place - found.spot.drive) / (found.spot.drive - start.drive)
-        beyond = run.fine.solve(found.spot.y + (found.spot.y - start.y) * ratio, place)
-        many = 0 if beyond is None else beyond.unstable - found.before
-        if many >= max(2, found.after - found.before):
-            wide = leave(run.fine, with_nulls(run.fine, found, start, many), run.control.sign, forward)
-            if wide is not None:
-                return wide
-    return None
-
-
-def _well_before(run: Run, found: Singular, room: float) -> Spot | None:
-    """Return the last point but two or earlier that is so far before a bifurcation, on the fine mesh."""
-    far = np.flatnonzero(np.abs(run.points.drive[:-2] - found.spot.drive) >= room)
-    return run.fine_spot(int(far[-1])) if len(far) else None
 
 
 def _last_step_before(run: Run) -> int:
@@ -141,8 +117,8 @@ def _behind_the_last(run: Run) -> Spot | None:
 
 def _parted(run: Run, found: Singular, one: Spot, other: Spot) -> Spot | None:
     """Go on behind a bifurcation between `one` and the last point `other`, where the control says; None to stop."""
-    clear = _clear_of(run, found, one, other)
     if found.after <= found.before or run.control.branch == "primary":
+        clear = _clear_of(run, found, one, other)
         last = run.points.take([-1])
         run.drop_last()
         beside.opening(run, found, one, None, run.branch)
@@ -153,7 +129,7 @@ def _parted(run: Run, found: Singular, one: Spot, other: Spot) -> Spot | None:
             run.append(run.as_points(clear, -1))
         return clear
     forward, onto = float(np.sign(other.drive - one.drive)), run.branch
-    wide = leave(run.fine, found, run.control.sign, forward) or _left_together(run, found, one, forward)
+    found, wide = left_behind(run, found, one, forward)
     left = None if wide is None else run.settled(run.fine.reduce(wide))
     if left is None and _too_far(run) and not _sure(run, one, other, found):
         run.events.pop()
@@ -162,7 +138,9 @@ def _parted(run: Run, found: Singular, one: Spot, other: Spot) -> Spot | None:
         return _again(run)
     if left is None:
         return _no_branch(run, found, other)
+    clear = _clear_of(run, found, one, other)
     run.drop_last()
+    run.events[-1] = replace(run.events[-1], after=found.after)
     name = f"bifurcated at {found.spot.drive * run.unit:.6g}, sign {run.control.sign:+d}"
     if run.natural:
         beside.opening(run, found, one, wide, name)
@@ -189,7 +167,7 @@ def _clear_of(run: Run, found: Singular, one: Spot, other: Spot) -> Spot:
     room = min(_CLEAR * run.span, 0.5 * float(ahead.min(initial=np.inf)))
     if not run.natural or abs(other.drive - found.spot.drive) >= room:
         return other
-    early = _well_before(run, found, 0.1 * room) or one  # from nearer the path would be foretold badly
+    early = well_before(run, found, 0.1 * room) or one  # from nearer the path would be foretold badly
     before = found.spot.drive - early.drive
     if before == 0.0:
         return other

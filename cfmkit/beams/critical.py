@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.beams.curvature import Curvature
 from cfmkit.beams.discretise import LOADS
-from cfmkit.beams.events import Singular, entered, with_nulls
+from cfmkit.beams.events import Singular, entered
 from cfmkit.beams.path import Event
 from cfmkit.beams.solver import Spot
 
@@ -64,8 +65,9 @@ def _sides(run: Run, start: Spot, goal: float) -> list[Spot | None]:
     Both are equally far from it, as far as possible. The side that the control asks for comes first.
     """
     fine, y, most = run.fine, run.fine.expand(start.y), start.unstable if run.control.branch == "primary" else 0
-    at = Singular(Spot(y, 0.0, fine.unit), fine.unit[:-1], False, most, most)
-    at = with_nulls(fine, at, Spot(fine.unstressed(), 0.0, fine.unit), 1)
+    curvature = Curvature(fine, y, 0.0)
+    null = curvature.null(np.abs(curvature.values).argsort()[:1])
+    at = Singular(Spot(y, 0.0, fine.unit), null, False, most, most)
     senses = (run.control.sign, -run.control.sign)
     for size in _SIZES:
         found = [entered(fine, at, sense * at.null, float(np.sign(goal)), (size,)) for sense in senses]

@@ -154,7 +154,7 @@ class Run:
         if code == STALLED and self.natural and len(self.points):
             if steadier(self):
                 return self.spot(-1)
-            joined = None if self.branch == "primary" else branch_ends.hop(self, spot, asked)
+            joined = branch_ends.hop(self, spot, asked) if any(name != "primary" for name in self.branches) else None
             return joined or corners.past(self, spot, asked)
         endings.stop(self, code)
         return None

@@ -31,6 +31,7 @@ CREEPING = 5e-5  # share of the drive's bounds that is a short step
 CREEPS, TAUT = 400, 100.0  # short steps in a row that are enough; change of forces for one of poses that counts for ten
 NOISE = 30.0  # how far off a guess may be where points are solved to a tolerance of one
 AGAIN = 1e-5  # change of a pose between two solutions of one point
+SHORTER, APART = 4.0, 1e4  # lengths of steps that may yet be shorter; between bifurcations that are met one by one
 INFO = 6  # unstable directions, index of the asked point or -1, parameter, iterations, d(drive)/ds, shortness
 
 
@@ -115,14 +116,18 @@ def _refused(code, moved, missed, bent, turn, count):
 
 
 @kernel
-def _passed(state, index, count, natural, watched):
+def _passed(state, index, count, natural, watched, length):
     """Tell whether a step has gone past more than one loss of stability, or into loads that its segments do not bear.
 
-    Behind one bifurcation the next ones are near: the first one is to be met first, by shorter steps.
+    Behind one bifurcation the next ones are near: the first one is to be met first, by shorter steps. Those that are
+    nearer than APART are met together: very short steps would follow the corner that errors of integration round off.
+    length: of the step, in units of the smallest one.
     """
+    if length <= SHORTER:
+        return False
     lost = state[1] - index if watched and natural else 0.0
     unborne = state[2] < SHORT and (lost > 0.0 or (natural and count == 1))
-    return lost > 1.0 or state[1] < min(index, 0.0) or unborne
+    return (lost > 1.0 and length > APART) or state[1] < min(index, 0.0) or unborne
 
 
 @maker
@@ -161,7 +166,7 @@ def march(m, n_free, y, drive, tangent, targets, options, outs, scratch):
             all_slopes(m, n_free, new_tangent, slope, scratch)
         bent = misses(old, new, slopes[0], slope, ahead, n_free, n) if known else 0.0
         refused = _refused(code, moved, missed, bent, turn, count)
-        passed = _passed(state, index, count, natural, options[10] > 0.5) and abs(ahead) > 4.0 * smallest
+        passed = _passed(state, index, count, natural, options[10] > 0.5, abs(ahead) / smallest)
         if refused or passed or not (natural or _forward(border, new_tangent)):
             step, denied = (0.5 * ahead if natural else 0.5 * step), denied + (1 if landing else 0)
             if abs(step) < smallest or denied >= options[13]:
