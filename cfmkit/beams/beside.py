@@ -35,7 +35,7 @@ def located(run: Run, one: Spot, other: Spot, fold: bool = False, vector: bool =
     if one.unstable == other.unstable:
         return None
     several = abs(other.unstable - one.unstable) > 1
-    tolerance = 0.0 if run.to_first or several else min(run.control.tolerance, _LOOSEST)
+    tolerance = 0.0 if run.to_first or several or fold else min(run.control.tolerance, _LOOSEST)
     found = locate(run.fine, one, other, run.natural, tolerance, fold, vector)
     if found is None or np.abs(run.targets - found.spot.drive).min() > _SIDES * tolerance * run.span:
         return found

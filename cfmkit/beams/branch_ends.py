@@ -15,7 +15,7 @@ from cfmkit.beams.solver import LONGEST
 if TYPE_CHECKING:
     from cfmkit.beams.events import Singular
     from cfmkit.beams.run import Run
-    from cfmkit.beams.solver import Spot
+    from cfmkit.beams.solver import Points, Spot
     from cfmkit.curves import FloatArray
 
 BEFORE_END = 1e-4  # share of the drive's range by which the end of a branch is passed over
@@ -23,6 +23,7 @@ _LEGS = 60
 _BACK = 0.01  # share of the range in one step where the end of a branch is looked for backwards
 _CLEAR = 0.01  # share of the drive's range behind the end of a branch where nothing leads back onto it
 _ROUNDING = 1e-9  # share of the drive's range by which a point at the end of a branch may seem to lie behind it
+_SHORT_OF = 0.2  # share of the way to the end of a branch that is left where the way is short
 _SAME = 1e-6  # largest difference of poses of two solutions that are one
 
 
@@ -63,12 +64,11 @@ def end_of_branch(run: Run, other: Spot, before: int, sense: float, onto: str) -
         if code != INERTIA:
             run.closed = code == DONE
             return None
-        earlier = points.take([-2]) if len(points) > 1 else run.as_points(start, -1)
+        earlier = run.as_points(start, -1).joined(points).take(slice(0, -1))
         start = run.last(points)
         if start.unstable <= before:
             break
-    one = run.fine.solve(run.fine.expand(earlier.y[-1]), float(earlier.drive[-1]))
-    beyond = run.fine.solve(run.fine.expand(points.y[-1]), float(points.drive[-1]))
+    one, beyond = _fine_before(run, earlier), _fine_before(run, points.take([-1]))
     closing = None if one is None or beyond is None else _place(run, one, beyond)
     if closing is None or beyond is None:
         return None
@@ -81,6 +81,15 @@ def end_at(run: Run, place: Singular, beyond: Spot, onto: str) -> BranchEnd:
     return BranchEnd(place.spot.drive, reduced(place.spot).y, reduced(beyond), place.before, place.after, onto)
 
 
+def _fine_before(run: Run, points: Points) -> Spot | None:
+    """Return the last of some points that is as stable on the fine mesh: beside a bifurcation it may not be."""
+    for k in reversed(range(len(points))):
+        wide = run.fine.solve(run.fine.expand(points.y[k]), float(points.drive[k]))
+        if wide is not None and wide.unstable == int(points.info[k, 0]):
+            return wide
+    return None
+
+
 def _place(run: Run, one: Spot, other: Spot) -> Singular | None:
     """Return the singular point between two equilibria, without its null vector."""
     return beside.located(run, one, other, vector=False)
@@ -90,6 +99,30 @@ def room(run: Run, place: float, sense: float) -> float:
     """Return how far from a bifurcation to go on, in one sense: not beyond the next point asked for away from it."""
     ahead = (run.targets - place) * sense
     return 0.5 * float(min(2.0 * BEFORE_END * run.span, ahead[ahead > beside.BESIDE * run.span].min(initial=np.inf)))
+
+
+def left(run: Run, spot: Spot, asked: int) -> tuple[FloatArray, FloatArray | None]:
+    """Return the values of the drive still to be reached and their numbers among those asked for.
+
+    No numbers where these are all that were asked for. A branch is followed to just before an end that is known.
+    The last number stands for no number.
+    """
+    run.toward = None
+    if asked == 0 and not run.ends:
+        return run.targets, None
+    first = asked if run.natural else run.first_asked
+    left, numbers = run.targets[first:], np.arange(first, len(run.targets))
+    if not run.natural:
+        return left, np.append(numbers, -1)
+    for end in run.ends:
+        sense = np.sign(end.drive - spot.drive)
+        before = min(room(run, end.drive, -sense), _SHORT_OF * abs(end.drive - spot.drive))
+        last = end.drive - sense * before
+        beyond = np.flatnonzero((left - last) * sense >= 0)
+        if len(beyond):
+            left, numbers = np.append(left[: beyond[0]], last), np.append(numbers[: beyond[0]], -1)
+            run.toward = end
+    return left, np.append(numbers, -1)
 
 
 def rejoin(run: Run, spot: Spot) -> Spot | None:
@@ -170,9 +203,8 @@ def close_behind(run: Run) -> bool:
     Coming forward nothing changes there: branch and path are both stable. Going back the path loses its stability; a
     branch that has not ended is stable back to where it opens.
     """
-    last = max(k for k, name in enumerate(run.branches) if name != "primary")
-    name = run.branches[last]
-    first = run.branches.index(name)
+    name = next(name for name in reversed(run.branches) if name != "primary")
+    first = run.branches.index(name, run.begun)
     opening, spot = float(run.points.drive[first]), run.spot(-1)
     sense = float(np.sign(opening - spot.drive))
     options = run.options(spot, sense * _BACK * run.span)
@@ -209,7 +241,7 @@ def relabel(run: Run, primary: Run) -> None:
     places = {int(number): k for k, number in enumerate(primary.points.info[:, 1]) if number >= 0}
     last = max(k for k, name in enumerate(run.branches) if name != "primary")
     first = last + 1
-    for index in range(last, 0, -1):
+    for index in range(last, run.begun, -1):
         number = int(run.points.info[index, 1])
         if number < 0:
             continue

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.beams import beside
+from cfmkit.beams import beside, folds
 from cfmkit.beams.beside import BESIDE
 from cfmkit.beams.branch_ends import end_at, end_of_branch
 from cfmkit.beams.descent import alone, left_behind, well_before
@@ -28,7 +28,11 @@ _FINEST = 1e-5  # share of the range below which a change of stability is not lo
 
 def cross(run: Run) -> Spot | None:
     """Handle a change of inertia between the last two points; return where to go on, None to stop."""
-    one, beyond = run.fine_spot(_last_step_before(run)), run.fine_spot(-1)
+    begun = -2 if run.natural else _last_step_before(run)
+    if run.natural:
+        one, beyond = run.fine_spot(-2), run.fine_spot(-1)
+    else:
+        one, beyond = folds.fine_spots(run, begun)
     if run.natural and len(run.points) > 2 and _beside(run, -2, one, beyond) and _may_be_taken_back(run):
         one = _without_last_but_one(run)
     if run.natural and _beside(run, -1, beyond, one):
@@ -37,7 +41,7 @@ def cross(run: Run) -> Spot | None:
             return run.spot(-1)
     other = run.spot(-1)
     _point_along(run, other)
-    senses = np.sign(run.points.info[-2:, 4])
+    senses = np.sign(run.points.info[[begun, -1], 4])
     fold = not run.natural and bool(senses[0] != senses[1])
     found = None if one is None or beyond is None else beside.located(run, one, beyond, fold)
     if found is None or one is None:
@@ -60,13 +64,13 @@ def cross(run: Run) -> Spot | None:
     run.events.append(Event(kind, found.spot.drive * run.unit, found.before, found.after))
     if run.first is None and not found.fold and found.after > found.before:
         run.first = found
-    return other if found.fold else _parted(run, found, one, other)
+    return _parted(run, found, one, other) if run.natural else other
 
 
 def _last_step_before(run: Run) -> int:
     """Return the index of the point that the last step began at: along the arc there are points asked for between."""
     index = -2
-    while not run.natural and -index < len(run.points) and run.points.info[index, 2] == -1.0:
+    while -index < len(run.points) and run.points.info[index, 2] == -1.0:
         index -= 1
     return index
 
@@ -118,16 +122,7 @@ def _behind_the_last(run: Run) -> Spot | None:
 def _parted(run: Run, found: Singular, one: Spot, other: Spot) -> Spot | None:
     """Go on behind a bifurcation between `one` and the last point `other`, where the control says; None to stop."""
     if found.after <= found.before or run.control.branch == "primary":
-        clear = _clear_of(run, found, one, other)
-        last = run.points.take([-1])
-        run.drop_last()
-        beside.opening(run, found, one, None, run.branch)
-        if last.info[0, 1] < run.asked():
-            last.info[0, 1] = -1.0  # it has just been added
-        run.append(last)
-        if clear is not other:
-            run.append(run.as_points(clear, -1))
-        return clear
+        return _past(run, found, one, _clear_of(run, found, one, other))
     forward, onto = float(np.sign(other.drive - one.drive)), run.branch
     found, wide = left_behind(run, found, one, forward)
     left = None if wide is None else run.settled(run.fine.reduce(wide))
@@ -137,25 +132,38 @@ def _parted(run: Run, found: Singular, one: Spot, other: Spot) -> Spot | None:
         run.without_branch = found
         return _again(run)
     if left is None:
+        if run.control.through_folds:
+            return _past(run, found, one, _clear_of(run, found, one, other))
         return _no_branch(run, found, other)
     clear = _clear_of(run, found, one, other)
     run.drop_last()
     run.events[-1] = replace(run.events[-1], after=found.after)
     name = f"bifurcated at {found.spot.drive * run.unit:.6g}, sign {run.control.sign:+d}"
-    if run.natural:
-        beside.opening(run, found, one, wide, name)
+    beside.opening(run, found, one, wide, name)
     left = _not_beyond(run, found, left, forward)
     run.branch = name
     run.append(run.as_points(left, -1))
     run.entry = 0.5 * abs(left.drive - found.spot.drive)
     run.closed = False
-    if run.natural:
-        ending = end_of_branch(run, clear, found.before, forward, onto)
-        run.ends = (
-            end_at(run, replace(found, before=found.after, after=found.before), one, onto),
-            *([ending] if ending else []),
-        )
+    ending = end_of_branch(run, clear, found.before, forward, onto)
+    run.ends = (
+        end_at(run, replace(found, before=found.after, after=found.before), one, onto),
+        *([ending] if ending else []),
+    )
     return left
+
+
+def _past(run: Run, found: Singular, one: Spot, clear: Spot) -> Spot:
+    """Stay on the path behind a bifurcation between `one` and the last point; go on from `clear`, there or beyond."""
+    last = run.points.take([-1])
+    run.drop_last()
+    beside.opening(run, found, one, None, run.branch)
+    if last.info[0, 1] < run.asked():
+        last.info[0, 1] = -1.0  # it has just been added
+    run.append(last)
+    if clear.drive != last.drive[0]:
+        run.append(run.as_points(clear, -1))
+    return clear
 
 
 def _clear_of(run: Run, found: Singular, one: Spot, other: Spot) -> Spot:
@@ -165,7 +173,7 @@ def _clear_of(run: Run, found: Singular, one: Spot, other: Spot) -> Spot:
     """
     ahead = np.abs(run.targets[run.asked() :] - other.drive)
     room = min(_CLEAR * run.span, 0.5 * float(ahead.min(initial=np.inf)))
-    if not run.natural or abs(other.drive - found.spot.drive) >= room:
+    if abs(other.drive - found.spot.drive) >= room:
         return other
     early = well_before(run, found, 0.1 * room) or one  # from nearer the path would be foretold badly
     before = found.spot.drive - early.drive
@@ -211,7 +219,7 @@ def _not_beyond(run: Run, found: Singular, left: Spot, forward: float) -> Spot:
     """
     ahead = (run.targets[run.asked() :][:1] - found.spot.drive) * forward
     reach, nearest = (left.drive - found.spot.drive) * forward, 0.5 * ahead[ahead > 0].min(initial=np.inf)
-    if not (run.natural and 2.0 * nearest < reach):
+    if not 2.0 * nearest < reach:
         return left
     start = run.fine.reduce(found.spot).y
     guess = start + np.sqrt(nearest / reach) * (left.y - start)

@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.beams import beside, endings
+from cfmkit.beams import beside
 from cfmkit.beams.branches import cross
-from cfmkit.beams.kernels.march import STALLED
 
 if TYPE_CHECKING:
     from cfmkit.beams.run import Run
@@ -21,7 +20,7 @@ _NEAR = 1e-4  # share of the drive's range from which the next point asked for i
 
 
 def past(run: Run, spot: Spot, asked: int) -> Spot | None:
-    """Go past a bifurcation where the march along the primary path stalled; end the path where there is none.
+    """Go past a bifurcation where the march along the primary path stalled; None where there is none, or it ends there.
 
     On the fine mesh the path is followed up to a point asked for just before the bifurcation, then across it.
     """
@@ -48,7 +47,6 @@ def past(run: Run, spot: Spot, asked: int) -> Spot | None:
                 return following
     if run.control.branch != "stop" and not run.stuck and _taken_back(run, spot.drive):
         return cross(run)
-    endings.stop(run, STALLED)
     return None
 
 
@@ -56,7 +54,9 @@ def _taken_back(run: Run, place: float) -> bool:
     """Take the path back to well before a place, and add a point behind it, if there is a bifurcation between."""
     points, names = run.points, list(run.branches)
     last = len(names) - 1
-    while last > 1 and names[last - 1] == names[-1] and abs(float(points.drive[last]) - place) < _WELL * run.span:
+    while last > run.begun + 1 and abs(float(points.drive[last]) - place) < _WELL * run.span:
+        if names[last - 1] != names[-1]:
+            break
         last -= 1
     run.points, run.branches = points.take(slice(0, last + 1)), names[: last + 1]
     if beside.behind(run, place):
@@ -70,7 +70,9 @@ def _taken_back(run: Run, place: float) -> bool:
 
 def _before(run: Run) -> Spot | None:
     """Return the last point that is before the bifurcation on the fine mesh too; those after it are taken back."""
-    for back in range(1, min(len(run.points), _BACK) + 1):
+    for back in range(1, min(len(run.points) - run.begun, _BACK) + 1):
+        if run.points.info[-back, 0] != run.points.info[-1, 0]:
+            return None
         wide = run.fine_spot(-back)
         if wide is not None and wide.unstable == int(run.points.info[-back, 0]):
             for _ in range(back - 1):

@@ -1,7 +1,8 @@
 """What is done to a network: one quantity that is taken through given values.
 
 Every drive has `points`, the values at which results are wanted, in the order in which they are passed, starting
-from rest (zero, which need not be among them). `Control` says how the path is followed.
+from rest (zero, which need not be among them). The values may turn round (up, and down again): what was passed is then
+met once more, from the other side. `Control` says how the path is followed.
 """
 
 from __future__ import annotations
@@ -75,12 +76,17 @@ class Control:
     tolerance : float
         Error of forces and positions allowed, relative to the largest of the path [1].
     through_folds : bool
-        Follow the path by its arc length, through limit points of the drive, instead of by the drive.
+        Follow the path through limit points of the drive, where it would end otherwise: from there on by its arc
+        length, until the drive leads on again. Until then it is unstable and stays on its curve, whatever `branch`
+        says; its bifurcations are told. Values asked for that are passed several times are delivered every time. It
+        ends where the last of them (the last before the points turn round) is passed first.
     branch : {"stable", "primary", "stop"}
         Where stability is lost leave for a stable branch, stay on the path and say so, or end the path there: the
-        quickest way to know that a design is no good.
+        quickest way to know that a design is no good. With `through_folds` the path stays on its curve also where no
+        stable branch begins.
     sign : {1, -1}
-        Which of two mirror-image branches is taken.
+        Which of two mirror-image branches is taken, at every bifurcation anew: also where the points turn round and a
+        bifurcation is passed again.
     largest_turn : float
         Largest change of a rotation, or of a position in units of the mean beam length, in one step [rad].
     first_step : float or None

@@ -51,10 +51,9 @@ def stop(run: Run, code: int) -> None:
         run.status, run.message = PathStatus.NO_START, _CRITICAL if _loaded(run) else _RIGID
     elif run.natural:
         run.status = PathStatus.LIMIT_POINT
-        run.message = (
-            f"the drive cannot go on {where}: a limit point, or a turn too sharp to follow; "
-            "follow the path by its arc length (through_folds)"
-        )
+        run.message = f"the drive cannot go on {where}: a limit point, or a turn too sharp to follow"
+        if not run.control.through_folds:
+            run.message += "; follow the path by its arc length (through_folds)"
     else:
         run.status, run.message = PathStatus.LOST, f"no step converged {where}"
 

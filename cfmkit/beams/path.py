@@ -40,8 +40,9 @@ class PathStatus(Enum):
 class Event:
     """Something on the path: a limit point, a bifurcation, or a change of stability that was not resolved.
 
-    `drive` is where (SI); `before` and `after` count the unstable directions on both sides. What is passed before the
-    drive begins is told first: its kind ends in "under prestress" or "under constant loads", `drive` is the share [1].
+    `drive` is where (SI); `before` and `after` count the unstable directions on both sides of the path that it lies on,
+    in the sense of travel: at the end of a branch, of the path that it joins. What is passed before the drive begins is
+    told first: its kind ends in "under prestress" or "under constant loads", `drive` is the share [1].
     """
 
     kind: str

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.beams import beside, branch_ends, branches, corners, critical, endings, preload
+from cfmkit.beams import beside, branch_ends, branches, corners, critical, endings, folds, preload
 from cfmkit.beams.accuracy import errors, largest_force
 from cfmkit.beams.discretise import Mesh
 from cfmkit.beams.expanded import ExpandedSolver
@@ -28,7 +28,6 @@ _HOPS = 60  # decisions on one path
 _FINE_STEPS = ((1e-5, 8), (1e-6, 16), (0.0, 32))  # of a beam, where singular points are looked for, by the tolerance
 _LOOSEST = 1e-7  # tolerance of Newton's method
 _TRIES = 6  # to land on a point asked for, before a bifurcation is looked for there
-_SHORT_OF = 0.2  # share of the way to the end of a branch that is left where the way is short
 _NEARBY = 0.01  # share of the drive's range
 _SMALLEST = 1e-7  # shortest step as a share of the drive's range
 
@@ -59,6 +58,10 @@ class Run:
     visited: Counter[tuple[float, ...]] = field(default_factory=Counter)  # how often it was taken up again, and where
     again_at: float = np.nan  # where it was taken up for the second time
     patient: bool = False  # whether a point asked for may be tried for as often as it takes
+    begun: int = 0  # index of the point from which the drive goes one way
+    first_asked: int = 0  # number of the point asked for from which on they are still to be done then
+    fold_at: float = np.nan  # where a march stalled last at what looked like a limit point
+    before_fold: int = 0  # unstable directions before the last limit point
     closed: bool = True  # no branch, or its end is known, or it is known to have none before the last point asked for
     entry: float = np.inf  # first step on a branch that was just entered
 
@@ -66,13 +69,14 @@ class Run:
         """Build the solver."""
         tolerance = min(_LOOSEST, 1e-3 * self.control.tolerance)
         self.solver = Solver(self.layout, self.mesh, tolerance, self.ramped)
-        self.targets = np.ones(1) if self.ramped else self.layout.drive.points / self.layout.scales.drive
+        self.values = np.ones(1) if self.ramped else self.layout.drive.points / self.layout.scales.drive
+        self.targets = self.values  # along the arc: up to where the drive turns round next
         self.points: Points = Points(np.empty((0, self.solver.size)), np.empty(0), np.empty((0, INFO)))
         self.branches: list[str] = []
-        values: list[float] = self.targets.tolist()
+        values: list[float] = self.values.tolist()
         self.low, self.high = min(0.0, *values), max(0.0, *values)
         self.span = self.high - self.low
-        self.natural = not self.control.through_folds
+        self.natural = True  # by the drive, not by the arc length
 
     @property
     def unit(self) -> float:
@@ -116,7 +120,10 @@ class Run:
             fresh = False
             hops += 1
             if code == DONE and asked == len(self.targets):
-                break
+                if asked == len(self.values):
+                    break
+                spot = folds.turn(self, asked)
+                continue
             following = self._taken_up(code, spot, asked)
             if following is None and not len(self.points):
                 break
@@ -145,18 +152,32 @@ class Run:
             self.message = f"stability is lost at {last:.6g}: the path ends there"
             return None
         if code == INERTIA:
-            return branches.cross(self)
+            return folds.resumed(self, branches.cross(self))
         if code == DONE:
             return branch_ends.rejoin(self, spot)
         if code == DENIED:
             self.patient = not beside.behind(self, float(self.targets[asked]))
             return spot if self.patient else branches.cross(self)
         if code == STALLED and self.natural and len(self.points):
-            if steadier(self):
-                return self.spot(-1)
-            joined = branch_ends.hop(self, spot, asked) if any(name != "primary" for name in self.branches) else None
-            return joined or corners.past(self, spot, asked)
+            return self._got_over(spot, asked)
         endings.stop(self, code)
+        return None
+
+    def _got_over(self, spot: Spot, asked: int) -> Spot | None:
+        """Return where to go on after a march by the drive that stalled; None to stop."""
+        fold = folds.near(self)
+        if fold and abs(spot.drive - self.fold_at) <= _NEARBY * self.span:
+            return folds.follow(self)
+        self.fold_at = spot.drive if fold else np.nan
+        if not fold and steadier(self):
+            return self.spot(-1)
+        joined = branch_ends.hop(self, spot, asked) if any(name != "primary" for name in self.branches) else None
+        joined = joined or corners.past(self, spot, asked)
+        if joined is not None or self.status is not PathStatus.COMPLETE:
+            return joined
+        if self.control.through_folds:
+            return folds.follow(self)
+        endings.stop(self, STALLED)
         return None
 
     def come_by(self, *place: float) -> None:
@@ -171,8 +192,8 @@ class Run:
 
     def asked(self) -> int:
         """Return the number of points asked for that are done."""
-        done = self.points.info[:, 1]
-        return int(done.max()) + 1 if len(done) else 0
+        done = self.points.info[self.begun :, 1]
+        return max(self.first_asked, int(done.max()) + 1) if len(done) else 0
 
     def as_points(self, spot: Spot, asked: int) -> Points:
         """Return one equilibrium as a list of points."""
@@ -207,7 +228,7 @@ class Run:
 
     def _leg(self, spot: Spot, asked: int, fresh: bool) -> tuple[int, int, Spot]:
         """March once; return why it ended, the points done and the last spot. A fresh start is yet to be solved for."""
-        left, numbers = self._left(spot, asked)
+        left, numbers = branch_ends.left(self, spot, asked)
         options = self.options(spot, self._first_step(spot, asked))
         patient = self.patient or not self.natural or self.control.branch == "stop"
         options[TRIES] = np.inf if patient else _TRIES
@@ -225,26 +246,6 @@ class Run:
             spot = self.spot(-1) if code == STALLED else self.last(points)
         return code, self.asked(), spot
 
-    def _left(self, spot: Spot, asked: int) -> tuple[FloatArray, FloatArray | None]:
-        """Return the values of the drive still to be reached and their numbers among those asked for.
-
-        No numbers where these are all that were asked for. A branch is followed to just before an end that is known.
-        The last number stands for no number.
-        """
-        self.toward = None
-        if not self.natural or (asked == 0 and not self.ends):
-            return self.targets, None
-        left, numbers = self.targets[asked:], np.arange(asked, len(self.targets))
-        for end in self.ends:
-            sense = np.sign(end.drive - spot.drive)
-            before = min(branch_ends.room(self, end.drive, -sense), _SHORT_OF * abs(end.drive - spot.drive))
-            last = end.drive - sense * before
-            beyond = np.flatnonzero((left - last) * sense >= 0)
-            if len(beyond):
-                left, numbers = np.append(left[: beyond[0]], last), np.append(numbers[: beyond[0]], -1)
-                self.toward = end
-        return left, np.append(numbers, -1)
-
     def last(self, points: Points) -> Spot:
         """Return the last of some points as a place to go on from."""
         return Spot(points.y[-1], float(points.drive[-1]), self.solver.unit.copy(), int(points.info[-1, 0]))
@@ -254,7 +255,8 @@ class Run:
             step, self.entry = min(self.control.first_step * self.span, self.entry), np.inf
             return step if not self.natural else float(np.copysign(step, self.targets[asked] - spot.drive))
         if not self.natural:
-            return 0.02 * min(self.span, 1.0)
+            step, self.entry = min(folds.first_step(self), self.entry), np.inf
+            return step
         ahead = float(self.targets[asked] - spot.drive)
         step, self.entry = min(abs(ahead), 0.05 * self.span, self.entry), np.inf
         return float(np.sign(ahead)) * step

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from cfmkit.curves import FloatArray
 
 ITERATIONS = 16
-LONGEST, SENSE, TRIES = 5, 12, 13  # numbers of a march's options: longest step, sense of a fresh start, tries to land
+NATURAL, LONGEST, SENSE, TRIES = 2, 5, 12, 13  # numbers of a march's options: by the drive, longest step, sense, tries
 _TIGHT = 1e-12  # prestress of springs, in lengths or radians, that counts
 _LARGEST_CHANGE, _SMALLEST_SHARE = 0.35, 1e-3  # of poses in one step; of the prestress
 FORCE_WEIGHT = 1e-3  # of a dimensionless force in the arc length

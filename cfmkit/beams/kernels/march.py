@@ -24,6 +24,8 @@ DONE, STALLED, INERTIA, LONG, FULL, OUTSIDE, NO_START, DENIED = range(8)
 a segment is too long for its load; no room for more points; the drive left its range; no equilibrium to start from;
 an asked value was tried for so often in vain that it may lie at a bifurcation."""
 
+VEER = 0.5  # cosine of the largest angle between the changes of poses at both ends of a step along the arc
+LOOKED_INTO = 0.01  # share of the longest step along the arc that is short enough to meet several things in
 SHORT = 0.25  # dM1/dM0 of a segment below which it must be split
 SECANT = 0.25  # of the last step: shorter ones go along the tangent, from which the secants of long ones differ
 STRETCH = 1.3  # factor on a step that lands on an asked value: rather than a short one after it
@@ -130,6 +132,36 @@ def _passed(state, index, count, natural, watched, length):
     return (lost > 1.0 and length > APART) or state[1] < min(index, 0.0) or unborne
 
 
+@kernel
+def _scale(natural, tangent, weight, n_free, border):
+    """Give a tangent along the arc the length one; `border` is room."""
+    if not natural:
+        set_border(natural, tangent, weight, n_free, border)
+
+
+@kernel
+def _strays(known, ahead, options, both, state, index, n_free, n):
+    """Tell whether in a step along the arc more happened than passing one limit point or one bifurcation.
+
+    Or, from the slopes before and behind it, whether poses change in another direction: behind a sharp turn lie other
+    paths.
+    """
+    old, new = both
+    changed, last = abs(state[1] - index), new.shape[0] - 1
+    several = changed > 1.0 or (known and changed == 0.0 and old[last] * new[last] < 0.0)
+    if several and options[10] > 0.5 and ahead > LOOKED_INTO * options[5]:
+        return True
+    if not known or ahead <= 4.0 * options[4]:
+        return False
+    along, one, other = 0.0, 0.0, 0.0
+    for i in range(last):
+        if i < n_free or (i >= n and (i - n) % 6 < 3):
+            along += old[i] * new[i]
+            one += old[i] * old[i]
+            other += new[i] * new[i]
+    return along < VEER * np.sqrt(one * other)
+
+
 @maker
 def march(m, n_free, y, drive, tangent, targets, options, outs, scratch):
     """Follow the path from (y, drive) through the targets.
@@ -145,7 +177,7 @@ def march(m, n_free, y, drive, tangent, targets, options, outs, scratch):
     kept = (np.zeros(KEPT), np.zeros((KEPT, size + 1)), np.zeros((KEPT, size + 1)))
     times, past, slopes = kept
     guess, new, state, slope = np.empty(size + 1), np.empty(size), np.zeros(6), np.zeros(size + 1)
-    border, new_tangent, unit = np.empty(n + 1), np.empty(n + 1), np.zeros(n + 1)
+    border, new_tangent, unit, unused = np.empty(n + 1), np.empty(n + 1), np.zeros(n + 1), np.empty(n + 1)
     unit[n] = 1.0
     stored, known = _begin(m, n_free, y, drive, natural, (state, unit, new, tangent, slope), options, outs, scratch)
     if stored < 0:
@@ -162,11 +194,14 @@ def march(m, n_free, y, drive, tangent, targets, options, outs, scratch):
         goal = aim(new, state, border, tangent, (kept, count, t, guess), natural, goal, ahead)
         code, iterations = solve(m, n_free, new, state, border, goal, (options[0], options[1]), new_tangent, scratch)
         moved, missed = changes(new, old, n_free, n), changes(new, guess, n_free, n)
-        if natural and code == SOLVED:
+        if code == SOLVED:
+            _scale(natural, new_tangent, options[7], n_free, unused)
             all_slopes(m, n_free, new_tangent, slope, scratch)
         bent = misses(old, new, slopes[0], slope, ahead, n_free, n) if known else 0.0
         refused = _refused(code, moved, missed, bent, turn, count)
         passed = _passed(state, index, count, natural, options[10] > 0.5, abs(ahead) / smallest)
+        if code == SOLVED and not natural:
+            passed = passed or _strays(known, ahead, options, (slopes[0], slope), state, index, n_free, n)
         if refused or passed or not (natural or _forward(border, new_tangent)):
             step, denied = (0.5 * ahead if natural else 0.5 * step), denied + (1 if landing else 0)
             if abs(step) < smallest or denied >= options[13]:
@@ -187,7 +222,7 @@ def march(m, n_free, y, drive, tangent, targets, options, outs, scratch):
         _store(stored, new, state, asked if landing else -1, t, iterations, new_tangent[n], outs)
         stored, asked, denied = stored + 1, asked + (1 if landing else 0), (0 if landing else denied)
         count = remember(kept, count if known or not natural else 0, t, new, state[0], slope, most)
-        known = natural
+        known = True
         copy(tangent, new_tangent)
         if options[10] > 0.5 and state[1] != index:
             return INERTIA, stored
