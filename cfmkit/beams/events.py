@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 _SEARCHES = 40
 _CLOSE = 1e-5  # share of the determinant at the ends that is near enough to interpolate the rest: the smallest,
 _LOOSE = 10.0  # and in units of the tolerance
+_HUGE = 700.0  # logarithm of a number that is not too large
 _OUTSIDE = 0.1  # of a bracket: one end may lie at the singular point, on either side
 _ASIDE = 0.03  # share of a bracket's part by which to stay off a singular point of several modes,
 _BESIDE = 1e-4  # and share of the eigenvalue at the ends: nearer, solutions may be those of branches
@@ -107,7 +108,7 @@ class _Search:
     def _size(self, spot: Spot) -> float:
         """Return the size of the tangent's determinant, or of the eigenvalue that changes its sign first of several."""
         if not self.several:
-            return math.exp(self._log_size(spot) - self.log_unit)
+            return math.exp(min(self._log_size(spot) - self.log_unit, _HUGE))
         values = eigenvalues(self.solver, spot.y, spot.drive)
         return abs(float(values[min(self.one.unstable, len(values) - 1)]))
 

@@ -58,8 +58,8 @@ class Run:
     visited: Counter[tuple[float, ...]] = field(default_factory=Counter)  # how often it was taken up again, and where
     again_at: float = np.nan  # where it was taken up for the second time
     patient: bool = False  # whether a point asked for may be tried for as often as it takes
-    begun: int = 0  # index of the point from which the drive goes one way
-    first_asked: int = 0  # number of the point asked for from which on they are still to be done then
+    begun: int = 0  # index of the point from which the drive leads again, behind a limit point
+    first_asked: int = 0  # number of the point asked for from which on they are to be done from there, or along the arc
     fold_at: float = np.nan  # where a march stalled last at what looked like a limit point
     before_fold: int = 0  # unstable directions before the last limit point
     closed: bool = True  # no branch, or its end is known, or it is known to have none before the last point asked for
@@ -111,7 +111,7 @@ class Run:
         self.too_long = code == LONG
         if spot is None and code == DONE:
             return
-        if self.natural and self.branch != "primary":
+        if self.branch != "primary":
             ending = preload.end_of_branch(self)
             self.ends = (ending,) if ending else ()
         asked, hops, fresh = int(self.targets[0] == 0.0), 0, True
