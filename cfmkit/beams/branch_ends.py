@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 BEFORE_END = 1e-4  # share of the drive's range by which the end of a branch is passed over
 _LEGS = 60
+_MARKS = 25  # places at most where the path that was left is looked at
 _BACK = 0.01  # share of the range in one step where the end of a branch is looked for backwards
 _CLEAR = 0.01  # share of the drive's range behind the end of a branch where nothing leads back onto it
 _ROUNDING = 1e-9  # share of the drive's range by which a point at the end of a branch may seem to lie behind it
@@ -58,7 +59,8 @@ def end_of_branch(run: Run, other: Spot, before: int, sense: float, onto: str) -
         margin = 2.0 * max(beside.BESIDE, min(run.control.tolerance, _CLEAR))  # on this mesh the end may lie behind
         step, behind = 0.02 * sense * run.span, ahead[-1] + margin * sense * run.span
         wide = np.abs(np.diff(ahead)) > margin * run.span  # points asked for, even several, may lie at the end
-        marks = np.append(0.5 * (ahead[1:] + ahead[:-1])[wide], behind)
+        between = (0.5 * (ahead[1:] + ahead[:-1]))[wide]
+        marks = np.append(between[:: 1 + len(between) // _MARKS], behind)
         options = run.options(start, step)
         code, points = run.solver.march(start, marks, options, run.control.most_points + len(marks))
         if code != INERTIA:
