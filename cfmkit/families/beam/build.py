@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from cfmkit.materials import Material
 
 _LARGEST_TURN = 0.35  # of a rotation in one step [rad]
-_SMOOTH = 0.12  # the same where every step is a point of the curve
+_SMOOTH = 0.07  # the same where every step is a point of the curve
 
 
 @dataclass(frozen=True)
