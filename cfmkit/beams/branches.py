@@ -76,7 +76,9 @@ def _last_step_before(run: Run) -> int:
 
 
 def _may_be_taken_back(run: Run) -> bool:
-    """Tell whether the last point but one was not taken back several times before."""
+    """Tell whether the last point but one was not taken back several times before, nor anything happened before it."""
+    if run.points.info[-3, 0] != run.points.info[-2, 0]:
+        return False
     place = (float(run.points.drive[-2]), np.inf)
     run.visited[place] += 1
     return run.visited[place] <= _TIMES
@@ -121,7 +123,8 @@ def _behind_the_last(run: Run) -> Spot | None:
 
 def _parted(run: Run, found: Singular, one: Spot, other: Spot) -> Spot | None:
     """Go on behind a bifurcation between `one` and the last point `other`, where the control says; None to stop."""
-    if found.after <= found.before or run.control.branch == "primary":
+    unstable_anyway = run.control.through_folds and found.before > 0
+    if found.after <= found.before or run.control.branch == "primary" or unstable_anyway:
         return _past(run, found, one, _clear_of(run, found, one, other))
     forward, onto = float(np.sign(other.drive - one.drive)), run.branch
     found, wide = left_behind(run, found, one, forward)

@@ -77,7 +77,7 @@ def first_step(run: Run) -> float:
 
 def resumed(run: Run, spot: Spot | None) -> Spot | None:
     """Let the drive take over again where it goes on towards its last point and the path is as stable as before."""
-    if spot is None or run.natural:
+    if spot is None or run.natural or not run.events:
         return spot
     run.entry = _last_step(run)  # a longer one might lead to another path
     if spot.unstable > run.before_fold:

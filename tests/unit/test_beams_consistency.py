@@ -90,3 +90,13 @@ def test_a_leaf_kept_on_its_path_meets_the_same_bifurcations_at_every_tolerance(
         assert [(e.kind, e.before, e.after) for e in path.events] == [(e.kind, e.before, e.after) for e in exact.events]
         places = [event.drive for event in path.events]
         assert places == pytest.approx([event.drive for event in exact.events], abs=3e-4 * float(drive.points[-1]))
+
+
+@pytest.mark.parametrize("seed", [59, 61, 86, 126])
+def test_a_path_that_meets_no_limit_point_is_the_same_with_permission_to_pass_some(seed: int) -> None:
+    """On coarse meshes these stop for a while; then the arc length is tried."""
+    network, drive = arch(np.random.default_rng(seed))
+    plain, allowed = (trace(network, drive, Control(tolerance=1e-5, through_folds=folds)) for folds in (False, True))
+    assert allowed.status is plain.status
+    assert allowed.events == plain.events
+    np.testing.assert_allclose(allowed.effort[allowed.at_asked], plain.effort[plain.at_asked], rtol=1e-9)
