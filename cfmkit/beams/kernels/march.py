@@ -133,25 +133,29 @@ def _passed(state, index, count, natural, watched, length):
 
 
 @kernel
-def _scale(natural, tangent, weight, n_free, border):
-    """Give a tangent along the arc the length one; `border` is room."""
-    if not natural:
-        set_border(natural, tangent, weight, n_free, border)
+def _slopes_behind(code, m, n_free, natural, weight, tangent, slope, room, scratch):
+    """Set the slopes behind a step; along the arc those per unit of its length. room (n + 1): for `set_border`."""
+    if code == SOLVED:
+        if not natural:
+            set_border(natural, tangent, weight, n_free, room)
+        all_slopes(m, n_free, tangent, slope, scratch)
 
 
 @kernel
-def _strays(known, ahead, options, both, state, index, n_free, n):
-    """Tell whether in a step along the arc more happened than passing one limit point or one bifurcation.
+def _strays(code, known, ahead, options, both, state, index, n_free, n):
+    """Tell whether in a step along the arc that led somewhere more happened than one limit point or one bifurcation.
 
     Or, from the slopes before and behind it, whether poses change in another direction: behind a sharp turn lie other
     paths.
     """
+    if code != SOLVED or options[2] > 0.5:
+        return False
     old, new = both
     changed, last = abs(state[1] - index), new.shape[0] - 1
     several = changed > 1.0 or (known and changed == 0.0 and old[last] * new[last] < 0.0)
     if several and options[10] > 0.5 and ahead > LOOKED_INTO * options[5]:
         return True
-    if not known or ahead <= 4.0 * options[4]:
+    if not known or ahead <= SHORTER * options[4]:
         return False
     along, one, other = 0.0, 0.0, 0.0
     for i in range(last):
@@ -194,14 +198,11 @@ def march(m, n_free, y, drive, tangent, targets, options, outs, scratch):
         goal = aim(new, state, border, tangent, (kept, count, t, guess), natural, goal, ahead)
         code, iterations = solve(m, n_free, new, state, border, goal, (options[0], options[1]), new_tangent, scratch)
         moved, missed = changes(new, old, n_free, n), changes(new, guess, n_free, n)
-        if code == SOLVED:
-            _scale(natural, new_tangent, options[7], n_free, unused)
-            all_slopes(m, n_free, new_tangent, slope, scratch)
+        _slopes_behind(code, m, n_free, natural, options[7], new_tangent, slope, unused, scratch)
         bent = misses(old, new, slopes[0], slope, ahead, n_free, n) if known else 0.0
         refused = _refused(code, moved, missed, bent, turn, count)
         passed = _passed(state, index, count, natural, options[10] > 0.5, abs(ahead) / smallest)
-        if code == SOLVED and not natural:
-            passed = passed or _strays(known, ahead, options, (slopes[0], slope), state, index, n_free, n)
+        passed = passed or _strays(code, known, ahead, options, (slopes[0], slope), state, index, n_free, n)
         if refused or passed or not (natural or _forward(border, new_tangent)):
             step, denied = (0.5 * ahead if natural else 0.5 * step), denied + (1 if landing else 0)
             if abs(step) < smallest or denied >= options[13]:
