@@ -154,9 +154,7 @@ def test_the_mirror_image_of_a_stack_that_bifurcates_has_its_layers_swapped():
     assert abs(first - second) > 1 * MM
 
 
-def test_a_column_overloaded_from_the_start_is_buckled_and_told_so():
-    """The curve begins on the stable branch, and the finding says under which share of the loads it opens."""
-    text = """
+COLUMN = """
 cfmkit: 1
 family: beam
 name: column
@@ -169,11 +167,20 @@ mechanism:
     top: {at: [0 mm, 100 mm]}
   beams:
     column: {start: foot, end: top}
+"""
+
+
+def test_a_column_overloaded_from_the_start_is_buckled_and_told_so():
+    """The curve begins on the stable branch, and the finding says under which share of the loads it opens."""
+    text = (
+        COLUMN
+        + """\
   loads:
     - {kind: point, node: top, fy: -0.4 N}
   drive: {kind: force, node: top, direction: 0 deg}
 analysis: {force: 0.01 N, points: 5}
 """
+    )
     one, other = (cfmkit.analyze(cfmkit.loads(text.replace("points: 5", more))) for more in ("points: 5", MIRRORED))
     euler = np.pi**2 * 2e9 * 8e-3 * 1e-9 / 12 / (4 * 0.1**2)
     share = float(re.search(r"under ([\d.]+) % of the constant loads", warned(one)["bifurcation"])[1])
@@ -187,23 +194,15 @@ MIRRORED = "points: 5, other_side: true"
 
 def test_a_spring_tightened_beyond_a_bifurcation_and_loads_that_follow_are_told():
     """A tendon from the top of a column to its foot buckles it at four times Euler's load."""
-    text = """
-cfmkit: 1
-family: beam
-mechanism:
-  material: {youngs_modulus: 2 GPa}
-  thickness: 1 mm
-  width: 8 mm
-  nodes:
-    foot: {at: [0 mm, 0 mm], support: clamped}
-    top: {at: [0 mm, 100 mm]}
-  beams:
-    column: {start: foot, end: top}
+    text = (
+        COLUMN
+        + """\
   springs:
     tendon: {kind: line, start: top, end: foot, stiffness: 100 N/m, free_length: 80 mm}
   drive: {kind: force, node: top, direction: 0 deg, follows: true}
 analysis: {force: 0.001 N, points: 5}
 """
+    )
     result = cfmkit.analyze(cfmkit.loads(text))
     euler = np.pi**2 * 2e9 * 8e-3 * 1e-9 / 12 / (4 * 0.1**2)
     share = float(re.search(r"under ([\d.]+) % of the prestress", warned(result)["bifurcation"])[1])
