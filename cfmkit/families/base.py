@@ -44,8 +44,8 @@ class Notes(Protocol):
     def find(self, key: str, /) -> int:
         """Return where the record of a key (32 hexadecimal digits) lies; -1 if there is none."""
 
-    def read(self, place: int, /) -> Any:
-        """Return a record."""
+    def read(self, place: int, key: str, /) -> Any:
+        """Return the record of a key that lies at a place."""
 
     def add(self, key: str, record: Any, /) -> int:
         """Keep a record of plain numbers, words, lists and mappings; return where it lies."""
@@ -57,8 +57,8 @@ class _Forgotten:
     def find(self, _key: str, /) -> int:
         return -1
 
-    def read(self, place: int, /) -> Any:
-        raise KeyError(place)
+    def read(self, place: int, key: str, /) -> Any:
+        raise KeyError(key)
 
     def add(self, _key: str, _record: Any, /) -> int:
         return -1
@@ -139,12 +139,15 @@ class BlockAnswer:
         Force or torque that each curve should have [N or N m].
     kind : {"force", "torque"}, optional
         What the effort of the curves is; None: as the names of the metrics say.
+    warnings : mapping of str to (n,) array of bool
+        Name of a finding -> the variants whose analysis would warn of it.
     """
 
     done: NDArray[Any]
     values: tuple[Mapping[str, FloatArray], ...]
     target: FloatArray | None = None
     kind: Kind | None = None
+    warnings: Mapping[str, NDArray[Any]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -30,7 +30,7 @@ be written, `lock` keeps other runs out, `transaction` changes many files as one
 
 from cfmkit.store.disk import FileRecord, atomic_write
 from cfmkit.store.folder import RunFolder
-from cfmkit.store.identity import file_hash, stable_hash
+from cfmkit.store.identity import code_stamp, file_hash, origin, stable_hash
 from cfmkit.store.manifest import Manifest
 
-__all__ = ["FileRecord", "Manifest", "RunFolder", "atomic_write", "file_hash", "stable_hash"]
+__all__ = ["FileRecord", "Manifest", "RunFolder", "atomic_write", "code_stamp", "file_hash", "origin", "stable_hash"]

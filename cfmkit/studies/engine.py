@@ -139,6 +139,7 @@ class Records:
         """Start without rows."""
         self.work, self._journal = work, journal
         self._places = np.full(len(work.plan), MISSING, dtype=np.int64)
+        self._keys = np.zeros((len(work.plan), 16), dtype=np.uint8)
         self._held: dict[int, Rows] = {}
         self.reused = self.bugs = 0
         self.bug = ""
@@ -157,22 +158,26 @@ class Records:
         place = self._journal.find(job.key)
         if place < 0:
             return None
-        rows = self.work.recall(self._journal.read(place))
+        rows = self.work.recall(self._journal.read(place, job.key))
         if len(rows) != job.stop - job.start:
             return None
-        self._places[job.start : job.stop] = place
+        self._lies(job, place)
         self.reused += len(rows)
         return rows
 
     def keep(self, job: Job, rows: Rows) -> None:
         """Note rows: in the journal if they would be the same anywhere, else until the process ends."""
         if rows.keepable:
-            self._places[job.start : job.stop] = self._journal.add(job.key, record(rows))
+            self._lies(job, self._journal.add(job.key, record(rows)))
             return
         self._places[job.start : job.stop] = HELD
         self._held[job.start] = rows
         self.bugs += len(rows.bugs)
         self.bug = self.bug or next(iter(rows.bugs.values()), "")
+
+    def _lies(self, job: Job, place: int) -> None:
+        self._places[job.start : job.stop] = place
+        self._keys[job.start : job.stop] = np.frombuffer(bytes.fromhex(job.key), dtype=np.uint8)
 
     def batches(self, size: int = BLOCK) -> Iterator[tuple[NDArray[np.int64], Rows]]:
         """Yield (indices of points, their rows) in order, about `size` at a time; unfinished points are left out."""
@@ -205,12 +210,15 @@ class Records:
             if place == MISSING:
                 at += 1
                 continue
-            part = self._held[at] if place == HELD else self._read(place)
+            part = self._held[at] if place == HELD else self._read(at)
             yield at, part
             at += 1 if isinstance(part, Row) else len(part)
 
-    def _read(self, place: int) -> Rows | Row:
-        told = self._journal.read(place)
+    def _told(self, index: int) -> Any:
+        return self._journal.read(int(self._places[index]), self._keys[index].tobytes().hex())
+
+    def _read(self, index: int) -> Rows | Row:
+        told = self._told(index)
         return self.work.recall(told) if "n" in told else recalled_row(told)
 
     def row(self, index: int) -> Rows:
@@ -219,7 +227,7 @@ class Records:
         if int(self._places[index]) == HELD:
             start = max(at for at in self._held if at <= index)
             return cut(self._held[start], index - start, index - start + 1)
-        rows = self.work.recall(self._journal.read(int(self._places[index])))
+        rows = self.work.recall(self._told(index))
         return rows if len(rows) == 1 else cut(rows, index - start, index - start + 1)
 
 

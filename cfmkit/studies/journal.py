@@ -7,7 +7,9 @@ to the disk once a second and at the end, so that a failing power supply costs a
 
 A line that is cut off at the end of the file (the process died while it was written) is
 dropped. A line in the middle whose checksum does not fit is passed over and counted: its
-point is computed again. There is one writer, which holds the lock of the folder.
+point is computed again. There is one writer, which holds the lock of the folder; should
+somebody remove the lock and a second one write, both append whole lines, and each still
+reads its own: a record is found by its place and believed by its key.
 """
 
 from __future__ import annotations
@@ -56,7 +58,6 @@ class Journal:
         self.damaged = 0
         self.torn = False
         self._file = -1
-        self._end = 0
         self._synced = time.monotonic()
         self._known = (np.zeros(0, np.uint64), np.zeros(0, np.int64))
 
@@ -78,7 +79,7 @@ class Journal:
         """Bring the file down to the disk and close it; one that holds nothing is removed."""
         try:
             self.sync()
-            if not self._end:
+            if not os.fstat(self._file).st_size:
                 discard(self.path)
         finally:
             os.close(self._file)
@@ -88,14 +89,14 @@ class Journal:
         return len(self._known[0])
 
     def find(self, key: str) -> int:
-        """Return where the record of a key that was there at the start lies; -1 if there is none."""
+        """Return where the newest record of a key that was there at the start lies; -1 if there is none."""
         keys, places = self._known
         number = np.uint64(int(key[:16], 16))
-        at = int(keys.searchsorted(number))
-        while at < len(keys) and keys[at] == number:
+        at = int(keys.searchsorted(number, side="right")) - 1
+        while at >= 0 and keys[at] == number:
             if os.pread(self._file, _KEYS, int(places[at]) + _BODY + _KEY) == key.encode():
                 return int(places[at])
-            at += 1
+            at -= 1
         return -1
 
     def add(self, key: str, record: Any) -> int:
@@ -107,23 +108,23 @@ class Journal:
             If it cannot be written.
         """
         line = _line(key, record)
-        place = self._end
         with reporting(self.path):
             rest = memoryview(line)
             while rest:
                 rest = rest[os.write(self._file, rest) :]
-        self._end += len(line)
+            # Where the system appended it, which is not where this process left off if another one writes, too.
+            place = os.lseek(self._file, 0, os.SEEK_CUR) - len(line)
         if time.monotonic() - self._synced > SYNC_EVERY:
             self.sync()
         return place
 
-    def read(self, place: int) -> Any:
-        """Return the record that lies at a place.
+    def read(self, place: int, key: str) -> Any:
+        """Return the record of a key that lies at a place.
 
         Raises
         ------
         cfmkit.errors.OutputError
-            If it cannot be read any more.
+            If it is not there any more, or the place holds another one.
         """
         with reporting(self.path, "read"):
             line = os.pread(self._file, 4096, place)
@@ -132,7 +133,7 @@ class Journal:
                 if not more:
                     break
                 line += more
-        if end < 0 or not _sound(line[: end + 1]):
+        if end < 0 or not _sound(line[: end + 1]) or line[_BODY + _KEY : _BODY + _KEY + _KEYS] != key.encode():
             raise OutputError(f"cannot read {self.path}: it was changed while the study ran; run it again")
         return json.loads(line[: end + 1])["r"]
 
@@ -146,19 +147,16 @@ class Journal:
         """Find every sound record; cut off a torn last line."""
         keys: list[int] = []
         places: list[int] = []
-        end = 0
         for place, line in self._lines():
             if not line.endswith(b"\n"):
                 self.torn = True
                 os.ftruncate(self._file, place)
                 break
-            end = place + len(line)
             if _sound(line):
                 keys.append(int(line[_BODY + _KEY : _BODY + _KEY + 16], 16))
                 places.append(place)
             else:
                 self.damaged += 1
-        self._end = end
         found, order = np.array(keys, np.uint64), np.argsort(np.array(keys, np.uint64), kind="stable")
         self._known = found[order], np.array(places, np.int64)[order]
 
@@ -205,7 +203,7 @@ class Memory:
         self._records.append(record)
         return len(self._records) - 1
 
-    def read(self, place: int) -> Any:
+    def read(self, place: int, _key: str) -> Any:
         """Return the record that lies at a place."""
         return self._records[place]
 

@@ -13,17 +13,15 @@ import hashlib
 import traceback
 from dataclasses import dataclass
 from functools import cached_property
-from importlib.metadata import version
 from math import isfinite
 from typing import TYPE_CHECKING, Any
 
-from cfmkit._version import __version__
 from cfmkit.errors import CfmError, SpecError
 from cfmkit.families import family
 from cfmkit.families.base import Run
 from cfmkit.metrics import Window, check, evaluate, values_of_family
 from cfmkit.results import Result, Status
-from cfmkit.store import file_hash, stable_hash
+from cfmkit.store import file_hash, origin, stable_hash
 from cfmkit.tables.source import named_in
 from cfmkit.units import to_border
 
@@ -144,12 +142,14 @@ class Study:
 
     @cached_property
     def identity(self) -> bytes:
-        """The hash of everything that decides a row, but the varied values; of data files the content counts."""
+        """The hash of everything that decides a row, but the varied values.
+
+        Of data files the content counts, and so does that of cfmkit: its version does not change with each commit.
+        """
         spec = self.spec.model_dump(mode="json", exclude=NOT_DECIDING)
-        versions = {name: version(name) for name in ("numpy", "scipy")} | {"cfmkit": __version__}
         noted = [(one.name, one.over) for one in self.metrics]
         data = [[str(source), file_hash(source.path.resolve())] for source in named_in(self.spec.model_dump())]
-        about = [RECORDS, self.paths, noted, self.design, self.curves, self.seed, versions, data]
+        about = [RECORDS, self.paths, noted, self.design, self.curves, self.seed, origin(), data]
         return bytes.fromhex(stable_hash([spec, *about]))
 
     def key(self, values: Sequence[Any]) -> str:

@@ -7,14 +7,17 @@ import re
 import stat
 import subprocess
 import sys
+from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
 import pytest
 from store_support import listing, one_line
 
+import cfmkit
 from cfmkit.errors import CfmError, OutputError
-from cfmkit.store import atomic_write, disk, file_hash, stable_hash
+from cfmkit.store import atomic_write, disk, file_hash, origin, stable_hash
+from cfmkit.store.identity import tree_hash
 
 # ---- atomic_write
 
@@ -147,6 +150,25 @@ def test_different_content_has_different_hashes(one, other):
 def test_what_has_no_canonical_text_has_no_hash(value):
     with pytest.raises(CfmError, match="no identity"):
         stable_hash(value)
+
+
+def test_the_stamp_of_a_package_is_that_of_its_source_files(tmp_path):
+    (tmp_path / "part").mkdir()
+    (tmp_path / "part" / "a.py").write_text("x = 1\n")
+    before = tree_hash(tmp_path)
+    (tmp_path / "part" / "__pycache__").mkdir()
+    for left in ("part/__pycache__/a.cpython-311.pyc", "part/kernel.nbi", ".hidden"):
+        (tmp_path / left).write_text("left behind")
+    assert tree_hash(tmp_path) == before
+    (tmp_path / "part" / "a.py").write_text("x = 2\n")
+    assert tree_hash(tmp_path) != before
+
+
+def test_what_computes_is_known_by_content_and_versions():
+    found = origin()
+    assert found["content"] == tree_hash(Path(cfmkit.__file__).parent)
+    assert found["numba"] == version("numba")
+    assert origin(("no-such-library",))["no-such-library"] == "not installed"
 
 
 # ---- the module itself

@@ -10,6 +10,7 @@ import cfmkit
 from cfmkit.errors import UsageError
 from cfmkit.families import family
 from cfmkit.results import Status
+from cfmkit.store import origin
 from cfmkit.studies.columns import metrics_of, sample_curve
 from cfmkit.studies.engine import Work, run
 from cfmkit.studies.journal import Journal
@@ -132,6 +133,28 @@ def test_whatever_decides_a_row_makes_it_new(tmp_path, change):
     with Journal(tmp_path / "journal") as journal:
         assert run(work(option), journal=journal).reused == 2
         assert run(work(option, **change), journal=journal).reused == 0
+
+
+@pytest.mark.parametrize("changed", ["content", "numba"])
+def test_rows_of_other_code_are_computed_again(tmp_path, monkeypatch, changed):
+    with Journal(tmp_path / "journal") as journal:
+        run(work(FRICTION), journal=journal)
+    monkeypatch.setattr("cfmkit.studies.study.origin", lambda: origin() | {changed: "another"})
+    with Journal(tmp_path / "journal") as journal:
+        assert run(work(FRICTION), journal=journal).reused == 0
+
+
+def test_a_second_writer_in_the_folder_changes_no_number(tmp_path):
+    other = "mechanism.profile.friction=[0.005, 0.006, 0.007]"
+    with Journal(tmp_path / "journal") as first, Journal(tmp_path / "journal") as second:
+
+        def disturbed(work_of, jobs, _stopping):
+            for job in jobs:
+                run(work(other), journal=second)
+                yield job, work_of(job)
+
+        found = run(work(FRICTION), disturbed, first)
+        assert values(found).tolist() == values(run(work(FRICTION))).tolist()
 
 
 def test_a_new_name_changes_nothing(tmp_path):

@@ -19,6 +19,10 @@ def path(tmp_path):
     return tmp_path / "journal.jsonl"
 
 
+def recalled(journal, key):
+    return journal.read(journal.find(key), key)
+
+
 def filled(path, count=5):
     with Journal(path) as journal:
         for number in range(count):
@@ -28,7 +32,7 @@ def filled(path, count=5):
 def test_a_record_comes_back_as_it_was(path):
     filled(path)
     with Journal(path) as journal:
-        assert [journal.read(journal.find(key(n)))["v"] for n in range(5)] == [[n / 3] for n in range(5)]
+        assert [recalled(journal, key(n))["v"] for n in range(5)] == [[n / 3] for n in range(5)]
         assert journal.find(key(7)) == -1
         assert (len(journal), journal.damaged, journal.torn) == (5, 0, False)
 
@@ -36,7 +40,7 @@ def test_a_record_comes_back_as_it_was(path):
 def test_a_long_record_comes_back_too(path):
     with Journal(path) as journal:
         place = journal.add(key(1), {"v": "x" * 3_000_000})
-        assert len(journal.read(place)["v"]) == 3_000_000
+        assert len(journal.read(place, key(1))["v"]) == 3_000_000
 
 
 def test_keys_that_begin_alike_are_told_apart(path):
@@ -45,7 +49,7 @@ def test_keys_that_begin_alike_are_told_apart(path):
         for one in alike:
             journal.add(one, one)
     with Journal(path) as journal:
-        assert [journal.read(journal.find(one)) for one in alike] == alike
+        assert [recalled(journal, one) for one in alike] == alike
 
 
 def test_a_torn_last_line_is_dropped_wherever_it_is_cut(path):
@@ -73,7 +77,7 @@ def test_a_damaged_record_is_passed_over_and_counted(path):
         with Journal(path) as journal:
             assert journal.damaged == 1
             assert journal.find(key(1)) == -1
-            assert journal.read(journal.find(key(2))) == {"v": [2 / 3]}
+            assert recalled(journal, key(2)) == {"v": [2 / 3]}
 
 
 def test_a_line_of_anything_else_is_damage_not_an_error(path):
@@ -107,4 +111,31 @@ def test_what_was_acknowledged_survives_a_kill(path):
     )
     assert subprocess.run([sys.executable, "-c", code, str(path)]).returncode == -9
     with Journal(path) as journal:
-        assert [journal.read(journal.find(key(n))) for n in range(100)] == list(range(100))
+        assert [recalled(journal, key(n)) for n in range(100)] == list(range(100))
+
+
+def test_a_record_is_believed_by_its_key_not_by_its_place(path):
+    filled(path, 2)
+    with Journal(path) as journal, pytest.raises(OutputError, match="it was changed while the study ran"):
+        journal.read(journal.find(key(0)), key(1))
+
+
+def test_each_of_two_writers_reads_its_own_records(path):
+    filled(path, 1)
+    with Journal(path) as first, Journal(path) as second:
+        places = {}
+        for number in range(1, 9):
+            writer = (first, second)[number % 2]
+            places[number] = writer, writer.add(key(number), {"v": ["x" * number]})
+        for number, (writer, place) in places.items():
+            assert writer.read(place, key(number)) == {"v": ["x" * number]}
+    with Journal(path) as journal:
+        assert (len(journal), journal.damaged) == (9, 0)
+
+
+def test_the_newest_record_of_a_key_counts(path):
+    with Journal(path) as journal:
+        journal.add(key(1), "old")
+        journal.add(key(1), "new")
+    with Journal(path) as journal:
+        assert recalled(journal, key(1)) == "new"

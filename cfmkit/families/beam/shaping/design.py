@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit._version import __version__
 from cfmkit.beams.beam import fit
 from cfmkit.families.beam.build import assemble
 from cfmkit.families.beam.findings import finding
@@ -20,7 +19,7 @@ from cfmkit.families.beam.shaping.task import Coordinate, Limits, Task
 from cfmkit.families.beam.shaping.variables import Variables
 from cfmkit.families.beam.words import percent
 from cfmkit.results import Design, Finding, Status
-from cfmkit.store import stable_hash
+from cfmkit.store import origin, stable_hash
 
 if TYPE_CHECKING:
     from cfmkit.families.base import Run
@@ -54,7 +53,7 @@ def shaped(spec: BeamSpec, wanted: Optimise, run: Run) -> Design:
         return Design(None, Status.INVALID, problem)
     task = task_of(spec, wanted)
     plan = Plan(drawn=wanted.drawn, deadline=deadline_of(wanted.time_budget, run.time_budget))
-    identity = stable_hash([spec.model_dump(mode="json", exclude=_NOT_DECIDING), run.seed, __version__])
+    identity = stable_hash([spec.model_dump(mode="json", exclude=_NOT_DECIDING), run.seed, origin()])
     result = explored(task, plan, (wanted.starts, wanted.widened), identity, run)
     spread = Spread(wanted.tolerances.nodes, wanted.tolerances.coefficients, wanted.tolerances.samples, run.seed)
     best = _best(task, result, spread, plan)

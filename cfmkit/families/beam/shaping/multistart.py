@@ -120,7 +120,7 @@ def _done(stage: Stage, run: Run) -> tuple[dict[int, Any], int, tuple[str, ...]]
     """Return the records of a stage by number, how many were noted before, and why processes died."""
     keys = {job: hashlib.sha256(f"{stage.identity} {job}".encode()).hexdigest()[:32] for job in stage.jobs}
     places = {job: run.notes.find(key) for job, key in keys.items()}
-    records = {job: run.notes.read(place) for job, place in places.items() if place >= 0}
+    records = {job: run.notes.read(place, keys[job]) for job, place in places.items() if place >= 0}
     reused, lost = len(records), list[str]()
     _tell(stage, run, records)
     left = [job for job in stage.jobs if job not in records]
