@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
-from cam_support import cam
+from cam_support import cam, fixed
 
 import cfmkit
 from cfmkit.export.arcs import outlines
+from cfmkit.families import family
 from cfmkit.families.refusals import CannotBuild
+from cfmkit.geometry import Smooth
 
 TURNS_AT_ONCE = {
     "brace_length": "1647.65 mm",
@@ -37,3 +40,47 @@ def test_flanks_that_cross_leave_no_plate_to_draw():
     with pytest.raises(CannotBuild, match="no plate is left between them") as caught:
         cfmkit.drawing(cam(rest_half_width="2 mm", profile__force_constant="1 mm"))
     assert caught.value.finding.name == "flanks_collide"
+
+
+LEFT = {
+    "other curve": {"profile": {"force_constant": "12 mm"}},
+    "smaller roller": {"profile": {"force_constant": "9.058 mm"}, "roller_radius": "10 mm"},
+    "longer brace, shorter stroke": {
+        "profile": {"force_constant": "8 mm", "stroke": "150 mm"},
+        "brace_length": "210 mm",
+    },
+    "wider": {"profile": {"force_constant": "9 mm", "rest_half_width": "70 mm"}},
+}
+
+
+@pytest.mark.parametrize("left", LEFT.values(), ids=LEFT)
+def test_the_left_flank_that_is_cut_is_the_one_that_is_analysed(left):
+    spec = fixed(cam(), left=left)
+    lone = cam(**{key: left[key] for key in ("brace_length", "roller_radius") if key in left})
+    lone = lone.replace({f"mechanism.profile.{key}": value for key, value in left["profile"].items()})
+    drawn, alone, right = (cfmkit.drawing(item) for item in (spec, lone, fixed(cam())))
+    tables = {table.name: table for table in drawn.tables}
+    wanted = {table.name: table for table in (*alone.tables[2:], *right.tables[:2])}
+    for name, table in wanted.items():
+        for column, (values, _) in table.columns.items():
+            assert np.array_equal(tables[name].columns[column][0], values), (name, column)
+    plate = next(contour for contour in drawn.contours if contour.layer == "cut" and not contour.hole)
+    up, down = (edge for edge in plate.edges if isinstance(edge, Smooth))
+    assert np.array_equal(up.points[:, 0], tables["cam-right"].columns["x"][0])
+    assert np.array_equal(down.points[::-1, 0], tables["cam-left"].columns["x"][0])
+    paths = [contour.edges[0].points for contour in drawn.contours if contour.layer == "path"]
+    assert np.array_equal(paths[1][:, 0], tables["roller-path-left"].columns["x"][0])
+    outlines(drawn)  # closed, and nowhere crossing itself
+
+
+def test_a_left_side_without_a_flank_of_its_own_leaves_the_cam_symmetric():
+    plain, braced = (cfmkit.drawing(fixed(cam(), **left)) for left in ({}, {"left": {"brace_length": "205 mm"}}))
+    for one, other in zip(plain.tables, braced.tables, strict=True):
+        assert np.array_equal(one.columns["x"][0], other.columns["x"][0])
+
+
+def test_what_the_left_flank_leaves_out_is_written_out():
+    left = {"brace_length": "205 mm", "profile": {"force_constant": "12 mm"}}
+    profile = family("cam").resolve(cam(left=left)).mechanism.left.profile
+    numbers = (profile.brace_length, profile.rest_half_width, profile.roller_radius, profile.stroke)
+    assert numbers == pytest.approx((0.205, 0.068, 0.016, 0.24))

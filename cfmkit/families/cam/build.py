@@ -16,7 +16,7 @@ from cfmkit.families.findings import mm
 from cfmkit.families.refusals import CannotBuild
 
 if TYPE_CHECKING:
-    from cfmkit.families.cam.spec import CamSpec, Masses, Mechanism
+    from cfmkit.families.cam.spec import CamSpec, Left, Masses, Mechanism
     from cfmkit.results import Finding
 
 
@@ -66,8 +66,37 @@ def resolve(spec: CamSpec) -> CamSpec:
         "roller_radius": profile.roller_radius or mechanism.roller_radius,
         "stroke": stroke,
     }
-    new_profile = profile.model_copy(update=written)
-    return spec.model_copy(update={"mechanism": mechanism.model_copy(update={"profile": new_profile})})
+    changes: dict[str, object] = {"profile": profile.model_copy(update=written)}
+    if mechanism.left and mechanism.left.profile:
+        changes["left"] = _resolved_left(mechanism, mechanism.left, stroke)
+    return spec.model_copy(update={"mechanism": mechanism.model_copy(update=changes)})
+
+
+def _resolved_left(mechanism: Mechanism, left: Left, stroke: float) -> Left:
+    """Return the left side with its own flank written out: what that leaves out follows the left side."""
+    profile = left.profile
+    if profile is None:
+        return left
+    written = {
+        "brace_length": profile.brace_length or left.brace_length or mechanism.brace_length,
+        "rest_half_width": profile.rest_half_width or mechanism.rest_half_width,
+        "roller_radius": profile.roller_radius or left.roller_radius or mechanism.roller_radius,
+        "stroke": profile.stroke or stroke,
+    }
+    return left.model_copy(update={"profile": profile.model_copy(update=written)})
+
+
+def left_side(spec: CamSpec) -> CamSpec:
+    """Return the spec whose right side is the left side of a resolved one."""
+    mechanism, left = spec.mechanism, spec.mechanism.left
+    if left is None:
+        return spec
+    changes = {
+        "brace_length": left.brace_length or mechanism.brace_length,
+        "roller_radius": left.roller_radius or mechanism.roller_radius,
+        "profile": left.profile or mechanism.profile,
+    }
+    return spec.model_copy(update={"mechanism": mechanism.model_copy(update=changes)})
 
 
 def slope_law(spec: CamSpec) -> SlopeLaw:
@@ -111,6 +140,18 @@ def assemble(spec: CamSpec) -> Assembly:
     weights = hanging_weights(mechanism.masses) if spec.gravity else (0.0, 0.0)
     loads = Loads(mechanism.springs.total, mechanism.rest_half_width, mechanism.brace_length, *weights)
     return Assembly(spec, profile, track, loads, reached, shortfall)
+
+
+def assemble_sides(spec: CamSpec) -> tuple[Assembly, Assembly]:
+    """Return the right and the left side put together; one and the same where nothing differs on the left.
+
+    Raises
+    ------
+    CannotBuild
+        If one of them cannot exist; the finding says why.
+    """
+    right = assemble(spec)
+    return right, assemble(left_side(right.spec)) if spec.mechanism.left else right
 
 
 def displacement_origin(assembly: Assembly) -> float:

@@ -25,6 +25,7 @@ from cfmkit.curves import Column, Curve
 from cfmkit.errors import DataError
 from cfmkit.families.cam.build import Assembly, assemble, displacement_origin
 from cfmkit.families.cam.built_values import findings_of_built, values_of_built
+from cfmkit.families.cam.checks import left_out
 from cfmkit.families.cam.findings import finding
 from cfmkit.families.cam.values import DEFINITIONS, design_values, largest
 from cfmkit.families.findings import mm
@@ -138,7 +139,7 @@ def analyze_built(spec: CamSpec) -> Result:
     tracks = _tracks(assembly, registration)
     travel, short = _travel(assembly, tracks)
     built = _solved(assembly, registration, tracks, travel)
-    found = [*([finding("outside_profile", short)] if short else []), *findings_of_built(built)]
+    found = [*([finding("outside_profile", short)] if short else []), *left_out(spec), *findings_of_built(built)]
     asked = assembly.spec.analysis.model_copy(
         update={"travel": float(travel[-1]), "gravity": spec.gravity, "fidelity": "quasi-static"}
     )

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from cfmkit.bodies.cam_cut import CamProfile
     from cfmkit.curves import FloatArray
     from cfmkit.families.cam.model import Solution
+    from cfmkit.families.cam.spec import CamSpec
     from cfmkit.results import Finding
 
 
@@ -24,6 +25,22 @@ def findings_of(solution: Solution) -> tuple[Finding, ...]:
     """Return every finding about a solved mechanism, the gravest first."""
     checks = (_collisions, _undercut, _jam, _dead_point, _springs, _contact)
     return tuple(found for check in checks for found in check(solution))
+
+
+def left_out(spec: CamSpec) -> tuple[Finding, ...]:
+    """Return what to say where the two sides differ: the quasi-static model is symmetric."""
+    errors, found = spec.mechanism.errors, []
+    if errors and (errors.slider_deviation or errors.flank_angle):
+        found.append("'mechanism.errors'")
+    if spec.mechanism.left:
+        found.append("'mechanism.left'")
+    if not found:
+        return ()
+    message = (
+        f"the quasi-static model is symmetric: {' and '.join(found)} count in the dynamic model only; "
+        "give 'analysis.dynamics' a slow motion to see the effect"
+    )
+    return (finding("symmetric_model", message),)
 
 
 def flanks_crossing(profile: CamProfile) -> Finding | None:

@@ -22,7 +22,7 @@ import numpy as np
 from cfmkit.bodies.cam_profile import brace_tangent
 from cfmkit.curves import Column, Curve, FloatArray
 from cfmkit.families.cam.build import CLOSE, Assembly, assemble, displacement_origin
-from cfmkit.families.cam.checks import findings_of
+from cfmkit.families.cam.checks import findings_of, left_out
 from cfmkit.families.cam.findings import finding
 from cfmkit.families.cam.statics import Forces, forces, jams
 from cfmkit.families.cam.values import theoretical_force, values_of
@@ -128,7 +128,7 @@ def analyze(spec: CamSpec, run: Run) -> Result:
     solution = with_band(solve(assembly), run.seed)
     shortfalls = _shortfalls(assembly, solution)
     failed = int(np.isnan(solution.up.slider[1:]).sum() + np.isnan(solution.down.slider[1:]).sum())
-    warnings = (*shortfalls, *_left_out(spec), *findings_of(solution))
+    warnings = (*shortfalls, *left_out(spec), *findings_of(solution))
     status, message = Status.COMPLETE, ""
     if shortfalls:
         status, message = Status.PARTIAL, shortfalls[0].message
@@ -176,22 +176,6 @@ def solve(assembly: Assembly) -> Solution:
     up = forces(states, assembly.loads, friction)
     down = forces(states, assembly.loads, -friction) if friction else up
     return Solution(assembly, travel, states, up, down, displacement_origin(assembly))
-
-
-def _left_out(spec: CamSpec) -> tuple[Finding, ...]:
-    """Return what to say where the two sides differ: this model is symmetric."""
-    errors, found = spec.mechanism.errors, []
-    if errors and (errors.slider_deviation or errors.flank_angle):
-        found.append("'mechanism.errors'")
-    if spec.mechanism.left:
-        found.append("'mechanism.left'")
-    if not found:
-        return ()
-    message = (
-        f"the quasi-static model is symmetric: {' and '.join(found)} count in the dynamic model only; "
-        "give 'analysis.dynamics' a slow motion to see the effect"
-    )
-    return (finding("symmetric_model", message),)
 
 
 def _shortfalls(assembly: Assembly, solution: Solution) -> tuple[Finding, ...]:

@@ -1,6 +1,6 @@
 """The cam plate as a closed contour that can be cut, and the roller path beside it.
 
-The two flanks are exact; what closes the contour (a margin above, a tab below that
+The two flanks are exact, each as its own side is analysed; what closes the contour (a margin above, a tab below that
 passes between the rollers, fixing holes) is a sensible choice that `mechanism.plate`
 can change. The tab is narrower than the space between the rollers at the start.
 """
@@ -12,15 +12,20 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.cam.build import assemble
+from cfmkit.families.cam.build import assemble_sides
 from cfmkit.families.cam.checks import flanks_crossing
 from cfmkit.families.refusals import CannotBuild
 from cfmkit.geometry import Arc, Contour, Curve2D, Drawing, Edge, Line, Smooth
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from cfmkit.bodies.cam_cut import CamProfile
     from cfmkit.curves import FloatArray
     from cfmkit.families.cam.spec import CamSpec, Plate
+
+    Profiles = tuple[CamProfile, CamProfile]
+    """The right flank and the left one, each as it would be on the right."""
 
 POINTS = 1201
 TAB_CLEARANCE = 0.25
@@ -35,19 +40,20 @@ def drawing(spec: CamSpec) -> Drawing:
     cfmkit.families.refusals.CannotBuild
         If there is no cam to draw.
     """
-    assembly = assemble(spec)
-    profile, plate = assembly.profile, assembly.spec.mechanism.plate
-    if crossing := flanks_crossing(profile):
-        raise CannotBuild(crossing)
-    path = path_edge(profile)
-    paths = Contour((path,), "path"), Contour((path.mirrored(),), "path")
-    return Drawing("cam", (*plate_contours(profile, plate), *paths), tuple(_tables(profile)))
+    sides = assemble_sides(spec)
+    profiles = sides[0].profile, sides[1].profile
+    for profile in dict.fromkeys(profiles):
+        if crossing := flanks_crossing(profile):
+            raise CannotBuild(crossing)
+    paths = Contour((path_edge(profiles[0]),), "path"), Contour((path_edge(profiles[1]).mirrored(),), "path")
+    contours = (*plate_contours(profiles, sides[0].spec.mechanism.plate), *paths)
+    return Drawing("cam", contours, tuple(_tables(profiles)))
 
 
-def plate_contours(profile: CamProfile, plate: Plate) -> tuple[Contour, ...]:
-    """Return the outline of the plate with a flank, and its holes."""
-    flank = flank_edge(profile)
-    return plate_contour(flank, plate, profile), *holes(flank, plate, profile)
+def plate_contours(profiles: Profiles, plate: Plate) -> tuple[Contour, ...]:
+    """Return the outline of the plate between a right and a left flank, and its holes."""
+    flanks = flank_edge(profiles[0]), flank_edge(profiles[1])
+    return plate_contour(flanks, plate, profiles), *holes(flanks, plate, profiles)
 
 
 def _coordinates(profile: CamProfile, start: float) -> FloatArray:
@@ -85,23 +91,23 @@ def _tangents(profile: CamProfile, u: FloatArray) -> FloatArray:
     return np.column_stack([-ny, nx])
 
 
-def plate_contour(flank: Smooth, plate: Plate, profile: CamProfile) -> Contour:
-    """Return the closed outline: right flank up, top, left flank down, bottom with the tab."""
-    first, last = flank.points[0], flank.points[-1]
-    top = last[1] + plate.top_margin
-    left = flank.mirrored().reversed()
-    corners = [(last[0], last[1])]
-    if plate.top_margin:
-        corners += [(last[0], top), (-last[0], top)]
-    corners.append((-last[0], last[1]))
-    edges: list[Edge] = [flank, *_lines(corners), left]
-    half = 0.5 * tab_width(plate, profile)
-    below = [(-first[0], first[1])]
+def plate_contour(flanks: tuple[Smooth, Smooth], plate: Plate, profiles: Profiles) -> Contour:
+    """Return the closed outline: right flank up, top, left flank down, bottom with the tab.
+
+    `flanks` are both drawn on the right; flanks that begin or end at different heights leave a step.
+    """
+    (low, high), (left_low, left_high) = ((flank.points[0], flank.points[-1]) for flank in flanks)
+    top = max(high[1], left_high[1]) + plate.top_margin
+    above = [(high[0], high[1]), (high[0], top), (-left_high[0], top), (-left_high[0], left_high[1])]
+    half = 0.5 * tab_width(plate, profiles)
     if half > 0 and plate.base_height > 0:
-        floor = first[1] - plate.base_height
-        below += [(-half, first[1]), (-half, floor), (half, floor), (half, first[1])]
-    below.append((first[0], first[1]))
-    return Contour((*edges, *_lines(below)), "cut", closed=True)
+        floor = min(low[1], left_low[1]) - plate.base_height
+        tab = [(-half, left_low[1]), (-half, floor), (half, floor), (half, low[1])]
+    else:  # a slanted bottom could pass through the higher roller
+        tab = [(0.0, left_low[1]), (0.0, low[1])] if left_low[1] != low[1] else []
+    below = [(-left_low[0], left_low[1]), *tab, (low[0], low[1])]
+    edges: list[Edge] = [flanks[0], *_lines(above), flanks[1].mirrored().reversed(), *_lines(below)]
+    return Contour(tuple(edges), "cut", closed=True)
 
 
 def _lines(corners: list[tuple[float, float]]) -> list[Line]:
@@ -109,27 +115,30 @@ def _lines(corners: list[tuple[float, float]]) -> list[Line]:
     return [Line(a, b) for a, b in pairwise(points) if a != b]
 
 
-def tab_width(plate: Plate, profile: CamProfile) -> float:
+def tab_width(plate: Plate, profiles: Profiles) -> float:
     """Return the width of the tab below the cam [m]; 0 if the rollers leave no space for one."""
-    x0, radius = profile.path.law.rest_half_width, profile.roller_radius
-    free = 2.0 * (x0 - (1.0 + TAB_CLEARANCE) * radius)
-    lowest = 2.0 * float(profile.flank(profile.start)[0])
+    free, lowest = np.inf, np.inf
+    for profile in profiles:
+        x0, radius = profile.path.law.rest_half_width, profile.roller_radius
+        free = min(free, 2.0 * (x0 - (1.0 + TAB_CLEARANCE) * radius))
+        lowest = min(lowest, 2.0 * float(profile.flank(profile.start)[0]))
     widest = max(min(free, lowest), 0.0)
     return min(plate.base_width, lowest) if plate.base_width else widest
 
 
-def holes(flank: Smooth, plate: Plate, profile: CamProfile) -> list[Contour]:
+def holes(flanks: tuple[Smooth, Smooth], plate: Plate, profiles: Profiles) -> list[Contour]:
     """Return the fixing holes: two in the tab and two near the top, where there is room for them."""
-    diameter, width = plate.hole_diameter, tab_width(plate, profile)
+    diameter, width = plate.hole_diameter, tab_width(plate, profiles)
     if not diameter:
         return []
-    first, last = flank.points[0], flank.points[-1]
+    bottom, top = (min(flank.points[0, 1] for flank in flanks), max(flank.points[-1, 1] for flank in flanks))
+    across = min(float(flank.points[-1, 0]) for flank in flanks)
+    top += plate.top_margin
     centers: list[tuple[float, float]] = []
     if plate.base_height >= 2.0 * diameter and width >= 6.0 * diameter:
-        centers += [(side * 0.3 * width, first[1] - 0.5 * plate.base_height) for side in (-1.0, 1.0)]
-    top = last[1] + plate.top_margin
-    if top - first[1] >= 6.0 * diameter and last[0] >= 4.0 * diameter:
-        centers += [(side * 0.5 * last[0], top - 2.0 * diameter) for side in (-1.0, 1.0)]
+        centers += [(side * 0.3 * width, bottom - 0.5 * plate.base_height) for side in (-1.0, 1.0)]
+    if top - bottom >= 6.0 * diameter and across >= 4.0 * diameter:
+        centers += [(side * 0.5 * across, top - 2.0 * diameter) for side in (-1.0, 1.0)]
     return [_circle(center, 0.5 * diameter) for center in centers]
 
 
@@ -138,12 +147,11 @@ def _circle(center: tuple[float, float], radius: float) -> Contour:
     return Contour((circle,), "cut", closed=True, hole=True)
 
 
-def _tables(profile: CamProfile) -> list[Curve2D]:
-    """Return the exact points of both flanks and both roller paths."""
-    law = profile.path.law
-    on_path, on_flank = _coordinates(profile, law.rest_half_width), _coordinates(profile, profile.start)
-    found = []
-    for side, sign in (("right", 1.0), ("left", -1.0)):
+def _tables(profiles: Profiles) -> Iterator[Curve2D]:
+    """Yield the exact points of both flanks and both roller paths."""
+    for side, sign, profile in zip(("right", "left"), (1.0, -1.0), profiles, strict=True):
+        law = profile.path.law
+        on_path, on_flank = _coordinates(profile, law.rest_half_width), _coordinates(profile, profile.start)
         path = {
             "x": (sign * on_path, "length"),
             "y": (profile.path.height(on_path), "length"),
@@ -157,5 +165,4 @@ def _tables(profile: CamProfile) -> list[Curve2D]:
             "y": (y, "length"),
             "curvature_radius": (law.curvature_radius(on_flank) - profile.roller_radius, "length"),
         }
-        found += [Curve2D(f"roller-path-{side}", path), Curve2D(f"cam-{side}", cam)]
-    return found
+        yield from (Curve2D(f"roller-path-{side}", path), Curve2D(f"cam-{side}", cam))

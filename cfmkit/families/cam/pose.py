@@ -94,7 +94,8 @@ class Scene:
 def scene(solution: Solution) -> Scene:
     """Return the parts that do not move, and what the mechanism sweeps over the whole solution."""
     assembly = solution.assembly
-    plate = polygons(plate_contours(assembly.track.profile, assembly.spec.mechanism.plate), "cut")
+    profile = assembly.track.profile
+    plate = polygons(plate_contours((profile, profile), assembly.spec.mechanism.plate), "cut")
     path, radius = roller_path(solution), assembly.spec.mechanism.roller_radius
     outline = np.concatenate(plate)
     across = max(float(path[:, 0].max()) + radius, float(outline[:, 0].max()))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from cfmkit.families.cam.build import Assembly, assemble, cam_start_height
+from cfmkit.families.cam.build import Assembly, assemble_sides, cam_start_height
 from cfmkit.families.cam.dynamics.center import pieces_of
 from cfmkit.families.cam.dynamics.machine import Machine
 from cfmkit.families.cam.dynamics.motion import Cycloid
@@ -49,9 +49,8 @@ def build(spec: CamSpec) -> Build:
     CannotBuild
         If it cannot exist; the finding says why.
     """
-    motion, mechanism = stated_motion(spec), spec.mechanism
-    right = assemble(spec)
-    left = assemble(_left(right.spec)) if mechanism.left else right
+    motion = stated_motion(spec)
+    right, left = assemble_sides(spec)
     lift = cam_start_height(right.profile) if motion.origin == "cam-start" else 0.0
     machine = _machine(spec, (right, left), lift)
     for name, side in (("right", machine.right), ("left", machine.left)):
@@ -70,22 +69,6 @@ def stated_motion(spec: CamSpec) -> Dynamics:
     if spec.analysis.dynamics is None:
         raise ValueError("the specification states no motion")
     return spec.analysis.dynamics
-
-
-def _left(spec: CamSpec) -> CamSpec:
-    """Return the spec whose right side is the left side of a resolved one."""
-    mechanism, left = spec.mechanism, spec.mechanism.left
-    if left is None:
-        return spec
-    profile = left.profile or mechanism.profile
-    if profile.stroke is None:
-        profile = profile.model_copy(update={"stroke": mechanism.profile.stroke})
-    changes = {
-        "brace_length": left.brace_length or mechanism.brace_length,
-        "roller_radius": left.roller_radius or mechanism.roller_radius,
-        "profile": profile,
-    }
-    return spec.model_copy(update={"mechanism": mechanism.model_copy(update=changes)})
 
 
 def _machine(spec: CamSpec, sides: tuple[Assembly, Assembly], lift: float) -> Machine:
