@@ -124,7 +124,7 @@ class ExactSampler:
         network, back = leaf_network(spec), max(back, 0.02 * end)
         self.each = about.half_beams * (1.0 if about.guided else 0.5)
         self.pushed = traced(network, "shuttle", end, branch=spec.analysis.branch, imperfection=about.waviness)
-        self.pulled = traced(network, "shuttle", -back, tolerance=1e-6)
+        self.pulled = traced(network, "shuttle", -back)
         self.chain = spring_chain(spec)
         ends = (max(preloads) + end, min(min(preloads) - back, -0.02 * end))
         self.sides = [traced(self.chain.network, self.chain.node, self.chain.travel * side) for side in ends]

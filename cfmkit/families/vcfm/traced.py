@@ -1,17 +1,21 @@
 """A traced beam network as a function: force, stress and form at any travel, from converged points of its path.
 
-Between two bifurcations the force is smooth, and a cubic spline through the points of the path gives it to 1e-7; the
-stress, which begins like a square root where a leaf buckles, is interpolated linearly. A leaf with a stated waviness
-has corners instead of bifurcations: there the path is traced densely, and all is linear.
+Between two bifurcations the force is smooth: there it is a row of Chebyshev polynomials, each on a panel of its own. A
+panel whose polynomial has not converged is halved, and the path is traced again at the nodes of the halves. A piece
+before a thin leaf buckles, 1/500 of the travel at a rise of 40 thicknesses, so gets as many nodes as any other, and so
+does the corner of a leaf with a stated waviness, which has no bifurcation. The stress begins like a square root where a
+leaf buckles, and has kinks where its place changes: it is interpolated monotonically, in the angle arccos of the place.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.polynomial import chebyshev
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -22,42 +26,107 @@ if TYPE_CHECKING:
 DOWN = -0.5 * np.pi
 
 GRIDS = (127, 113)
-"""Points asked for along a path; the second where the first leave a doubt."""
+"""Points requested first, to find the bifurcations; the second where the first leave a doubt."""
 
 CLOSE = 0.02
 """Bifurcations closer than this share of the travel are looked at again."""
 
-DENSE = 600
-"""Points asked for of a path with corners."""
+TOLERANCES = (1e-9, 1e-7, 1e-6, 1e-5)
+"""Of the path, relative to its largest force, which far beyond the flat pose is a thousand times the peak. Slender
+leaves that are pulled straight there do not reach the first: the next is taken."""
+
+NODES = 16
+"""Of a panel."""
+
+RESOLVED = 3e-8
+"""Size of a panel's last coefficients, relative to the largest force so far, at which it has converged."""
+
+WIDE, CORNERED = 4, 16
+"""Panels of a piece at first, and of one that may have corners."""
+
+HALVINGS = 12
+"""At most so many: a corner left then is 1/16000 of its piece."""
+
+
+APART = 1e-3
+"""Least distance of points that the stress is interpolated between, in the angle that is pi for a piece [rad]."""
+
+EARLY = 0.25
+"""Part of the travel within which the leaves have their peak, which is the scale of all before it."""
+
+_UNIT = chebyshev.chebpts1(NODES)
+_TRANSFORM = chebyshev.chebvander(_UNIT, NODES - 1).T * (np.where(np.arange(NODES), 2.0, 1.0) / NODES)[:, None]
 
 
 @dataclass(frozen=True)
-class Traced:
-    """Converged points of a path, from zero on.
-
-    Attributes
-    ----------
-    places : (n,) array
-        Travel, all of one sign [m].
-    force, stress : (n,) array
-        [N, Pa].
-    stable, buckled : (n,) array of bool
-        Whether the form is stable, and another than as made.
-    edges : tuple of float
-        Zero, the bifurcations and the end [m].
-    smooth : bool
-        Whether the force is smooth between the edges.
-    problem : str
-        Why the path ends early; empty if it does not.
-    """
+class Points:
+    """Converged points of a path in the order of travel: places [m], force [N], stress [Pa], stability, form; (n,)."""
 
     places: FloatArray
     force: FloatArray
     stress: FloatArray
     stable: Any
     buckled: Any
+
+    def joined(self, other: Points) -> Points:
+        """Return these points and others, each place once."""
+        pairs = zip(self.columns, other.columns, strict=True)
+        places, *columns = (np.concatenate(pair) for pair in pairs)
+        _, kept = np.unique(np.abs(places), return_index=True)
+        return Points(places[kept], *(column[kept] for column in columns))
+
+    @property
+    def columns(self) -> tuple[Any, ...]:
+        """All of them."""
+        return self.places, self.force, self.stress, self.stable, self.buckled
+
+
+@dataclass(frozen=True)
+class Panels:
+    """A function that is one polynomial on each panel.
+
+    Attributes
+    ----------
+    ends : (k + 1,) array
+        Of the panels, increasing.
+    coefficients : (k, NODES) array
+        Of the Chebyshev polynomials; NaN where a node is not known.
+    """
+
+    ends: FloatArray
+    coefficients: FloatArray
+
+    def at(self, x: FloatArray) -> FloatArray:
+        """Return the function at some places, by Clenshaw's recurrence; beyond the ends by the nearest panel's."""
+        panel = np.searchsorted(self.ends[1:-1], x, side="right")
+        low, high = self.ends[panel], self.ends[panel + 1]
+        t = (2.0 * x - low - high) / (high - low)
+        c, one, two = self.coefficients[panel], np.zeros(x.shape), np.zeros(x.shape)
+        for k in range(NODES - 1, 0, -1):
+            one, two = c[..., k] + 2.0 * t * one - two, one
+        found: FloatArray = c[..., 0] + t * one - two
+        return found
+
+
+@dataclass(frozen=True)
+class Traced:
+    """A path as a function of the travel, from zero on.
+
+    Attributes
+    ----------
+    points : Points
+        Travels all of one sign.
+    panels : Panels
+        Force [N] over the size of the travel [m].
+    edges : tuple of float
+        Zero, the bifurcations and the end [m].
+    problem : str
+        Why the path ends early; empty if it does not.
+    """
+
+    points: Points
+    panels: Panels | None
     edges: tuple[float, ...]
-    smooth: bool
     problem: str = ""
 
     @property
@@ -70,32 +139,27 @@ class Traced:
         return np.searchsorted(inner, self.sense * np.asarray(travel), side="right")
 
     @cached_property
-    def _laws(self) -> list[Callable[[FloatArray], Any]]:
-        """One function of the travel for each piece between two edges."""
-        from scipy.interpolate import CubicSpline
-
-        pieces = self._piece(self.places)
-        found: list[Callable[[FloatArray], Any]] = []
-        for number in range(len(self.edges) - 1):
-            here = np.flatnonzero(pieces == number)
-            x, y = self.sense * self.places[here], self.force[here]
-            if self.smooth and len(here) >= 4:
-                found.append(CubicSpline(x, y))
-            elif len(here):
-                found.append(partial(np.interp, xp=x, fp=y))
-            else:
-                found.append(partial(np.interp, xp=self.sense * self.places, fp=self.force))
+    def _stresses(self) -> list[Callable[[FloatArray], FloatArray]]:
+        """The stress on each piece, as a function of the travel's size."""
+        pieces, own = self._piece(self.points.places), self.sense * self.points.places
+        ends = self.sense * np.array(self.edges)
+        found = []
+        for number, (low, high) in enumerate(pairwise(ends)):
+            here = pieces == number
+            found.append(_stress_law(own[here], self.points.stress[here], float(low), float(high)))
         return found
 
     def at(self, travel: FloatArray) -> tuple[FloatArray, FloatArray, Any, Any]:
         """Return force, stress, stability and form at some travels [m]; NaN beyond the end."""
         x, pieces = self.sense * np.asarray(travel, dtype=float), self._piece(travel)
-        force = np.empty(x.shape)
-        for number, law in enumerate(self._laws):
-            chosen = pieces == number
-            force[chosen] = law(x[chosen])
-        own = self.sense * self.places
-        stress = np.interp(x, own, self.stress)
+        force, stress = np.full(x.shape, np.nan), np.full(x.shape, np.nan)
+        if self.panels is not None:
+            force = self.panels.at(x)
+            unknown = np.isnan(force)
+            force[unknown] = np.interp(x[unknown], self.sense * self.points.places, self.points.force)
+            for number, law in enumerate(self._stresses):
+                chosen = pieces == number
+                stress[chosen] = law(x[chosen])
         beyond = x > self.sense * self.edges[-1] * (1 + 1e-9) + 1e-15
         force[beyond], stress[beyond] = np.nan, np.nan
         return force, stress, self._stable[pieces], self._buckled[pieces]
@@ -109,60 +173,147 @@ class Traced:
     @cached_property
     def _buckled(self) -> Any:
         """Whether each piece is on a branch that was not there as made."""
-        return self._most(self.buckled, False)
+        return self._most(self.points.buckled, False)
 
     @cached_property
     def _stable(self) -> Any:
         """Whether each piece is stable."""
-        return self._most(self.stable, True)
+        return self._most(self.points.stable, True)
 
     def _most(self, flags: Any, empty: bool) -> Any:
         """Return what most of the points of each piece are."""
-        pieces = self._piece(self.places)
+        pieces = self._piece(self.points.places)
         found = [flags[pieces == number] for number in range(len(self.edges) - 1)]
         return np.array([one.mean() > 0.5 if len(one) else empty for one in found])
 
 
+def _stress_law(x: FloatArray, stress: FloatArray, low: float, high: float) -> Callable[[FloatArray], FloatArray]:
+    """Return the stress of a piece [Pa], monotone between its points in the angle arccos of the place."""
+    from scipy.interpolate import PchipInterpolator
+
+    def angle(place: FloatArray) -> FloatArray:
+        return np.asarray(np.arccos(np.clip(1.0 - 2.0 * (place - low) / (high - low), -1.0, 1.0)))
+
+    around = angle(x)
+    # the path's own points crowd at a bifurcation: two that all but coincide say nothing of the slope
+    kept = [0] if len(around) else []
+    for number in range(1, len(around)):
+        if around[number] - around[kept[-1]] > APART:
+            kept.append(number)
+    if len(kept) < 2:
+        return lambda place: np.full(place.shape, stress[0] if len(stress) else np.nan)
+    law = PchipInterpolator(around[kept], stress[kept])
+    return lambda place: np.asarray(law(angle(place)))
+
+
 def traced(network: Network, node: str, end: float, **control: Any) -> Traced:
     """Return what a network does while a node moves down by up to `end` [m], or up where that is negative."""
-    grids = (DENSE,) if control.get("imperfection") else GRIDS
-    for count in grids:
-        found = _once(network, node, end * np.arange(1, count + 1) / count, control)
-        gaps = np.abs(np.diff(found.edges[1:-1]))
-        # bifurcations close together may come from a point asked for next to one: other points tell
-        if found.problem or not (gaps < CLOSE * abs(found.edges[-1])).any():
+    route = Route(network, node, control)
+    for count in GRIDS:
+        grid = end * np.arange(1, count + 1) / count
+        points, edges, problem = _begun(*route.through(grid))
+        gaps = np.abs(np.diff(edges[1:-1]))
+        # bifurcations close together may come from a point requested next to one: other points tell
+        if problem or not (gaps < CLOSE * abs(edges[-1])).any():
             break
-    return found
+    panels, points = _resolved(route, edges, points, grid) if edges[-1] else (None, points)
+    return Traced(points, panels, edges, problem)
 
 
-def _once(network: Network, node: str, places: FloatArray, control: dict[str, Any]) -> Traced:
-    from cfmkit.beams import Control, Displacement, PathStatus, trace
+@dataclass
+class Route:
+    """What is traced, and by which tolerance that works."""
 
-    path: Path = trace(network, Displacement(node, DOWN, places), Control(**control))
-    sense = np.sign(places[-1])
-    kept = _forward(sense * path.drive, np.asarray(path.accurate))
-    stress = np.max([path.beam_stress(name)[0] for name in network.beams], axis=0)[kept]
-    reached = float(path.drive[kept[-1]]) if len(kept) else 0.0
+    network: Network
+    node: str
+    control: dict[str, Any]
+    tolerances: tuple[float, ...] = TOLERANCES
+
+    def through(self, places: FloatArray) -> tuple[Path, FloatArray]:
+        """Return the path through some places, by the strictest tolerance that it reaches, and the places."""
+        from cfmkit.beams import Control, Displacement, PathStatus, trace
+
+        drive = Displacement(self.node, DOWN, places)
+        for number, tolerance in enumerate(self.tolerances):
+            path = trace(self.network, drive, Control(**({"tolerance": tolerance} | self.control)))
+            if path.status is not PathStatus.INACCURATE:
+                self.tolerances = self.tolerances[number:]
+                break
+        return path, places
+
+
+def _begun(path: Path, places: FloatArray) -> tuple[Points, tuple[float, ...], str]:
+    """Return the points of a first path with that of zero, its edges, and why it ends early."""
+    from cfmkit.beams import PathStatus
+
+    sense, points = np.sign(places[-1]), _points(path, places)
+    reached = float(points.places[-1]) if len(points.places) else 0.0
     whole = abs(reached - places[-1]) <= 1e-9 * abs(places[-1])
-    events = [event.drive for event in path.events if event.kind == "bifurcation"]
+    events = sorted((e.drive for e in path.events if e.kind == "bifurcation"), key=abs)
+    inner: list[float] = []
+    for event in events:  # one that is found from both sides is one
+        if 0 < sense * event < sense * reached and abs(event - (inner[-1] if inner else 0.0)) > 1e-10:
+            inner.append(event)
     problem = "" if path.status is PathStatus.COMPLETE and whole else path.message
-    inner = tuple(sorted({round(event, 10) for event in events if 0 < sense * event < sense * reached}, key=abs))
-    names = np.asarray(path.branch)[kept]
-    first = 0 if len(kept) and path.drive[kept[0]] == 0 else 1  # the pose as made, where the path does not list it
-    zero = [0.0] * first
-    return Traced(
-        np.concatenate([zero, path.drive[kept]]),
-        np.concatenate([zero, path.effort[kept]]),
-        np.concatenate([zero, stress]),
-        np.concatenate([[True] * first, path.stable[kept]]).astype(bool),
-        np.concatenate([[False] * first, np.char.startswith(names, "bifurcated")]).astype(bool),
-        (0.0, *inner, reached),
-        not control.get("imperfection"),
-        problem,
-    )
+    zero = Points(*(np.array([value]) for value in (0.0, 0.0, 0.0, True, False)))  # the pose as made
+    return zero.joined(points), (0.0, *inner, reached), problem
 
 
-def _forward(drive: FloatArray, accurate: Any) -> Any:
-    """Return the indices of accurate points at which the drive is farther than ever before."""
-    farthest = np.maximum.accumulate(np.concatenate([[-1e-30], drive[:-1]])) if len(drive) else drive
-    return np.flatnonzero(accurate & (drive > farthest + 1e-15))
+def _points(path: Path, places: FloatArray) -> Points:
+    """Return the accurate points of a path at which the drive is farther than ever before."""
+    drive = np.array(path.drive)
+    asked = path.asked >= 0
+    drive[asked] = places[path.asked[asked]]  # to the last digit, so that nodes are found again
+    size = np.sign(places[-1]) * drive
+    farthest = np.maximum.accumulate(np.concatenate([[-1e-30], size[:-1]])) if len(size) else size
+    kept = np.flatnonzero(np.asarray(path.accurate) & (size > farthest + 1e-15))
+    stress = np.max([path.beam_stress(name)[0] for name in path.layout.network.beams], axis=0)
+    buckled = np.char.startswith(np.asarray(path.branch).astype(str), "bifurcated")
+    return Points(drive[kept], path.effort[kept], stress[kept], path.stable[kept].astype(bool), buckled[kept])
+
+
+def _resolved(route: Route, edges: tuple[float, ...], points: Points, grid: FloatArray) -> tuple[Panels, Points]:
+    """Return the force as panels that have converged, and all points that were traced for them."""
+    sense = np.sign(edges[-1])
+    ends, count = sense * np.array(edges), CORNERED if route.control.get("imperfection") else WIDE
+    pieces = list(pairwise(ends.tolist()))
+    # points in every piece and those of the first path: none that follows may step over a bifurcation that this one saw
+    guards = [np.linspace(*piece, 5)[1:-1] for piece in pieces]
+    guards.append(sense * grid[np.abs(grid) < ends[-1]])
+    early = min(float(ends[1]), EARLY * float(ends[-1]))
+    wanted = [panel for piece in pieces for panel in pairwise(np.linspace(*piece, count + 1).tolist())]
+    done: dict[tuple[float, float], FloatArray] = {}
+    for left in range(HALVINGS, -1, -1):
+        places = np.unique(np.concatenate([*guards, *(_nodes(panel) for panel in wanted)]))
+        points = points.joined(_points(*route.through(sense * places)))
+        size = sense * points.places
+        largest = np.maximum.accumulate(np.abs(points.force))
+        halves: list[tuple[float, float]] = []
+        for panel in wanted:
+            found = _coefficients(panel, size, points.force)
+            scale = largest[np.searchsorted(size, max(panel[1], early), side="right") - 1]
+            if left and np.abs(found[-3:]).max() > RESOLVED * scale:  # false where a node is missing
+                middle = 0.5 * (panel[0] + panel[1])
+                halves += [(panel[0], middle), (middle, panel[1])]
+            else:
+                done[panel] = found
+        if not halves:
+            break
+        wanted = halves
+    ordered = sorted(done)
+    borders = np.array([low for low, _ in ordered] + [ordered[-1][1]])
+    return Panels(borders, np.array([done[panel] for panel in ordered])), points
+
+
+def _nodes(panel: tuple[float, float]) -> FloatArray:
+    """Return the Chebyshev nodes of a panel, none of which is an end."""
+    low, high = panel
+    return np.asarray(0.5 * (low + high) + 0.5 * (high - low) * _UNIT)
+
+
+def _coefficients(panel: tuple[float, float], size: FloatArray, force: FloatArray) -> FloatArray:
+    """Return the Chebyshev coefficients of a panel from points that hold its nodes; NaN if one is missing."""
+    nodes = _nodes(panel)
+    at = np.minimum(np.searchsorted(size, nodes), len(size) - 1)
+    found: FloatArray = _TRANSFORM @ np.where(size[at] == nodes, force[at], np.nan)
+    return found
