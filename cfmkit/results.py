@@ -114,6 +114,9 @@ class Result:
         Motion of the pose that the band ranges are measured around [m or rad].
     allowable_stress : float, optional
         What the column ``max_stress`` is compared with [Pa].
+    load_cases : tuple of Curve
+        Curves of the same mechanism under other loads or settings whose stress counts beside that of the nominal one,
+        in ``stress_max``, ``safety_factor`` and ``usable_stroke``.
     tables : mapping
         More files of a run, by stem: what makes the table of each, ``adjustability`` for adjustability.csv.
     state : Any
@@ -130,6 +133,7 @@ class Result:
     target: float | None = None
     reference: float | None = None
     allowable_stress: float | None = None
+    load_cases: tuple[Curve, ...] = ()
     tables: Mapping[str, Callable[[], Table]] = field(default_factory=dict)
     state: Any = None
 

@@ -121,8 +121,9 @@ def _area(branch: Branch, window: Window) -> float:
 
 
 def stress_max(branch: Branch) -> float:
-    """Return the largest stress in the window."""
-    return float(_stress(branch.inside).max())
+    """Return the largest stress in the window, in whatever load case it is."""
+    beside = [float(one.stress.max()) for one in branch.inside_beside if one.stress is not None]
+    return max([float(_stress(branch.inside).max()), *beside])
 
 
 def safety_factor(branch: Branch) -> float:

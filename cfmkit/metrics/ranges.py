@@ -158,8 +158,9 @@ def _bad(branch: Branch, reference: float) -> list[Interval]:
     band = frame.band * (1 + ROUNDING)
     # two one-sided limits: the absolute value has a kink that linear interpolation would miss
     broken = _excess(trace, ratio - band) + _excess(trace, -band - ratio)
-    if frame.allowable_stress is not None and trace.stress is not None:
-        broken += _excess(trace, trace.stress - frame.allowable_stress * (1 + ROUNDING))
+    for one in (trace, *branch.beside):
+        if frame.allowable_stress is not None and one.stress is not None:
+            broken += _excess(one, one.stress - frame.allowable_stress * (1 + ROUNDING))
     return broken
 
 

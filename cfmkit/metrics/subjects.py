@@ -34,6 +34,8 @@ class Frame:
         Half width of the force band of ``usable_stroke``, as a fraction.
     valid : tuple of (float, float) or None
         Intervals of the motion in which the mechanism works as intended; None: everywhere.
+    load_cases : tuple of Curve
+        Whose stress counts beside the curve's own.
     """
 
     target: float | None = None
@@ -41,6 +43,7 @@ class Frame:
     allowable_stress: float | None = None
     band: float = 0.05
     valid: tuple[tuple[float, float], ...] | None = None
+    load_cases: tuple[Curve, ...] = ()
 
     def needed_target(self) -> float:
         """Return the target, which may not be zero.
@@ -141,6 +144,19 @@ class Branch:
         if covers(self.extent, window):
             return restrict(self.trace, window)
         return f"branch {self.name!r} covers {self.span(*self.extent)} only"
+
+    @cached_property
+    def beside(self) -> tuple[Trace, ...]:
+        """The same branch in the other load cases."""
+        return tuple(one for curve in self.frame.load_cases for one in traces(curve) if one.name == self.name)
+
+    @property
+    def inside_beside(self) -> tuple[Trace, ...]:
+        """What lies in the window of the other load cases, as far as each of them goes."""
+        if self.window is None:
+            return self.beside
+        clipped = ((one, max(one.extent[0], self.window.lo), min(one.extent[1], self.window.hi)) for one in self.beside)
+        return tuple(restrict(one, Window(low, high)) for one, low, high in clipped if low < high)
 
     @cached_property
     def spread(self) -> Spread:

@@ -182,11 +182,11 @@ _LOADS = (
         flatness.hysteresis_area,
         scope="loop",
     ),
-    Definition("stress_max", "stress", "largest stress in the window", flatness.stress_max),
+    Definition("stress_max", "stress", "largest stress in the window, of all load cases", flatness.stress_max),
     Definition(
         "safety_factor",
         "factor",
-        "allowable stress over the largest stress in the window; 1 or more is within the limit",
+        "allowable stress over the largest stress in the window, of all load cases; 1 or more is within the limit",
         flatness.safety_factor,
         "smallest",
     ),

@@ -29,6 +29,8 @@ FAMILY = Family(
         "rest_shift_max",
         "spring_stress_max",
         "bistable_stress_max",
+        "travel_stress_max",
+        "travel_safety_factor",
     ),
     branches=("load",),
     template="vcfm.yaml",

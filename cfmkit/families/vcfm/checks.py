@@ -148,18 +148,21 @@ def _yield(solution: Solution) -> Iterator[Finding]:
     if allowed is None:
         return
     slack = 1e-9 if solution.spec.analysis.fidelity == "exact" else CLOSED_FORM
-    for push in solution.pushes:
-        for name, stress in (("spring", push.spring_stress), ("leaves", push.leaves.stress)):
-            over = np.flatnonzero(stress > allowed * (1 + slack))
-            if len(over):
-                first, top = int(over[0]), int(stress.argmax())
-                yield finding(
-                    "yield",
-                    f"in the {name} the stress passes {mpa(allowed)} at {mm(float(push.travel[first]))} with a preload "
-                    f"of {mm(push.preload)} and reaches {mpa(float(stress[top]))} at {mm(float(push.travel[top]))}; "
-                    "use longer or thinner leaves, or less preload",
-                )
-                return
+    parts = [
+        (push, name, stress)
+        for push in solution.pushes
+        for name, stress in (("spring", push.spring_stress), ("leaves", push.leaves.stress))
+    ]
+    push, name, stress = max(parts, key=lambda part: float(part[2].max()))
+    over = np.flatnonzero(stress > allowed * (1 + slack))
+    if len(over):
+        first, top = int(over[0]), int(stress.argmax())
+        yield finding(
+            "yield",
+            f"in the {name} the stress passes {mpa(allowed)} at {mm(float(push.travel[first]))} with a preload "
+            f"of {mm(push.preload)} and reaches {mpa(float(stress[top]))} at {mm(float(push.travel[top]))}; "
+            "use longer or thinner leaves, or less preload",
+        )
 
 
 def _buckling(solution: Solution) -> Iterator[Finding]:

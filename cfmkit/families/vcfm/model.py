@@ -156,16 +156,18 @@ def analyze(spec: VcfmSpec, run: Run) -> Result:
         return Result(spec, Status.NO_EQUILIBRIUM, solution.sampler.problem)
     short = solution.nominal.travel[-1] < spec.travel * (1 - 1e-9) or bool(solution.sampler.problem)
     status = Status.PARTIAL if short else Status.COMPLETE
+    curves = tuple(_curve(push) for push in solution.pushes)
     return Result(
         spec=_as_run(spec),
         status=status,
         message=solution.sampler.problem if short else "",
-        curves=tuple(_curve(push) for push in solution.pushes),
+        curves=curves,
         values=values_of(solution),
         warnings=findings_of(solution),
         valid=_valid(solution),
         target=spec.design.force if spec.design else None,
         allowable_stress=spec.mechanism.material.allowable,
+        load_cases=curves[1:],
         tables={"adjustability": partial(adjustability, solution), "readings": partial(readings, solution)},
         state=solution,
     )

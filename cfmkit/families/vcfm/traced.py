@@ -15,7 +15,8 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.polynomial import chebyshev
+
+from cfmkit.numerics.panels import Panels, coefficients, nodes_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -35,9 +36,6 @@ TOLERANCES = (1e-9, 1e-7, 1e-6, 1e-5)
 """Of the path, relative to its largest force, which far beyond the flat pose is a thousand times the peak. Slender
 leaves that are pulled straight there do not reach the first: the next is taken."""
 
-NODES = 16
-"""Of a panel."""
-
 RESOLVED = 3e-8
 """Size of a panel's last coefficients, relative to the largest force so far, at which it has converged."""
 
@@ -53,9 +51,6 @@ APART = 1e-3
 
 EARLY = 0.25
 """Part of the travel within which the leaves have their peak, which is the scale of all before it."""
-
-_UNIT = chebyshev.chebpts1(NODES)
-_TRANSFORM = chebyshev.chebvander(_UNIT, NODES - 1).T * (np.where(np.arange(NODES), 2.0, 1.0) / NODES)[:, None]
 
 
 @dataclass(frozen=True)
@@ -79,33 +74,6 @@ class Points:
     def columns(self) -> tuple[Any, ...]:
         """All of them."""
         return self.places, self.force, self.stress, self.stable, self.buckled
-
-
-@dataclass(frozen=True)
-class Panels:
-    """A function that is one polynomial on each panel.
-
-    Attributes
-    ----------
-    ends : (k + 1,) array
-        Of the panels, increasing.
-    coefficients : (k, NODES) array
-        Of the Chebyshev polynomials; NaN where a node is not known.
-    """
-
-    ends: FloatArray
-    coefficients: FloatArray
-
-    def at(self, x: FloatArray) -> FloatArray:
-        """Return the function at some places, by Clenshaw's recurrence; beyond the ends by the nearest panel's."""
-        panel = np.searchsorted(self.ends[1:-1], x, side="right")
-        low, high = self.ends[panel], self.ends[panel + 1]
-        t = (2.0 * x - low - high) / (high - low)
-        c, one, two = self.coefficients[panel], np.zeros(x.shape), np.zeros(x.shape)
-        for k in range(NODES - 1, 0, -1):
-            one, two = c[..., k] + 2.0 * t * one - two, one
-        found: FloatArray = c[..., 0] + t * one - two
-        return found
 
 
 @dataclass(frozen=True)
@@ -284,13 +252,13 @@ def _resolved(route: Route, edges: tuple[float, ...], points: Points, grid: Floa
     wanted = [panel for piece in pieces for panel in pairwise(np.linspace(*piece, count + 1).tolist())]
     done: dict[tuple[float, float], FloatArray] = {}
     for left in range(HALVINGS, -1, -1):
-        places = np.unique(np.concatenate([*guards, *(_nodes(panel) for panel in wanted)]))
+        places = np.unique(np.concatenate([*guards, *(nodes_of(panel) for panel in wanted)]))
         points = points.joined(_points(*route.through(sense * places)))
         size = sense * points.places
         largest = np.maximum.accumulate(np.abs(points.force))
         halves: list[tuple[float, float]] = []
         for panel in wanted:
-            found = _coefficients(panel, size, points.force)
+            found = coefficients(panel, size, points.force)
             scale = largest[np.searchsorted(size, max(panel[1], early), side="right") - 1]
             if left and np.abs(found[-3:]).max() > RESOLVED * scale:  # false where a node is missing
                 middle = 0.5 * (panel[0] + panel[1])
@@ -303,17 +271,3 @@ def _resolved(route: Route, edges: tuple[float, ...], points: Points, grid: Floa
     ordered = sorted(done)
     borders = np.array([low for low, _ in ordered] + [ordered[-1][1]])
     return Panels(borders, np.array([done[panel] for panel in ordered])), points
-
-
-def _nodes(panel: tuple[float, float]) -> FloatArray:
-    """Return the Chebyshev nodes of a panel, none of which is an end."""
-    low, high = panel
-    return np.asarray(0.5 * (low + high) + 0.5 * (high - low) * _UNIT)
-
-
-def _coefficients(panel: tuple[float, float], size: FloatArray, force: FloatArray) -> FloatArray:
-    """Return the Chebyshev coefficients of a panel from points that hold its nodes; NaN if one is missing."""
-    nodes = _nodes(panel)
-    at = np.minimum(np.searchsorted(size, nodes), len(size) - 1)
-    found: FloatArray = _TRANSFORM @ np.where(size[at] == nodes, force[at], np.nan)
-    return found

@@ -39,6 +39,12 @@ DEFINITIONS = {
     "stiffness_mismatch": ("ratio", "|K_p - K_n| times the length of the window over the constant force"),
     "spring_stress_max": ("stress", "largest stress of the spring up to the end of the window, over all preloads"),
     "bistable_stress_max": ("stress", "largest stress of the leaves up to the end of the window, over all preloads"),
+    "travel_stress_max": (
+        "stress",
+        "largest stress of leaves and spring over the whole travel and all preloads: unless a stop ends the travel "
+        "with the window, this one counts",
+    ),
+    "travel_safety_factor": ("factor", "allowable stress over that"),
 }
 
 
@@ -50,6 +56,8 @@ def values_of(solution: Solution) -> Mapping[str, Quantity]:
     force = solution.constant_force
     span = solution.window[1] - solution.window[0]
     leaves, spring = np.max([push.largest_stress(solution.window[1]) for push in solution.pushes], axis=0).tolist()
+    over_travel = max(max(push.largest_stress(np.inf)) for push in solution.pushes)
+    allowed = solution.spec.mechanism.material.allowable
     numbers: dict[str, float | None] = {
         "positive_stiffness": one.positive_stiffness,
         "negative_stiffness": one.negative_stiffness,
@@ -70,6 +78,8 @@ def values_of(solution: Solution) -> Mapping[str, Quantity]:
         "stiffness_mismatch": abs(one.positive_stiffness - one.negative_stiffness) * span / force if force else None,
         "spring_stress_max": spring,
         "bistable_stress_max": leaves,
+        "travel_stress_max": over_travel,
+        "travel_safety_factor": allowed / over_travel if allowed and over_travel else None,
     } | _adjustment(solution)
     return {name: _quantity(name, value) for name, value in numbers.items()}
 

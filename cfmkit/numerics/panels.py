@@ -1,0 +1,74 @@
+"""Functions of one variable as a row of Chebyshev polynomials, each on a panel of its own.
+
+A panel's polynomial goes through the values at its nodes, none of which is an end: a jump or a kink between two panels
+does no harm. How fast the coefficients fall says whether a panel is short enough.
+
+Reference
+---------
+L. N. Trefethen, Approximation Theory and Approximation Practice, SIAM (2013), ch. 2-4.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.polynomial import chebyshev
+
+if TYPE_CHECKING:
+    from cfmkit.curves import FloatArray
+
+NODES = 16
+"""Of a panel."""
+
+_UNIT = chebyshev.chebpts1(NODES)
+_TRANSFORM = chebyshev.chebvander(_UNIT, NODES - 1).T * (np.where(np.arange(NODES), 2.0, 1.0) / NODES)[:, None]
+
+
+@dataclass(frozen=True)
+class Panels:
+    """A function that is one polynomial on each panel.
+
+    Attributes
+    ----------
+    ends : (k + 1,) array
+        Of the panels, increasing.
+    coefficients : (k, NODES) array
+        Of the Chebyshev polynomials; NaN where a node is not known.
+    """
+
+    ends: FloatArray
+    coefficients: FloatArray
+
+    def at(self, x: FloatArray) -> FloatArray:
+        """Return the function at some places, by Clenshaw's recurrence; beyond the ends by the nearest panel's."""
+        panel = np.searchsorted(self.ends[1:-1], x, side="right")
+        low, high = self.ends[panel], self.ends[panel + 1]
+        t = (2.0 * x - low - high) / (high - low)
+        c, one, two = self.coefficients[panel], np.zeros(x.shape), np.zeros(x.shape)
+        for k in range(NODES - 1, 0, -1):
+            one, two = c[..., k] + 2.0 * t * one - two, one
+        found: FloatArray = c[..., 0] + t * one - two
+        return found
+
+
+def nodes_of(panel: tuple[float, float]) -> FloatArray:
+    """Return the nodes of a panel between two ends, increasing."""
+    low, high = panel
+    return np.asarray(0.5 * (low + high) + 0.5 * (high - low) * _UNIT)
+
+
+def coefficients(panel: tuple[float, float], x: FloatArray, values: FloatArray) -> FloatArray:
+    """Return the Chebyshev coefficients of a panel from values at places that hold its nodes; NaN if one is missing.
+
+    Examples
+    --------
+    >>> x = nodes_of((0.0, 2.0))
+    >>> coefficients((0.0, 2.0), x, x**2)[:3].round(12).tolist()
+    [1.5, 2.0, 0.5]
+    """
+    nodes = nodes_of(panel)
+    at = np.minimum(np.searchsorted(x, nodes), len(x) - 1)
+    found: FloatArray = _TRANSFORM @ np.where(x[at] == nodes, values[at], np.nan)
+    return found
