@@ -131,16 +131,21 @@ class Report:
         return replace(self, metrics={**self.metrics, **metrics}, supplement=both)
 
     def as_json(self) -> dict[str, Any]:
-        """Return what metrics.json says."""
-        from cfmkit.metrics import metrics_json
+        """Return what metrics.json says; what only a design search knows is a block of its own, no metric."""
+        from cfmkit.metrics import metrics_json, search_json
 
-        return {
-            "status": self.status.key,
-            "message": self.message,
-            "metrics": metrics_json(self.metrics),
-            "requirements": [outcome.as_json() for outcome in self.requirements],
-            "warnings": [{"name": item.name, "message": item.message} for item in self.warnings],
-        } | dict(self.supplement.data)
+        searched = {"search": search_json(self.design.search)} if self.design and self.design.search else {}
+        return (
+            {
+                "status": self.status.key,
+                "message": self.message,
+                "metrics": metrics_json(self.metrics),
+                "requirements": [outcome.as_json() for outcome in self.requirements],
+                "warnings": [{"name": item.name, "message": item.message} for item in self.warnings],
+            }
+            | searched
+            | dict(self.supplement.data)
+        )
 
 
 def worst(codes: list[ExitCode]) -> ExitCode:

@@ -88,6 +88,28 @@ class Quantity:
 
 
 @dataclass(frozen=True)
+class Searched:
+    """A number that only a design search knows, with the model and the window that it is of.
+
+    Attributes
+    ----------
+    quantity : Quantity
+        Its definition says in words of its own what it is: it never poses as a metric.
+    model : str
+        The model that was solved, as ``analysis.fidelity`` names it.
+    window : (float, float) or None
+        Between which ends of the motion it holds [m or rad]; None where there is no window to it.
+    motion : str
+        Dimension of the window: "length" or "angle".
+    """
+
+    quantity: Quantity
+    model: str
+    window: tuple[float, float] | None = None
+    motion: str = "length"
+
+
+@dataclass(frozen=True)
 class Result:
     """The outcome of one analysis.
 
@@ -184,8 +206,8 @@ class Design:
         Where there is no design: path of the specification -> the nearest value for which there would be one.
     warnings : tuple of Finding
         What the user must know.
-    values : mapping
-        What was found out beside the analysis of the new specification.
+    search : mapping
+        What only the search knows, by name: of its starts, of its audit, of parts that it has drawn.
     notes : tuple of (str, str)
         Paragraphs of the page: the word that begins each, and the text.
     tables : mapping
@@ -198,7 +220,7 @@ class Design:
     active_bounds: tuple[str, ...] = ()
     nearest_feasible: Mapping[str, str] = field(default_factory=dict)
     warnings: tuple[Finding, ...] = ()
-    values: Mapping[str, Quantity] = field(default_factory=dict)
+    search: Mapping[str, Searched] = field(default_factory=dict)
     notes: tuple[tuple[str, str], ...] = ()
     tables: Mapping[str, Callable[[], Table]] = field(default_factory=dict)
 

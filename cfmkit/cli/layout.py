@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from rich.table import Table
 from rich.text import Text
 
-from cfmkit.cli.rows import rows
+from cfmkit.cli.rows import rows, searched
 from cfmkit.cli.terminal import BAD, FAINT, GOOD, LABEL
 from cfmkit.errors import ExitCode
 from cfmkit.specfile import STDIN
@@ -46,6 +46,8 @@ def _page(outcome: Outcome, terminal: Terminal) -> Iterator[RenderableType]:
         yield Text()
     for word, text in found.supplement.lines:
         yield from paragraph(word, text, terminal.width)
+    for text in searched(found.design.search) if found.design else ():
+        yield from paragraph("search", text, terminal.width)
     yield from _verdict(outcome, terminal.width)
     yield from _warnings(outcome, terminal.width)
     yield from written(outcome.folder, [*outcome.written, "manifest.json"], terminal)

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from cfmkit.metrics import Outcome
     from cfmkit.report import Report
-    from cfmkit.results import Quantity
+    from cfmkit.results import Quantity, Searched
     from cfmkit.spec import Requirement
 
 HEADLINE = (
@@ -59,6 +59,16 @@ def rows(report: Report, everything: bool = False) -> list[Row]:
     found = [_row(report, name) for name in plain if _has_value(report, name)]
     required = zip(report.result.spec.requirements, report.requirements, strict=True)
     return [*found, *(_requirement(report, *pair) for pair in required)]
+
+
+def searched(found: Mapping[str, Searched]) -> list[str]:
+    """Return what only a design search knows: one paragraph for each model and window, which it names first."""
+    groups: dict[str, list[str]] = {}
+    for name, one in found.items():
+        if one.quantity.value is not None:
+            over = "" if one.window is None else f", {span(*one.window, one.motion)}"
+            groups.setdefault(one.model + over, []).append(f"{words(name)} {_short(one.quantity, 3)}")
+    return [f"{about}: {', '.join(told)}" for about, told in groups.items()]
 
 
 def words(name: str) -> str:

@@ -7,7 +7,7 @@ curve, `requirements` compares with bounds, `report` writes border units.
 
 from cfmkit.metrics.evaluation import Survey, evaluate, frame_of, measure, survey, window_of
 from cfmkit.metrics.known import definition_of, known_metrics, metrics_by_name, other_name
-from cfmkit.metrics.report import as_json, metrics_json
+from cfmkit.metrics.report import as_json, metrics_json, search_json
 from cfmkit.metrics.requirements import Outcome, check, requirement_problems, validate_requirements
 from cfmkit.metrics.subjects import Branch, Cycle, Frame
 from cfmkit.metrics.table import TABLE, Definition, definitions, split_name, unknown_metric, values_of_family
@@ -37,6 +37,7 @@ __all__ = [
     "other_name",
     "requirement_problems",
     "restrict",
+    "search_json",
     "split_name",
     "survey",
     "traces",

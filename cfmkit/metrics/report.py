@@ -10,7 +10,7 @@ from cfmkit.units import border_unit, to_border
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from cfmkit.results import Quantity
+    from cfmkit.results import Quantity, Searched
 
 
 def as_json(quantity: Quantity) -> dict[str, Any]:
@@ -42,3 +42,22 @@ def _reason(quantity: Quantity) -> dict[str, str]:
 def metrics_json(quantities: Mapping[str, Quantity]) -> dict[str, dict[str, Any]]:
     """Return the block ``metrics`` of metrics.json."""
     return {name: as_json(quantity) for name, quantity in quantities.items()}
+
+
+def search_json(found: Mapping[str, Searched]) -> dict[str, dict[str, Any]]:
+    """Return the block ``search`` of metrics.json: what a design search knows, with its model and window.
+
+    Examples
+    --------
+    >>> from cfmkit.results import Quantity, Searched
+    >>> search_json({"starts": Searched(Quantity(20.0, "count", "random starts"), "inextensible", (0.0, 0.01))})
+    {'starts': {'value': 20.0, 'unit': '1', 'definition': 'random starts', 'model': 'inextensible', \
+'window': [0.0, 10.0], 'window_unit': 'mm'}}
+    """
+    return {name: as_json(one.quantity) | _of(one) for name, one in found.items()}
+
+
+def _of(found: Searched) -> dict[str, Any]:
+    """Return model and window in border units."""
+    window = None if found.window is None else [finite_border(end, found.motion) for end in found.window]
+    return {"model": found.model, "window": window, "window_unit": window and border_unit(found.motion)}

@@ -22,14 +22,27 @@ def test_a_design_is_repeated_from_the_journal_with_the_same_bytes(cli, arch):
     first = cli("design", arch, "-o", "out", "--no-plots")
     assert first.code == 0
     design = (cli.folder / "out/design.yaml").read_bytes()
-    report = json.loads((cli.folder / "out/metrics.json").read_text())["metrics"]
-    assert report["audit_half_band"]["value"] < 0.01
-    assert report["tolerance_half_band_p90"]["value"] > report["audit_half_band"]["value"]
+    report = json.loads((cli.folder / "out/metrics.json").read_text())
+    assert report["metrics"]["half_band"]["value"] < 0.01
+    assert report["search"]["tolerance_half_band_p90"]["value"] > report["metrics"]["half_band"]["value"]
     again = cli("design", arch, "-o", "out", "--no-plots", "-j", "1")
     assert again.code == 0
     assert "2 from the journal" in " ".join(again.out.split())
     assert (cli.folder / "out/design.yaml").read_bytes() == design
     assert cli("analyze", "out/design.yaml", "-o", "judged", "--no-plots").code == 0
+
+
+def test_what_only_the_search_knows_is_a_block_of_its_own_with_model_and_window(cli, arch):
+    done = cli("design", arch, "-o", "out", "--no-plots", "--json")
+    told = json.loads((cli.folder / "out/metrics.json").read_text())
+    assert json.loads(done.out)["search"] == told["search"]
+    assert not any(name.startswith(("audit", "tolerance", "starts")) for name in told["metrics"])
+    starts, reissner = told["search"]["starts"], told["search"]["audit_half_band_reissner"]
+    assert (starts["value"], starts["unit"], starts["model"]) == (2.0, "1", "inextensible")
+    assert (reissner["model"], reissner["window"], reissner["window_unit"]) == ("reissner", [6.0, 12.0], "mm")
+    page = " ".join(cli("design", arch, "-o", "out", "--no-plots").out.split())
+    assert "search inextensible, 6 ... 12 mm: starts 2, " in page
+    assert "search reissner, 6 ... 12 mm: audit half band reissner " in page
 
 
 def test_without_a_shape_the_blocking_limit_and_the_nearest_value_are_named(cli, arch):

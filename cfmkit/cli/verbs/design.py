@@ -60,7 +60,7 @@ def compute(spec: Spec, run: Run) -> Report:
     design = api.design(spec, run)
     result = api.analyze(design.spec, run) if design.spec is not None else undesigned(spec, design)
     tables = {f"{stem}.csv": partial(_csv, table) for stem, table in design.tables.items()}
-    return report_on(result, design).beside(design.values, Supplement(files=tables, lines=design.notes))
+    return report_on(result, design).beside({}, Supplement(files=tables, lines=design.notes))
 
 
 def _csv(table: Callable[[], Table]) -> bytes:

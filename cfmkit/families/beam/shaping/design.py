@@ -13,7 +13,7 @@ from cfmkit.families.beam.findings import finding
 from cfmkit.families.beam.shaping.audit import Audit, Spread, audited
 from cfmkit.families.beam.shaping.infeasible import blocked, held_by
 from cfmkit.families.beam.shaping.multistart import Explored, deadline_of, explored, ranked
-from cfmkit.families.beam.shaping.report import notes_of, starts_table, values_of
+from cfmkit.families.beam.shaping.report import notes_of, search_of, starts_table
 from cfmkit.families.beam.shaping.search import Found, Plan, improved, widened
 from cfmkit.families.beam.shaping.task import Coordinate, Limits, Task
 from cfmkit.families.beam.shaping.variables import Variables
@@ -67,7 +67,7 @@ def shaped(spec: BeamSpec, wanted: Optimise, run: Run) -> Design:
         _told(task, found, result),
         active_bounds=held,
         warnings=_warnings(task, found, audit, result),
-        values=values_of(audit),
+        search=search_of(task, found, audit, result),
         notes=notes_of(audit, spread, held),
         tables={"starts": lambda: starts_table(task, result)},
     )
@@ -95,6 +95,8 @@ def task_of(spec: BeamSpec, wanted: Optimise) -> Task:
         objective=wanted.objective,
         half_band=wanted.half_band,
         compared=None if wanted.compare is None else (wanted.compare[0] / layers, wanted.compare[1] / layers),
+        fidelity=spec.fidelity,
+        layers=layers,
     )
 
 

@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.beam.words import percent
-from cfmkit.results import Quantity
+from cfmkit.results import Quantity, Searched
 from cfmkit.units import format_short
 
 if TYPE_CHECKING:
@@ -15,78 +14,97 @@ if TYPE_CHECKING:
 
     from cfmkit.families.beam.shaping.audit import Audit, Spread
     from cfmkit.families.beam.shaping.multistart import Explored
+    from cfmkit.families.beam.shaping.search import Found
     from cfmkit.families.beam.shaping.task import Task
     from cfmkit.tables import Table
 
+REISSNER = "reissner"
+
 DEFINITIONS = {
-    "audit_half_band": ("ratio", "(max - min)/(max + min) of the force over the window of the design"),
-    "audit_half_band_reissner": ("ratio", "the same with beams that stretch and shear"),
-    "audit_strict_range": ("ratio", "share of the travel up to d in which (max - min) <= 5 % of max"),
-    "audit_strict_range_reissner": ("ratio", "the same with beams that stretch and shear"),
-    "audit_stress": ("stress", "largest bending stress from rest to d"),
-    "audit_gap": ("length", "least gap between surfaces of different beams from rest to d, away from joints"),
-    "audit_crossings": ("count", "poses, of 61 from rest to d, at which beams cross"),
-    "tolerance_half_band_median": ("ratio", "median half band of networks within the tolerances"),
-    "tolerance_half_band_p90": ("ratio", "half band that nine of ten networks within the tolerances keep"),
-    "tolerance_strict_range_median": ("ratio", "median share of the travel with (max - min) <= 5 % of max"),
-    "tolerance_strict_range_p10": ("ratio", "share of the travel that nine of ten networks reach"),
-    "tolerance_lost": ("count", "networks within the tolerances that cannot be followed to d"),
+    "starts": ("count", "random starts that led to a shape"),
+    "starts_within_limits": ("count", "starts whose shape meets all limits, as the audit at more poses found"),
+    "traces": ("count", "networks that were followed over the window"),
+    "audit_gap": ("length", "least gap between surfaces of different beams at 61 poses from rest on, away from joints"),
+    "audit_crossings": ("count", "poses, of 61 from rest on, at which beams cross"),
+    "audit_half_band_reissner": (
+        "ratio",
+        "(max - min)/(max + min) of the force with beams that stretch and shear: `half_band` of "
+        "`cfmkit analyze design.yaml --fidelity reissner`",
+    ),
+    "audit_strict_range_reissner": (
+        "ratio",
+        "share of the travel in which (max - min) <= 5 % of max with beams that stretch and shear: "
+        "`strict_range_fraction` of the same command",
+    ),
+    "tolerance_half_band_median": (
+        "ratio",
+        "(max - min)/(max + min) of the median network drawn within tolerances",
+    ),
+    "tolerance_half_band_p90": (
+        "ratio",
+        "(max - min)/(max + min) that nine of ten such networks keep",
+    ),
+    "tolerance_strict_range_median": (
+        "ratio",
+        "share of the travel with (max - min) <= 5 % of max, median of them",
+    ),
+    "tolerance_strict_range_p10": (
+        "ratio",
+        "the same share that nine of ten of them reach",
+    ),
+    "tolerance_lost": ("count", "such networks that cannot be followed to the end of the window"),
 }
+"""What only the search knows. What the analysis of the design knows, too, is not said a second time."""
 
 
-def values_of(audit: Audit) -> Mapping[str, Quantity]:
-    """Return the audit by name."""
+def search_of(task: Task, found: Found, audit: Audit, result: Explored) -> Mapping[str, Searched]:
+    """Return what only the search knows, each number with the model and the window that it is of."""
+    asked, own, whole = (
+        (task.layers * first, task.layers * task.window[1]) for first in (task.window[0], found.start, 0.0)
+    )
+    told = dict.fromkeys(DEFINITIONS, (task.fidelity, whole))
+    told |= dict.fromkeys(("starts", "starts_within_limits", "traces"), (task.fidelity, asked))
+    told |= dict.fromkeys(("tolerance_half_band_median", "tolerance_half_band_p90"), (task.fidelity, own))
+    told |= {"audit_half_band_reissner": (REISSNER, own), "audit_strict_range_reissner": (REISSNER, whole)}
+    numbers = _counts(result) | _audited(audit)
+    return {name: Searched(Quantity(numbers[name], *DEFINITIONS[name]), *of) for name, of in told.items()}
+
+
+def _counts(result: Explored) -> dict[str, float | None]:
+    some = [one for one in result.found.values() if one is not None]
+    feasible = sum(one.feasible for one in some)
+    traces = sum(one.evaluations for one in some)
+    return {"starts": float(len(some)), "starts_within_limits": float(feasible), "traces": float(traces)}
+
+
+def _audited(audit: Audit) -> dict[str, float | None]:
     bands, ranges = audit.bands, audit.ranges
-    numbers: dict[str, float | None] = {
-        "audit_half_band": audit.half_band,
-        "audit_half_band_reissner": audit.stiff,
-        "audit_strict_range": audit.strict,
-        "audit_strict_range_reissner": audit.strict_stiff,
-        "audit_stress": audit.stress,
+    return {
         "audit_gap": audit.gap,
         "audit_crossings": float(audit.crossings),
+        "audit_half_band_reissner": audit.stiff,
+        "audit_strict_range_reissner": audit.strict_stiff,
         "tolerance_half_band_median": float(np.median(bands)) if len(bands) else None,
         "tolerance_half_band_p90": float(np.quantile(bands, 0.9)) if len(bands) else None,
         "tolerance_strict_range_median": float(np.median(ranges)) if len(ranges) else None,
         "tolerance_strict_range_p10": float(np.quantile(ranges, 0.1)) if len(ranges) else None,
         "tolerance_lost": float(audit.lost),
     }
-    return {name: Quantity(value, *DEFINITIONS[name]) for name, value in numbers.items()}
 
 
 def notes_of(audit: Audit, spread: Spread, held: tuple[str, ...]) -> tuple[tuple[str, str], ...]:
-    """Return the paragraphs of the page."""
-    return tuple(note for note in (_audit(audit), _tolerances(audit, spread), _held(held)) if note[1])
-
-
-def _audit(audit: Audit) -> tuple[str, str]:
-    parts = [
-        "stable all the way" if audit.stable else "not stable all the way",
-        "no crossings" if not audit.crossings else f"beams cross at {audit.crossings} poses",
-    ]
-    if audit.half_band is not None:
-        strict = percent(audit.strict or 0.0)
-        parts.append(f"force ± {percent(audit.half_band)} over the window, within 5 % over {strict} of the way")
-    if audit.stiff is not None:
-        parts.append(f"with stretching and shear ± {percent(audit.stiff)} and {percent(audit.strict_stiff or 0.0)}")
-    if audit.stress is not None:
-        parts.append(f"bending stress up to {format_short(audit.stress, 'stress')}")
-    if audit.gap is not None:
-        parts.append(f"gaps of at least {format_short(audit.gap, 'length')}")
-    return "audit", ", ".join(parts)
-
-
-def _tolerances(audit: Audit, spread: Spread) -> tuple[str, str]:
-    if not len(audit.bands):
-        return "spread", ""
-    lost = f"; {audit.lost} cannot be followed to the end" if audit.lost else ""
-    band, band_p90 = (percent(float(np.quantile(audit.bands, share))) for share in (0.5, 0.9))
-    kept, kept_p90 = (percent(float(np.quantile(audit.ranges, share))) for share in (0.5, 0.1))
-    return "spread", (
-        f"nodes off by {format_short(spread.nodes, 'length')} and coefficients by {spread.coefficients:g} rad "
-        f"(standard deviations, {spread.samples} networks): force ± {band} in the median, "
-        f"± {band_p90} in nine of ten; within 5 % over {kept} of the way in the median, {kept_p90} in nine of ten{lost}"
+    """Return the paragraphs of the page that hold no number of the block `search`."""
+    drawn = (
+        f"{spread.samples} networks with nodes off by {format_short(spread.nodes, 'length')} and coefficients by "
+        f"{spread.coefficients:g} rad (standard deviations)"
     )
+    sound = ", ".join(
+        (
+            "stable all the way" if audit.stable else "not stable all the way",
+            "no crossings" if not audit.crossings else f"beams cross at {audit.crossings} poses",
+        )
+    )
+    return tuple(note for note in (("audit", sound), ("drawn", drawn), _held(held)) if note[1])
 
 
 def _held(held: tuple[str, ...]) -> tuple[str, str]:

@@ -100,6 +100,10 @@ class Task:
         a and b of the objective of the paper [m].
     points : int
         Poses in the window.
+    fidelity : str
+        The model of the network, as ``analysis.fidelity`` names it.
+    layers : int
+        How many of the network stand in series in the mechanism: its displacements are so many times as large.
     """
 
     network: Network
@@ -116,6 +120,8 @@ class Task:
     half_band: float = 0.025
     compared: tuple[float, float] | None = None
     points: int = 17
+    fidelity: str = "inextensible"
+    layers: int = 1
 
     @cached_property
     def size(self) -> float:
