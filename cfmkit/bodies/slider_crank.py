@@ -75,16 +75,17 @@ class Linkage:
         reach = self.crank + self.coupler
         return math.sqrt((reach - self.offset) * (reach + self.offset))
 
-    @property
-    def nearest_position(self) -> float:
-        """The slider's x at the end of its way towards the pivot [m], for the branch to the right.
+    def way(self, angle: float) -> tuple[float, float]:
+        """Return the ends of the slider's way around the place it has at a crank angle [m], seen to the right.
 
-        Folded; where the offset is too large for that, the stretched position on the other side.
+        Distances along the way from the pivot's foot; of the left branch those of its mirror image. From stretched
+        to folded on one side of the foot; where the offset is too large to fold, stretched on either side.
         """
-        short = self.crank - self.coupler
+        short, far = self.crank - self.coupler, self.stretched_position
         if abs(self.offset) > abs(short):
-            return -self.stretched_position
-        return math.sqrt((short - self.offset) * (short + self.offset))
+            return -far, far
+        near = math.sqrt((short - self.offset) * (short + self.offset))
+        return (near, far) if self.branch * float(self.slider_position(np.asarray(angle))) >= 0.0 else (-far, -near)
 
     def arc(self, angle: float) -> tuple[float, float]:
         """Return the ends of the crank angles that can be reached from `angle` [rad]; infinite for a full turn.
@@ -122,9 +123,12 @@ class Linkage:
         return position
 
     def knee(self, angle: float) -> float:
-        """Return the angle from the coupler's direction to the crank's, in (-pi, pi]; 0 where stretched [rad]."""
+        """Return the angle from the coupler's direction to the crank's [rad]: 0 where stretched, pi where folded."""
         if abs(math.remainder(angle - self.stretched_angle, 2.0 * math.pi)) <= STRETCHED:
             return 0.0
+        folded = self.folded_angle
+        if folded is not None and abs(math.remainder(angle - folded, 2.0 * math.pi)) <= STRETCHED:
+            return math.pi
         return math.remainder(angle - float(self.coupler_angle(np.asarray(angle))), 2.0 * math.pi)
 
     def _run(self, lift: FloatArray) -> FloatArray:

@@ -22,6 +22,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from cfmkit.bodies.slider_crank import Linkage
     from cfmkit.curves import FloatArray
 
@@ -161,9 +163,10 @@ def along_slider(linkage: Linkage, unloaded: float, side: int, travel: FloatArra
     """Return the unit curves over the slider's travel towards the pivot: effort is a force at the slider [B, eq. 2-7].
 
     Everything is written in the knee angle psi between crank and coupler, which the travel
-    gives without cancellation: x_s^2 - x^2 = 4 r1 r2 sin^2(psi/2), x_s the stretched position. Where the
-    springs are relaxed in the stretched position, the effort at its 0/0 is the limit; otherwise it
-    is infinite there. NaN where the linkage does not reach, and as the stiffness at the stretched position.
+    gives without cancellation: x_s^2 - x^2 = 4 r1 r2 sin^2(psi/2), x_s the stretched position. x has a sign:
+    beyond the pivot's foot the same travel leads away from the pivot. Where the springs are relaxed in the
+    stretched or the folded position, the effort at its 0/0 is the limit; otherwise it grows without bound towards
+    both. NaN where the linkage does not reach, and as the stiffness at those positions.
 
     Parameters
     ----------
@@ -174,20 +177,19 @@ def along_slider(linkage: Linkage, unloaded: float, side: int, travel: FloatArra
     side : int
         1: the crank is beyond the stretched position (psi > 0), -1: before it.
     travel : (n,) array
-        From the unloaded position, positive towards the pivot [m].
+        From the unloaded position [m]; positive to the left on the right branch, to the right on the left one:
+        towards the pivot from where the linkage is stretched.
     """
     if linkage.branch < 0:
         mirror = along_slider(linkage.mirrored(), math.pi - unloaded, -side, travel)
         angle, position = math.pi - mirror.angle, -mirror.position
         return UnitCurves(angle, position, -mirror.turn, mirror.effort, mirror.stiffness)
     travel = np.asarray(travel, dtype=np.float64)
-    path = _SliderPath(linkage, linkage.knee(unloaded), side)
+    path = _SliderPath(linkage, unloaded, side)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         state = path.at(travel)
         effort, stiffness = path.efforts(state)
-    far = travel > path.x0 - linkage.nearest_position + 1e-12 * path.x0
-    near = travel < -path.slack - 1e-12 * path.x0
-    effort, stiffness = (np.where(far | near, np.nan, item) for item in (effort, stiffness))
+    effort, stiffness = (np.where(path.beyond(travel), np.nan, item) for item in (effort, stiffness))
     return UnitCurves(unloaded + state.turn[0], state.position, state.turn, effort, stiffness)
 
 
@@ -200,25 +202,61 @@ class _SliderState:
     turn: FloatArray
 
 
-class _SliderPath:
-    """The way of the slider of a linkage on one side of the stretched position."""
+NEARLY_FOLDED = 0.99
+"""Above this share of sin(psi/2) the knee angle is computed from its cosine, which keeps the digits next to pi."""
 
-    def __init__(self, linkage: Linkage, start: float, side: int) -> None:
-        self.linkage, self.start, self.side = linkage, start, side
-        xs = linkage.stretched_position
-        gap = 4.0 * linkage.crank * linkage.coupler * math.sin(0.5 * start) ** 2
-        self.x0 = math.sqrt(max(xs**2 - gap, 0.0))
-        self.slack = gap / (xs + self.x0)  # x_s - x0
-        self.phi0, self.chi0 = _shares(linkage, np.asarray(start))
+NEAR_FOOT = 0.01
+"""Below this share of the stretched position squared, x0 squared as a difference has lost digits."""
+
+
+class _SliderPath:
+    """The way of the slider of a linkage on one side of the stretched position.
+
+    The slider may be on either side of the pivot's foot, and may pass it where the offset is
+    too large for the links to fold: x has a sign, and the knee angle keeps its own.
+    """
+
+    def __init__(self, linkage: Linkage, unloaded: float, side: int) -> None:
+        knee = linkage.knee(unloaded)
+        self.linkage, self.side = linkage, side
+        self.start = side * math.pi if knee == math.pi else knee  # folded is on either side
+        xs, place = linkage.stretched_position, float(linkage.slider_position(np.asarray(unloaded)))
+        self.gap = 4.0 * linkage.crank * linkage.coupler * math.sin(0.5 * self.start) ** 2
+        square = max(xs**2 - self.gap, 0.0)
+        self.x0 = place if square < NEAR_FOOT * xs**2 else math.copysign(math.sqrt(square), place)
+        self.low, self.high = linkage.way(unloaded)
+        self.phi0, self.chi0 = _shares(linkage, np.asarray(self.start))
+
+    def beyond(self, travel: FloatArray) -> NDArray[np.bool_]:
+        """Return whether the slider cannot get there."""
+        slack = 1e-12 * abs(self.x0)
+        found: NDArray[np.bool_] = (travel > self.x0 - self.low + slack) | (travel < -self._room() - slack)
+        return found
+
+    def _room(self) -> float:
+        """Return how far the slider can be pulled away from the unloaded position [m]."""
+        xs = self.linkage.stretched_position
+        return self.gap / (xs + self.x0) if self.x0 >= 0.0 and self.high == xs else self.high - self.x0
+
+    def _to_stretched(self, travel: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the distances from the stretched positions on either side, x_s - x and x_s + x, without cancellation.
+
+        The product of both is x_s^2 - x^2.
+        """
+        xs = self.linkage.stretched_position
+        if self.x0 >= 0.0:
+            return np.maximum(self.gap / (xs + self.x0) + travel, 0.0), xs + (self.x0 - travel)
+        return xs + (travel - self.x0), np.maximum(self.gap / (xs - self.x0) - travel, 0.0)
 
     def at(self, travel: FloatArray) -> _SliderState:
         """Return the state at some travels."""
         link = self.linkage
         position = self.x0 - travel
-        beyond = np.maximum(self.slack + travel, 0.0)
-        gap = beyond * (link.stretched_position + position)
-        share = np.sqrt(gap / (4.0 * link.crank * link.coupler))
-        knee = self.side * 2.0 * np.arcsin(np.minimum(share, 1.0))
+        ahead, behind = self._to_stretched(travel)
+        share = np.sqrt(ahead * behind / (4.0 * link.crank * link.coupler))
+        other = math.cos(0.5 * self.start) ** 2 - travel * (self.x0 + position) / (4.0 * link.crank * link.coupler)
+        folding = math.pi - 2.0 * np.arcsin(np.sqrt(np.clip(other, 0.0, 1.0)))
+        knee = self.side * np.where(share > NEARLY_FOLDED, folding, 2.0 * np.arcsin(np.minimum(share, 1.0)))
         e = link.offset
         view = np.arctan2(e * travel, position * self.x0 + e * e)  # how far the direction from A to C has turned
         phi, chi = _shares(link, knee)
@@ -235,7 +273,9 @@ class _SliderPath:
         view1, view2 = e / d2, 2.0 * e * x / d2**2
         views = np.array([1.0, 0.0, 1.0])[:, None]
         lever = x / (r1 * r2)  # psi' = lever / sin psi
-        ratio = np.where(sine == 0.0, by_knee, state.turn[:3] / sine) if self.start == 0.0 else state.turn[:3] / sine
+        ratio = state.turn[:3] / sine
+        if self.start == 0.0 or abs(self.start) == math.pi:  # 0/0 where relaxed: the limit is that of the slopes
+            ratio = np.where(knee == self.start, by_knee / np.cos(self.start), ratio)
         effort = state.turn[:3] * views * view1 + ratio * by_knee * lever
         bend = r1 * r2 * (r2**2 - r1**2) * sine / d2**2
         bends = np.stack([bend, np.zeros_like(knee), bend])
@@ -244,7 +284,7 @@ class _SliderPath:
         first = views * view1 + by_knee * knee1
         second = views * view2 + bends * knee1**2 + by_knee * knee2
         stiffness = first**2 + state.turn[:3] * second
-        stiffness[:, sine == 0.0] = np.nan
+        stiffness[:, (sine == 0.0) | (np.abs(knee) == math.pi)] = np.nan
         travel = -state.turn[3]
         return np.vstack([effort, travel[None]]), np.vstack([stiffness, np.ones_like(travel)[None]])
 

@@ -237,7 +237,8 @@ class _Ground:
             axis=1
         )
         start, step = start[keep], step[keep]
-        count = np.minimum(np.ceil(np.abs(step).max(axis=1, initial=0.0) / CELL).astype(int) + 1, 2000)
+        # of a segment that leaves the axes by far, as many cells; the limit comes first, or the integer overflows
+        count = np.minimum(np.ceil(np.abs(step).max(axis=1, initial=0.0) / CELL) + 1, 2000).astype(int)
         if not len(count):
             return
         which = np.repeat(np.arange(len(count)), count)

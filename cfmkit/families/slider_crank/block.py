@@ -7,7 +7,7 @@ found on the closed form, for all designs side by side.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -176,9 +176,10 @@ def _base(spec: SliderCrankSpec) -> Base | None:
     except CannotBuild:
         return None
     low, high = asked_motion(spec, assembly)
-    first, last = assembly.reach
     base = Base(spec, assembly, low, high)
-    whole = first <= low and high <= last and np.isfinite(base.units.effort).all()
+    whole = (
+        replace(assembly, rates=np.ones(4)).within(low, high) == (low, high) and np.isfinite(base.units.effort).all()
+    )
     return base if whole and np.isfinite(base.nodes[1].effort).all() else None
 
 

@@ -21,7 +21,10 @@ if TYPE_CHECKING:
 TURN = 2.0 * math.pi
 
 SHORT_OF_END = 1e-3
-"""Share of an arc that the default motion stays away from its ends, where efforts have no bound."""
+"""Share of an arc that a motion stays away from its ends, where efforts have no bound."""
+
+CLOSEST = 1e-6
+"""Nearer to such an end, as a share of the way to it, the last digits of the motion decide the effort's."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +75,8 @@ class Assembly:
     @property
     def rest(self) -> float:
         """The motion at which the springs are relaxed; NaN on the side of the stretched position where they are not."""
-        other_side = self.drive == "force" and self.side * self.linkage.knee(self.unloaded) < 0.0
+        knee = self.linkage.knee(self.unloaded)
+        other_side = self.drive == "force" and self.side * knee < 0.0 and knee != math.pi
         return math.nan if other_side else self.start
 
     @property
@@ -80,16 +84,53 @@ class Assembly:
         """Ends of the motion that the linkage allows [rad or m]; infinite where the crank turns fully."""
         if self.drive == "torque":
             return self.linkage.arc(self.unloaded)
-        way = self.linkage.branch * float(self.linkage.slider_position(np.asarray(self.unloaded)))
-        relaxed_there = self.linkage.knee(self.unloaded) == 0.0
-        first = 0.0 if relaxed_there else way - self.linkage.stretched_position
-        return first, way - self.linkage.nearest_position
+        place = self.linkage.branch * float(self.linkage.slider_position(np.asarray(self.unloaded)))
+        low, high = self.linkage.way(self.unloaded)
+        first, last = self._relaxed_ends
+        return 0.0 if first else place - high, 0.0 if last else place - low
+
+    @property
+    def _relaxed_ends(self) -> tuple[bool, bool]:
+        """Whether the springs are relaxed at the first, and at the last place that a driven slider can reach."""
+        stretched, folded = (self.linkage.knee(self.unloaded) == knee for knee in (0.0, math.pi))
+        past = self.linkage.branch * float(self.linkage.slider_position(np.asarray(self.unloaded))) < 0.0
+        return (folded, stretched) if past else (stretched, folded)
+
+    @property
+    def poles(self) -> tuple[bool, bool]:
+        """Whether the effort grows without bound towards the first, and towards the last place of the reach.
+
+        A drive loses its hold in a dead point: nothing but springs that are relaxed there, or that it drives itself,
+        give it a finite effort.
+        """
+        if self.drive == "torque":
+            held = bool(self.rates[1:].any())
+            first, last = (held and math.isfinite(end) and end != self.unloaded for end in self.reach)
+            return first, last
+        link, held = self.linkage, bool(self.rates[:3].any())
+        ends = link.way(self.unloaded)[::-1]
+        first, last = (held and end != 0.0 and not rest for end, rest in zip(ends, self._relaxed_ends, strict=True))
+        return first, last
+
+    def within(self, low: float, high: float) -> tuple[float, float]:
+        """Return the part of a motion that is within reach, and ends before the efforts grow without bound.
+
+        What keeps off a pole by itself is left as it is. What touches or passes it ends `SHORT_OF_END` of the way
+        from the unloaded position before it: there the effort is some thirty times what it is elsewhere.
+        """
+        (first, last), (at_first, at_last) = self.reach, self.poles
+        if at_first and low < first + CLOSEST * (self.start - first):
+            first += SHORT_OF_END * (self.start - first)
+        if at_last and high > last - CLOSEST * (last - self.start):
+            last -= SHORT_OF_END * (last - self.start)
+        return max(low, first), min(high, last)
 
     @property
     def stretched(self) -> float:
         """The motion in the stretched position nearest to the unloaded one."""
         if self.drive == "force":
-            return self.reach[0]
+            first, last = self.reach
+            return first if self.linkage.way(self.unloaded)[1] == self.linkage.stretched_position else last
         return self.unloaded - math.remainder(self.unloaded - self.linkage.stretched_angle, TURN)
 
 

@@ -127,7 +127,10 @@ def _height(spec: SliderCrankSpec, lengths: dict[str, float]) -> float:
     first, last = task.allowed
     if wanted.window[0] < first - 1e-9 or wanted.window[1] > last + 1e-9:
         return math.inf
-    goal = task.goal(wanted.window)
+    try:
+        goal = task.goal(wanted.window)
+    except Infeasible:
+        goal = None
     if goal is None:
         return math.inf
     least = wanted.objective == "least-squares"

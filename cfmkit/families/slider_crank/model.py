@@ -30,12 +30,16 @@ from cfmkit.families.slider_crank.values import values_of
 from cfmkit.results import Result, Status
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
     from cfmkit.bodies.slider_crank_springs import UnitCurves
     from cfmkit.families.base import Run
     from cfmkit.families.slider_crank.build import Assembly
     from cfmkit.families.slider_crank.spec import SliderCrankSpec
     from cfmkit.results import Finding
 
+
+Ends = tuple[float, float]
 
 RATES = {f"mechanism.springs.{name}": row for row, name in enumerate(JOINTS)}
 """Where a specification has the rates, and the rows of the springs."""
@@ -143,14 +147,14 @@ def analyze(spec: SliderCrankSpec, run: Run) -> Result:
         solution, shortfalls = solve(spec, assembly)
     except CannotBuild as problem:
         return no_result(spec, problem.finding)
-    status = Status.PARTIAL if shortfalls else Status.COMPLETE
+    status, said = Status.PARTIAL if shortfalls else Status.COMPLETE, {item.name for item in shortfalls}
     return Result(
         spec=_as_run(spec, assembly),
         status=status,
         message=shortfalls[0].message if shortfalls else "",
         curves=(_curve(solution),),
         values=values_of(solution),
-        warnings=(*shortfalls, *findings_of(spec, solution)),
+        warnings=(*shortfalls, *(item for item in findings_of(spec, solution) if item.name not in said)),
         target=target_of(spec),
         reference=solution.reference,
         state=solution,
@@ -178,21 +182,20 @@ def solve(spec: SliderCrankSpec, assembly: Assembly) -> tuple[Solution, tuple[Fi
     CannotBuild
         If it reaches nothing of it.
     """
-    low, high = asked_motion(spec, assembly)
-    first, last = assembly.reach
-    short = _shortfall(assembly, (low, high), (first, last))
-    start, stop = max(low, first), min(high, last)
-    if short is not None and not start < stop:
-        raise CannotBuild(short)
+    asked = asked_motion(spec, assembly)
+    start, stop = assembly.within(*asked)
+    short = tuple(_shortfalls(assembly, asked, (start, stop)))
+    if short and not start < stop:
+        raise CannotBuild(short[0])
     motion = np.linspace(start, stop, spec.analysis.points)
     units = assembly.units(motion)
     finite = np.isfinite(units.effort[assembly.rates > 0.0]).all(axis=0)
-    if not finite.all():  # at an end of the motion only: the unbounded place itself is left out
+    if not finite.all():  # where springs are relaxed in a dead point of the crank: 0/0 in that place alone
         motion = motion[finite]
         units = assembly.units(motion)
     character = Character(assembly, start, stop, spec.analysis.tolerance, window_of(spec))
     solution = Solution(assembly, motion, units, character, reference_motion(spec, assembly), spec.mechanism.legs)
-    return solution, () if short is None else (short,)
+    return solution, short
 
 
 def window_of(spec: SliderCrankSpec) -> tuple[float, float] | None:
@@ -210,24 +213,46 @@ def efforts_inside(motion: FloatArray, units: UnitCurves, window: tuple[float, f
     return np.stack([np.interp(places, motion, row) for row in units.effort])
 
 
-def _shortfall(assembly: Assembly, asked: tuple[float, float], reach: tuple[float, float]) -> Finding | None:
-    """Return why the linkage does not reach all of a motion; None if it does."""
+def _shortfalls(assembly: Assembly, asked: Ends, run: Ends) -> Iterator[Finding]:
+    """Yield why the motion that is run through is less than what is asked for."""
+    reach = assembly.reach
     slack = 1e-9 * (asked[1] - asked[0])
-    if asked[0] >= reach[0] - slack and asked[1] <= reach[1] + slack:
-        return None
+    beyond = asked[0] < reach[0] - slack or asked[1] > reach[1] + slack
+    ends = zip(assembly.poles, reach, run, asked, strict=True)
+    poles = [(pole, end) for unbound, pole, end, wanted in ends if unbound and end != wanted]
     if assembly.drive == "torque":
-        whole = asked[1] - asked[0] >= TURN * (1 - 1e-9)
-        text = (
-            f"the crank reaches {deg(reach[0])} to {deg(reach[1])}, and {deg(asked[0])} to {deg(asked[1])} are asked "
-            "for: at the ends the coupler stands across the slider's way; ask for less, or lengthen the coupler "
-            f"beyond {mm(assembly.linkage.crank + abs(assembly.linkage.offset))} for full turns"
+        if beyond or poles:
+            yield _dead_point(assembly, asked, reach)
+        return
+    if beyond:
+        yield finding(
+            "out_of_reach",
+            f"from the unloaded position the slider can travel {mm(reach[0])} to {mm(reach[1])}, and {mm(asked[0])} to "
+            f"{mm(asked[1])} are asked for",
         )
-        return finding("no_full_turn" if whole else "coupler_dead_point", text)
-    text = (
-        f"from the unloaded position the slider can travel {mm(reach[0])} to {mm(reach[1])}, and {mm(asked[0])} to "
-        f"{mm(asked[1])} are asked for"
+    if poles:
+        yield unbounded(poles)
+
+
+def _dead_point(assembly: Assembly, asked: Ends, reach: Ends) -> Finding:
+    whole = asked[1] - asked[0] >= TURN * (1 - 1e-9)
+    return finding(
+        "no_full_turn" if whole else "coupler_dead_point",
+        f"the crank reaches {deg(reach[0])} to {deg(reach[1])}, and {deg(asked[0])} to {deg(asked[1])} are asked "
+        "for: at the ends the coupler stands across the slider's way; ask for less, or lengthen the coupler "
+        f"beyond {mm(assembly.linkage.crank + abs(assembly.linkage.offset))} for full turns",
     )
-    return finding("out_of_reach", text)
+
+
+def unbounded(poles: Sequence[tuple[float, float]]) -> Finding:
+    """Return that the force grows without bound at some travels, and where the curve ends before them [m]."""
+    places = " and ".join(mm(pole) for pole, _end in poles)
+    ends = " and ".join(mm(end) for _pole, end in poles)
+    return finding(
+        "force_unbounded",
+        f"at {places} of travel crank and coupler are in one line and the springs are not relaxed: no finite force "
+        f"takes the slider there; the curve ends before, at {ends}",
+    )
 
 
 def reference_motion(spec: SliderCrankSpec, assembly: Assembly) -> float:

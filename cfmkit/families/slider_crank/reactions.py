@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
+    from cfmkit.bodies.slider_crank import Linkage
     from cfmkit.bodies.slider_crank_springs import UnitCurves
     from cfmkit.curves import FloatArray
     from cfmkit.families.slider_crank.build import Assembly
@@ -35,7 +36,7 @@ def reactions(assembly: Assembly, units: UnitCurves, drive: FloatArray) -> tuple
         upwards) [N]; for the rates and the drive given, so of all legs together or of one.
     """
     link, rates, turn = assembly.linkage, assembly.rates, units.turn
-    beta = link.coupler_angle(units.angle)
+    beta = _coupler_angle(link, units)
     along = -rates[3] * turn[3] - link.branch * drive  # force of spring and drive on the slider, along x
     moment = -rates[1] * turn[1] - rates[2] * turn[2]  # of both torsion springs on the coupler
     sine, cosine = np.sin(beta), np.cos(beta)
@@ -44,3 +45,15 @@ def reactions(assembly: Assembly, units: UnitCurves, drive: FloatArray) -> tuple
         across = (link.coupler * sine * along - moment) / (link.coupler * cosine)
     coupler: FloatArray = along * cosine + across * sine
     return coupler, -across
+
+
+def _coupler_angle(link: Linkage, units: UnitCurves) -> FloatArray:
+    """Return the direction of the coupler [rad].
+
+    A slider that is driven takes the crank pin past the place where the coupler stands across its way; from there on
+    the coupler points to the other side than the branch says.
+    """
+    beta = link.coupler_angle(units.angle)
+    turned = link.branch * (units.position - link.crank * np.cos(units.angle)) < 0.0
+    angle: FloatArray = np.where(turned, np.pi - beta, beta)
+    return angle

@@ -178,7 +178,9 @@ class CrankAnalysis(PrintedAnalysis):
         None, description="crank angles to run through; default: one turn, or the arc that the linkage reaches"
     )
     travel: tuple[Length, Length] | None = Field(
-        None, description="slider travel from the unloaded position, towards the pivot positive; default: all of it"
+        None,
+        description="slider travel from the unloaded position, positive against the branch: inwards from where it is "
+        "stretched; default: all of it",
     )
     side: Literal["before", "beyond"] | None = Field(
         None, description="where the crank is when a force drives: before or beyond the stretched position"

@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.bodies.slider_crank_springs import JOINTS
+from cfmkit.families.refusals import Infeasible
 from cfmkit.families.slider_crank.build import assemble
+from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.rates import Goal
 
 if TYPE_CHECKING:
@@ -53,7 +55,7 @@ class Task:
     @cached_property
     def allowed(self) -> tuple[float, float]:
         """Ends of the motion that linkage and joint limits allow around the unloaded position [rad or m]."""
-        low, high = self.assembly.reach
+        low, high = replace(self.assembly, rates=np.ones(len(JOINTS))).within(*self.assembly.reach)
         start = self.assembly.start
         if self.assembly.drive == "torque":
             low, high = max(low, start - math.pi), min(high, start + math.pi)
@@ -80,6 +82,11 @@ class Task:
         """Return where the goal is looked at: at the `points` of the design, or on more places.
 
         Where the force has to begin at zero, the first of the design's intervals is left out.
+
+        Raises
+        ------
+        Infeasible
+            If places even in the crank's angle are wanted, and the crank turns back.
         """
         low, high = window
         points, start = self.wanted.points, self.assembly.start
@@ -87,13 +94,19 @@ class Task:
         share = np.linspace(1.0 / points if runs_in else 0.0, 1.0, count or points + (not runs_in))
         if self.wanted.spacing == "even" or self.assembly.drive == "torque":
             return low + (high - low) * share
-        ends = self.assembly.units(np.array([low, high])).angle
-        angle = ends[0] + (ends[1] - ends[0]) * share
+        angle = self.assembly.units(np.linspace(low, high, PROBES)).angle
+        if np.ptp(np.sign(np.diff(angle))) > 0.0:
+            text = "the crank turns back within the window, where the coupler stands across the slider's way"
+            raise Infeasible(finding("infeasible_targets", f"{text}: set 'design.spacing: even', or change the window"))
+        return self._travels(angle[0] + (angle[-1] - angle[0]) * share, high)
+
+    def _travels(self, angle: FloatArray, last: float) -> FloatArray:
+        """Return the travels at crank angles, of the two that each allows: those that lead up to a last one."""
         link = self.assembly.linkage
-        away: FloatArray = link.branch * (
-            link.slider_position(np.asarray(self.assembly.unloaded)) - link.slider_position(angle)
-        )
-        return away
+        start, own = float(link.slider_position(np.asarray(self.assembly.unloaded))), link.slider_position(angle)
+        away: FloatArray = link.branch * (start - own)
+        other: FloatArray = link.branch * (start - (2.0 * link.crank * np.cos(angle) - own))
+        return away if abs(away[-1] - last) <= abs(other[-1] - last) else other
 
     def goal(self, window: tuple[float, float], count: int | None = None) -> Goal | None:
         """Return the goal over a window; None where the linkage does not get there with finite efforts."""

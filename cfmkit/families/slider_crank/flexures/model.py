@@ -83,7 +83,7 @@ def analyze(spec: SliderCrankSpec, run: Run) -> Result:
     if low < 0:
         pulled = finding("pulled", "a printed chain is pressed, not pulled: 'analysis.travel' must not begin below 0")
         return no_result(spec, pulled)
-    side = side_of(spec, linkage, unloaded) * linkage.branch if spec.analysis.side is not None else 0
+    side = side_of(spec, linkage, unloaded) if spec.analysis.side is not None else 0
     pressed = chain.press(np.linspace(low, high, spec.analysis.points), side, spec.analysis.accuracy)
     usable = len(pressed.travel) > 1 and pressed.ending is not Ending.WRONG_BRANCH
     told = () if pressed.ending is Ending.COMPLETE else (finding(_NAMES[pressed.ending], pressed.message),)

@@ -96,7 +96,7 @@ def rotations(linkage: Linkage, unloaded: float, travel: FloatArray) -> FloatArr
     """Return how far the three joints have turned where the slider has travelled, (3, n) [rad]."""
     from cfmkit.bodies.slider_crank_springs import along_slider
 
-    side = 1 if linkage.knee(unloaded) * linkage.branch >= 0 else -1
+    side = -1 if linkage.knee(unloaded) < 0 else 1
     return along_slider(linkage, unloaded, side, np.asarray(travel)).turn[:3]
 
 
@@ -114,7 +114,7 @@ def stroke_within(linkage: Linkage, unloaded: float, allowed: FloatArray) -> tup
     """
     from cfmkit.numerics.roots import bracketed_root
 
-    far = linkage.branch * float(linkage.slider_position(np.array(unloaded))) - linkage.nearest_position
+    far = linkage.branch * float(linkage.slider_position(np.array(unloaded))) - linkage.way(unloaded)[0]
     grid = np.linspace(0.0, 0.999 * far, 400)
     share = np.abs(rotations(linkage, unloaded, grid)) / np.asarray(allowed)[:, None]
     worst = share.max(axis=0)
