@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from cfmkit.metrics import Outcome
     from cfmkit.report import Report
     from cfmkit.results import Quantity, Searched
-    from cfmkit.spec import Requirement
+    from cfmkit.spec import Requirement, Spec
 
 HEADLINE = (
     "force_mean",
@@ -26,6 +26,7 @@ HEADLINE = (
     "torque_ripple",
     "hysteresis_area",
     "stress_max",
+    "allowable_stress",
     "safety_factor",
 )
 """Metrics that are shown of every family, as far as they have a value."""
@@ -103,6 +104,8 @@ def _has_value(report: Report, name: str) -> bool:
 def _row(report: Report, name: str) -> Row:
     if name == "usable_stroke":
         return Row(words(name), _stroke(report))
+    if name == "allowable_stress":
+        return Row(words(name), _short(report.metrics[name]) + _rule(report.result.spec))
     window = window_of(report.result)
     return Row(words(name), _branches(report, name, report.metrics) + _over(report, name, window))
 
@@ -115,6 +118,14 @@ def _stroke(report: Report) -> str:
         return length
     run = span(float(motion.min()), float(motion.max()), stroke.dimension)
     return f"{length}: {span(start.value, end.value, stroke.dimension)} of {run}"
+
+
+def _rule(spec: Spec) -> str:
+    """Return by which rule a stress is allowed, where the mechanism says how much of its strength may be used."""
+    try:
+        return f": yield strength / {spec.at('mechanism.safety_factor'):.4g}"
+    except KeyError:
+        return ""
 
 
 def _branches(report: Report, name: str, metrics: Mapping[str, Quantity]) -> str:

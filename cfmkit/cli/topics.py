@@ -135,16 +135,19 @@ def materials_page() -> Page:
 
     records = [asdict(item) for item in MATERIALS.values()]
     columns = (
-        field("name", "material"),
-        Column("E [GPa]", lambda item: f"{item['youngs_modulus'] / 1e9:.4g}"),
-        Column("from ... to", lambda item: _range(item["scatter"]["youngs_modulus"], 1e9)),
-        Column("yield [MPa]", lambda item: _number(item["yield_strength"], 1e6)),
-        Column("from ... to", lambda item: _range(item["scatter"]["yield_strength"], 1e6)),
-        field("poisson_ratio", "nu"),
-        Column("kg/m^3", lambda item: f"{item['density']:.4g}"),
+        field("name", "material", wraps=True),
+        Column("E\n[GPa]", lambda item: f"{item['youngs_modulus'] / 1e9:.4g}"),
+        Column("from ... to", lambda item: _range(item["scatter"]["youngs_modulus"], 1e9), wraps=True),
+        Column("yield_strength\n[MPa]", lambda item: _number(item["yield_strength"], 1e6)),
+        Column("from ... to", lambda item: _range(item["scatter"]["yield_strength"], 1e6), wraps=True),
     )
     text = "At room temperature, for short loads; the ranges are what to expect in practice. In SI under --json."
-    sources = (field("name", "material"), field("source", wraps=True))
+    sources = (
+        field("name", "material", wraps=True),
+        field("poisson_ratio", "nu"),
+        Column("density\n[kg/m^3]", lambda item: f"{item['density']:.4g}"),
+        field("source", wraps=True),
+    )
     sections = (Section("", records, columns), Section("sources", records, sources))
     return Page("materials", text, sections, {"materials": records})
 

@@ -35,6 +35,10 @@ _PART = r"""(?:\s*"[^"]+"\s*|\s*'[^']+'\s*|[^."'=]+)"""
 _OPTION = re.compile(rf"({_PART}(?:\.{_PART})*)=(.*)", re.DOTALL)
 
 
+SHORT_FOR = {"material": "name"}
+"""Keys whose bare text is short for a block with that one key: ``material: pla`` is ``material: {name: pla}``."""
+
+
 class NoSuchPlace(Exception):
     """There is no place in the tree where the value could go."""
 
@@ -89,7 +93,10 @@ def with_value(tree: Any, path: tuple[str, ...], value: Any) -> Any:
     if tree is not None and not isinstance(tree, dict):
         raise NoSuchPlace(f"{head!r} is below a value; only blocks and lists have something below them")
     block = dict(tree or {})
-    block[head] = with_value(block.get(head), rest, value) if rest else value
+    below = block.get(head)
+    if rest and head in SHORT_FOR and isinstance(below, str):
+        below = {SHORT_FOR[head]: below}
+    block[head] = with_value(below, rest, value) if rest else value
     return block
 
 

@@ -253,7 +253,7 @@ def test_worked_designs_by_closed_forms_and_one_exact_pass(stem):
         assert wanted is None or value == pytest.approx(wanted, abs=1.1 * digit)
     after, (stress, _) = fit_widths(spec, spec.design, sizes)
     assert (after.leaf.width / MM, after.side.width / MM) == pytest.approx(fitted, rel=2e-4)
-    assert stress == pytest.approx(spec.mechanism.material.allowable, rel=2e-3)
+    assert stress == pytest.approx(spec.mechanism.allowable_stress, rel=2e-3)
 
 
 def test_the_first_worked_design_is_refused_and_the_nearest_is_a_config():

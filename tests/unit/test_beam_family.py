@@ -252,7 +252,7 @@ def test_shallow_beams_without_stretching_have_no_path_and_no_number_is_invented
 
 
 def test_stress_above_the_allowable_one_is_told_with_its_place():
-    told = warned(solved("beam_lan2010"))["stress_exceeded"]
+    told = warned(solved("beam_lan2010"))["overstressed"]
     assert told == "the largest stress in the window is 48.22 MPa, at 0.260 of beam b4; allowable are 48.1 MPa"
 
 
@@ -447,4 +447,4 @@ def test_the_last_point_of_a_drive_to_the_negative_side_counts():
     result = cfmkit.analyze(cantilever(("travel: 100 mm", "travel: -300 mm"), ("50 MPa", "1 MPa")))
     largest = result.curve.extra["max_stress"].values.max()
     assert value(result, "stress_max") == pytest.approx(largest)
-    assert f"is {largest / 1e6:.4g} MPa" in warned(result)["stress_exceeded"]
+    assert f"is {largest / 1e6:.4g} MPa" in warned(result)["overstressed"]

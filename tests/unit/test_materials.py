@@ -1,16 +1,21 @@
 import math
+from pathlib import Path
 
 import pytest
 
-from cfmkit import materials
-from cfmkit.errors import ExitCode
-from cfmkit.materials import MATERIALS, Material, UnknownMaterial, material
+import cfmkit
+from cfmkit.errors import ExitCode, SpecError
+from cfmkit.materials import MATERIALS, Material, UnknownMaterial, library, material
+from cfmkit.specfile import bind
+from cfmkit.yamlio import dump, read_document
+
+CONFIGS = Path(__file__).parents[2] / "configs"
 
 EVERY = pytest.mark.parametrize("item", MATERIALS.values(), ids=lambda item: item.name)
 
 
 def test_no_two_entries_of_the_library_share_a_name():
-    entries = (*materials._METALS, *materials._PLASTICS, *materials._PAPERS)
+    entries = (*library._METALS, *library._PLASTICS, *library._PAPERS)
     assert len({item.name for item in entries}) == len(entries) == len(MATERIALS)
 
 
@@ -124,3 +129,101 @@ def test_an_unknown_material_is_an_invalid_value_for_the_command_line_and_a_valu
 def test_the_library_cannot_be_changed():
     with pytest.raises(TypeError):
         MATERIALS["pla"] = material("abs")  # type: ignore[index]
+
+
+EVERYWHERE = {
+    "beam_lan2010": "mechanism.material",
+    "vcfm_ding2022": "mechanism.material",
+    "slider_crank_strip": "mechanism.material",
+    "cam": "mechanism.contact.material",
+}
+"""Where the four families say what a part is made of, by a config that does."""
+
+ONE_MATERIAL = ("pla", "{name: pla}", "{youngs_modulus: 3 GPa, poisson_ratio: 0.36, yield_strength: 45 MPa}")
+"""The same material by its name, as a block, and by its values."""
+
+
+def made_of(stem: str, text: str, *more: str):
+    """Return a config's specification with another material, and that material."""
+    contact = ["mechanism.contact.width=8 mm"] if stem == "cam" else []
+    spec = cfmkit.load(CONFIGS / f"{stem}.yaml", [*contact, f"{EVERYWHERE[stem]}={text}", *more])
+    return spec, spec.at(EVERYWHERE[stem])
+
+
+@pytest.mark.parametrize("stem", EVERYWHERE)
+def test_a_material_is_a_name_a_block_or_values_alike_in_every_family(stem: str):
+    found = [made_of(stem, text)[1] for text in ONE_MATERIAL]
+    assert {(one.modulus, one.poisson, one.yield_strength) for one in found} == {(3e9, 0.36, 45e6)}
+    changed = made_of(stem, "{name: pla, youngs_modulus: 2.5 GPa}")[1]
+    assert (changed.modulus, changed.poisson, changed.yield_strength) == (2.5e9, 0.36, 45e6)
+    assert made_of(stem, "{youngs_modulus: 3 GPa}")[1].poisson == 0.3
+
+
+@pytest.mark.parametrize("stem", EVERYWHERE)
+def test_a_value_of_a_bare_name_can_be_set_and_replaced_and_another_name_brings_its_own_values(stem: str):
+    path = EVERYWHERE[stem]
+    _, changed = made_of(stem, "pla", f"{path}.youngs_modulus=2.5 GPa")
+    assert (changed.name, changed.modulus) == ("pla", 2.5e9)
+    named, _ = made_of(stem, "pla")
+    assert dict(named.leaves())[f"{path}.youngs_modulus"] == 3e9
+    assert named.replace({f"{path}.youngs_modulus": 2.5e9}).at(path) == changed
+    assert named.replace({f"{path}.name": "pom"}).at(path) == named.replace({path: "pom"}).at(path)
+    assert named.replace({path: "pom"}).at(path).modulus == material("pom").youngs_modulus
+
+
+@pytest.mark.parametrize("complete", [False, True])
+@pytest.mark.parametrize("stem", EVERYWHERE)
+def test_a_material_is_written_in_one_form_and_reads_back(stem: str, complete: bool):
+    for text in ONE_MATERIAL:
+        spec, found = made_of(stem, text)
+        written = dump(spec, complete=complete)
+        assert "material:\n" in written
+        assert ("poisson_ratio: 0.36" in written) == (complete or "poisson" in text)
+        assert bind(read_document(written, "again.yaml", CONFIGS)).at(EVERYWHERE[stem]) == found
+
+
+@pytest.mark.parametrize("stem", EVERYWHERE)
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("pon", "did you mean 'pom'"),
+        ("{name: pon}", "did you mean 'pom'"),
+        ("5", "5 is no material: give a name from `show materials`, or values such as"),
+        ("{poisson_ratio: 0.3}", "needs 'name' or 'youngs_modulus'"),
+        ("{youngs_modulos: 3 GPa}", "did you mean 'youngs_modulus'?"),
+        ("{youngs_modulus: 0 GPa}", "must be > 0"),
+    ],
+)
+def test_a_material_that_is_none_is_refused_in_one_line(stem: str, text: str, words: str):
+    with pytest.raises(SpecError) as caught:
+        made_of(stem, text)
+    (problem,) = caught.value.problems
+    assert words in problem.message
+
+
+@pytest.mark.parametrize("stem", [stem for stem in EVERYWHERE if stem != "cam"])
+def test_the_allowable_stress_is_the_yield_strength_over_the_safety_factor_in_every_family(stem: str):
+    values = ONE_MATERIAL[2]
+    plain, _ = made_of(stem, values, "mechanism.safety_factor=1")
+    assert type(plain.mechanism).model_fields["safety_factor"].default == 1.0
+    short = ["analysis.points=5"]
+    for factor in (1, 1.5):
+        result = cfmkit.analyze(made_of(stem, values, f"mechanism.safety_factor={factor}", *short)[0])
+        assert result.allowable_stress == 45e6 / factor
+        assert result.values["allowable_stress"].value == 45e6 / factor
+
+
+def test_the_old_word_of_vcfm_for_the_allowable_stress_is_still_read_and_no_longer_written():
+    spec, _ = made_of("vcfm_ding2022", "{name: pla, allowable_stress: 30 MPa}")
+    assert spec.mechanism.allowable_stress == 30e6
+    assert "allowable_stress" not in dump(spec, complete=True)
+    assert "yield_strength: 30 MPa" in dump(spec)
+    again = spec.replace({"mechanism.material.allowable_stress": "22 MPa"})
+    assert again.mechanism.allowable_stress == 22e6
+
+
+def test_the_old_word_beside_a_safety_factor_is_refused_because_it_could_mean_two_things():
+    with pytest.raises(SpecError) as caught:
+        made_of("vcfm_ding2022", "{name: pla, allowable_stress: 30 MPa}", "mechanism.safety_factor=1.5")
+    (problem,) = caught.value.problems
+    assert "give 'yield_strength' instead" in problem.message

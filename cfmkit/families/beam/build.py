@@ -12,14 +12,12 @@ from cfmkit import beams as engine
 from cfmkit.families.beam.chain import chained
 from cfmkit.families.beam.layers import stacked
 from cfmkit.families.beam.parts.faults import HELD
-from cfmkit.materials import material
 
 if TYPE_CHECKING:
     from cfmkit.beams.network import LoadOn, Spring
     from cfmkit.beams.shapes import Shape
     from cfmkit.families.beam.parts.spec import (
         LoadSpec,
-        MaterialValues,
         MemberSpec,
         NodeSpec,
         ShapeSpec,
@@ -27,7 +25,6 @@ if TYPE_CHECKING:
         Thickness,
     )
     from cfmkit.families.beam.spec import BeamSpec
-    from cfmkit.materials import Material
 
 _LARGEST_TURN = 0.35  # of a rotation in one step [rad]
 _SMOOTH = 0.07  # the same where every step is a point of the curve
@@ -127,14 +124,9 @@ def mirror_axis(assembly: Assembly) -> tuple[complex, float] | None:
 def allowable_stress(spec: BeamSpec) -> float | None:
     """Return yield strength over safety factor [Pa], of the weakest beam; None where none is known."""
     mechanism = spec.mechanism
-    known = [values_of(beam.material or mechanism.material).yield_strength for beam in mechanism.beams.values()]
-    given = [strength for strength in known if strength is not None]
-    return min(given) / mechanism.safety_factor if given else None
-
-
-def values_of(given: str | MaterialValues) -> Material | MaterialValues:
-    """Return a material by its values."""
-    return material(given) if isinstance(given, str) else given
+    materials = [beam.material or mechanism.material for beam in mechanism.beams.values()]
+    limits = [one.allowable(mechanism.safety_factor) for one in materials]
+    return min((limit for limit in limits if limit is not None), default=None)
 
 
 def thickest(thickness: Thickness) -> float:
@@ -163,14 +155,14 @@ def _node(node: NodeSpec) -> engine.Node:
 
 def _beam(spec: BeamSpec, beam: MemberSpec) -> engine.Beam:
     mechanism = spec.mechanism
-    of = values_of(beam.material or mechanism.material)
+    of = beam.material or mechanism.material
     section = engine.Section(
-        of.youngs_modulus,
+        of.modulus,
         beam.width or mechanism.width,
         _thickness(beam.thickness or mechanism.thickness),
         axial=spec.fidelity != "inextensible",
         shear=spec.fidelity == "reissner",
-        poisson_ratio=of.poisson_ratio,
+        poisson_ratio=of.poisson,
     )
     return engine.Beam(
         beam.start,

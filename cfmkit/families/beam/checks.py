@@ -174,7 +174,7 @@ def _stress(solution: Solution) -> Iterator[Finding]:
     index = int(np.flatnonzero(inside)[solution.stress[inside].argmax()])
     beam, place = solution.stress_at[0][index], solution.stress_at[1][index]
     yield finding(
-        "stress_exceeded",
+        "overstressed",
         f"the largest stress in the window is {format_short(worst, 'stress')}, at {place:.3f} of beam "
         f"{beam}; allowable are {format_short(allowable, 'stress')}",
     )

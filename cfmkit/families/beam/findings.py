@@ -18,7 +18,7 @@ FINDINGS = {
     "unstable": "a part of the path is not stable: the mechanism would leave it",
     "flutter_not_judged": "forces turn with their node: stability is judged against divergence, not against flutter",
     "imperfection": "the beams were bent in the first buckling mode, as asked",
-    "stress_exceeded": "the stress exceeds the allowable one within the window",
+    "overstressed": "the stress exceeds the allowable one within the window",
     "rescale_approximate": "the rule by which forces are scaled is exact only for beams that do not stretch",
     "rescale_stress": "after scaling, the stress reaches the allowable one within the window",
     "design_unsound": "the best shape that was found fails its audit",

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.families.beam.build import thickest, values_of
+from cfmkit.families.beam.build import thickest
 from cfmkit.families.beam.findings import finding
 from cfmkit.families.beam.model import solve
 from cfmkit.families.beam.values import ranges, window_of
@@ -219,7 +219,7 @@ def _validity(spec: BeamSpec, wanted: Rescale) -> list[Finding]:
 
 def _force_ratio(old: Mechanism, new: Mechanism) -> float:
     """Return the force of one mechanism over that of another by Eq. 6: E b h^3 / L_x^2."""
-    moduli = [values_of(one.material).youngs_modulus for one in (new, old)]
+    moduli = [one.material.modulus for one in (new, old)]
     widths = (new.width / old.width) ** EXPONENTS["width"]
     thicknesses = (thickest(new.thickness) / thickest(old.thickness)) ** EXPONENTS["thickness"]
     return float(moduli[0] / moduli[1] * widths * thicknesses * (size_of(new) / size_of(old)) ** EXPONENTS["size"])
@@ -253,7 +253,7 @@ def _told(old: BeamSpec, new: BeamSpec) -> str:
     for name, (before, after) in pairs.items():
         if abs(after / before - 1) > CLOSE:
             changes.append(f"{name} {format_short(before, 'length')} -> {format_short(after, 'length')}")
-    before, after = (values_of(one.mechanism.material).youngs_modulus for one in (old, new))
+    before, after = (one.mechanism.material.modulus for one in (old, new))
     if before != after:
         changes.append(f"E {format_short(before, 'stress')} -> {format_short(after, 'stress')}")
     return "rescaled: " + ", ".join(changes) if changes else "nothing to change"

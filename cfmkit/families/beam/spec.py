@@ -13,7 +13,6 @@ from cfmkit.families.beam.parts.spec import (
     DriveSpec,
     LinkSpec,
     LoadSpec,
-    MaterialValues,
     MemberSpec,
     NodeSpec,
     PartSpec,
@@ -21,10 +20,10 @@ from cfmkit.families.beam.parts.spec import (
     SpringSpec,
     Thickness,
     checked_thickness,
-    known_material,
 )
 from cfmkit.families.beam.shaping.spec import Optimise, optimise_faults
 from cfmkit.families.beam.surface.spec import Surface
+from cfmkit.materials.spec import MaterialField, SafetyFactor
 from cfmkit.spec import Analysis, Displacement, Model, Spec, refuse
 from cfmkit.units import DIMENSIONS, Force, Length, Ratio, Torque
 
@@ -35,8 +34,8 @@ _EXTENT = {"displacement": "travel", "rotation": "travel", "force": "force", "mo
 class Mechanism(Model):
     """A planar network of slender beams, and what is done to it."""
 
-    material: str | MaterialValues = Field(description="a name from `show materials`, or {youngs_modulus, ...}")
-    safety_factor: Annotated[Ratio, Field(ge=1)] = Field(1.0, description="allowable stress: yield strength over this")
+    material: MaterialField = Field(description="a name from `show materials`, or {youngs_modulus, ...}")
+    safety_factor: SafetyFactor = 1.0
     thickness: Thickness = Field(
         description="in the plane of bending (w of Lan); or [[fraction, thickness], ...], linear between"
     )
@@ -59,11 +58,6 @@ class Mechanism(Model):
     copies: Copies | None = Field(None, description="how often what is described here occurs")
     part: PartSpec | None = Field(None, description="how it is cut: fillets, smallest gap and feature")
 
-    @field_validator("material")
-    @classmethod
-    def _known(cls, value: str | MaterialValues) -> str | MaterialValues:
-        return known_material(value)
-
     @field_validator("thickness")
     @classmethod
     def _stations(cls, value: Thickness) -> Thickness:
@@ -83,17 +77,12 @@ class Rescale(Model):
     )
     free: Literal["width", "thickness", "size"] = Field("width", description="what follows from the force wanted")
     size: PositiveLength | None = Field(None, description="distance of the outermost nodes along x (L_x of Lan)")
-    material: str | MaterialValues | None = Field(None, description="another material")
+    material: MaterialField | None = Field(None, description="another material")
     thickness: PositiveLength | None = Field(None, description="another (largest) thickness in the plane")
     width: PositiveLength | None = Field(None, description="another width out of the plane")
     to_allowable_stress: bool = Field(
         False, description="let travel and window end where the stress reaches the allowable one, and start at c"
     )
-
-    @field_validator("material")
-    @classmethod
-    def _known(cls, value: str | MaterialValues | None) -> str | MaterialValues | None:
-        return None if value is None else known_material(value)
 
     @model_validator(mode="after")
     def _free_is_not_given(self) -> Self:

@@ -26,7 +26,7 @@ DEFINITIONS = {
     "strict_range_fraction": ("ratio", "(d - c)/d with that c"),
     "stress_at_end": ("stress", "largest stress at d"),
     "stress_limit_displacement": ("length", "where the stress first reaches the allowable one"),
-    "allowable_stress": ("stress", "yield strength over safety factor; of several materials, the smallest"),
+    "allowable_stress": ("stress", "yield strength over `mechanism.safety_factor`; of several materials, the smallest"),
     "stress_total_max": ("stress", "largest stress in the window with the axial part, at places along each beam"),
     "prestress_force": ("force", "force at rest: not zero where beams are forced into place"),
     "prestress_stress": ("stress", "largest stress at rest"),

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from cfmkit.families.cam.manufacturing.spec import Manufacturing
-from cfmkit.materials import material
+from cfmkit.materials.spec import MaterialField, MaterialSpec
 from cfmkit.spec import Analysis, Model, Spec
 from cfmkit.tables.source import DataSource
 from cfmkit.units import Angle, Force, Inertia, Length, Mass, Ratio, Stiffness, Time
@@ -125,12 +125,10 @@ class Contact(Model):
     """What decides the contact pressure between roller and cam."""
 
     width: PositiveLength = Field(description="width of the line contact, usually the plate's thickness")
-    material: str = Field("steel-s235", description="a name from `show materials`; roller and cam alike")
-
-    @field_validator("material")
-    @classmethod
-    def _known(cls, name: str) -> str:
-        return material(name).name
+    material: MaterialField = Field(
+        default_factory=lambda: MaterialSpec(name="steel-s235"),
+        description="a name from `show materials`, or {youngs_modulus, ...}; roller and cam alike",
+    )
 
 
 class Left(Model):

@@ -113,14 +113,12 @@ def contact_pressure(solution: Solution) -> FloatArray:
 
     p0 = sqrt(N E* / (pi b R)), E* = E / (2 (1 - nu^2)), 1/R = 1/r + 1/rho_cam.
     """
-    from cfmkit.materials import material
-
     assembly = solution.assembly
     contact = assembly.spec.mechanism.contact
     if contact is None:
         return np.full_like(solution.travel, np.nan)
-    solid = material(contact.material)
-    modulus = solid.youngs_modulus / (2.0 * (1.0 - solid.poisson_ratio**2))
+    solid = contact.material
+    modulus = solid.modulus / (2.0 * (1.0 - solid.poisson**2))
     path_radius = assembly.profile.path.law.curvature_radius(solution.states.parameter)
     with np.errstate(divide="ignore", invalid="ignore"):
         cam_radius = path_radius - assembly.profile.roller_radius + assembly.spec.mechanism.profile.offset

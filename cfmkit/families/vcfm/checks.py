@@ -45,7 +45,7 @@ CLOSED_FORM = 0.005
 
 def findings_of(solution: Solution) -> tuple[Finding, ...]:
     """Return every finding about a solved mechanism, the gravest first."""
-    checks = (_measured, _truss, _leaf_shape, _flatness, _returns, _preloads, _yield, _buckling, _imperfect, _range)
+    checks = (_measured, _truss, _leaf_shape, _flatness, _returns, _preloads, _strength, _buckling, _imperfect, _range)
     return tuple(found for check in checks for found in check(solution))
 
 
@@ -143,8 +143,8 @@ def _preloads(solution: Solution) -> Iterator[Finding]:
             return
 
 
-def _yield(solution: Solution) -> Iterator[Finding]:
-    allowed = solution.spec.mechanism.material.allowable
+def _strength(solution: Solution) -> Iterator[Finding]:
+    allowed = solution.spec.mechanism.allowable_stress
     if allowed is None:
         return
     slack = 1e-9 if solution.spec.analysis.fidelity == "exact" else CLOSED_FORM
@@ -158,7 +158,7 @@ def _yield(solution: Solution) -> Iterator[Finding]:
     if len(over):
         first, top = int(over[0]), int(stress.argmax())
         yield finding(
-            "yield",
+            "overstressed",
             f"in the {name} the stress passes {mpa(allowed)} at {mm(float(push.travel[first]))} with a preload "
             f"of {mm(push.preload)} and reaches {mpa(float(stress[top]))} at {mm(float(push.travel[top]))}; "
             "use longer or thinner leaves, or less preload",

@@ -66,15 +66,15 @@ def design(spec: VcfmSpec, run: Run) -> Design:
 
 
 def _attempt(spec: VcfmSpec) -> Design:
-    target, allowable = spec.design, spec.mechanism.material.allowable
+    target, allowable = spec.design, spec.mechanism.allowable_stress
     if target is None:
         return Design(None, Status.INVALID, "this spec has no 'design' block: add the targets 'force', 'stroke', ...")
     if allowable is None:
-        message = "a design needs the stress that is allowed: add 'mechanism.material.allowable_stress'"
+        message = "a design needs the stress that is allowed: add 'mechanism.material.yield_strength'"
         return Design(None, Status.INVALID, message)
     try:
         sizes = closed_form(spec, target)
-        active = ["mechanism.material.allowable_stress"] if target.leaf_length is None else []
+        active = ["mechanism.material.yield_strength"] if target.leaf_length is None else []
         if target.refine:
             from cfmkit.families.vcfm.refine import refined
 
@@ -94,7 +94,6 @@ def closed_form(spec: VcfmSpec, target: VcfmDesign) -> Sizes:
     Infeasible
         With the constraint that cannot be met, and the nearest value that can.
     """
-    about = spec.mechanism.material
     check_guide(spec)
     thickness = thickness_for(target)
     shortest = shortest_leaf(spec, target, thickness)
@@ -102,9 +101,9 @@ def closed_form(spec: VcfmSpec, target: VcfmDesign) -> Sizes:
     if length < shortest * (1 - 1e-9):
         raise Infeasible(
             finding(
-                "yield",
-                f"leaves of {mm(length)} would be stressed beyond {mpa(about.allowable or 0.0)}, or be steeper than "
-                f"15 deg: the shortest allowed is {mm(shortest)}",
+                "overstressed",
+                f"leaves of {mm(length)} would be stressed beyond {mpa(spec.mechanism.allowable_stress or 0.0)}, or be "
+                f"steeper than 15 deg: the shortest allowed is {mm(shortest)}",
             ),
             {"design.leaf_length": at_least(shortest)},
         )
@@ -128,7 +127,7 @@ def spring_side(spec: VcfmSpec, target: VcfmDesign, leaf: Strip) -> Strip:
     made, positive = spec.mechanism.material, spec.mechanism.positive
     deflection = 0.5 * (float(onset_and_exit(leaf)[1]) + target.preload_stroke)
     e, t, tilt = made.modulus, positive.thickness, positive.angle
-    length = sqrt(3.0 * e * t * deflection * cos(tilt) / (made.allowable or 1.0))
+    length = sqrt(3.0 * e * t * deflection * cos(tilt) / (spec.mechanism.allowable_stress or 1.0))
     side = Strip(length, tilt, t, 1.0, e, made.poisson)
     return replace(side, width=float(target.force / target.height / Diamond(side, share_of(positive)).stiffness))
 

@@ -111,7 +111,7 @@ def stress(result: Result) -> Figure:
     if most is not nominal:
         text = f"spring, preload {value_text(most.preload, 'length')}"
         series.append(Series(most.spring_stress, text, VERMILLION, prefer=0.5))
-    allowed = solution.spec.mechanism.material.allowable
+    allowed = solution.spec.mechanism.allowable_stress
     passed = allowed is not None and bool(max(np.nanmax(item.values) for item in series) > allowed * 1.005)
     limits = [Limit(allowed, f"allowed {value_text(allowed, 'stress')}", trouble=passed)] if allowed else []
     diagram = Diagram(over, TRAVEL, Scale("largest stress", "stress"), series, limits, _beyond(solution))

@@ -15,7 +15,7 @@ FINDINGS = {
     "stroke_unreachable": "the rise is too small for the stroke asked for",
     "asymmetric_buckling": "a shuttle that can turn lets the leaves buckle at half the load",
     "out_of_plane_buckling": "the leaves are so narrow that they would rather buckle out of the plane",
-    "yield": "the stress allowed is passed",
+    "overstressed": "the stress exceeds the allowable one",
     "imperfection": "waviness of the leaves as made spoils the flatness",
     "theory_range": "an angle or a travel beyond what the closed forms are good for",
     "unstable_branch": "the force shown is that of an unstable form, which a real leaf leaves",

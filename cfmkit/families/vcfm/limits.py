@@ -95,7 +95,7 @@ def shortest_leaf(spec: VcfmSpec, target: VcfmDesign, thickness: float) -> float
     root = pi * thickness / rise
     u = min(1.0, 2.0 / 3.0 * (1.0 + sqrt(1.0 - root * root)))
     stressed = buckled_stress(rise, thickness, u)
-    return max(sqrt(made.modulus / (made.allowable or 1.0) * stressed), rise / sin(STEEP))
+    return max(sqrt(made.modulus / (spec.mechanism.allowable_stress or 1.0) * stressed), rise / sin(STEEP))
 
 
 def check_room(target: VcfmDesign, sizes: Sizes) -> None:

@@ -166,7 +166,7 @@ def analyze(spec: VcfmSpec, run: Run) -> Result:
         warnings=findings_of(solution),
         valid=_valid(solution),
         target=spec.design.force if spec.design else None,
-        allowable_stress=spec.mechanism.material.allowable,
+        allowable_stress=spec.mechanism.allowable_stress,
         load_cases=curves[1:],
         tables={"adjustability": partial(adjustability, solution), "readings": partial(readings, solution)},
         state=solution,

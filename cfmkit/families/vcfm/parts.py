@@ -16,7 +16,7 @@ from cfmkit.families.vcfm.vbeam import VBeam
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from cfmkit.families.vcfm.spec import Bistable, Material, Positive, VcfmSpec
+    from cfmkit.families.vcfm.spec import Bistable, LeafMaterial, Positive, VcfmSpec
     from cfmkit.families.vcfm.springs import Spring
 
 Leaf = VBeam | CosineArch | HybridLeaf | TrussLeaf
@@ -72,7 +72,7 @@ class Parts:
         return float(self.leaf.balance)
 
 
-def strip_of(leaf: Positive | Bistable, made_of: Material) -> Strip:
+def strip_of(leaf: Positive | Bistable, made_of: LeafMaterial) -> Strip:
     """Return a leaf of a specification; of the springs only the diamond's are inclined."""
     angle = 0.0 if leaf.structure in ("folded", "straight", "u-shape") else leaf.angle
     return Strip(leaf.length, angle, leaf.thickness, leaf.width, made_of.modulus, made_of.poisson)

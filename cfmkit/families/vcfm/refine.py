@@ -36,7 +36,7 @@ def refined(spec: VcfmSpec, target: VcfmDesign, sizes: Sizes) -> Sizes:
     Infeasible
         If the exact stress stays above the allowable one.
     """
-    allowable = spec.mechanism.material.allowable or 0.0
+    allowable = spec.mechanism.allowable_stress or 0.0
     for _ in range(RESCALES):
         sizes, stresses = fit_widths(spec, target, sizes)
         over = [stress / allowable for stress in stresses]

@@ -2,61 +2,38 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from math import radians, sin
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
-from cfmkit.materials import material
-from cfmkit.spec import Analysis, Model, Spec
-from cfmkit.units import Angle, Force, Length, Ratio, Stiffness, Stress
+from cfmkit.materials.spec import MaterialSpec, PositiveStress, SafetyFactor, material_input
+from cfmkit.spec import Analysis, Model, Spec, refuse
+from cfmkit.units import Angle, Force, Length, Ratio, Stiffness
 
 PositiveLength = Annotated[Length, Field(gt=0)]
 NonNegativeLength = Annotated[Length, Field(ge=0)]
 LeafAngle = Annotated[Angle, Field(ge=0, le=radians(40))]
 SteepAngle = Annotated[Angle, Field(gt=0, le=radians(40))]
-PositiveStress = Annotated[Stress, Field(gt=0)]
 
 
-class Material(Model):
-    """What the leaves are made of: a name from `show materials`, own values, or a name with some values changed."""
+class LeafMaterial(MaterialSpec):
+    """A material that also takes the old word of this family for how much of its strength may be used."""
 
-    name: str | None = Field(None, description="a name from `show materials`")
-    youngs_modulus: PositiveStress | None = Field(None, description="E; default: the named material's")
-    poisson_ratio: Annotated[Ratio, Field(ge=0, lt=0.5)] | None = Field(
-        None, description="default: the named material's, else 0.3"
-    )
     allowable_stress: PositiveStress | None = Field(
-        None, description="stress that must not be passed; default: the named material's yield strength, if known"
+        None, description="old word: the 'yield_strength' where 'safety_factor' is 1", exclude=True
     )
-
-    @field_validator("name")
-    @classmethod
-    def _known(cls, name: str | None) -> str | None:
-        return None if name is None else material(name).name
 
     @model_validator(mode="after")
-    def _stiff(self) -> Self:
-        if self.name is None and self.youngs_modulus is None:
-            raise ValueError("needs 'name' or 'youngs_modulus'")
+    def _in_one_form(self) -> Self:
+        if self.allowable_stress is not None:
+            # past the frozen model: nothing that reads or writes a material knows two words
+            object.__setattr__(self, "yield_strength", self.allowable_stress)
+            object.__setattr__(self, "allowable_stress", None)
+            self.model_fields_set.discard("allowable_stress")
+            self.model_fields_set.add("yield_strength")
         return self
-
-    @property
-    def modulus(self) -> float:
-        """E [Pa]."""
-        return self.youngs_modulus or material(str(self.name)).youngs_modulus
-
-    @property
-    def poisson(self) -> float:
-        """Poisson's ratio."""
-        if self.poisson_ratio is not None:
-            return self.poisson_ratio
-        return material(self.name).poisson_ratio if self.name else 0.3
-
-    @property
-    def allowable(self) -> float | None:
-        """Stress that must not be passed [Pa]; None where nothing is known."""
-        return self.allowable_stress or (material(self.name).yield_strength if self.name else None)
 
 
 class Positive(Model):
@@ -141,10 +118,28 @@ class Frame(Model):
 class Mechanism(Model):
     """A shuttle between snap-through leaves and a spring whose other end the preload moves."""
 
-    material: Material
+    material: Annotated[LeafMaterial, material_input(LeafMaterial)] = Field(
+        description="of leaves and spring: a name from `show materials`, or {youngs_modulus, ...}"
+    )
+    safety_factor: SafetyFactor = 1.0
     positive: Positive
     bistable: Bistable
     frame: Frame = Field(default_factory=lambda: Frame(), description="rigid parts, for drawings")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _allowable_stress_is_given_once(cls, data: Any) -> Any:
+        block = data if isinstance(data, Mapping) else {}
+        old = block["material"].get("allowable_stress") if isinstance(block.get("material"), Mapping) else None
+        if old is not None and block.get("safety_factor") not in (None, 1):
+            told = "is an old word, and means nothing beside 'safety_factor': give 'yield_strength' instead"
+            refuse("Mechanism", {("material", "allowable_stress"): told})
+        return data
+
+    @property
+    def allowable_stress(self) -> float | None:
+        """Yield strength over safety factor [Pa]; None where no strength is known."""
+        return self.material.allowable(self.safety_factor)
 
 
 class VcfmDesign(Model):

@@ -37,6 +37,7 @@ DEFINITIONS = {
     "force_per_preload": ("stiffness", "that change over the change of the preload"),
     "least_force": ("force", "least force once the leaves are past their peak: positive if it returns by itself"),
     "stiffness_mismatch": ("ratio", "|K_p - K_n| times the length of the window over the constant force"),
+    "allowable_stress": ("stress", "yield strength over `mechanism.safety_factor`"),
     "spring_stress_max": ("stress", "largest stress of the spring up to the end of the window, over all preloads"),
     "bistable_stress_max": ("stress", "largest stress of the leaves up to the end of the window, over all preloads"),
     "travel_stress_max": (
@@ -57,7 +58,7 @@ def values_of(solution: Solution) -> Mapping[str, Quantity]:
     span = solution.window[1] - solution.window[0]
     leaves, spring = np.max([push.largest_stress(solution.window[1]) for push in solution.pushes], axis=0).tolist()
     over_travel = max(max(push.largest_stress(np.inf)) for push in solution.pushes)
-    allowed = solution.spec.mechanism.material.allowable
+    allowed = solution.spec.mechanism.allowable_stress
     numbers: dict[str, float | None] = {
         "positive_stiffness": one.positive_stiffness,
         "negative_stiffness": one.negative_stiffness,
@@ -76,6 +77,7 @@ def values_of(solution: Solution) -> Mapping[str, Quantity]:
         "rest_shift_max": max((abs(push.rest) for push in solution.pushes if push.rest is not None), default=None),
         "least_force": nominal.least[1] if nominal.least else None,
         "stiffness_mismatch": abs(one.positive_stiffness - one.negative_stiffness) * span / force if force else None,
+        "allowable_stress": solution.spec.mechanism.allowable_stress,
         "spring_stress_max": spring,
         "bistable_stress_max": leaves,
         "travel_stress_max": over_travel,

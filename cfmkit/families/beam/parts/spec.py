@@ -7,27 +7,14 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, field_validator, model_validator
 
 from cfmkit.families.beam.parts.faults import HELD
-from cfmkit.materials import material
+from cfmkit.materials.spec import MaterialField
 from cfmkit.spec import Model
-from cfmkit.units import Angle, Force, Length, LineLoad, Ratio, RotationalStiffness, Stiffness, Stress, Torque
+from cfmkit.units import Angle, Force, Length, LineLoad, Ratio, RotationalStiffness, Stiffness, Torque
 
 PositiveLength = Annotated[Length, Field(gt=0)]
 Point = tuple[Length, Length]
 Station = tuple[Annotated[Ratio, Field(ge=0, le=1)], PositiveLength]
 Thickness = PositiveLength | Annotated[tuple[Station, ...], Field(min_length=2)]
-
-
-class MaterialValues(Model):
-    """A material by its values."""
-
-    youngs_modulus: Annotated[Stress, Field(gt=0)] = Field(description="E")
-    poisson_ratio: Annotated[Ratio, Field(gt=-1, le=0.5)] = Field(0.3, description="for the shear stiffness")
-    yield_strength: Annotated[Stress, Field(gt=0)] | None = Field(None, description="for the allowable stress")
-
-
-def known_material(value: str | MaterialValues) -> str | MaterialValues:
-    """Return the value if it is no name, or the name of a material that is known."""
-    return material(value).name if isinstance(value, str) else value
 
 
 class Moved(Model):
@@ -129,16 +116,11 @@ class MemberSpec(Model):
         None, description="in the plane; or [[fraction, thickness], ...], linear between"
     )
     width: PositiveLength | None = Field(None, description="out of the plane")
-    material: str | MaterialValues | None = Field(None, description="a name from `show materials`, or its values")
+    material: MaterialField | None = Field(None, description="a name from `show materials`, or its values")
     start_joint: Literal["rigid", "pin"] = Field("rigid", description="whether the first end turns with its node")
     end_joint: Literal["rigid", "pin"] = Field("rigid", description="whether the last end turns with its node")
     start_offset: Point | None = Field(None, description="rigid arm from the node to the beam; turns with the node")
     end_offset: Point | None = Field(None, description="the same at the last end")
-
-    @field_validator("material")
-    @classmethod
-    def _known(cls, value: str | MaterialValues | None) -> str | MaterialValues | None:
-        return None if value is None else known_material(value)
 
     @field_validator("thickness")
     @classmethod

@@ -19,7 +19,6 @@ from cfmkit.families.slider_crank.flexures.chain import (
 )
 from cfmkit.families.slider_crank.flexures.pressing import Chain
 from cfmkit.families.slider_crank.flexures.sizing import Flexure
-from cfmkit.materials import material
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -44,9 +43,7 @@ def elasticity(printed: Printed) -> Elasticity:
     given = printed.material
     if given is None:
         raise InputError("a part of flexures or a strip needs 'mechanism.material'")
-    one = material(given) if isinstance(given, str) else given
-    limit = None if one.yield_strength is None else one.yield_strength / printed.safety_factor
-    return Elasticity(one.youngs_modulus, one.poisson_ratio, limit)
+    return Elasticity(given.modulus, given.poisson, given.allowable(printed.safety_factor))
 
 
 def flexures_of(printed: Printed) -> tuple[Flexure, ...]:

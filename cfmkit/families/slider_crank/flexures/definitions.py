@@ -11,6 +11,7 @@ DEFINITIONS = {
     "run_in_98": ("length", "travel at which the force first reaches 98 % of its mean in the window"),
     "side_force_max": ("force", "largest force of the slider on its guide, across its way"),
     "guide_moment_max": ("torque", "largest moment of the slider on its guide"),
+    "allowable_stress": ("stress", "yield strength over `mechanism.safety_factor`"),
     "stress_place": ("length", "where the stress is largest: along the centre line from the clamped end"),
     "stress_stroke": ("length", "travel at which the allowable stress is reached"),
     "width_ratio": ("ratio", "smallest width over thickness"),

@@ -5,25 +5,17 @@ from __future__ import annotations
 import itertools
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, model_validator
 
-from cfmkit.materials import material
+from cfmkit.materials.spec import MaterialField, SafetyFactor
 from cfmkit.spec import Analysis, Model
-from cfmkit.units import Length, Ratio, Stress
+from cfmkit.units import Length, Ratio
 
 PositiveLength = Annotated[Length, Field(gt=0)]
 Share = Annotated[Ratio, Field(gt=0, lt=1)]
 Point = tuple[Length, Length]
 LengthRange = tuple[PositiveLength, PositiveLength]
 ShareRange = tuple[Share, Share]
-
-
-class MaterialValues(Model):
-    """A material by its values."""
-
-    youngs_modulus: Annotated[Stress, Field(gt=0)] = Field(description="E")
-    poisson_ratio: Annotated[Ratio, Field(gt=-1, le=0.5)] = Field(0.35, description="for the shear stiffness")
-    yield_strength: Annotated[Stress, Field(gt=0)] | None = Field(None, description="for the allowable stress")
 
 
 class FlexureSpec(Model):
@@ -100,18 +92,13 @@ class Process(Model):
 class Printed(Model):
     """What makes a slider-crank one piece: lumped flexures or a strip, and their material."""
 
-    material: str | MaterialValues | None = Field(
+    material: MaterialField | None = Field(
         None, description="of 'flexures' or 'beam': a name from `show materials`, or {youngs_modulus, ...}"
     )
-    safety_factor: Annotated[Ratio, Field(ge=1)] = Field(1.0, description="allowable stress: yield strength over this")
+    safety_factor: SafetyFactor = 1.0
     flexures: Flexures | None = Field(None, description="small flexures at the joints, rigid links between: 'lumped'")
     beam: StripSpec | None = Field(None, description="one strip of varying thickness: fidelity 'beam'")
     process: Process | None = Field(None, description="how it is made, for warnings")
-
-    @field_validator("material")
-    @classmethod
-    def _known(cls, value: str | MaterialValues | None) -> str | MaterialValues | None:
-        return material(value).name if isinstance(value, str) else value
 
     @property
     def finest(self) -> Literal["prb", "lumped", "beam"]:

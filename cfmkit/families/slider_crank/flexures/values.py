@@ -25,6 +25,7 @@ def numbers(solution: Printed) -> Iterator[tuple[str, float | None, str]]:
     yield "side_force_max", _largest(solution.side_force), ""
     yield "guide_moment_max", _largest(solution.guide_moment), ""
     last = int(np.argmax(solution.stress))
+    yield "allowable_stress", solution.material.allowable_stress, "the material has no 'yield_strength'"
     yield "stress_place", float(solution.place[last]), ""
     yield "stress_stroke", *stress_stroke(solution)
     yield "width_ratio", solution.width_ratio, ""
