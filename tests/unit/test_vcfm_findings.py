@@ -67,7 +67,7 @@ def test_what_is_measured_of_hybrid_leaves_is_not_held_against_a_force_that_they
 
 def test_stress_is_that_of_the_worst_preload():
     """The preload of 7.5 mm doubles the stress of the spring: 60.7 MPa at 4 mm, 71.2 MPa at the end of the travel."""
-    strength = "mechanism.material.allowable_stress=30 MPa"
+    strength = "mechanism.material.yield_strength=30 MPa"
     alone, pressed = analyzed(strength), analyzed(strength, preloads="[0 mm, 2.5 mm, 7.5 mm]")
     first, worst = (api.evaluate(found, ["stress_max", "safety_factor"]) for found in (alone, pressed))
     assert first["safety_factor"].value == pytest.approx(1.35, abs=0.005)
@@ -75,11 +75,11 @@ def test_stress_is_that_of_the_worst_preload():
     assert worst["safety_factor"].value == pytest.approx(30 / 60.69, rel=2e-4)
     assert pressed.values["travel_stress_max"].value == pytest.approx(13.5 * 5.2776e6, rel=2e-4)
     assert pressed.values["travel_safety_factor"].value == pytest.approx(0.421, abs=5e-4)
-    assert "with a preload of 7.5 mm and reaches 71.25 MPa at 6 mm" in message(pressed, "yield")
+    assert "with a preload of 7.5 mm and reaches 71.25 MPa at 6 mm" in message(pressed, "overstressed")
 
 
 def test_a_usable_stroke_keeps_the_allowable_stress_at_every_preload():
-    strength = "mechanism.material.allowable_stress=50 MPa"
+    strength = "mechanism.material.yield_strength=50 MPa"
     alone, pressed = (analyzed(FLAT, strength, preloads=preloads) for preloads in ("[0 mm]", "[0 mm, 6 mm]"))
     ends = [api.evaluate(found, ["usable_end"])["usable_end"].value for found in (alone, pressed)]
     assert ends[1] == pytest.approx(50 / 5.2776 * MM - 6 * MM, rel=1e-3)

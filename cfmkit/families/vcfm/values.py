@@ -77,7 +77,7 @@ def values_of(solution: Solution) -> Mapping[str, Quantity]:
         "rest_shift_max": max((abs(push.rest) for push in solution.pushes if push.rest is not None), default=None),
         "least_force": nominal.least[1] if nominal.least else None,
         "stiffness_mismatch": abs(one.positive_stiffness - one.negative_stiffness) * span / force if force else None,
-        "allowable_stress": solution.spec.mechanism.allowable_stress,
+        "allowable_stress": allowed,
         "spring_stress_max": spring,
         "bistable_stress_max": leaves,
         "travel_stress_max": over_travel,
