@@ -49,6 +49,8 @@ class Status(Enum):
             Status.COMPLETE: ExitCode.OK,
             Status.PARTIAL: ExitCode.PARTIAL,
             Status.INVALID: ExitCode.INVALID,
+            # Whether there is a solution is not known: more time may find it.
+            Status.TIMEOUT: ExitCode.PARTIAL,
             Status.CRASHED: ExitCode.BUG,
         }
         return codes.get(self, ExitCode.NO_SOLUTION)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import os
+import re
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -44,10 +45,53 @@ def read_spec(name: str, changes: Iterable[str] = ()) -> Document:
 
 
 def changed(document: Document, changes: Iterable[str]) -> Document:
-    """Return a document with options applied in their order."""
+    """Return a document with options applied in their order, but those for specifications of another family.
+
+    Raises
+    ------
+    cfmkit.errors.UsageError
+        If an option is malformed or is for a family that does not exist.
+    """
     for change in changes:
-        document = document.set(change)
+        family, option = addressed(change)
+        if family is None or family == _family_of(document):
+            document = document.set(option)
     return document
+
+
+def addressed(change: str) -> tuple[str | None, str]:
+    """Return the family that an option such as ``cam:mechanism.roller_radius=10 mm`` is for, and the option itself.
+
+    Raises
+    ------
+    cfmkit.errors.UsageError
+        If there is no such family.
+
+    Examples
+    --------
+    >>> addressed("cam:analysis.points=51"), addressed("analysis.points=51")
+    (('cam', 'analysis.points=51'), (None, 'analysis.points=51'))
+    """
+    path = change.partition("=")[0]
+    family, colon, _ = path.partition(":")
+    if not colon or not _FAMILY.fullmatch(family):
+        return None, change
+    from cfmkit import families
+
+    if family not in families.names():
+        near = difflib.get_close_matches(family, families.names(), n=1)
+        hint = f"; did you mean {near[0]!r}?" if near else f": there are {', '.join(families.names())}"
+        raise UsageError(f"--set {shown(change)}: there is no family {family!r}{hint}")
+    return family, change[len(family) + 1 :]
+
+
+_FAMILY = re.compile("[A-Za-z][A-Za-z0-9_-]*")
+"""What may stand before the colon of an option for one family; a path with a colon has dots or quotes before it."""
+
+
+def _family_of(document: Document) -> str | None:
+    named = document.tree.get("family") if isinstance(document.tree, dict) else None
+    return named if isinstance(named, str) else None
 
 
 def standard_input() -> bytes:

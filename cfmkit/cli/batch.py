@@ -6,6 +6,7 @@ import os
 import time
 import traceback
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from cfmkit.cli.failures import answer_to
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from cfmkit.cli.runs import Verb
     from cfmkit.spec import Spec
     from cfmkit.studies.executors import Executor, Lost
+    from cfmkit.studies.kept import KeptRuns
 
 
 @dataclass(frozen=True)
@@ -48,12 +50,21 @@ class BatchWork:
         ``design`` or ``analyze``; None: design what has a block `design`.
     arguments : tuple of str
         The command line, for the manifests.
+    fresh : bool
+        Whether searches begin anew, too, where an earlier one was ended.
     """
 
     out: str
     options: Computing
     verb: str | None
     arguments: tuple[str, ...]
+    fresh: bool = False
+
+    @property
+    def deciding(self) -> list[Any]:
+        """Everything in it that decides what a run finds and writes."""
+        given = self.options
+        return [list(given.changes), given.fidelity, given.seed, given.no_plots, self.verb]
 
     def __call__(self, job: Job) -> Entry:
         """Return what becomes of one specification; nothing is raised but what ends the process."""
@@ -67,13 +78,24 @@ class BatchWork:
             entry = replace(_failed(entry, error), bug="".join(traceback.format_exception(error)))
         return replace(entry, seconds=time.perf_counter() - start)
 
+    def refusal(self, job: Job) -> Entry | None:
+        """Return what is wrong with a specification; None if it is valid."""
+        from cfmkit.cli.runs import spec_of
+
+        try:
+            spec_of(replace(self.options, spec=job.spec))
+        except CfmError as error:
+            return _failed(Entry(job.spec, job.folder), error)
+        return None
+
     def _done(self, entry: Entry) -> Entry:
         from cfmkit.cli.runs import execute, spec_of
 
         options = replace(self.options, spec=entry.spec, out=os.path.join(self.out, entry.folder))
         spec = spec_of(options)
-        verb = _verb(self.verb or _natural(spec))
-        known = replace(entry, verb=verb.name, family=spec.family, name=" ".join(spec.name.split()))
+        verb = _verb(self.verb or _natural(spec), self.fresh)
+        name = " ".join(spec.name.split())
+        known = replace(entry, verb=verb.name, family=spec.family, name=name, data=_data_of(spec))
         try:
             answer = execute(verb, options, Terminal(self.arguments, quiet=True))
         except CfmError as error:
@@ -89,12 +111,21 @@ def _natural(spec: Spec) -> str:
     return "design" if designs else "analyze"
 
 
-def _verb(name: str) -> Verb:
+def _data_of(spec: Spec) -> tuple[tuple[str, str | None], ...]:
+    """Return the data files that a specification names, and the hashes of their content."""
+    from cfmkit.store import file_hash
+    from cfmkit.tables.source import named_in
+
+    return tuple((str(source), file_hash(source.path.resolve())) for source in named_in(spec.model_dump()))
+
+
+def _verb(name: str, fresh: bool) -> Verb:
     from cfmkit.cli.runs import Verb
     from cfmkit.cli.verbs import analyze, design
 
     if name == "design":
-        return Verb("design", "designed and analysed", design.compute)
+        # One process: the specifications of the batch share the cores already.
+        return Verb("design", "designed and analysed", design.compute, running=partial(design.long_run, 1, fresh))
     return Verb("analyze", "analysed", analyze.compute)
 
 
@@ -110,6 +141,7 @@ def _answered(entry: Entry, answer: Answer) -> Entry:
         message="; ".join(told),
         requirements=tuple(data["requirements"]),
         warnings=tuple(data["warnings"]),
+        written=True,
     )
 
 
@@ -135,20 +167,41 @@ class Crew:
     executor: Executor
     fail_fast: bool
     progress: StudyProgress
+    kept: KeptRuns
 
 
 def carry_out(work: BatchWork, jobs: Sequence[Job], crew: Crew) -> tuple[Entry, ...]:
-    """Return what became of every specification, in their order; those that were not run are skipped."""
+    """Return what became of every specification, in their order; those that were not run are skipped.
+
+    What an earlier batch has finished and nobody has changed since is not computed again.
+    """
     found: dict[int, Entry] = {}
 
     def stopping() -> bool:
         failed = crew.fail_fast and any(one.code is not ExitCode.OK for one in found.values())
         return failed or crew.progress.stopping()
 
+    def note(job: Job, entry: Entry) -> None:
+        found[job.index] = entry
+        crew.progress.done(1, int(entry.code is not ExitCode.OK), entry.reused)
+
+    def new() -> Iterator[Job]:
+        for job in jobs:
+            if stopping():
+                return
+            entry = crew.kept.recall(job.spec, job.folder)
+            if entry is not None and not entry.verb:
+                entry = work.refusal(job)
+            if entry is None:
+                yield job
+            else:
+                note(job, entry)
+
     crew.progress.total(len(jobs))
-    for job, outcome in crew.executor(work, iter(jobs), stopping):
-        found[job.index] = outcome if isinstance(outcome, Entry) else lost(job, outcome)
-        crew.progress.done(1, int(found[job.index].code is not ExitCode.OK), False)
+    for job, outcome in crew.executor(work, new(), stopping):
+        entry = outcome if isinstance(outcome, Entry) else lost(job, outcome)
+        crew.kept.keep(entry)
+        note(job, entry)
     told = "not run: interrupted" if crew.progress.stopped else LEFT
     return tuple(found.get(job.index) or Entry(job.spec, job.folder, message=told) for job in jobs)
 

@@ -28,7 +28,9 @@ def show_batch(entries: Sequence[Entry], ending: Ending, terminal: Terminal) -> 
 
 
 def _page(entries: Sequence[Entry], ending: Ending, terminal: Terminal) -> Iterator[RenderableType]:
-    yield across(Text(message(entries), LABEL), f"{ending.seconds:.2f} s", terminal.width)
+    count = sum(one.reused for one in entries)
+    reused = f", {count} reused" if count else ""
+    yield across(Text(message(entries), LABEL), f"{ending.seconds:.2f} s{reused}", terminal.width)
     yield Text()
     yield _table(entries)
     yield Text()

@@ -20,7 +20,8 @@ Changes = Annotated[
         "--set",
         metavar="A.B=VALUE",
         help="Replace a value of the spec, with its unit, e.g. --set mechanism.roller_radius='10 mm'. A key that has "
-        """dots itself stands in quotes: 'sensitivity.parameters."mechanism.width"=[1 mm, 2 mm]'. Repeatable.""",
+        """dots itself stands in quotes: 'sensitivity.parameters."mechanism.width"=[1 mm, 2 mm]'. Of many specs """
+        "those of one family only: --set cam:mechanism.roller_radius='10 mm'. Repeatable.",
         show_default=False,
     ),
 ]

@@ -43,6 +43,7 @@ Timeout = Annotated[
     float | None,
     typer.Option("--timeout-per-point", metavar="S", help="Give up a point after S seconds.", show_default=False),
 ]
+Fresh = Annotated[bool, typer.Option("--fresh", help="Compute anew what an earlier run has finished.")]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,6 +54,7 @@ class Studying(Computing):
     cluster: ClusterAddress = None
     max_points: MaxPoints = 1_000_000
     timeout_per_point: Timeout = None
+    fresh: Fresh = False
 
 
 @dataclass(frozen=True)
@@ -115,13 +117,13 @@ def prepare_process() -> None:
 
 
 @contextmanager
-def desk(out: str, terminal: Terminal) -> Iterator[Desk]:
-    """Lock the folder and open the journal; Ctrl-C asks to stop inside the block."""
+def desk(out: str, terminal: Terminal, fresh: bool = False) -> Iterator[Desk]:
+    """Lock the folder and open the journal, to reuse nothing if `fresh`; Ctrl-C asks to stop inside the block."""
     from cfmkit.cli.progress import watching
     from cfmkit.store import RunFolder
     from cfmkit.studies.journal import Journal
 
-    with RunFolder(out) as folder, Journal(folder.journal) as journal, watching(terminal) as progress:
+    with RunFolder(out) as folder, Journal(folder.journal, fresh) as journal, watching(terminal) as progress:
         if journal.damaged:
             terminal.complain([f"journal  {journal.damaged} damaged records are computed again"])
         yield Desk(folder, journal, progress)

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cfmkit.errors import ExitCode, UsageError
+from cfmkit.results import Status
 from cfmkit.tables import Table, TableColumn
 
 if TYPE_CHECKING:
@@ -53,6 +54,10 @@ class Entry:
         How long it took.
     bug : str
         The traceback, if a bug ended it.
+    data : tuple of (str, str)
+        The data files that the specification names, and the hashes of their content.
+    written, reused : bool
+        Whether it wrote its folder, and whether that was done by an earlier batch.
     """
 
     spec: str
@@ -68,6 +73,9 @@ class Entry:
     errors: tuple[str, ...] = ()
     seconds: float = field(default=0.0, compare=False)
     bug: str = field(default="", compare=False)
+    data: tuple[tuple[str, str | None], ...] = field(default=(), compare=False)
+    written: bool = field(default=False, compare=False)
+    reused: bool = field(default=False, compare=False)
 
     @property
     def skipped(self) -> bool:
@@ -239,7 +247,7 @@ def message(entries: Sequence[Entry]) -> str:
     '2 specs: 1 ok, 1 skipped'
     """
     counts = Counter(outcome(one) for one in entries)
-    told = ", ".join(f"{counts[word]} {word}" for word in (*OUTCOMES.values(), SKIPPED) if counts[word])
+    told = ", ".join(f"{counts[word]} {word}" for word in (*OUTCOMES.values(), TIMED_OUT, SKIPPED) if counts[word])
     return f"{len(entries)} spec{'s' * (len(entries) != 1)}: {told}"
 
 
@@ -256,7 +264,11 @@ OUTCOMES = {
 }
 """What an exit code is called in a summary."""
 
+TIMED_OUT = "timed out"
+
 
 def outcome(one: Entry) -> str:
     """Return in a word how a specification ended."""
+    if one.status == Status.TIMEOUT.key:
+        return TIMED_OUT
     return SKIPPED if one.skipped else OUTCOMES.get(one.code, "failed")

@@ -44,6 +44,13 @@ _ENCODE = json.JSONEncoder(separators=(",", ":"), allow_nan=False).encode
 class Journal:
     """A context manager around the journal file of a folder.
 
+    Parameters
+    ----------
+    path : Path
+        The file.
+    fresh : bool
+        Whether to find nothing that was there before; it stays in the file, and what is added supersedes it.
+
     Attributes
     ----------
     damaged : int
@@ -52,9 +59,10 @@ class Journal:
         Whether the last line was cut off.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, fresh: bool = False) -> None:
         """Remember the file; it is made on entry."""
         self.path = path
+        self.fresh = fresh
         self.damaged = 0
         self.torn = False
         self._file = -1
@@ -157,6 +165,8 @@ class Journal:
                 places.append(place)
             else:
                 self.damaged += 1
+        if self.fresh:
+            return
         found, order = np.array(keys, np.uint64), np.argsort(np.array(keys, np.uint64), kind="stable")
         self._known = found[order], np.array(places, np.int64)[order]
 

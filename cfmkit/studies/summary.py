@@ -143,12 +143,14 @@ class Summary:
         """Return what the process is to say.
 
         0 if every point is complete; 6 if some are not; with none that was solved 70 if all
-        of them hit a bug, 3 if all are invalid, else 4; 5 if all is well but the requirements,
-        which no point meets together.
+        of them hit a bug, 3 if all are invalid, 6 if one ran out of time and may have a solution,
+        else 4; 5 if all is well but the requirements, which no point meets together.
         """
         if not self.usable:
             if bugs and bugs == self.total:
                 return ExitCode.BUG
+            if self.counts[Status.TIMEOUT]:
+                return ExitCode.PARTIAL
             invalid = self.counts[Status.INVALID] == self.total
             return ExitCode.INVALID if invalid else ExitCode.NO_SOLUTION
         if self.counts[Status.COMPLETE] < self.total:

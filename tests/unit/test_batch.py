@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
 
 from cfmkit.errors import ExitCode, UsageError
+from cfmkit.store import RunFolder, file_hash, origin
 from cfmkit.studies.batch import Entry, folders, message, requirements_table, results_table, sources
+from cfmkit.studies.journal import Journal
 from cfmkit.studies.junit import junit
+from cfmkit.studies.kept import KeptRuns
 
 
 @pytest.fixture
@@ -168,3 +172,94 @@ def test_the_message_counts_every_end():
 
 def test_two_specifications_of_one_name_in_two_folders_are_told_apart():
     assert folders([str(Path("/p/a/cam.yaml")), str(Path("/p/b/cam.yaml"))]) == ("a-cam", "b-cam")
+
+
+# ---- what an earlier batch has finished
+
+
+SPEC_TEXT = "family: cam\n"
+DONE = Entry("a.yaml", "a", "analyze", "cam", "one", "complete", data=(("flank.csv", None),), written=True)
+
+
+@pytest.fixture
+def finished(tmp_path, monkeypatch):
+    """A folder in which a batch has finished one specification that names a data file."""
+    monkeypatch.chdir(tmp_path)
+    Path("a.yaml").write_text(SPEC_TEXT)
+    Path("flank.csv").write_text("x\n1\n")
+    keep(replace(DONE, data=(("flank.csv", file_hash(Path("flank.csv"))),)))
+    return tmp_path
+
+
+def keep(entry, edit=lambda: None, options=()):
+    with RunFolder("out/a") as folder:
+        folder.write("curve.csv", b"1\n")
+        folder.write("figures/loop.png", b"2")
+        folder.commit({})
+    with Journal(Path("out/journal")) as journal:
+        kept = KeptRuns("out", list(options), journal)
+        kept.recall("a.yaml", "a")
+        edit()
+        kept.keep(entry)
+
+
+def recalled(*options, fresh=False):
+    with Journal(Path("out/journal"), fresh) as journal:
+        return KeptRuns("out", list(options), journal).recall("a.yaml", "a")
+
+
+def test_what_is_as_it_was_is_reused(finished):
+    found = recalled()
+    assert (found, found.reused) == (DONE, True)
+
+
+def test_nothing_is_reused_that_is_to_be_computed_anew(finished):
+    assert recalled(fresh=True) is None
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda: Path("a.yaml").write_text(SPEC_TEXT + "# another\n"),
+        lambda: Path("flank.csv").write_text("x\n2\n"),
+        lambda: Path("flank.csv").unlink(),
+        lambda: Path("out/a/curve.csv").write_text("3\n"),
+        lambda: Path("out/a/figures/loop.png").unlink(),
+        lambda: Path("out/a/manifest.json").unlink(),
+        lambda: Path("out/a/.cfmkit.lock").touch(),
+        lambda: Path("out/a/.cfmkit-run").mkdir(),
+    ],
+    ids=["spec", "data", "data-gone", "edited", "deleted", "no-manifest", "in-use", "half-committed"],
+)
+def test_whatever_was_changed_since_is_computed_anew(finished, change):
+    change()
+    assert recalled() is None
+
+
+def test_other_options_and_other_code_are_computed_anew(finished, monkeypatch):
+    assert recalled("--seed 1") is None
+    monkeypatch.setattr("cfmkit.studies.kept.origin", lambda libraries: origin(libraries) | {"content": "another"})
+    assert recalled() is None
+
+
+@pytest.mark.parametrize(
+    "entry",
+    [
+        replace(DONE, code=ExitCode.BUG, status="bug"),
+        replace(DONE, code=ExitCode.IO, status="io"),
+        replace(DONE, code=ExitCode.PARTIAL, status="timeout", written=False),
+    ],
+    ids=lambda entry: entry.status,
+)
+def test_an_end_that_may_differ_tomorrow_is_not_kept(tmp_path, monkeypatch, entry):
+    monkeypatch.chdir(tmp_path)
+    Path("a.yaml").write_text(SPEC_TEXT)
+    keep(replace(entry, data=()))
+    assert recalled() is None
+
+
+def test_what_was_saved_while_it_was_computed_is_not_kept(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("a.yaml").write_text(SPEC_TEXT)
+    keep(replace(DONE, data=()), edit=lambda: Path("a.yaml").write_text("family: beam\n"))
+    assert recalled() is None

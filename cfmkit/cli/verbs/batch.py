@@ -9,7 +9,7 @@ import typer
 
 from cfmkit.cli.answer import Answer
 from cfmkit.cli.options import Changing, Common, Fidelity, NoPlots, Quiet, Seed
-from cfmkit.cli.studies import Jobs, Timeout
+from cfmkit.cli.studies import Fresh, Jobs, Timeout
 from cfmkit.errors import ExitCode
 
 if TYPE_CHECKING:
@@ -60,6 +60,7 @@ class Options(Changing, Common):
     fail_fast: FailFast = False
     jobs: Jobs = None
     timeout_per_point: Timeout = None
+    fresh: Fresh = False
     fidelity: Fidelity = None
     seed: Seed = 0
     no_plots: NoPlots = False
@@ -67,26 +68,40 @@ class Options(Changing, Common):
 
 
 def run(options: Options, terminal: Terminal) -> Answer:
-    """Design or analyse many specs, check their requirements, and sum up; the exit code says the worst."""
+    """Design or analyse many specs, check their requirements, and sum up; the exit code says the worst.
+
+    A spec that an earlier batch has finished is reused as long as nothing has changed: neither spec nor options, nor
+    cfmkit, nor a file that was written.
+    """
     from cfmkit.cli import studies
 
     studies.prepare_process()
     from cfmkit.cli import batch
     from cfmkit.cli.progress import watching
+    from cfmkit.specfile import addressed
     from cfmkit.store import RunFolder
     from cfmkit.studies.batch import folders, sources
+    from cfmkit.studies.journal import Journal
     from cfmkit.studies.junit import junit
+    from cfmkit.studies.kept import KeptRuns
 
     start = studies.now()
     out = _folder(options)
+    for change in options.changes:
+        addressed(change)
     files = sources(options.specs, out)
     jobs = [batch.Job(k, *pair) for k, pair in enumerate(zip(files, folders(files), strict=True))]
     executor = batch.executor_for(options.jobs, len(jobs), options.timeout_per_point)
     report = None if options.junit is None else batch.prepared(options.junit)
-    with RunFolder(out) as folder, watching(terminal, "specs") as progress:
+    work = _work(options, out, terminal)
+    with (
+        RunFolder(out) as folder,
+        Journal(folder.journal, options.fresh) as journal,
+        watching(terminal, "specs") as progress,
+    ):
         folder.check("results.csv", "requirements.csv", "metrics.json")
-        crew = batch.Crew(executor, options.fail_fast, progress)
-        entries = batch.carry_out(_work(options, out, terminal), jobs, crew)
+        kept = KeptRuns(out, work.deciding, journal)
+        entries = batch.carry_out(work, jobs, batch.Crew(executor, options.fail_fast, progress, kept))
         code = batch.exit_code(entries, progress.stopped)
         written = _write(folder, entries, _about(options, terminal, code))
     if report is not None:
@@ -114,7 +129,7 @@ def _work(options: Options, out: str, terminal: Terminal) -> BatchWork:
         no_plots=options.no_plots,
         quiet=True,
     )
-    return BatchWork(out, common, options.verb, terminal.arguments)
+    return BatchWork(out, common, options.verb, terminal.arguments, options.fresh)
 
 
 def _about(options: Options, terminal: Terminal, code: ExitCode) -> dict[str, Any]:
@@ -170,6 +185,7 @@ def _answer(entries: Sequence[Entry], code: ExitCode, ending: Ending, terminal: 
     from cfmkit.studies.batch import message
 
     data = _data(entries, code) | {"out": ending.folder, "files": list(ending.files), "junit": ending.junit}
+    data["reused"] = sum(one.reused for one in entries)
 
     def view(screen: Terminal) -> None:
         from cfmkit.cli.batch_page import show_batch

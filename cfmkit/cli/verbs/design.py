@@ -8,7 +8,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from cfmkit.cli.options import Common, Computing
-from cfmkit.cli.studies import Jobs
+from cfmkit.cli.studies import Fresh, Jobs
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -29,26 +29,26 @@ class Options(Computing, Common):
     """Arguments and options."""
 
     jobs: Jobs = None
+    fresh: Fresh = False
 
 
 def run(options: Options, terminal: Terminal) -> Answer:
     """Design a mechanism for the targets of its spec, analyse it, and draw what is to be cut."""
     from cfmkit.cli.runs import Verb, execute
+    from cfmkit.studies.executors import cores
 
-    return execute(
-        Verb("design", "designed and analysed", compute, running=partial(long_run, options)), options, terminal
-    )
+    running = partial(long_run, options.jobs or cores(), options.fresh)
+    return execute(Verb("design", "designed and analysed", compute, running=running), options, terminal)
 
 
 @contextmanager
-def long_run(options: Options, folder: RunFolder, plain: Run) -> Iterator[Run]:
+def long_run(jobs: int, fresh: bool, folder: RunFolder, plain: Run) -> Iterator[Run]:
     """Yield a run that works in several processes and notes what it has finished in the folder's journal."""
-    from cfmkit.studies.executors import cores, serial
+    from cfmkit.studies.executors import serial
     from cfmkit.studies.journal import Journal
     from cfmkit.studies.pool import Pool
 
-    jobs = options.jobs or cores()
-    with Journal(folder.journal) as journal:
+    with Journal(folder.journal, fresh) as journal:
         yield replace(plain, executor=serial if jobs == 1 else Pool(jobs), notes=journal)
 
 

@@ -113,7 +113,7 @@ def run(options: Options, terminal: Terminal) -> Answer:
     start = studies.now()
     out = folder_of(options, "sensitivity")
     setup = prepare(spec_of(options), options.seed, options.max_points)
-    with studies.desk(out, terminal) as place:
+    with studies.desk(out, terminal, options.fresh) as place:
         place.folder.check("results.csv", "indices.csv", "metrics.json", "resolved.yaml")
         found = carry_out(setup, lambda work: studies.compute(work, options, place))
         for piece in found.evaluator.pieces:

@@ -78,7 +78,7 @@ def run(options: Options, terminal: Terminal) -> Answer:
     out = folder_of(options, "sweep")
     spec, asked = spec_of(options), request(options)
     work = prepare(spec, asked)
-    with studies.desk(out, terminal) as place:
+    with studies.desk(out, terminal, options.fresh) as place:
         place.folder.check("results.csv", "metrics.json", "resolved.yaml")
         records = studies.compute(work, options, place)
         studies.tracebacks(records, terminal)

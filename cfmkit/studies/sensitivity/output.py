@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from cfmkit.errors import ExitCode
 from cfmkit.families import family
 from cfmkit.metrics import metrics_json
-from cfmkit.results import Finding, Quantity
+from cfmkit.results import Finding, Quantity, Status
 from cfmkit.studies.sensitivity.intervals import LEVEL
 from cfmkit.studies.tables import results_table
 from cfmkit.studies.variation import written
@@ -78,7 +78,7 @@ def exit_code(found: Findings) -> ExitCode:
     if found.interrupted:
         return ExitCode.INTERRUPTED
     evaluator = found.evaluator
-    if evaluator.count and evaluator.failed == evaluator.count:
+    if evaluator.count and evaluator.failed == evaluator.count and not evaluator.ends[Status.TIMEOUT]:
         return ExitCode.NO_SOLUTION
     stated = found.setup.method == "local" and not found.lacking
     if (evaluator.failed and not stated) or found.lacking:
