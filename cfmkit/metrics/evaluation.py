@@ -12,8 +12,8 @@ from cfmkit.errors import UsageError
 from cfmkit.metrics.known import metrics_by_name
 from cfmkit.metrics.subjects import Cycle, Frame, cycle
 from cfmkit.metrics.table import Definition, definitions, split_name, unknown_metric
-from cfmkit.metrics.traces import Undefined, Window
-from cfmkit.results import Quantity
+from cfmkit.metrics.traces import Undefined, Window, traces
+from cfmkit.results import Quantity, Status
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -159,6 +159,15 @@ def survey_of(result: Result, window: Window | None) -> Survey | None:
     return survey(result.curves[0], frame_of(result), window) if result.curves else None
 
 
+def _left_of(window: Window | None, result: Result) -> Window | None:
+    """Return what is left of a window inside which the curve of a partial result ends; else the window itself."""
+    if window is None or result.status is not Status.PARTIAL or not result.curves or not len(result.curves[0]):
+        return window
+    extents = [trace.extent for trace in traces(result.curves[0])]
+    low, high = max(window.lo, *(low for low, _ in extents)), min(window.hi, *(high for _, high in extents))
+    return Window(low, high) if low < high else window
+
+
 def evaluate(
     result: Result,
     names: Iterable[str] | None = None,
@@ -174,7 +183,8 @@ def evaluate(
     names : iterable of str, optional
         Only these (``force_mean``, ``force_mean[load]``, a family's value); default: all.
     window : Window, optional
-        Default: ``analysis.window``, else the full travel.
+        Default: ``analysis.window``, else the full travel. Of a partial result whose curve ends
+        inside it, what is left of it (requirements over it are missed all the same).
     extra_definitions : iterable of Definition
         A family's metrics beside those of the contract.
 
@@ -188,7 +198,7 @@ def evaluate(
     cfmkit.errors.UsageError
         If one of `names` exists neither as a metric nor as a value of the family.
     """
-    view = survey_of(result, window or window_of(result))
+    view = survey_of(result, _left_of(window or window_of(result), result))
     kind, extra = kind_of(result), tuple(extra_definitions)
     if names is not None:
         known = metrics_by_name(kind, extra)

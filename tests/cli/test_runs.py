@@ -211,12 +211,12 @@ def test_the_cure_of_a_spec_from_standard_input_says_where_to_write(cli, cam):
     assert "cfmkit design - --set design.avoid_undercut=true -o out\n" in page
 
 
-def test_a_design_without_room_for_a_plate_keeps_its_analysis(cli, cam):
+def test_a_design_whose_rollers_overlap_is_refused_with_the_largest_that_fits(cli, cam):
     narrow = ("--set", "mechanism.rest_half_width=2 mm", "--set", "design.force=5 N")
     done = cli("design", cam, *QUICK, "-o", "out", *narrow)
-    assert done.code == 5, done.err
-    assert "warning  flanks_collide: the flanks cross the axis" in done.out
-    assert (cli.folder / "out/curve.csv").is_file()
+    assert done.code == 4
+    assert "the rollers overlap by 28 mm" in done.out + done.err
+    assert "2 mm" in done.out + done.err
     assert not (cli.folder / "out/geometry").exists()
     export = cli("export", cam, "-o", "cut", *narrow, "--set", "mechanism.profile.force_constant=1 mm")
     assert export.code == 4

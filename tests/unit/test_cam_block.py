@@ -201,3 +201,28 @@ def test_a_block_that_is_lost_costs_only_the_points_that_are_lost_alone():
     assert together.row(7).status(0) == (Status.CRASHED, "it died")
     for k in set(range(40)) - {7}:
         assert np.allclose(together.row(k).values, alone.row(k).values, rtol=1e-12, equal_nan=True)
+
+
+def test_a_block_warns_of_what_each_cam_warns_of():
+    spec = SPEC.replace({"mechanism.springs.max_elongation": "130 mm"})
+    ranges = RANGES | {"mechanism.rolling_friction": "0:0.3", "mechanism.profile.force_constant": "5 mm:30 mm"}
+    del ranges["design.force"]
+    plan = sampled(axes(spec, wishes(ranges), drawn=True), Draw("sobol", 256))
+    values = dict(zip(plan.paths, plan.block(0, 256), strict=True))
+    with np.errstate(all="ignore"):
+        answer = analyze_block(spec, Block(values, (Measure("force_mean"),), 256))
+    seen = set()
+    for k in np.flatnonzero(answer.done)[:60].tolist():
+        alone = cfmkit.analyze(spec.replace(dict(zip(plan.paths, plan.point(k), strict=True))))
+        names = list(dict.fromkeys(found.name for found in alone.warnings))
+        assert [name for name, warned in answer.warnings.items() if warned[k]] == names, k
+        seen |= set(names)
+    assert seen >= {"undercut", "up_jam", "spring_overstretched", "slack_cable"}
+
+
+def test_rollers_that_overlap_are_left_to_the_model_of_one_cam():
+    radius = np.array([0.067, 0.068, 0.0681, 0.150])
+    answer = analyze_block(SPEC, Block({"mechanism.roller_radius": radius}, (Measure("force_mean"),), 4))
+    assert answer.done.tolist() == [True, True, False, False]
+    large = work(ranges={"mechanism.roller_radius": "69 mm:150 mm"}, count=8, names=("force_mean",))
+    assert {run(large).row(k).status(0)[0] for k in range(8)} == {Status.NO_EQUILIBRIUM}

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from cam_support import MM, analyze, at, cam, fixed, message, names
 
+from cfmkit.families.cam.build import assemble
 from cfmkit.families.cam.findings import FINDINGS, finding
 from cfmkit.results import Status
 
@@ -350,10 +351,37 @@ def test_the_cable_goes_slack_where_friction_holds_the_rollers_on_the_way_down()
 # --- (10), (11) collisions and the end of the profile -----------------------------------------------------------------
 
 
-def test_rollers_that_overlap_are_reported():
+def test_rollers_that_overlap_at_the_start_are_not_assembled():
     result = run(rest_half_width="9 mm", profile__stroke="50 mm", **FITS)
-    assert "the rollers overlap by 2 mm" in message(result, "rollers_collide")
-    assert "rollers_collide" not in names(run(rest_half_width="10.1 mm", profile__stroke="50 mm", **FITS))
+    assert result.status is Status.NO_EQUILIBRIUM
+    assert not result.curves
+    assert names(result) == ["rollers_collide"]
+    assert "the rollers overlap by 2 mm at the start" in result.message
+    assert "'mechanism.roller_radius'" in result.message
+    beside = run(rest_half_width="10.1 mm", profile__stroke="50 mm", **FITS)
+    assert beside.status is Status.COMPLETE
+
+
+@pytest.mark.parametrize("radius", ["80 mm", "150 mm"])
+def test_the_published_cam_has_no_room_for_rollers_as_large_as_this(radius):
+    result = run(roller_radius=radius)
+    assert result.status is Status.NO_EQUILIBRIUM
+    assert names(result)[0] in ("rollers_collide", "flanks_collide")
+    assert not result.curves
+
+
+def test_a_larger_roller_on_a_cut_cam_must_have_room_beside_the_other():
+    spec = cam(rest_half_width="14 mm", profile__stroke="50 mm", **FITS)
+    assert analyze(fixed(spec, roller_radius="14 mm")).status is Status.COMPLETE
+    assert names(analyze(fixed(spec, roller_radius="15 mm"))) == ["rollers_collide"]
+
+
+def test_springs_that_are_slack_over_the_whole_travel_hold_nothing():
+    result = analyze(fixed(cam(**FITS), rest_half_width="150 mm"))
+    assert result.status is Status.NO_EQUILIBRIUM
+    assert names(result) == ["spring_slack"]
+    assert "'mechanism.rest_half_width'" in result.message
+    assert analyze(fixed(cam(**FITS), rest_half_width="130 mm")).status is Status.COMPLETE
 
 
 def test_rollers_larger_than_the_braces_are_refused():
@@ -364,14 +392,19 @@ def test_rollers_larger_than_the_braces_are_refused():
     assert names(analyze(fixed(cam(**FITS), profile__offset="-195 mm"))) == ["rollers_collide"]
 
 
-def test_flanks_that_cross_the_axis_are_reported():
+def test_flanks_that_cross_the_axis_leave_no_cam():
     # Friction cut for makes the flank's normal lean at the start: x = x0 - r sin(atan f).
     crossing = {"rest_half_width": "4 mm", "profile__friction": 0.4, "profile__force_constant": "50 mm"}
-    result = run(**crossing, roller_radius="12 mm", profile__stroke="50 mm")
-    x, _ = result.state.assembly.profile.flank(result.state.assembly.profile.start)
+    spec = cam(**crossing, roller_radius="12 mm", profile__stroke="50 mm")
+    profile = assemble(spec).profile
+    x, _ = profile.flank(profile.start)
     assert x < 0
+    result = analyze(spec)
+    assert result.status is Status.NO_EQUILIBRIUM
     assert f"(x = {x / MM:.4g} mm)" in message(result, "flanks_collide")
-    assert "flanks_collide" not in names(run(**crossing, roller_radius="8 mm", profile__stroke="50 mm"))
+    small = run(**crossing, roller_radius="3 mm", profile__stroke="50 mm")
+    assert small.status is Status.COMPLETE
+    assert "flanks_collide" not in names(small)
 
 
 def test_a_small_roller_on_a_cam_that_crosses_the_axis_is_refused():

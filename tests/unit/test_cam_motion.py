@@ -18,6 +18,7 @@ from cfmkit.families.cam.dynamics.history import direct_history, multibody_histo
 from cfmkit.families.cam.dynamics.motion import Cycloid, Moment
 from cfmkit.families.cam.dynamics.multibody import CornerContact, NineCoordinates, Scheme
 from cfmkit.families.cam.statics import forces
+from cfmkit.metrics import Window, evaluate
 from cfmkit.results import Status
 
 UNLIKE = {
@@ -199,14 +200,61 @@ def names(result):
     return [item.name for item in result.warnings]
 
 
-def test_lift_off_and_slack_cable_are_found_with_time_and_place():
-    result = analyze(moving(analysis__dynamics__time="0.05 s", masses__roller="1 kg", masses__roller_inertia=None))
-    found = {item.name: item.message for item in result.warnings}
+LIFTS_OFF = {"analysis__dynamics__time": "0.05 s", "masses__roller": "1 kg", "masses__roller_inertia": None}
+
+
+def test_a_motion_ends_where_a_roller_leaves_the_cam_whatever_the_number_of_points():
+    results = [analyze(moving(**LIFTS_OFF, analysis__dynamics__points=points)) for points in (31, 201, 3001)]
+    for result in results:
+        assert result.status is Status.PARTIAL
+        assert names(result)[0] == "lift_off"
+        assert "a roller leaves the cam at" in result.message
+        contact = result.curve.extra["contact_force_right"].values
+        assert (contact > 0).all()
+        assert contact[-1] < 1e-9 * contact.max()
+    last = [result.curve.displacement[-1] for result in results]
+    np.testing.assert_allclose(last, last[0], rtol=1e-12)
+    found = {item.name: item.message for item in results[1].warnings}
     assert " s (" in found["slack_cable"]
-    assert "each roller" in found["lift_off"]
-    contact = result.curve.extra["contact_force_right"].values
-    assert not result.curve.stable[contact <= 0].any()
-    assert (contact <= 0).any()
+    measured = evaluate(results[1], ["force_max"], Window(0.04, 0.12))["force_max"].value
+    inside = results[1].curve.displacement >= 0.04
+    assert measured == pytest.approx(results[1].curve.force[inside].max(), rel=1e-2)
+
+
+def test_the_nine_coordinates_end_at_the_same_place():
+    direct, other = (
+        analyze(moving(**LIFTS_OFF, analysis__dynamics__method=method)) for method in ("direct", "multibody")
+    )
+    assert other.status is Status.PARTIAL
+    assert len(other.curve) == len(direct.curve) - 1
+    np.testing.assert_allclose(other.curve.force, direct.curve.force[:-1], rtol=1e-6)
+
+
+def test_a_motion_down_ends_where_the_springs_go_slack():
+    down = {"analysis__dynamics__slider_position": "300 mm", "analysis__dynamics__stroke": "-100 mm"}
+    part = {"profile__rest_half_width": "68 mm", "rest_half_width": "90 mm"}
+    result = analyze(moving(**down, **part, analysis__dynamics__time="10 s"))
+    assert result.status is Status.PARTIAL
+    assert names(result)[0] in ("spring_slack", "lift_off")
+    assert result.curve.extra["spring_elongation"].values.min() >= 0
+    assert result.curve.extra["spring_elongation"].values[-1] == pytest.approx(0, abs=1e-9)
+
+
+def test_a_motion_that_starts_with_overlapping_rollers_is_refused_and_one_that_ends_so_is_partial():
+    low = {"rest_half_width": "12 mm", "profile__roller_radius": "5 mm", "roller_radius": "16 mm"}
+    low |= {"analysis__dynamics__time": "10 s"}
+    start, _ = build(moving(**low)).machine.span
+
+    def moved(position, stroke):
+        return analyze(moving(**low, analysis__dynamics__slider_position=position, analysis__dynamics__stroke=stroke))
+
+    up, down = moved(start + 1e-5, 0.05), moved(start + 0.05, -0.05 + 1e-5)
+    assert up.status is Status.NO_EQUILIBRIUM
+    assert names(up) == ["rollers_collide"]
+    assert down.status is Status.PARTIAL
+    assert names(down)[0] == "rollers_collide"
+    x = down.state.history.center.real
+    assert x[:, -1] == pytest.approx([16e-3, 16e-3], abs=1e-9)
 
 
 def test_a_motion_that_leaves_the_profile_is_partial():

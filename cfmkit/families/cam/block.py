@@ -63,12 +63,16 @@ def analyze_block(spec: CamSpec, block: Block) -> BlockAnswer | None:
     done = np.zeros(block.size, dtype=bool)
     values = [_empty(measure.name, block.size) for measure in block.measures]
     settings = spec.analysis.points, "contact_force_max" in names, spec.analysis.band
+    warnings: dict[str, NDArray[np.bool_]] = {}
+    limit = spec.mechanism.springs.max_elongation
     for chosen, cams in (*_plain(designs, settings), *_undercut(designs, settings)):
         done[chosen] = cams.solved
+        for name, warned in cams.warned(limit):
+            warnings.setdefault(name, np.zeros(block.size, dtype=bool))[chosen] = warned
         for measure, found in zip(block.measures, values, strict=True):
             for branch, numbers in measured(cams, measure).items():
                 found[branch][chosen] = numbers
-    return BlockAnswer(done, tuple(values), designs.target, "force")
+    return BlockAnswer(done, tuple(values), designs.target, "force", warnings)
 
 
 def _plain(designs: Designs, settings: Settings) -> Iterator[tuple[NDArray[np.intp], Slab]]:

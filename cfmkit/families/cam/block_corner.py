@@ -149,6 +149,12 @@ class CornerSlab(Slab):
         """Travel at the start over which friction lets no force move the slider up [m]."""
         return np.array([next((high for low, high in each if low <= 0), 0.0) for each in self.jams])
 
+    @property
+    def jammed(self) -> NDArray[np.bool_]:
+        """Whether friction lets no force move the slider up somewhere on the travel."""
+        total = self.travel[:, -1]
+        return np.array([any(low < end for low, _ in each) for each, end in zip(self.jams, total, strict=True)])
+
     @cached_property
     def corner_peak(self) -> FloatArray:
         """Largest force on the way up on the corner [N], from samples refined by a parabola through the highest."""

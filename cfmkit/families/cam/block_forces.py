@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from numpy.typing import NDArray
 
     from cfmkit.curves import FloatArray
@@ -75,7 +77,8 @@ class Designs:
         for value in (self.brace, self.x0, self.radius, self.stiffness, self.constant, self.stroke, self.target):
             positive &= value > 0
         reaches = self.end < self.brace - 2e-9 * (self.brace - self.x0)
-        fits = self.radius <= self.brace
+        # Rollers that overlap at the start are no mechanism (`existence`).
+        fits = (self.radius <= self.brace) & (self.radius <= self.x0)
         starts = self.x0 < self.brace * (1 - 1e-5)
         return positive & reaches & fits & starts & (self.friction >= 0) & (self.friction < 1)
 
@@ -202,6 +205,21 @@ class Slab:
     def solved(self) -> NDArray[np.bool_]:
         """Whether a force was found at every sample."""
         return self.up.moves & self.down.moves
+
+    def warned(self, max_elongation: float | None) -> Iterator[tuple[str, NDArray[np.bool_]]]:
+        """Yield the findings that `checks.findings_of` has of such cams, in its order: name, and which designs."""
+        corner = self.corner_travel > 0
+        yield from (("undercut", corner), ("contact_not_single_valued", corner), ("up_jam", self.jammed))
+        if max_elongation:
+            yield "spring_overstretched", 2.0 * self.stretch[:, -1] > max_elongation * (1 + 1e-9)
+        forces = (self.up, self.down) if self.designs.friction.any() else (self.up,)
+        slack = [((self.stretch > 0) & (one.slider <= 0)).any(axis=1) for one in forces]
+        yield "slack_cable", np.logical_or.reduce(slack)
+
+    @property
+    def jammed(self) -> NDArray[np.bool_]:
+        """Whether friction lets no force move the slider up somewhere on the travel."""
+        return self.jam_travel > 0
 
     def spread(self, branch: str, window: Any) -> Spread:
         """Return the forces of one branch inside a window."""

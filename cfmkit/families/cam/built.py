@@ -26,6 +26,7 @@ from cfmkit.errors import DataError
 from cfmkit.families.cam.build import Assembly, assemble, displacement_origin
 from cfmkit.families.cam.built_values import findings_of_built, values_of_built
 from cfmkit.families.cam.checks import left_out
+from cfmkit.families.cam.existence import check_first_pose, check_springs, until_overlap
 from cfmkit.families.cam.findings import finding
 from cfmkit.families.cam.values import DEFINITIONS, design_values, largest
 from cfmkit.families.findings import mm
@@ -41,6 +42,7 @@ if TYPE_CHECKING:
     from cfmkit.curves import FloatArray
     from cfmkit.families.cam.spec import CamSpec
     from cfmkit.families.cam.statics import Loads
+    from cfmkit.results import Finding
 
 
 STRANGE = 0.01
@@ -133,13 +135,15 @@ def analyze_built(spec: CamSpec) -> Result:
     """
     try:
         assembly = assemble(spec)
+        check_first_pose(assembly)
+        registration = registered(assembly)
+        tracks = _tracks(assembly, registration)
+        travel, ended = _travel(assembly, tracks)
+        built = _solved(assembly, registration, tracks, travel)
+        check_springs(built.elongation, built.forces(1.0)[1], assembly.loads.rest_half_width)
     except CannotBuild as problem:
         return no_result(spec, problem.finding)
-    registration = registered(assembly)
-    tracks = _tracks(assembly, registration)
-    travel, short = _travel(assembly, tracks)
-    built = _solved(assembly, registration, tracks, travel)
-    found = [*([finding("outside_profile", short)] if short else []), *left_out(spec), *findings_of_built(built)]
+    short, found = (ended.message, [ended]) if ended else ("", [])
     asked = assembly.spec.analysis.model_copy(
         update={"travel": float(travel[-1]), "gravity": spec.gravity, "fidelity": "quasi-static"}
     )
@@ -149,7 +153,7 @@ def analyze_built(spec: CamSpec) -> Result:
         message=short,
         curves=(_curve(built),),
         values=_values(built),
-        warnings=tuple(found),
+        warnings=(*found, *left_out(spec), *findings_of_built(built)),
         valid=((float(travel[0]) + built.origin, float(travel[-1]) + built.origin),),
         target=spec.design.force if spec.design else float(built.shares["design"][-1]),
         state=built,
@@ -196,7 +200,7 @@ def _tracks(assembly: Assembly, registration: Registration) -> tuple[BuiltTrack,
     return found[0], found[1]
 
 
-def _travel(assembly: Assembly, tracks: tuple[BuiltTrack, BuiltTrack]) -> tuple[FloatArray, str]:
+def _travel(assembly: Assembly, tracks: tuple[BuiltTrack, BuiltTrack]) -> tuple[FloatArray, Finding | None]:
     """Return the travels at which both sides were measured, and why they are short, if they are [m]."""
     start = assembly.track.start
     low = max(float(track.slider[0]) for track in tracks) - start
@@ -204,10 +208,14 @@ def _travel(assembly: Assembly, tracks: tuple[BuiltTrack, BuiltTrack]) -> tuple[
     asked = assembly.spec.analysis.travel
     if high <= max(low, 0.0):
         raise DataError(f"{assembly.spec.mechanism.profile.file}: the two flanks were measured at different heights")
-    short = ""
+    short = None
     if asked is not None and asked > high * (1 + 1e-9):
-        short = f"the travel asked for is {mm(asked)}, but the flanks were measured up to {mm(high)} of travel only"
-    return np.linspace(max(low, 0.0), min(asked or high, high), assembly.spec.analysis.points), short
+        message = f"the travel asked for is {mm(asked)}, but the flanks were measured up to {mm(high)} of travel only"
+        short = finding("outside_profile", message)
+    travel = np.linspace(max(low, 0.0), min(asked or high, high), assembly.spec.analysis.points)
+    x = tracks[0].at(start + travel)[0], tracks[1].at(start + travel)[0]
+    count, overlap = until_overlap(travel, start + travel, x, assembly.spec.mechanism)
+    return travel[:count], overlap or short
 
 
 def _solved(
@@ -231,10 +239,8 @@ def _solved(
 
 def across(assembly: Assembly, registration: Registration) -> tuple[FloatArray, FloatArray]:
     """Return the errors of both flanks in x at the same y, positive outside [m]."""
-    right, left = (
-        flank.side * gaps_across(flank, points, u)
-        for flank, points, u in zip(flanks_of(assembly), registration.points, registration.parameters, strict=True)
-    )
+    sides = zip(flanks_of(assembly), registration.points, registration.parameters, strict=True)
+    right, left = (flank.side * gaps_across(flank, points, u) for flank, points, u in sides)
     return right, left
 
 
@@ -291,6 +297,3 @@ def _curve(built: Built) -> Curve:
         stable = (loop(up[1], down[1]) > 0) & (loop(up[2], down[2]) > 0)
     branch = np.repeat(["load", "unload"], len(built.travel))
     return Curve(loop(built.travel) + built.origin, loop(up[0], down[0]), branch, stable, extra)
-
-
-__all__ = ["Built", "Sides", "analyze_built", "registered"]

@@ -14,7 +14,6 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from cfmkit.bodies.cam_cut import CamProfile
     from cfmkit.curves import FloatArray
     from cfmkit.families.cam.model import Solution
     from cfmkit.families.cam.spec import CamSpec
@@ -23,7 +22,7 @@ if TYPE_CHECKING:
 
 def findings_of(solution: Solution) -> tuple[Finding, ...]:
     """Return every finding about a solved mechanism, the gravest first."""
-    checks = (_collisions, _undercut, _jam, _dead_point, _springs, _contact)
+    checks = (_undercut, _jam, _dead_point, _springs, _contact)
     return tuple(found for check in checks for found in check(solution))
 
 
@@ -41,30 +40,6 @@ def left_out(spec: CamSpec) -> tuple[Finding, ...]:
         "give 'analysis.dynamics' a slow motion to see the effect"
     )
     return (finding("symmetric_model", message),)
-
-
-def flanks_crossing(profile: CamProfile) -> Finding | None:
-    """Return what to say where the flanks meet or cross, so that there is no plate between them."""
-    x = float(profile.flank(profile.start)[0])
-    if x > 0:
-        return None
-    return finding(
-        "flanks_collide",
-        f"the flanks cross the axis (x = {mm(x)}): no plate is left between them; "
-        "use a smaller roller or springs with a longer rest length",
-    )
-
-
-def _collisions(solution: Solution) -> Iterator[Finding]:
-    assembly = solution.assembly
-    if crossing := flanks_crossing(assembly.profile):
-        yield crossing
-    gap = float(solution.states.x.min()) - assembly.spec.mechanism.roller_radius
-    if gap < 0:
-        yield finding(
-            "rollers_collide",
-            f"the rollers overlap by {mm(-2 * gap)}; use smaller rollers or a longer spring rest length",
-        )
 
 
 def _undercut(solution: Solution) -> Iterator[Finding]:

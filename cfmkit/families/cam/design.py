@@ -20,6 +20,7 @@ import numpy as np
 from cfmkit.bodies.cam_path import reach
 from cfmkit.bodies.cam_profile import SlopeLaw, brace_tangent
 from cfmkit.families.cam.build import CLOSE, check_start, hanging_weights
+from cfmkit.families.cam.existence import rollers_overlap
 from cfmkit.families.cam.findings import finding
 from cfmkit.families.findings import at_least, at_most, mm, newton, rate
 from cfmkit.families.refusals import CannotBuild, Infeasible, no_design
@@ -70,6 +71,7 @@ def _design(spec: CamSpec, target: CamDesign) -> Design:
     pull, factor = shaping(spec, target)
     _check_beginning(spec, target, factor)
     smallest = _smallest_constant(spec, target, factor)
+    _check_room(spec)
     ways = {"force-constant": _from_springs, "stiffness": _from_constant, "catalogue": _from_catalogue}
     choice = ways[target.choose](spec, target, pull, factor, smallest)
     law = _law(spec, target, choice.force_constant, factor)
@@ -110,6 +112,14 @@ def _check_beginning(spec: CamSpec, target: CamDesign, factor: float) -> None:
     except CannotBuild as problem:
         longer = {"mechanism.brace_length": f"more than {mm(mechanism.rest_half_width)}"}
         raise Infeasible(problem.finding, longer if problem.finding.name == "brace_too_short" else None) from None
+
+
+def _check_room(spec: CamSpec) -> None:
+    """Raise if the rollers overlap with the springs at rest."""
+    mechanism = spec.mechanism
+    if (gap := 2.0 * (mechanism.rest_half_width - mechanism.roller_radius)) < 0:
+        room = {"mechanism.roller_radius": at_most(mechanism.rest_half_width)}
+        raise Infeasible(rollers_overlap(gap), room)
 
 
 def _smallest_constant(spec: CamSpec, target: CamDesign, factor: float) -> float | None:

@@ -23,6 +23,7 @@ from cfmkit.bodies.cam_profile import brace_tangent
 from cfmkit.curves import Column, Curve, FloatArray
 from cfmkit.families.cam.build import CLOSE, Assembly, assemble, displacement_origin
 from cfmkit.families.cam.checks import findings_of, left_out
+from cfmkit.families.cam.existence import check_first_pose, check_springs
 from cfmkit.families.cam.findings import finding
 from cfmkit.families.cam.statics import Forces, forces, jams
 from cfmkit.families.cam.values import theoretical_force, values_of
@@ -123,9 +124,12 @@ def analyze(spec: CamSpec, run: Run) -> Result:
         return analyze_built(spec)
     try:
         assembly = assemble(spec)
+        check_first_pose(assembly)
+        solution = solve(assembly)
+        check_springs(solution.elongation, solution.up.contact, assembly.loads.rest_half_width)
     except CannotBuild as problem:
         return no_result(spec, problem.finding)
-    solution = with_band(solve(assembly), run.seed)
+    solution = with_band(solution, run.seed)
     shortfalls = _shortfalls(assembly, solution)
     failed = int(np.isnan(solution.up.slider[1:]).sum() + np.isnan(solution.down.slider[1:]).sum())
     warnings = (*shortfalls, *left_out(spec), *findings_of(solution))

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.families.cam.build import assemble_sides
-from cfmkit.families.cam.checks import flanks_crossing
+from cfmkit.families.cam.existence import flanks_crossing
 from cfmkit.families.refusals import CannotBuild
 from cfmkit.geometry import Arc, Contour, Curve2D, Drawing, Edge, Line, Smooth
 

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from cfmkit.families.cam.dynamics.model import Moved
     from cfmkit.results import Finding
 
-SIDES = ("right", "left")
 ROLLER_SHARE = (0.25, 2.0)
 """Moment of inertia of a roller over that of a solid cylinder: below, its mass would lie within half the
 radius; above, outside of the roller (a thin ring has 2)."""
@@ -30,7 +29,7 @@ BRACE_SHARE = (0.1, 3.0)
 
 def findings_of(moved: Moved) -> tuple[Finding, ...]:
     """Return every finding about a motion, the gravest first."""
-    checks = (_lift_off, _slack_cable, _held, _on_corner, _springs, _inertias, _friction)
+    checks = (_slack_cable, _held, _on_corner, _springs, _inertias, _friction)
     return tuple(found for check in checks for found in check(moved))
 
 
@@ -52,19 +51,6 @@ def runs_on_corner(parts: Build) -> Finding:
         "on the corner of the cam the contact is no function of its height, as the nine-coordinate model needs it: "
         f"start above {mm(above)}, or use 'analysis.dynamics.method: direct'",
     )
-
-
-def _lift_off(moved: Moved) -> Iterator[Finding]:
-    alike = moved.build.machine.left == moved.build.machine.right
-    for side, contact in zip(SIDES[: 1 if alike else 2], moved.history.contact, strict=False):
-        lost = contact <= 0
-        if lost.any():
-            yield finding(
-                "lift_off",
-                f"the cam would have to pull {'each' if alike else f'the {side}'} roller with up to "
-                f"{newton(-float(np.nanmin(contact)))} {_when(moved, lost)}: it leaves the cam there, "
-                "and what follows is not what happens",
-            )
 
 
 def _slack_cable(moved: Moved) -> Iterator[Finding]:

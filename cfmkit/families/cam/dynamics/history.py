@@ -5,12 +5,13 @@ Sides are rows: right, left, with x outwards.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cfmkit.families.cam.dynamics.direct import respond
+from cfmkit.families.cam.dynamics.motion import Moment
 from cfmkit.families.cam.dynamics.multibody import NineCoordinates
 from cfmkit.families.cam.dynamics.reactions import reactions
 
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 
     from cfmkit.curves import FloatArray
     from cfmkit.families.cam.dynamics.machine import Machine
-    from cfmkit.families.cam.dynamics.motion import Cycloid, Moment
+    from cfmkit.families.cam.dynamics.motion import Cycloid
     from cfmkit.families.cam.dynamics.multibody import Scheme
 
 
@@ -62,6 +63,14 @@ class History:
     elongation: FloatArray
     center: NDArray[np.complex128]
     on_corner: NDArray[np.bool_]
+
+    def first(self, count: int) -> History:
+        """Return the history of the first points."""
+        if count >= len(self.times):
+            return self
+        rows = {item.name: getattr(self, item.name) for item in fields(self) if item.name != "moment"}
+        cut = {name: values[..., :count] for name, values in rows.items()}
+        return History(moment=Moment(*(values[:count] for values in self.moment)), **cut)
 
 
 def direct_history(machine: Machine, motion: Cycloid, times: FloatArray) -> History:

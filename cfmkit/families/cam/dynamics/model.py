@@ -12,7 +12,7 @@ Reference
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from cfmkit.families.cam.build import displacement_origin
 from cfmkit.families.cam.dynamics.build import Build, build, stated_motion
 from cfmkit.families.cam.dynamics.checks import findings_of, outside, runs_on_corner
 from cfmkit.families.cam.dynamics.direct import statics
+from cfmkit.families.cam.dynamics.ending import ending
 from cfmkit.families.cam.dynamics.history import History, direct_history, multibody_history
 from cfmkit.families.cam.dynamics.multibody import CornerContact
 from cfmkit.families.cam.dynamics.values import slow_force, values_of
@@ -74,11 +75,15 @@ def analyze(spec: CamSpec, run: Run) -> Result:
     -------
     Result
         Branch ``load`` for a motion upwards, ``unload`` downwards. PARTIAL if the motion leaves
-        the profile; NO_EQUILIBRIUM if the mechanism cannot exist, or the motion lies outside it.
+        the profile, or becomes impossible (a roller lifts off); NO_EQUILIBRIUM if the mechanism
+        cannot exist, or the motion lies outside it.
     """
     try:
         parts = build(spec)
         times, missing = _inside(parts, spec)
+        end = ending(parts, times, _displacement(parts, 0.0))
+        if end:
+            times, missing = _until(end.time, times, spec), (end.finding, *missing)
         moved = _moved(spec, parts, times)
     except CannotBuild as problem:
         return no_result(spec, problem.finding)
@@ -115,13 +120,24 @@ def _inside(parts: Build, spec: CamSpec) -> tuple[FloatArray, tuple[Finding, ...
     return times[inside], (found,)
 
 
+def _until(end: float, times: FloatArray, spec: CamSpec) -> FloatArray:
+    """Return the times before a motion ends, and its end; the nine coordinates are known at even times only."""
+    before = times[times < end]
+    return before if stated_motion(spec).method == "multibody" else np.append(before, end)
+
+
+def _displacement(parts: Build, position: Any) -> Any:
+    """Return the displacement that the analysis asks for at slider positions [m]."""
+    return position + parts.lift - parts.right.track.start + displacement_origin(parts.right)
+
+
 def _moved(spec: CamSpec, parts: Build, times: FloatArray) -> Moved:
     low, high = parts.machine.span
     upward = parts.motion.stroke > 0
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         history = _history(spec, parts, times)
         static = statics(parts.machine, np.clip(history.moment.position, low, high), upward).force
-    displacement = history.moment.position + parts.lift - parts.right.track.start + displacement_origin(parts.right)
+    displacement = _displacement(parts, history.moment.position)
     return Moved(_as_run(spec, parts), parts, history, static, displacement)
 
 
@@ -129,7 +145,8 @@ def _history(spec: CamSpec, parts: Build, times: FloatArray) -> History:
     if stated_motion(spec).method == "direct":
         return direct_history(parts.machine, parts.motion, times)
     try:
-        return multibody_history(parts.machine, parts.motion, len(times))
+        whole = multibody_history(parts.machine, parts.motion, stated_motion(spec).points)
+        return whole.first(len(times))
     except CornerContact:
         found = runs_on_corner(parts)
         raise CannotBuild(found) from None
