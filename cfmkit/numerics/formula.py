@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import ast
+import math
 import operator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
+from cfmkit.units.numbers import shown
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -42,12 +45,15 @@ def formula(text: str) -> Callable[[FloatArray], FloatArray]:
     [0.0, 3.0]
     """
     if len(text) > LONGEST:
-        raise ValueError(f"a formula has at most {LONGEST} characters")
+        raise ValueError(f"a formula has at most {LONGEST} characters, this one has {len(text)}")
     try:
         tree = ast.parse(text.strip(), mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError):
-        raise ValueError(f"{text!r} is no formula; write e.g. '1.5*(1 - cos(pi*x/12))'") from None
-    _value(tree, np.ones(1))
+        raise ValueError(f"{shown(text)} is no formula; write e.g. '1.5*(1 - cos(pi*x/12))'") from None
+    try:
+        _value(tree, np.ones(1))
+    except RecursionError:
+        raise ValueError(f"{shown(text)} is nested too deep for a formula") from None
 
     def function(x: FloatArray) -> FloatArray:
         with np.errstate(all="ignore"):
@@ -58,7 +64,7 @@ def formula(text: str) -> Callable[[FloatArray], FloatArray]:
 
 def _value(node: ast.expr, x: FloatArray) -> Any:
     if isinstance(node, ast.Constant) and isinstance(node.value, int | float) and not isinstance(node.value, bool):
-        return float(node.value)
+        return _number(node.value)
     if isinstance(node, ast.Name) and node.id in ("x", "pi"):
         return x if node.id == "x" else np.pi
     if isinstance(node, ast.BinOp) and type(node.op) in _TWO:
@@ -72,5 +78,16 @@ def _value(node: ast.expr, x: FloatArray) -> Any:
             raise ValueError(f"{node.func.id}() takes {wanted} value{'s' if wanted > 1 else ''}")
         with np.errstate(all="ignore"):
             return _FUNCTIONS[node.func.id](*(_value(one, x) for one in node.args))
-    told = ast.unparse(node)
-    raise ValueError(f"{told!r} means nothing here; there are numbers, x, pi, + - * / ** and {', '.join(_FUNCTIONS)}")
+    told = shown(ast.unparse(node))
+    raise ValueError(f"{told} means nothing here; there are numbers, x, pi, + - * / ** and {', '.join(_FUNCTIONS)}")
+
+
+def _number(value: int | float) -> float:
+    """Return a number of a formula as a float; one that is too large for it is refused."""
+    try:
+        number = float(value)
+    except OverflowError:
+        number = float("inf")
+    if not math.isfinite(number):
+        raise ValueError("a number of the formula is too large: at most 1.8e308")
+    return number

@@ -30,6 +30,9 @@ PLACES = ("length", "angle")
 SMALLEST, LARGEST = 1e-30, 1e30
 """Sizes that a specification may give, in SI units: their squares and products are still numbers."""
 
+MOST_TURNS = 10_000
+"""Angles that a specification may give, in turns: arrays are made as long as a shape winds."""
+
 _BOUNDS: dict[str, tuple[str, Callable[[float, float], bool]]] = {
     "gt": (">", operator.gt),
     "ge": (">=", operator.ge),
@@ -70,6 +73,9 @@ class Quantity:
         if number and not SMALLEST <= abs(number) <= LARGEST:
             told = value.strip() if isinstance(value, str) else decimal_text(number)
             raise QuantityError(f"{told} is beyond what is computed with: {SMALLEST:g} to {LARGEST:g} in SI units")
+        if dimension == "angle" and abs(number) > MOST_TURNS * math.tau:
+            told = value.strip() if isinstance(value, str) else format_quantity(number, "angle")
+            raise QuantityError(f"{told} is beyond what is computed with: at most {MOST_TURNS} turns of 360 deg")
         return number, dimension
 
     def _read(self, value: Any) -> tuple[float, str]:

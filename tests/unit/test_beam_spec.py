@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 from beam_support import CANTILEVER, CONFIGS, cantilever, config
 
@@ -174,3 +176,62 @@ def test_a_written_specification_reads_back_equal():
     for name in ("beam_lan2010", "beam_end_effector", "beam_rescaled"):
         spec = config(name)
         assert cfmkit.loads(cfmkit.dumps(spec)) == spec
+
+
+LONG = "1" * 401
+
+
+@pytest.mark.parametrize(
+    ("shape", "key", "words"),
+    [
+        ("{kind: polynomial, coefficients: [0 deg, 1e12 deg]}", "coefficients.1", "at most 10000 turns of 360 deg"),
+        ("{kind: polynomial, coefficients: [0 deg, 3e6 deg]}", "coefficients", "at most 1000 are computed with"),
+        ("{kind: polynomial, coefficients: [" + "1 deg, " * 10_000 + "1 deg]}", "coefficients", "at most 10000 may be"),
+        ("{kind: arc, sweep: 1e12 deg}", "sweep", "at most 10000 turns of 360 deg"),
+        ("{kind: arc, sweep: -3e6 deg}", "sweep", "must be >= -360000 deg and <= 360000 deg"),
+        ("{kind: arc, sweep: " + LONG + " deg}", "sweep", "is too long"),
+    ],
+)
+def test_shapes_that_wind_beyond_what_can_be_sampled_are_refused_with_the_limit(shape, key, words):
+    _, path, message = only(("end: tip}", f"end: tip, shape: {shape}}}"))
+    assert path == f"mechanism.beams.beam.shape.{key}"
+    assert words in message
+
+
+def test_a_beam_may_wind_and_have_many_coefficients_within_the_limits():
+    for coefficients in ("0 deg, 359000 deg", ", ".join(["0 deg"] + ["175 deg"] * 1_999)):
+        pair = ("end: tip}", f"end: tip, shape: {{kind: polynomial, coefficients: [{coefficients}]}}}}")
+        assert cantilever(pair).mechanism.beams["beam"].shape.kind == "polynomial"
+
+
+@pytest.mark.parametrize(
+    ("height", "words"),
+    [
+        ("1/0", "has no height at x = 0 mm"),
+        ("1/(x - 6)", "has no height at x = 6 mm"),
+        ("sqrt(5 - x)", "has no height at x = 5.04 mm"),
+        ("exp(x**4)", "has no height at"),
+        (LONG, "a number of the formula is too large: at most 1.8e308"),
+        ("1e400*x", "a number of the formula is too large: at most 1.8e308"),
+        ("x + " * 200 + "1", "a formula has at most 500 characters, this one has 801"),
+    ],
+)
+def test_a_surface_that_has_no_height_somewhere_is_refused_with_the_place(height, words):
+    profile = f"{{kind: formula, height: '{height}', length: 12 mm}}"
+    _, path, message = only(("  points: 21", f"  points: 21\n  surface: {{profile: {profile}, preload: 8 mm}}"))
+    assert path == "analysis.surface.profile.height"
+    assert words in message
+
+
+EXTREMES = ("1e12", "-1e12", "1e29", "1e-29", "1e300", "-1", "9" * 30, LONG)
+
+
+def test_every_number_of_a_spec_at_extremes_is_read_or_refused():
+    """Nothing else than a specification or its error comes of it; what would need memory for it ran for minutes."""
+    text = (CONFIGS / "beam_end_effector.yaml").read_text()
+    for match in re.finditer(r"(?<=[:\[,] )-?[0-9]+(?:[.][0-9]+)?(?= ?[a-zA-Z]*[,}\]\n])", text):
+        for value in EXTREMES:
+            try:
+                cfmkit.loads(text[: match.start()] + value + text[match.end() :])
+            except SpecError as error:
+                assert all(len(problem.message) < 300 for problem in error.problems)

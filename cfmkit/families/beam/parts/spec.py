@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
@@ -58,6 +59,11 @@ class NodeSpec(Model):
         return self
 
 
+MOST_WINDINGS = 1000
+"""Turns that the angle along one beam may make: a shape is sampled as densely as it winds."""
+_MOST_SWEEP = math.radians(360 * MOST_WINDINGS)
+
+
 class Straight(Model):
     """A straight beam."""
 
@@ -68,15 +74,29 @@ class PolynomialShape(Model):
     """The angle along the beam as a polynomial of the fraction u of its length: c0 + c1 u + c2 u^2 + ..."""
 
     kind: Literal["polynomial"]
-    coefficients: tuple[Angle, ...] = Field(min_length=1, description="[c0, c1, ...], angles from the x axis")
+    coefficients: tuple[Angle, ...] = Field(
+        min_length=1, max_length=10_000, description="[c0, c1, ...], angles from the x axis"
+    )
     length: PositiveLength | None = Field(None, description="nominal length, for `closure` and its report")
+
+    @field_validator("coefficients")
+    @classmethod
+    def _winds_so_often(cls, values: tuple[float, ...]) -> tuple[float, ...]:
+        turns = sum(map(abs, values[1:])) / math.tau
+        if turns > MOST_WINDINGS:
+            raise ValueError(
+                f"the sizes of c1, c2, ... add up to {turns:.4g} turns: at most {MOST_WINDINGS} are computed with"
+            )
+        return values
 
 
 class ArcShape(Model):
     """A circular arc between the nodes."""
 
     kind: Literal["arc"]
-    sweep: Angle = Field(description="by how much the angle grows from start to end; positive bulges to the right")
+    sweep: Annotated[Angle, Field(ge=-_MOST_SWEEP, le=_MOST_SWEEP)] = Field(
+        description="by how much the angle grows from start to end; positive bulges to the right"
+    )
 
 
 class CosineShape(Model):

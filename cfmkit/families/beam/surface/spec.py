@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, ValidationInfo, field_validator
+import numpy as np
+from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from cfmkit.families.beam.parts.spec import PositiveLength
 from cfmkit.numerics.formula import formula
-from cfmkit.spec import Model
+from cfmkit.spec import Model, refuse
 from cfmkit.tables.source import DataSource
 from cfmkit.units import Length, Ratio
+from cfmkit.units.fields import LARGEST
 
 
 class FileProfile(Model):
@@ -39,6 +41,17 @@ class FormulaProfile(Model):
     def _readable(cls, text: str) -> str:
         formula(text)
         return text
+
+    @model_validator(mode="after")
+    def _has_a_height_everywhere(self) -> Self:
+        x = np.linspace(0.0, self.length, self.points) * 1e3
+        heights = formula(self.height)(x)
+        bad = ~(np.abs(heights) <= LARGEST * 1e3)
+        if bad.any():
+            place = x[int(bad.argmax())]
+            told = f"has no height at x = {place:.6g} mm: a finite number of mm is needed everywhere on the surface"
+            refuse("FormulaProfile", {("height",): told})
+        return self
 
 
 class Surface(Model):
