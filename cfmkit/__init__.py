@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 from cfmkit._version import __version__
 
 if TYPE_CHECKING:
-    from cfmkit.api import analyze, check, design, drawing, dumps, evaluate, load, loads, sensitivity, sweep
+    from cfmkit.api import analyze, check, design, drawing, dumps, evaluate, load, loads, measure, sensitivity, sweep
     from cfmkit.curves import Curve
     from cfmkit.errors import (
         CfmError,
@@ -34,6 +34,8 @@ if TYPE_CHECKING:
         SpecError,
         UsageError,
     )
+    from cfmkit.experiment.reading import Recording
+    from cfmkit.experiment.report import MeasureReport
     from cfmkit.families.base import Run
     from cfmkit.results import Design, Finding, Quantity, Result, Status
     from cfmkit.spec import Spec
@@ -49,6 +51,7 @@ _HOMES = {
         "evaluate",
         "load",
         "loads",
+        "measure",
         "sensitivity",
         "sweep",
     ),
@@ -67,6 +70,8 @@ _HOMES = {
         "SpecError",
         "UsageError",
     ),
+    "cfmkit.experiment.reading": ("Recording",),
+    "cfmkit.experiment.report": ("MeasureReport",),
     "cfmkit.families.base": ("Run",),
     "cfmkit.results": ("Design", "Finding", "Quantity", "Result", "Status"),
     "cfmkit.spec": ("Spec",),
@@ -84,10 +89,12 @@ __all__ = [
     "FolderInUse",
     "GeometryError",
     "InputError",
+    "MeasureReport",
     "OutputError",
     "Problem",
     "Quantity",
     "QuantityError",
+    "Recording",
     "Result",
     "Run",
     "SolutionError",
@@ -105,6 +112,7 @@ __all__ = [
     "evaluate",
     "load",
     "loads",
+    "measure",
     "sensitivity",
     "sweep",
 ]

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
     from matplotlib.figure import Figure
 
+    from cfmkit.experiment.reading import Recording
+    from cfmkit.experiment.report import MeasureReport
     from cfmkit.geometry import Drawing
     from cfmkit.metrics import Outcome, Window
     from cfmkit.results import Design, Quantity, Result
@@ -216,6 +218,75 @@ def sensitivity(spec: Spec, jobs: int = 1, **block: Any) -> StudyResult:
     from cfmkit.studies.outcome import examined
 
     return examined(spec, jobs, block)
+
+
+def measure(
+    data: str | os.PathLike[str] | Recording,
+    *,
+    units: str | None = None,
+    window: str | tuple[float, float] | None = None,
+    filter: str = "default",
+    target: str | float | None = None,
+    tare: str | float | None = None,
+    zero: str | float | None = None,
+    flip: Iterable[str] = (),
+    as_recorded: bool = False,
+    one_branch: bool = False,
+) -> MeasureReport:
+    """Return what a measured force curve says: branches, metrics raw and filtered, hysteresis, repeatability.
+
+    Parameters
+    ----------
+    data : path-like or Recording
+        A lab file with displacement and force, or angle and torque, perhaps time; or the arrays themselves.
+    units : str, optional
+        Units that the header does not name: ``"s=mm,F=N"``.
+    window : str or (float, float), optional
+        Where to measure: ``"40 mm:210 mm"``, or numbers in m or rad. Default: all that every branch covers.
+    filter : str
+        Low-pass of each branch: ``"2 Hz"``, ``"0.24 1/mm, order 3"``, ``"2 Hz, corrected"`` or ``"none"``.
+    target : str or float, optional
+        Force [N] or torque [N m] that it should have.
+    tare, zero : str or float, optional
+        What the sensors show without load [N or N m] and at the mechanism's zero [m or rad]; ``"start"``: at first.
+    flip : iterable of str
+        ``"force"``, ``"displacement"``, ``"torque"``, ``"angle"``: what is recorded with the other sign.
+    as_recorded : bool
+        Leave out neither spikes nor points next to reversals.
+    one_branch : bool
+        Accept a recording that has no way back.
+
+    Raises
+    ------
+    cfmkit.errors.UsageError
+        If the file cannot be read, or an option is malformed.
+    cfmkit.errors.DataError
+        If it holds no curve, or the window was not measured.
+
+    Examples
+    --------
+    >>> import cfmkit
+    >>> found = cfmkit.measure("configs/synthetic/cam_loop.csv", window="40 mm:120 mm", filter="2 Hz")
+    >>> round(found.numbers.filtered["force_mean[load]"].value, 2)
+    50.46
+    """
+    from cfmkit.experiment.corrections import corrected
+    from cfmkit.experiment.filtering import read_filter
+    from cfmkit.experiment.measured import LEFT_OUT, measured, require_loop
+    from cfmkit.experiment.options import read_target, read_window
+    from cfmkit.experiment.reading import Recording, read_recording
+    from cfmkit.experiment.report import report_on
+    from cfmkit.metrics import Frame
+
+    low_pass = filter if filter == "default" else read_filter(filter)
+    recording = data if isinstance(data, Recording) else read_recording(data, units)
+    place = read_window(window, recording.kind)
+    frame = Frame(target=read_target(target, recording.kind))
+    recording = corrected(recording, tare, zero, tuple(flip))
+    source = measured(recording, low_pass, () if as_recorded else LEFT_OUT)
+    if not one_branch:
+        require_loop(source)
+    return report_on(source, frame, place)
 
 
 def resolve(spec: Spec) -> Spec:

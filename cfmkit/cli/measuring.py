@@ -20,12 +20,42 @@ Units = Annotated[
     ),
 ]
 
+Tare = Annotated[
+    str | None,
+    typer.Option(
+        "--tare", metavar="FORCE", show_default=False,
+        help="What the force sensor shows without load, e.g. '0.4 N': taken off. 'start': what it shows at first.",
+    ),
+]  # fmt: skip
+Zero = Annotated[
+    str | None,
+    typer.Option(
+        "--zero", metavar="LENGTH", show_default=False,
+        help="What the displacement sensor shows at the mechanism's zero: taken off. 'start': the first point.",
+    ),
+]  # fmt: skip
+Flip = Annotated[
+    str | None,
+    typer.Option(
+        "--flip", metavar="NAMES", show_default=False,
+        help="What is recorded with the other sign: force, displacement (or torque, angle), or both with a comma.",
+    ),
+]  # fmt: skip
+
 
 @dataclass(frozen=True, kw_only=True)
 class Measuring:
-    """What a verb takes that reads a measurement beside a spec."""
+    """What a verb takes that reads a measurement."""
 
     units: Units = None
+    tare: Tare = None
+    zero: Zero = None
+    flip: Flip = None
+
+    @property
+    def flips(self) -> tuple[str, ...]:
+        """What ``--flip`` names."""
+        return tuple(word.strip() for word in self.flip.split(",")) if self.flip else ()
 
 
 def data_record(name: str) -> dict[str, Any]:
@@ -37,9 +67,23 @@ def data_record(name: str) -> dict[str, Any]:
     return {"data": {"source": name, "sha256": file_hash(Path(name).resolve())}}
 
 
-def read_measured(name: str, units: str | None) -> Measured:
+def read_measured(name: str, options: Measuring) -> Measured:
     """Return the measurement in a file, raw."""
-    from cfmkit.experiment.measured import measured
-    from cfmkit.experiment.reading import read_recording
+    from cfmkit.experiment.measured import read_measured as read
 
-    return measured(read_recording(name, units), None)
+    return read(name, options.units, options.tare, options.zero, options.flips)
+
+
+def refuse_without_data(options: Measuring) -> None:
+    """Refuse options about a measurement where none is named.
+
+    Raises
+    ------
+    cfmkit.errors.UsageError
+        Naming the first of them.
+    """
+    from cfmkit.errors import UsageError
+
+    for name in ("units", "tare", "zero", "flip"):
+        if getattr(options, name) is not None:
+            raise UsageError(f"--{name} is for a measurement: name it with --data")

@@ -21,17 +21,28 @@ import numpy as np
 from cfmkit.curves import Column, Curve, FloatArray
 from cfmkit.errors import DataError
 from cfmkit.experiment.branches import LOAD, UNLOAD, WHOLE, Stroke, Strokes, covered, split
+from cfmkit.experiment.corrections import corrected
 from cfmkit.experiment.filtering import DEFAULT_ORDER, LowPass, low_passed
 from cfmkit.experiment.hysteresis import repeatability, turned_loop
+from cfmkit.experiment.reading import read_recording
+from cfmkit.experiment.reversals import settled
 from cfmkit.metrics import Frame, Window, measure
+from cfmkit.metrics.subjects import span_text
+from cfmkit.numerics.robust import spikes
 from cfmkit.results import Finding, Quantity
+from cfmkit.units import format_short
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    import os
+    from collections.abc import Collection, Mapping, Sequence
 
     from numpy.typing import NDArray
 
     from cfmkit.experiment.reading import Recording
+    from cfmkit.experiment.reversals import Settled
+
+LEFT_OUT = ("reversals", "spikes")
+"""What verbs leave out of a recording unless it is to count as recorded."""
 
 CYCLES_PER_STROKE = 60.0
 """Cut-off of the filter that is used unless one is named, in cycles over the whole travel: 2 Hz in [SS]."""
@@ -40,6 +51,9 @@ FINDINGS = {
     "one_branch": "the recording has no way back: there is no loop",
     "unfinished_cycle": "strokes that belong to no complete cycle are left out",
     "pauses": "points at which the machine stood are left out",
+    "spikes": "points far off their neighbours are left out",
+    "reversals": "points next to reversals, where the force passes from one branch to the other, are left out",
+    "window_at_reversal": "the window reaches into points that are left out next to reversals: it was shortened",
     "not_filtered": "there are too few points for the filter",
     "negative_force": "the mean force is negative: the sign of the sensor may be turned",
     "negative_loop": "the mechanism would give energy in every cycle: a sign may be turned",
@@ -60,6 +74,8 @@ class Measured:
         One a cycle, raw; columns `time` where there is one, and `raw`'s order is that of the motion.
     filtered : tuple of Curve
         The same points with filtered forces; empty without a filter.
+    reached : Window
+        What every branch reached before points next to reversals were left out.
     low_pass : LowPass or None
         The filter.
     warnings : tuple of Finding
@@ -69,6 +85,7 @@ class Measured:
     recording: Recording
     strokes: Strokes
     raw: tuple[Curve, ...]
+    reached: Window
     filtered: tuple[Curve, ...] = ()
     low_pass: LowPass | None = None
     warnings: tuple[Finding, ...] = ()
@@ -79,7 +96,9 @@ class Measured:
         return (self.filtered or self.raw)[0]
 
 
-def measured(recording: Recording, low_pass: LowPass | str | None = "default") -> Measured:
+def measured(
+    recording: Recording, low_pass: LowPass | str | None = "default", leave_out: Collection[str] = ("reversals",)
+) -> Measured:
     """Return a recording as raw and filtered curves.
 
     Parameters
@@ -89,30 +108,139 @@ def measured(recording: Recording, low_pass: LowPass | str | None = "default") -
     low_pass : LowPass, "default" or None
         Default: order 6 per pass, 60 cycles over the whole travel; left out, with a
         warning, where there are too few points for that. None: no filter.
+    leave_out : collection of str
+        ``"reversals"`` for the points next to them at which the force passes between the branches,
+        ``"spikes"`` for points far off their neighbours.
 
     Raises
     ------
     cfmkit.errors.DataError
         If there is no stroke in the recording, or a filter that was named cannot be used.
     """
-    strokes = split(recording)
-    cycles = strokes.cycles or ((*strokes.strokes[:1],),)
-    warnings = _warnings(recording, strokes)
+    strokes, reached, left_out = _strokes(recording, leave_out)
+    cycles = _cycles(strokes)
+    warnings = (*_warnings(recording, strokes), *left_out)
     chosen = _default(recording) if isinstance(low_pass, str) else low_pass
     raw = tuple(_curve(recording, cycle, recording.effort, strokes) for cycle in cycles)
     if turned_loop(raw):
         told = f"the {recording.kind} on the way up is smaller than on the way back, and every cycle would give energy"
         warnings = (*warnings, Finding("negative_loop", f"{told}: is the sign of a column turned?"))
+    plain = Measured(recording, strokes, raw, reached=reached, warnings=warnings)
     if chosen is None:
-        return Measured(recording, strokes, raw, warnings=warnings)
+        return plain
     try:
         smooth = _smooth(recording, [stroke for cycle in cycles for stroke in cycle], chosen)
     except DataError as problem:
         if low_pass != "default":
             raise DataError(f"{recording.name}: {problem}") from None
-        return Measured(recording, strokes, raw, warnings=(*warnings, Finding("not_filtered", str(problem))))
+        return replace(plain, warnings=(*warnings, Finding("not_filtered", str(problem))))
     filtered = tuple(_curve(recording, cycle, smooth, strokes) for cycle in cycles)
-    return Measured(recording, strokes, raw, filtered, chosen, warnings)
+    return replace(plain, filtered=filtered, low_pass=chosen)
+
+
+def read_measured(
+    path: str | os.PathLike[str],
+    units: str | None = None,
+    tare: str | float | None = None,
+    zero: str | float | None = None,
+    flip: Collection[str] = (),
+) -> Measured:
+    """Return the raw curves in a lab file, spikes and passages at reversals left out.
+
+    Parameters
+    ----------
+    path : path-like
+        As for `cfmkit.experiment.reading.read_recording`.
+    units : str, optional
+        Likewise.
+    tare, zero, flip
+        As for `cfmkit.experiment.corrections.corrected`.
+    """
+    recording = corrected(read_recording(path, units), tare, zero, flip)
+    return measured(recording, None, LEFT_OUT)
+
+
+def _cycles(strokes: Strokes) -> tuple[tuple[Stroke, ...], ...]:
+    """Return the strokes that are measured, cycle by cycle; the first one alone where there is no cycle."""
+    return strokes.cycles or ((*strokes.strokes[:1],),)
+
+
+def _strokes(recording: Recording, leave_out: Collection[str]) -> tuple[Strokes, Window, tuple[Finding, ...]]:
+    """Return what counts of each stroke, what all branches reached, and what is said of the points left out."""
+    spiky = _spiky(recording) if "spikes" in leave_out else np.zeros(len(recording), dtype=bool)
+    strokes = _without(recording, spiky)
+    reached, told = _reached(recording, strokes), _spikes_left_out(recording, spiky)
+    if "reversals" not in leave_out:
+        return strokes, reached, told
+    found = settled(recording, strokes)
+    return found.strokes, reached, (*told, *_passages_left_out(recording, found))
+
+
+def _spiky(recording: Recording) -> NDArray[np.bool_]:
+    """Return which points are spikes: far off their neighbours, and in few of the strokes that pass the place.
+
+    What most strokes show at one place belongs to the mechanism, such as the corner at which a cam begins.
+    """
+    jumps = spikes(recording.motion) != 0
+    heights = np.where(jumps, 0.0, spikes(recording.effort))
+    found: NDArray[np.bool_] = heights != 0
+    strokes = _without(recording, jumps).strokes
+    for run in np.split(np.flatnonzero(found), np.flatnonzero(np.diff(np.flatnonzero(found)) > 1) + 1):
+        if len(run) and any(_is_of_the_mechanism(recording.motion, heights, strokes, int(k)) for k in run):
+            found[run] = False
+    found |= jumps
+    return found
+
+
+def _is_of_the_mechanism(motion: FloatArray, heights: FloatArray, strokes: Sequence[Stroke], point: int) -> bool:
+    """Return whether most strokes have something alike where one point is off its neighbours."""
+    alike = passing = 0
+    for stroke in strokes:
+        away = np.abs(motion[stroke.points] - motion[point])
+        near = away <= 1.5 * stroke.way / len(stroke.points)
+        passing += bool(near.any())
+        ratio = heights[stroke.points[near]] / heights[point]
+        alike += bool(((ratio > 0.5) & (ratio < 2.0)).any())
+    return alike >= 2 and 2 * alike > passing
+
+
+def _without(recording: Recording, spiky: NDArray[np.bool_]) -> Strokes:
+    """Return the strokes of a recording without some of its points."""
+    kept = np.flatnonzero(~spiky)
+    time = None if recording.time is None else recording.time[kept]
+    found = split(replace(recording, motion=recording.motion[kept], effort=recording.effort[kept], time=time))
+    return replace(found, strokes=tuple(replace(item, points=kept[item.points]) for item in found.strokes))
+
+
+def _reached(recording: Recording, strokes: Strokes) -> Window:
+    """Return what all measured strokes reached; the point at a reversal counts for both of its strokes."""
+    measured_ones = {id(stroke) for cycle in _cycles(strokes) for stroke in cycle}
+    ends, before = [], None
+    for stroke in strokes.strokes:
+        points = recording.motion[stroke.points]
+        points = points if before is None else np.append(points, before)
+        before = recording.motion[stroke.points[-1]]
+        if id(stroke) in measured_ones:
+            ends.append((float(points.min()), float(points.max())))
+    return Window(max(low for low, _ in ends), min(high for _, high in ends))
+
+
+def _spikes_left_out(recording: Recording, spiky: NDArray[np.bool_]) -> tuple[Finding, ...]:
+    """Return what is said of spikes."""
+    count = int(spiky.sum())
+    if not count:
+        return ()
+    return (Finding("spikes", f"{count} of {len(recording)} points stand far off their neighbours: left out"),)
+
+
+def _passages_left_out(recording: Recording, found: Settled) -> tuple[Finding, ...]:
+    """Return what is said of the points next to reversals."""
+    if not found.length:
+        return ()
+    length = format_short(found.length, "length" if recording.kind == "force" else "angle", 3)
+    points = f"{found.points} point{'s' * (found.points > 1)} within {length} of the ends of strokes"
+    told = f"{points} are left out: there the {recording.kind} passes from one branch to the other"
+    return (Finding("reversals", told),)
 
 
 def _default(recording: Recording) -> LowPass:
@@ -188,12 +316,15 @@ class Measurement:
         Raw metrics of every cycle.
     window : Window
         Where they hold.
+    warnings : tuple of Finding
+        What the user must know of the window.
     """
 
     raw: Mapping[str, Quantity]
     filtered: Mapping[str, Quantity]
     each: tuple[Mapping[str, Quantity], ...]
     window: Window
+    warnings: tuple[Finding, ...] = ()
 
 
 def numbers_of(source: Measured, frame: Frame | None = None, window: Window | None = None) -> Measurement:
@@ -213,23 +344,34 @@ def numbers_of(source: Measured, frame: Frame | None = None, window: Window | No
     cfmkit.errors.DataError
         If a branch does not cover the window.
     """
+    window, warnings = _window(source, window)
+    each = tuple(measure(curve, frame or Frame(), window) for curve in source.raw)
+    smooth = tuple(measure(curve, frame or Frame(), window) for curve in source.filtered)
+    raw = _mean(each) | repeatability(source.raw, window)
+    return Measurement(raw, _mean(smooth) if smooth else {}, each, window, warnings)
+
+
+def _window(source: Measured, wanted: Window | None) -> tuple[Window, tuple[Finding, ...]]:
+    """Return where the numbers hold, and what is said where that is less than what was requested."""
+    name, kind = source.recording.name, source.recording.kind
     try:
         common = common_window(source.raw)
     except DataError as problem:
-        raise DataError(f"{source.recording.name}: {problem}") from None
-    window = window or common
-    slack = 1e-9 * (window.hi - window.lo)
-    if window.lo < common.lo - slack or window.hi > common.hi + slack:
-        from cfmkit.metrics.subjects import span_text
-
-        kind = source.recording.kind
+        raise DataError(f"{name}: {problem}") from None
+    wanted = wanted or common
+    slack = 1e-9 * (wanted.hi - wanted.lo)
+    inside = Window(max(wanted.lo, common.lo), min(wanted.hi, common.hi))
+    if wanted.lo >= common.lo - slack and wanted.hi <= common.hi + slack:
+        return wanted, ()
+    within_reach = wanted.lo >= source.reached.lo - slack and wanted.hi <= source.reached.hi + slack
+    if not within_reach or not inside.lo < inside.hi:
         raise DataError(
-            f"{source.recording.name}: the window {span_text(window.lo, window.hi, kind)} is not measured on every "
-            f"branch: {span_text(common.lo, common.hi, kind)} is"
+            f"{name}: the window {span_text(wanted.lo, wanted.hi, kind)} is not measured on every branch: "
+            f"{span_text(common.lo, common.hi, kind)} is"
         )
-    each = tuple(measure(curve, frame or Frame(), window) for curve in source.raw)
-    smooth = tuple(measure(curve, frame or Frame(), window) for curve in source.filtered)
-    return Measurement(_mean(each) | repeatability(source.raw, window), _mean(smooth) if smooth else {}, each, window)
+    told = f"the window {span_text(wanted.lo, wanted.hi, kind)} touches a reversal"
+    taken = f"the numbers hold over {span_text(inside.lo, inside.hi, kind)}, which every branch covers"
+    return inside, (Finding("window_at_reversal", f"{told}: {taken}"),)
 
 
 def common_window(curves: Sequence[Curve]) -> Window:
@@ -281,5 +423,6 @@ def _mean(each: Sequence[Mapping[str, Quantity]]) -> dict[str, Quantity]:
 
 
 __all__ = [
-    "FINDINGS", "LOAD", "UNLOAD", "Measured", "Measurement", "common_window", "measured", "numbers_of", "require_loop",
+    "FINDINGS", "LEFT_OUT", "LOAD", "UNLOAD", "Measured", "Measurement", "common_window", "measured", "numbers_of",
+    "read_measured", "require_loop",
 ]  # fmt: skip

@@ -11,8 +11,8 @@ if TYPE_CHECKING:
     from cfmkit.curves import Kind
 
 
-def read_window(text: str | None, kind: Kind) -> Window | None:
-    """Return the window that text such as ``40 mm:210 mm`` says; None for None.
+def read_window(text: str | tuple[float, float] | None, kind: Kind) -> Window | None:
+    """Return the window that text such as ``40 mm:210 mm`` says, or two numbers in m or rad; None for None.
 
     Raises
     ------
@@ -23,6 +23,9 @@ def read_window(text: str | None, kind: Kind) -> Window | None:
 
     if text is None:
         return None
+    if not isinstance(text, str):
+        low, high = text
+        return Window(low, high)
     ends = text.split(":")
     if len(ends) != 2:
         raise UsageError(f"--window: {text!r} is not 'from:to'; write e.g. --window '40 mm:210 mm'")
@@ -35,8 +38,8 @@ def read_window(text: str | None, kind: Kind) -> Window | None:
     return Window(low, high)
 
 
-def read_target(text: str | None, kind: Kind) -> float | None:
-    """Return the force [N] or torque [N m] that a text says; None for None.
+def read_target(text: str | float | None, kind: Kind) -> float | None:
+    """Return the force [N] or torque [N m] that a text says, or a number as it is; None for None.
 
     Raises
     ------
@@ -45,8 +48,8 @@ def read_target(text: str | None, kind: Kind) -> float | None:
     """
     from cfmkit.units import read_quantity
 
-    if text is None:
-        return None
+    if text is None or not isinstance(text, str):
+        return text
     try:
         return read_quantity(text, kind)
     except QuantityError as error:

@@ -95,6 +95,8 @@ class Recording:
         Which pair `motion` and `effort` are.
     decisions : Decisions or None
         How the file was read.
+    notes : tuple of str
+        What was changed since.
     """
 
     name: str
@@ -103,6 +105,7 @@ class Recording:
     time: FloatArray | None = None
     kind: Kind = "force"
     decisions: Decisions | None = field(default=None, compare=False)
+    notes: tuple[str, ...] = field(default=(), compare=False)
 
     def __post_init__(self) -> None:
         """Freeze the arrays and refuse what no curve can be."""
@@ -115,6 +118,11 @@ class Recording:
     def __len__(self) -> int:
         """Return the number of points."""
         return len(self.motion)
+
+    @property
+    def lines(self) -> list[str]:
+        """Sentences on how the file was read and what was changed since."""
+        return [*(self.decisions.lines() if self.decisions else []), *self.notes]
 
 
 def read_recording(path: str | os.PathLike[str], units: str | None = None) -> Recording:

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
     from cfmkit.curves import Curve
     from cfmkit.metrics import Frame, Window
+    from cfmkit.results import Finding
 
 
 @dataclass(frozen=True)
@@ -35,23 +36,27 @@ class MeasureReport:
     source: Measured
     numbers: Measurement
 
+    @property
+    def warnings(self) -> tuple[Finding, ...]:
+        """What the user must know of recording and window."""
+        return (*self.source.warnings, *self.numbers.warnings)
+
     @cached_property
     def data(self) -> dict[str, Any]:
         """What metrics.json says: the contract's keys for the raw curve, the filtered one, and what was decided."""
         source, low_pass = self.source, self.source.low_pass
-        decisions = source.recording.decisions
         return {
             "status": "complete",
             "message": "",
             "metrics": metrics_json(self.numbers.raw),
             "requirements": [],
-            "warnings": [{"name": item.name, "message": item.message} for item in source.warnings],
+            "warnings": [{"name": item.name, "message": item.message} for item in self.warnings],
             "metrics_filtered": metrics_json(self.numbers.filtered),
             "filter": low_pass.sentence if low_pass else None,
             "window": _ends(self),
             "cycles": len(source.raw),
             "data": source.recording.name,
-            "reading": decisions.lines() if decisions else [],
+            "reading": source.recording.lines,
         }
 
 

@@ -28,23 +28,22 @@ def comparison_data(comparison: Comparison, source: Measured) -> dict[str, Any]:
 
     dimension, window = comparison.curve.motion_dimension, comparison.window
     low, high = (float(to_border(end, dimension)) for end in (window.lo, window.hi))
-    decisions = source.recording.decisions
     return {
         "data": {
             "file": source.recording.name,
             "window": {"from": low, "to": high, "unit": border_unit(dimension)},
             "points": sum(len(item.motion) for item in comparison.samples),
-            "reading": decisions.lines() if decisions else [],
+            "reading": source.recording.lines,
         }
     }
 
 
 def comparison_lines(comparison: Comparison, source: Measured) -> tuple[tuple[str, str], ...]:
     """Return the paragraphs that a page shows: how the file was read, and the errors."""
-    decisions, metrics, kind = source.recording.decisions, comparison.metrics(), comparison.curve.kind
+    metrics, kind = comparison.metrics(), comparison.curve.kind
     several = len(comparison.samples) > 1
     over = span_text(comparison.window.lo, comparison.window.hi, kind)
-    lines = [("read", text) for text in (decisions.lines() if decisions else [])]
+    lines = [("read", text) for text in source.recording.lines]
     for item in comparison.samples:
         suffix = f"[{item.branch}]" if several else ""
         values = [metrics[name + suffix].value for name in ("data_rmse", "data_offset", "data_error_max")]

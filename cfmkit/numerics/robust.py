@@ -15,6 +15,15 @@ TUKEY = 4.685
 MAD = 1.4826
 """Standard deviation of normal values over their median absolute deviation."""
 
+SPIKE = 8.0
+"""A sample is a spike where it is off the median of its neighbours by so many standard deviations of the noise."""
+
+_BESIDE = 3
+"""Samples on either side that the median is of: spikes of up to three samples are seen."""
+
+_RARE = 0.05
+"""Where more than this part of the samples look like spikes, that is how the signal is."""
+
 
 def robust_scale(values: FloatArray) -> float:
     """Return 1.4826 times the median absolute deviation from the median: the SD of normal values."""
@@ -45,3 +54,43 @@ def neighbour_noise(places: FloatArray, values: FloatArray) -> float:
     share = (places[1:-1] - places[:-2]) / (places[2:] - places[:-2])
     gaps = values[1:-1] - (1.0 - share) * values[:-2] - share * values[2:]
     return robust_scale(gaps / np.sqrt(1.0 + share**2 + (1.0 - share) ** 2))
+
+
+def spikes(values: FloatArray) -> FloatArray:
+    """Return how far samples stand off their neighbours as neither noise nor a smooth signal does; 0 for all others.
+
+    A running median (Hampel's filter, seven samples) follows steps and slopes; what is off it by more
+    than noise, usual steps and rounding explain is a spike. Spikes may be up to three samples long;
+    the first and the last sample, which have neighbours on one side only, are none.
+
+    Parameters
+    ----------
+    values : (n,) array
+        In the order of time.
+
+    References
+    ----------
+    F. R. Hampel, J. Am. Stat. Assoc. 69 (1974) 383-393.
+
+    Examples
+    --------
+    >>> values = np.arange(30.0)
+    >>> values[4] = 90.0
+    >>> np.flatnonzero(spikes(values)).tolist()
+    [4]
+    """
+    from scipy.ndimage import median_filter
+
+    height = values - median_filter(values, 2 * _BESIDE + 1, mode="nearest")
+    off = np.abs(height)
+    steps = np.abs(np.diff(values))
+    low, high = np.percentile(values, (5, 95))
+    limit = max(
+        SPIKE * MAD * float(np.median(off)),
+        5.0 * float(np.percentile(off, 90)),
+        # Where a smooth signal turns or jumps the median is as many steps off as there are neighbours on a side.
+        2.0 * _BESIDE * float(np.percentile(steps, 75)),
+        0.005 * float(high - low),
+    )
+    found = off > max(limit, 1e-9 * float(np.abs(values).max()))
+    return np.where(found & (found.sum() <= _RARE * len(values)), height, 0.0)

@@ -8,7 +8,7 @@ import resource
 
 import numpy as np
 import pytest
-from experiment_support import csv_text, reference_case, rows
+from experiment_support import csv_text, lossy_loop, reference_case, rows, triangle
 
 
 @pytest.fixture
@@ -114,6 +114,51 @@ def test_what_is_wrong_is_said_in_one_line_with_its_exit_code(cli, data, argumen
     assert complaint in done.err
     assert done.err.count("\n") == 1
     assert not (cli.folder / "out").exists()
+
+
+@pytest.fixture
+def spoilt(cli):
+    """An elastic reversal of 1 mm, two spikes, 0.4 N of tare, a zero at 3 mm, the force with the other sign."""
+    case = lossy_loop(triangle(2), elastic=1.0)
+    effort = np.array(case.effort)
+    effort[[60, 500]] += 20.0
+    text = "t [s];s [mm];F [N]\n" + rows((case.time, 1e3 * case.motion + 3.0, -(effort + 0.4)), digits=9)
+    (cli.folder / "spoilt.csv").write_text(text)
+    return "spoilt.csv"
+
+
+def test_tare_zero_and_flip_are_taken_out_and_spikes_and_reversals_left_out(cli, spoilt):
+    done = cli("measure", spoilt, "--tare=-0.4 N", "--zero", "start", "--flip", "force", "--window", "0 mm:100 mm",
+               "-o", "out", "--no-plots", "--json")  # fmt: skip
+    assert done.code == 0
+    assert [item["name"] for item in done.document["warnings"]] == ["spikes", "reversals", "window_at_reversal"]
+    raw = done.document["metrics"]
+    assert raw["force_ripple[load]"]["value"] == pytest.approx(0.6 / 50.8, rel=1e-3)
+    assert raw["force_mean[unload]"]["value"] == pytest.approx(49.5, abs=0.02)
+    assert done.document["window"]["from"] == pytest.approx(1.5)
+    assert done.document["reading"][-3:] == [
+        "-0.4 N taken off the force", "3 mm taken off the displacement", "force with the other sign",
+    ]  # fmt: skip
+
+
+def test_as_recorded_nothing_is_left_out(cli, spoilt):
+    done = cli("measure", spoilt, "--flip", "force", "--as-recorded", "-o", "out", "--no-plots", "--json")
+    assert done.document["warnings"] == []
+    assert done.document["metrics"]["force_max"]["value"] > 70
+
+
+@pytest.mark.parametrize(
+    ("arguments", "complaint"),
+    [
+        (("--tare", "0.4"), "--tare: 0.4 has no unit; write '0.4 N'; or say 'start'"),
+        (("--zero", "1 N"), "--zero: '1 N' is a force"),
+        (("--flip", "torque"), "--flip: 'torque' is not in this recording; it has force and displacement"),
+    ],
+)
+def test_malformed_corrections_are_usage_errors(cli, data, arguments, complaint):
+    done = cli("measure", data, *arguments, "--no-plots")
+    assert (done.code, done.err.count("\n")) == (2, 1)
+    assert complaint in done.err
 
 
 def test_one_branch_only_is_refused_unless_it_is_all_there_is(cli):

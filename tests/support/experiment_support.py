@@ -61,3 +61,25 @@ def csv_text(header: str = "t [s];s [mm];F [N]", change: Callable[[int, list[str
     lines = [line.split(";") for line in rows(loop_columns()).splitlines()]
     changed = [change(index, line) for index, line in enumerate(lines)] if change else lines
     return header + "\n" + "\n".join(";".join(line) for line in changed) + "\n"
+
+
+def lossy_loop(
+    motion: np.ndarray, gap: float = 1.0, elastic: float = 0.0, decay: bool = False, noise: float = 0.0, seed: int = 0
+) -> Recording:
+    """A force of 50 N with a ripple of 0.3 N over 30 mm, and friction that turns its sign over `elastic` mm.
+
+    Without `elastic` the sample at a reversal already has the sign of the way back. With `decay` the
+    sign turns exponentially, to 2 % after `elastic`; else linearly.
+    """
+    step = np.diff(motion, append=motion[-2])
+    sign = np.sign(step)
+    if elastic:
+        sign[0] = -1.0
+        for k in range(1, len(motion)):
+            way = np.sign(motion[k] - motion[k - 1])
+            moved = abs(motion[k] - motion[k - 1]) / elastic
+            sign[k] = way + (sign[k - 1] - way) * np.exp(-4.0 * moved) if decay else sign[k - 1] + way * 2.0 * moved
+            sign[k] = np.clip(sign[k], -1.0, 1.0)
+    force = 50.0 + 0.3 * np.sin(2 * np.pi * motion / 30.0) + 0.5 * gap * sign
+    force = force + (np.random.default_rng(seed).normal(0.0, noise, len(force)) if noise else 0.0)
+    return Recording("made.csv", motion * 1e-3, force, 0.05 * np.arange(len(motion)))

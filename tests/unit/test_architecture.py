@@ -176,6 +176,7 @@ def longest_function(path: Path) -> tuple[int, str]:
 
 @pytest.mark.parametrize("path", SOURCES, ids=lambda path: str(path.relative_to(ROOT)))
 def test_files_and_functions_stay_small(path):
-    assert len(path.read_text(encoding="utf-8").splitlines()) <= 300
+    """A file is a subject, which may take 500 lines; none is cut in two to stay short."""
+    assert len(path.read_text(encoding="utf-8").splitlines()) <= 500
     size, name = longest_function(path)
     assert size <= 60, name

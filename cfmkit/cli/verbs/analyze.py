@@ -52,11 +52,11 @@ def run(options: Options, terminal: Terminal) -> Answer:
         from cfmkit.cli.measuring import data_record, read_measured
 
         inputs = data_record(options.data)
-        work = partial(compute_beside, read_measured(options.data, options.units))
-    elif options.units is not None:
-        from cfmkit.errors import UsageError
+        work = partial(compute_beside, read_measured(options.data, options))
+    else:
+        from cfmkit.cli.measuring import refuse_without_data
 
-        raise UsageError("--units is for a measurement: name it with --data")
+        refuse_without_data(options)
     if options.compare_fidelity:
         work = partial(compute_each, work)
     return execute(Verb("analyze", "analysed", work, inputs), options, terminal)

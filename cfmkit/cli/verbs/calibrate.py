@@ -64,7 +64,7 @@ def run(options: Options, terminal: Terminal) -> Answer:
 
     if options.loss not in LOSSES:
         raise UsageError(f"--loss: there is no {options.loss!r}; there are {', '.join(LOSSES)}")
-    source = read_measured(options.data, options.units)
+    source = read_measured(options.data, options)
     verb = Verb("calibrate", "calibrated", partial(compute, options, source), data_record(options.data))
     return execute(verb, options, terminal)
 

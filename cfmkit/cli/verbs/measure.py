@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from cfmkit.cli.answer import Answer
-from cfmkit.cli.measuring import Units, data_record
+from cfmkit.cli.measuring import Measuring, data_record
 from cfmkit.cli.options import Common, NoPlots, Quiet
 
 if TYPE_CHECKING:
@@ -51,20 +51,23 @@ Target = Annotated[
     str | None,
     typer.Option("--target", metavar="FORCE", help="Force or torque it should have.", show_default=False),
 ]
+AsRecorded = Annotated[
+    bool, typer.Option("--as-recorded", help="Leave out neither spikes nor what is next to reversals.")
+]
 OneBranch = Annotated[bool, typer.Option("--one-branch", help="Accept a recording that has no way back.")]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Options(Common):
+class Options(Measuring, Common):
     """Arguments and options."""
 
     data: DataFile
     out: MeasureFolder = None
-    units: Units = None
     window: WindowOption = None
     filter: Filter = None
     target: Target = None
     one_branch: OneBranch = False
+    as_recorded: AsRecorded = False
     no_plots: NoPlots = False
     quiet: Quiet = False
 
@@ -108,21 +111,20 @@ def _folder(options: Options) -> str:
 
 
 def _report(options: Options) -> MeasureReport:
-    from cfmkit.experiment.filtering import read_filter
-    from cfmkit.experiment.measured import measured, require_loop
-    from cfmkit.experiment.options import read_target, read_window
-    from cfmkit.experiment.reading import read_recording
-    from cfmkit.experiment.report import report_on
-    from cfmkit.metrics import Frame
+    from cfmkit import api
 
-    chosen = "default" if options.filter is None else read_filter(options.filter)
-    recording = read_recording(options.data, options.units)
-    window = read_window(options.window, recording.kind)
-    frame = Frame(target=read_target(options.target, recording.kind))
-    source = measured(recording, chosen)
-    if not options.one_branch:
-        require_loop(source)
-    return report_on(source, frame, window)
+    return api.measure(
+        options.data,
+        units=options.units,
+        window=options.window,
+        filter=options.filter or "default",
+        target=options.target,
+        tare=options.tare,
+        zero=options.zero,
+        flip=options.flips,
+        as_recorded=options.as_recorded,
+        one_branch=options.one_branch,
+    )
 
 
 def _page(report: MeasureReport, screen: Terminal) -> Iterator[RenderableType]:
@@ -143,7 +145,7 @@ def _page(report: MeasureReport, screen: Terminal) -> Iterator[RenderableType]:
     yield Text()
     yield _numbers(report)
     yield Text()
-    for item in source.warnings:
+    for item in report.warnings:
         yield from paragraph("warning", f"{item.name}: {item.message}", screen.width, BAD)
 
 

@@ -1,0 +1,99 @@
+"""What is known to be wrong with the zeros and signs of a recording, taken out before anything is read off it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.errors import QuantityError, UsageError
+
+if TYPE_CHECKING:
+    from collections.abc import Collection
+
+    from cfmkit.curves import FloatArray
+    from cfmkit.experiment.reading import Recording
+
+START = "start"
+"""In place of a value: what the first point says, where the machine has not moved yet."""
+
+_STANDS = 1e-3
+"""The machine has not moved where it is this near to its first place, in parts of the travel."""
+
+
+def words_of(kind: str) -> tuple[str, str]:
+    """Return what effort and motion of a curve are called."""
+    return ("force", "displacement") if kind == "force" else ("torque", "angle")
+
+
+def corrected(
+    recording: Recording, tare: str | float | None = None, zero: str | float | None = None, flip: Collection[str] = ()
+) -> Recording:
+    """Return a recording with other zeros and signs: (reading - zero), turned where it is to be.
+
+    Parameters
+    ----------
+    recording : Recording
+        As recorded.
+    tare : str or float, optional
+        Force or torque that the sensor shows without load: a text with its unit, a number [N or N m], or
+        ``start`` for the mean of the points before the machine moves.
+    zero : str or float, optional
+        Displacement or angle that the sensor shows at the mechanism's zero, likewise [m or rad].
+    flip : collection of str
+        ``force`` and ``displacement``, or ``torque`` and ``angle``: what is recorded with the other sign.
+
+    Raises
+    ------
+    cfmkit.errors.UsageError
+        If a value cannot be read, or there is nothing of that name to turn.
+    """
+    effort, motion = words_of(recording.kind)
+    if strange := next((word for word in flip if word not in (effort, motion)), None):
+        raise UsageError(f"--flip: {strange!r} is not in this recording; it has {effort} and {motion}")
+    resting = _resting(recording.motion)
+    shown = [_shown(tare, recording.effort[:resting], "--tare", recording.kind)]
+    shown.append(_shown(zero, recording.motion[:1], "--zero", "length" if recording.kind == "force" else "angle"))
+    signs = [-1.0 if word in flip else 1.0 for word in (effort, motion)]
+    notes = [*_notes((effort, motion), shown, recording.kind), *(f"{word} with the other sign" for word in flip)]
+    if not notes:
+        return recording
+    return replace(
+        recording,
+        effort=signs[0] * (recording.effort - shown[0]),
+        motion=signs[1] * (recording.motion - shown[1]),
+        notes=(*recording.notes, *notes),
+    )
+
+
+def _resting(motion: FloatArray) -> int:
+    """Return how many points there are before the machine moves; at least one."""
+    moved = np.abs(motion - motion[0]) > _STANDS * float(np.ptp(motion))
+    return max(int(np.argmax(moved)), 1)
+
+
+def _shown(value: str | float | None, first: FloatArray, option: str, dimension: str) -> float:
+    from cfmkit.units import read_quantity
+
+    if value is None:
+        return 0.0
+    if not isinstance(value, str):
+        return float(value)
+    if value.strip() == START:
+        return float(first.mean())
+    try:
+        return read_quantity(value, dimension)
+    except QuantityError as error:
+        raise UsageError(f"{option}: {error}; or say {START!r} for what the first point says") from None
+
+
+def _notes(words: tuple[str, str], shown: list[float], kind: str) -> list[str]:
+    from cfmkit.units import format_short
+
+    dimensions = (kind, "length" if kind == "force" else "angle")
+    return [
+        f"{format_short(value, dimension, 6)} taken off the {word}"
+        for word, value, dimension in zip(words, shown, dimensions, strict=True)
+        if value
+    ]
