@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from cfmkit.errors import ExitCode, UsageError
 from cfmkit.results import Status
+from cfmkit.studies.rows import WARNINGS_JOINT
 from cfmkit.tables import Table, TableColumn
 
 if TYPE_CHECKING:
@@ -86,6 +87,11 @@ class Entry:
     def missed(self) -> tuple[Mapping[str, Any], ...]:
         """The requirements that are not met."""
         return tuple(one for one in self.requirements if not one["ok"])
+
+    @property
+    def warned(self) -> str | None:
+        """The names of the warnings, as tables say them."""
+        return WARNINGS_JOINT.join(sorted({one["name"] for one in self.warnings})) or None
 
     def as_json(self) -> dict[str, Any]:
         """Return its part of metrics.json: nothing that differs from run to run."""
@@ -211,7 +217,7 @@ def results_table(entries: Sequence[Entry]) -> Table:
             TableColumn("exit_code", tuple(None if one.skipped else int(one.code) for one in entries)),
             TableColumn("requirements", tuple(len(one.requirements) for one in entries)),
             TableColumn("missed", tuple(len(one.missed) for one in entries)),
-            TableColumn("warnings", tuple(len(one.warnings) for one in entries)),
+            TableColumn("warnings", tuple(one.warned for one in entries)),
             TableColumn("message", tuple(one.message for one in entries)),
         )
     )

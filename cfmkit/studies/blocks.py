@@ -56,7 +56,18 @@ def evaluate_block(study: Study, plan: Plan, start: int, stop: int) -> Rows:
     if study.curves:
         # Rows are those of the block, whether curves are wanted or not.
         curves |= {int(k): study.evaluate(plan.point(start + int(k))).curve for k in np.flatnonzero(done)}
-    return Rows(values, met, odd, curves, bugs)
+    return Rows(values, met, odd, curves, bugs, _warned(answer, singly, rest))
+
+
+def _warned(answer: BlockAnswer, singly: list[int], rest: Rows) -> dict[str, NDArray[np.bool_]]:
+    """Return which rows have which warnings: those of the block model, of the rows analysed one by one their own."""
+    warned = {}
+    for name in sorted({*answer.warnings, *rest.warned}):
+        mask = np.array(answer.warnings.get(name, np.zeros(len(answer.done))), dtype=bool)
+        mask[singly] = rest.warned.get(name, False)
+        if mask.any():
+            warned[name] = mask
+    return warned
 
 
 def _answer(study: Study, plan: Plan, start: int, stop: int) -> BlockAnswer | None:

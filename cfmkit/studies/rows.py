@@ -20,6 +20,9 @@ if TYPE_CHECKING:
     from cfmkit.curves import FloatArray
 
 
+WARNINGS_JOINT = "; "
+"""Between the names of warnings in a column of a table."""
+
 _STATUS = {status.key: status for status in Status}
 
 
@@ -39,6 +42,8 @@ class Rows:
         Curves as CSV, where they are kept.
     bugs : mapping of int to str
         Tracebacks.
+    warned : mapping of str to (n,) array of bool
+        Name of a warning -> the rows that have it.
     """
 
     values: FloatArray
@@ -46,6 +51,7 @@ class Rows:
     odd: Mapping[int, tuple[Status, str]] = field(default_factory=dict)
     curves: Mapping[int, bytes] = field(default_factory=dict)
     bugs: Mapping[int, str] = field(default_factory=dict)
+    warned: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict)
 
     def __len__(self) -> int:
         """Return the number of rows."""
@@ -79,7 +85,9 @@ def gathered(rows: Sequence[Row], metrics: int, requirements: int) -> Rows:
             curves[k] = row.curve
         if row.bug:
             bugs[k] = row.bug
-    return Rows(values, met, odd, curves, bugs)
+    names = sorted({name for row in rows for name in row.warnings})
+    warned = {name: np.array([name in row.warnings for row in rows], dtype=bool) for name in names}
+    return Rows(values, met, odd, curves, bugs, warned)
 
 
 def record(rows: Rows) -> Any:
@@ -87,6 +95,8 @@ def record(rows: Rows) -> Any:
     if len(rows) != 1:
         odd = {str(k): [status.key, message] for k, (status, message) in rows.odd.items()}
         told = {"n": len(rows), "v": _packed(rows.values), "q": _packed(rows.met), "o": odd}
+        if rows.warned:
+            told["w"] = {name: _packed(np.packbits(mask)) for name, mask in sorted(rows.warned.items())}
         return told | ({"u": {str(k): _text(curve) for k, curve in rows.curves.items()}} if rows.curves else {})
     status, message = rows.status(0)
     told = {"s": status.key}
@@ -95,6 +105,8 @@ def record(rows: Rows) -> Any:
     if status.usable:
         told["v"] = _packed(rows.values)
         told["q"] = "".join("01"[met] for met in rows.met[0].tolist())
+    if names := [name for name, mask in sorted(rows.warned.items()) if mask[0]]:
+        told["w"] = names
     if rows.curves:
         told["u"] = _text(rows.curves[0])
     return told
@@ -107,14 +119,19 @@ def recalled(told: Any, metrics: int, requirements: int) -> Rows:
     values = _unpacked(told["v"], np.float64).reshape(told["n"], metrics)
     met = _unpacked(told["q"], np.bool_).reshape(told["n"], requirements)
     curves = {int(k): _bytes(text) for k, text in told.get("u", {}).items()}
-    return Rows(values, met, {int(k): (_STATUS[s], m) for k, (s, m) in told["o"].items()}, curves)
+    odd = {int(k): (_STATUS[s], m) for k, (s, m) in told["o"].items()}
+    masks = {
+        name: np.unpackbits(_unpacked(bits, np.uint8), count=told["n"]) for name, bits in told.get("w", {}).items()
+    }
+    return Rows(values, met, odd, curves, warned={name: mask.astype(bool) for name, mask in masks.items()})
 
 
 def recalled_row(told: Any) -> Row:
     """Return the single row that a record is."""
     curve = _bytes(told["u"]) if "u" in told else b""
     noted = tuple(_unpacked(told["v"], np.float64).tolist()) if "v" in told else ()
-    return Row(_STATUS[told["s"]], noted, tuple(map("1".__eq__, told.get("q", ""))), told.get("m", ""), curve)
+    met = tuple(map("1".__eq__, told.get("q", "")))
+    return Row(_STATUS[told["s"]], noted, met, told.get("m", ""), curve, warnings=tuple(told.get("w", ())))
 
 
 def joined(parts: Sequence[Rows]) -> Rows:
@@ -129,7 +146,17 @@ def joined(parts: Sequence[Rows]) -> Rows:
         {start + k: item for start, part in pairs for k, item in part.odd.items()},
         {start + k: item for start, part in pairs for k, item in part.curves.items()},
         {start + k: item for start, part in pairs for k, item in part.bugs.items()},
+        _joined_masks(parts),
     )
+
+
+def _joined_masks(parts: Sequence[Rows]) -> dict[str, NDArray[np.bool_]]:
+    """Return the masks of all warnings over all pieces."""
+    names = sorted({name for part in parts for name in part.warned})
+    return {
+        name: np.concatenate([part.warned.get(name, np.zeros(len(part), dtype=bool)) for part in parts])
+        for name in names
+    }
 
 
 def cut(rows: Rows, start: int, stop: int) -> Rows:
@@ -141,7 +168,8 @@ def cut(rows: Rows, start: int, stop: int) -> Rows:
         return {k - start: item for k, item in items.items() if start <= k < stop}
 
     odd, curves, bugs = kept(rows.odd), kept(rows.curves), kept(rows.bugs)
-    return Rows(rows.values[start:stop], rows.met[start:stop], odd, curves, bugs)
+    warned = {name: mask[start:stop] for name, mask in rows.warned.items()}
+    return Rows(rows.values[start:stop], rows.met[start:stop], odd, curves, bugs, warned)
 
 
 def _packed(values: NDArray[Any]) -> str:
@@ -150,6 +178,10 @@ def _packed(values: NDArray[Any]) -> str:
 
 def _unpacked(text: str, dtype: Any) -> NDArray[Any]:
     return np.frombuffer(base64.b64decode(text), dtype=dtype)
+
+
+def _mask(text: str, count: int) -> NDArray[np.bool_]:
+    return np.unpackbits(_unpacked(text, np.uint8), count=count).astype(bool)
 
 
 def _text(data: bytes) -> str:

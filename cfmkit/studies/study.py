@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import hashlib
 import traceback
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import isfinite
 from typing import TYPE_CHECKING, Any
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 NOT_DECIDING = {"name", "description", "sweep", "sensitivity"}
 """Parts of a specification that change no result of a point."""
 
-RECORDS = 2
+RECORDS = 3
 """How records of the journal are written: those of another number are computed again."""
 
 _STATUS_OF = {3: Status.INVALID, 4: Status.NO_EQUILIBRIUM, 70: Status.CRASHED}
@@ -91,6 +91,8 @@ class Row:
         The point's curves as CSV, if the study keeps them.
     bug : str
         The traceback, if a bug ended it.
+    warnings : tuple of str
+        Names of what the user must know, sorted.
     """
 
     status: Status
@@ -99,6 +101,7 @@ class Row:
     message: str = ""
     curve: bytes = b""
     bug: str = ""
+    warnings: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -179,24 +182,27 @@ class Study:
             return _bug(error)
 
     def solve(self, spec: Spec) -> Result:
-        """Return the result of a variant, designed first if the study says so."""
+        """Return the result of a variant, designed first if the study says so, with the warnings of both."""
         record, run = family(spec.family), Run(self.seed)
-        if self.design and record.design is not None:
-            design = record.design(spec, run)
-            if design.spec is None:
-                return Result(spec, design.status, design.message)
-            spec = design.spec
-        return record.analyze(spec, run)
+        if not self.design or record.design is None:
+            return record.analyze(spec, run)
+        design = record.design(spec, run)
+        if design.spec is None:
+            return Result(spec, design.status, design.message, warnings=design.warnings)
+        result = record.analyze(design.spec, run)
+        return replace(result, warnings=(*design.warnings, *result.warnings))
 
     def row(self, result: Result) -> Row:
         """Return what is noted about a result."""
+        warnings = tuple(sorted({item.name for item in result.warnings}))
         if not result.status.usable:
-            return Row(result.status, message=result.message)
+            return Row(result.status, message=result.message, warnings=warnings)
         extra = values_of_family(family(result.spec.family).values)
         values = self._values(result, extra)
         met = tuple(outcome.ok for outcome in check(result.spec.requirements, result, extra))
         message = "" if result.status is Status.COMPLETE else result.message
-        return Row(result.status, values, met, message, _curve(result) if self.curves else b"")
+        curve = _curve(result) if self.curves else b""
+        return Row(result.status, values, met, message, curve, warnings=warnings)
 
     def _values(self, result: Result, extra: tuple[Definition, ...]) -> tuple[float | None, ...]:
         found: dict[tuple[str, tuple[float, float] | None], float | None] = {}

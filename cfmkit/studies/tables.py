@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cfmkit.studies.rows import WARNINGS_JOINT
 from cfmkit.tables import Table, TableColumn, border_column, csv_chunks, read_csv
 from cfmkit.units import border_unit
 
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
 
 
 def results_csv(records: Records, watch: Watch | None = None) -> Iterator[bytes]:
-    """Yield results.csv: what varies, the metrics, whether the requirements are met, status, message.
+    """Yield results.csv: what varies, the metrics, whether the requirements are met, status, warnings, message.
 
     Parameters
     ----------
@@ -51,7 +52,7 @@ def results_table(records: Records, indices: NDArray[np.int64], rows: Rows) -> T
     told = [rows.status(k) for k in range(len(rows))] if rows.odd else None
     status = tuple(one.key for one, _ in told) if told else ("complete",) * len(rows)
     message = tuple(text or None for _, text in told) if told else (None,) * len(rows)
-    ends = TableColumn("status", status), TableColumn("message", message)
+    ends = TableColumn("status", status), TableColumn("warnings", _warnings(rows)), TableColumn("message", message)
     return Table((*varied(records.work.plan, indices), *metrics, *met, *ends))
 
 
@@ -84,6 +85,17 @@ def _met(rows: Rows) -> tuple[str | None, ...]:
     words = np.where(rows.met.all(axis=1), "true", "false").tolist()
     unsolved = {k for k, (status, _) in rows.odd.items() if not status.usable}
     return tuple(None if k in unsolved else word for k, word in enumerate(words)) if unsolved else tuple(words)
+
+
+def _warnings(rows: Rows) -> tuple[str | None, ...]:
+    """Return the names of the warnings of each row: ``high_pressure_angle; undercut``."""
+    combined = np.zeros(len(rows), dtype=np.int64)
+    names = sorted(rows.warned)
+    for k, name in enumerate(names):
+        combined |= rows.warned[name].astype(np.int64) << k
+    found, place = np.unique(combined, return_inverse=True)
+    texts = [WARNINGS_JOINT.join(name for k, name in enumerate(names) if code >> k & 1) or None for code in found]
+    return tuple(texts[at] for at in place.tolist())
 
 
 def _pieces(table: Table, first: bool) -> Iterator[bytes]:

@@ -9,7 +9,8 @@ import pytest
 import cfmkit
 from cfmkit.errors import UsageError
 from cfmkit.families import family
-from cfmkit.results import Status
+from cfmkit.families.base import BlockAnswer
+from cfmkit.results import Finding, Status
 from cfmkit.store import origin
 from cfmkit.studies.columns import metrics_of, sample_curve
 from cfmkit.studies.engine import Work, run
@@ -17,7 +18,9 @@ from cfmkit.studies.journal import Journal
 from cfmkit.studies.plan import grid
 from cfmkit.studies.pool import Pool
 from cfmkit.studies.study import Study
+from cfmkit.studies.tables import results_csv
 from cfmkit.studies.variation import axes, wish
+from cfmkit.tables import read_csv
 
 SPEC = cfmkit.load("configs/cam.yaml").replace({"analysis.points": 41})
 FRICTION = "mechanism.profile.friction=[0, 0.001]"
@@ -155,6 +158,48 @@ def test_a_second_writer_in_the_folder_changes_no_number(tmp_path):
 
         found = run(work(FRICTION), disturbed, first)
         assert values(found).tolist() == values(run(work(FRICTION))).tolist()
+
+
+def warnings(records):
+    return [table["warnings"][k] for table in [read_csv(b"".join(results_csv(records)))] for k in range(len(table))]
+
+
+def test_the_table_names_the_warnings_of_each_point(tmp_path):
+    expected = []
+    for friction in (0.0, 0.004):
+        result = Study(SPEC, ("mechanism.profile.friction",), (), design=True).solve(
+            SPEC.replace({"mechanism.profile.friction": friction})
+        )
+        expected.append("; ".join(sorted({item.name for item in result.warnings})))
+    assert "undercut" in expected[0]
+    for reused in (0, 2):  # computed, and from the journal
+        with Journal(tmp_path / "journal") as journal:
+            records = run(work("mechanism.profile.friction=[0, 0.004]", design=True), journal=journal)
+            assert (warnings(records), records.reused) == (expected, reused)
+
+
+def test_the_warnings_of_a_block_are_those_of_its_model_and_of_single_analyses(monkeypatch, tmp_path):
+    record = family("cam")
+
+    def block(spec, asked):
+        friction = asked.values["mechanism.profile.friction"]
+        values = tuple({"": np.zeros(asked.size)} for _ in asked.measures)
+        told = {"high_pressure_angle": friction > 0.0015, "undercut": friction > 0.0005}
+        return BlockAnswer(friction < 0.0025, values, None, "force", told)
+
+    def single(spec, run):
+        found = record.analyze(spec, run)
+        return dataclasses.replace(found, warnings=(Finding("odd", "no matter"), Finding("odd", "again")))
+
+    fake = dataclasses.replace(record, analyze=single, analyze_block=block)
+    monkeypatch.setattr("cfmkit.studies.blocks.family", lambda _name: fake)
+    monkeypatch.setattr("cfmkit.studies.study.family", lambda _name: fake)
+    some = work("mechanism.profile.friction=[0, 0.001, 0.002, 0.003]", names=("theoretical_force",))
+    expected = [None, "undercut", "high_pressure_angle; undercut", "odd"]
+    for reused in (0, 4):
+        with Journal(tmp_path / "journal") as journal:
+            records = run(some, journal=journal)
+            assert (warnings(records), records.reused) == (expected, reused)
 
 
 def test_a_new_name_changes_nothing(tmp_path):
