@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from vcfm_support import CONFIGS, TABLE_I
+import yaml
+from vcfm_support import CONFIGS, MM, TABLE_I
 
 import cfmkit
 from cfmkit import api
@@ -35,6 +36,45 @@ def test_a_limit_is_named_and_the_nearest_feasible_value_works(change):
     assert set(found.nearest_feasible) == {path}
     cured = designed(change, *more, f"{path}={found.nearest_feasible[path]}")
     assert cured.status is Status.COMPLETE, cured.message
+
+
+BARE = {
+    "cfmkit": 1,
+    "family": "vcfm",
+    "mechanism": {
+        "material": {"youngs_modulus": "1477 MPa", "allowable_stress": "30 MPa"},
+        "positive": {"length": "27 mm", "angle": "7 deg", "thickness": "1.5 mm", "width": "10 mm"},
+        "bistable": {"half_beams": 4, "length": "30 mm", "angle": "8 deg", "thickness": "1 mm", "width": "3.6 mm"},
+    },
+}
+
+
+@pytest.mark.parametrize(
+    ("force", "adjustment", "stroke", "rise"), [(11.15, 5, 3.8, 4.265), (42.4, 31, 5.1, 5.6), (24, 3, 2.2, 2.6)]
+)
+def test_a_bare_design_block_leads_to_an_analysis_of_what_was_requested(tmp_path, force, adjustment, stroke, rise):
+    """Window, travel, preloads and requirements of the design itself: all met, without a word against it."""
+    block = f"design: {{force: {force} N, adjustment: {adjustment} N, stroke: {stroke} mm, rise: {rise} mm}}\n"
+    (tmp_path / "bare.yaml").write_text(yaml.safe_dump(BARE) + block)
+    spec = api.design(cfmkit.load(tmp_path / "bare.yaml")).spec
+    low, high = spec.analysis.window
+    assert stroke * MM * (1 - 1e-3) <= high - low <= stroke * MM
+    assert spec.analysis.travel == high
+    assert spec.analysis.preloads == pytest.approx((0.0, rise * MM * adjustment / force))
+    for model in ("analytic", "exact"):
+        found = api.analyze(spec.replace({"analysis.fidelity": model}))
+        outcomes = {outcome.metric: outcome for outcome in api.check(found)}
+        assert {"force_ripple", "deviation_from_target", "force_change_max", "safety_factor"} == set(outcomes)
+        assert all(outcome.ok for outcome in outcomes.values())
+        assert {finding.name for finding in found.warnings} <= {"bistable"}
+
+
+def test_what_a_design_is_told_to_analyse_stays():
+    given = ("analysis={preloads: [0 mm, 1 mm], window: [1.5 mm, 4 mm]}", "requirements=[]")
+    spec = designed(*given).spec
+    assert spec.analysis.preloads == (0.0, 1e-3)
+    assert spec.analysis.window == (1.5e-3, 4e-3)
+    assert spec.requirements == ()
 
 
 def test_leaves_that_cannot_buckle_have_no_nearest_stroke():

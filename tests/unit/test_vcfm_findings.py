@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 from vcfm_support import MM, analyzed, message, names, table_i
@@ -63,6 +65,59 @@ def test_what_is_measured_of_hybrid_leaves_is_not_held_against_a_force_that_they
     hybrid = ("mechanism.bistable.structure=hybrid", "mechanism.bistable.flexure_length=5 mm")
     assert "measured_contradiction" in names(analyzed())
     assert "measured_contradiction" not in names(analyzed(*hybrid))
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        ["analysis.window=[0.3 mm, 4.6 mm]"],
+        ["analysis.window=[1 mm, 5.6 mm]", FLAT],
+        ["analysis.flatness=5 %"],
+        ["mechanism.bistable.structure=cosine", "mechanism.bistable.thickness=2 mm", "analysis.window=[1 mm, 6 mm]"],
+        ["mechanism.bistable.thickness=1.5 mm", "analysis.window=[1 mm, 4 mm]"],
+        ["mechanism.positive.structure=straight"],
+    ],
+)
+def test_the_cure_of_a_force_that_is_not_flat_works(changes):
+    """Either another width, or the part of the travel that is flat: tried before it is told."""
+    found = analyzed(*changes)
+    told = message(found, "not_flat")
+    (flat,) = [one for one in found.warnings if one.name == "not_flat"]
+    cures = list(flat.cures)
+    if wider := re.search(r"leaves ([\d.]+) times as wide", told):
+        cures = [f"mechanism.bistable.width={6 * float(wider[1])} mm"]
+    assert cures
+    cured = analyzed(*changes, *cures)
+    assert "not_flat" not in names(cured)
+    assert api.evaluate(cured, ["force_ripple"])["force_ripple"].value <= cured.spec.analysis.flatness
+
+
+def test_a_window_that_begins_before_the_leaves_buckle_is_told_the_flat_part():
+    told = message(analyzed(FLAT, "analysis.window=[0.3 mm, 4.6 mm]"), "not_flat")
+    assert "cancel, but not in the whole window" in told
+    assert "the leaves are buckled from 0.9097 mm to 4.771 mm only; the force is flat from" in told
+
+
+@pytest.mark.parametrize("thickness", [1.87, 1.95, 2.0, 2.4])
+def test_arches_that_do_not_buckle_have_the_stiffness_of_their_curve(thickness):
+    """Below a rise of 2.31 thicknesses: K_n is the steepest slope, and no constant force is stated."""
+    arch = ("mechanism.bistable.structure=cosine", f"mechanism.bistable.thickness={thickness} mm")
+    found = analyzed(*arch, "analysis.travel=8 mm", "analysis.points=1601")
+    leaves = found.curve.extra["bistable_force"].values
+    steepest = -np.gradient(leaves, found.curve.motion).min()
+    assert found.values["negative_stiffness"].value == pytest.approx(steepest, rel=1e-3)
+    assert found.values["constant_force"].value is None
+    assert "do not buckle" in message(found, "no_linear_region")
+    exact = analyzed(*arch, "analysis.fidelity=exact")
+    assert exact.values["negative_stiffness"].value == pytest.approx(steepest, rel=0.08)
+    assert "no_linear_region" in names(exact)
+
+
+def test_no_constant_force_is_stated_where_no_number_stands_for_the_curve():
+    hybrid = ("mechanism.bistable.structure=hybrid", "mechanism.bistable.flexure_length=5 mm")
+    for changes in (["mechanism.positive.structure=straight"], [*hybrid], leaf(thickness="1.5 mm")):
+        assert analyzed(*changes).values["constant_force"].value is None
+    assert analyzed().values["constant_force"].value == pytest.approx(13.66, abs=5e-3)
 
 
 def test_stress_is_that_of_the_worst_preload():

@@ -56,10 +56,13 @@ class CosineArch:
         """Travel at which the arch carries nothing [m]: a third of the rise beyond its wall."""
         return 4.0 / 3.0 * self.strip.rise
 
-    @property
+    @cached_property
     def negative_stiffness(self) -> Any:
-        """Size of the negative stiffness of one leaf [N/m]."""
-        return self.critical_force / self.strip.reach
+        """Size of the negative stiffness of one leaf [N/m]: of the buckled form, else of the steepest fall."""
+        if np.isfinite(self.linear[0]):
+            return self.critical_force / self.strip.reach
+        places = np.linspace(0.0, 2.0, 801) * self.strip.rise
+        return max(0.0, -float(np.gradient(self.force(places), places).min()))
 
     @property
     def first_stiffness(self) -> Any:

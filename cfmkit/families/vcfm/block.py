@@ -90,7 +90,7 @@ def _sound(spec: VcfmSpec, block: Block, names: set[str]) -> NDArray[np.bool_]:
         done &= (given >= 1) & (given <= 1000) if path.endswith("half_beams") else given > 0
         if path.endswith("angle"):
             done &= given <= np.radians(40)
-    if "negative_stiffness" in names and spec.analysis.fidelity == "analytic":
+    if names & {"negative_stiffness", "constant_force"} and spec.analysis.fidelity == "analytic":
         whole = Slab.of(spec, block.values, block.size)
         done &= np.ravel(whole.leaf.strip.slenderness > LINEAR_ABOVE)
     return done

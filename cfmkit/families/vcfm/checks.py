@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.findings import mm, mpa, newton, percent, rate
+from cfmkit.families.findings import at_least, at_most, mm, mpa, newton, percent, rate
 from cfmkit.families.vcfm.findings import finding
 from cfmkit.families.vcfm.preload import measured_stiffness_for
 from cfmkit.families.vcfm.sbranch import POLE
@@ -20,6 +20,7 @@ from cfmkit.families.vcfm.vbeam import (
     RELIABLE,
     STEEP,
     VBeam,
+    overrated,
 )
 
 if TYPE_CHECKING:
@@ -39,8 +40,14 @@ PRESSED, STRETCHED = 0.3, 0.12
 
 ROUNDING = 1e-9
 
-CLOSED_FORM = 0.005
-"""By so much the closed forms overrate the stress of flat leaves: a stress that is higher by less is none."""
+ALIKE = 0.01
+"""Stiffnesses that differ by less than this share cancel."""
+
+WIDEST = 50.0
+"""Factor on a width up to which one is looked for that makes the force flat."""
+
+EXACT_FORM = 2e-4
+"""Share of a stress that counts for nothing: designs are fitted to 1e-4."""
 
 
 def findings_of(solution: Solution) -> tuple[Finding, ...]:
@@ -50,20 +57,25 @@ def findings_of(solution: Solution) -> tuple[Finding, ...]:
 
 
 def _leaf_shape(solution: Solution) -> Iterator[Finding]:
-    if solution.spec.mechanism.bistable.structure != "v-beam" or solution.spec.analysis.fidelity == "truss":
+    kind, one = solution.spec.mechanism.bistable.structure, solution.character
+    if kind == "hybrid" or solution.spec.analysis.fidelity == "truss":
         return
     q = float(solution.parts.strip.slenderness)
+    negative, straight = q >= NEGATIVE_ABOVE, q > LINEAR_ABOVE
     told = f"rise over thickness is {q:.4g}"
-    if q < NEGATIVE_ABOVE:
+    if kind == "cosine":  # whose limits depend on the angle: as the curve has it
+        negative, straight = one.negative_stiffness > 0, bool(np.isfinite(one.linear[0]))
+    limits = {"v-beam": (f", below {NEGATIVE_ABOVE}", ", not above pi"), "cosine": ("", "")}[kind]
+    if not negative:
         yield finding(
             "no_negative_stiffness",
-            f"{told}, below {NEGATIVE_ABOVE}: the force of the leaves only rises, nothing cancels the spring; "
+            f"{told}{limits[0]}: the force of the leaves only rises, nothing cancels the spring; "
             "use thinner or steeper leaves",
         )
-    elif q <= LINEAR_ABOVE:
+    elif not straight:
         yield finding(
             "no_linear_region",
-            f"{told}, not above pi: the leaves do not buckle and their force is a curve; the constant-force window is "
+            f"{told}{limits[1]}: the leaves do not buckle and their force is a curve; the constant-force window is "
             "its top only. Use thinner or steeper leaves",
         )
 
@@ -74,22 +86,65 @@ def _flatness(solution: Solution) -> Iterator[Finding]:
     if not len(force) or force.max() <= 0:
         return
     ripple, allowed = float((force.max() - force.min()) / force.max()), solution.spec.analysis.flatness
-    if ripple > allowed:
-        one = solution.character
-        yield finding(
-            "not_flat",
-            f"K_p = {rate(one.positive_stiffness)} and K_n = {rate(one.negative_stiffness)} do not cancel: over "
-            f"{mm(low)} ... {mm(high)} the force varies by {percent(ripple)} of its maximum, {percent(allowed)} is "
-            f"allowed{_balancing(one.positive_stiffness, one.negative_stiffness)}",
-        )
+    if ripple <= allowed:
+        return
+    one = solution.character
+    alike = one.positive_stiffness > 0 and abs(one.negative_stiffness / one.positive_stiffness - 1.0) < ALIKE
+    told = f"K_p = {rate(one.positive_stiffness)} and K_n = {rate(one.negative_stiffness)}"
+    cause = f"{told} cancel, but not in the whole window" if alike else f"{told} do not cancel"
+    words, cures = _flattening(solution, ripple)
+    yield finding(
+        "not_flat",
+        f"{cause}: over {mm(low)} ... {mm(high)} the force varies by {percent(ripple)} of its maximum, "
+        f"{percent(allowed)} is allowed{words}",
+        *cures,
+    )
 
 
-def _balancing(positive: float, negative: float) -> str:
-    """Return by how much the width of either structure is off, where that is what is wrong."""
-    if negative <= 0 or positive <= 0 or abs(positive / negative - 1.0) < 0.01:
-        return ""
-    wide, stiff = positive / negative, negative / positive
-    return f"; leaves {wide:.3g} times as wide, or a spring {stiff:.3g} times as wide, make them equal"
+def _flattening(solution: Solution, ripple: float) -> tuple[str, tuple[str, ...]]:
+    """Return what makes the force flat, in words and as changes of the specification: only what has been tried.
+
+    Forces are linear in the widths, so that other widths need no other solution. Where none is flat over the window,
+    the window is wrong: then the flat part is named.
+    """
+    factor, left = _better_width(solution)
+    allowed = solution.spec.analysis.flatness
+    if left <= allowed and left < ripple:
+        text = f"; leaves {factor:.3g} times as wide, or a spring {1.0 / factor:.3g} times as wide, make them equal"
+        return text, ()
+    (first, last), flat = solution.character.linear, solution.windows[0]
+    low, high = solution.window
+    why = ""
+    if np.isfinite(first) and (low < first or high > last):
+        why = f"; the leaves are buckled from {mm(first)} to {mm(last)} only"
+    if flat is None or (flat[0] - low <= 0 and flat[1] - high >= 0):
+        return f"{why}; no width of leaves or spring makes it flat", ()
+    start, end = at_least(flat[0]), at_most(flat[1])
+    return f"{why}; the force is flat from {start} to {end}: state that as the window", (
+        f"analysis.window=[{start}, {end}]",
+    )
+
+
+def _better_width(solution: Solution) -> tuple[float, float]:
+    """Return the factor on the leaves' width that makes the force flattest in the window, and the ripple left."""
+    low, high = solution.window
+    travel = solution.nominal.travel
+    places = np.unique(np.concatenate([np.linspace(low, high, 201), travel[(travel > low) & (travel < high)]]))
+    leaves = solution.sampler.leaf_force(places)
+    spring = solution.sampler.spring(places + solution.nominal.preload)[0]
+    if not np.isfinite(leaves + spring).all():
+        return 1.0, np.inf
+    one = solution.character
+    factors = np.geomspace(1.0 / WIDEST, WIDEST, 801)
+    if one.negative_stiffness > 0:  # the nearest at hand where the slopes are constant
+        factors = np.append(factors, one.positive_stiffness / one.negative_stiffness)
+    force = factors[:, None] * leaves + spring
+    top, bottom = force.max(axis=1), force.min(axis=1)
+    with np.errstate(all="ignore"):
+        left = np.where(bottom > 0, (top - bottom) / top, np.inf)
+    # stiffnesses that cancel are what a reader expects: another factor only where that one does not do
+    best = len(factors) - 1 if left[-1] <= solution.spec.analysis.flatness else int(left.argmin())
+    return float(factors[best]), float(left[best])
 
 
 def _returns(solution: Solution) -> Iterator[Finding]:
@@ -121,6 +176,8 @@ def _overload(solution: Solution, push: Push) -> Iterator[Finding]:
     end = solution.character.linear[1]
     if np.isfinite(end) and push.travel[-1] > end * (1 + 1e-9):
         at_end, last = float(np.interp(end, push.travel, push.force)), float(push.force[-1])
+        if last - at_end <= solution.spec.analysis.flatness * abs(last):
+            return
         yield finding(
             "overload",
             f"beyond {mm(end)} the leaves straighten and stiffen: the force goes from {newton(at_end)} to "
@@ -147,7 +204,8 @@ def _strength(solution: Solution) -> Iterator[Finding]:
     allowed = solution.spec.mechanism.allowable_stress
     if allowed is None:
         return
-    slack = 1e-9 if solution.spec.analysis.fidelity == "exact" else CLOSED_FORM
+    exact = solution.spec.analysis.fidelity == "exact"
+    slack = EXACT_FORM if exact else overrated(float(solution.parts.strip.angle))
     parts = [
         (push, name, stress)
         for push in solution.pushes

@@ -9,7 +9,7 @@ exact force flattest at F_c are those of a linear least-squares fit: one pass is
 from __future__ import annotations
 
 from dataclasses import replace
-from math import asin, cos, sqrt
+from math import asin, ceil, cos, floor, log10, sqrt
 from typing import TYPE_CHECKING
 
 from cfmkit.families.findings import at_least, mm, mpa
@@ -25,8 +25,9 @@ from cfmkit.families.vcfm.limits import (
 from cfmkit.families.vcfm.parts import share_of
 from cfmkit.families.vcfm.springs import Diamond
 from cfmkit.families.vcfm.strip import Strip
-from cfmkit.families.vcfm.vbeam import critical_force, onset_and_exit
+from cfmkit.families.vcfm.vbeam import critical_force, onset_and_exit, overrated
 from cfmkit.results import Design, Status
+from cfmkit.units import format_short
 
 if TYPE_CHECKING:
     from cfmkit.families.base import Run
@@ -83,7 +84,7 @@ def _attempt(spec: VcfmSpec) -> Design:
             check_room(target, sizes)
     except Infeasible as problem:
         return no_design(problem.finding, problem.nearest)
-    return Design(written(spec, sizes), Status.COMPLETE, active_bounds=tuple(active))
+    return Design(completed(spec, target, sizes), Status.COMPLETE, active_bounds=tuple(active))
 
 
 def closed_form(spec: VcfmSpec, target: VcfmDesign) -> Sizes:
@@ -160,6 +161,37 @@ def check_width(spec: VcfmSpec, target: VcfmDesign, leaf: Strip) -> None:
         ),
         {"design.leaf_length": at_least(longer)},
     )
+
+
+def completed(spec: VcfmSpec, target: VcfmDesign, sizes: Sizes) -> VcfmSpec:
+    """Return the designed mechanism with an analysis that shows what was requested, where the spec states none.
+
+    The window is the linear region by the closed form, as long as the stroke; the travel ends with it, the preloads
+    are none and the whole. Required are the force and its adjustment, within `analysis.flatness`, and the stress.
+    """
+    low, high = (float(end) for end in sizes.linear)
+    # inwards to a thousandth of the stroke: numbers that can be read
+    step = 10.0 ** floor(log10(target.stroke) - 3)
+    inside = ceil(low / step) * step, floor(high / step) * step
+    analysis, flat = spec.analysis, spec.analysis.flatness
+    given = analysis.model_fields_set if "analysis" in spec.model_fields_set else set()
+    changes: dict[str, object] = {}
+    if "preloads" not in given:
+        changes["analysis.preloads"] = (0.0, target.preload_stroke)
+    if analysis.window is None:
+        changes["analysis.window"] = inside
+    if analysis.travel is None:
+        changes["analysis.travel"] = inside[1] if analysis.window is None else max(inside[1], float(analysis.window[1]))
+    if "requirements" not in spec.model_fields_set:
+        most, least = (format_short(target.adjustment * (1.0 + share), "force", 6) for share in (flat, -flat))
+        allowed = f"{100.0 * flat:.6g} %"
+        changes["requirements"] = (
+            {"metric": "deviation_from_target", "max": allowed},
+            {"metric": "force_ripple", "max": allowed},
+            {"metric": "force_change_max", "min": least, "max": most},
+            {"metric": "safety_factor", "min": f"{floor(1e3 * (1.0 - overrated(sizes.leaf.angle))) / 1e3:.3f}"},
+        )
+    return written(spec, sizes).replace(changes)
 
 
 def written(spec: VcfmSpec, sizes: Sizes) -> VcfmSpec:

@@ -65,10 +65,10 @@ def figures(result: Result) -> dict[str, Callable[[], Figure]]:
 def force(result: Result) -> Figure:
     """Return the nominal curve with the requirement bands."""
     solution: Solution = result.state
-    flat = value_text(solution.parts.balance, "length")
-    level = Limit(solution.constant_force, f"the spring alone, at {flat}")
+    flat, alone = value_text(solution.parts.balance, "length"), solution.constant_force
+    levels = () if alone is None else (Limit(alone, f"the spring alone, at {flat}"),)
     nominal = replace(result, curves=result.curves[:1])
-    look = Look(levels=(level,), regions=_beyond(solution))
+    look = Look(levels=levels, regions=_beyond(solution))
     return loop_figure(nominal, look, "force over travel of the shuttle, from the as-made pose")
 
 

@@ -113,11 +113,20 @@ class Solution:
         """The curve of the first preload."""
         return self.pushes[0]
 
-    @property
-    def constant_force(self) -> float:
-        """Force of the spring at the nominal preload where the leaves carry nothing [N]."""
-        place = np.array([self.parts.balance + self.nominal.preload])
-        return float(self.sampler.spring(place)[0][0])
+    @cached_property
+    def constant_force(self) -> float | None:
+        """Force of the spring at the nominal preload where the leaves carry nothing [N]; None if they do carry there.
+
+        Leaves that do not buckle push where they are flat, and so do hybrid ones; a straight beam as the spring has no
+        constant stiffness. Then no single number stands for the curve.
+        """
+        kinds = self.spec.mechanism.positive.structure, self.spec.mechanism.bistable.structure
+        place = np.array([self.parts.balance])
+        force = float(self.sampler.spring(place + self.nominal.preload)[0][0])
+        bears = abs(float(self.sampler.leaf_force(place)[0])) > 1e-6 * abs(force) and not (
+            np.isfinite(self.character.linear[0]) and kinds[1] != "hybrid"
+        )
+        return None if bears or kinds[0] == "straight" else force
 
     @cached_property
     def windows(self) -> tuple[tuple[float, float] | None, ...]:

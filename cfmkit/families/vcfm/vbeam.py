@@ -93,6 +93,14 @@ def buckled_stress(rise: float, thickness: float, share: float) -> float:
     return float(np.pi * rise * thickness * bend + np.pi**2 * thickness**2 / 3.0)
 
 
+def overrated(angle: float) -> float:
+    """Return by what share the closed form overrates the largest stress of a buckled leaf at an angle [rad].
+
+    At most: 0.12 percent at 3 deg, 0.73 at 7 deg, 2.85 at 14 deg where the leaf just buckles, less the thinner it is.
+    """
+    return 0.5 * angle * angle
+
+
 @dataclass(frozen=True)
 class VBeam:
     """The law of one leaf: force and stress over the travel, and where it is buckled."""
