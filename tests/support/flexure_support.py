@@ -41,23 +41,21 @@ def corners(unloaded: float = UNLOADED, before: Sequence[float] = (0.5, 0.5, 0.5
     return flexure_ends(joints(LINKAGE, unloaded), [10.8 * MM] * 3, before)
 
 
-def rise(path: Path, index: int, unloaded: float) -> float:
-    """Return how far the crank pin, or the middle of a strip, has moved to the left."""
+def knee(path: Path, index: int, unloaded: float) -> np.ndarray:
+    """Return where the crank pin, or the middle of a strip, is."""
     pins = joints(LINKAGE, unloaded)
-    axis = (pins[2] - pins[0]) / np.hypot(*(pins[2] - pins[0]))
-    if STRIP in path.layout.network.beams:
-        shape = path.shape(STRIP, index)
-        moved = shape[np.abs((shape - pins[0]) @ axis - 60 * MM).argmin()] - pins[0]
-    else:
-        moved = path.motion("crank")[index, :2]
-    return float(axis[0] * moved[1] - axis[1] * moved[0])
+    if STRIP not in path.layout.network.beams:
+        return pins[1] + path.motion("crank end")[index, :2]
+    shape = path.shape(STRIP, index)
+    marks = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(shape, axis=0).T))])
+    return shape[np.abs(marks - 60 * MM).argmin()]
 
 
 def lumped_chain(unloaded: float = UNLOADED, flexures: Sequence[Flexure] = TABLE_2) -> Chain:
     """Return Table 2 as a chain."""
     pins = joints(LINKAGE, unloaded)
     ends = flexure_ends(pins, [item.length for item in flexures], [item.before for item in flexures])
-    return Chain(ends, pins, lambda p: lumped(p, flexures, ABS), np.pi, lambda p, i: rise(p, i, unloaded))
+    return Chain(ends, pins, lambda p: lumped(p, flexures, ABS), np.pi, lambda p, i: knee(p, i, unloaded))
 
 
 def strip_chain(
@@ -79,7 +77,7 @@ def strip_chain(
     def build(at: np.ndarray) -> object:
         return Strip(at, width, values, places).network(material)
 
-    return Chain(points, joints(LINKAGE, unloaded), build, np.pi, lambda p, i: rise(p, i, unloaded))  # type: ignore[arg-type]
+    return Chain(points, joints(LINKAGE, unloaded), build, np.pi, lambda p, i: knee(p, i, unloaded))  # type: ignore[arg-type]
 
 
 __all__ = ["ABS", "FLEXURES", "LINKAGE", "MM", "RATES", "SHARES", "TABLE_2", "THICKNESS", "UNLOADED", "WIDTH"]

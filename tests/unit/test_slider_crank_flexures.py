@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -142,6 +143,52 @@ def test_a_chain_that_begins_late_on_its_other_side_says_from_where() -> None:
     assert found.ending is Ending.STARTS_LATE
     assert "mm on only" in found.message
     assert found.travel[0] > 0
+
+
+LONG_WAYS = {
+    "right": ("56.9 mm", "-30.2 mm", "110.5 mm", "5.48 deg", "131.6 mm"),
+    "left": ("69.4 mm", "-41.1 mm", "110.4 mm", "-0.87 deg", "115.5 mm"),
+}
+
+
+@pytest.mark.parametrize("branch", LONG_WAYS)
+def test_a_chain_that_turns_with_its_slider_keeps_its_side(branch: str) -> None:
+    """The crank pin comes back past where the line to the slider had been, but never crosses the line as it is."""
+    crank, offset, stretched, lead, travel = LONG_WAYS[branch]
+    lengths = [
+        f"crank_length={crank}",
+        f"offset={offset}",
+        f"stretched_position={stretched}",
+        f"unloaded_offset={lead}",
+    ]
+    changes = [f"mechanism.{item}" for item in (*lengths, "unloaded_angle=null", f"branch={branch}")]
+    about = [
+        f"analysis.travel=[0 mm, {travel}]",
+        "analysis.points=31",
+        "analysis.recheck=false",
+        "analysis.window=null",
+    ]
+    result = api.analyze(spec("lumped", *changes, *about))
+    assert result.status is Status.COMPLETE, result.message
+    springs = api.analyze(spec("lumped", *changes, *about, "analysis.fidelity=prb"))
+    # no closer: flexures of 10.8 mm are stiffer than springs, and turn by more than a right angle here
+    np.testing.assert_allclose(result.curve.force[1:], springs.curve.force[1:], rtol=0.35)
+
+
+def test_a_chain_that_goes_over_to_the_other_side_has_a_curve_up_to_there() -> None:
+    """The crank pin of a real chain, but for a jump beyond 6 mm that stands for going over."""
+    chain = lumped_chain()
+    travel = np.linspace(0.0, 10.0, 11) * MM
+
+    def knee(path: Any, index: int) -> np.ndarray:
+        place = chain.knee(path, index)
+        return place if path.drive[index] < 6.5 * MM else place + np.array([0.0, -40.0 * MM])
+
+    found = replace(chain, knee=knee).press(travel)
+    assert found.ending is Ending.CROSSES
+    assert "between 6 and 7 mm" in found.message
+    np.testing.assert_allclose(found.travel, travel[:7])
+    np.testing.assert_allclose(found.force, chain.press(travel).force[:7])
 
 
 def test_pressing_beyond_all_reason_is_not_complete() -> None:

@@ -102,10 +102,14 @@ def chain_of_flexures(parts: Sequence[Flexure], made_of: Elasticity, linkage: Li
     pins = joints(linkage, unloaded)
     ends = flexure_ends(pins, [one.length for one in parts], [one.before for one in parts])
 
-    def rise(path: Path, index: int) -> float:
-        return _sideways(pins, path.motion("crank")[index, :2])
+    def knee(path: Path, index: int) -> FloatArray:
+        dx, dy, turn = path.motion("crank")[index]
+        x, y = pins[1] - ends[1]  # the crank is rigid and takes its pin along
+        cosine, sine = np.cos(turn), np.sin(turn)
+        place: FloatArray = ends[1] + np.array([dx + cosine * x - sine * y, dy + sine * x + cosine * y])
+        return place
 
-    return Chain(ends, pins, lambda points: lumped(points, parts, made_of), travel_direction(linkage), rise)
+    return Chain(ends, pins, lambda points: lumped(points, parts, made_of), travel_direction(linkage), knee)
 
 
 def pins_of(printed: Printed, linkage: Linkage, unloaded: float) -> FloatArray:
@@ -129,23 +133,18 @@ def strip_chain(strip: Strip, made_of: Elasticity, pins: FloatArray, direction: 
     def build(points: FloatArray) -> Network:
         return Strip(points, strip.width, strip.thickness, strip.places).network(made_of)
 
-    def rise(path: Path, index: int) -> float:
+    def knee(path: Path, index: int) -> FloatArray:
         before = _unloaded_samples(path)
         row = int(np.hypot(*(before - pins[1]).T).argmin())
-        return _sideways(pins, path.shape(STRIP, index)[row] - before[row])
+        place: FloatArray = pins[1] + path.shape(STRIP, index)[row] - before[row]
+        return place
 
-    return Chain(strip.corners, pins, build, direction, rise)
+    return Chain(strip.corners, pins, build, direction, knee)
 
 
 def travel_direction(linkage: Linkage) -> float:
     """Return the direction in which the slider moves towards the pivot [rad]."""
     return float(np.pi) if linkage.branch > 0 else 0.0
-
-
-def _sideways(pins: FloatArray, moved: FloatArray) -> float:
-    """Return the part of a motion to the left of the line from pivot to slider pin [m]."""
-    axis = (pins[2] - pins[0]) / np.hypot(*(pins[2] - pins[0]))
-    return float(axis[0] * moved[1] - axis[1] * moved[0])
 
 
 def _unloaded_samples(path: Path) -> FloatArray:

@@ -49,6 +49,7 @@ _NAMES = {
     Ending.UNSTABLE: "unstable",
     Ending.NOT_CONVERGED: "not_converged",
     Ending.WRONG_BRANCH: "wrong_branch",
+    Ending.CROSSES: "wrong_branch",
     Ending.STARTS_LATE: "branch_begins_late",
 }
 

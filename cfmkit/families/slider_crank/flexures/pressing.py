@@ -22,6 +22,8 @@ from cfmkit.families.slider_crank.flexures.chain import SLIDER, kink, mirrored
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from numpy.typing import NDArray
+
     from cfmkit.beams import Network
     from cfmkit.curves import FloatArray
 
@@ -33,6 +35,9 @@ STRAIGHT, CLEAR = 1e-9, 2e-4
 
 BOW = 2e-3
 """Offset that a chain is given to send it to one side, in lengths of the chain."""
+
+FEWEST = 2
+"""A curve has at least so many points."""
 
 BENT = 0.1
 """Offset beyond which it is a frame rather than a chain, and goes where its shape sends it."""
@@ -46,6 +51,7 @@ class Ending(Enum):
     UNSTABLE = "stability is lost: the chain would jump"
     NOT_CONVERGED = "no step converged, or the tolerance was not reached"
     WRONG_BRANCH = "the chain bends to the other side than asked for"
+    CROSSES = "the chain goes over to the other side than asked for"
     STARTS_LATE = "this branch exists only beyond some travel"
 
 
@@ -62,7 +68,7 @@ class Pressed:
     message : str
         One sentence with the place.
     side : int
-        1: the crank pin has moved to the left of the line from pivot to slider pin; -1: to its right.
+        1: the crank pin is to the left of the line from pivot to slider pin; -1: to its right.
     """
 
     path: Path
@@ -97,15 +103,15 @@ class Chain:
         From such points to the network.
     direction : float
         Of the travel [rad]: pi where the slider moves towards smaller x.
-    rise : callable
-        From a path and a point of it to how far the crank pin has moved to the left [m].
+    knee : callable
+        From a path and a point of it to where the crank pin is [m].
     """
 
     points: FloatArray
     pins: FloatArray
     build: Callable[[FloatArray], Network]
     direction: float
-    rise: Callable[[Path, int], float]
+    knee: Callable[[Path, int], FloatArray]
 
     @property
     def side(self) -> int:
@@ -188,16 +194,44 @@ class Chain:
         if helped or not len(path.at_asked):
             ending = Ending.NOT_CONVERGED if ending is Ending.COMPLETE else ending
             return Pressed(path, ending, message)
-        last = int(path.at_asked[-1])
-        side = int(np.sign(self.rise(path, last)))
+        sides = self._sides(path, wanted)
+        side = int(sides[-1])
         stable = path.stable[path.at_asked]
         if ending is Ending.COMPLETE and not stable.all():
             first = path.drive[path.at_asked][~stable][0]
             ending, message = Ending.UNSTABLE, f"unstable from {first * 1e3:.4g} mm on"
         chain_like = abs(kink(self.pins)) <= BENT * self.length
         if ending is Ending.COMPLETE and side != wanted and (chain_like or wanted != self.side):
-            ending, message = Ending.WRONG_BRANCH, Ending.WRONG_BRANCH.value
+            return self._crossed(path, sides, wanted)
         return Pressed(path, ending, message, side)
+
+    def _sides(self, path: Path, wanted: int) -> FloatArray:
+        """Return to which side the chain is bent at the points asked for: the side wanted, or the other one.
+
+        It is bent to the other side where the crank pin has moved there, and is beyond the line from pivot to slider
+        pin, too: far on its way a chain turns with that line, and the pin comes back past where the line had been.
+        """
+        way = np.array([np.cos(self.direction), np.sin(self.direction)])
+        last = path.at_asked.tolist()
+        pins = np.array([self.knee(path, at) for at in last])
+        moved = np.array([kink(np.array([self.pins[0], pin, self.pins[2]])) for pin in pins]) - kink(self.pins)
+        ends = self.pins[2] + np.outer(path.drive[path.at_asked], way)
+        off = np.array([kink(np.array([self.pins[0], *pose])) for pose in zip(pins, ends, strict=True)])
+        sides: FloatArray = np.where((np.sign(moved) == wanted) | (np.sign(off) == wanted), wanted, np.sign(moved))
+        begins = np.flatnonzero(path.drive[path.at_asked] > 0.0)
+        if len(begins) and sides[-1] != wanted and np.sign(moved[begins[0]]) != wanted:
+            sides[:] = -wanted  # it went there at once, whatever its kink says
+        return sides
+
+    def _crossed(self, path: Path, sides: FloatArray, wanted: int) -> Pressed:
+        """Return what there is before the chain bends to the other side: nothing where it does so at once."""
+        first = int(np.flatnonzero(sides == wanted)[-1]) + 1 if (sides == wanted).any() else 0
+        if first < FEWEST:
+            return Pressed(path, Ending.WRONG_BRANCH, Ending.WRONG_BRANCH.value, -wanted)
+        places = path.drive[path.at_asked][first - 1 : first + 1] * 1e3
+        text = f"between {places[0]:.4g} and {places[1]:.4g} mm the chain goes over to the other side than asked for"
+        kept = _part(path, np.isin(path.asked, path.asked[path.at_asked][:first]))
+        return Pressed(kept, Ending.CROSSES, text, wanted)
 
 
 _ENDINGS = {
@@ -217,7 +251,11 @@ def _beginning(path: Path, drive: Displacement) -> int:
 
 def _since(path: Path, first: int) -> Path:
     """Return a path from the point with a number on."""
-    keep = path.asked >= first
+    return _part(path, path.asked >= first)
+
+
+def _part(path: Path, keep: NDArray[np.bool_]) -> Path:
+    """Return some of the points of a path."""
     return replace(
         path,
         points=path.points.take(keep),
