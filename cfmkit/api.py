@@ -314,9 +314,7 @@ def drawing(spec: Spec) -> Drawing:
 
 
 def figures(result: Result) -> Mapping[str, Callable[[], Figure]]:
-    """Return what draws each of the family's pictures of a result, by name; nothing where it draws none."""
-    record = family(result.spec.family)
-    if record.draw is None or not result.curves:
-        return {}
-    drawn: Mapping[str, Callable[[], Figure]] = import_module(record.draw).figures(result)
-    return drawn
+    """Return what draws each picture of a result, by name; of a family that draws none, the curve alone."""
+    from cfmkit.plots import render
+
+    return render.figures(family(result.spec.family), result)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from importlib.resources import files
 
+from cfmkit.errors import UsageError
 from cfmkit.families import family
 
 
@@ -13,7 +14,9 @@ def template(name: str) -> str:
     Raises
     ------
     cfmkit.errors.UsageError
-        If there is no such family.
+        If there is no such family, or it comes without a template.
     """
     record = family(name)
+    if not record.template:
+        raise UsageError(f"the family {name!r} has no template; `cfmkit show {name}` lists its keys")
     return files("cfmkit").joinpath("templates", record.template).read_text(encoding="utf-8")

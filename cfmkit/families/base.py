@@ -168,6 +168,22 @@ class MeasuredLoop:
 
 
 @dataclass(frozen=True)
+class Search:
+    """What a family's design may say that no analysis of the specification it writes can: what only the search knows.
+
+    Attributes
+    ----------
+    findings : tuple of str
+        Names of findings about the search.
+    tables : tuple of str
+        Names of tables about it, as ``starts.csv``.
+    """
+
+    findings: tuple[str, ...] = ()
+    tables: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
 class Family:
     """One family of mechanisms, as the registry knows it.
 
@@ -181,6 +197,8 @@ class Family:
         ``analyze(spec, run) -> Result``.
     design : callable, optional
         ``design(spec, run) -> Design``; its spec is analysed like any other.
+    search : Search, optional
+        What a design says beside the analysis; None: nothing, it only computes.
     values : mapping
         The family's own scalar results beside the metrics of the contract:
         name -> (dimension, definition).
@@ -218,6 +236,7 @@ class Family:
     spec_type: type[Spec]
     analyze: Callable[[Any, Run], Result]
     design: Callable[[Any, Run], Design] | None = None
+    search: Search | None = None
     values: Mapping[str, tuple[str, str]] = field(default_factory=dict)
     words: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     resolve: Callable[[Any], Any] | None = None

@@ -3,37 +3,20 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 
 import cfmkit
 from cfmkit import families
+from cfmkit.families.base import Search
 
 CONFIGS = sorted((Path(__file__).parents[2] / "configs").glob("*.yaml"))
 LONG = ("beam_design_lan",)
 
 
-@dataclass(frozen=True)
-class Added:
-    """What the design of a family may say beside the analysis of the specification that it wrote."""
-
-    searched: bool = False
-    warnings: frozenset[str] = frozenset()
-    files: frozenset[str] = frozenset()
-
-
-ADDED = {
-    "beam": Added(
-        searched=True,
-        files=frozenset({"starts.csv", ".cfmkit-journal.jsonl"}),
-    ),
-    "cam": Added(),
-    "slider-crank": Added(warnings=frozenset({"near_optima", "spring_dropped", "window_not_proven"})),
-    "vcfm": Added(),
-}
-"""By family: a design that adds anything else fails."""
+JOURNAL = ".cfmkit-journal.jsonl"
+"""Where a search notes what it has finished."""
 
 EVERY_DESIGN = "design.yaml", "geometry/"
 """What every design writes, and no analysis: the specification, and what is to be cut."""
@@ -53,10 +36,10 @@ def contents(folder):
     return found, json.loads(found.pop("metrics.json"))
 
 
-def test_each_family_declares_what_its_designs_add():
-    assert set(ADDED) == set(families.names())
-    for name, added in ADDED.items():
-        assert added.warnings <= set(families.family(name).findings)
+@pytest.mark.parametrize("name", families.names())
+def test_what_a_family_says_of_its_search_are_findings_that_it_explains(name):
+    record = families.family(name)
+    assert set((record.search or Search()).findings) <= set(record.findings)
 
 
 @pytest.mark.parametrize("path", _cases(), ids=lambda path: path.stem)
@@ -67,23 +50,23 @@ def test_a_config_is_analysed_and_designed_with_exit_0(cli, path):
         return
     assert cli("design", str(path), "-o", "two", "-q", "--no-plots").code == 0
     assert cli("analyze", "two/design.yaml", "-o", "three", "-q", "--no-plots").code == 0
-    same_but_for(ADDED[spec.family], cli.folder / "two", cli.folder / "three")
+    same_but_for(families.family(spec.family).search, cli.folder / "two", cli.folder / "three")
 
 
-def same_but_for(added, design, analysis):
+def same_but_for(search, design, analysis):
     """Check that a design's folder holds all of the analysis's, to the letter, and nothing more than is declared."""
     (files, told), (same_files, same) = contents(design), contents(analysis)
     more = {name for name in set(files) - set(same_files) if not name.startswith(EVERY_DESIGN)}
     assert {name: files.get(name) for name in same_files} == same_files
-    assert more <= added.files
+    assert more <= ({*search.tables, JOURNAL} if search else set())
 
     assert {name: told["metrics"].get(name) for name in same["metrics"]} == same["metrics"]
     assert set(told["metrics"]) == set(same["metrics"])
-    search = told.pop("search", {})
-    assert added.searched or not search
-    assert not set(search) & set(told["metrics"]), "what only the search knows is in the words of a metric"
-    assert all(one["model"] for one in search.values())
+    known = told.pop("search", {})
+    assert search or not known
+    assert not set(known) & set(told["metrics"]), "what only the search knows is in the words of a metric"
+    assert all(one["model"] for one in known.values())
     beside = [item for item in told["warnings"] if item not in same["warnings"]]
     assert [item for item in told["warnings"] if item not in beside] == same["warnings"]
-    assert {item["name"] for item in beside} <= added.warnings
+    assert {item["name"] for item in beside} <= set(search.findings if search else ())
     assert {**told, "metrics": 0, "warnings": 0} == {**same, "metrics": 0, "warnings": 0}

@@ -9,9 +9,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import spare_family
 
 import cfmkit
 from cfmkit import api, families, report
+from cfmkit.cli.main import main
 from cfmkit.geometry import Drawing
 from cfmkit.keys import keys
 from cfmkit.results import Status
@@ -202,3 +204,35 @@ def test_the_files_of_a_run_are_the_same_every_time(path):
     one, other = (dict(report.files(found, plots=False)) for _ in range(2))
     assert {"metrics.json", "resolved.yaml", "curve.csv"} <= set(one)
     assert one == other
+
+
+@pytest.fixture
+def spare(monkeypatch, tmp_path):
+    """A fifth family in the registry, which draws and designs nothing; its spec in the current folder."""
+    monkeypatch.setitem(families.FAMILIES, "spare", "spare_family")
+    monkeypatch.chdir(tmp_path)
+    Path("spare.yaml").write_text(spare_family.TEXT)
+    return "spare.yaml"
+
+
+def test_a_family_without_drawings_gets_the_picture_of_its_curve(spare):
+    assert set(api.figures(cfmkit.analyze(cfmkit.load(spare)))) == {"curve"}
+    assert main(["analyze", spare, "-o", "out", "-q"]) == 0
+    assert Path("out/figures/curve.png").read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize(
+    "command", [("check",), ("design",), ("export",), ("sweep", "--vary", "analysis.points=[5,6]")]
+)
+def test_a_family_with_as_little_as_there_can_be_breaks_no_command(spare, command, capsys):
+    verb, *options = command
+    assert main([verb, spare, *options, *(["-o", "out"] if verb != "check" else [])]) in (0, 2, 3)
+    assert "bug" not in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "arguments", [("show", "spare"), ("show",), ("schema", "spare"), ("schema",), ("new", "spare")]
+)
+def test_a_family_without_a_template_or_references_is_explained_like_the_others(spare, arguments, capsys):
+    assert main(list(arguments)) in (0, 2)
+    assert "bug" not in capsys.readouterr().err

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from cfmkit.families.base import Family
+from cfmkit.families.base import Family, Search
 from cfmkit.families.beam.build import resolve
 from cfmkit.families.beam.design import design
 from cfmkit.families.beam.findings import FINDINGS
@@ -17,6 +17,7 @@ FAMILY = Family(
     spec_type=BeamSpec,
     analyze=analyze,
     design=design,
+    search=Search(tables=("starts.csv",)),
     values=DEFINITIONS | SURFACE,
     resolve=resolve,
     draw="cfmkit.families.beam.draw",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from cfmkit.families.base import Family
+from cfmkit.families.base import Family, Search
 from cfmkit.families.slider_crank.block import analyze_block
 from cfmkit.families.slider_crank.build import resolve
 from cfmkit.families.slider_crank.classes import CLASSES
@@ -20,6 +20,7 @@ FAMILY = Family(
     analyze=analyze,
     analyze_block=analyze_block,
     design=design,
+    search=Search(findings=("near_optima", "spring_dropped", "window_not_proven")),
     values=DEFINITIONS,
     words={"stiffness_class": CLASSES},
     resolve=resolve,

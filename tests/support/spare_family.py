@@ -1,0 +1,39 @@
+"""A fifth family as somebody else would write it, with as little as there can be: a spring, and nothing that draws."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+
+from cfmkit.curves import Curve
+from cfmkit.families.base import Family, Run
+from cfmkit.results import Result, Status
+from cfmkit.spec import Analysis, Model, Spec
+from cfmkit.units import Stiffness  # noqa: TC001  pydantic reads the annotation
+
+TEXT = """
+cfmkit: 1
+family: spare
+mechanism: {stiffness: 2 N/mm}
+"""
+
+
+class Mechanism(Model):
+    stiffness: Stiffness
+
+
+class SpareSpec(Spec):
+    family: Literal["spare"]
+    mechanism: Mechanism
+    analysis: Analysis = Analysis(points=5)
+
+
+def analyze(spec: SpareSpec, run: Run) -> Result:
+    travel = np.linspace(0.0, 0.01, spec.analysis.points)
+    load = np.repeat("load", len(travel))
+    curve = Curve(travel, spec.mechanism.stiffness * travel, load, np.ones(len(travel), dtype=bool))
+    return Result(spec, Status.COMPLETE, "", curves=(curve,))
+
+
+FAMILY = Family("spare", "a spring", SpareSpec, analyze)
