@@ -68,7 +68,7 @@ def searched(found: Mapping[str, Searched]) -> list[str]:
     for name, one in found.items():
         if one.quantity.value is not None:
             over = "" if one.window is None else f", {span(*one.window, one.motion)}"
-            groups.setdefault(one.model + over, []).append(f"{words(name)} {_short(one.quantity, 3)}")
+            groups.setdefault(one.model + over, []).append(f"{words(name)} {_short(one.quantity)}")
     return [f"{about}: {', '.join(told)}" for about, told in groups.items()]
 
 

@@ -1,18 +1,18 @@
 """The judgement of a shape on terms that the search does not use.
 
-More poses, the stable branch, true gaps and crossings, the theory with stretching and shear, and what is left of the
-constant force when nodes and coefficients are off by their tolerances.
+The stable branch, true gaps and crossings, and what is left of the constant force when nodes and coefficients are off
+by their tolerances. Force and stress are judged by the analysis of the specification that is written.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.beams import Control, Displacement, Network, PathStatus, trace
+from cfmkit.beams import Control, Displacement, PathStatus, trace
 from cfmkit.beams.batch import trace_many
 from cfmkit.families.beam.build import thickest_of
 from cfmkit.families.beam.shaping.separation import pairs
@@ -42,7 +42,7 @@ class Spread:
 
 @dataclass(frozen=True)
 class Audit:
-    """What was found; None where the path does not reach the end of the window.
+    """Whether a mechanism exists as drawn.
 
     Attributes
     ----------
@@ -52,30 +52,12 @@ class Audit:
         Poses, of 61 from rest to the end, at which beams cross.
     gap : float or None
         Least distance of surfaces away from joints at any pose [m].
-    half_band, stiff : float or None
-        Half band over the window, and the same with stretching and shear [1].
-    strict, strict_stiff : float or None
-        Share of the travel over which the force keeps within 5 % of its maximum, up to the end.
-    stress : float or None
-        Largest bending stress from rest to the end [Pa].
-    bands, ranges : (n,) array
-        Half bands and strict shares of networks within the tolerances that could be followed.
-    lost : int
-        Networks within the tolerances that could not.
     """
 
     complete: bool
     stable: bool
     crossings: int
     gap: float | None
-    half_band: float | None
-    stiff: float | None
-    strict: float | None
-    strict_stiff: float | None
-    stress: float | None
-    bands: FloatArray
-    ranges: FloatArray
-    lost: int
 
     @property
     def sound(self) -> bool:
@@ -83,28 +65,33 @@ class Audit:
         return self.complete and self.stable and self.crossings == 0
 
 
-def audited(variables: Variables, found: Found, spread: Spread) -> Audit:
+@dataclass(frozen=True)
+class Drawn:
+    """Networks drawn within the tolerances.
+
+    Attributes
+    ----------
+    bands, ranges : (n,) array
+        Half bands and strict shares of those that could be followed.
+    lost : int
+        Those that could not.
+    """
+
+    bands: FloatArray
+    ranges: FloatArray
+    lost: int
+
+
+def audited(variables: Variables, found: Found) -> Audit:
     """Return the judgement of a design."""
     task, network = variables.task, variables.build(found.x)
     at = np.linspace(0.0, task.window[1], POSES)
     path = trace(network, Displacement(task.driven, task.direction, at), Control(tolerance=1e-7))
-    stiff = _curve(task, _reissner(network), at)
-    complete = path.status is PathStatus.COMPLETE
-    force = path.effort[path.at_asked] * task.copies
-    bands, ranges, lost = tolerated(variables, found, spread)
     return Audit(
-        complete,
+        path.status is PathStatus.COMPLETE,
         bool(path.stable.all()),
         sum(crossing(task, path, int(k)) for k in path.at_asked),
         _least_gap(task, path),
-        half_band(at, force, found.start) if complete else None,
-        None if stiff is None else half_band(at, stiff, found.start),
-        strict_share(at, force) if complete else None,
-        None if stiff is None else strict_share(at, stiff),
-        float(path.peak_stress(axial=False).value.max()) if complete else None,
-        bands,
-        ranges,
-        lost,
     )
 
 
@@ -128,8 +115,8 @@ def strict_share(at: FloatArray, force: FloatArray) -> float:
     return (count - 1) / (len(fine) - 1)
 
 
-def tolerated(variables: Variables, found: Found, spread: Spread) -> tuple[FloatArray, FloatArray, int]:
-    """Return half bands and strict shares of networks within the tolerances, and how many could not be followed."""
+def tolerated(variables: Variables, found: Found, spread: Spread) -> Drawn:
+    """Return what is left of the constant force in networks within the tolerances."""
     task, rng = variables.task, np.random.default_rng([spread.seed, 1])
     places = len(task.coordinates)
     sizes = np.full(variables.count, spread.coefficients)
@@ -141,21 +128,7 @@ def tolerated(variables: Variables, found: Found, spread: Spread) -> tuple[Float
     outcomes = [one.value for one in trace_many(networks, drive, Control(tolerance=1e-5)) if one.status == "COMPLETE"]
     bands = np.array([half_band(at, one.effort, found.start) for one in outcomes])
     ranges = np.array([strict_share(at, one.effort) for one in outcomes])
-    return bands, ranges, spread.samples - len(outcomes)
-
-
-def _curve(task: Task, network: Network, at: FloatArray) -> FloatArray | None:
-    path = trace(network, Displacement(task.driven, task.direction, at), Control(tolerance=1e-6))
-    return path.effort[path.at_asked] * task.copies if path.status is PathStatus.COMPLETE else None
-
-
-def _reissner(network: Network) -> Network:
-    """Return the network with beams that stretch and shear."""
-    beams = {
-        name: replace(beam, section=replace(beam.section, axial=True, shear=True))
-        for name, beam in network.beams.items()
-    }
-    return Network(network.nodes, beams, network.links, network.springs, network.loads)
+    return Drawn(bands, ranges, spread.samples - len(outcomes))
 
 
 def crossing(task: Task, path: Path, pose: int) -> bool:

@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-import numpy as np
-
-from cfmkit.beams.beam import fit
 from cfmkit.families.beam.build import assemble
 from cfmkit.families.beam.findings import finding
-from cfmkit.families.beam.shaping.audit import Audit, Spread, audited
+from cfmkit.families.beam.shaping.audit import Spread, tolerated
 from cfmkit.families.beam.shaping.infeasible import blocked, held_by
+from cfmkit.families.beam.shaping.judging import Judged, judged
 from cfmkit.families.beam.shaping.multistart import Explored, deadline_of, explored, ranked
 from cfmkit.families.beam.shaping.report import notes_of, search_of, starts_table
-from cfmkit.families.beam.shaping.search import Found, Plan, improved, widened
-from cfmkit.families.beam.shaping.task import Coordinate, Limits, Task
+from cfmkit.families.beam.shaping.search import Plan, finished, widened
+from cfmkit.families.beam.shaping.task import MARGIN, Coordinate, Limits, Task
 from cfmkit.families.beam.shaping.variables import Variables
 from cfmkit.families.beam.words import percent
 from cfmkit.results import Design, Finding, Status
@@ -26,14 +24,7 @@ if TYPE_CHECKING:
     from cfmkit.families.beam.shaping.spec import Optimise
     from cfmkit.families.beam.spec import BeamSpec
 
-AUDITED = 5
-"""Designs that are audited, the best first, until one is sound."""
-
-MARGIN = 2e-3
-"""The search asks for so much less stress and slimmer beams: the stress peaks between its poses and places, too."""
-
 _NOT_DECIDING = {"name", "description", "requirements", "sweep", "sensitivity"}
-_PLACES, _TURNS = 7, 6  # decimals of designed coordinates [m] and coefficients [rad]
 
 
 def shaped(spec: BeamSpec, wanted: Optimise, run: Run) -> Design:
@@ -55,21 +46,22 @@ def shaped(spec: BeamSpec, wanted: Optimise, run: Run) -> Design:
     plan = Plan(drawn=wanted.drawn, deadline=deadline_of(wanted.time_budget, run.time_budget))
     identity = stable_hash([spec.model_dump(mode="json", exclude=_NOT_DECIDING), run.seed, origin()])
     result = explored(task, plan, (wanted.starts, wanted.widened), identity, run)
-    spread = Spread(wanted.tolerances.nodes, wanted.tolerances.coefficients, wanted.tolerances.samples, run.seed)
-    best = _best(task, result, spread, plan)
+    tables = {"starts": lambda: starts_table(task, result)}
+    best = _best(spec, task, result, plan)
     if isinstance(best, Design):
-        return replace(best, tables={"starts": lambda: starts_table(task, result)})
-    found, audit = best
-    held = held_by(task, found)
+        return replace(best, tables=tables)
+    spread = Spread(wanted.tolerances.nodes, wanted.tolerances.coefficients, wanted.tolerances.samples, run.seed)
+    drawn = tolerated(Variables(task, best.found.order), best.found, spread)
+    held = held_by(task, best.found)
     return Design(
-        written(spec, task, found),
+        best.spec,
         Status.COMPLETE,
-        _told(task, found, result),
+        _told(task, best, result),
         active_bounds=held,
-        warnings=_warnings(task, found, audit, result),
-        search=search_of(task, found, audit, result),
-        notes=notes_of(audit, spread, held),
-        tables={"starts": lambda: starts_table(task, result)},
+        warnings=_warnings(task, best, result),
+        search=search_of(task, best, drawn, result),
+        notes=notes_of(best.audit, spread, held),
+        tables=tables,
     )
 
 
@@ -96,6 +88,7 @@ def task_of(spec: BeamSpec, wanted: Optimise) -> Task:
         half_band=wanted.half_band,
         compared=None if wanted.compare is None else (wanted.compare[0] / layers, wanted.compare[1] / layers),
         fidelity=spec.fidelity,
+        total_stress=spec.stress == "total",
         layers=layers,
     )
 
@@ -130,9 +123,9 @@ def _limits(wanted: Optimise, allowable_stress: float | None) -> Limits:
     )
 
 
-def _best(task: Task, result: Explored, spread: Spread, plan: Plan) -> tuple[Found, Audit] | Design:
-    """Return the best design whose audit is sound, or why there is none."""
-    candidates = list(ranked(task, result.found))
+def _best(spec: BeamSpec, task: Task, result: Explored, plan: Plan) -> Judged | Design:
+    """Return the best design that analysis and audit confirm, or why there is none."""
+    candidates = [one for _, one in ranked(task, result.found)]
     if not candidates:
         some = [one for one in result.found.values() if one is not None]
         if not some:
@@ -140,16 +133,16 @@ def _best(task: Task, result: Explored, spread: Spread, plan: Plan) -> tuple[Fou
         if plan.late():
             said = f"none of {len(some)} starts met all limits in the time allowed: give it more, or run again to go on"
             return Design(None, Status.INFEASIBLE, said)
-        why = blocked(task, some, replace(plan, deadline=None))
-        if why.freed is None:
+        free = replace(plan, deadline=None)
+        why = blocked(task, some, free)
+        met = None if why.freed is None else widened(task, finished(task, why.freed, free), free)
+        if met is None or not met.feasible:
             missed = "; ".join(f"{name} ({about})" for name, about in why.missed.items())
             said = f"no shape of {len(some)} starts meets all limits; the best misses {missed}"
             return Design(None, Status.INFEASIBLE, said, nearest_feasible=why.nearest)
-        free = replace(plan, deadline=None)
-        candidates = [(-1, widened(task, improved(task, why.freed, free), free))]
-    first = candidates[0][1]
-    if task.objective == "range" and first.objective > task.half_band:
-        flattest = min((one for _, one in candidates), key=lambda one: one.objective)
+        candidates = [met]
+    if task.objective == "range" and candidates[0].objective > task.half_band:
+        flattest = min(candidates, key=lambda one: one.objective)
         said = (
             f"no shape of {len(result.found)} starts keeps the force within ± {percent(task.half_band)} over the "
             f"window asked for; the flattest keeps it within ± {percent(flattest.objective)}"
@@ -157,12 +150,11 @@ def _best(task: Task, result: Explored, spread: Spread, plan: Plan) -> tuple[Fou
         nearest = {"design.optimise.half_band": f"at least {percent(1.02 * flattest.objective)}"}
         return Design(None, Status.INFEASIBLE, said, nearest_feasible=nearest)
     fallback = None
-    for _, one in candidates[:AUDITED]:
-        rounded = _rounded(task, one)
-        audit = audited(Variables(task, one.order), rounded, spread)
-        if audit.sound:
-            return rounded, audit
-        fallback = fallback or (rounded, audit)
+    for one in candidates:
+        design = judged(spec, task, one)
+        if not design.faults:
+            return design
+        fallback = fallback or design
     assert fallback is not None
     return fallback
 
@@ -179,54 +171,18 @@ def _nothing(result: Explored, plan: Plan) -> Design:
     return Design(None, Status.INFEASIBLE, said)
 
 
-def _rounded(task: Task, found: Found) -> Found:
-    """Return a design with coordinates and coefficients that print short."""
-    places, x = len(task.coordinates), found.x.copy()
-    x[:places] = np.round(x[:places] * task.size, _PLACES) / task.size
-    x[places:] = np.round(x[places:], _TURNS)
-    return replace(found, x=np.clip(x, *Variables(task, found.order).bounds.T))
-
-
-def written(spec: BeamSpec, task: Task, found: Found) -> BeamSpec:
-    """Return the specification with nodes and shapes written out, and the window of the design as its window."""
-    variables = Variables(task, found.order)
-    network = variables.build(found.x)
-    moved = dict.fromkeys(one.node for one in task.coordinates)
-    nodes = {name: (_place(network.nodes[name].x), _place(network.nodes[name].y)) for name in moved}
-    changes: dict[str, Any] = {f"mechanism.nodes.{name}.at": at for name, at in nodes.items()}
-    for name in task.shaped:
-        beam = network.beams[name]
-        start, end = network.nodes[beam.start], network.nodes[beam.end]
-        reach = (
-            end.x - start.x + beam.end_offset[0] - beam.start_offset[0],
-            end.y - start.y + beam.end_offset[1] - beam.start_offset[1],
-        )
-        fitted = fit(beam, reach)
-        shape = {
-            "kind": "polynomial",
-            "coefficients": (float(np.real(fitted.rotation)), *(float(c) for c in beam.shape.coefficients[1:])),  # type: ignore[union-attr]
-            "length": float(np.real(fitted.length)),
-        }
-        changes[f"mechanism.beams.{name}.shape"] = shape
-    layers = spec.mechanism.copies.layers if spec.mechanism.copies else 1
-    begins = round(float(np.ceil(found.start * layers * 1e6)) / 1e6, 6)
-    changes["analysis.window"] = (begins, float(task.window[1] * layers))
-    return spec.replace(changes)
-
-
-def _place(value: float) -> float:
-    return round(float(value), _PLACES)
-
-
-def _told(task: Task, found: Found, result: Explored) -> str:
-    """Return what the search did, in one sentence."""
+def _told(task: Task, design: Judged, result: Explored) -> str:
+    """Return what the search did, in one sentence; force and window in it are those of the analysis."""
+    found, window = design.found, design.window
     some = [one for one in result.found.values() if one is not None]
     feasible = [one for one in some if one.feasible]
     total = sum(one.evaluations for one in some)
     reused = f", {result.reused} from the journal" if result.reused else ""
     left = f", {result.missing} not done in the time" if result.missing else ""
-    share = 1 - found.start / task.window[1]
-    reached = f"force within ± {percent(found.objective)} over {percent(share)} of the travel"
+    reached = "the analysis has no force at the end of the window"
+    if design.half_band is not None:
+        share = 1 - window[0] / window[1]
+        reached = f"force within ± {percent(design.half_band)} over {percent(share)} of the travel"
     if task.objective == "paper":
         reached = f"F(a)/F(b) - 1 = {found.objective:.3f}"
     return (
@@ -235,23 +191,18 @@ def _told(task: Task, found: Found, result: Explored) -> str:
     )
 
 
-def _warnings(task: Task, found: Found, audit: Audit, result: Explored) -> tuple[Finding, ...]:
-    """Return what the audit holds against the design."""
+def _warnings(task: Task, design: Judged, result: Explored) -> tuple[Finding, ...]:
+    """Return what analysis and audit hold against the design."""
     out = []
-    if not audit.sound:
-        faults = [
-            "the path ends early" if not audit.complete else "",
-            "it is not stable all the way" if not audit.stable else "",
-            f"beams cross at {audit.crossings} of the poses" if audit.crossings else "",
-        ]
-        out.append(finding("design_unsound", "the design fails its audit: " + ", ".join(filter(None, faults))))
+    if design.faults:
+        out.append(finding("design_unsound", "the design fails its audit: " + ", ".join(design.faults)))
     if task.objective == "paper":
         out.append(
             finding(
                 "objective_ill_posed",
-                f"F(a)/F(b) - 1 = {found.objective:.3f} is bounded by nothing but the limits: a force that falls from "
-                f"b to a is rewarded; over the window the half band is "
-                + (percent(audit.half_band) if audit.half_band is not None else "not known"),
+                f"F(a)/F(b) - 1 = {design.found.objective:.3f} is bounded by nothing but the limits: a force that "
+                "falls from b to a is rewarded; over the window the half band is "
+                + (percent(design.half_band) if design.half_band is not None else "not known"),
                 "design.optimise.objective=ripple",
             )
         )

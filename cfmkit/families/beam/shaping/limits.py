@@ -20,7 +20,13 @@ if TYPE_CHECKING:
     from cfmkit.families.beam.shaping.poses import Poses
     from cfmkit.families.beam.shaping.response import Response
 
-SIDES = {"stress": ("left side", "right side"), "x": ("right", "left"), "y": ("top", "bottom")}
+SIDES = {
+    "stress": ("left side", "right side"),
+    "left": ("left side, tension", "left side, compression"),
+    "right": ("right side, tension", "right side, compression"),
+    "x": ("right", "left"),
+    "y": ("top", "bottom"),
+}
 
 
 @dataclass(frozen=True)
@@ -56,9 +62,13 @@ class View:
 
 
 def stress(view: View) -> list[Rows]:
-    """Signed extremes of the bending stress of each beam at every pose but rest, against the allowable stress."""
-    allowed = view.response.variables.task.limits.stress
-    return [] if allowed is None else [_extremes(view, "stress", slice(1, None), (allowed, allowed), allowed)]
+    """Signed extremes of the stress of each beam at every pose but rest, against the allowable stress."""
+    task = view.response.variables.task
+    allowed = task.limits.stress
+    if allowed is None:
+        return []
+    parts = ("left", "right") if task.total_stress else ("stress",)
+    return [_extremes(view, part, slice(1, None), (allowed, allowed), allowed) for part in parts]
 
 
 def envelope(view: View) -> list[Rows]:

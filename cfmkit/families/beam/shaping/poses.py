@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from cfmkit.curves import FloatArray
     from cfmkit.families.beam.shaping.task import Task
 
-_BEFORE = 2
+_EACH = 8  # poses of the window for one before it
 _MIDDLE = 0.7  # of the end: a pose under load that stays where it is while the window grows
 
 
@@ -48,7 +48,7 @@ def poses_of(task: Task, start: float) -> Poses:
     end = task.window[1]
     inside = start + 0.5 * (end - start) * (1 - np.cos(np.linspace(0, np.pi, task.points)))
     inside[-1] = end
-    before = np.linspace(0.0, start, _BEFORE + 2)[1:-1] if start > 0 else np.zeros(0)
+    before = np.linspace(0.0, start, task.points // _EACH + 2)[1:-1] if start > 0 else np.zeros(0)
     also = np.array(task.compared or (end, end))
     middle = _MIDDLE * end
     at = np.unique(np.concatenate([[0.0], before, inside, also, [middle]]))

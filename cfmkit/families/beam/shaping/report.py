@@ -6,15 +6,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.families.base import Run
+from cfmkit.families.beam.model import analyze
+from cfmkit.metrics import Window, evaluate
 from cfmkit.results import Quantity, Searched
 from cfmkit.units import format_short
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from cfmkit.families.beam.shaping.audit import Audit, Spread
+    from cfmkit.families.beam.shaping.audit import Audit, Drawn, Spread
+    from cfmkit.families.beam.shaping.judging import Judged
     from cfmkit.families.beam.shaping.multistart import Explored
-    from cfmkit.families.beam.shaping.search import Found
     from cfmkit.families.beam.shaping.task import Task
     from cfmkit.tables import Table
 
@@ -57,17 +60,28 @@ DEFINITIONS = {
 """What only the search knows. What the analysis of the design knows, too, is not said a second time."""
 
 
-def search_of(task: Task, found: Found, audit: Audit, result: Explored) -> Mapping[str, Searched]:
+def search_of(task: Task, design: Judged, drawn: Drawn, result: Explored) -> Mapping[str, Searched]:
     """Return what only the search knows, each number with the model and the window that it is of."""
-    asked, own, whole = (
-        (task.layers * first, task.layers * task.window[1]) for first in (task.window[0], found.start, 0.0)
-    )
+    own = design.window
+    asked, whole = (task.layers * task.window[0], own[1]), (0.0, own[1])
     told = dict.fromkeys(DEFINITIONS, (task.fidelity, whole))
     told |= dict.fromkeys(("starts", "starts_within_limits", "traces"), (task.fidelity, asked))
     told |= dict.fromkeys(("tolerance_half_band_median", "tolerance_half_band_p90"), (task.fidelity, own))
     told |= {"audit_half_band_reissner": (REISSNER, own), "audit_strict_range_reissner": (REISSNER, whole)}
-    numbers = _counts(result) | _audited(audit)
-    return {name: Searched(Quantity(numbers[name], *DEFINITIONS[name]), *of) for name, of in told.items()}
+    numbers = _counts(result) | _audited(design.audit) | _drawn(drawn)
+    if task.fidelity != REISSNER:  # else the metrics say it
+        numbers |= _reissner(design)
+    return {name: Searched(Quantity(numbers[name], *DEFINITIONS[name]), *told[name]) for name in numbers}
+
+
+def _reissner(design: Judged) -> dict[str, float | None]:
+    """Return what the analysis says of the design with beams that stretch and shear."""
+    result = analyze(design.spec.replace({"analysis.fidelity": REISSNER}), Run())
+    found = evaluate(result, ["half_band", "strict_range_fraction"], Window(*design.window))
+    return {
+        "audit_half_band_reissner": found["half_band"].value,
+        "audit_strict_range_reissner": found["strict_range_fraction"].value,
+    }
 
 
 def _counts(result: Explored) -> dict[str, float | None]:
@@ -78,17 +92,17 @@ def _counts(result: Explored) -> dict[str, float | None]:
 
 
 def _audited(audit: Audit) -> dict[str, float | None]:
-    bands, ranges = audit.bands, audit.ranges
+    return {"audit_gap": audit.gap, "audit_crossings": float(audit.crossings)}
+
+
+def _drawn(drawn: Drawn) -> dict[str, float | None]:
+    bands, ranges = drawn.bands, drawn.ranges
     return {
-        "audit_gap": audit.gap,
-        "audit_crossings": float(audit.crossings),
-        "audit_half_band_reissner": audit.stiff,
-        "audit_strict_range_reissner": audit.strict_stiff,
         "tolerance_half_band_median": float(np.median(bands)) if len(bands) else None,
         "tolerance_half_band_p90": float(np.quantile(bands, 0.9)) if len(bands) else None,
         "tolerance_strict_range_median": float(np.median(ranges)) if len(ranges) else None,
         "tolerance_strict_range_p10": float(np.quantile(ranges, 0.1)) if len(ranges) else None,
-        "tolerance_lost": float(audit.lost),
+        "tolerance_lost": float(drawn.lost),
     }
 
 

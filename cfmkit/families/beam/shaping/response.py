@@ -37,12 +37,27 @@ class Line:
         Centre line [m].
     stress : (p, r) array
         Bending stress on the left side [Pa]: signed.
+    axial : (p, r) array or None
+        Axial stress, where it counts [Pa].
     """
 
     place: FloatArray
     x: FloatArray
     y: FloatArray
     stress: FloatArray
+    axial: FloatArray | None = None
+
+    @property
+    def left(self) -> FloatArray:
+        """Stress on the left side with the axial part [Pa], tension positive."""
+        assert self.axial is not None
+        return self.axial + self.stress
+
+    @property
+    def right(self) -> FloatArray:
+        """Stress on the right side with the axial part [Pa], tension positive."""
+        assert self.axial is not None
+        return self.axial - self.stress
 
 
 @dataclass(frozen=True)
@@ -75,7 +90,14 @@ class Response:
     def state(self) -> State:
         """Force and beams."""
         states = np.moveaxis(self.path.sampler.states[self.keep], 2, 0)
-        return State(self.path.effort[self.keep] * self.variables.task.copies, self._lines(states))
+        axial = {name: self.path.sections(name).axial_stress[self.keep] for name in self._pulled}
+        return State(self.path.effort[self.keep] * self.variables.task.copies, self._lines(states, axial))
+
+    @property
+    def _pulled(self) -> tuple[str, ...]:
+        """The beams whose axial stress counts."""
+        task = self.variables.task
+        return tuple(task.network.beams) if task.total_stress else ()
 
     @cached_property
     def slopes(self) -> State:
@@ -89,12 +111,13 @@ class Response:
         try:
             found = gradient(self.path, self.variables.build, self.x)
             rows, effort = found.rows, found.effort  # in this order: with the rows the efforts are known
+            axial = {name: found.sections(name).axial_stress for name in self._pulled}
         except (CfmError, np.linalg.LinAlgError):
             raise NoAnswer from None
-        return State(effort * self.variables.task.copies, self._lines(np.moveaxis(rows, 2, 0)))
+        return State(effort * self.variables.task.copies, self._lines(np.moveaxis(rows, 2, 0), axial))
 
-    def _lines(self, states: FloatArray) -> dict[str, Line]:
-        """Return the beams from dimensionless states (7, p, rows, ...)."""
+    def _lines(self, states: FloatArray, axial: dict[str, FloatArray]) -> dict[str, Line]:
+        """Return the beams from dimensionless states (7, p, rows, ...) and axial stresses (p, rows, ...)."""
         from cfmkit.beams.recover import MOMENT, X, Y
 
         sampler, scales = self.path.sampler, self.path.layout.scales
@@ -107,7 +130,8 @@ class Response:
             stress = _stress_of_moment(self.variables.task.network.beams[name].section, place[once]) * scales.moment
             stress = stress.reshape(-1, *[1] * (states.ndim - 3))
             x, y, moment = (states[which][:, at] for which in (X, Y, MOMENT))
-            lines[name] = Line(place[once], x * scales.length, y * scales.length, moment * stress)
+            pull = axial[name][:, once] if name in axial else None
+            lines[name] = Line(place[once], x * scales.length, y * scales.length, moment * stress, pull)
         return lines
 
 

@@ -3,6 +3,9 @@
 A flat force and low stress seldom come together in a random network. One that is flat is easy to draw, and the stress
 can be brought down while it stays flat: so the limits are met first, with the half band capped, by letting all of them
 give way by one amount that is minimised. The other way round ends in stiff springs that meet every limit.
+
+What comes out is judged at many more poses than were searched with. Where force or stress between the poses are not
+what the poses say, the search goes on with more of them; what a design is ranked by is what was seen at many poses.
 """
 
 from __future__ import annotations
@@ -13,6 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.families.beam.shaping.closer import CloseView, looked_at
 from cfmkit.families.beam.shaping.goals import Compared, Flattest, Widest, window_force
 from cfmkit.families.beam.shaping.limits import LIMITS
 from cfmkit.families.beam.shaping.program import Shaping
@@ -21,11 +25,16 @@ from cfmkit.families.beam.shaping.variables import Variables
 from cfmkit.numerics.sqp import Effort, Optimum, minimize
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from cfmkit.curves import FloatArray
     from cfmkit.families.beam.shaping.task import Task
 
 VIOLATION = 1e-4
 """A limit missed by less than this share holds."""
+
+PLACES, TURNS = 7, 6
+"""Decimals of designed coordinates [m] and coefficients [rad]."""
 
 _WIDENINGS = 3  # minimisations, each from the last
 _CLOSE = 2e-3  # of the end of the window: a gain that is not worth another one
@@ -35,6 +44,9 @@ _TOLERANCE = 1e-5  # of the objective
 _FLAT = 0.05  # a random network with this half band is flat enough to begin with
 _ROUNDS = 6  # towards the limits
 _STIFF = 0.2  # one with this is a spring, and not looked at further
+_FINER = (33, 65)  # poses in the window where the first 17 do not show what the force does
+_SAME = 1.01  # a half band at many poses that is within this and the next of that at few
+_NEAR = 1e-4
 _STEEP = 20.0  # what a half band beyond that counts against the violation of the limits
 
 
@@ -86,6 +98,8 @@ class Found:
         Why the last minimisation ended.
     evaluations : int
         Traces of the network so far.
+    points : int
+        Poses in the window that it was searched with last.
     """
 
     x: FloatArray
@@ -95,6 +109,7 @@ class Found:
     violation: float
     ending: str
     evaluations: int
+    points: int = 17
 
     @property
     def feasible(self) -> bool:
@@ -126,7 +141,16 @@ def searched(task: Task, seed: int, index: int, plan: Plan) -> Found | None:
     if best is None:
         return None
     best = replace(best, evaluations=evaluations)
-    return improved(task, best if best.feasible else met(task, best, task.orders[-1], plan), plan)
+    return finished(task, best if best.feasible else met(task, best, task.orders[-1], plan), plan)
+
+
+def finished(task: Task, found: Found, plan: Plan) -> Found:
+    """Return a design flattened in every order from its own on, as it is at many poses."""
+
+    def again(finer: Task, design: Found) -> Found:
+        return _flattened(finer, design, design.order, plan, plan.flattening)
+
+    return confirmed(task, improved(task, found, plan), plan, again)
 
 
 def improved(task: Task, found: Found, plan: Plan) -> Found:
@@ -135,6 +159,72 @@ def improved(task: Task, found: Found, plan: Plan) -> Found:
         if order >= found.order and not plan.late():
             found = _flattened(task, found, order, plan, plan.flattening)
     return found
+
+
+def confirmed(task: Task, found: Found, plan: Plan, again: Callable[[Task, Found], Found]) -> Found:
+    """Return a design with objective, window and limits as they are at many poses.
+
+    Parameters
+    ----------
+    task, found, plan : Task, Found, Plan
+        What was searched for, and what came out; where that misses a limit it is returned as it is.
+    again : callable
+        What searches on, from a task with more poses and a design.
+    """
+    if not found.feasible:
+        return found
+    for points in (*(more for more in _FINER if more > task.points), None):
+        found = rounded(task, found)
+        view = looked_at(task, Variables(task, found.order).build(found.x))
+        found = replace(found, evaluations=found.evaluations + 1)
+        if points is None or plan.late() or _shows_all(task, found, view):
+            break
+        more = again(replace(task, points=points), found)
+        found = replace(more, points=points)
+        if not found.feasible:
+            return found
+    return _as_seen(task, found, view)
+
+
+def _shows_all(task: Task, found: Found, view: CloseView | None) -> bool:
+    """Tell whether a design is at many poses what it was found to be at those of the search."""
+    if view is None or _overstress(task, view) > 0:
+        return False
+    if task.objective == "paper":
+        return True
+    if task.objective == "range" and found.objective <= task.half_band:
+        return view.widest(task.half_band) <= found.start + _CLOSE * task.window[1]
+    return view.half_band(found.start) <= _SAME * found.objective + _NEAR
+
+
+def _as_seen(task: Task, found: Found, view: CloseView | None) -> Found:
+    """Return a design with what was seen at many poses: half band, widest window, stress."""
+    if view is None:
+        return replace(found, violation=np.inf)
+    found = replace(found, violation=max(found.violation, _overstress(task, view)))
+    if task.objective == "paper":
+        return found
+    start = found.start
+    if task.objective == "range":  # no less than the window that was asked for
+        start = min(max(start, view.widest(task.half_band)), task.window[0])
+    violation = found.violation
+    if start > found.start:  # the mean force is over another window
+        violation = max(violation, worst_of(Shaping(Variables(task, found.order), start, Flattest()), found.x))
+    return replace(found, start=start, objective=view.half_band(start), violation=violation)
+
+
+def _overstress(task: Task, view: CloseView) -> float:
+    """Return by which share the stress at many poses exceeds the allowable one; zero where it does not."""
+    allowed = task.allowable_stress
+    return 0.0 if allowed is None else max(0.0, float(view.stress.max()) / allowed - 1.0)
+
+
+def rounded(task: Task, found: Found) -> Found:
+    """Return a design with coordinates and coefficients that print short."""
+    places, x = len(task.coordinates), found.x.copy()
+    x[:places] = np.round(x[:places] * task.size, PLACES) / task.size
+    x[places:] = np.round(x[places:], TURNS)
+    return replace(found, x=np.clip(x, *Variables(task, found.order).bounds.T))
 
 
 def drawn(task: Task, rng: np.random.Generator, plan: Plan) -> list[Found]:
@@ -240,6 +330,19 @@ def widened(task: Task, found: Found, plan: Plan) -> Found:
     """
     if task.objective != "range" or not (found.feasible and found.objective <= task.half_band):
         return found
+    good, task = found, replace(task, points=found.points)
+    wide = _widest(task, good, plan)
+
+    def again(finer: Task, design: Found) -> Found:
+        return _repaired(finer, design, replace(good, evaluations=design.evaluations), plan)
+
+    wide = confirmed(task, wide, plan, again)
+    kept = wide.feasible and wide.start < good.start and wide.objective <= task.half_band
+    return wide if kept else replace(good, evaluations=wide.evaluations)
+
+
+def _widest(task: Task, found: Found, plan: Plan) -> Found:
+    """Return the widest window at the poses of the search."""
     goal = Widest(task.window[1], task.half_band)
     for _ in range(_WIDENINGS):
         program = Shaping(Variables(task, found.order), found.start, goal)

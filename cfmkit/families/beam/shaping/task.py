@@ -13,6 +13,9 @@ if TYPE_CHECKING:
 
 Objective = Literal["ripple", "range", "paper"]
 
+MARGIN = 2e-3
+"""The search asks for so much less stress and slimmer beams: the stress peaks between its poses and places, too."""
+
 
 @dataclass(frozen=True)
 class Coordinate:
@@ -36,7 +39,7 @@ class Limits:
     Attributes
     ----------
     stress : float
-        Largest bending stress at every pose [Pa].
+        Largest stress at every pose [Pa]: by the margin `MARGIN` below the allowable one.
     envelope : (xmin, xmax, ymin, ymax)
         Where the centre lines must lie before loading [m].
     deformed_envelope : (xmin, xmax, ymin, ymax)
@@ -102,6 +105,8 @@ class Task:
         Poses in the window.
     fidelity : str
         The model of the network, as ``analysis.fidelity`` names it.
+    total_stress : bool
+        Whether the axial part counts as stress, too: as in the analysis of the design.
     layers : int
         How many of the network stand in series in the mechanism: its displacements are so many times as large.
     """
@@ -121,7 +126,13 @@ class Task:
     compared: tuple[float, float] | None = None
     points: int = 17
     fidelity: str = "inextensible"
+    total_stress: bool = False
     layers: int = 1
+
+    @property
+    def allowable_stress(self) -> float | None:
+        """The stress that the analysis allows [Pa]; None where it is not limited."""
+        return None if self.limits.stress is None else self.limits.stress / (1 - MARGIN)
 
     @cached_property
     def size(self) -> float:
