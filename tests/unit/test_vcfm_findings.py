@@ -98,6 +98,37 @@ def test_a_window_that_begins_before_the_leaves_buckle_is_told_the_flat_part():
     assert "the leaves are buckled from 0.9097 mm to 4.771 mm only; the force is flat from" in told
 
 
+@pytest.mark.parametrize("flexure", [5, 7, 10])
+@pytest.mark.parametrize("thickness", [0.4, 0.8, 1.2])
+def test_hybrid_leaves_are_told_with_their_exact_force_and_stress(flexure, thickness):
+    """Their flexures buckle: by pseudo-rigid bodies the peak is up to ten times too high, the stress half as high."""
+    hybrid = (
+        "mechanism.bistable.structure=hybrid", f"mechanism.bistable.flexure_length={flexure} mm",
+        f"mechanism.bistable.thickness={thickness} mm", "analysis.points=121", "requirements=[]",
+    )  # fmt: skip
+    found, exact = analyzed(*hybrid), analyzed(*hybrid, "analysis.fidelity=exact")
+    assert found.spec.analysis.fidelity == "exact"
+    assert found.curve.force.tolist() == exact.curve.force.tolist()
+    bodies = analyzed(*hybrid, "analysis.fidelity=analytic")
+    told = message(bodies, "theory_range")
+    assert "theory_range" not in names(found)
+    force, stress = (bodies.curve.extra[name].values for name in ("bistable_force", "bistable_stress"))
+    true_force, true_stress = (found.curve.extra[name].values for name in ("bistable_force", "bistable_stress"))
+    if "bend and buckle" not in told:
+        assert force.max() == pytest.approx(true_force.max(), rel=0.1)
+        assert 0.5 < stress.max() / true_stress.max() < 1
+        assert thickness > 4.265 / 6
+    else:
+        assert force.max() > true_force.max()
+
+
+def test_a_model_that_is_named_is_taken_for_hybrid_leaves_too():
+    spec = table_i("mechanism.bistable.structure=hybrid", "mechanism.bistable.flexure_length=5 mm")
+    assert spec.analysis.fidelity == "exact"
+    assert spec.replace({"analysis.fidelity": "analytic"}).analysis.fidelity == "analytic"
+    assert table_i().replace({"mechanism.bistable.thickness": 1e-3}).analysis.fidelity == "analytic"
+
+
 @pytest.mark.parametrize("thickness", [1.87, 1.95, 2.0, 2.4])
 def test_arches_that_do_not_buckle_have_the_stiffness_of_their_curve(thickness):
     """Below a rise of 2.31 thicknesses: K_n is the steepest slope, and no constant force is stated."""

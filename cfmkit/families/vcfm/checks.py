@@ -9,6 +9,7 @@ import numpy as np
 
 from cfmkit.families.findings import at_least, at_most, mm, mpa, newton, percent, rate
 from cfmkit.families.vcfm.findings import finding
+from cfmkit.families.vcfm.hybrid import HybridLeaf
 from cfmkit.families.vcfm.preload import measured_stiffness_for
 from cfmkit.families.vcfm.sbranch import POLE
 from cfmkit.families.vcfm.springs import Diamond
@@ -266,7 +267,20 @@ def _range(solution: Solution) -> Iterator[Finding]:
         return
     strip = solution.parts.strip
     angle, reach = float(strip.angle), RELIABLE * solution.parts.balance
-    if angle > STEEP:
+    if isinstance(solution.parts.leaf, HybridLeaf):
+        much = (
+            f"with a rise of {float(strip.slenderness):.3g} flexure thicknesses and an axial force of up to "
+            f"{percent(solution.parts.leaf.crushing)} of the flexures' own buckling load these bend and buckle, which "
+            "pseudo-rigid bodies do not: the force is overrated, up to several times"
+            if solution.parts.leaf.flexures_buckle
+            else "as pseudo-rigid bodies hybrid leaves have their force to about 10 % up to the peak, worse beyond"
+        )
+        yield finding(
+            "theory_range",
+            f"{much}; their stress is up to half too low. Verify with 'analysis.fidelity: exact'",
+            "analysis.fidelity=exact",
+        )
+    elif angle > STEEP:
         yield finding(
             "theory_range",
             f"leaves at {degrees(angle):.3g} deg: beyond 15 deg the closed forms are for small angles no more; "

@@ -195,7 +195,9 @@ class VcfmAnalysis(Analysis):
     )
     travel: PositiveLength | None = Field(None, description="how far the shuttle goes; default: 1.4 times the rise")
     fidelity: Literal["truss", "analytic", "exact"] = Field(
-        "analytic", description="the paper's eq. 18 and 19, the corrected closed forms, or beams in large deflection"
+        "analytic",
+        description="the paper's eq. 18 and 19, the corrected closed forms, or beams in large deflection; "
+        "for hybrid leaves the default is exact",
     )
     branch: Literal["stable", "primary"] = Field(
         "stable", description="where a leaf buckles: leave for the stable form, or stay on the S form; exact model only"
@@ -220,6 +222,17 @@ class VcfmSpec(Spec):
     mechanism: Mechanism
     design: VcfmDesign | None = Field(None, description="what `cfmkit design` is to reach")
     analysis: VcfmAnalysis = Field(default_factory=lambda: VcfmAnalysis(), description="how it is run")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _hybrid_leaves_are_exact(cls, data: Any) -> Any:
+        """Choose the exact model for hybrid leaves unless another is named: no law has flexures that buckle."""
+        match data:
+            case {"mechanism": {"bistable": {"structure": "hybrid"}}, "analysis": Mapping() | None as analysis}:
+                return dict(data) | {"analysis": {"fidelity": "exact"} | dict(analysis or {})}
+            case {"mechanism": {"bistable": {"structure": "hybrid"}}} if "analysis" not in data:
+                return dict(data) | {"analysis": {"fidelity": "exact"}}
+        return data
 
     @model_validator(mode="after")
     def _truss_has_two_laws(self) -> Self:
