@@ -7,17 +7,20 @@ is fitted; those that they determine badly are fitted and named as such.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.errors import CfmError, SolutionError
-from cfmkit.experiment.comparison import Comparison, Samples, compare
+from cfmkit.errors import CfmError, SolutionError, UsageError
+from cfmkit.experiment.comparison import Comparison, Samples, Zeros, compare
+from cfmkit.experiment.parameters import DATA, ZEROS
 from cfmkit.families import family
 from cfmkit.families.base import Run
-from cfmkit.numerics.fit import Fit, LeastSquares, Loss, NotFinite, solve, unidentifiable
+from cfmkit.metrics import Window
+from cfmkit.numerics.fit import Fit, LeastSquares, Loss, NotFinite, lack_of_fit, solve, unidentifiable
 from cfmkit.results import Finding
+from cfmkit.units import format_short
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -25,12 +28,17 @@ if TYPE_CHECKING:
     from cfmkit.curves import FloatArray
     from cfmkit.experiment.measured import Measured
     from cfmkit.experiment.parameters import Parameter
-    from cfmkit.metrics import Window
     from cfmkit.results import Result
     from cfmkit.spec import Spec
 
 POOR = 0.3
 """Parameters known to less than this part of their size are reported as badly known."""
+
+BY_CHANCE = 1e-3
+"""Residuals are not random where chance makes their means as large less often than that."""
+
+SWING = 0.2
+"""Swings of the residuals that are smaller than this part of their noise are left alone, however certain."""
 
 TIED = 0.999
 """Parameters more correlated than this are reported as badly told apart."""
@@ -38,6 +46,7 @@ TIED = 0.999
 FINDINGS = {
     "weakly_identified": "the data determine a fitted value badly",
     "at_bound": "a fitted value lies on its bound: the data ask for more",
+    "lack_of_fit": "the residuals are not random: the model does not describe the measurement",
     "not_converged": "the fit stopped before it converged",
 }
 
@@ -55,7 +64,9 @@ class Calibration:
     fit : Fit
         Values and their uncertainty, in the order of the parameters.
     before, after : Comparison
-        Model and measurement at the start and at the end.
+        Model and measurement at the start and at the end; the latter less the fitted zeros.
+    zeros : Zeros
+        Of the recording, as fitted.
     result : Result
         Of the fitted specification.
     warnings : tuple of Finding
@@ -68,6 +79,7 @@ class Calibration:
     before: Comparison
     after: Comparison
     result: Result
+    zeros: Zeros = field(default_factory=Zeros)
     warnings: tuple[Finding, ...] = ()
 
 
@@ -105,15 +117,46 @@ def calibrate(
     cfmkit.errors.SolutionError
         If the start has no solution, or the data do not determine the parameters, which are named.
     """
-    before = compare(_analysed(spec), source, window)
+    before = _compared(spec, source, parameters, window)
     problem = _problem(spec, before, parameters)
     _check(problem, problem.start, parameters)
     fit = solve(problem, loss)
     _check(problem, fit.values, parameters)
     fitted = _with_values(spec, parameters, fit.values)
     result = _analysed(fitted)
-    after = Comparison(before.samples, before.window, result.curve)
-    return Calibration(fitted, tuple(parameters), fit, before, after, result, tuple(_warnings(parameters, fit)))
+    zeros = _zeros(parameters, fit.values)
+    after = Comparison(tuple(item.less(zeros) for item in before.samples), before.window, result.curve)
+    warnings = (*_warnings(parameters, fit), *_misfit(parameters, fit, after))
+    return Calibration(fitted, tuple(parameters), fit, before, after, result, zeros, warnings)
+
+
+def _compared(spec: Spec, source: Measured, parameters: Sequence[Parameter], window: Window | None) -> Comparison:
+    """Return the start beside the measurement, where the model exists for every zero that is tried."""
+    result = _analysed(spec)
+    found = compare(result, source, window)
+    shift = next((item for item in parameters if _is_shift(item)), None)
+    if shift is None:
+        return found
+    parts = [found.curve.on(item.model_branch).motion for item in found.samples]
+    low = max(found.window.lo, max(float(part.min()) for part in parts) + shift.high)
+    high = min(found.window.hi, min(float(part.max()) for part in parts) + shift.low)
+    if not low < high:
+        raise UsageError(f"--bounds: within those of {shift.path} there is no travel that the model always covers")
+    return compare(result, source, Window(low, high))
+
+
+def _is_shift(item: Parameter) -> bool:
+    return item.path in (f"{DATA}displacement_offset", f"{DATA}angle_offset")
+
+
+def _zeros(parameters: Sequence[Parameter], values: FloatArray) -> Zeros:
+    """Return what the parameters say of the recording."""
+    found = {"effort": 0.0, "motion": 0.0, "drift": 0.0}
+    for item, value in zip(parameters, values, strict=True):
+        if item.path.startswith(DATA):
+            name = "motion" if _is_shift(item) else "drift" if item.path.endswith("drift") else "effort"
+            found[name] = float(value)
+    return Zeros(**found)
 
 
 def _analysed(spec: Spec) -> Result:
@@ -124,7 +167,9 @@ def _analysed(spec: Spec) -> Result:
 
 
 def _with_values(spec: Spec, parameters: Sequence[Parameter], values: FloatArray) -> Spec:
-    return spec.replace({item.path: float(value) for item, value in zip(parameters, values, strict=True)})
+    changes = {item.path: float(value) for item, value in zip(parameters, values, strict=True)}
+    changes = {path: value for path, value in changes.items() if not path.startswith(DATA)}
+    return spec.replace(changes) if changes else spec
 
 
 def _problem(spec: Spec, before: Comparison, parameters: Sequence[Parameter]) -> LeastSquares:
@@ -137,7 +182,8 @@ def _problem(spec: Spec, before: Comparison, parameters: Sequence[Parameter]) ->
             curve = _analysed(_with_values(spec, parameters, values)).curve
         except CfmError:
             return nothing  # the solver then takes a shorter step
-        return np.concatenate([item.errors(curve) for item in before.samples])
+        zeros = _zeros(parameters, values)
+        return np.concatenate([item.less(zeros).errors(curve) for item in before.samples])
 
     return LeastSquares(residuals, columns[0], columns[1], columns[2], columns[3], level)
 
@@ -181,6 +227,29 @@ def _warnings(parameters: Sequence[Parameter], fit: Fit) -> list[Finding]:
     if not fit.converged:
         found.append(Finding("not_converged", "the fit stopped before it converged; start from other values"))
     return found
+
+
+def _misfit(parameters: Sequence[Parameter], fit: Fit, after: Comparison) -> list[Finding]:
+    """Return whether the residuals are random; a value on its bound explains by itself why not."""
+    if fit.at_bound.any() or not len(fit.residuals):
+        return []
+    ordered = [item.errors(after.curve)[np.argsort(item.motion, kind="stable")] for item in after.samples]
+    found = lack_of_fit(ordered, len(parameters))
+    level = float(np.abs(np.concatenate([item.effort for item in after.samples])).max())
+    if found.chance > BY_CHANCE or found.swing < max(SWING * found.noise, 1e-5 * level):
+        return []
+    kind = after.curve.kind
+    swing, noise = (format_short(value, kind, 3) for value in (found.swing, found.noise))
+    fitted = {item.path for item in parameters}
+    other = ", ".join(path for path in (DATA + name for name in ZEROS[kind]) if path not in fitted)
+    cure = f"zeros of the recording can be fitted, too: {other}" if other else "another value or model is at fault"
+    return [
+        Finding(
+            "lack_of_fit",
+            f"model less measurement swings by {swing} (rms) along the travel, beside a noise of {noise}: what was "
+            f"fitted does not describe the measurement, and the intervals hold only where it does; {cure}",
+        )
+    ]
 
 
 def table(calibration: Calibration) -> list[dict[str, Any]]:

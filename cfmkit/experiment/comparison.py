@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import import_module
 from typing import TYPE_CHECKING
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from cfmkit.errors import DataError
 from cfmkit.experiment.branches import LOAD, UNLOAD
+from cfmkit.experiment.measured import elapsed
 from cfmkit.families import family
 from cfmkit.families.base import MeasuredLoop
 from cfmkit.metrics import Undefined, Window, window_of
@@ -43,16 +44,41 @@ class Samples:
         Name in the model.
     motion, effort : (n,) array
         As measured [m, N] or [rad, N m].
+    elapsed : (n,) array
+        Which part of the recording had passed, 0 to 1.
     """
 
     branch: str
     model_branch: str
     motion: FloatArray
     effort: FloatArray
+    elapsed: FloatArray
+
+    def less(self, zeros: Zeros) -> Samples:
+        """Return the samples with the errors of the zeros taken out."""
+        motion, effort = self.motion - zeros.motion, self.effort - zeros.effort - zeros.drift * self.elapsed
+        return replace(self, motion=motion, effort=effort)
 
     def errors(self, curve: Curve) -> FloatArray:
         """Return model less measurement at every point; NaN where the model has no value."""
         return model_at(curve, self.model_branch, self.motion) - self.effort
+
+
+@dataclass(frozen=True)
+class Zeros:
+    """What the sensors show where they should show nothing.
+
+    Attributes
+    ----------
+    effort, motion : float
+        Without load, and at the mechanism's zero [N, m] or [N m, rad].
+    drift : float
+        By how much more without load at the end of the recording [N or N m].
+    """
+
+    effort: float = 0.0
+    motion: float = 0.0
+    drift: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -193,17 +219,17 @@ def _samples(source: Measured, branch: str, mine: str, window: Window) -> Sample
     keep = [(part.motion >= window.lo - slack) & (part.motion <= window.hi + slack) for part in parts]
     motion = np.concatenate([part.motion[inside] for part, inside in zip(parts, keep, strict=True)])
     effort = np.concatenate([part.effort[inside] for part, inside in zip(parts, keep, strict=True)])
-    motion, effort = _grouped([np.clip(motion, window.lo, window.hi), effort])
-    return Samples(branch, mine, motion, effort)
+    passed = elapsed(source, branch)[np.concatenate(keep)]
+    motion, effort, passed = _grouped([np.clip(motion, window.lo, window.hi), effort, passed])
+    return Samples(branch, mine, motion, effort, passed)
 
 
-def _grouped(columns: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray]:
+def _grouped(columns: Sequence[FloatArray]) -> Sequence[FloatArray]:
     """Return averages over groups of neighbours, where there are more points than it takes."""
     count = len(columns[0])
     size = -(-count // MOST) if count else 1
     if size == 1:
-        return columns[0], columns[1]
+        return columns
     edges = np.arange(0, count, size)
     lengths = np.diff(np.append(edges, count))
-    one, other = (np.add.reduceat(values, edges) / lengths for values in columns)
-    return one, other
+    return [np.add.reduceat(values, edges) / lengths for values in columns]

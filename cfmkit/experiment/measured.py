@@ -281,6 +281,19 @@ def _curve(recording: Recording, cycle: Sequence[Stroke], effort: FloatArray, st
     return Curve(recording.motion[points], effort[points], branch, stable, extra, recording.kind, label)
 
 
+def elapsed(source: Measured, branch: str) -> FloatArray:
+    """Return which part of the recording had passed at every raw point of a branch, cycle by cycle; 0 to 1.
+
+    By the time where it was recorded, else by the number of points.
+    """
+    recording = source.recording
+    clock = np.arange(len(recording), dtype=float) if recording.time is None else recording.time
+    clock = (clock - clock[0]) / (float(np.ptp(clock)) or 1.0)
+    strokes = [stroke for cycle in _cycles(source.strokes) for stroke in cycle if stroke.branch == branch]
+    passed: FloatArray = np.concatenate([clock[stroke.points[_by_motion(recording, stroke)]] for stroke in strokes])
+    return passed
+
+
 def _warnings(recording: Recording, strokes: Strokes) -> tuple[Finding, ...]:
     found = []
     cycles = strokes.cycles
@@ -423,6 +436,6 @@ def _mean(each: Sequence[Mapping[str, Quantity]]) -> dict[str, Quantity]:
 
 
 __all__ = [
-    "FINDINGS", "LEFT_OUT", "LOAD", "UNLOAD", "Measured", "Measurement", "common_window", "measured", "numbers_of",
-    "read_measured", "require_loop",
+    "FINDINGS", "LEFT_OUT", "LOAD", "UNLOAD", "Measured", "Measurement", "common_window", "elapsed", "measured",
+    "numbers_of", "read_measured", "require_loop",
 ]  # fmt: skip

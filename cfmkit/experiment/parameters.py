@@ -6,6 +6,8 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from cfmkit.errors import QuantityError, UsageError
 from cfmkit.studies.leaves import CannotVary, leaf
 from cfmkit.yamlio.shape import Slot
@@ -13,7 +15,21 @@ from cfmkit.yamlio.shape import Slot
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
+    from cfmkit.experiment.reading import Recording
     from cfmkit.spec import Spec
+
+DATA = "data."
+"""What begins so is no value of the specification, but of the recording."""
+
+ZEROS = {
+    "force": {"force_offset": "force", "displacement_offset": "length", "drift": "force"},
+    "torque": {"torque_offset": "torque", "angle_offset": "angle", "drift": "torque"},
+}
+"""By kind of curve, what can be fitted of a recording, with its dimension: what the sensors show without load and at
+the mechanism's zero, and by how much the former grows from the first point of the recording to the last."""
+
+SHIFT = 0.02
+"""Of the recorded travel: how far the zero of the displacement may be off unless bounds say more."""
 
 INSIDE = 1e-9
 """How far inside an open bound a value stays, in sizes of the parameter."""
@@ -44,7 +60,10 @@ class Parameter:
 
 
 def parameters(
-    spec: Spec, paths: Iterable[str], bounds: Mapping[str, tuple[float, float]] | None = None
+    spec: Spec,
+    paths: Iterable[str],
+    bounds: Mapping[str, tuple[float, float]] | None = None,
+    recording: Recording | None = None,
 ) -> tuple[Parameter, ...]:
     """Return the parameters at some paths of a specification.
 
@@ -53,9 +72,11 @@ def parameters(
     spec : Spec
         Whose values are the start.
     paths : iterable of str
-        Dotted paths of numbers.
+        Dotted paths of numbers; those that begin with ``data.`` are values of the recording.
     bounds : mapping of str to (float, float)
         SI; the specification's own bounds hold besides.
+    recording : Recording, optional
+        Whose zeros may be fitted.
 
     Raises
     ------
@@ -69,7 +90,37 @@ def parameters(
         raise UsageError(f"--fit names {twice!r} twice")
     if strange := next((name for name in bounds or {} if name not in names), None):
         raise UsageError(f"--bounds names {strange!r}, which --fit does not")
-    return tuple(_parameter(spec, name, (bounds or {}).get(name)) for name in names)
+    return tuple(
+        _of_data(name, (bounds or {}).get(name), recording)
+        if name.startswith(DATA)
+        else _parameter(spec, name, (bounds or {}).get(name))
+        for name in names
+    )
+
+
+def _of_data(path: str, bounds: tuple[float, float] | None, recording: Recording | None) -> Parameter:
+    """Return a zero of the recording to fit; it starts from none."""
+    dimension = _zero(path, "--fit", recording)
+    values = recording.motion if recording and path.endswith(("displacement_offset", "angle_offset")) else None
+    if values is not None:
+        size = 0.5 * SHIFT * float(np.ptp(values))
+        low, high = bounds or (-2.0 * size, 2.0 * size)
+    else:
+        size = 0.01 * float(np.abs(recording.effort).max()) if recording else 1.0
+        low, high = bounds or (-math.inf, math.inf)
+    if not low <= 0.0 <= high:
+        raise UsageError(f"--fit: {path} starts at 0, outside its bounds {_range(low, high, dimension)}")
+    return Parameter(path, dimension, 0.0, low, high, size)
+
+
+def _zero(path: str, option: str, recording: Recording | None) -> str:
+    """Return the dimension of a value of the recording."""
+    known = ZEROS[recording.kind if recording else "force"]
+    name = path.removeprefix(DATA)
+    if name not in known:
+        there = ", ".join(DATA + item for item in known)
+        raise UsageError(f"{option}: there is no {path!r}; of a recording there are {there}")
+    return known[name]
 
 
 def _parameter(spec: Spec, path: str, bounds: tuple[float, float] | None) -> Parameter:
@@ -148,7 +199,9 @@ def _range(low: float, high: float, dimension: str) -> str:
     return f"{_told(low, dimension)} ... {_told(high, dimension)}"
 
 
-def read_bounds(options: Iterable[str], spec: Spec) -> dict[str, tuple[float, float]]:
+def read_bounds(
+    options: Iterable[str], spec: Spec, recording: Recording | None = None
+) -> dict[str, tuple[float, float]]:
     """Return what ``--bounds a.b=0:0.01`` says, by path, SI.
 
     Raises
@@ -163,14 +216,22 @@ def read_bounds(options: Iterable[str], spec: Spec) -> dict[str, tuple[float, fl
         if not equals or len(ends) != 2:
             raise UsageError(f"--bounds: {option!r} is not 'a.b=low:high'")
         try:
-            about = leaf(type(spec), path)
-            low, high = (float(about.read(_number(end))[0]) for end in ends)
+            low, high = (_bound(end, path, spec, recording) for end in ends)
         except (CannotVary, QuantityError, ValueError) as problem:
             raise UsageError(f"--bounds: {option!r}: {problem}") from None
         if not low < high:
             raise UsageError(f"--bounds: {option!r} must be increasing")
         found[path] = (low, high)
     return found
+
+
+def _bound(text: str, path: str, spec: Spec, recording: Recording | None) -> float:
+    """Return a bound of a value of the specification or of the recording, SI."""
+    from cfmkit.units import read_quantity
+
+    if path.startswith(DATA):
+        return read_quantity(text, _zero(path, "--bounds", recording))
+    return float(leaf(type(spec), path).read(_number(text))[0])
 
 
 def _number(text: str) -> float | str:

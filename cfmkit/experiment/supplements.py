@@ -122,6 +122,11 @@ def calibration_lines(calibration: Calibration) -> tuple[tuple[str, str], ...]:
         value, width = float(calibration.fit.values[k]), float(half[k])
         told = f"{_exact(value, item.dimension)} ± {_exact(width, item.dimension, 2)}"
         lines.append(("fitted", f"{item.path} = {told} (95 %), from {_exact(item.start, item.dimension)}"))
+    zeros, kind = calibration.zeros, calibration.after.curve.kind
+    known = {"--tare": (zeros.effort, kind), "--zero": (zeros.motion, calibration.after.curve.motion_dimension)}
+    options = " ".join(f'{name} "{_exact(value, unit, 6)}"' for name, (value, unit) in known.items() if value)
+    if options:
+        lines.append(("data", f"{options} lays the recording on the fitted model (analyze --data, measure)"))
     return tuple(lines)
 
 

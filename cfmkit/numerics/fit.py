@@ -13,8 +13,10 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from cfmkit.numerics.robust import robust_scale
+
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from cfmkit.curves import FloatArray
 
@@ -236,6 +238,73 @@ def _fit(problem: LeastSquares, best: Any, loss: Loss) -> Fit:
     covariance = noise**2 * inflation * inverse * np.outer(problem.size, problem.size)
     freedom = max(count / inflation - len(values), 1.0)
     return Fit(values, covariance, residuals, noise, inflation, best.active_mask != 0, freedom, bool(best.success))
+
+
+@dataclass(frozen=True)
+class LackOfFit:
+    """Whether residuals swing along the data by more than their noise explains.
+
+    Attributes
+    ----------
+    swing : float
+        Root mean square of what is systematic in them.
+    noise : float
+        Standard deviation of what is not.
+    chance : float
+        Probability that noise alone makes means of neighbours as large.
+    """
+
+    swing: float
+    noise: float
+    chance: float
+
+
+BLOCKS = 24
+"""Means of so many stretches of each branch are compared with the noise inside them, at most."""
+
+_SAMPLES_A_BLOCK = 8
+
+
+def lack_of_fit(branches: Sequence[FloatArray], fitted: int) -> LackOfFit:
+    """Return the F test of means of neighbouring residuals against the scatter inside each group of neighbours.
+
+    Neighbours count as pure error, as repeated points do in the classical test; where they are alike
+    over less than a stretch, as under vibration, so many of them count as one. Residuals beyond five
+    robust standard deviations count as that much.
+
+    Parameters
+    ----------
+    branches : sequence of (n,) array
+        Residuals of each branch in the order of its places.
+    fitted : int
+        Number of fitted values.
+
+    References
+    ----------
+    N. R. Draper, H. Smith, Applied Regression Analysis, 3rd ed., Wiley 1998, sec. 2.1: lack of fit and pure error.
+    """
+    from scipy.special import fdtrc
+
+    far = 5.0 * robust_scale(np.concatenate(list(branches)))
+    blocks = []
+    for residuals in branches:
+        count = min(BLOCKS, len(residuals) // _SAMPLES_A_BLOCK)
+        if count >= 2:
+            blocks += np.array_split(np.clip(residuals, -far, far) if far else residuals, count)
+    free = len(blocks) - fitted
+    if free < 2:
+        return LackOfFit(0.0, 0.0, 1.0)
+    means = np.array([block.mean() for block in blocks])
+    inside = np.concatenate([block - block.mean() for block in blocks])
+    alike = correlation_time(inside)
+    left = max(len(inside) / alike - len(blocks), 1.0)
+    noise = float(np.sqrt((inside**2).sum() / max(len(inside) - len(blocks), 1)))
+    sizes = np.array([len(block) for block in blocks])
+    by_chance = alike * noise**2
+    between = float((sizes * means**2).sum())
+    swing = max((between - free * by_chance) / sizes.sum(), 0.0) ** 0.5
+    chance = float(fdtrc(free, left, between / free / by_chance)) if by_chance else float(swing == 0)
+    return LackOfFit(swing, noise, chance)
 
 
 def correlation_time(residuals: FloatArray) -> float:

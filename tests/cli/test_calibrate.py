@@ -85,6 +85,25 @@ def test_calibrate_draws_the_fit(cli, cam, rig):
     assert (cli.folder / "fit/figures/data.png").read_bytes().startswith(b"\x89PNG")
 
 
+def test_a_tare_is_fitted_and_the_page_says_how_to_take_it_off(cli, cam, rig):
+    head, *lines = (cli.folder / rig).read_text().splitlines()
+    moved = [f"{s};{float(f) + 0.4:.4f}" for s, f in (line.split(";") for line in lines)]
+    (cli.folder / "tare.csv").write_text("\n".join([head, *moved]) + "\n")
+    warned = cli("calibrate", cam, "tare.csv", *FIT, "-o", "one", "--no-plots")
+    assert "warning  lack_of_fit" in warned.out
+    fitted = cli("calibrate", cam, "tare.csv", "--fit", f"{FIT[1]},data.force_offset", "--bounds",
+                 "data.force_offset=-1 N:1 N", "-o", "two", "--no-plots")  # fmt: skip
+    assert "lack_of_fit" not in fitted.out
+    offset = metrics(cli, "two")["parameters"][2]
+    assert (offset["path"], offset["unit"]) == ("data.force_offset", "N")
+    assert offset["value"] == pytest.approx(0.4, abs=0.02)
+    assert 'data     --tare "0.' in fitted.out
+    again = cli("analyze", "two/calibrated.yaml", "--data", "tare.csv", "--tare", f"{offset['value']} N", "-o", "three",
+                "--no-plots", "--json")  # fmt: skip
+    value = again.document["metrics"]["data_rmse"]["value"]
+    assert value == pytest.approx(metrics(cli, "two")["metrics"]["data_rmse"]["value"], rel=1e-9)
+
+
 @pytest.mark.parametrize(
     ("arguments", "code", "complaint"),
     [

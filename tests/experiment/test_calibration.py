@@ -24,12 +24,16 @@ def built(friction=0.002, **changes):
     return resolved(fixed(cam(analysis__window=("5 mm", "230 mm")), rolling_friction=friction, **changes))
 
 
-def recording(spec, noise=0.0, seed=0, shift=0.0):
-    """The model's own loop with normal noise of that standard deviation [N], and a constant force added."""
+def recording(spec, noise=0.0, seed=0, shift=0.0, drift=0.0, moved=0.0):
+    """The model's own loop with normal noise of that standard deviation [N], a constant force and a growing one added.
+
+    `moved` is what the displacement shows at the mechanism's zero [m].
+    """
     curve = analyze(spec).curve
     good = np.isfinite(curve.force)
     spread = np.random.default_rng(seed).normal(0.0, noise, int(good.sum())) if noise else 0.0
-    return measured(Recording("made.csv", curve.motion[good], curve.force[good] + spread + shift), None)
+    force = curve.force[good] + spread + shift + drift * np.linspace(0.0, 1.0, int(good.sum()))
+    return measured(Recording("made.csv", curve.motion[good] + moved, force), None)
 
 
 def test_a_model_has_no_error_beside_its_own_curve():
@@ -169,3 +173,64 @@ def test_malformed_bounds_are_usage_errors(text):
 
 def test_bounds_are_read_with_their_units():
     assert read_bounds([f"{REST}=60 mm:7 cm"], built()) == {REST: (0.06, 0.07)}
+
+
+def test_bounds_of_the_recordings_zeros_are_read_with_their_units():
+    assert read_bounds(["data.drift=-1 N:2 N"], built()) == {"data.drift": (-1.0, 2.0)}
+    with pytest.raises(UsageError, match=r"data\.drift=1 mm:2 mm"):
+        read_bounds(["data.drift=1 mm:2 mm"], built())
+
+
+@pytest.mark.parametrize("noise", [0.02, 0.1, 0.3])
+@pytest.mark.parametrize("paths", [[REST], [REST, FRICTION]])
+def test_a_tare_that_is_not_fitted_spoils_the_rest_length_and_the_fit_says_so(paths, noise):
+    """0.4 N on the sensor give a rest half width of 68.01 mm instead of 68.25 mm."""
+    source, start = recording(built(0.00225, rest_half_width="68.25 mm"), noise, shift=0.4), built(0.00225)
+    found = calibrate(start, source, parameters(start, paths))
+    assert found.fit.values[0] == pytest.approx(0.06801, abs=0.00004)
+    (finding,) = found.warnings
+    assert finding.name == "lack_of_fit"
+    assert finding.message.endswith("too: data.force_offset, data.displacement_offset, data.drift")
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(
+    ("name", "made"),
+    [("force_offset", {"shift": 0.4}), ("drift", {"drift": 0.5}), ("displacement_offset", {"moved": 1e-3})],
+)
+def test_zeros_of_the_recording_are_fitted_beside_the_mechanism(name, made, seed):
+    source, start = recording(built(0.00225, rest_half_width="68.25 mm"), 0.05, seed, **made), built(0.002)
+    chosen = parameters(start, [REST, FRICTION, f"data.{name}"], None, source.recording)
+    found = calibrate(start, source, chosen)
+    truth = [0.06825, 0.00225, *made.values()]
+    assert (np.abs(found.fit.values - truth) < 1.6 * found.fit.half_widths()).all()
+    assert "lack_of_fit" not in {item.name for item in found.warnings}
+    assert found.after.metrics()["data_rmse"].value == pytest.approx(0.05, rel=0.1)
+    assert [item.at("mechanism.rolling_friction") for item in (found.spec,)] == [found.fit.values[1]]
+
+
+def test_vibration_that_the_sampling_resolves_is_no_lack_of_fit():
+    """Ten samples a period: successive residuals are alike, but not over the travel."""
+    truth = built(0.00225, rest_half_width="68.25 mm")
+    source = recording(truth, 0.02)
+    shaken = source.recording.effort + 0.2 * np.sin(np.arange(len(source.recording)) * 2 * np.pi / 10.3)
+    source = measured(Recording("shaken.csv", source.recording.motion, shaken), None)
+    found = calibrate(built(), source, parameters(built(), [REST, FRICTION]))
+    assert found.warnings == ()
+
+
+@pytest.mark.parametrize(
+    ("path", "kind", "complaint"),
+    [
+        (
+            "data.tare",
+            "force",
+            "there is no 'data.tare'; of a recording there are data.force_offset, data.displacement",
+        ),
+        ("data.force_offset", "torque", "of a recording there are data.torque_offset, data.angle_offset, data.drift"),
+    ],
+)
+def test_what_a_recording_does_not_have_is_a_usage_error(path, kind, complaint):
+    motion = triangle(1) / 1e3
+    with pytest.raises(UsageError, match=complaint):
+        parameters(built(), [path], None, Recording("made.csv", motion, 50 + motion, kind=kind))

@@ -76,7 +76,8 @@ def compute(options: Options, source: Measured, spec: Spec, run: Run) -> Report:
     from cfmkit.numerics.fit import LOSSES
 
     start = resolved(spec)
-    chosen = parameters(start, options.fit.split(","), read_bounds(options.bounds or (), start))
+    bounds = read_bounds(options.bounds or (), start, source.recording)
+    chosen = parameters(start, options.fit.split(","), bounds, source.recording)
     loss = next(name for name in LOSSES if name == options.loss)
     return report(calibrate(start, source, chosen, loss), source)
 
