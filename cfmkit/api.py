@@ -296,8 +296,15 @@ def resolve(spec: Spec) -> Spec:
     return resolved
 
 
-def drawing(spec: Spec) -> Drawing:
+def drawing(spec: Spec, tolerance: float | None = None) -> Drawing:
     """Return the outlines of the parts that can be cut or printed.
+
+    Parameters
+    ----------
+    spec : Spec
+        What to draw.
+    tolerance : float, optional
+        Largest distance of the outlines from the exact edges [m]; default: 5 um.
 
     Raises
     ------
@@ -309,7 +316,8 @@ def drawing(spec: Spec) -> Drawing:
     record = family(spec.family)
     if record.outline is None:
         raise UsageError(f"a {spec.family} mechanism has no part to draw")
-    drawn: Drawing = import_module(record.outline).drawing(spec)
+    given = () if tolerance is None else (tolerance,)
+    drawn: Drawing = import_module(record.outline).drawing(spec, *given)
     return drawn
 
 

@@ -20,6 +20,10 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
 
+TOLERANCE = 5e-6
+"""How far outlines may be from the exact ones unless told otherwise [m]."""
+
+
 @dataclass(frozen=True)
 class Line:
     """A straight edge from `start` to `end`, each (2,) [m]."""

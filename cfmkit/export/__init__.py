@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from cfmkit.export.arcs import TOLERANCE, outlines
+from cfmkit.export.arcs import outlines
 from cfmkit.export.dxf import dxf_bytes, write_dxf
 from cfmkit.export.kerf import with_kerf
 from cfmkit.export.layers import check_name
 from cfmkit.export.points import write_points
 from cfmkit.export.svg import svg_bytes, write_svg
+from cfmkit.geometry import TOLERANCE
 
 if TYPE_CHECKING:
     from cfmkit.geometry import Drawing

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.export.arcs import TOLERANCE, Outline, outlines
+from cfmkit.export.arcs import Outline, outlines
 from cfmkit.export.checks import flat_points
 from cfmkit.export.layers import Look, check_name, looks
+from cfmkit.geometry import TOLERANCE
 from cfmkit.units import to_border
 
 if TYPE_CHECKING:

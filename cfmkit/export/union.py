@@ -1,11 +1,12 @@
 """One part from overlapping pieces: merged, inside corners rounded by the cutter, checked for being one piece.
 
-The boundary is a chain of short lines no farther than `ROUGH` from the true one.
+The boundary is a chain of short lines; how far they may be from the true one is an argument.
 """
 
 from __future__ import annotations
 
 import itertools
+import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,12 +20,18 @@ if TYPE_CHECKING:
     from cfmkit.curves import FloatArray
 
 ROUGH = 1e-6
-_QUARTER = 32  # pieces of a quarter circle
+"""By default contours are no farther from the true ones [m]."""
+
+_QUARTER, _MOST_PIECES = 32, 10_000  # pieces of a quarter circle
 _SPECK = 1e-12  # holes smaller than this are rounding [m2]
 
 
 def merged(
-    pieces: Sequence[FloatArray], fillet: float = 0.0, holes: Sequence[FloatArray] = (), layer: str = "cut"
+    pieces: Sequence[FloatArray],
+    fillet: float = 0.0,
+    holes: Sequence[FloatArray] = (),
+    layer: str = "cut",
+    rough: float = ROUGH,
 ) -> tuple[Contour, ...]:
     """Return the contours of the union of closed polygons, each (n, 2) [m].
 
@@ -38,6 +45,8 @@ def merged(
         Polygons that are cut out in the end.
     layer : str
         Of the contours.
+    rough : float
+        How far the contours may be from those of the union, fillets included [m].
 
     Raises
     ------
@@ -47,16 +56,22 @@ def merged(
     from shapely import Polygon, union_all
 
     # what overlaps by rounding only must still become one piece
-    whole = union_all([Polygon(piece).buffer(ROUGH / 4, join_style="mitre") for piece in pieces])
+    whole = union_all([Polygon(piece).buffer(rough / 4, join_style="mitre") for piece in pieces])
     if fillet > 0:
-        whole = whole.buffer(fillet, quad_segs=_QUARTER).buffer(-fillet, quad_segs=_QUARTER)
+        pieces_of = max(_QUARTER, quarter_pieces(fillet, rough / 4))
+        whole = whole.buffer(fillet, quad_segs=pieces_of).buffer(-fillet, quad_segs=pieces_of)
     if holes:
         whole = whole.difference(union_all([Polygon(hole) for hole in holes]))
-    whole = whole.simplify(ROUGH / 2)
+    whole = whole.simplify(rough / 2)
     parts = [part for part in getattr(whole, "geoms", [whole]) if part.area > _SPECK]
     if not parts:
         raise GeometryError("the pieces of the part leave nothing to cut")
     return tuple(contour for part in parts for contour in _contours(part, layer))
+
+
+def quarter_pieces(radius: float, bulge: float) -> int:
+    """Return into how many lines a quarter of a circle is cut, so that it bulges out of them by `bulge` [m] at most."""
+    return min(_MOST_PIECES, math.ceil(0.25 * math.pi / math.acos(max(1.0 - bulge / radius, 0.0)))) if radius > 0 else 1
 
 
 def _contours(part: Any, layer: str) -> list[Contour]:

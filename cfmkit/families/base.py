@@ -218,7 +218,8 @@ class Family:
     draw : str, optional
         ``"module"`` with ``figures(result)``, imported when drawing.
     outline : str, optional
-        ``"module"`` with ``drawing(spec)``, imported when exporting.
+        ``"module"`` with ``drawing(spec, tolerance)``, imported when exporting. Edges that are not
+        `Smooth` lie within the tolerance [m] of the exact ones; smooth ones are fitted by whoever writes them.
     headline : tuple of str
         Values and metrics that are shown first after a run, in this order.
     branches : tuple of str

@@ -139,3 +139,47 @@ def test_the_smallest_gap_is_found_without_looking_at_beams_far_away(monkeypatch
     assert smallest_gap(lines, halves) == min(every)
     assert len(every) == 12 * 11 / 2 + 12 * 12
     assert len(looked) < len(every) / 2
+
+
+TOLERANCES = [50e-6, 5e-6, 0.5e-6, 0.05e-6]
+
+
+def edge_points(contours, per_edge=9):
+    """Return places along the edges of contours, the ends of edges among them, (n, 2) [m]."""
+    share = np.linspace(0.0, 1.0, per_edge)[:, None]
+    return np.concatenate(
+        [np.array(edge.start) * (1 - share) + np.array(edge.end) * share for one in contours for edge in one.edges]
+    )
+
+
+@pytest.mark.parametrize("sweep", ["170 deg", "-60 deg"])
+@pytest.mark.parametrize("tolerance", TOLERANCES)
+def test_the_edges_of_a_curved_beam_hold_the_tolerance(tolerance, sweep):
+    """Of an arc: two circles about its centre, half a thickness inside and outside of its radius."""
+    pair = ("end: tip}", f"end: tip, thickness: 8 mm, shape: {{kind: arc, sweep: {sweep}}}}}")
+    part = ("width: 100 mm", "width: 100 mm\n  part: {fillet: 2 mm}")
+    contours = [one for one in cfmkit.drawing(cantilever(pair, part), tolerance).contours if one.layer == "cut"]
+    half = np.radians(float(sweep.split()[0])) / 2
+    radius, center = 0.2 / abs(np.sin(half)), np.array([0.2, 0.2 / np.tan(half)])
+    away = edge_points(contours) - center
+    angle = np.abs(np.angle((away @ [1, 1j]) / (-1j * np.sign(half))))
+    distance = np.hypot(*away[angle < 0.8 * abs(half)].T) - radius
+    assert len(distance) > 300
+    assert np.abs(np.abs(distance) - 4 * MM).max() <= tolerance
+
+
+def test_the_eyes_of_pins_hold_the_tolerance():
+    for tolerance in TOLERANCES:
+        contours = cfmkit.drawing(config("beam_lee_frame"), tolerance).contours
+        holes = [edge_points([one]) for one in contours if one.layer == "cut" and one.hole]
+        assert len(holes) == 2
+        for points in holes:
+            distance = np.hypot(*(points - points.mean(axis=0)).T)
+            assert np.abs(distance - 1.2 * 2 * MM).max() <= tolerance
+
+
+def test_a_finer_tolerance_gives_another_contour_and_a_coarser_one_the_same_as_ever():
+    spec = cantilever(("end: tip}", "end: tip, shape: {kind: cosine, rise: 40 mm}}"))
+    count = [sum(len(one.edges) for one in cfmkit.drawing(spec, each).contours) for each in TOLERANCES]
+    assert count[0] <= count[1] < count[2] < count[3]
+    assert cfmkit.drawing(spec).contours[0].edges == cfmkit.drawing(spec, 5e-6).contours[0].edges

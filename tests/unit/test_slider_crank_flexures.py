@@ -441,6 +441,36 @@ def test_the_outline_has_the_flexures_thickness(name: str) -> None:
     assert gaps.min() == pytest.approx(table.min(), rel=1e-6)
 
 
+@pytest.mark.parametrize("changes", [(), ("mechanism.unloaded_angle=60 deg",)])
+@pytest.mark.parametrize("name", ["lumped", "strip", "tapered"])
+def test_every_straight_piece_has_its_thickness_up_to_its_corners(name: str, changes: tuple[str, ...]) -> None:
+    """The distance from the centre line of every piece to the edge is half its thickness there, also beside corners."""
+    drawn = api.drawing(spec(name, *changes), 1e-9)
+    cut = next(contour for contour in drawn.contours if contour.layer == "cut")
+    edges = [(complex(*edge.start), complex(*edge.end)) for edge in cut.edges]  # type: ignore[union-attr]
+    table = {key: values for key, (values, _) in drawn.tables[0].columns.items()}
+    points = table["x"] + 1j * table["y"]
+    pieces = range(0, len(points) - 1, 2) if name == "lumped" else range(len(points) - 1)
+    for k in pieces:  # a lumped chain has links between its flexures
+        along = points[k + 1] - points[k]
+        for share in (0.3, 0.5, 0.7):
+            half = 0.5 * (table["thickness"][k] * (1 - share) + table["thickness"][k + 1] * share)
+            at, normal = points[k] + share * along, 1j * along / abs(along)
+            for side in (1, -1):
+                reach = [hit for edge in edges if (hit := _ray(at, side * normal, *edge)) is not None]
+                assert min(reach) == pytest.approx(half, abs=1e-9)
+
+
+def _ray(at: complex, way: complex, start: complex, end: complex) -> float | None:
+    """Return how far a ray goes to an edge [m]; None where it misses it."""
+    edge, off = (end - start) / way, (start - at) / way
+    if edge.imag == 0:
+        return None
+    share = -off.imag / edge.imag
+    reach = off.real + share * edge.real
+    return reach if 0 <= share <= 1 and reach > 0 else None
+
+
 def test_printing_allowance_is_not_drawn() -> None:
     thin = api.drawing(spec("strip", "mechanism.beam.offset=0.1 mm")).tables[0].columns["thickness"][0]
     np.testing.assert_allclose(thin, 0.97721 * MM)

@@ -54,7 +54,7 @@ def run(options: Options, terminal: Terminal) -> Answer:
     wishes = {"kerf": _length(options.kerf, "--kerf"), "tolerance": _length(options.tolerance, "--tolerance")}
     given = {key: value for key, value in wishes.items() if value is not None}
     with RunFolder(out) as folder:
-        for name, data in files(api.drawing(spec), **given).items():
+        for name, data in files(api.drawing(spec, wishes["tolerance"]), **given).items():
             folder.write(name, data)
         origin = provenance("export", spec, options.spec, terminal)
         manifest = folder.commit(origin | {"status": "complete", "exit_code": 0})

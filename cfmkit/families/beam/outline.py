@@ -13,10 +13,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.beams.layout import Layout
+from cfmkit.export.union import quarter_pieces
 from cfmkit.families.beam.build import assemble, mirror_axis, thickest
 from cfmkit.families.beam.parts.spec import PartSpec
 from cfmkit.families.beam.strips import Strip, mirrored, strips
-from cfmkit.geometry import Contour, Curve2D, Drawing, Smooth
+from cfmkit.geometry import TOLERANCE, Contour, Curve2D, Drawing, Smooth
 
 if TYPE_CHECKING:
     from cfmkit.beams.network import Network
@@ -37,22 +38,34 @@ _CORNERS = 64
 _ON_AXIS = 0.5
 
 
-def drawing(spec: BeamSpec) -> Drawing:
-    """Return the part, its centre lines, and the point table of every beam."""
+SHARE = 0.2
+"""Part of the tolerance that each step from the exact edges to the lines of the contour may take; there are four."""
+
+
+def drawing(spec: BeamSpec, tolerance: float = TOLERANCE) -> Drawing:
+    """Return the part, its centre lines, and the point table of every beam.
+
+    Parameters
+    ----------
+    spec : BeamSpec
+        What to draw.
+    tolerance : float
+        Largest distance of the contour from the exact edges [m].
+    """
     from cfmkit.export.union import merged
 
     assembly = assemble(spec)
     network = assembly.network
     fits = Layout(network, assembly.drive()).fits
-    beams = {name: strips(network, fits, name) for name in network.beams}
-    pieces, holes = _pieces(assembly, beams)
+    beams = {name: strips(network, fits, name, SHARE * tolerance) for name in network.beams}
+    pieces, holes = _pieces(assembly, beams, SHARE * tolerance)
     lines = [_line(strip) for found in beams.values() for strip in found]
     if (axis := mirror_axis(assembly)) is not None:
         pieces = [*pieces, *(mirrored(piece, *axis)[::-1] for piece in pieces), *_bars(assembly, beams, *axis)]
         holes = [*holes, *(mirrored(hole, *axis)[::-1] for hole in holes)]
         lines = [*lines, *(_mirrored_line(line, *axis) for line in lines)]
     fillet = (spec.mechanism.part or PartSpec()).fillet
-    contours = merged(pieces, fillet, holes)
+    contours = merged(pieces, fillet, holes, rough=min(ROUGH, SHARE * tolerance))
     paths = tuple(Contour((line,), "path") for line in lines)
     tables = tuple(_table(f"beam-{name}", found) for name, found in beams.items())
     return Drawing("beams", (*contours, *paths), tables)
@@ -62,24 +75,27 @@ def _mirrored_line(line: Smooth, at: complex, direction: float) -> Smooth:
     return Smooth(mirrored(line.points, at, direction), mirrored(line.tangents, 0j, direction))
 
 
-def _pieces(assembly: Assembly, beams: dict[str, list[Strip]]) -> tuple[list[FloatArray], list[FloatArray]]:
+def _pieces(
+    assembly: Assembly, beams: dict[str, list[Strip]], bulge: float
+) -> tuple[list[FloatArray], list[FloatArray]]:
     """Return the polygons of one half: strips, joints, pads, eyes, bars; and the holes in eyes."""
     network = assembly.network
     pieces = [strip.polygon for found in beams.values() for strip in found]
     holes = []
     for name, found in beams.items():
         beam = network.beams[name]
-        pieces += [_disc(one.points[-1], 0.5 * min(one.thickness[-1], two.thickness[0])) for one, two in _joints(found)]
+        for one, two in itertools.pairwise(found):
+            pieces.append(_disc(one.points[-1], 0.5 * min(one.thickness[-1], two.thickness[0]), bulge))
         for node, strip, last in ((beam.start, found[0], False), (beam.end, found[-1], True)):
             size = float(strip.thickness[-1 if last else 0])
             at = strip.points[-1 if last else 0]
-            pieces.append(_disc(at, 0.5 * size))
+            pieces.append(_disc(at, 0.5 * size, bulge))
             support = network.nodes[node].support
             if _padded(assembly, node):
                 pieces.append(_pad(strip, last))
             elif support.across and not support.rotation:
-                pieces.append(_disc(at, EYE * size))
-                holes.append(_disc(at, HOLE * size))
+                pieces.append(_disc(at, EYE * size, bulge))
+                holes.append(_disc(at, HOLE * size, bulge))
             pieces += _arm(network, node, at, PAD * size)
     thick = max(float(strip.thickness.max()) for found in beams.values() for strip in found)
     for link in network.links:
@@ -133,12 +149,9 @@ def _arm(network: Network, node: str, at: FloatArray, width: float) -> list[Floa
     return [_bar(place, at, width)] if np.hypot(*(at - place)) > ROUGH else []
 
 
-def _joints(found: list[Strip]) -> list[tuple[Strip, Strip]]:
-    return list(itertools.pairwise(found))
-
-
-def _disc(center: FloatArray, radius: float) -> FloatArray:
-    turn = np.linspace(0.0, 2 * math.pi, _CORNERS, endpoint=False)
+def _disc(center: FloatArray, radius: float, bulge: float) -> FloatArray:
+    """Return a polygon whose sides are no farther than `bulge` [m] within the circle."""
+    turn = np.linspace(0.0, 2 * math.pi, max(_CORNERS, 4 * quarter_pieces(radius, bulge)), endpoint=False)
     return center + radius * np.column_stack([np.cos(turn), np.sin(turn)])
 
 

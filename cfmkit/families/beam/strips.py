@@ -13,11 +13,11 @@ from cfmkit.curves import read_only
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
 
-    from cfmkit.beams.beam import Fit
+    from cfmkit.beams.beam import Beam, Fit
     from cfmkit.beams.network import Network
     from cfmkit.curves import FloatArray
 
-STEPS = 160
+STEPS, MOST_STEPS = 160, 20_000
 _GAUSS, _WEIGHTS = np.polynomial.legendre.leggauss(4)
 NEAR = 3.0  # thicknesses beside a common end that are no gap
 TOGETHER = 0.25  # of the thickness: ends closer than this are one
@@ -39,16 +39,24 @@ class Strip:
         return self.points + half, self.points - half
 
     @property
+    def sagitta(self) -> float:
+        """How far the edges and the centre line bulge out of the lines between neighbouring points, at most [m]."""
+        turn = np.abs(np.diff(self.angle))
+        chords = np.max([np.hypot(*np.diff(line, axis=0).T) for line in (self.points, *self.sides)], axis=0)
+        return float((turn * (chords + turn * self.thickness[1:])).max(initial=0.0)) / 8.0
+
+    @property
     def polygon(self) -> FloatArray:
         """The outline, (2n, 2) [m]."""
         left, right = self.sides
         return np.concatenate([left, right[::-1]])
 
 
-def strips(network: Network, fits: Mapping[str, Fit], name: str, steps: int = STEPS) -> list[Strip]:
+def strips(network: Network, fits: Mapping[str, Fit], name: str, tolerance: float = np.inf) -> list[Strip]:
     """Return a beam in smooth pieces, from its first end to its last.
 
-    It is cut where its shape has a corner and where its thickness has a kink or a step.
+    It is cut where its shape has a corner and where its thickness has a kink or a step. Lines between the points of
+    a piece are no farther than `tolerance` [m] from its edges and its centre line.
     """
     beam, fit = network.beams[name], fits[name]
     start = network.nodes[beam.start]
@@ -56,19 +64,27 @@ def strips(network: Network, fits: Mapping[str, Fit], name: str, steps: int = ST
     cuts = {*fit.course.breaks.tolist(), *(fit.parameter(float(place)) for place in beam.section.stations)}
     found = []
     for low, high in itertools.pairwise(sorted(cuts)):
-        count = max(4, int(np.ceil(steps * (high - low))))
-        t, inside = np.linspace(low, high, count + 1), 0.5 * (low + high)
-        half = 0.5 * (t[1] - t[0])
-        nodes = (t[:-1] + half)[:, None] + half * _GAUSS
-        speed, angle = np.real(fit.speed(nodes, inside)), np.real(fit.angle(nodes, inside))
-        step = half * np.stack([speed * np.cos(angle), speed * np.sin(angle)]) @ _WEIGHTS
-        points = at + np.concatenate([np.zeros((1, 2)), np.cumsum(step.T, axis=0)])
-        place = t if fit.course.uniform else np.array([float(np.real(fit.arc(float(one)))) for one in t])
-        middle = float(place[len(place) // 2])
-        thickness = np.real(beam.section.thickness_at(place, middle)) + np.zeros(len(t))
-        found.append(Strip(read_only(points), read_only(np.real(fit.angle(t, inside))), read_only(thickness)))
-        at = points[-1]
+        count = max(4, int(np.ceil(STEPS * (high - low))))
+        piece = _piece(beam, fit, at, np.linspace(low, high, count + 1))
+        while piece.sagitta > tolerance and count < MOST_STEPS:
+            count = min(MOST_STEPS, int(1.1 * count * np.sqrt(piece.sagitta / tolerance)) + 1)
+            piece = _piece(beam, fit, at, np.linspace(low, high, count + 1))
+        found.append(piece)
+        at = piece.points[-1]
     return found
+
+
+def _piece(beam: Beam, fit: Fit, at: FloatArray, t: FloatArray) -> Strip:
+    """Return a smooth piece of a beam that starts at a place [m], at parameters of its shape."""
+    inside, half = 0.5 * (t[0] + t[-1]), 0.5 * (t[1] - t[0])
+    nodes = (t[:-1] + half)[:, None] + half * _GAUSS
+    speed, angle = np.real(fit.speed(nodes, inside)), np.real(fit.angle(nodes, inside))
+    step = half * np.stack([speed * np.cos(angle), speed * np.sin(angle)]) @ _WEIGHTS
+    points = at + np.concatenate([np.zeros((1, 2)), np.cumsum(step.T, axis=0)])
+    place = t if fit.course.uniform else np.array([float(np.real(fit.arc(float(one)))) for one in t])
+    middle = float(place[len(place) // 2])
+    thickness = np.real(beam.section.thickness_at(place, middle)) + np.zeros(len(t))
+    return Strip(read_only(points), read_only(np.real(fit.angle(t, inside))), read_only(thickness))
 
 
 def mirrored(points: FloatArray, at: complex, direction: float) -> FloatArray:

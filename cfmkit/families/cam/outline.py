@@ -15,7 +15,7 @@ import numpy as np
 from cfmkit.families.cam.build import assemble_sides
 from cfmkit.families.cam.existence import flanks_crossing
 from cfmkit.families.refusals import CannotBuild
-from cfmkit.geometry import Arc, Contour, Curve2D, Drawing, Edge, Line, Smooth
+from cfmkit.geometry import TOLERANCE, Arc, Contour, Curve2D, Drawing, Edge, Line, Smooth
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -32,7 +32,7 @@ TAB_CLEARANCE = 0.25
 """Space left between the tab and a roller, in roller radii."""
 
 
-def drawing(spec: CamSpec) -> Drawing:
+def drawing(spec: CamSpec, tolerance: float = TOLERANCE) -> Drawing:
     """Return the plate, the roller paths and their point tables of a cam specification.
 
     Raises

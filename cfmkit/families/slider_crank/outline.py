@@ -7,13 +7,14 @@ end and at the slider, links wider than any flexure, eyes around the pins of the
 from __future__ import annotations
 
 import itertools
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cfmkit.families.slider_crank.build import linkage_of, resolve, unloaded_angle
 from cfmkit.families.slider_crank.flexures.assembly import corners, flexures_of, strip_of
-from cfmkit.geometry import Arc, Contour, Curve2D, Drawing, Line, circle, polygon
+from cfmkit.geometry import TOLERANCE, Arc, Contour, Curve2D, Drawing, Line, circle, polygon
 
 if TYPE_CHECKING:
     from cfmkit.curves import FloatArray
@@ -23,11 +24,14 @@ if TYPE_CHECKING:
 PAD = (0.012, 0.010)
 """Length and width of the pads [m]."""
 
+STRAIGHT, MITRE = 1e-9, 2.0
+"""Sine of an angle that is no corner; reach of the edges at a sharp corner, in half widths."""
+
 LINK_RATIO, EYE_SHARE, HOLE_SHARE = 5.0, 0.08, 0.04
 """Width of a link in flexure thicknesses; radii of eyes and pin holes in lengths of the shorter link."""
 
 
-def drawing(spec: SliderCrankSpec) -> Drawing:
+def drawing(spec: SliderCrankSpec, tolerance: float = TOLERANCE) -> Drawing:
     """Return the outlines of a slider-crank as its fidelity has it, with a table of its sections.
 
     Raises
@@ -79,13 +83,10 @@ def _strip(strip: Strip, offset: float) -> Drawing:
 
 def _piece(points: FloatArray, half: FloatArray) -> tuple[Contour, ...]:
     """Return the outline around a chain of points with half widths [m], between two pads, and its centre line."""
-    first, last = points[0], points[-1]
     begin, end = _direction(points, 0), _direction(points, len(points) - 1)
-    line = np.vstack([first - PAD[0] * begin, points, last + PAD[0] * end])
+    line = np.vstack([points[0] - PAD[0] * begin, points, points[-1] + PAD[0] * end])
     wide = np.concatenate([[half[0]], half, [half[-1]]])
-    normals = np.array([_normal(line, k) for k in range(len(line))])
-    left, right = line + wide[:, None] * normals, line - wide[:, None] * normals
-    around = [(float(x), float(y)) for x, y in np.concatenate([left, right[::-1]])]
+    around = [(float(x), float(y)) for x, y in (*_edge(line, wide), *reversed(_edge(line, -wide)))]
     kept = [point for point, following in zip(around, [*around[1:], around[0]], strict=True) if point != following]
     centre = [(float(x), float(y)) for x, y in dict.fromkeys(map(tuple, points))]
     path = Contour(tuple(Line(a, b) for a, b in itertools.pairwise(centre)), "path")
@@ -102,9 +103,57 @@ def _direction(points: FloatArray, k: int) -> FloatArray:
     return way
 
 
-def _normal(points: FloatArray, k: int) -> FloatArray:
-    x, y = _direction(points, k)
-    return np.array([-y, x])
+@dataclass(frozen=True)
+class _Side:
+    """One side of a straight piece of a chain: its last point on the centre line, and both ends of the edge [m]."""
+
+    along: FloatArray
+    end: FloatArray
+    first: FloatArray
+    last: FloatArray
+
+
+def _edge(line: FloatArray, half: FloatArray) -> list[FloatArray]:
+    """Return the corners of the edge to the left of a chain, or to the right where half widths are negative [m].
+
+    Every straight piece has exactly its width up to where its edge meets the next one.
+    """
+    sides = []
+    for k in range(len(line) - 1):
+        way = line[k + 1] - line[k]
+        if (length := np.hypot(*way)) > 0:
+            normal = np.array([-way[1], way[0]]) / length
+            sides.append(
+                _Side(way / length, line[k + 1], line[k] + half[k] * normal, line[k + 1] + half[k + 1] * normal)
+            )
+    inner = [corner for one, other in itertools.pairwise(sides) for corner in _corner(one, other)]
+    return [sides[0].first, *inner, sides[-1].last]
+
+
+def _corner(one: _Side, other: _Side) -> list[FloatArray]:
+    """Return where two edges meet; where the width steps, both ends on the line that halves the angle."""
+    if abs(_cross(one.along, other.along)) < STRAIGHT:
+        return [one.last, other.first]
+    at, reach = one.end, float(np.hypot(*(one.last - one.end)))
+    ways = one.last - one.first, other.last - other.first
+    if np.isclose(reach, np.hypot(*(other.first - at)), rtol=1e-9, atol=0.0):
+        met = _meeting(one.last, ways[0], other.first, ways[1])
+        if np.hypot(*(met - at)) <= MITRE * reach:
+            return [met]
+        middle = one.last + other.first - 2.0 * at
+        return [at + reach * middle / np.hypot(*middle)]
+    halving = other.along - one.along
+    return [_meeting(one.last, ways[0], at, halving), _meeting(other.first, ways[1], at, halving)]
+
+
+def _meeting(a: FloatArray, way: FloatArray, b: FloatArray, other: FloatArray) -> FloatArray:
+    """Return where the lines through two points along two ways meet."""
+    met: FloatArray = a + _cross(b - a, other) / _cross(way, other) * way
+    return met
+
+
+def _cross(a: FloatArray, b: FloatArray) -> float:
+    return float(a[0] * b[1] - a[1] * b[0])
 
 
 def _links(crank: float, coupler: float) -> Drawing:

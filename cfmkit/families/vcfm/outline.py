@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.families.vcfm.parts import strip_of
-from cfmkit.geometry import Arc, Contour, Curve2D, Drawing, Edge, Line, Smooth
+from cfmkit.geometry import TOLERANCE, Arc, Contour, Curve2D, Drawing, Edge, Line, Smooth
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -34,7 +34,7 @@ Item = Point | Arc | Smooth
 """A corner, or an edge that is not straight."""
 
 
-def drawing(spec: VcfmSpec) -> Drawing:
+def drawing(spec: VcfmSpec, tolerance: float = TOLERANCE) -> Drawing:
     """Return the leaves with shuttle and walls and the spring, and a table of the leaves' centre line."""
     leaves, low = leaves_contours(spec)
     places, heights, _ = _centre_line(spec)
