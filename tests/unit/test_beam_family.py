@@ -12,6 +12,7 @@ import cfmkit
 from cfmkit.beams import Section, Taper
 from cfmkit.errors import DataError
 from cfmkit.families.beam.build import thickest_of, thinnest_of
+from cfmkit.families.beam.surface.ride import DEFINITIONS as SURFACE
 from cfmkit.results import Status
 
 GUIDED = ("tip: {at: [400 mm, 0 mm]}", "tip: {at: [400 mm, 0 mm], support: parallel}")
@@ -314,6 +315,8 @@ def test_an_imperfection_is_named_and_opens_the_bifurcation():
 
 # --- a surface --------------------------------------------------------------------------------------------
 
+PROFILE = "analysis.surface.profile"
+
 
 def test_the_force_along_a_surface_is_that_at_preload_plus_height():
     result = solved("beam_end_effector")
@@ -327,10 +330,81 @@ def test_the_force_along_a_surface_is_that_at_preload_plus_height():
 def test_normal_and_lateral_force_balance_the_axial_one():
     along = solved("beam_end_effector", "analysis.surface.friction=0.3").curves[1]
     height, way = along.extra["surface_height"].values, along.motion
-    angle = np.arctan(np.gradient(height, way))
-    normal, lateral = along.extra["contact_force"].values, along.extra["lateral_force"].values
-    np.testing.assert_allclose(normal * (np.cos(angle) - 0.3 * np.sin(angle)), along.effort, rtol=1e-12)
-    np.testing.assert_allclose(normal * (np.sin(angle) + 0.3 * np.cos(angle)), lateral, rtol=1e-12)
+    slope = 1.75 * np.pi / 12.3 * np.sin(np.pi * way / (12.3 * MM))  # of the formula, exactly, at the ends, too
+    np.testing.assert_allclose(np.gradient(height, way)[1:-1], slope[1:-1], atol=2e-4)
+    for sign, tail in ((1, ""), (-1, "_back")):  # friction is against the motion: on the way back it helps
+        angle = sign * np.arctan(slope)
+        normal, lateral = (along.extra[f"{name}_force{tail}"].values for name in ("contact", "lateral"))
+        np.testing.assert_allclose(normal * (np.cos(angle) - 0.3 * np.sin(angle)), along.effort, rtol=1e-12)
+        np.testing.assert_allclose(normal * (np.sin(angle) + 0.3 * np.cos(angle)), lateral, rtol=1e-12)
+
+
+def test_forces_on_a_surface_are_the_largest_of_both_ways():
+    """A wedge that falls all the way: with friction the tip is pressed on harder on the way back, up the slope."""
+    result = solved("beam_end_effector", "analysis.surface.friction=0.3", f"{PROFILE}.height=3.5 - x*3.5/12.3")
+    force, angle = value(result, "tip_force_max"), np.arctan(3.5 / 12.3)
+    up = force / (np.cos(angle) - 0.3 * np.sin(angle))
+    assert value(result, "contact_force_max") == pytest.approx(up, rel=1e-9)
+    assert value(result, "lateral_force_max") == pytest.approx(up * (np.sin(angle) + 0.3 * np.cos(angle)), rel=1e-9)
+
+
+@pytest.mark.parametrize("between", ["smooth", "straight"])
+def test_a_surface_is_judged_between_its_points(tmp_path, between):
+    """Eight points of a hump: its top lies between two of them."""
+    from scipy.interpolate import CubicSpline
+
+    x = np.linspace(0, 12.3, 8)
+    y = 3.5 * np.sin(np.pi * x / 12.3)
+    points = "\n".join(f"{a:.9f},{b:.9f}" for a, b in zip(x, y, strict=True))
+    (tmp_path / "hump.csv").write_text(f"x [mm],y [mm]\n{points}\n")
+    found = on_file(tmp_path, f"{{kind: file, file: hump.csv, between: {between}}}")
+    fine = np.linspace(0, 12.3, 200_001)
+    height = (CubicSpline(x, y) if between == "smooth" else lambda at: np.interp(at, x, y))(fine) * MM
+    nominal = found.curves[0]
+    force = CubicSpline(nominal.motion, nominal.force)(1.76 * MM + height)
+    assert value(found, "surface_relief") == pytest.approx(np.ptp(height), rel=1e-9)
+    assert value(found, "tip_force_min") == pytest.approx(force.min(), rel=1e-5)
+    assert value(found, "tip_force_max") == pytest.approx(force.max(), rel=1e-5)
+    stress = np.interp(1.76 * MM + height.max(), nominal.motion, nominal.extra["max_stress"].values)
+    assert value(found, "surface_stress_max") == pytest.approx(stress, rel=1e-6)
+
+
+def on_file(folder, profile):
+    """The end-effector on a surface from a file."""
+    text = cfmkit.dumps(config("beam_end_effector"))
+    start, end = text.index("    profile:"), text.index("    preload:")
+    (folder / "spec.yaml").write_text(text[:start] + f"    profile: {profile}\n" + text[end:])
+    return cfmkit.analyze(cfmkit.load(folder / "spec.yaml"))
+
+
+def test_forces_along_a_surface_do_not_depend_on_how_many_of_its_points_are_written():
+    few, many = (
+        solved("beam_end_effector", f"{PROFILE}.points={n}", f"{PROFILE}.height=1.7*(1 - cos(pi*x/6.15))")
+        for n in (7, 2000)
+    )
+    for name in SURFACE:
+        assert value(few, name) == pytest.approx(value(many, name), rel=1e-9)
+
+
+def test_stress_along_a_surface_is_judged_beyond_the_window_too():
+    changes = ("mechanism.safety_factor=1.3", "analysis.window=[1.76 mm, 3 mm]")
+    result = solved("beam_end_effector", *changes)
+    assert {"surface_stress_exceeded"} == {"surface_stress_exceeded", "stress_exceeded"} & warned(result).keys()
+    assert value(result, "surface_stress_max") == pytest.approx(66.4e6, abs=5e4)
+    assert value(result, "surface_safety_factor") == pytest.approx(76 / 1.3 / 66.4, rel=1e-3)
+    missed = [outcome.metric for outcome in cfmkit.check(result) if not outcome.ok]
+    assert missed == ["surface_safety_factor"]
+
+
+def test_a_tip_that_leaves_the_surface_is_not_out_of_reach():
+    """Where the surface falls below the mechanism at rest, and where the mechanism has no force left."""
+    falls = solved("beam_end_effector", f"{PROFILE}.height=-x/2")
+    assert falls.status is Status.PARTIAL
+    assert {"tip_lifts_off"} == {"tip_lifts_off", "surface_out_of_reach"} & warned(falls).keys()
+    assert value(falls, "surface_reach") == pytest.approx(2 * 1.76 * MM, rel=1e-9)
+    assert falls.curves[1].extra["contact_force"].values.min() >= 0
+    far = solved("beam_end_effector", "analysis.surface.preload=3 mm")
+    assert {"surface_out_of_reach"} == {"tip_lifts_off", "surface_out_of_reach"} & warned(far).keys()
 
 
 def test_a_surface_that_rises_too_far_is_partial():

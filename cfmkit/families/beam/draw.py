@@ -50,7 +50,7 @@ def figures(result: Result) -> dict[str, Callable[[], Figure]]:
     if result.state is None or not result.curves:
         return {}
     makers = [curve, shapes, reactions, stress]
-    if result.spec.at("analysis.surface") is not None:
+    if result.spec.at("analysis.surface") is not None and len(result.curves) > 1:
         makers.append(surface)
     return {maker.__name__: partial(maker, result) for maker in makers}
 

@@ -2,7 +2,9 @@
 
 The carrier moves along x; the tip is guided along the drive and follows the heights, so that the mechanism is displaced
 by the preload plus the height. With a slope angle a and friction m the axial force F of the mechanism is held by the
-normal force N: F = N (cos a - m sin a) on the way along x, and the carrier is pushed back by N (sin a + m cos a).
+normal force N: F = N (cos a - m sin a) on the way along x, and the carrier is pushed back by N (sin a + m cos a). On
+the way back the slope has the other sign. Between the points of a profile the surface runs on (`Course`); extremes are
+those of everything between its ends.
 
 Assumes: slow motion, a sharp tip that stays on the surface, guides without friction.
 
@@ -13,14 +15,15 @@ Reference
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cfmkit.curves import Column, Curve
 from cfmkit.families.beam.findings import finding
-from cfmkit.numerics.cubic import values_at
+from cfmkit.families.beam.surface.course import LOOKED_AT, course_of, largest
+from cfmkit.numerics.cubic import bisect, values_at
 from cfmkit.results import Quantity
 from cfmkit.units import format_short
 
@@ -29,18 +32,26 @@ if TYPE_CHECKING:
 
     from cfmkit.curves import FloatArray
     from cfmkit.families.beam.model import Solution
+    from cfmkit.families.beam.surface.course import Course
     from cfmkit.families.beam.surface.spec import Surface
     from cfmkit.results import Finding
 
 DEFINITIONS = {
-    "tip_force_min": ("force", "smallest axial force of the tip along the surface"),
-    "tip_force_max": ("force", "largest axial force of the tip along the surface"),
+    "tip_force_min": ("force", "smallest axial force of the tip between the ends of the way along the surface"),
+    "tip_force_max": ("force", "largest axial force of the tip between the ends of the way along the surface"),
     "tip_force_band": ("ratio", "(max - min)/max of the axial force along the surface"),
-    "surface_relief": ("length", "largest height of the surface less the smallest"),
-    "contact_force_max": ("force", "largest normal force between tip and surface"),
-    "lateral_force_max": ("force", "largest force against the motion along the surface"),
+    "surface_relief": ("length", "largest height of the surface less the smallest, as far as it is followed"),
+    "contact_force_max": ("force", "largest normal force between tip and surface, whichever way it moves"),
+    "lateral_force_max": ("force", "largest force against the motion along the surface, whichever way it moves"),
     "surface_reach": ("length", "how far along the surface the mechanism can follow it"),
-}
+    "surface_stress_max": ("stress", "largest stress in the mechanism along the surface"),
+    "surface_safety_factor": (
+        "factor", "allowable stress over the largest stress along the surface; 1 or more is within the limit"
+    ),
+}  # fmt: skip
+
+_SLACK = 1e-12  # of the travel: a surface may reach exactly to its ends
+_NO_FORCE = 1e-9  # of the largest force: less is none
 
 
 @dataclass(frozen=True)
@@ -51,14 +62,21 @@ class Ride:
     ----------
     place, height, displacement : (n,) array
         Along the surface, of it, and of the mechanism [m].
-    force, contact, lateral : (n,) array
-        Axial force of the tip, normal force on the surface, force against the motion [N].
+    force : (n,) array
+        Axial force of the tip [N].
+    contact, lateral : (2, n) arrays
+        Normal force on the surface and force against the motion [N], on the way along x and on the way back; not
+        finite where the tip jams.
     stress : (n,) array
         Largest stress in the mechanism [Pa].
     stable : (n,) array of bool
         Whether the mechanism is stable there.
-    missing : str
-        Why it ends before the surface does; empty if it does not.
+    values : mapping
+        The scalar results; extremes are those between the points, too.
+    ending : Finding or None
+        Why it ends before the surface does.
+    findings : tuple of Finding
+        What else is wrong with it.
     """
 
     place: FloatArray
@@ -69,28 +87,88 @@ class Ride:
     lateral: FloatArray
     stress: FloatArray
     stable: Any
-    missing: str = ""
+    values: Mapping[str, float | None]
+    ending: Finding | None = None
+    findings: tuple[Finding, ...] = ()
+
+    @property
+    def missing(self) -> str:
+        """Why it ends before the surface does; empty if it does not."""
+        return "" if self.ending is None else self.ending.message
 
 
-def profile(surface: Surface) -> tuple[FloatArray, FloatArray]:
-    """Return places along a surface and its heights [m].
+@dataclass(frozen=True)
+class Tip:
+    """The mechanism as the tip feels it: over displacements that increase [m], from rest to where it turns back.
 
-    Raises
-    ------
-    cfmkit.errors.DataError
-        If the file cannot be used.
+    Attributes
+    ----------
+    surface : Surface
+        What the tip follows.
+    course : Course
+        Its height and slope.
+    x, effort, stress, stable : (n,) arrays
+        Displacements [m], forces [N], largest stresses [Pa], and 1 where stable.
     """
-    given = surface.profile
-    if given.kind == "file":
-        from pathlib import Path
 
-        from cfmkit.tables.labpoints import read_profile
+    surface: Surface
+    course: Course
+    x: FloatArray
+    effort: FloatArray
+    stress: FloatArray
+    stable: FloatArray
 
-        return read_profile(getattr(given.file, "path", Path(given.file)))
-    from cfmkit.numerics.formula import formula
+    def displacement(self, place: FloatArray) -> FloatArray:
+        """Return the displacement of the mechanism at places along the surface [m]."""
+        return self.surface.preload + self.course.height(place)
 
-    x = np.linspace(0.0, given.length, given.points)
-    return x, formula(given.height)(x * 1e3) * 1e-3
+    def force(self, place: FloatArray) -> FloatArray:
+        """Return the axial force at places along the surface [N]."""
+        return self.force_at(self.displacement(place))
+
+    def force_at(self, displacement: FloatArray) -> FloatArray:
+        """Return the axial force at displacements [N]; at those that are not solved for, that at the nearest one."""
+        return values_at(self.x, self.effort, np.clip(displacement, self.x[0], self.x[-1]))
+
+    def contact(self, place: FloatArray, way: int) -> FloatArray:
+        """Return the normal force on the way along x (1) or back (-1) [N]; infinite where the tip jams."""
+        slope = way * self.course.slope(place)
+        with np.errstate(divide="ignore"):
+            return self.force(place) * np.hypot(1.0, slope) / np.maximum(1.0 - self.surface.friction * slope, 0.0)
+
+    def lateral(self, place: FloatArray, way: int) -> FloatArray:
+        """Return the force against the motion along x (1) or back (-1) [N]."""
+        slope = way * self.course.slope(place)
+        return self.contact(place, way) * (slope + self.surface.friction) / np.hypot(1.0, slope)
+
+    def follows(self, place: FloatArray) -> Any:
+        """Tell at which places the mechanism is solved for what the surface asks of it, and presses on it."""
+        u = self.displacement(place)
+        slack = _SLACK * (self.x[-1] - self.x[0])
+        inside = (u >= self.x[0] - slack) & (u <= self.x[-1] + slack)
+        return inside & (self.force(place) >= 0)
+
+    def ending(self, place: float) -> Finding:
+        """Return why the tip does not follow the surface beyond a place [m]."""
+        u = float(self.displacement(np.array([place]))[0])
+        where, asked = format_short(place, "length"), format_short(u, "length")
+        if u < self.x[0] and self.effort[0] <= 0:
+            return finding(
+                "tip_lifts_off",
+                f"the tip leaves the surface at {where} along it: there the mechanism is at rest and the surface falls "
+                "further",
+            )
+        if self.x[0] <= u <= self.x[-1] and np.isfinite(self.force(np.array([place]))).all():
+            return finding(
+                "tip_lifts_off",
+                f"the tip leaves the surface at {where} along it: the force of the mechanism falls to zero at a "
+                f"displacement of {asked}",
+            )
+        low, high = (format_short(float(end), "length") for end in (self.x[0], self.x[-1]))
+        return finding(
+            "surface_out_of_reach",
+            f"the surface asks for a displacement of {asked} at {where}, the mechanism is solved for {low} to {high}",
+        )
 
 
 def ride(solution: Solution) -> Ride | None:
@@ -98,28 +176,85 @@ def ride(solution: Solution) -> Ride | None:
     surface = solution.spec.analysis.surface
     if surface is None:
         return None
-    place, height = profile(surface)
-    displacement = surface.preload + height
-    x = solution.motion
-    inside = np.isfinite(displacement) & (displacement >= x.min() - 1e-15) & (displacement <= x.max() * (1 + 1e-12))
-    count = len(place) if inside.all() else int(np.argmin(inside))
-    missing = ""
-    if count < len(place):
-        missing = (
-            f"the surface asks for a displacement of {format_short(float(displacement[count]), 'length')} at "
-            f"{format_short(float(place[count]), 'length')}, the mechanism is solved for "
-            f"{format_short(float(x.min()), 'length')} to {format_short(float(x.max()), 'length')}"
+    tip = _tip(solution, surface)
+    rows = tip.course.rows
+    looked_at = tip.course.places(float(rows[-1]))
+    lost = np.flatnonzero(~tip.follows(looked_at))
+    end, ending = float(rows[-1]), None
+    if len(lost):
+        first = int(lost[0])
+        beyond = float(looked_at[first])
+        if first:
+            near = float(looked_at[first - 1])
+            beyond = bisect(lambda place: not tip.follows(np.array([place]))[0], near, beyond)
+            end = float(np.nextafter(beyond, near))
+        ending = tip.ending(beyond)
+        rows = np.append(rows[rows < end], end) if first else rows[:0]
+    u = tip.displacement(rows)
+    ways = (1, -1)
+    contact, lateral = (np.array([of(rows, way) for way in ways]) for of in (tip.contact, tip.lateral))
+    stress, stable = np.interp(u, tip.x, tip.stress), np.interp(u, tip.x, tip.stable) == 1
+    values = _values(tip, rows, solution.assembly.allowable_stress)
+    shown = Ride(rows, u - surface.preload, u, tip.force(rows), contact, lateral, stress, stable, values, ending)
+    return replace(shown, findings=tuple(_findings(tip, shown, solution.assembly.allowable_stress)))
+
+
+def _tip(solution: Solution, surface: Surface) -> Tip:
+    """Return the mechanism up to where its path turns back: the tip cannot follow it beyond."""
+    x, effort, stress = solution.motion, solution.effort, solution.stress
+    steps = np.sign(np.diff(x))
+    turns = np.flatnonzero(steps != steps[0])
+    count = int(turns[0]) + 1 if len(turns) else len(x)
+    sense = slice(None) if steps[0] > 0 else slice(None, None, -1)
+    effort = np.where(np.abs(effort) > _NO_FORCE * np.nanmax(np.abs(effort)), effort, 0.0 * effort)  # at rest: rounding
+    parts = (part[:count][sense] for part in (x, effort, stress, np.asarray(solution.stable, dtype=float)))
+    return Tip(surface, course_of(surface), *parts)
+
+
+def _values(tip: Tip, rows: FloatArray, allowable: float | None) -> dict[str, float | None]:
+    """Return the scalar results by name; extremes are those of the surface and of the force between all points."""
+    numbers: dict[str, float | None] = dict.fromkeys(DEFINITIONS)
+    if not len(rows):
+        return numbers
+    places = tip.course.places(float(rows[-1]))
+    top, bottom = largest(tip.displacement, places), -largest(lambda at: -tip.displacement(at), places)
+    between = np.unique(np.concatenate([np.linspace(bottom, top, LOOKED_AT), np.clip(tip.x, bottom, top)]))
+    high, low = largest(tip.force_at, between), -largest(lambda at: -tip.force_at(at), between)
+    stress = float(np.interp(between, tip.x, tip.stress).max())
+    contact, lateral = (
+        max(largest(lambda at, of=of, way=way: of(at, way), places) for way in (1, -1))  # type: ignore[misc]
+        for of in (tip.contact, tip.lateral)
+    )
+    return numbers | {
+        "tip_force_min": low,
+        "tip_force_max": high,
+        "tip_force_band": (high - low) / high if high > 0 else None,
+        "surface_relief": top - bottom,
+        "contact_force_max": contact if np.isfinite(contact) else None,
+        "lateral_force_max": lateral if np.isfinite(lateral) else None,
+        "surface_reach": float(rows[-1] - rows[0]),
+        "surface_stress_max": stress,
+        "surface_safety_factor": allowable / stress if allowable is not None and stress > 0 else None,
+    }
+
+
+def _findings(tip: Tip, found: Ride, allowable: float | None) -> Iterator[Finding]:
+    """Yield what is wrong with a ride beside its ending."""
+    stress = found.values["surface_stress_max"]
+    if allowable is not None and stress is not None and stress > allowable:
+        yield finding(
+            "surface_stress_exceeded",
+            f"along the surface the largest stress is {format_short(stress, 'stress')}; allowable are "
+            f"{format_short(allowable, 'stress')}",
         )
-    slope = np.gradient(height, place)[:count]
-    place, height, displacement = place[:count], height[:count], displacement[:count]
-    force = values_at(x, solution.effort, displacement)
-    cos = 1.0 / np.hypot(1.0, slope)
-    with np.errstate(divide="ignore"):
-        contact = force / np.maximum(cos - surface.friction * slope * cos, 0.0)
-    lateral = contact * (slope * cos + surface.friction * cos)
-    stress = np.interp(displacement, x, solution.stress)
-    stable = np.interp(displacement, x, solution.stable) == 1
-    return Ride(place, height, displacement, force, contact, lateral, stress, stable, missing)
+    if not len(found.place):
+        return
+    places = tip.course.places(float(found.place[-1]))
+    for way, told in ((1, "along x"), (-1, "back")):
+        jammed = ~np.isfinite(tip.contact(places, way))
+        if jammed.any():
+            place = format_short(float(places[int(jammed.argmax())]), "length")
+            yield finding("tip_jams", f"on the way {told} the slope at {place} is too steep for the friction")
 
 
 def curve_of(found: Ride) -> Curve:
@@ -127,8 +262,10 @@ def curve_of(found: Ride) -> Curve:
     extra = {
         "surface_height": Column(found.height, "length"),
         "mechanism_displacement": Column(found.displacement, "length"),
-        "contact_force": Column(found.contact, "force"),
-        "lateral_force": Column(found.lateral, "force"),
+        "contact_force": Column(found.contact[0], "force"),
+        "lateral_force": Column(found.lateral[0], "force"),
+        "contact_force_back": Column(found.contact[1], "force"),
+        "lateral_force_back": Column(found.lateral[1], "force"),
         "max_stress": Column(found.stress, "stress"),
     }
     branch = np.repeat(["surface"], len(found.place))
@@ -137,28 +274,11 @@ def curve_of(found: Ride) -> Curve:
 
 def values_along(found: Ride) -> Mapping[str, Quantity]:
     """Return the scalar results of a ride by name."""
-    numbers: dict[str, float | None] = dict.fromkeys(DEFINITIONS)
-    if len(found.place):
-        low, high = float(found.force.min()), float(found.force.max())
-        numbers = {
-            "tip_force_min": low,
-            "tip_force_max": high,
-            "tip_force_band": (high - low) / high if high > 0 else None,
-            "surface_relief": float(np.ptp(found.height)),
-            "contact_force_max": float(found.contact.max()) if np.isfinite(found.contact).all() else None,
-            "lateral_force_max": float(found.lateral.max()) if np.isfinite(found.lateral).all() else None,
-            "surface_reach": float(found.place[-1] - found.place[0]),
-        }
-    return {name: Quantity(value, *DEFINITIONS[name]) for name, value in numbers.items()}
+    return {name: Quantity(value, *DEFINITIONS[name]) for name, value in found.values.items()}
 
 
 def findings_along(found: Ride) -> Iterator[Finding]:
     """Yield what is wrong with a ride."""
-    if found.missing:
-        yield finding("surface_out_of_reach", found.missing)
-    if len(found.force) and found.force.min() <= 0:
-        place = float(found.place[int(found.force.argmin())])
-        yield finding("tip_lifts_off", f"the tip is not pressed on the surface at {format_short(place, 'length')}")
-    if not np.isfinite(found.contact).all():
-        place = float(found.place[int(np.argmin(np.isfinite(found.contact)))])
-        yield finding("tip_jams", f"the slope at {format_short(place, 'length')} is too steep for the friction")
+    if found.ending is not None:
+        yield found.ending
+    yield from found.findings

@@ -20,6 +20,9 @@ class FileProfile(Model):
 
     kind: Literal["file"]
     file: str = Field(description="a CSV beside the specification: x [mm], y [mm]")
+    between: Literal["smooth", "straight"] = Field(
+        "smooth", description="how it runs between its points: a cubic spline, or straight lines with corners"
+    )
 
     @field_validator("file", mode="wrap")
     @classmethod
