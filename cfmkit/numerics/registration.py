@@ -6,6 +6,10 @@ Weights are Tukey's biweight of the normal residuals, c = 4.685, in units of the
 standard deviation on their curve, 1.4826 MAD; the iteration starts without weights. Several curves are
 registered jointly: one motion each would hide how they stand to each other.
 
+A part that is wider by the same amount along all normals can be registered with that width as a fourth
+unknown. Without it steep curves take the width for a shift along them, and where they are less
+steep the points that contradict this look like outliers.
+
 The motion is p -> R(angle) p + shift, about the origin.
 """
 
@@ -84,7 +88,11 @@ class Registration:
         Of angle and shift, inflated where successive residuals are alike.
     growth : (2,) array
         Shift, at the centre of the points, by which the registration would answer a part that is
-        larger by one along all normals: an error of width that it takes for a place.
+        larger by one along all normals: an error of width that it takes for a place. 0 where the width is fitted.
+    width : float
+        By how much the part is larger along all normals, as fitted; 0 where it was not.
+    width_deviation : float
+        Its standard deviation.
     """
 
     angle: float
@@ -95,6 +103,8 @@ class Registration:
     weights: tuple[FloatArray, ...]
     covariance: FloatArray
     growth: FloatArray
+    width: float = 0.0
+    width_deviation: float = 0.0
 
     @property
     def deviations(self) -> FloatArray:
@@ -169,7 +179,11 @@ def feet(curve: SmoothCurve, points: FloatArray, guess: FloatArray | None = None
 
 
 def register(
-    points: Sequence[FloatArray], curves: Sequence[SmoothCurve], robust: bool = True, start: FloatArray | None = None
+    points: Sequence[FloatArray],
+    curves: Sequence[SmoothCurve],
+    robust: bool = True,
+    start: FloatArray | None = None,
+    width: bool = False,
 ) -> Registration:
     """Return points registered jointly to their curves.
 
@@ -183,35 +197,75 @@ def register(
         Whether outliers lose their weight.
     start : (3,) array, optional
         Angle [rad] and shift to start from; default: none.
+    width : bool
+        Whether the part may be larger or smaller by one amount along all normals.
     """
-    state = np.zeros(3) if start is None else np.array(start, dtype=float)
+    state = np.zeros(4)
+    state[:3] = 0.0 if start is None else start
     size = float(np.sqrt(np.mean(np.concatenate([(item - item.mean(axis=0)) ** 2 for item in points]).sum(axis=1))))
     guess: list[FloatArray | None] = [None] * len(points)
     for weighted in (False, True) if robust else (False,):
         for _ in range(_STEPS):
-            moved = [turned(item, state[0], state[1:]) for item in points]
+            moved = [turned(item, state[0], state[1:3]) for item in points]
             found = [feet(curve, item, u) for curve, item, u in zip(curves, moved, guess, strict=True)]
             guess = [*found]
-            rows, residuals, weights = _equations(curves, moved, found, weighted)
-            step = _step(rows, residuals, weights, size)
-            state = _composed(state, step)
-            if np.abs(step * [size, 1.0, 1.0]).max() <= 1e-14 * size:
+            rows, residuals, weights = _equations(curves, moved, found, weighted, state[3])
+            step = _step(rows[:, : 4 if width else 3], residuals - state[3], weights, size)
+            state[:3] = _composed(state[:3], step[:3])
+            state[3] += step[3] if width else 0.0
+            if np.abs(step[:3] * [size, 1.0, 1.0]).max() <= 1e-14 * size:
                 break
-    return _registration(state, points, curves, robust)
+    return _registration(state, points, curves, robust, width)
+
+
+def registered_where_it_is(
+    points: Sequence[FloatArray], curves: Sequence[SmoothCurve], like: Registration
+) -> Registration:
+    """Return points that are in the part's datum already: nothing is moved, and outliers are those of a registration.
+
+    Parameters
+    ----------
+    points, curves
+        As for `register`.
+    like : Registration
+        Whose weights count, of the same points.
+    """
+    found = [feet(curve, item) for curve, item in zip(curves, points, strict=True)]
+    _, residuals, weights = _equations(curves, points, found, False, 0.0)
+    cuts = np.cumsum([len(item) for item in points])[:-1]
+    inside = np.split(weights, cuts)
+    return Registration(
+        angle=0.0,
+        shift=np.zeros(2),
+        points=tuple(points),
+        parameters=tuple(found),
+        errors=tuple(np.split(residuals, cuts)),
+        weights=tuple(weight * one for weight, one in zip(like.weights, inside, strict=True)),
+        covariance=np.zeros((3, 3)),
+        growth=np.zeros(2),
+    )
 
 
 def _equations(
-    curves: Sequence[SmoothCurve], moved: Sequence[FloatArray], parameters: Sequence[FloatArray], weighted: bool
+    curves: Sequence[SmoothCurve],
+    moved: Sequence[FloatArray],
+    parameters: Sequence[FloatArray],
+    weighted: bool,
+    width: float,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the rows of the linearised problem, the normal residuals and the weights, all curves stacked."""
+    """Return the rows of the linearised problem, the normal residuals and the weights, all curves stacked.
+
+    The last column is that of the width, which the residuals still hold.
+    """
     frames = [curve.frame(u) for curve, u in zip(curves, parameters, strict=True)]
     points, normals = np.concatenate(moved), np.concatenate([item.normals for item in frames])
     residuals = _dot(points - np.concatenate([item.points for item in frames]), normals)
-    rows = np.column_stack([normals[:, 1] * points[:, 0] - normals[:, 0] * points[:, 1], normals])
+    lever = normals[:, 1] * points[:, 0] - normals[:, 0] * points[:, 1]
+    rows = np.column_stack([lever, normals, -np.ones(len(normals))])
     inside = np.concatenate([_inside(curve, u) for curve, u in zip(curves, parameters, strict=True)])
     weights = inside.astype(float)
     if weighted:
-        weights *= _trust(residuals, inside, [len(item) for item in moved])
+        weights *= _trust(residuals - width, inside, [len(item) for item in moved])
     return rows, residuals, weights
 
 
@@ -230,7 +284,7 @@ def _inside(curve: SmoothCurve, u: FloatArray) -> Any:
 
 def _step(rows: FloatArray, residuals: FloatArray, weights: FloatArray, size: float) -> FloatArray:
     root = np.sqrt(weights)[:, None]
-    scale = np.array([size, 1.0, 1.0])
+    scale = np.array([size, 1.0, 1.0, 1.0])[: rows.shape[1]]
     solution = np.linalg.lstsq(root * rows / scale, -root[:, 0] * residuals, rcond=None)[0]
     step: FloatArray = solution / scale
     return step
@@ -242,27 +296,29 @@ def _composed(state: FloatArray, step: FloatArray) -> FloatArray:
 
 
 def _registration(
-    state: FloatArray, points: Sequence[FloatArray], curves: Sequence[SmoothCurve], robust: bool
+    state: FloatArray, points: Sequence[FloatArray], curves: Sequence[SmoothCurve], robust: bool, width: bool
 ) -> Registration:
-    moved = [turned(item, state[0], state[1:]) for item in points]
+    moved = [turned(item, state[0], state[1:3]) for item in points]
     found = [feet(curve, item) for curve, item in zip(curves, moved, strict=True)]
-    rows, residuals, weights = _equations(curves, moved, found, robust)
+    rows, residuals, weights = _equations(curves, moved, found, robust, state[3])
+    rows = rows[:, : 4 if width else 3]
     cuts = np.cumsum([len(item) for item in points])[:-1]
     errors, shares = np.split(residuals, cuts), np.split(weights, cuts)
-    inside = weights > 0
-    free = max(int(inside.sum()) - 3, 1)
-    variance = float((weights * residuals**2).sum() / free)
-    seen = [error[share > 0] for error, share in zip(errors, shares, strict=True)]
+    inside, left = weights > 0, residuals - state[3]
+    free = max(int(inside.sum()) - rows.shape[1], 1)
+    variance = float((weights * left**2).sum() / free)
+    seen = [error[share > 0] - state[3] for error, share in zip(errors, shares, strict=True)]
     alike = max([correlation_time(error) for error in seen if len(error)], default=1.0)
     normal = rows.T @ (weights[:, None] * rows)
     covariance: FloatArray = variance * alike * np.asarray(np.linalg.pinv(normal, rcond=1e-18), dtype=float)
     size = float(np.ptp(np.concatenate(moved), axis=0).max())
     answer = _step(rows, np.ones_like(residuals), weights, size)
     x, y = np.concatenate(moved).mean(axis=0)
-    growth = answer[1:] + answer[0] * np.array([-y, x])
+    growth = answer[1:3] + answer[0] * np.array([-y, x])
     return Registration(
-        float(state[0]), state[1:], tuple(moved), tuple(found), tuple(errors), tuple(shares), covariance, growth
-    )
+        float(state[0]), state[1:3], tuple(moved), tuple(found), tuple(errors), tuple(shares), covariance[:3, :3],
+        growth, float(state[3]), float(np.sqrt(covariance[3, 3])) if width else 0.0,
+    )  # fmt: skip
 
 
 def gaps_across(curve: SmoothCurve, points: FloatArray, parameters: FloatArray, axis: int = 0) -> FloatArray:

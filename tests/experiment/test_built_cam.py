@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from flanks import Errors, measured
+from flanks import Errors, flanks, measured, parameters
 
 import cfmkit
 from cfmkit.bodies.cam_built import built_flank, built_track
@@ -239,6 +239,59 @@ def test_what_a_width_error_is_taken_for_is_told_with_the_weak_direction(tmp_pat
     (message,) = [item.message for item in found.warnings if item.name == "registration_weak"]
     assert "% the shift in y; " in message
     assert f"a cam that lies {0.01 * lifted:.4g} mm lower" in message
+
+
+@pytest.mark.parametrize("waves", [{}, {"noise": 0.002e-3}, {"waviness": 0.015e-3, "noise": 0.002e-3}])
+@pytest.mark.parametrize("offset", [-0.05e-3, 0.05e-3, 0.12e-3])
+def test_a_cam_that_is_wider_has_the_force_of_one_cut_with_that_offset_from_its_start(tmp_path, offset, waves):
+    found = built(tmp_path, Errors(offset=offset, **waves))
+    assert found.values["profile_outliers"].value < 6
+    assert found.values["registration_width"].value == pytest.approx(offset, abs=0.006e-3)
+    warnings = {item.name: item.message for item in found.warnings}
+    assert ("more" if offset > 0 else "less") in warnings["width_error"]
+    spec = cfmkit.load(tmp_path / "cam.yaml")
+    cut = spec.replace(
+        {"mechanism.profile.file": None, "mechanism.profile.noise": None, "mechanism.profile.offset": offset}
+    )
+    truth = cfmkit.analyze(cut).curve.on("load")
+    curve = found.curve.on("load")
+    assert curve.motion[0] < 2.7e-3  # the points begin at 15.5 mm of height
+    inside = curve.motion > 0.006
+    expected = np.interp(curve.motion[inside], truth.motion, truth.effort)
+    errors = curve.effort[inside] - expected
+    # Waves add forces of their own, as large as half a newton, which change their sign.
+    assert abs(errors.mean()) < (0.02 if "waviness" not in waves else 0.1)
+
+
+def test_taken_for_a_motion_a_wider_cam_is_registered_as_before(tmp_path):
+    write(tmp_path, measured(Errors(offset=0.05e-3)))
+    spec = spec_of(tmp_path).replace({"mechanism.profile.registration": "motion"})
+    found = cfmkit.analyze(spec)
+    assert found.values["registration_width"].value == 0
+    assert "width_error" not in {item.name for item in found.warnings}
+
+
+def test_long_waves_are_not_taken_for_a_width(tmp_path):
+    found = built(tmp_path, Errors(waviness=0.02e-3, length=120e-3, noise=0.002e-3))
+    assert found.values["registration_width"].value == 0
+
+
+def test_points_in_the_datum_of_the_part_stay_where_they_are(tmp_path):
+    """A cam that was mounted 0.5 mm too high: nothing of that is registered away."""
+    write(tmp_path, measured(Errors(noise=0.001e-3), move=(0.0, np.array([0.0, 0.5e-3]))))
+    spec = spec_of(tmp_path).replace({"mechanism.profile.registration": "datum"})
+    found = cfmkit.analyze(spec)
+    assert [found.values[f"registration_{name}"].value for name in ("angle", "x", "y")] == [0.0, 0.0, 0.0]
+    u = parameters()
+    normals = np.concatenate([flank.frame(u).normals for flank in flanks()])
+    assert found.values["profile_mean"].value == pytest.approx(0.5e-3 * normals[:, 1].mean(), rel=0.02)
+    assert not {"registration_weak", "width_error"} & {item.name for item in found.warnings}
+
+
+def test_registration_needs_measured_points(tmp_path):
+    (tmp_path / "cam.yaml").write_text(CONFIG.replace("stroke: 240 mm}", "stroke: 240 mm, registration: datum}", 1))
+    with pytest.raises(SpecError, match="it needs a 'file'"):
+        cfmkit.load(tmp_path / "cam.yaml")
 
 
 def test_without_a_side_column_the_sign_of_x_tells_the_sides(tmp_path):

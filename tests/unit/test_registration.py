@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from flanks import Errors, flanks, measured, parameters, profile
 
-from cfmkit.numerics.registration import feet, gaps_across, register, turned
+from cfmkit.numerics.registration import feet, gaps_across, register, registered_where_it_is, turned
 from cfmkit.numerics.robust import neighbour_noise
 from cfmkit.numerics.smoothing import smoothed
 
@@ -65,6 +65,33 @@ def test_the_shift_that_a_width_error_is_taken_for_is_told_beforehand():
     moved = turned(np.zeros((1, 2)), wide.angle - exact.angle, np.zeros(2))[0]
     assert wide.shift - exact.shift + turn - moved == pytest.approx(0.01e-3 * told, rel=1e-3, abs=1e-9)
     assert told[1] > 3
+
+
+@pytest.mark.parametrize("offset", [-0.2e-3, -0.05e-3, 0.05e-3, 0.3e-3])
+def test_a_cam_that_is_simply_wider_keeps_all_its_points_and_its_place_with_a_width(offset):
+    """Taken for a motion, +0.05 mm on both flanks lose the first 12 mm as outliers and move the cam by 0.2 mm."""
+    points = measured(Errors(offset=offset))
+    found, moved = register(points, flanks(), width=True), register(points, flanks())
+    assert found.width == pytest.approx(offset, rel=1e-9)
+    assert found.shift * 1e3 == pytest.approx(SHIFT, abs=5e-9)
+    assert all((weight > 0).all() for weight in found.weights)
+    assert np.concatenate(found.errors) == pytest.approx(np.full(600, offset), rel=1e-9)
+    assert abs(moved.shift[1] * 1e3 - SHIFT[1]) > 2 * abs(offset) * 1e3
+
+
+def test_the_stated_deviation_of_the_width_is_that_of_repeated_measurements():
+    found = [register(measured(Errors(0.0, offset=0.05e-3, noise=0.02e-3, seed=seed)), flanks(), False, width=True)
+             for seed in range(30)]  # fmt: skip
+    widths = np.array([item.width for item in found])
+    assert found[0].width_deviation == pytest.approx(widths.std(ddof=1), rel=0.4)
+    assert abs(widths.mean() - 0.05e-3) < 3 * widths.std(ddof=1) / 30**0.5
+
+
+def test_points_in_the_parts_datum_are_not_moved():
+    points = measured(Errors(offset=0.05e-3), move=(0.0, np.zeros(2)))
+    found = registered_where_it_is(points, flanks(), register(points, flanks(), width=True))
+    assert (found.angle, *found.shift) == (0.0, 0.0, 0.0)
+    assert np.concatenate(found.errors) == pytest.approx(np.full(600, 0.05e-3), rel=1e-9)
 
 
 @pytest.mark.parametrize("spacing", ["even", "uneven"])

@@ -31,7 +31,7 @@ from cfmkit.families.cam.findings import finding
 from cfmkit.families.cam.values import DEFINITIONS, design_values, largest
 from cfmkit.families.findings import mm
 from cfmkit.families.refusals import CannotBuild, no_result
-from cfmkit.numerics.registration import Registration, gaps_across, register
+from cfmkit.numerics.registration import Registration, gaps_across, register, registered_where_it_is
 from cfmkit.results import Quantity, Result, Status
 from cfmkit.tables.labpoints import read_sides
 from cfmkit.tables.source import DataSource
@@ -47,6 +47,12 @@ if TYPE_CHECKING:
 
 STRANGE = 0.01
 """Points are those of another part if they are off the design by this part of their height."""
+
+WIDTH_CERTAIN = 5.0
+"""An error of width is taken from the points where it is so many of its standard deviations,"""
+
+WIDTH_EXPLAINS = 0.6
+"""and where it leaves less than this part of the variance of their errors."""
 
 
 @dataclass(frozen=True)
@@ -165,9 +171,33 @@ def registered(assembly: Assembly) -> Registration:
     source = assembly.spec.mechanism.profile.file
     if not isinstance(source, DataSource):
         raise DataError("the specification names no file with measured points")
-    found = register(read_sides(source.path), flanks_of(assembly))
+    points, flanks = read_sides(source.path), flanks_of(assembly)
+    way = assembly.spec.mechanism.profile.registration or "auto"
+    if way == "datum":
+        found = registered_where_it_is(points, flanks, register(points, flanks, width=True))
+    elif way == "auto":
+        found = _as_the_points_tell(register(points, flanks), register(points, flanks, width=True))
+    else:
+        found = register(points, flanks, width=way == "width")
     _check_fit(found, source)
     return found
+
+
+def _as_the_points_tell(moved: Registration, widened: Registration) -> Registration:
+    """Return the registration with an error of width where that explains what waves and noise do not, else without.
+
+    Long waves look like a width, too: it is believed only where it is certain and takes away much of the errors, on
+    the points that count with it.
+    """
+    if not any(use.any() for use in widened.used):
+        return moved
+    with_width, without = (
+        np.concatenate([error[use] for error, use in zip(item.errors, widened.used, strict=True)])
+        for item in (widened, moved)
+    )
+    certain = abs(widened.width) > WIDTH_CERTAIN * widened.width_deviation
+    explains = np.mean((with_width - widened.width) ** 2) < WIDTH_EXPLAINS * np.mean(without**2)
+    return widened if certain and explains else moved
 
 
 def _check_fit(found: Registration, name: str) -> None:

@@ -33,6 +33,10 @@ BUILT_DEFINITIONS = {
     "registration_angle": ("angle", "turn that lays the measured points on the design"),
     "registration_x": ("length", "shift in x after that turn"),
     "registration_y": ("length", "shift in y after that turn"),
+    "registration_width": (
+        "length",
+        "material on both flanks, along the normal, that the registration fitted; 0: none",
+    ),
     "registration_uncertainty": ("length", "standard deviation of the least certain motion of the registration"),
     "registration_y_per_width": (
         "ratio",
@@ -71,6 +75,7 @@ def values_of_built(built: Built) -> Mapping[str, Quantity]:
         "registration_angle": found.angle,
         "registration_x": float(found.shift[0]),
         "registration_y": float(found.shift[1]),
+        "registration_width": found.width,
         "registration_uncertainty": found.weakest(half_extent(built))[1],
         "registration_y_per_width": float(found.growth[1]),
         "profile_force_sd": float(np.nanstd(share, ddof=1)),
@@ -140,14 +145,25 @@ def _weak(built: Built) -> Iterator[Finding]:
     """Yield how uncertain the place of the cam is along the direction that the points tell least of."""
     direction, deviation = built.registration.weakest(half_extent(built))
     rmse, lifted = _rms(_used(built)), float(built.registration.growth[1])
+    if built.registration.width:
+        more = "more" if built.registration.width > 0 else "less"
+        yield finding(
+            "width_error",
+            f"the points are those of a cam with {mm(abs(built.registration.width))} {more} material on both flanks, "
+            f"± {mm(built.registration.width_deviation)} (one standard deviation), and are laid on the design so; "
+            "'mechanism.profile.registration: motion' takes it for a place, 'datum' moves nothing",
+        )
     if deviation > 0.1 * rmse and rmse > 0:
         names = ("the angle", "the shift in x", "the shift in y")
         parts = [f"{100 * part**2:.0f} % {name}" for part, name in zip(direction, names, strict=True) if part**2 > 0.05]
+        taken = (
+            f"; and 0.01 mm more on both flanks would be taken for a cam that lies {mm(1e-5 * abs(lifted))} "
+            f"{'lower' if lifted > 0 else 'higher'}: the flanks are steep"
+        )
         yield finding(
             "registration_weak",
             f"where the cam lies is known to ± {mm(deviation)} (one standard deviation) along its weakest "
-            f"direction: {', '.join(parts)}; and 0.01 mm more on both flanks would be taken for a cam that lies "
-            f"{mm(1e-5 * abs(lifted))} {'lower' if lifted > 0 else 'higher'}: the flanks are steep",
+            f"direction: {', '.join(parts)}{'' if built.registration.width else taken}",
         )
 
 

@@ -31,6 +31,7 @@ FINDINGS = {
     "weight_too_large": "the force wanted does not even carry the weight of the moving parts",
     "force_constant_too_small": "the force constant needed is below the one that avoids undercut",
     "registration_weak": "measured points do not say well where the cam lies",
+    "width_error": "the measured cam is wider or narrower than the design on both flanks",
     "profile_outliers": "measured points lie so far off that the registration gave them no weight",
     "noise_understated": "neighbouring points differ by more than the stated noise of the measurement explains",
     "noise_overstated": "the stated noise of the measurement is larger than all errors of the profile",

@@ -98,6 +98,11 @@ class Profile(Model):
     offset: Length = Field(0.0, description="material left on the flank beyond the profile, outward (a cutting error)")
     file: str | None = Field(None, description="measured points of both flanks, a CSV beside the spec: x [mm], y [mm]")
     noise: PositiveLength | None = Field(None, description="standard deviation of the points in `file`")
+    registration: Literal["auto", "motion", "width", "datum"] | None = Field(
+        None,
+        description="how the points in `file` are laid on the design: by a motion, by a motion and one error of width, "
+        "not at all because they are in the part's datum; auto, the default: with the width where the points tell it",
+    )
 
     @field_validator("file", mode="wrap")
     @classmethod
@@ -109,6 +114,8 @@ class Profile(Model):
     def _noise_is_stated(self) -> Self:
         if (self.file is None) != (self.noise is None):
             raise ValueError("'file' and 'noise' belong together: how exact are the measured points?")
+        if self.registration is not None and self.file is None:
+            raise ValueError("'registration' says how measured points are laid on the design: it needs a 'file'")
         return self
 
 
