@@ -15,7 +15,7 @@ from cfmkit.cli.options import Computing
 from cfmkit.errors import ExitCode, UsageError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
     from cfmkit.cli.progress import StudyProgress
     from cfmkit.cli.terminal import Terminal
@@ -101,6 +101,14 @@ def commit(place: Desk, made: Made, terminal: Terminal, code: ExitCode) -> Manif
         "exit_code": int(code),
     }
     return place.folder.commit(about)
+
+
+def finish(place: Desk, pieces: Sequence[Records]) -> None:
+    """Make the journal small, once every point of a study has its row and the files are in place."""
+    from cfmkit.studies.engine import compact
+
+    if all(piece.finished == len(piece) for piece in pieces):
+        compact(place.journal, pieces)
 
 
 def names(text: str | None) -> tuple[str, ...]:

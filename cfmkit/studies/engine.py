@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from contextlib import closing
+from contextlib import closing, suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import groupby
@@ -11,16 +11,16 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from cfmkit.errors import UsageError
+from cfmkit.errors import OutputError, UsageError
 from cfmkit.families import family
 from cfmkit.studies.blocks import BLOCK, evaluate_block, vectorised
 from cfmkit.studies.executors import Lost, serial
-from cfmkit.studies.journal import Memory
+from cfmkit.studies.journal import INSIDE, MOST_TOGETHER, Memory, line_of
 from cfmkit.studies.rows import Rows, cut, gathered, joined, recalled, recalled_row, record
 from cfmkit.studies.study import Row
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
     from numpy.typing import NDArray
 
@@ -68,7 +68,10 @@ class Work:
         """Number of points in a job: of small studies few, so that every process has some; few with their curves."""
         if not self.vectorised:
             return 1
-        return SMALLEST if self.study.curves else min(BLOCK, max(SMALLEST, len(self.plan) // JOBS))
+        if self.study.curves:
+            return SMALLEST
+        # A power of two, so that a study with a few more points has the same blocks and finds them in the journal.
+        return 1 << (min(BLOCK, max(SMALLEST, len(self.plan) // JOBS)).bit_length() - 1)
 
     def jobs(self) -> Iterator[Job]:
         """Yield every job in the order of the points."""
@@ -141,6 +144,7 @@ class Records:
         self._places = np.full(len(work.plan), MISSING, dtype=np.int64)
         self._keys = np.zeros((len(work.plan), 16), dtype=np.uint8)
         self._held: dict[int, Rows] = {}
+        self._line: tuple[str, Rows | None] = ("", None)
         self.reused = self.bugs = 0
         self.bug = ""
 
@@ -158,7 +162,7 @@ class Records:
         place = self._journal.find(job.key)
         if place < 0:
             return None
-        rows = self.work.recall(self._journal.read(place, job.key))
+        rows = self._rows(self._journal.read(place, job.key))
         if len(rows) != job.stop - job.start:
             return None
         self._lies(job, place)
@@ -214,12 +218,59 @@ class Records:
             yield at, part
             at += 1 if isinstance(part, Row) else len(part)
 
+    @property
+    def loose(self) -> bool:
+        """Whether single rows have lines of their own in the journal."""
+        alone = (self._places >= 0) & ((self._places & INSIDE) == 0)
+        return not self.work.vectorised and int(alone.sum()) > 1
+
+    def places(self) -> NDArray[np.int64]:
+        """Return where in the journal rows lie, each place once."""
+        return np.unique(self._places[self._places >= 0])
+
+    def lines(self) -> Iterator[bytes]:
+        """Yield the lines of a journal that holds these rows and nothing else: single ones stand together."""
+        keys: list[str] = []
+        rows: list[Rows] = []
+        at = 0
+        while at < len(self._places):
+            if self._places[at] < 0:
+                at += 1
+                continue
+            key, told = self._key(at), self._told(at)
+            if "n" in told and "keys" not in told:
+                yield self._journal.line(int(self._places[at]), key)
+                at += int(told["n"])
+                continue
+            keys.append(key)
+            rows.append(self._rows(told))
+            at += 1
+            if len(keys) == MOST_TOGETHER:
+                yield _together(keys, rows)
+                keys, rows = [], []
+        if keys:
+            yield _together(keys, rows)
+
+    def _key(self, index: int) -> str:
+        key: bytes = self._keys[index].tobytes()
+        return key.hex()
+
     def _told(self, index: int) -> Any:
-        return self._journal.read(int(self._places[index]), self._keys[index].tobytes().hex())
+        return self._journal.read(int(self._places[index]), self._key(index))
 
     def _read(self, index: int) -> Rows | Row:
         told = self._told(index)
-        return self.work.recall(told) if "n" in told else recalled_row(told)
+        return self._rows(told) if "n" in told else recalled_row(told)
+
+    def _rows(self, told: Any) -> Rows:
+        """Return the rows that a record is; of one among others its own, the line being read once for all of them."""
+        if "at" not in told:
+            return self.work.recall(told)
+        keys, whole = self._line
+        if whole is None or keys is not told["keys"]:
+            whole = self.work.recall(told)
+            self._line = told["keys"], whole
+        return cut(whole, told["at"], told["at"] + 1)
 
     def row(self, index: int) -> Rows:
         """Return the row of one finished point."""
@@ -227,7 +278,7 @@ class Records:
         if int(self._places[index]) == HELD:
             start = max(at for at in self._held if at <= index)
             return cut(self._held[start], index - start, index - start + 1)
-        rows = self.work.recall(self._told(index))
+        rows = self._rows(self._told(index))
         return rows if len(rows) == 1 else cut(rows, index - start, index - start + 1)
 
 
@@ -295,4 +346,24 @@ def _singles(work: Work, block: Job) -> Iterator[Job]:
         yield work.job(start, start + 1)
 
 
-__all__ = ["Job", "Monitor", "Records", "Silent", "Work", "run"]
+def _together(keys: list[str], rows: list[Rows]) -> bytes:
+    """Return the line of a journal that holds several single rows."""
+    whole = joined(rows)
+    return line_of(keys[0], {"keys": "".join(keys), **record(whole)} if len(keys) > 1 else record(whole))
+
+
+def compact(journal: Journal, pieces: Sequence[Records]) -> None:
+    """Bring the journal of a finished study to a tenth of its size; a later run with more points still finds these.
+
+    What it holds of other studies is dropped: most of it is of older code or another specification. If it cannot be
+    written anew it stays as it is.
+    """
+    used = np.unique(np.concatenate([piece.places() for piece in pieces])) if pieces else np.zeros(0)
+    tidy = len(used) == journal.held and not journal.damaged and not any(piece.loose for piece in pieces)
+    if tidy or not len(used):
+        return
+    with suppress(OutputError):
+        journal.rewrite(line for piece in pieces for line in piece.lines())
+
+
+__all__ = ["Job", "Monitor", "Records", "Silent", "Work", "compact", "run"]

@@ -5,6 +5,9 @@ it. Every record is one ``write`` of the operating system, so that what `add` ha
 returned from survives the death of the process at any moment; the file is brought down
 to the disk once a second and at the end, so that a failing power supply costs a second.
 
+The journal of a finished study is written anew, in little room: hundreds of records stand in one line, which is
+``{"c":"<crc32>","k":"<key of the first>","r":{"keys":"<key><key>...",...}}``.
+
 A line that is cut off at the end of the file (the process died while it was written) is
 dropped. A line in the middle whose checksum does not fit is passed over and counted: its
 point is computed again. There is one writer, which holds the lock of the folder; should
@@ -23,10 +26,10 @@ from zlib import crc32
 import numpy as np
 
 from cfmkit.errors import OutputError
-from cfmkit.store.disk import discard, reporting
+from cfmkit.store.disk import atomic_write, discard, reporting
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterable, Iterator
     from pathlib import Path
     from types import TracebackType
 
@@ -36,6 +39,16 @@ _KEY = len(b'"k":"')
 _KEYS = 32
 SYNC_EVERY = 1.0
 """Seconds between two moments at which the file is brought down to the disk."""
+
+_PACK = b'","r":{"keys":"'
+"""Between the key of a line that has many and the list of them."""
+
+_BITS = 13
+INSIDE = (1 << _BITS) - 1
+"""Those bits of a place that say which record of a line is meant, counted from one; 0 where it is the only one."""
+
+MOST_TOGETHER = 256
+"""Records in one line: few enough to be read for the sake of one."""
 
 _CHUNK = 1 << 20
 _ENCODE = json.JSONEncoder(separators=(",", ":"), allow_nan=False).encode
@@ -57,6 +70,8 @@ class Journal:
         Records whose checksum did not fit when the file was opened.
     torn : bool
         Whether the last line was cut off.
+    held : int
+        Records in the file, those that were found and those that were added.
     """
 
     def __init__(self, path: Path, fresh: bool = False) -> None:
@@ -65,7 +80,9 @@ class Journal:
         self.fresh = fresh
         self.damaged = 0
         self.torn = False
+        self.held = 0
         self._file = -1
+        self._last: tuple[int, dict[str, Any]] = (-1, {})
         self._synced = time.monotonic()
         self._known = (np.zeros(0, np.uint64), np.zeros(0, np.int64))
 
@@ -102,7 +119,7 @@ class Journal:
         number = np.uint64(int(key[:16], 16))
         at = int(keys.searchsorted(number, side="right")) - 1
         while at >= 0 and keys[at] == number:
-            if os.pread(self._file, _KEYS, int(places[at]) + _BODY + _KEY) == key.encode():
+            if os.pread(self._file, _KEYS, _key_place(int(places[at]))) == key.encode():
                 return int(places[at])
             at -= 1
         return -1
@@ -115,25 +132,55 @@ class Journal:
         cfmkit.errors.OutputError
             If it cannot be written.
         """
-        line = _line(key, record)
+        line = line_of(key, record)
         with reporting(self.path):
             rest = memoryview(line)
             while rest:
                 rest = rest[os.write(self._file, rest) :]
             # Where the system appended it, which is not where this process left off if another one writes, too.
             place = os.lseek(self._file, 0, os.SEEK_CUR) - len(line)
+        self.held += 1
         if time.monotonic() - self._synced > SYNC_EVERY:
             self.sync()
-        return place
+        return place << _BITS
 
     def read(self, place: int, key: str) -> Any:
-        """Return the record of a key that lies at a place.
+        """Return the record of a key that lies at a place; where others stand in its line all, and under ``at`` which.
 
         Raises
         ------
         cfmkit.errors.OutputError
             If it is not there any more, or the place holds another one.
         """
+        start, inside = place >> _BITS, (place & INSIDE) - 1
+        if inside < 0:
+            return _record(self._line(start, key))
+        if self._last[0] != start:
+            self._last = start, _record(self._line(start))
+        whole = self._last[1]
+        if whole["keys"][_KEYS * inside : _KEYS * (inside + 1)] != key:
+            raise self._changed()
+        return {**whole, "at": inside}
+
+    def line(self, place: int, key: str) -> bytes:
+        """Return the line of a record that stands alone, as it is in the file."""
+        return self._line(place >> _BITS, key)
+
+    def rewrite(self, lines: Iterable[bytes]) -> None:
+        """Put lines in place of all that is there, whole or not at all; nothing can be read after that.
+
+        Raises
+        ------
+        cfmkit.errors.OutputError
+            If they cannot be written; the old ones are still there.
+        """
+        atomic_write(self.path, lines)
+
+    def _changed(self) -> OutputError:
+        return OutputError(f"cannot read {self.path}: it was changed while the study ran; run it again")
+
+    def _line(self, place: int, key: str = "") -> bytes:
+        """Return a sound line, which has a certain key if one is given."""
         with reporting(self.path, "read"):
             line = os.pread(self._file, 4096, place)
             while (end := line.find(b"\n")) < 0:
@@ -141,9 +188,10 @@ class Journal:
                 if not more:
                     break
                 line += more
-        if end < 0 or not _sound(line[: end + 1]) or line[_BODY + _KEY : _BODY + _KEY + _KEYS] != key.encode():
-            raise OutputError(f"cannot read {self.path}: it was changed while the study ran; run it again")
-        return json.loads(line[: end + 1])["r"]
+        line = line[: end + 1]
+        if not _sound(line) or (key and line[_BODY + _KEY : _BODY + _KEY + _KEYS] != key.encode()):
+            raise self._changed()
+        return line
 
     def sync(self) -> None:
         """Bring what was written down to the disk."""
@@ -160,11 +208,13 @@ class Journal:
                 self.torn = True
                 os.ftruncate(self._file, place)
                 break
-            if _sound(line):
-                keys.append(int(line[_BODY + _KEY : _BODY + _KEY + 16], 16))
-                places.append(place)
-            else:
+            if not _sound(line):
                 self.damaged += 1
+                continue
+            for inside, key in _keys_in(line):
+                keys.append(int(key[:16], 16))
+                places.append(place << _BITS | inside)
+        self.held = len(keys)
         if self.fresh:
             return
         found, order = np.array(keys, np.uint64), np.argsort(np.array(keys, np.uint64), kind="stable")
@@ -179,9 +229,32 @@ class Journal:
                 place += len(line)
 
 
-def _line(key: str, record: Any) -> bytes:
+def line_of(key: str, record: Any) -> bytes:
+    """Return a record as a line of a journal."""
     body = f'"k":"{key}","r":{_ENCODE(record)}}}'.encode()
     return b'%b%08x",%b\n' % (_HEAD, crc32(body), body)
+
+
+def _record(line: bytes) -> Any:
+    return json.loads(line)["r"]
+
+
+def _keys_in(line: bytes) -> Iterator[tuple[int, bytes]]:
+    """Yield (number of a record in the line, its key); the number is 0 where the line has one record."""
+    start = _BODY + _KEY + _KEYS
+    if line[start : start + len(_PACK)] != _PACK:
+        yield 0, line[_BODY + _KEY : start]
+        return
+    start += len(_PACK)
+    keys = line[start : line.index(b'"', start)]
+    for inside in range(len(keys) // _KEYS):
+        yield inside + 1, keys[_KEYS * inside : _KEYS * (inside + 1)]
+
+
+def _key_place(place: int) -> int:
+    """Return where in the file the key of a record stands."""
+    start, inside = (place >> _BITS) + _BODY + _KEY, place & INSIDE
+    return start if not inside else start + _KEYS + len(_PACK) + _KEYS * (inside - 1)
 
 
 def _sound(line: bytes) -> bool:
@@ -216,6 +289,10 @@ class Memory:
     def read(self, place: int, _key: str) -> Any:
         """Return the record that lies at a place."""
         return self._records[place]
+
+    def line(self, _place: int, key: str) -> bytes:
+        """Raise: there are no lines."""
+        raise KeyError(key)
 
     def sync(self) -> None:
         """Do nothing: there is no file."""

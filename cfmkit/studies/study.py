@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 NOT_DECIDING = {"name", "description", "sweep", "sensitivity"}
 """Parts of a specification that change no result of a point."""
 
-RECORDS = 3
+RECORDS = 4
 """How records of the journal are written: those of another number are computed again."""
 
 _STATUS_OF = {3: Status.INVALID, 4: Status.NO_EQUILIBRIUM, 70: Status.CRASHED}

@@ -82,6 +82,19 @@ def test_a_wider_range_reuses_the_points_it_shares(cli):
     assert (wider.document["reused"], wider.document["points"]["total"]) == (5, 6)
 
 
+def test_a_larger_grid_of_a_vectorised_model_reuses_the_blocks_it_shares(cli):
+    """Their number decided their size: 10 000 points and 10 100 had no block in common."""
+    rows = "mechanism.roller_radius=6 mm:7 mm:100"
+    springs = "mechanism.springs.stiffness=[{}]"
+    lists = [", ".join(f"{0.5 + k / 1000:.3f} N/mm" for k in range(count)) for count in (100, 101)]
+    options = ("--metrics", "theoretical_force", "-o", "out", "--no-plots", "--json")
+    cli("sweep", str(CAM), "--vary", springs.format(lists[0]), "--vary", rows, *options)
+    journal = next(cli.folder.glob("out/.cfmkit-journal*")).stat().st_size
+    assert journal < (cli.folder / "out" / "results.csv").stat().st_size / 5
+    wider = cli("sweep", str(CAM), "--vary", springs.format(lists[1]), "--vary", rows, *options)
+    assert (wider.document["points"]["total"], wider.document["reused"]) == (10_100, 9_984)
+
+
 def test_the_block_of_the_spec_says_what_options_say(cli, tmp_path):
     text = CAM.read_text()
     block = (

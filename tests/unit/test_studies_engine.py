@@ -11,12 +11,13 @@ from cfmkit.errors import UsageError
 from cfmkit.families import family
 from cfmkit.families.base import BlockAnswer
 from cfmkit.results import Finding, Status
-from cfmkit.store import origin
+from cfmkit.store import disk, origin
 from cfmkit.studies.columns import metrics_of, sample_curve
-from cfmkit.studies.engine import Work, run
+from cfmkit.studies.engine import Work, compact, run
 from cfmkit.studies.journal import Journal
 from cfmkit.studies.plan import grid
 from cfmkit.studies.pool import Pool
+from cfmkit.studies.rows import squeezed, unsqueezed
 from cfmkit.studies.study import Study
 from cfmkit.studies.tables import results_csv
 from cfmkit.studies.variation import axes, wish
@@ -161,7 +162,7 @@ def test_a_second_writer_in_the_folder_changes_no_number(tmp_path):
 
 
 def warnings(records):
-    return [table["warnings"][k] for table in [read_csv(b"".join(results_csv(records)))] for k in range(len(table))]
+    return list(read_csv(table(records))["warnings"])
 
 
 def test_the_table_names_the_warnings_of_each_point(tmp_path):
@@ -200,6 +201,59 @@ def test_the_warnings_of_a_block_are_those_of_its_model_and_of_single_analyses(m
         with Journal(tmp_path / "journal") as journal:
             records = run(some, journal=journal)
             assert (warnings(records), records.reused) == (expected, reused)
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (2, 3), (300, 7), (5, 0)])
+def test_numbers_come_back_from_the_journal_bit_for_bit(shape):
+    random = np.random.default_rng(1)
+    odd = np.array([np.nan, np.inf, -np.inf, -0.0, 5e-324, 1e308, 0.1])
+    smooth = np.sin(np.linspace(0.0, 1.0, shape[0]))[:, None] * np.arange(1, shape[1] + 1)
+    for table in (smooth, random.normal(size=shape), random.choice(odd, shape)):
+        back = unsqueezed(squeezed(table), *shape)
+        assert back.tobytes() == np.ascontiguousarray(table).tobytes()
+
+
+def test_numbers_of_neighbours_in_a_grid_take_little_room():
+    grid = np.sin(np.linspace(0.0, 1.0, 4000))[:, None] * np.arange(1.0, 5.0)
+    assert len(squeezed(grid)) < grid.nbytes / 3
+
+
+def test_the_journal_of_a_finished_study_is_small_and_serves_a_wider_one(tmp_path):
+    path = tmp_path / "journal"
+    names = tuple(item.name for item in metrics_of(SPEC, ()))
+    ranges = {count: f"mechanism.springs.max_elongation=130 mm:{129 + count} mm:{count}" for count in (300, 301)}
+    with Journal(path) as journal:
+        run(work("mechanism.springs.max_elongation=[99 mm]", design=True, names=names), journal=journal)
+    with Journal(path) as journal:
+        records = run(work(ranges[300], design=True, names=names), journal=journal)
+        before, large = table(records), path.stat().st_size
+        compact(journal, [records])
+    assert path.stat().st_size < large / 5
+    with Journal(path) as journal:
+        again = run(work(ranges[300], design=True, names=names), journal=journal)
+        assert (again.reused, table(again), journal.damaged) == (300, before, 0)
+        small = path.read_bytes()
+        compact(journal, [again])
+        assert path.read_bytes() == small, "it is small already"
+    with Journal(path) as journal:
+        wider = run(work(ranges[301], design=True, names=names), journal=journal)
+        assert (wider.reused, wider.row(299).values.tobytes()) == (300, again.row(299).values.tobytes())
+
+
+def test_a_journal_that_cannot_be_made_small_stays_as_it_is(tmp_path, monkeypatch):
+    path = tmp_path / "journal"
+    with Journal(path) as journal:
+        records = run(work(FRICTION, design=True), journal=journal)
+        before = path.read_bytes()
+        monkeypatch.setattr(disk.system, "fsync", lambda _file: (_ for _ in ()).throw(OSError(28, "no space")))
+        compact(journal, [records])
+        monkeypatch.undo()
+    assert path.read_bytes() == before
+    assert [item.name for item in tmp_path.iterdir()] == ["journal"]
+
+
+def table(records):
+    return b"".join(results_csv(records))
 
 
 def test_a_new_name_changes_nothing(tmp_path):

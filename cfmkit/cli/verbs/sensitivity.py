@@ -122,6 +122,7 @@ def run(options: Options, terminal: Terminal) -> Answer:
             place.folder.write(name, data)
         made = studies.Made("sensitivity", options.spec, setup.study.spec, setup.seed, found.evaluator.count)
         manifest = studies.commit(place, made, terminal, exit_code(found))
+        studies.finish(place, [piece.records for piece in found.evaluator.pieces])
     return answer(found, out, (*manifest.files, "manifest.json"), studies.now() - start)
 
 

@@ -88,6 +88,7 @@ def run(options: Options, terminal: Terminal) -> Answer:
         code = exit_code(records, summary)
         made = studies.Made("sweep", options.spec, work.study.spec, options.seed, len(work.plan))
         manifest = studies.commit(place, made, terminal, code)
+        studies.finish(place, [records])
         told = summary.as_json(records)
     written = (*manifest.files, "manifest.json")
     return studies.answer(studies.Ending(records, code, told, out, written, studies.now() - start), options.spec)
