@@ -103,7 +103,9 @@ def analyze(spec: Spec, run: Run | None = None) -> Result:
     >>> result.status.key, len(result.curve.branches)
     ('complete', 2)
     """
-    return family(spec.family).analyze(spec, run or Run())
+    from cfmkit.metrics import windows_judged
+
+    return windows_judged(family(spec.family).analyze(spec, run or Run()))
 
 
 def design(spec: Spec, run: Run | None = None) -> Design:

@@ -21,6 +21,10 @@ if TYPE_CHECKING:
     from cfmkit.tables import Table
 
 
+WINDOW_OUTSIDE = "window_outside"
+"""Name of the finding that nothing was measured over a window."""
+
+
 class Status(Enum):
     """How a solve ended."""
 
@@ -129,6 +133,9 @@ class Result:
         Scalar results that the family computes itself, by name.
     warnings : tuple of Finding
         What the user must know; warnings never change the exit code.
+    travel : tuple of (float, float), optional
+        Where the motion was to start and to end [m or rad]: shares of the travel are of this. Default: the
+        nominal curve, as far as it goes.
     valid : tuple of (float, float)
         Intervals of the motion [m or rad] in which the mechanism works as intended
         (for a cam: the roller runs on the flank). ``usable_stroke`` looks there only.
@@ -153,6 +160,7 @@ class Result:
     curves: tuple[Curve, ...] = ()
     values: Mapping[str, Quantity] = field(default_factory=dict)
     warnings: tuple[Finding, ...] = ()
+    travel: tuple[float, float] | None = None
     valid: tuple[tuple[float, float], ...] | None = None
     target: float | None = None
     reference: float | None = None

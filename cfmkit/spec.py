@@ -13,7 +13,17 @@ from typing import Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
-from cfmkit.units import Displacement, Length, MetricValue, Ratio
+from cfmkit.units import (
+    DIMENSIONS,
+    SHARE,
+    Displacement,
+    Ends,
+    Length,
+    MetricValue,
+    Ratio,
+    dimension_of_end,
+    ends_increase,
+)
 
 
 class Model(BaseModel):
@@ -28,8 +38,9 @@ class Requirement(Model):
     metric: str = Field(description="name of a metric, as `show metrics` lists them; `[branch]` picks a branch")
     min: MetricValue | None = Field(None, description="smallest value allowed, with its unit")
     max: MetricValue | None = Field(None, description="largest value allowed, with its unit")
-    over: tuple[Displacement, Displacement] | None = Field(
-        None, description="window of displacement or angle, e.g. [2 mm, 240 mm]; default: analysis.window"
+    over: Ends | None = Field(
+        None,
+        description="window, e.g. [2 mm, 240 mm], or shares of the travel: [1 %, 100 %]; default: analysis.window",
     )
 
     @field_validator("metric")
@@ -43,7 +54,7 @@ class Requirement(Model):
     def _bounded(self) -> Self:
         if self.min is None and self.max is None:
             raise ValueError("needs 'min', 'max' or both")
-        if self.over is not None and not self.over[0] < self.over[1]:
+        if self.over is not None and not ends_increase(self.over):
             raise ValueError("'over' must be increasing")
         return self
 
@@ -52,14 +63,16 @@ class Analysis(Model):
     """What every family's `analysis` block has; families add their own keys."""
 
     points: int = Field(481, ge=5, le=1_000_000, description="points per branch of the curve")
-    window: tuple[Displacement, Displacement] | None = Field(
-        None, description="where the metrics are taken; default: the full travel"
+    window: Ends | None = Field(
+        None,
+        description="where the metrics are taken, e.g. [2 mm, 240 mm] or, in shares of the travel, [1 %, 100 %]; "
+        "default: the full travel",
     )
     band: float = Field(0.05, gt=0, lt=1, description="half width of the force band of `usable_stroke`, as a fraction")
 
     @model_validator(mode="after")
     def _window_increases(self) -> Self:
-        if self.window is not None and not self.window[0] < self.window[1]:
+        if self.window is not None and not ends_increase(self.window):
             raise ValueError("'window' must be increasing")
         return self
 
@@ -149,6 +162,35 @@ class Spec(Model):
     requirements: tuple[Requirement, ...] = Field((), description="checked after every run")
     sweep: Sweep | None = Field(None, description="what `cfmkit sweep` varies")
     sensitivity: Sensitivity | None = Field(None, description="what `cfmkit sensitivity` varies")
+
+    @property
+    def motion(self) -> Literal["length", "angle"] | None:
+        """What the curves run over: displacements, or angles; None where a family does not say."""
+        return None
+
+    @model_validator(mode="after")
+    def _windows_are_of_the_motion(self) -> Self:
+        if self.motion is None:
+            return self
+        right = DIMENSIONS[self.motion]
+        faults = {
+            path: f"the curve runs over {right.phrase}: write its window in {right.unit}, or in shares of the travel: "
+            "[1 %, 100 %]"
+            for path, ends in self.windows()
+            if {dimension_of_end(end) for end in ends} - {self.motion, SHARE}
+        }
+        refuse("Spec", faults)
+        return self
+
+    def windows(self) -> Iterator[tuple[tuple[str | int, ...], Ends]]:
+        """Yield (path, window) of the analysis, then of each requirement that has its own."""
+        # a family need not have this block, and no family is named here
+        window = getattr(getattr(self, "analysis", None), "window", None)
+        if window is not None:
+            yield ("analysis", "window"), window
+        for index, one in enumerate(self.requirements):
+            if one.over is not None:
+                yield ("requirements", index, "over"), one.over
 
     def at(self, path: str) -> Any:
         """Return the value at a dotted path, SI for quantities: ``spec.at("mechanism.springs.stiffness")``.

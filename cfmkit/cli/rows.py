@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from cfmkit import api
 from cfmkit.families import family
-from cfmkit.metrics import Window, known_metrics, split_name, window_of
+from cfmkit.metrics import Window, known_metrics, left_of, split_name, window_of
 from cfmkit.units import border_unit, format_short, to_border
 
 if TYPE_CHECKING:
@@ -106,7 +106,7 @@ def _row(report: Report, name: str) -> Row:
         return Row(words(name), _stroke(report))
     if name == "allowable_stress":
         return Row(words(name), _short(report.metrics[name]) + _rule(report.result.spec))
-    window = window_of(report.result)
+    window = left_of(window_of(report.result), report.result)
     return Row(words(name), _branches(report, name, report.metrics) + _over(report, name, window))
 
 

@@ -34,6 +34,8 @@ def _page(ending: Ending, terminal: Terminal) -> Iterator[RenderableType]:
     yield Text()
     if ending.code is ExitCode.REQUIREMENT_MISSED:
         yield from paragraph("missed", "no point meets every requirement", terminal.width, BAD)
+    for one in ending.data["warnings"]:
+        yield from paragraph("warning", f"{one['name']}: {one['message']}", terminal.width, BAD)
     yield from written(ending.folder, ending.files, terminal)
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Protocol
 
+from cfmkit.results import WINDOW_OUTSIDE
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
 
@@ -167,6 +169,10 @@ class MeasuredLoop:
     down: FloatArray
 
 
+SHARED = {WINDOW_OUTSIDE: "a window is not within the curve: what is measured over it has no value"}
+"""Findings that are made of any family's result."""
+
+
 @dataclass(frozen=True)
 class Search:
     """What a family's design may say that no analysis of the specification it writes can: what only the search knows.
@@ -251,3 +257,7 @@ class Family:
     template: str = ""
     findings: dict[str, str] = field(default_factory=dict)
     references: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Add the findings that every family has."""
+        object.__setattr__(self, "findings", {**self.findings, **SHARED})

@@ -5,8 +5,9 @@ windows, `subjects` is what a metric looks at, `evaluation` runs the table over 
 curve, `requirements` compares with bounds, `report` writes border units.
 """
 
-from cfmkit.metrics.evaluation import Survey, evaluate, frame_of, measure, survey, window_of
+from cfmkit.metrics.evaluation import Survey, evaluate, frame_of, left_of, measure, survey, travel_of, window_of
 from cfmkit.metrics.known import definition_of, known_metrics, metrics_by_name, other_name
+from cfmkit.metrics.outside import gaps, windows_judged
 from cfmkit.metrics.report import as_json, metrics_json, search_json
 from cfmkit.metrics.requirements import Outcome, check, requirement_problems, validate_requirements
 from cfmkit.metrics.subjects import Branch, Cycle, Frame
@@ -30,7 +31,9 @@ __all__ = [
     "definitions",
     "evaluate",
     "frame_of",
+    "gaps",
     "known_metrics",
+    "left_of",
     "measure",
     "metrics_by_name",
     "metrics_json",
@@ -41,8 +44,10 @@ __all__ = [
     "split_name",
     "survey",
     "traces",
+    "travel_of",
     "unknown_metric",
     "validate_requirements",
     "values_of_family",
     "window_of",
+    "windows_judged",
 ]

@@ -14,12 +14,14 @@ from cfmkit.metrics.subjects import Cycle, Frame, cycle
 from cfmkit.metrics.table import Definition, definitions, split_name, unknown_metric
 from cfmkit.metrics.traces import Undefined, Window, traces
 from cfmkit.results import Quantity, Status
+from cfmkit.units import Share, between
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping
 
     from cfmkit.curves import Curve, Kind
     from cfmkit.results import Result
+    from cfmkit.units import Ends
 
 
 class Value(NamedTuple):
@@ -142,11 +144,29 @@ def frame_of(result: Result) -> Frame:
     return Frame(result.target, result.reference, result.allowable_stress, band, result.valid, result.load_cases)
 
 
-def window_of(result: Result) -> Window | None:
-    """Return ``analysis.window`` of the specification, if it states one."""
+def travel_of(result: Result) -> tuple[float, float] | None:
+    """Return where the motion was to start and to end [m or rad]; None where that is not known."""
+    if result.travel is not None or not result.curves or not len(result.curves[0]):
+        return result.travel
+    first = traces(result.curves[0])[0]
+    low, high = first.extent
+    return (low, high) if first.motion[0] - low <= high - first.motion[0] else (high, low)
+
+
+def window_of(result: Result, over: Ends | None = None) -> Window | None:
+    """Return a window in places, by default ``analysis.window``; None for the full travel.
+
+    Raises
+    ------
+    cfmkit.errors.InputError
+        If it has no width.
+    """
     # a family need not have this block, and no family is named here
-    ends = getattr(getattr(result.spec, "analysis", None), "window", None)
-    return Window(float(ends[0]), float(ends[1])) if ends is not None else None
+    ends = over if over is not None else getattr(getattr(result.spec, "analysis", None), "window", None)
+    travel = travel_of(result)
+    if ends is None or (travel is None and any(isinstance(end, Share) for end in ends)):
+        return None
+    return Window(*between(ends, travel or (0.0, 0.0)))
 
 
 def kind_of(result: Result) -> Kind | None:
@@ -159,7 +179,7 @@ def survey_of(result: Result, window: Window | None) -> Survey | None:
     return survey(result.curves[0], frame_of(result), window) if result.curves else None
 
 
-def _left_of(window: Window | None, result: Result) -> Window | None:
+def left_of(window: Window | None, result: Result) -> Window | None:
     """Return what is left of a window inside which the curve of a partial result ends; else the window itself."""
     if window is None or result.status is not Status.PARTIAL or not result.curves or not len(result.curves[0]):
         return window
@@ -198,7 +218,7 @@ def evaluate(
     cfmkit.errors.UsageError
         If one of `names` exists neither as a metric nor as a value of the family.
     """
-    view = survey_of(result, _left_of(window or window_of(result), result))
+    view = survey_of(result, left_of(window or window_of(result), result))
     kind, extra = kind_of(result), tuple(extra_definitions)
     if names is not None:
         known = metrics_by_name(kind, extra)

@@ -14,13 +14,13 @@ from cfmkit.metrics.limits import Limits, bound
 from cfmkit.metrics.report import finite_border
 from cfmkit.metrics.subjects import span_text
 from cfmkit.metrics.table import Definition, split_name, unknown_metric
-from cfmkit.metrics.traces import Window
-from cfmkit.units import DIMENSIONS, border_unit
+from cfmkit.units import DIMENSIONS, SHARE, border_unit
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     from cfmkit.curves import Kind
+    from cfmkit.metrics.traces import Window
     from cfmkit.results import Result
     from cfmkit.spec import Requirement, Spec
 
@@ -157,10 +157,10 @@ def _window_faults(over: tuple[float, float], meant: Definition, kind: Kind | No
     if meant.scope == "value":
         yield "over", f"{meant.name!r} is not measured over a window; remove 'over'"
         return
-    given = {getattr(end, "dimension", _MOTION.get(kind or "", "length")) for end in over}
+    given = {getattr(end, "dimension", _MOTION.get(kind or "", "length")) for end in over} - {SHARE}
     if len(given) > 1:
         yield "over", "one end is a length and the other an angle"
-    elif kind is not None and given != {_MOTION[kind]}:
+    elif kind is not None and given - {_MOTION[kind]}:
         right, wrong = DIMENSIONS[_MOTION[kind]].phrase, DIMENSIONS[given.pop()].phrase
         yield "over", f"the curve is a {kind} curve: its window is {right}, not {wrong}"
 
@@ -228,8 +228,7 @@ def _meant(requirement: Requirement, items: Sequence[Definition]) -> Definition:
 
 
 def _window(requirement: Requirement, result: Result) -> Window | None:
-    over = requirement.over
-    return window_of(result) if over is None else Window(float(over[0]), float(over[1]))
+    return window_of(result, requirement.over)
 
 
 def _values(name: str, definition: Definition, view: Survey | None, result: Result) -> tuple[Value, ...]:

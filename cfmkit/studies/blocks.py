@@ -11,6 +11,7 @@ from cfmkit.families.base import Block, Measure
 from cfmkit.metrics import metrics_by_name, other_name, split_name, values_of_family
 from cfmkit.metrics.limits import ROUNDING, Limits
 from cfmkit.studies.rows import Rows, gathered
+from cfmkit.units import Share
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -72,7 +73,7 @@ def _warned(answer: BlockAnswer, singly: list[int], rest: Rows) -> dict[str, NDA
 
 def _answer(study: Study, plan: Plan, start: int, stop: int) -> BlockAnswer | None:
     model = family(study.spec.family).analyze_block
-    if model is None:
+    if model is None or _follows_the_travel(study):
         return None
     values, asked = dict(zip(plan.paths, plan.block(start, stop), strict=True)), measures(study)
     renamed = tuple(Measure(other_name(one.name), one.window) for one in asked)
@@ -81,6 +82,12 @@ def _answer(study: Study, plan: Plan, start: int, stop: int) -> BlockAnswer | No
         if found is None and renamed != asked:
             found = model(study.spec, Block(values, renamed, stop - start))
     return found
+
+
+def _follows_the_travel(study: Study) -> bool:
+    """Return whether some window is a share of the travel, which each point has its own: blocks have one for all."""
+    windows = [*(ends for _, ends in study.spec.windows()), *(one.over for one in study.metrics if one.over)]
+    return any(isinstance(end, Share) for ends in windows for end in ends)
 
 
 def measures(study: Study) -> tuple[Measure, ...]:

@@ -15,7 +15,7 @@ import numpy as np
 
 from cfmkit.errors import CfmError, Problem, SpecError, UsageError
 from cfmkit.families import family
-from cfmkit.metrics import Undefined, Window, window_of
+from cfmkit.metrics import Undefined, Window, window_of, windows_judged
 from cfmkit.metrics.differences import Difference, counterpart, effort_at, largest, mean, overlap, rms, summarize
 from cfmkit.metrics.subjects import span_text
 from cfmkit.results import Finding, Status
@@ -244,8 +244,7 @@ def compare(nominal: Result, choices: Choices, run: Run) -> Comparison:
 
 
 def _analyze(spec: Spec, run: Run) -> Result:
-    found: Result = family(spec.family).analyze(spec, run)
-    return found
+    return windows_judged(family(spec.family).analyze(spec, run))
 
 
 def fidelity_of(result: Result) -> str:

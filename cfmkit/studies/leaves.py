@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 from cfmkit.errors import QuantityError
-from cfmkit.units import BareFloat, Place, Quantity
+from cfmkit.units import BareFloat, Quantity, place_of
 from cfmkit.units.fields import described
 from cfmkit.yamlio.explain import not_among
 from cfmkit.yamlio.shape import Slot, expected, required
@@ -82,7 +82,7 @@ class Leaf:
             value, dimension = quantity.read(marked)
         except QuantityError as error:
             raise CannotVary(str(error)) from None
-        return (Place(value, dimension) if len(quantity.dimensions) > 1 else value), dimension
+        return (place_of(value, dimension) if len(quantity.dimensions) > 1 else value), dimension
 
     def _number(self, given: Any) -> tuple[Value, str]:
         if isinstance(given, bool) or not isinstance(given, int | float):

@@ -18,7 +18,7 @@ from cfmkit.decimals import even_grid, shift_decimal
 from cfmkit.errors import UsageError
 from cfmkit.studies.variation import is_place
 from cfmkit.tables import border_values
-from cfmkit.units import Place, format_quantity, from_border, to_border
+from cfmkit.units import Place, format_quantity, from_border, place_of, to_border
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -61,7 +61,7 @@ class Variable:
         """Return one value as `Spec.replace` takes it."""
         value = self.values[index]
         plain = value.item() if isinstance(value, np.generic) else value
-        return Place(plain, self.dimension) if self.place else plain
+        return place_of(plain, self.dimension) if self.place else plain
 
 
 @dataclass(frozen=True)

@@ -38,7 +38,7 @@ class Rows:
     met : (n, r) array of bool
         Requirements; False where nothing was solved.
     odd : mapping of int to (Status, str)
-        Status and message of the rows that are not complete.
+        Status and message of the rows that are not complete, or that have something to say.
     curves : mapping of int to bytes
         Curves as CSV, where they are kept.
     bugs : mapping of int to str
@@ -61,7 +61,7 @@ class Rows:
     @property
     def failed(self) -> int:
         """Number of rows that are not complete."""
-        return len(self.odd)
+        return sum(status is not Status.COMPLETE for status, _ in self.odd.values())
 
     @property
     def keepable(self) -> bool:
@@ -80,7 +80,7 @@ def gathered(rows: Sequence[Row], metrics: int, requirements: int) -> Rows:
     met = np.array([row.met or none_met for row in rows], dtype=bool).reshape(len(rows), requirements)
     odd, curves, bugs = {}, {}, {}
     for k, row in enumerate(rows):
-        if row.status is not Status.COMPLETE:
+        if row.status is not Status.COMPLETE or row.message:
             odd[k] = row.status, row.message
         if row.curve:
             curves[k] = row.curve

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 from cfmkit.errors import CfmError, SpecError
 from cfmkit.families import family
 from cfmkit.families.base import Run
-from cfmkit.metrics import Window, check, evaluate, values_of_family
+from cfmkit.metrics import check, evaluate, gaps, values_of_family, window_of, windows_judged
 from cfmkit.results import Result, Status
 from cfmkit.store import file_hash, origin, stable_hash
 from cfmkit.tables.source import named_in
@@ -28,8 +28,9 @@ from cfmkit.units import to_border
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from cfmkit.metrics import Definition
+    from cfmkit.results import Quantity
     from cfmkit.spec import Spec
+    from cfmkit.units import Ends
 
 NOT_DECIDING = {"name", "description", "sweep", "sensitivity"}
 """Parts of a specification that change no result of a point."""
@@ -52,8 +53,8 @@ class Metric:
         Of `cfmkit.units`.
     definition : str
         What it is.
-    over : tuple of (float, float), optional
-        Where it is measured [m or rad]; default: the window of the analysis.
+    over : tuple of WindowEnd, optional
+        Where it is measured: places [m or rad], or shares of the travel; default: the window of the analysis.
     words : tuple of str
         Those that a metric of the dimension ``text`` is an index into.
     label : str
@@ -63,7 +64,7 @@ class Metric:
     name: str
     dimension: str
     definition: str = ""
-    over: tuple[float, float] | None = None
+    over: Ends | None = None
     label: str = ""
     words: tuple[str, ...] = ()
 
@@ -185,11 +186,11 @@ class Study:
         """Return the result of a variant, designed first if the study says so, with the warnings of both."""
         record, run = family(spec.family), Run(self.seed)
         if not self.design or record.design is None:
-            return record.analyze(spec, run)
+            return windows_judged(record.analyze(spec, run))
         design = record.design(spec, run)
         if design.spec is None:
             return Result(spec, design.status, design.message, warnings=design.warnings)
-        result = record.analyze(design.spec, run)
+        result = windows_judged(record.analyze(design.spec, run))
         return replace(result, warnings=(*design.warnings, *result.warnings))
 
     def row(self, result: Result) -> Row:
@@ -198,19 +199,26 @@ class Study:
         if not result.status.usable:
             return Row(result.status, message=result.message, warnings=warnings)
         extra = values_of_family(family(result.spec.family).values)
-        values = self._values(result, extra)
+        values = tuple(_finite(item.value) for item in self.quantities(result))
         met = tuple(outcome.ok for outcome in check(result.spec.requirements, result, extra))
-        message = "" if result.status is Status.COMPLETE else result.message
+        message = _gaps(result) if result.status is Status.COMPLETE else result.message
         curve = _curve(result) if self.curves else b""
         return Row(result.status, values, met, message, curve, warnings=warnings)
 
-    def _values(self, result: Result, extra: tuple[Definition, ...]) -> tuple[float | None, ...]:
-        found: dict[tuple[str, tuple[float, float] | None], float | None] = {}
+    def quantities(self, result: Result) -> tuple[Quantity, ...]:
+        """Return what each metric of the study is on a result, with the reason where it has no value."""
+        extra = values_of_family(family(result.spec.family).values)
+        found: dict[tuple[str, Ends | None], Quantity] = {}
         for over in dict.fromkeys(one.over for one in self.metrics):
             names = [one.name for one in self.metrics if one.over == over]
-            window = None if over is None else Window(*over)
-            found |= {(name, over): item.value for name, item in evaluate(result, names, window, extra).items()}
-        return tuple(_finite(found[one.name, one.over]) for one in self.metrics)
+            window = None if over is None else window_of(result, over)
+            found |= {(name, over): item for name, item in evaluate(result, names, window, extra).items()}
+        return tuple(found[one.name, one.over] for one in self.metrics)
+
+
+def _gaps(result: Result) -> str:
+    """Return why a point that was solved has cells without a value: the windows that its curve does not cover."""
+    return "; ".join(gap.short for gap in gaps(result))
 
 
 def _finite(value: float | None) -> float | None:

@@ -16,7 +16,7 @@ import numpy as np
 
 from cfmkit.errors import ExitCode
 from cfmkit.metrics import other_name
-from cfmkit.results import Status
+from cfmkit.results import WINDOW_OUTSIDE, Status
 from cfmkit.studies.variation import written
 from cfmkit.units import border_unit, to_border
 
@@ -75,6 +75,8 @@ class Summary:
         Columns whose values are kept for pictures.
     counts : Counter
         Points by status.
+    gapped, first_gap : int, str
+        Complete points without a value over some window, and what the first of them says.
     best, best_value, best_meets : int, float, bool
         The best point so far, its metrics, and whether it meets every requirement.
     """
@@ -84,6 +86,8 @@ class Summary:
     counts: Counter[Status] = field(default_factory=Counter)
     met: NDArray[np.int64] = field(init=False)
     all_met: int = 0
+    gapped: int = 0
+    first_gap: str = ""
     best: int | None = None
     best_values: FloatArray | None = None
     best_meets: bool = False
@@ -101,6 +105,10 @@ class Summary:
         self.counts[Status.COMPLETE] += len(rows) - len(rows.odd)
         self.counts.update(status for status, _ in rows.odd.values())
         self.met += rows.met.sum(axis=0)
+        gaps = [(k, text) for k, (status, text) in rows.odd.items() if status is Status.COMPLETE]
+        if gaps and not self.gapped:
+            self.first_gap = f"point {int(indices[gaps[0][0]]) + 1}: {gaps[0][1]}"
+        self.gapped += len(gaps)
         usable = np.ones(len(rows), dtype=bool)
         usable[[k for k, (status, _) in rows.odd.items() if not status.usable]] = False
         meets = usable & rows.met.all(axis=1)
@@ -178,7 +186,7 @@ class Summary:
             "metrics": {} if best is None else self._metrics(),
             "range": self._range(),
             "requirements": self._requirements(),
-            "warnings": [],
+            "warnings": self._warnings(),
         }
 
     def _best(self, records: Records) -> dict[str, Any] | None:
@@ -214,6 +222,13 @@ class Summary:
                 ends = {"min": float(to_border(low, one.dimension)), "max": float(to_border(high, one.dimension))}
                 found[one.name] = ends | {"unit": border_unit(one.dimension)}
         return found
+
+    def _warnings(self) -> list[dict[str, str]]:
+        if not self.gapped:
+            return []
+        told = f"{self.gapped} of {self.total} points have no value over a window that their curve does not cover"
+        cure = "windows in shares of the travel follow it: [1 %, 100 %]"
+        return [{"name": WINDOW_OUTSIDE, "message": f"{told} ({self.first_gap}); {cure}"}]
 
     def _requirements(self) -> list[dict[str, Any]]:
         listed = zip(self.study.spec.requirements, self.met.tolist(), strict=True)

@@ -173,7 +173,7 @@ class Place(float):
     @classmethod
     def __get_pydantic_core_schema__(cls, _source: Any, _handler: Any) -> CoreSchema:
         """Build the validator and the serialiser."""
-        return _plain_schema(_read_place, _write_place)
+        return plain_schema(_read_place, write_place)
 
     @classmethod
     def __get_pydantic_json_schema__(cls, _core: Any, _handler: Any) -> dict[str, Any]:
@@ -185,10 +185,11 @@ PLACE = Quantity(PLACES)
 
 
 def _read_place(value: Any) -> Place:
-    return value if isinstance(value, Place) else Place(*PLACE.read(value))
+    return value if isinstance(value, Place) and value.dimension in PLACES else Place(*PLACE.read(value))
 
 
-def _write_place(value: float) -> str:
+def write_place(value: float) -> str:
+    """Return a place as text with its unit."""
     return format_quantity(value, getattr(value, "dimension", "length"))
 
 
@@ -202,7 +203,7 @@ class _OpenQuantity:
 
     def __get_pydantic_core_schema__(self, _source: Any, _handler: Any) -> CoreSchema:
         """Build the validator."""
-        return _plain_schema(self.read, _number_or_text)
+        return plain_schema(self.read, _number_or_text)
 
     def __get_pydantic_json_schema__(self, _core: Any, _handler: Any) -> dict[str, Any]:
         """Describe the text that is expected."""
@@ -220,7 +221,8 @@ def quantity(dimension: str) -> Quantity:
     return Quantity((dimension_of(dimension).name,))
 
 
-def _plain_schema(read: Callable[[Any], Any], write: Callable[[Any], Any]) -> CoreSchema:
+def plain_schema(read: Callable[[Any], Any], write: Callable[[Any], Any]) -> CoreSchema:
+    """Return the schema of what is read and written by two functions."""
     from pydantic_core import core_schema
 
     written = core_schema.plain_serializer_function_ser_schema(write, when_used="json")

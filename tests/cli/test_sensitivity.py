@@ -258,3 +258,18 @@ def test_a_metric_that_does_not_vary_is_told_and_changes_no_exit_code(cli, study
     told = cli("sensitivity", study, "--method", "sobol", "--samples", "4", "--no-plots", "--metrics", "force_constant")
     assert told.code == 0
     assert "force_constant does not vary" in " ".join(told.out.split())
+
+
+def test_a_sensitivity_without_any_value_names_the_window_that_is_outside(cli, tmp_path):
+    varied = ("--vary", "mechanism.rolling_friction=0.001:0.004", "--metrics", "force_ripple")
+    done = cli(
+        "sensitivity",
+        str(CONFIG.parents[1] / "cam.yaml"),
+        *varied,
+        "--set",
+        "analysis.window=[250 mm, 300 mm]",
+        "-o",
+        "out",
+    )
+    assert done.code == 4
+    assert "no value over 250 ... 300 mm (analysis.window): the curve covers 0 ... 240 mm only" in done.err

@@ -312,3 +312,31 @@ def test_of_numbers_without_a_unit_only_shares_are_percentages(cli):
     lines = {words[0]: words[1] for line in told.splitlines() if len(words := re.split(r"\s{2,}", line.strip())) == 2}
     assert lines["stable positions"] == "2"
     assert lines["torque ripple"].endswith(" %")
+
+
+DESIGNED = ("--design", "--vary", "design.stroke=150mm:250mm:3", "--metrics", "force_mean,force_ripple", "--no-plots")
+
+
+def test_a_table_says_why_cells_are_empty_where_a_window_does_not_follow_a_swept_stroke(cli, tmp_path):
+    done = cli("sweep", str(CAM), *DESIGNED, "-o", "out")
+    found = rows(tmp_path / "out")
+    assert [row["force_mean [N]"] == "" for row in found] == [True, True, False]
+    assert [row["message"] for row in found] == [
+        f"no value over 2 ... 240 mm (analysis.window, requirements.0.over): the curve covers 0 ... {end} mm only; "
+        f"no value over 5 ... 240 mm (requirements.1.over): the curve covers 0 ... {end} mm only"
+        for end in (150, 200)
+    ] + [""]
+    (told,) = json.loads((tmp_path / "out" / "metrics.json").read_text())["warnings"]
+    assert told["name"] == "window_outside"
+    assert told["message"].startswith("2 of 3 points have no value over a window")
+    assert "window_outside" in done.out
+
+
+def test_windows_in_shares_of_the_travel_follow_a_swept_stroke(cli, tmp_path):
+    shares = ("--set", "analysis.window=[1 %, 100 %]", "--set", "requirements.0.over=[1 %, 100 %]")
+    done = cli("sweep", str(CAM), *DESIGNED, "-o", "out", *shares, "--set", "requirements.1.over=[5 mm, 100 %]")
+    assert done.code == 0
+    found = rows(tmp_path / "out")
+    assert all(float(row["force_ripple [1]"]) > 0 for row in found)
+    assert [(row["requirements_met"], row["message"]) for row in found] == [("true", "")] * 3
+    assert json.loads((tmp_path / "out" / "metrics.json").read_text())["warnings"] == []

@@ -28,7 +28,7 @@ def findings_of(solution: Solution) -> tuple[Finding, ...]:
     return tuple(
         one
         for source in (
-            _ending, _window, _closure, _events, _stability, _accuracy, _imperfection, _stress, _slenderness, _gaps,
+            _ending, _closure, _events, _stability, _accuracy, _imperfection, _stress, _slenderness, _gaps,
         )
         for one in source(solution)
     )  # fmt: skip
@@ -38,22 +38,6 @@ def _ending(solution: Solution) -> Iterator[Finding]:
     path = solution.path
     if path.status not in (PathStatus.COMPLETE, PathStatus.INACCURATE):
         yield finding("ends_early", in_units(solution.assembly, path.message or path.status.value))
-
-
-def _window(solution: Solution) -> Iterator[Finding]:
-    """Say that a window is wider than a curve that went as far as it was asked to."""
-    window, x = solution.spec.analysis.window, solution.motion
-    if window is None or len(x) < 2 or solution.path.status not in (PathStatus.COMPLETE, PathStatus.INACCURATE):
-        return
-    slack = 1e-9 * float(np.abs(x).max())
-    if window[0] < x.min() - slack or window[1] > x.max() + slack:
-        dimension = "angle" if _effort(solution) == "torque" else "length"
-        low, high, least, most = (format_short(float(v), dimension) for v in (*window, x.min(), x.max()))
-        yield finding(
-            "window_outside",
-            f"the window {low} to {high} is not within the curve, {least} to {most}: what is measured over it has no "
-            "value",
-        )
 
 
 def _closure(solution: Solution) -> Iterator[Finding]:

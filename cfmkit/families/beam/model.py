@@ -23,7 +23,7 @@ from cfmkit.families.beam.build import Assembly, assemble, mirror_axis, resolve,
 from cfmkit.families.beam.checks import findings_of
 from cfmkit.families.beam.strips import Gap, mirrored, smallest_gap
 from cfmkit.families.beam.surface.ride import curve_of, findings_along, ride, values_along
-from cfmkit.families.beam.values import values_of
+from cfmkit.families.beam.values import travel_of, values_of
 from cfmkit.families.beam.words import in_units
 from cfmkit.results import Result, Status
 
@@ -167,6 +167,7 @@ def analyze(spec: BeamSpec, run: Run) -> Result:
         curves=curves,
         values=values,
         warnings=warnings,
+        travel=travel_of(solution),
         target=_target(spec),
         reference=None if spec.analysis.reference is None else float(spec.analysis.reference),
         allowable_stress=solution.assembly.allowable_stress,

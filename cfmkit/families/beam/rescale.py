@@ -22,7 +22,7 @@ from cfmkit.families.beam.model import solve
 from cfmkit.families.beam.values import ranges, window_of
 from cfmkit.numerics.cubic import value_at
 from cfmkit.results import Design, Status
-from cfmkit.units import Place, format_short
+from cfmkit.units import Place, Share, format_short
 
 if TYPE_CHECKING:
     from cfmkit.families.beam.parts.spec import Thickness
@@ -167,6 +167,8 @@ def _lengths(block: Any, names: tuple[str, ...], factor: float) -> Any:
 def _point(value: Any, factor: float) -> Any:
     if isinstance(value, tuple):
         return tuple(_point(one, factor) for one in value)
+    if isinstance(value, Share):  # of the travel, which is scaled itself
+        return value
     return Place(value * factor, value.dimension) if isinstance(value, Place) else value * factor
 
 

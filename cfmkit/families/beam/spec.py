@@ -173,6 +173,11 @@ class BeamSpec(Spec):
         return self.analysis.stress or ("bending" if self.fidelity == "inextensible" else "total")
 
     @property
+    def motion(self) -> Literal["length", "angle"]:
+        """What the curve runs over: the displacement or the angle of the driven node."""
+        return "angle" if self.mechanism.drive.kind in ("rotation", "moment") else "length"
+
+    @property
     def extent(self) -> float:
         """How far the drive goes: the travel [m or rad], the force [N] or the moment [N m]."""
         value: float = getattr(self.analysis, _EXTENT[self.mechanism.drive.kind])

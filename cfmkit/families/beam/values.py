@@ -9,6 +9,7 @@ import numpy as np
 from cfmkit.families.beam.build import thickest_of
 from cfmkit.numerics.cubic import bisect, crossing, first_extreme, value_at
 from cfmkit.results import Quantity
+from cfmkit.units import between
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -70,11 +71,17 @@ def values_of(solution: Solution) -> Mapping[str, Quantity]:
 
 
 def window_of(solution: Solution) -> tuple[float, float]:
-    """Return the window of the analysis, or the whole travel."""
+    """Return the window of the analysis in places, or the whole travel."""
     window = solution.spec.analysis.window
     if window is not None:
-        return float(window[0]), float(window[1])
+        return between(window, travel_of(solution))
     return float(solution.motion.min()), float(solution.motion.max())
+
+
+def travel_of(solution: Solution) -> tuple[float, float]:
+    """Return where the motion was to start and to end; of a drive by a load, where it did [m or rad]."""
+    start, end = float(solution.motion[0]), float(solution.motion[-1])
+    return start, solution.spec.extent if solution.spec.analysis.travel is not None else end
 
 
 def within(solution: Solution, low: float, high: float) -> Any:

@@ -24,7 +24,7 @@ from cfmkit.bodies.cam_profile import brace_tangent
 from cfmkit.curves import Column, Curve
 from cfmkit.errors import DataError
 from cfmkit.families.cam.build import Assembly, assemble, displacement_origin
-from cfmkit.families.cam.built_values import findings_of_built, values_of_built
+from cfmkit.families.cam.built_values import findings_of_built, requested_travel, values_of_built
 from cfmkit.families.cam.checks import left_out
 from cfmkit.families.cam.existence import check_first_pose, check_springs, until_overlap
 from cfmkit.families.cam.findings import finding
@@ -160,6 +160,7 @@ def analyze_built(spec: CamSpec) -> Result:
         curves=(_curve(built),),
         values=_values(built),
         warnings=(*found, *left_out(spec), *findings_of_built(built)),
+        travel=requested_travel(built),
         valid=((float(travel[0]) + built.origin, float(travel[-1]) + built.origin),),
         target=spec.design.force if spec.design else float(built.shares["design"][-1]),
         state=built,

@@ -10,6 +10,7 @@ from cfmkit.families.cam.findings import finding
 from cfmkit.families.findings import mm
 from cfmkit.numerics.robust import neighbour_noise
 from cfmkit.results import Quantity
+from cfmkit.units import between
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -91,8 +92,15 @@ def window_mask(built: Built) -> NDArray[np.bool_]:
     place, window = built.travel + built.origin, built.assembly.spec.analysis.window
     if window is None:
         return np.ones(len(place), dtype=bool)
-    inside: NDArray[np.bool_] = (place >= window[0]) & (place <= window[1])
+    low, high = between(window, requested_travel(built))
+    inside: NDArray[np.bool_] = (place >= low) & (place <= high)
     return inside if inside.sum() > 2 else np.ones(len(place), dtype=bool)
+
+
+def requested_travel(built: Built) -> tuple[float, float]:
+    """Return where the displacement starts and where it was to end [m]."""
+    start, end = float(built.travel[0]), built.assembly.spec.analysis.travel or float(built.travel[-1])
+    return start + built.origin, end + built.origin
 
 
 def loop_area_per_friction(built: Built) -> float:

@@ -145,6 +145,7 @@ def analyze(spec: CamSpec, run: Run) -> Result:
         curves=(_curve(solution),),
         values=values_of(solution),
         warnings=warnings,
+        travel=(solution.origin, solution.origin + _requested(solution, bool(shortfalls))),
         valid=((solution.corner_travel + solution.origin, float(solution.travel[-1]) + solution.origin),),
         target=spec.design.force if spec.design else theoretical_force(solution),
         state=solution,
@@ -159,6 +160,13 @@ def with_band(solution: Solution, seed: int) -> Solution:
     from cfmkit.families.cam.manufacturing.band import force_band
 
     return replace(solution, band=force_band(solution.assembly, tolerance, solution.travel, seed))
+
+
+def _requested(solution: Solution, short: bool) -> float:
+    """Return how far the slider was to go [m]; without a request, as far as the flank was to be cut."""
+    spec = solution.assembly.spec
+    stroke = (spec.mechanism.profile.stroke or 0.0) if short else float(solution.travel[-1])
+    return spec.analysis.travel or stroke
 
 
 def _as_run(spec: CamSpec, solution: Solution) -> CamSpec:

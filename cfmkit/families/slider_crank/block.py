@@ -215,12 +215,9 @@ class Slab:
     @cached_property
     def classified(self) -> Classified:
         """Classes, drops and numbers of equilibria."""
-        places = np.broadcast_to(self.base.nodes[0], self.sharp.shape)
-        spec = self.base.spec
-        curves = Monotone(places, self.sharp)
-        return classify(
-            curves, self.base.assembly.start, spec.analysis.tolerance, window_of(spec), self.base.assembly.rest
-        )
+        spec, assembly = self.base.spec, self.base.assembly
+        curves = Monotone(np.broadcast_to(self.base.nodes[0], self.sharp.shape), self.sharp)
+        return classify(curves, assembly.start, spec.analysis.tolerance, window_of(spec, assembly), assembly.rest)
 
     @cached_property
     def band(self) -> tuple[FloatArray, FloatArray]:

@@ -146,7 +146,7 @@ def _run_in(solution: Solution) -> Iterator[Finding]:
 
 
 def _of_band(spec: SliderCrankSpec, solution: Solution) -> Iterator[Finding]:
-    found, reference, window = solution.character, solution.reference, spec.analysis.window
+    found, reference, window = solution.character, solution.reference, solution.character.window
     asked = spec.analysis.reference_angle if solution.assembly.drive == "torque" else spec.analysis.reference_travel
     if asked is not None and not found.low <= reference <= found.high:
         yield finding("reference_outside", f"the reference {place(solution, reference)} is outside the motion")

@@ -28,6 +28,7 @@ from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.reactions import reactions
 from cfmkit.families.slider_crank.values import values_of
 from cfmkit.results import Result, Status
+from cfmkit.units import between
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -155,6 +156,7 @@ def analyze(spec: SliderCrankSpec, run: Run) -> Result:
         curves=(_curve(solution),),
         values=values_of(solution),
         warnings=(*shortfalls, *(item for item in findings_of(spec, solution) if item.name not in said)),
+        travel=asked_motion(spec, assembly),
         target=target_of(spec),
         reference=solution.reference,
         state=solution,
@@ -193,15 +195,15 @@ def solve(spec: SliderCrankSpec, assembly: Assembly) -> tuple[Solution, tuple[Fi
     if not finite.all():  # where springs are relaxed in a dead point of the crank: 0/0 in that place alone
         motion = motion[finite]
         units = assembly.units(motion)
-    character = Character(assembly, start, stop, spec.analysis.tolerance, window_of(spec))
+    character = Character(assembly, start, stop, spec.analysis.tolerance, window_of(spec, assembly))
     solution = Solution(assembly, motion, units, character, reference_motion(spec, assembly), spec.mechanism.legs)
     return solution, short
 
 
-def window_of(spec: SliderCrankSpec) -> tuple[float, float] | None:
+def window_of(spec: SliderCrankSpec, assembly: Assembly) -> tuple[float, float] | None:
     """Return the window in which the effort is wanted constant, if the analysis states one [rad or m]."""
     window = spec.analysis.window
-    return None if window is None else (float(window[0]), float(window[1]))
+    return None if window is None else between(window, asked_motion(spec, assembly))
 
 
 def efforts_inside(motion: FloatArray, units: UnitCurves, window: tuple[float, float] | None) -> FloatArray:

@@ -214,6 +214,11 @@ class SliderCrankSpec(Spec):
     analysis: CrankAnalysis = Field(default_factory=CrankAnalysis, description="how it is run")
 
     @property
+    def motion(self) -> Literal["length", "angle"]:
+        """What the curve runs over: the slider's travel, or the angle of the crank."""
+        return "length" if self.analysis.drive == "force" else "angle"
+
+    @property
     def fidelity(self) -> Literal["prb", "lumped", "beam"]:
         """The model that the analysis uses."""
         return self.analysis.fidelity or self.mechanism.finest

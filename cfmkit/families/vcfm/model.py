@@ -22,6 +22,7 @@ from cfmkit.families.vcfm.values import values_of
 from cfmkit.families.vcfm.windows import longest_window
 from cfmkit.numerics.roots import bracketed_root
 from cfmkit.results import Result, Status
+from cfmkit.units import between
 
 if TYPE_CHECKING:
     from cfmkit.curves import FloatArray
@@ -134,11 +135,15 @@ class Solution:
         return tuple(push.window(self.spec.analysis.flatness) for push in self.pushes)
 
     @property
+    def course(self) -> tuple[float, float]:
+        """Where the shuttle starts from at the nominal preload, and where it was to go [m]."""
+        return float(self.nominal.travel[0]), self.spec.travel
+
+    @property
     def window(self) -> tuple[float, float]:
         """Where forces are compared [m]: the analysis' window, else the linear range, else the longest flat stretch."""
         if self.spec.analysis.window is not None:
-            ends = self.spec.analysis.window
-            return float(ends[0]), float(ends[1])
+            return between(self.spec.analysis.window, self.course)
         low, high = self.character.linear
         if np.isfinite(low) and low < self.spec.travel:
             return low, min(high, self.spec.travel)
@@ -173,6 +178,7 @@ def analyze(spec: VcfmSpec, run: Run) -> Result:
         curves=curves,
         values=values_of(solution),
         warnings=findings_of(solution),
+        travel=solution.course,
         valid=_valid(solution),
         target=spec.design.force if spec.design else None,
         allowable_stress=spec.mechanism.allowable_stress,

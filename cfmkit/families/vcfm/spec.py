@@ -249,6 +249,11 @@ class VcfmSpec(Spec):
         return self
 
     @property
+    def motion(self) -> Literal["length", "angle"]:
+        """What the curves run over: the displacement of the shuttle."""
+        return "length"
+
+    @property
     def travel(self) -> float:
         """How far the shuttle goes [m]."""
         leaf = self.mechanism.bistable

@@ -117,11 +117,12 @@ class Evaluator:
     def _numbers(self, rows: Rows) -> FloatArray:
         numbers = np.concatenate([rows.values, rows.met.astype(np.float64)], axis=1)
         # A curve that ends early is measured over another travel: its metrics are no samples of these.
-        numbers[list(rows.odd)] = np.nan
+        failed = {k: item for k, item in rows.odd.items() if item[0] is not Status.COMPLETE}
+        numbers[list(failed)] = np.nan
         self.ends[Status.COMPLETE] += len(rows) - len(rows.odd)
         self.ends.update(status for status, _ in rows.odd.values())
-        if rows.odd and not self.first_failure:
-            self.first_failure = next(iter(rows.odd.values()))[1]
+        if failed and not self.first_failure:
+            self.first_failure = next(iter(failed.values()))[1]
         return numbers
 
     @property

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from math import isfinite
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -16,18 +17,19 @@ from cfmkit.studies.columns import metrics_of
 from cfmkit.studies.plan import MOST_POINTS, refuse_too_many
 from cfmkit.studies.sensitivity.parameters import correlations, parameters_of, together
 from cfmkit.studies.study import Study
-from cfmkit.units import border_unit, to_border
+from cfmkit.units import Share, border_unit, format_short, to_border
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from cfmkit.curves import Curve, FloatArray
     from cfmkit.metrics import Outcome
-    from cfmkit.results import Result
+    from cfmkit.results import Quantity, Result
     from cfmkit.spec import Requirement, Sensitivity, Spec
     from cfmkit.studies.sensitivity.failures import Policy
     from cfmkit.studies.sensitivity.parameters import Parameter
     from cfmkit.studies.study import Metric
+    from cfmkit.units import Ends
 
 Method = Literal["oat", "local", "morris", "sobol", "tolerance"]
 SAMPLES = {"oat": 11, "local": 2, "morris": 20, "sobol": 256, "tolerance": 1000}
@@ -178,8 +180,8 @@ def _suits(block: Sensitivity, parameters: tuple[Parameter, ...]) -> None:
         raise SpecError([Problem("", 0, 0, f"sensitivity.parameters.{one.path}", told) for one in outside])
 
 
-def _noted(one: Requirement) -> tuple[str, tuple[float, float] | None]:
-    return one.metric, None if one.over is None else (float(one.over[0]), float(one.over[1]))
+def _noted(one: Requirement) -> tuple[str, Ends | None]:
+    return one.metric, one.over
 
 
 def _metrics(spec: Spec, block: Sensitivity, sample: Curve | None) -> tuple[Metric, ...]:
@@ -202,9 +204,12 @@ def _numeric(metrics: tuple[Metric, ...], block: Sensitivity) -> tuple[Metric, .
     return tuple(one for one in metrics if not one.words)
 
 
-def _label(name: str, over: tuple[float, float] | None, motion: str) -> str:
+def _label(name: str, over: Ends | None, motion: str) -> str:
     if over is None:
         return name
+    if any(isinstance(end, Share) for end in over):
+        low, high = (format_short(end, getattr(end, "dimension", motion), 6) for end in over)
+        return f"{name} over {low} ... {high}"
     low, high = (f"{float(to_border(end, motion)):.6g}" for end in over)
     return f"{name} over {low} ... {high} {border_unit(motion)}"
 
@@ -222,16 +227,25 @@ def _with_nominal(study: Study, result: Result) -> tuple[Study, Nominal, tuple[F
     """Return the study of those metrics that have a value, and the result without deviations as it sees it."""
     row = study.row(result)
     valued = [k for k, value in enumerate(row.values) if value is not None]
+    told = {one.label: item.reason or "there is none" for one, item in _valueless(study, result)}
     if not valued:
-        raise SolutionError("none of the metrics has a value for the specification itself")
-    gone = [one.label for k, one in enumerate(study.metrics) if k not in valued]
+        reasons = "; ".join(dict.fromkeys(row.message or reason for reason in told.values()))
+        raise SolutionError(f"none of the metrics has a value for the specification itself: {reasons}")
     without = tuple(
-        Finding("no_value", f"{label} has no value for the specification itself: left out") for label in gone
+        Finding("no_value", f"{label} has no value for the specification itself ({reason}): left out")
+        for label, reason in told.items()
     )
     outcomes = check(study.spec.requirements, result, values_of_family(family(study.spec.family).values))
     values = np.array([row.values[k] for k in valued], dtype=np.float64)
     kept = replace(study, metrics=tuple(study.metrics[k] for k in valued))
     return kept, Nominal(result, outcomes, values), without
+
+
+def _valueless(study: Study, result: Result) -> Iterator[tuple[Metric, Quantity]]:
+    """Yield the metrics without a value, with what is known instead."""
+    for one, item in zip(study.metrics, study.quantities(result), strict=True):
+        if item.value is None or not isfinite(item.value):
+            yield one, item
 
 
 def _cautions(spec: Spec, block: Sensitivity, parameters: tuple[Parameter, ...], samples: int) -> Iterator[Finding]:

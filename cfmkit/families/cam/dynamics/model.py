@@ -100,6 +100,7 @@ def analyze(spec: CamSpec, run: Run) -> Result:
         curves=(_curve(moved),),
         values=values_of(moved),
         warnings=(*missing, *findings_of(moved)),
+        travel=_requested(parts),
         target=spec.design.force if spec.design else constant_force(parts.right),
         state=moved,
     )
@@ -139,6 +140,12 @@ def _moved(spec: CamSpec, parts: Build, times: FloatArray) -> Moved:
         static = statics(parts.machine, np.clip(history.moment.position, low, high), upward).force
     displacement = _displacement(parts, history.moment.position)
     return Moved(_as_run(spec, parts), parts, history, static, displacement)
+
+
+def _requested(parts: Build) -> tuple[float, float]:
+    """Return where the motion was to start and to end [m]."""
+    start, end = _displacement(parts, parts.motion.at(parts.motion.times(2)).position).tolist()
+    return start, end
 
 
 def _history(spec: CamSpec, parts: Build, times: FloatArray) -> History:

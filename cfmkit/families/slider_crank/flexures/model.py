@@ -31,6 +31,7 @@ from cfmkit.families.slider_crank.flexures.solution import Printed
 from cfmkit.families.slider_crank.flexures.values import numbers
 from cfmkit.families.slider_crank.values import DEFINITIONS as ALL
 from cfmkit.results import Quantity, Result, Status
+from cfmkit.units import between
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -90,14 +91,15 @@ def analyze(spec: SliderCrankSpec, run: Run) -> Result:
     told = () if pressed.ending is Ending.COMPLETE else (finding(_NAMES[pressed.ending], pressed.message),)
     if not usable:
         return Result(spec, Status.NO_EQUILIBRIUM, pressed.message, warnings=told)
-    window = spec.analysis.window or (float(pressed.travel[0]), float(pressed.travel[-1]))
+    whole = (float(pressed.travel[0]), float(pressed.travel[-1]))
+    window = whole if spec.analysis.window is None else between(spec.analysis.window, (low, high))
     solution = Printed(
         "lumped" if spec.fidelity == "lumped" else "beam",
         chain,
         pressed,
         elasticity(spec.mechanism),
         spec.mechanism.legs,
-        (float(window[0]), float(window[1])),
+        window,
         spec.analysis.recheck,
     )
     return Result(
@@ -107,6 +109,7 @@ def analyze(spec: SliderCrankSpec, run: Run) -> Result:
         curves=(_curve(solution),),
         values=_values(solution),
         warnings=(*told, *findings_of(spec, solution)),
+        travel=(low, high),
         target=spec.design.force if spec.design else None,
         reference=spec.analysis.reference_travel,
         allowable_stress=solution.material.allowable_stress,
