@@ -133,7 +133,10 @@ SETS = {
 
 @pytest.mark.parametrize("path", SETS)
 def test_the_four_sets_of_fig_9(path):
-    """Mean force on 2 ... 4 mm and length of the longest window within 5 %; last the means by the truss law."""
+    """Mean force on 2 ... 4 mm and length of the longest window within 5 %; last the means by the truss law.
+
+    The lengths are of samples 0.02 mm apart: the window itself reaches up to one step farther at either end.
+    """
     values, means, ranges, truss = SETS[path]
     unit = "deg" if path.endswith("angle") else "mm"
     one = ("mechanism.bistable.half_beams=2", "mechanism.positive.loaded=half", "analysis.flatness=5 %")
@@ -141,7 +144,7 @@ def test_the_four_sets_of_fig_9(path):
     for value, mean, longest, barred in zip(values, means, ranges, truss, strict=True):
         found = analyzed(*one, f"{path}={value} {unit}")
         assert force_at(found, WINDOW).mean() == pytest.approx(mean, abs=2e-3)
-        assert found.values["window_length"].value / MM == pytest.approx(longest, abs=0.021)
+        assert longest - 1e-3 <= found.values["window_length"].value / MM <= longest + 0.04
         bars = analyzed(*one, f"{path}={value} {unit}", "analysis.fidelity=truss")
         assert force_at(bars, WINDOW).mean() == pytest.approx(barred, abs=8e-3)
 

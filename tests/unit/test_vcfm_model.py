@@ -108,6 +108,45 @@ def test_the_longest_window_is_what_trying_all_gives():
         assert (start, stop) == plain_longest(np.where(np.isnan(curve), -1, curve), 0.05)
 
 
+@pytest.mark.parametrize("model", ["analytic", "exact"])
+@pytest.mark.parametrize(
+    "changes",
+    [
+        ["analysis.flatness=5 %"],
+        ["analysis.flatness=1 %", "mechanism.positive.width=8.509 mm"],
+        ["mechanism.bistable.structure=cosine", "mechanism.bistable.thickness=2 mm"],
+        ["mechanism.bistable.thickness=0.3 mm", "mechanism.positive.width=0.25 mm"],
+    ],
+)
+def test_places_do_not_depend_on_the_number_of_points(model, changes):
+    names = ("window_start", "window_end", "window_length", "window_force", "least_force", "rest_shift_max")
+    few, many = (
+        analyzed(f"analysis.fidelity={model}", *changes, f"analysis.points={n}", preloads="[0 mm, 1 mm]")
+        for n in (301, 3001)
+    )
+    for name in names:
+        assert few.values[name].value == pytest.approx(many.values[name].value, rel=2e-5), name
+
+
+def test_the_ends_of_a_window_are_where_the_force_leaves_the_band():
+    found = analyzed("analysis.flatness=1 %", "mechanism.positive.width=8.509 mm", "analysis.points=121")
+    start, end = (found.values[name].value for name in ("window_start", "window_end"))
+    fine = analyzed("mechanism.positive.width=8.509 mm", "analysis.points=60001").curve
+    for low, high in ((start, end), (start - 1e-5, end), (start, end + 1e-5)):
+        inside = (fine.motion >= low) & (fine.motion <= high)
+        ripple = np.ptp(fine.force[inside]) / fine.force[inside].max()
+        assert bool(ripple <= 0.01 * (1 + 2e-4)) is ((low, high) == (start, end))
+
+
+def test_the_map_of_preloads_has_a_start_of_the_window_without_jags():
+    """From one preload to the next it moves evenly; by samples it jumped by their distance."""
+    found = analyzed("analysis.flatness=5 %", preloads="[0 mm, 6 mm]")
+    drawn = api.figures(found)["adjustability"]()
+    lines = [line.get_ydata() for line in drawn.axes[-1].lines if len(line.get_ydata()) > 10]
+    steps = np.diff(lines[0])
+    assert np.abs(np.diff(steps)).max() < 0.02 * np.abs(steps).max()
+
+
 # --- blocks ----------------------------------------------------------------------------------------------------
 
 RANGES = {

@@ -18,7 +18,7 @@ from cfmkit.families.vcfm.springs import Diamond
 from cfmkit.families.vcfm.strip import Strip
 from cfmkit.families.vcfm.truss import TrussDiamond, TrussLeaf
 from cfmkit.families.vcfm.vbeam import LINEAR_ABOVE, VBeam
-from cfmkit.families.vcfm.windows import longest_window
+from cfmkit.families.vcfm.windows import flat_window
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -174,9 +174,13 @@ class Slab:
         return np.hstack(parts)
 
     @cached_property
-    def window(self) -> tuple[Any, Any]:
-        """First and last sample of each longest flat stretch."""
-        return longest_window(self.force, self.flatness)
+    def window(self) -> tuple[FloatArray, FloatArray]:
+        """Start and end of each longest flat stretch [m]."""
+
+        def force_at(places: FloatArray) -> FloatArray:
+            return np.asarray(self.half_beams * self.leaf.force(places) + self.spring.force(places))
+
+        return flat_window(self.grid, self.force, self.flatness, force_at)
 
 
 def _between(motion: FloatArray, force: FloatArray, place: float) -> FloatArray:
@@ -223,14 +227,9 @@ METRICS: dict[str, Callable[[Spread, Slab], FloatArray]] = {
 }
 
 
-def _window_end(slab: Slab, which: int) -> FloatArray:
-    first, last = slab.window
-    return np.where(last > first, slab.grid[slab.window[which]], np.nan)[:, None]
-
-
 def _window_length(slab: Slab) -> FloatArray:
-    first, last = slab.window
-    return np.asarray(slab.grid[last] - slab.grid[first])[:, None]
+    start, end = slab.window
+    return np.asarray(np.nan_to_num(end - start))[:, None]
 
 
 def _stroke(slab: Slab) -> Any:
@@ -248,7 +247,7 @@ SCALARS: dict[str, Callable[[Slab], Any]] = {
     "linear_end": lambda slab: slab.leaf.linear[1],
     "linear_stroke": _stroke,
     "constant_force": lambda slab: slab.spring.force(slab.leaf.strip.rise),
-    "window_start": lambda slab: _window_end(slab, 0),
-    "window_end": lambda slab: _window_end(slab, 1),
+    "window_start": lambda slab: slab.window[0][:, None],
+    "window_end": lambda slab: slab.window[1][:, None],
     "window_length": _window_length,
 }

@@ -27,6 +27,7 @@ from cfmkit.families.vcfm.vbeam import (
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from cfmkit.curves import FloatArray
     from cfmkit.families.vcfm.model import Push, Solution
     from cfmkit.results import Finding
 
@@ -43,6 +44,10 @@ ROUNDING = 1e-9
 
 ALIKE = 0.01
 """Stiffnesses that differ by less than this share cancel."""
+
+TRIED = (0.998, 0.99, 0.97, 0.94, 0.9)
+"""Shares of the flatness that are looked for where a window is proposed: by the samples of a curve, with a corner cut
+off, the whole must be kept."""
 
 WIDEST = 50.0
 """Factor on a width up to which one is looked for that makes the force flat."""
@@ -86,7 +91,7 @@ def _flatness(solution: Solution) -> Iterator[Finding]:
     force = push.inside((low, high))
     if not len(force) or force.max() <= 0:
         return
-    ripple, allowed = float((force.max() - force.min()) / force.max()), solution.spec.analysis.flatness
+    ripple, allowed = _ripple(force), solution.spec.analysis.flatness
     if ripple <= allowed:
         return
     one = solution.character
@@ -113,17 +118,22 @@ def _flattening(solution: Solution, ripple: float) -> tuple[str, tuple[str, ...]
     if left <= allowed and left < ripple:
         text = f"; leaves {factor:.3g} times as wide, or a spring {1.0 / factor:.3g} times as wide, make them equal"
         return text, ()
-    (first, last), flat = solution.character.linear, solution.windows[0]
-    low, high = solution.window
+    (first, last), (low, high) = solution.character.linear, solution.window
     why = ""
     if np.isfinite(first) and (low < first or high > last):
         why = f"; the leaves are buckled from {mm(first)} to {mm(last)} only"
-    if flat is None or (flat[0] - low <= 0 and flat[1] - high >= 0):
-        return f"{why}; no width of leaves or spring makes it flat", ()
-    start, end = at_least(flat[0]), at_most(flat[1])
-    return f"{why}; the force is flat from {start} to {end}: state that as the window", (
-        f"analysis.window=[{start}, {end}]",
-    )
+    for share in TRIED:
+        flat = solution.flat_part(solution.nominal, share * allowed)
+        if flat is not None and _ripple(solution.nominal.inside(flat)) <= (1.0 - ROUNDING) * allowed:
+            start, end = at_least(flat[0]), at_most(flat[1])
+            cure = f"analysis.window=[{start}, {end}]"
+            return f"{why}; the force is flat from {start} to {end}: state that as the window", (cure,)
+    return f"{why}; no width of leaves or spring makes it flat", ()
+
+
+def _ripple(force: FloatArray) -> float:
+    """Return (max - min)/max of some forces."""
+    return float((force.max() - force.min()) / force.max()) if len(force) and force.max() > 0 else np.inf
 
 
 def _better_width(solution: Solution) -> tuple[float, float]:
@@ -151,13 +161,13 @@ def _better_width(solution: Solution) -> tuple[float, float]:
 def _returns(solution: Solution) -> Iterator[Finding]:
     push, (low, high) = solution.nominal, solution.window
     q = float(solution.parts.strip.slenderness)
-    if push.least and solution.spec.mechanism.bistable.structure == "v-beam" and q > BISTABLE_ABOVE:
-        place, force = push.least
+    if solution.least and solution.spec.mechanism.bistable.structure == "v-beam" and q > BISTABLE_ABOVE:
+        place, force = solution.least
         end = mm(float(push.travel[-1]))
         back = (
             f"its force past the peak of the leaves is {newton(force)} at least (at {mm(place)}; followed to {end}), "
             "so the mechanism returns by itself"
-            if force > 0
+            if force > ROUNDING * float(np.abs(push.force).max())
             else f"its force falls to {newton(force)} at {mm(place)}: the mechanism stays there until it is pulled back"
         )
         yield finding("bistable", f"without the spring the leaves snap to a second stable pose; with it {back}")

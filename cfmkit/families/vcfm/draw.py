@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.curves import Curve
-from cfmkit.families.vcfm.model import rest_of
+from cfmkit.families.vcfm.model import force_of, rest_of
 from cfmkit.families.vcfm.preload import force_change, rest_shift
 from cfmkit.families.vcfm.scene import scene
 from cfmkit.families.vcfm.truss import TrussLeaf
-from cfmkit.families.vcfm.windows import longest_window
+from cfmkit.families.vcfm.windows import flat_window
 from cfmkit.plots import parts
 from cfmkit.plots.curves import Look, plot_curve
 from cfmkit.plots.diagram import Diagram, Limit, Region, Scale, Series, diagram_figure
@@ -45,8 +45,8 @@ if TYPE_CHECKING:
     from cfmkit.results import Result
 
 TRAVEL = Scale("displacement", "length")
-FINE = 961
-"""Places at which the start of a window is looked for."""
+FINE = 241
+"""Places from which on the start of a window is looked for."""
 
 PRELOADS = 41
 """Preloads of the map."""
@@ -193,10 +193,13 @@ def adjustability(result: Result) -> Figure:
 def _starts(solution: Solution, preloads: FloatArray) -> FloatArray:
     """Return where the longest window within the flatness starts at each preload [m]; NaN where there is none."""
     travel = np.linspace(0.0, float(solution.nominal.travel[-1]), FINE)
-    leaves = solution.sampler.leaves(travel).force
-    forces = np.array([leaves + solution.sampler.spring(travel + preload)[0] for preload in preloads])
-    first, last = longest_window(forces, solution.spec.analysis.flatness)
-    return np.where(last > first, travel[first], np.nan)
+
+    def force_at(places: FloatArray) -> FloatArray:
+        rows = zip(places, preloads, strict=True)
+        return np.array([force_of(solution.sampler, row, float(preload)) for row, preload in rows])
+
+    forces = force_at(np.broadcast_to(travel, (len(preloads), FINE)))
+    return flat_window(travel, forces, solution.spec.analysis.flatness, force_at)[0]
 
 
 def _shift(solution: Solution, preload: float, grid: FloatArray) -> float:

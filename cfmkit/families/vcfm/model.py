@@ -19,7 +19,7 @@ from cfmkit.families.vcfm.parts import parts
 from cfmkit.families.vcfm.samples import LawSampler
 from cfmkit.families.vcfm.tables import adjustability, readings
 from cfmkit.families.vcfm.values import values_of
-from cfmkit.families.vcfm.windows import longest_window
+from cfmkit.families.vcfm.windows import extreme, flat_window
 from cfmkit.numerics.roots import bracketed_root
 from cfmkit.results import Result, Status
 from cfmkit.units import between
@@ -67,27 +67,11 @@ class Push:
         total: FloatArray = np.add(self.leaves.force, self.spring_force)
         return total
 
-    @cached_property
-    def least(self) -> tuple[float, float] | None:
-        """Where and how small the force becomes once the leaves are past their peak [m, N]; None if they have none."""
-        falls = np.flatnonzero((np.diff(self.leaves.force) < 0) & (self.travel[:-1] >= 0))
-        if not len(falls):
-            return None
-        lowest = int(falls[0] + np.argmin(self.force[falls[0] :]))
-        return float(self.travel[lowest]), float(self.force[lowest])
-
     def largest_stress(self, end: float) -> tuple[float, float]:
         """Return the largest stress of leaves and spring up to a travel [m], in Pa."""
         before = self.travel <= end * (1 + 1e-9)
         leaves, spring = (stress[before].max(initial=0.0) for stress in (self.leaves.stress, self.spring_stress))
         return float(leaves), float(spring)
-
-    def window(self, flatness: float) -> tuple[float, float] | None:
-        """Return the longest stretch on which (max - min)/max of the force is within `flatness` [m]; None if none."""
-        first, last = longest_window(self.force[None, :], flatness)
-        if first[0] == last[0]:
-            return None
-        return float(self.travel[first[0]]), float(self.travel[last[0]])
 
     def inside(self, window: tuple[float, float]) -> FloatArray:
         """Return the forces at the samples in a window, its interpolated ends included [N]."""
@@ -131,8 +115,40 @@ class Solution:
 
     @cached_property
     def windows(self) -> tuple[tuple[float, float] | None, ...]:
-        """Constant-force window of each curve [m]."""
-        return tuple(push.window(self.spec.analysis.flatness) for push in self.pushes)
+        """Constant-force window of each curve [m]; None where the force is nowhere positive."""
+        return tuple(self.flat_part(push, self.spec.analysis.flatness) for push in self.pushes)
+
+    def flat_part(self, push: Push, flatness: float) -> tuple[float, float] | None:
+        """Return the longest stretch of a curve on which (max - min)/max of the force is within `flatness` [m]."""
+
+        def force_at(places: FloatArray) -> FloatArray:
+            return force_of(self.sampler, places[0], push.preload)[None, :]
+
+        start, end = flat_window(push.travel, push.force[None, :], flatness, force_at)
+        return (float(start[0]), float(end[0])) if np.isfinite(start[0]) else None
+
+    @cached_property
+    def least(self) -> tuple[float, float] | None:
+        """Where and how small the nominal force becomes past the peak of the leaves [m, N]; None without one."""
+        push, sampler = self.nominal, self.sampler
+        falls = np.flatnonzero((np.diff(push.leaves.force) < 0) & (push.travel[:-1] >= 0))
+        if not len(falls):
+            return None
+        step, end = float(push.travel[-1] - push.travel[-2]), float(push.travel[-1])
+        # thin leaves have their peak between the first two points: it is looked for, not taken from them
+        peak = extreme(sampler.leaf_force, float(push.travel[falls[0]]), step, (max(float(push.travel[0]), 0.0), end))
+        lowest = float(push.travel[int(falls[0] + np.argmin(push.force[falls[0] :]))])
+        place = extreme(lambda travel: -force_of(sampler, travel, push.preload), max(lowest, peak), step, (peak, end))
+        return place, float(force_of(sampler, np.array([place]), push.preload)[0])
+
+    @property
+    def window_force(self) -> float | None:
+        """Mean of the nominal force over its constant-force window [N]; None where there is none."""
+        if self.windows[0] is None or not self.windows[0][1] > self.windows[0][0]:
+            return None
+        places = np.linspace(*self.windows[0], 401)
+        force = force_of(self.sampler, places, self.nominal.preload)
+        return float(np.trapezoid(force, places) / (places[-1] - places[0]))
 
     @property
     def course(self) -> tuple[float, float]:
@@ -203,6 +219,11 @@ def solve(spec: VcfmSpec) -> Solution:
     # a preload at which the spring cannot be followed has no curve; the sampler's problem says so
     pushes = (nominal, *(push for push in others if len(push.travel) >= LEAST))
     return Solution(spec, made, sampler, sampler.character, pushes)
+
+
+def force_of(sampler: Sampler, travel: FloatArray, preload: float) -> FloatArray:
+    """Return the force on the shuttle at some travels and a preload [N]."""
+    return np.asarray(sampler.leaf_force(travel) + sampler.spring(travel + preload)[0])
 
 
 def rest_of(sampler: Sampler, preload: float, grid: FloatArray) -> float | None:

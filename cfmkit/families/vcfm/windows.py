@@ -1,4 +1,9 @@
-"""The longest stretch of a curve on which the force stays within a band: for one curve or many at once."""
+"""The longest stretch of a curve on which the force stays within a band: for one curve or many at once.
+
+Found among samples first, each start with the place in the next cell where the force leaves the band. Then again with
+more samples around both ends and around the highest and the lowest force in between, until they are 1/4096 of a step
+apart: the ends are those of the curve, not of its samples.
+"""
 
 from __future__ import annotations
 
@@ -7,9 +12,117 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
     from cfmkit.curves import FloatArray
+
+ZOOMS, CLOSER, AROUND = 6, 4.0, np.linspace(-2.0, 2.0, 17)
+"""How often it is looked more closely, how much more each time, and where around a place, in steps."""
+
+
+def extreme(
+    function: Callable[[FloatArray], FloatArray], place: float, step: float, span: tuple[float, float]
+) -> float:
+    """Return where a function is largest near a place, within a span; `step` says how far off that may be.
+
+    Examples
+    --------
+    >>> round(extreme(np.sin, 1.5, 0.25, (0.0, 3.0)), 4)
+    1.5708
+    """
+    for _ in range(2 * ZOOMS):
+        near = np.unique(np.clip(place + AROUND * step, *span))
+        place, step = float(near[function(near).argmax()]), step / CLOSER
+    return place
+
+
+def flat_window(
+    travel: FloatArray, force: FloatArray, flatness: float, force_at: Callable[[FloatArray], FloatArray]
+) -> tuple[FloatArray, FloatArray]:
+    """Return start and end of the longest window with (max - min)/max within `flatness`, for each curve [m].
+
+    Parameters
+    ----------
+    travel : (n,) array
+        Increasing [m].
+    force : (k, n) array
+        Forces there [N]; a window holds positive ones only.
+    flatness : float
+        Largest (max - min)/max.
+    force_at : callable
+        Forces at other places of each curve, (k, m) -> (k, m) [N].
+
+    Returns
+    -------
+    start, end : (k,) array
+        NaN where no force is positive. The first of several longest.
+
+    Examples
+    --------
+    >>> hill = lambda x: 4.0 - x**2
+    >>> x = np.linspace(-2.0, 2.0, 9)
+    >>> start, end = flat_window(x, hill(x)[None, :], 0.05, hill)
+    >>> float(start[0].round(3)), float(end[0].round(3)), round(0.2**0.5, 3)
+    (-0.447, 0.447, 0.447)
+    """
+    places = np.broadcast_to(travel, force.shape)
+    force = np.where(np.isfinite(force), force, -1.0)
+    step = np.full(len(force), np.diff(travel).max())
+    low, high = travel[0], travel[-1]
+    for zoom in range(ZOOMS + 1):
+        start, end, top, bottom = _longest(places, force, flatness)
+        if zoom == ZOOMS:
+            break
+        centres = np.stack([start, end, top, bottom], axis=1)
+        more = (centres[:, :, None] + AROUND * step[:, None, None]).reshape(len(force), -1)
+        more = np.clip(np.where(np.isfinite(more), more, low), low, high)
+        known = force_at(more)
+        places, force = np.hstack([places, more]), np.hstack([force, np.where(np.isfinite(known), known, -1.0)])
+        order = np.argsort(places, axis=1, kind="stable")
+        places, force = np.take_along_axis(places, order, 1), np.take_along_axis(force, order, 1)
+        step = step / CLOSER
+    return start, end
+
+
+def _longest(places: FloatArray, force: FloatArray, flatness: float) -> tuple[FloatArray, ...]:
+    """Return start and end of each curve's longest window that starts at a sample, and where it is highest and lowest.
+
+    Between two samples the force is linear.
+    """
+    reach = _reach(force, flatness)
+    rows, n = np.arange(len(force)), force.shape[1]
+    last = np.arange(n) + reach
+    after = np.minimum(last + 1, n - 1)
+    high, low = _extremes(force, last)
+    here, there = np.take_along_axis(force, last, 1), np.take_along_axis(force, after, 1)
+    # it leaves the band over its upper end, or over its lower one
+    level = np.where(there > high, low / (1.0 - flatness), (1.0 - flatness) * high)
+    with np.errstate(all="ignore"):
+        share = np.where(last < n - 1, np.clip((level - here) / (there - here), 0.0, 1.0), 0.0)
+    at_last, at_after = np.take_along_axis(places, last, 1), np.take_along_axis(places, after, 1)
+    end = at_last + np.where(np.isfinite(share), share, 0.0) * (at_after - at_last)
+    length = np.where(force > 0, end - places, -1.0)
+    first = (length >= length.max(axis=1, keepdims=True) * (1 - 1e-12)).argmax(axis=1)
+    none = length[rows, first] <= 0
+    inside = (np.arange(n) >= first[:, None]) & (np.arange(n) <= last[rows, first][:, None])
+    top = places[rows, np.where(inside, force, -np.inf).argmax(axis=1)]
+    bottom = places[rows, np.where(inside, force, np.inf).argmin(axis=1)]
+    found = places[rows, first], end[rows, first], top, bottom
+    return tuple(np.where(none, np.nan, one) for one in found)
+
+
+def _extremes(force: FloatArray, last: NDArray[np.intp]) -> tuple[FloatArray, FloatArray]:
+    """Return the largest and smallest force from each sample to another behind it."""
+    levels, start = _levels(force), np.arange(force.shape[1])
+    size = last - start + 1
+    level = np.frexp(size.astype(float))[1] - 1  # the largest power of two within
+    highs, lows = (np.stack([pair[k] for pair in levels]) for k in (0, 1))
+    rows = np.arange(len(force))[:, None]
+    tail = last + 1 - (1 << level)
+    high = np.maximum(highs[level, rows, start], highs[level, rows, tail])
+    return high, np.minimum(lows[level, rows, start], lows[level, rows, tail])
 
 
 def longest_window(force: FloatArray, flatness: float) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
@@ -33,8 +146,15 @@ def longest_window(force: FloatArray, flatness: float) -> tuple[NDArray[np.intp]
     >>> int(first[0]), int(last[0])
     (2, 4)
     """
+    reach = _reach(np.where(np.isfinite(force), force, -1.0), flatness)
+    first = reach.argmax(axis=1)
+    return first, first + reach[np.arange(len(force)), first]
+
+
+def _reach(force: FloatArray, flatness: float) -> NDArray[np.intp]:
+    """Return how many samples behind each one are still within the band that begins there."""
     curves, n = force.shape
-    levels = _levels(np.where(np.isfinite(force), force, -1.0))
+    levels = _levels(force)
     reach = np.zeros((curves, n), dtype=np.intp)
     high, low = levels[0][0].copy(), levels[0][1].copy()
     rows, start = np.arange(curves)[:, None], np.arange(n)[None, :]
@@ -47,8 +167,7 @@ def longest_window(force: FloatArray, flatness: float) -> tuple[NDArray[np.intp]
         fits &= (bottom > 0) & (top - bottom <= flatness * top * (1 + 1e-12))
         reach = np.where(fits, reach + 2**level, reach)
         high, low = np.where(fits, top, high), np.where(fits, bottom, low)
-    first = reach.argmax(axis=1)
-    return first, first + reach[np.arange(curves), first]
+    return reach
 
 
 def _levels(force: FloatArray) -> list[tuple[FloatArray, FloatArray]]:
