@@ -18,8 +18,25 @@ A solver that stops early is not an exception: it is a `cfmkit.results.Status`.
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from enum import IntEnum
+
+_LONG_QUOTE = re.compile(r"(?P<quote>['\"])(?P<text>(?:(?!(?P=quote)).){200,})(?P=quote)", re.DOTALL)
+
+
+def shortened(message: str) -> str:
+    """Return a message in which whatever somebody gave is quoted only as far as he needs to recognise it."""
+    return _LONG_QUOTE.sub(lambda found: f"{found['quote']}{found['text'][:47]}...{found['quote']}", message)
+
+
+def visible(text: str) -> str:
+    """Return text on one line, escaped where it cannot be seen: no name may command a terminal."""
+    return text if text.isprintable() else "".join(char if char.isprintable() else _escaped(char) for char in text)
+
+
+def _escaped(char: str) -> str:
+    return f"\\x{ord(char):02x}" if ord(char) < 256 else f"\\u{ord(char):04x}"
 
 
 class ExitCode(IntEnum):
@@ -69,6 +86,10 @@ class Problem:
     column: int
     path: str
     message: str
+
+    def __post_init__(self) -> None:
+        """Keep the message short, whatever it quotes."""
+        object.__setattr__(self, "message", shortened(self.message))
 
     def __str__(self) -> str:
         """Return the one line that the user reads: ``file:line:col: path: message``."""

@@ -10,7 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cfmkit.errors import Problem, SpecError, UsageError
+from cfmkit.errors import Problem, SpecError, UsageError, visible
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -81,7 +81,7 @@ def addressed(change: str) -> tuple[str | None, str]:
     if family not in families.names():
         near = difflib.get_close_matches(family, families.names(), n=1)
         hint = f"; did you mean {near[0]!r}?" if near else f": there are {', '.join(families.names())}"
-        raise UsageError(f"--set {shown(change)}: there is no family {family!r}{hint}")
+        raise UsageError(f"--set {visible(change)}: there is no family {family!r}{hint}")
     return family, change[len(family) + 1 :]
 
 
@@ -123,13 +123,13 @@ def content(name: str) -> bytes:
         raise UsageError(f"{name!r} is not the name of a file")
     try:
         if Path(name).is_dir():
-            raise UsageError(f"{shown(name)} is a folder; name the specification in it{_inside(name)}")
+            raise UsageError(f"{visible(name)} is a folder; name the specification in it{_inside(name)}")
         with open(name, "rb") as file:
             return file.read(LARGEST + 1)
     except FileNotFoundError:
-        raise UsageError(f"{shown(name)}: there is no such file{_similar(name)}") from None
+        raise UsageError(f"{visible(name)}: there is no such file{_similar(name)}") from None
     except OSError as error:
-        raise UsageError(f"{shown(name)} cannot be read: {(error.strerror or str(error)).lower()}") from None
+        raise UsageError(f"{visible(name)} cannot be read: {(error.strerror or str(error)).lower()}") from None
 
 
 def bind(document: Document) -> Spec:
@@ -220,25 +220,20 @@ def renamed(error: SpecError, old: str, new: str) -> SpecError:
     return SpecError([replace(one, source=new) if one.source == old else one for one in error.problems])
 
 
-def shown(name: str) -> str:
-    """Return a file name for a message: on one line, whatever characters it holds."""
-    return name if name.isprintable() else ascii(name)
-
-
 def _similar(name: str) -> str:
     """Return a hint with the names in that folder that look alike."""
     folder, base = os.path.split(name)
     if folder and not os.path.isdir(folder):
-        return f" (nor a folder {shown(folder)})"
+        return f" (nor a folder {visible(folder)})"
     # without their endings: those are alike in any two names
     files = {os.path.splitext(file)[0]: file for file in _yaml_files(folder or ".")}
     near = difflib.get_close_matches(os.path.splitext(base)[0], files, n=1)
-    return f"; did you mean {shown(os.path.join(folder, files[near[0]]))!r}?" if near else ""
+    return f"; did you mean {visible(os.path.join(folder, files[near[0]]))!r}?" if near else ""
 
 
 def _inside(folder: str) -> str:
     found = _yaml_files(folder)
-    return f", e.g. {shown(os.path.join(folder, found[0]))}" if found else ""
+    return f", e.g. {visible(os.path.join(folder, found[0]))}" if found else ""
 
 
 def _yaml_files(folder: str) -> list[str]:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from cfmkit.cli.failures import answer_to
 from cfmkit.cli.terminal import Terminal
-from cfmkit.errors import CfmError, ExitCode, OutputError, UsageError
+from cfmkit.errors import CfmError, ExitCode, OutputError, UsageError, visible
 from cfmkit.results import Status
 from cfmkit.studies.batch import LEFT, Entry
 
@@ -259,6 +259,6 @@ def complaints(entries: Sequence[Entry], tracebacks: bool) -> Iterator[str]:
     for one in entries:
         yield from one.errors
         if one.bug and not one.errors:
-            yield f"error    {one.spec}: {one.message}"
+            yield f"error    {visible(one.spec)}: {one.message}"
         if one.bug and tracebacks:
             yield from one.bug.rstrip("\n").split("\n")

@@ -9,7 +9,7 @@ from rich.text import Text
 
 from cfmkit.cli.layout import across, paragraph, written
 from cfmkit.cli.terminal import BAD, FAINT, GOOD, LABEL
-from cfmkit.errors import ExitCode
+from cfmkit.errors import ExitCode, visible
 from cfmkit.studies.batch import message, outcome
 
 if TYPE_CHECKING:
@@ -37,10 +37,12 @@ def _page(entries: Sequence[Entry], ending: Ending, terminal: Terminal) -> Itera
     for one in entries:
         for requirement in one.missed if one.verb and not one.errors else ():
             told = requirement["sentence"].removesuffix(": missed")
-            yield from paragraph("missed", f"{one.spec}: {told}", terminal.width, BAD)
+            yield from paragraph("missed", f"{visible(one.spec)}: {told}", terminal.width, BAD)
         if terminal.verbose:
             for item in one.warnings:
-                yield from paragraph("warning", f"{one.spec}: {item['name']}: {item['message']}", terminal.width, BAD)
+                yield from paragraph(
+                    "warning", f"{visible(one.spec)}: {item['name']}: {item['message']}", terminal.width, BAD
+                )
     yield from written(ending.folder, ending.files, terminal)
     if ending.junit:
         yield from paragraph("written", ending.junit, terminal.width, GOOD)
@@ -55,7 +57,7 @@ def _table(entries: Sequence[Entry]) -> Table:
         good = word == "ok"
         style = GOOD if good else FAINT if one.skipped else BAD
         grid.add_row(
-            Text(f"  {one.spec}"),
+            Text(f"  {visible(one.spec)}"),
             Text(one.verb),
             Text(word if good or one.skipped else word.upper(), style),
             _detail(one),

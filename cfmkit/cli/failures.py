@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from cfmkit.cli.answer import Answer, document
-from cfmkit.errors import CfmError, ExitCode, OutputError, SpecError
+from cfmkit.errors import CfmError, ExitCode, OutputError, SpecError, shortened
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -78,6 +78,10 @@ def _entries(error: BaseException) -> Iterator[dict[str, Any]]:
 
 
 def _sentence(error: BaseException) -> str:
+    return shortened(_told(error))
+
+
+def _told(error: BaseException) -> str:
     if isinstance(error, ParserError):
         return _of_the_parser(error)
     if isinstance(error, Stopped):

@@ -12,7 +12,7 @@ from rich.text import Text
 
 from cfmkit.cli.rows import rows, searched
 from cfmkit.cli.terminal import BAD, FAINT, GOOD, LABEL
-from cfmkit.errors import ExitCode
+from cfmkit.errors import ExitCode, visible
 from cfmkit.specfile import STDIN
 
 if TYPE_CHECKING:
@@ -61,7 +61,15 @@ def cure_command(outcome: Outcome, cure: str) -> str:
     kept = [change for change in outcome.changes if change.partition("=")[0].strip() != path]
     settings = [word for change in (*kept, cure) for word in ("--set", change)]
     folder = ["-o", outcome.folder] if outcome.source == STDIN else []
-    return shlex.join(["cfmkit", verb, outcome.source, *settings, *folder])
+    return " ".join(map(quoted, ["cfmkit", verb, outcome.source, *settings, *folder]))
+
+
+def quoted(word: str) -> str:
+    """Return a word of a command line as a shell takes it, on one line whatever it holds."""
+    if word.isprintable():
+        return shlex.quote(word)
+    escaped = word.replace("\\", "\\\\").replace("'", "\\'")
+    return f"$'{visible(escaped)}'"
 
 
 def _header(outcome: Outcome, width: int) -> Text:
@@ -113,7 +121,7 @@ def written(folder: str, names: Iterable[str], terminal: Terminal) -> Iterator[T
     """Yield the lines that say what stands in a folder now; all of it under ``-v``."""
     most = None if terminal.verbose else MOST_NAMES
     told = " ".join(_braced(names, most))
-    yield from paragraph("written", f"{folder.rstrip('/')}/  {told}", terminal.width, GOOD)
+    yield from paragraph("written", f"{visible(folder.rstrip('/'))}/  {told}", terminal.width, GOOD)
 
 
 def _kept(outcome: Outcome, width: int) -> Iterator[Text]:

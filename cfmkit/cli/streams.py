@@ -6,7 +6,7 @@ import os
 import sys
 from typing import TYPE_CHECKING
 
-from cfmkit.errors import OutputError
+from cfmkit.errors import OutputError, visible
 
 if TYPE_CHECKING:
     from typing import TextIO
@@ -39,9 +39,9 @@ def put(text: str) -> None:
 
 
 def complain(text: str) -> None:
-    """Write to standard error, if that is possible."""
+    """Write to standard error, if that is possible; what cannot be seen is escaped."""
     try:
-        _write(sys.stderr, text)
+        _write(sys.stderr, "\n".join(map(visible, text.split("\n"))))
     except OSError:
         silence(sys.stderr)
 

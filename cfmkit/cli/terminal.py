@@ -16,11 +16,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from cfmkit.cli import streams
+from cfmkit.errors import visible
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
 
-    from rich.console import Console, RenderableType
+    from rich.console import Console, ConsoleOptions, RenderableType
+    from rich.segment import Segment
 
     Report = Callable[[float, str], None]
 
@@ -72,7 +74,7 @@ class Terminal:
         for item in items:
             # What a text says about wrapping would be lost: rich prints a copy of it.
             no_wrap, overflow = getattr(item, "no_wrap", None), getattr(item, "overflow", None)
-            console.print(item, crop=False, no_wrap=no_wrap, overflow=overflow)
+            console.print(_Visible(item), crop=False, no_wrap=no_wrap, overflow=overflow)
         streams.put("\n".join(line.rstrip() for line in page.getvalue().split("\n")))
 
     def text(self, text: str) -> None:
@@ -87,7 +89,7 @@ class Terminal:
     def complain(self, lines: Sequence[str]) -> None:
         """Print lines to standard error."""
         for line in lines:
-            streams.complain(f"{line}\n")
+            streams.complain(f"{visible(line)}\n")
 
     @contextmanager
     def progress(self) -> Iterator[Report]:
@@ -109,6 +111,19 @@ class Terminal:
         return Console(file=page, force_terminal=colours, width=self.width, highlight=False, markup=False, emoji=False)
 
 
+@dataclass(frozen=True)
+class _Visible:
+    """Something to print, in which a name that holds control characters commands nothing."""
+
+    item: RenderableType
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> Iterator[Segment]:
+        from rich.segment import Segment
+
+        for text, style, control in console.render(self.item, options):
+            yield Segment("\n".join(map(visible, text.split("\n"))), style, control)
+
+
 class _Bar:
     """A progress bar on standard error that appears with the first report and leaves nothing behind."""
 
@@ -120,7 +135,7 @@ class _Bar:
         """Show how far the run is."""
         if self._progress is None:
             self._start()
-        self._progress.update(self._task, completed=fraction, description=text)
+        self._progress.update(self._task, completed=fraction, description=visible(text))
 
     def close(self) -> None:
         """Remove the bar."""

@@ -11,7 +11,7 @@ import re
 import unicodedata
 from typing import TYPE_CHECKING
 
-from cfmkit.errors import QuantityError
+from cfmkit.errors import QuantityError, visible
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -29,11 +29,7 @@ _SHOWN = 50
 def shown(text: str) -> str:
     """Return `text` quoted for a message: on one line, escaped where it cannot be seen, cut where it is long."""
     cut = text if len(text) <= _SHOWN else text[: _SHOWN - 3] + "..."
-    return "'" + "".join(char if char == " " or char.isprintable() else _escape(char) for char in cut) + "'"
-
-
-def _escape(char: str) -> str:
-    return f"\\x{ord(char):02x}" if ord(char) < 256 else f"\\u{ord(char):04x}"
+    return f"'{visible(cut)}'"
 
 
 def odd_character(text: str) -> tuple[int, str] | None:

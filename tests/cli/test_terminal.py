@@ -137,3 +137,50 @@ def test_progress_is_shown_where_somebody_watches(monkeypatch):
 )
 def test_progress_is_not_shown_elsewhere(monkeypatch, stream, terminal):
     assert reported(monkeypatch, stream, terminal) == ""
+
+
+NAME = "a\x1b[31m\nb.yaml"
+"""A file name that would turn a terminal red and break a line."""
+
+
+@pytest.mark.parametrize("verb", ["check", "batch", "analyze", "design", "sweep", "export"])
+def test_a_name_with_control_characters_is_shown_escaped_and_on_one_line(cli, cam, verb):
+    (cli.folder / cam).rename(cli.folder / NAME)
+    options = ["--vary", "analysis.points=[481,401]"] if verb == "sweep" else []
+    done = cli(verb, NAME, *options, *(["--no-plots", "-o", "o\x1b[5m"] if verb not in ("check", "export") else []))
+    assert done.code == 0
+    for text in (done.out, done.err):
+        assert all(char == "\n" or char.isprintable() for char in text)
+    named = [line for line in (done.out + done.err).split("\n") if "b.yaml" in line]
+    assert all("a\\x1b[31m\\x0ab.yaml" in line for line in named)
+    assert named or verb in ("sweep", "export")
+
+
+def test_a_broken_file_with_control_characters_in_its_name_and_content_commands_nothing(cli):
+    (cli.folder / NAME).write_text("cfmkit: 1\nfamily: 'x\ny'\nname: \"\\e[5m\"\n")
+    for done in (cli("check", NAME), cli("batch", NAME), cli("check", "no\x1b[31m.yaml"), cli("show", "\x1b[31m")):
+        assert done.code in (2, 3)
+        assert all(char == "\n" or char.isprintable() for char in done.out + done.err)
+
+
+LONG = "q" * 3000
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        "family={}",
+        "mechanism.brace_length={}",
+        "mechanism.contact={{width: 8 mm, material: {}}}",
+        "mechanism.profile.file={}",
+        "analysis.fidelity={}",
+        "requirements.0.metric={}",
+        "requirements.0.over=[{}, 1 mm]",
+        "mechanism.{}=1",
+    ],
+)
+def test_a_long_value_is_quoted_no_further_than_needed_to_recognise_it(cli, cam, change):
+    done = cli("check", cam, "--set", change.format(LONG))
+    assert done.code in (2, 3)
+    assert all(len(line.replace(f"--set mechanism.{LONG}", "")) < 700 for line in done.err.split("\n"))
+    assert "qqqq" in done.err

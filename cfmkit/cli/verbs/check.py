@@ -10,7 +10,7 @@ import typer
 from cfmkit.cli.answer import Answer
 from cfmkit.cli.failures import answer_to
 from cfmkit.cli.options import Changing, Common, Quiet
-from cfmkit.errors import CfmError, ExitCode
+from cfmkit.errors import CfmError, ExitCode, visible
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -93,14 +93,15 @@ def _lines(found: list[Finding], requirements: bool) -> Iterator[Text]:
 
     from cfmkit.cli.terminal import BAD, GOOD
 
-    wide = max(len(item.file) for item in found)
+    wide = max(len(visible(item.file)) for item in found)
     for item in found:
         if item.spec is None:
             count = len(item.failure.errors)
             told = f"  {count} problem{'s' if count > 1 else ''}"
-            yield Text.assemble(item.file.ljust(wide), "  ", ("INVALID", BAD), told)
+            yield Text.assemble(visible(item.file).ljust(wide), "  ", ("INVALID", BAD), told)
             continue
-        yield Text.assemble(item.file.ljust(wide), "  ", ("ok", GOOD), f"       {item.spec.family}  {item.spec.name}")
+        about = f"       {item.spec.family}  {' '.join(item.spec.name.split())}"
+        yield Text.assemble(visible(item.file).ljust(wide), "  ", ("ok", GOOD), about)
         for requirement in item.spec.requirements if requirements else ():
             yield Text(f"    {_required(requirement)}")
 

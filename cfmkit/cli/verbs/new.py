@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -11,6 +10,7 @@ import typer
 
 from cfmkit.cli.answer import Answer
 from cfmkit.cli.options import Common
+from cfmkit.errors import visible
 
 if TYPE_CHECKING:
     from cfmkit.cli.terminal import Terminal
@@ -49,11 +49,11 @@ def run(options: Options, terminal: Terminal) -> Answer:
     verb = "design" if family(options.family).design else "analyze"
 
     def view(screen: Terminal) -> None:
-        from cfmkit.cli.layout import paragraph
+        from cfmkit.cli.layout import paragraph, quoted
         from cfmkit.cli.terminal import GOOD
 
-        screen.show(*paragraph("written", name, screen.width, GOOD))
-        screen.show(*paragraph("next", shlex.join(["cfmkit", verb, name]), screen.width))
+        screen.show(*paragraph("written", visible(name), screen.width, GOOD))
+        screen.show(*paragraph("next", " ".join(map(quoted, ["cfmkit", verb, name])), screen.width))
 
     return Answer({"family": options.family, "file": name}, view)
 
