@@ -229,6 +229,14 @@ class Journal:
                 place += len(line)
 
 
+def is_journal(path: Path) -> bool:
+    """Return whether a file is a journal: an ordinary file, not a link, with a record whose checksum fits."""
+    if path.is_symlink() or not path.is_file():
+        return False
+    with path.open("rb") as file:
+        return any(_sound(line) for line in file)
+
+
 def line_of(key: str, record: Any) -> bytes:
     """Return a record as a line of a journal."""
     body = f'"k":"{key}","r":{_ENCODE(record)}}}'.encode()

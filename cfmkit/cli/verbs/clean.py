@@ -1,0 +1,143 @@
+"""``cfmkit clean``: takes away what runs have written, and nothing else."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from cfmkit.cli.answer import Answer
+from cfmkit.cli.options import Common, Quiet
+from cfmkit.errors import ExitCode, FolderInUse, UsageError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from rich.text import Text
+
+    from cfmkit.cli.terminal import Terminal
+    from cfmkit.studies.cleaning import Remains
+
+PLACE = 80
+
+Folder = Annotated[
+    str, typer.Argument(metavar="DIR", help="Folder that runs have written to, or above such.", show_default=False)
+]
+Yes = Annotated[bool, typer.Option("-y", "--yes", help="Remove without asking.")]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Options(Common):
+    """Arguments and options."""
+
+    folder: Folder
+    yes: Yes = False
+    quiet: Quiet = False
+
+
+def run(options: Options, terminal: Terminal) -> Answer:
+    """List what runs have written below a folder, ask, and remove it.
+
+    Only what a manifest or a journal proves to be theirs goes: files that were edited, and all others, stay.
+    """
+    from cfmkit.studies.cleaning import remains_below
+
+    _refuse_what_is_no_folder(options.folder)
+    found = list(remains_below(options.folder))
+    if not (terminal.json or terminal.quiet):
+        for line in _lines(found, everything=terminal.verbose > 0):
+            terminal.show(line)
+    agreed = bool(found) and (options.yes or _agreed(found, terminal))
+    removed, busy = _removed(found, options.folder) if agreed else ([], [])
+    message = _message(found, removed)
+
+    def view(screen: Terminal) -> None:
+        screen.text(f"{message}\n")
+
+    return Answer(
+        _data(removed, found) | {"message": message},
+        view,
+        ExitCode.IN_USE if busy else ExitCode.OK,
+        complaints=tuple(f"error    {error}" for error in busy),
+        errors=tuple({"message": str(error)} for error in busy),
+    )
+
+
+def _refuse_what_is_no_folder(name: str) -> None:
+    import os
+
+    from cfmkit.specfile import shown
+
+    if not name or "\0" in name or not os.path.isdir(name):
+        raise UsageError(f"{shown(name)!s}: there is no such folder")
+
+
+def _agreed(found: Sequence[Remains], terminal: Terminal) -> bool:
+    """Return whether the user says yes.
+
+    Raises
+    ------
+    cfmkit.errors.UsageError
+        If nobody is there to answer.
+    """
+    from cfmkit.cli import streams
+
+    streams.complain(f"remove {_count(found)}? [y/N] ")
+    answer = sys.stdin.readline() if sys.stdin is not None else ""
+    if not answer:
+        terminal.complain([""])
+        raise UsageError("nothing was removed: nobody answers on standard input; say --yes")
+    return answer.strip().lower() in ("y", "yes")
+
+
+def _removed(found: Sequence[Remains], top: str) -> tuple[list[Remains], list[FolderInUse]]:
+    """Remove what was found, innermost folders first; return what has gone, and where live runs are at work."""
+    from cfmkit.studies.cleaning import remove
+
+    gone, busy = [], []
+    for one in sorted(found, key=lambda one: len(one.folder.parts), reverse=True):
+        try:
+            gone.append(remove(one, top))
+        except FolderInUse as error:
+            busy.append(error)
+    return gone[::-1], busy
+
+
+def _count(found: Sequence[Remains]) -> str:
+    files = sum(len(one.files) for one in found)
+    size = sum(one.size for one in found) / 1e6
+    return f"{files} file{'s' * (files != 1)} in {len(found)} folder{'s' * (len(found) != 1)}, {size:.3g} MB"
+
+
+def _message(found: Sequence[Remains], removed: Sequence[Remains]) -> str:
+    if not found:
+        return "nothing here was written by cfmkit"
+    return f"removed {_count(removed)}" if removed else "nothing was removed"
+
+
+def _lines(found: Sequence[Remains], everything: bool) -> Iterator[Text]:
+    from rich.text import Text
+
+    from cfmkit.store.disk import shown
+    from cfmkit.studies.cleaning import EDITED
+
+    for one in found:
+        yield Text(f"{shown(one.folder)}/  {_count([one])}", no_wrap=True, overflow="ignore")
+        for name in one.files if everything else ():
+            yield Text(f"  {shown(name)}", no_wrap=True, overflow="ignore")
+        for name in one.edited:
+            yield Text(f"  stays: {shown(name)}: {EDITED}", no_wrap=True, overflow="ignore")
+
+
+def _data(removed: Sequence[Remains], found: Sequence[Remains]) -> dict[str, Any]:
+    def paths(groups: Iterator[tuple[Remains, tuple[str, ...]]]) -> list[str]:
+        return [str(one.folder / name) for one, names in groups for name in names]
+
+    return {
+        "found": paths((one, one.files) for one in found),
+        "removed": paths((one, one.files) for one in removed),
+        "edited": paths((one, one.edited) for one in found),
+        "bytes": sum(one.size for one in removed),
+    }

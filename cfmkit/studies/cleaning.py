@@ -1,0 +1,114 @@
+"""What runs left below a folder, as far as a manifest or a journal proves that it is theirs, and taking it away.
+
+A file is a run's if the manifest beside it lists it and its content is what was written; one that was edited since is
+somebody's work and stays, as does whatever no manifest lists. A journal proves itself: its lines carry
+their checksums. Links are neither followed nor removed.
+"""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from cfmkit.errors import OutputError
+from cfmkit.store import Manifest, RunFolder, disk
+from cfmkit.store.disk import reporting
+from cfmkit.store.names import JOURNAL, MANIFEST, hash_in, mode_of
+from cfmkit.studies.journal import is_journal
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+EDITED = "it was changed since it was written"
+
+
+@dataclass(frozen=True)
+class Remains:
+    """What is left of runs in one folder.
+
+    Attributes
+    ----------
+    folder : Path
+        Where.
+    files : tuple of str
+        Names below it that are proven to be ours, the manifest last, so that it lists what is left at any moment.
+    size : int
+        Bytes in them.
+    edited : tuple of str
+        Names that a manifest lists, but whose content is another one now: they stay.
+    """
+
+    folder: Path
+    files: tuple[str, ...]
+    size: int
+    edited: tuple[str, ...] = ()
+
+
+def remains_below(root: str | os.PathLike[str]) -> Iterator[Remains]:
+    """Yield what is left of runs in a folder and in those below it, hidden ones left out.
+
+    Raises
+    ------
+    cfmkit.errors.OutputError
+        If a folder cannot be read.
+    """
+
+    def unreadable(error: OSError) -> None:
+        raise OutputError(f"cannot read {disk.shown(error.filename)}: {disk.reason(error)}")
+
+    for place, folders, _ in os.walk(os.path.realpath(root), onerror=unreadable):
+        folders[:] = sorted(name for name in folders if not name.startswith("."))
+        found = remains_in(Path(place))
+        if found.files:
+            yield found
+
+
+def remains_in(folder: Path) -> Remains:
+    """Return what is left of runs in a folder; no files where nothing is proven to be ours."""
+    manifest = _manifest(folder)
+    listed = manifest.files if manifest is not None else {}
+    with reporting(folder, "look at"):
+        hashes = {name: hash_in(folder, name) for name in listed if mode_of(folder / name) is not None}
+        files = [name for name, digest in hashes.items() if digest == listed[name].sha256]
+        if is_journal(folder / JOURNAL):
+            files.append(JOURNAL)
+        if manifest is not None:
+            files.append(MANIFEST)
+        size = sum((folder / name).stat().st_size for name in files)
+    return Remains(folder, tuple(files), size, tuple(name for name in hashes if name not in files))
+
+
+def _manifest(folder: Path) -> Manifest | None:
+    """Return the manifest of a folder; None where there is none, or one that cfmkit did not write."""
+    try:
+        return Manifest.read(folder)
+    except OutputError:
+        return None
+
+
+def remove(remains: Remains, top: str | os.PathLike[str]) -> Remains:
+    """Take away what is left of runs in a folder; return what was removed.
+
+    Folders that are empty then go, too: its own, itself, and those above it up to `top`, which stays unless a run
+    wrote to it.
+
+    Raises
+    ------
+    cfmkit.errors.FolderInUse
+        If a live run works there.
+    cfmkit.errors.OutputError
+        If a file cannot be removed; those before it are gone.
+    """
+    root = remains.folder
+    # Under the lock everything is looked at again: a run may have been there while the user was asked.
+    with RunFolder(root) as folder:
+        found = remains_in(folder.path)
+        for name in found.files:
+            with reporting(root / name, "remove"):
+                disk.system.unlink(root / name)
+    inner = {root / above for name in found.files for above in Path(name).parents}
+    outer = {above for above in root.parents if Path(os.path.realpath(top)) in above.parents}
+    disk.remove_empty((inner | outer) - {Path.cwd()})
+    return found
