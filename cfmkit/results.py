@@ -9,14 +9,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 from cfmkit.errors import ExitCode
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-    from cfmkit.curves import Curve
+    from cfmkit.curves import Curve, FloatArray
     from cfmkit.spec import Spec
     from cfmkit.tables import Table
 
@@ -115,6 +115,27 @@ class Searched:
     motion: str = "length"
 
 
+class ClosedForm(Protocol):
+    """A model that gives the effort at every place, not at the samples of the curve only.
+
+    Metrics that are places (``usable_stroke``, ``band_range_1pct``, ``range_95``) are solved on it, so that
+    they do not depend on the number of samples.
+    """
+
+    @property
+    def places(self) -> FloatArray:
+        """Increasing places over the motion, (n,), so dense that the effort hides nothing between two [m or rad]."""
+        ...
+
+    def effort(self, branch: str, places: FloatArray, /) -> FloatArray:
+        """Return the effort of a branch at places of any shape [N or N m]; NaN where there is no equilibrium."""
+        ...
+
+    def excess_stress(self, branch: str, places: FloatArray, /) -> FloatArray:
+        """Return by how much the stress exceeds what is allowed [Pa]."""
+        ...
+
+
 @dataclass(frozen=True)
 class Result:
     """The outcome of one analysis.
@@ -148,6 +169,8 @@ class Result:
     load_cases : tuple of Curve
         Curves of the same mechanism under other loads or settings whose stress counts beside that of the nominal one,
         in ``stress_max``, ``safety_factor`` and ``usable_stroke``.
+    closed : ClosedForm, optional
+        The nominal curve at every place, where the model is so cheap.
     tables : mapping
         More files of a run, by stem: what makes the table of each, ``adjustability`` for adjustability.csv.
     state : Any
@@ -166,6 +189,7 @@ class Result:
     reference: float | None = None
     allowable_stress: float | None = None
     load_cases: tuple[Curve, ...] = ()
+    closed: ClosedForm | None = None
     tables: Mapping[str, Callable[[], Table]] = field(default_factory=dict)
     state: Any = None
 

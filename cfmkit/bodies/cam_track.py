@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -27,6 +27,38 @@ if TYPE_CHECKING:
     from cfmkit.curves import FloatArray
 
 KNOTS = 65
+
+
+class Pivot(NamedTuple):
+    """A roller that pivots on a corner, of one cam or of many side by side.
+
+    Attributes
+    ----------
+    x, y : float or array
+        The corner [m].
+    radius, brace : float or array
+        Between corner and roller centre, and between that and the slider's pin [m].
+    low, high : float or array
+        Angles of the contact normal between which it pivots [rad].
+    """
+
+    x: Any
+    y: Any
+    radius: Any
+    brace: Any
+    low: Any
+    high: Any
+
+
+def pivot_angle(slider: FloatArray, pivot: Pivot) -> FloatArray:
+    """Return the angle of the contact normal on the corner [rad], from a triangle of known sides."""
+    rise, brace, radius = slider - pivot.y, pivot.brace, pivot.radius
+    side = np.hypot(pivot.x, rise)
+    along = ((radius - brace) * (radius + brace) + side * side) / (2.0 * side)
+    square = (brace - side + radius) * (brace + side - radius) * (side + radius - brace) * (side + radius + brace)
+    off = np.sqrt(np.maximum(square, 0.0)) / (2.0 * side)
+    turn = np.arctan2(off * rise - along * pivot.x, -(along * rise + off * pivot.x))
+    return np.asarray(np.minimum(np.maximum(turn, pivot.low), pivot.high))
 
 
 class Track:
@@ -178,19 +210,19 @@ class Track:
     def _corner_states(self, slider: FloatArray) -> TrackStates:
         """Return states on the corner: with the centre and the slider's pin it is a triangle of known sides."""
         xc, yc = self._corner_point
-        rise, brace, radius = slider - yc, self.brace_length, self.radius
-        side = np.hypot(xc, rise)
-        along = ((radius - brace) * (radius + brace) + side * side) / (2.0 * side)
-        square = (brace - side + radius) * (brace + side - radius) * (side + radius - brace) * (side + radius + brace)
-        off = np.sqrt(np.maximum(square, 0.0)) / (2.0 * side)
-        turn = np.arctan2(off * rise - along * xc, -(along * rise + off * xc))
-        turn = np.minimum(np.maximum(turn, self._pivots[0]), self._pivots[1])
+        radius = self.radius
+        turn = pivot_angle(slider, self.pivot)
         if self.dead_point == self.start:
             turn[slider <= self.start] = self._pivots[0]
         sin, cos = np.sin(turn), np.cos(turn)
         bend, always = 1.0 / (radius * cos * cos * cos), np.ones(slider.shape, dtype=bool)
         contact = np.full(slider.shape, self.profile.start)
         return TrackStates(xc + radius * sin, yc - radius * cos, sin / cos, bend, always, contact)
+
+    @property
+    def pivot(self) -> Pivot:
+        """The triangle that a brace and the corner make."""
+        return Pivot(*self._corner_point, self.radius, self.brace_length, *self._pivots)
 
     def stretches(self) -> Iterator[Stretch]:
         """Yield the parts of the track on which the slider rises, in order, from `start` on."""

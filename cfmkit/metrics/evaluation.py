@@ -141,7 +141,15 @@ def _quantity(definition: Definition, value: Value) -> Quantity:
 def frame_of(result: Result) -> Frame:
     """Return what the curves of a result are measured against."""
     band = getattr(getattr(result.spec, "analysis", None), "band", Frame.band)
-    return Frame(result.target, result.reference, result.allowable_stress, band, result.valid, result.load_cases)
+    return Frame(
+        result.target,
+        result.reference,
+        result.allowable_stress,
+        band,
+        result.valid,
+        result.load_cases,
+        result.closed,
+    )
 
 
 def travel_of(result: Result) -> tuple[float, float] | None:

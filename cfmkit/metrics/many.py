@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.metrics.flatness import UNIFORM_POINTS
-from cfmkit.metrics.ranges import ROUNDING
+from cfmkit.metrics.traces import ROUNDING
+from cfmkit.numerics.roots import boundary
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -32,15 +33,23 @@ class ManyBranches:
         Increasing along each row [m or rad], and finite [N or N m].
     low, high : (d,) array
         Ends of the window, or of the travel where there is no window.
+    exact : callable, optional
+        The effort at any places of each row, (d, m) -> (d, m): then places are solved for, not interpolated.
+    excess : callable, optional
+        By how much the stress exceeds what is allowed, at any places of each row [Pa].
     """
 
     motion: FloatArray
     effort: FloatArray
     low: FloatArray
     high: FloatArray
+    exact: Callable[[FloatArray], FloatArray] | None = None
+    excess: Callable[[FloatArray], FloatArray] | None = None
 
     def at(self, places: FloatArray) -> FloatArray:
         """Return the effort at places of each row, (d, m), by linear interpolation."""
+        if self.exact is not None:
+            return self.exact(places)
         last = self.motion.shape[1] - 1
         rows = np.arange(len(self.motion))[:, None]
         left = np.stack([row.searchsorted(at, "right") for row, at in zip(self.motion, places, strict=True)]) - 1
@@ -80,8 +89,12 @@ def _first_95(many: ManyBranches) -> FloatArray:
     sample, earlier = np.minimum(first, motion.shape[1] - 1), np.maximum(first - 1, 0)
     place = np.where(first < before, motion[rows, sample], many.high)
     level = np.where(first < before, effort[rows, sample], nominal)
-    heights = effort[rows, earlier] - 0.95 * nominal, level - 0.95 * nominal
-    crossed = _crossing((motion[rows, earlier], place), heights)
+    if many.exact is not None:
+        solve, wanted = many.exact, nominal[:, None]
+        crossed = boundary(lambda at: ~(solve(at) / wanted >= 0.95 - ROUNDING), motion[rows, earlier], place)
+    else:
+        heights = effort[rows, earlier] - 0.95 * nominal, level - 0.95 * nominal
+        crossed = _crossing((motion[rows, earlier], place), heights)
     return np.where(nominal == 0, np.nan, np.where(first == 0, motion[:, 0], crossed))
 
 
@@ -122,6 +135,11 @@ def _edge(
         np.where(beside, place, many.motion[rows, inner]),
         np.where(beside, 0.0, offset[rows, inner]),
     )
+    if many.exact is not None:
+        solve, here = many.exact, many.exact(place[:, None])
+        return boundary(
+            lambda at: np.abs(solve(at) / here - 1) <= tolerance * (1 + ROUNDING), good, many.motion[rows, worst]
+        )
     level = np.where(offset[rows, worst] > 0, tolerance, -tolerance)
     return _crossing((many.motion[rows, worst], good), (offset[rows, worst] - level, height - level))
 
@@ -143,6 +161,8 @@ def usable_interval(
         Where the mechanism starts to work as intended.
     """
     motion = branches[0].motion
+    if all(branch.exact is not None for branch in branches):
+        return _solved_interval(branches, target, band * (1 + ROUNDING), valid)
     # What is usable of each step between two samples, and whether a new interval begins there.
     steps = _Steps(motion[:, :-1].copy(), motion[:, 1:].copy(), np.zeros(motion[:, 1:].shape, dtype=bool))
     steps.begins[:, 0] = True
@@ -157,6 +177,39 @@ def usable_interval(
     best = (length >= length.max(axis=1, keepdims=True) * (1 - 1e-9)).argmax(axis=1)
     some = length[rows, best] > 0
     return np.where(some, start[rows, best], np.nan), np.where(some, steps.high[rows, best], np.nan)
+
+
+def _solved_interval(
+    branches: Sequence[ManyBranches], target: FloatArray, width: float, valid: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return `usable_interval` of branches that are known at every place: its ends are solved for."""
+    motion, wanted = branches[0].motion, target[:, None]
+    rows, count = np.arange(len(motion)), motion.shape[1]
+
+    def holds(at: FloatArray) -> NDArray[np.bool_]:
+        kept = at >= valid[:, None]
+        for branch in branches:
+            if branch.exact is not None:
+                kept &= np.abs(branch.exact(at) / wanted - 1) <= width
+            if branch.excess is not None:
+                kept &= branch.excess(at) <= 0
+        return kept
+
+    good = holds(motion)
+    begins, ends = good.copy(), good.copy()
+    begins[:, 1:] &= ~good[:, :-1]
+    ends[:, :-1] &= ~good[:, 1:]
+    since = np.maximum.accumulate(np.where(begins, np.arange(count), 0), axis=1)
+    # Between two places outside and inside the last bit of length is unknown: runs that are equally long but
+    # for that are told apart by their first place, as where places are interpolated.
+    length = np.where(ends, motion - np.take_along_axis(motion, since, axis=1), -1.0)
+    last = (length >= length.max(axis=1, keepdims=True) * (1 - 1e-9)).argmax(axis=1)
+    first, some = since[rows, last], good.any(axis=1)
+    before, after = np.maximum(first - 1, 0), np.minimum(last + 1, count - 1)
+    start = boundary(holds, motion[rows, first], motion[rows, before])
+    end = boundary(holds, motion[rows, last], motion[rows, after])
+    some &= end > start
+    return np.where(some, start, np.nan), np.where(some, end, np.nan)
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,16 +3,19 @@
 Here the window only says what to compare with (its end, its centre, its mean);
 the travel that is looked at is the whole branch. Places between two samples are
 found by linear interpolation. A sample without equilibrium (no force) is
-outside every band, and so is the way from there to the next sample.
+outside every band, and so is the way from there to the next sample. Where the model
+is known at every place (`cfmkit.results.ClosedForm`) places are solved for, whatever the samples.
 """
 
 from __future__ import annotations
 
+from math import isfinite
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.metrics.traces import Undefined
+from cfmkit.metrics import many
+from cfmkit.metrics.traces import ROUNDING, Undefined
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -22,9 +25,6 @@ if TYPE_CHECKING:
     from cfmkit.metrics.traces import Trace
 
 Interval = tuple[float, float]
-
-ROUNDING = 1e-12
-"""A force on the edge of a band is inside it, whatever the last bits of the division say."""
 
 
 def range_95(branch: Branch) -> float:
@@ -46,6 +46,8 @@ def _first_95(branch: Branch) -> float:
     nominal = branch.at(end)
     if nominal == 0:
         raise Undefined(f"the {branch.kind} at the end is zero")
+    if branch.closed is not None:
+        return _known(end - many.range_95(branch.closed))
     motion, effort = branch.function
     before = int(motion.searchsorted(end))
     reached = effort[:before] / nominal >= 0.95 - ROUNDING
@@ -65,11 +67,27 @@ def _crossing(motion: Interval, height: tuple[float, float]) -> float:
 def band_range(branch: Branch, tolerance: float) -> float:
     """Return the widest interval around the reference pose in which ``|F / F_ref - 1|`` is within the tolerance."""
     motion, offset, here = branch.around
+    if branch.closed is not None and branch.frame.reference is None:
+        return _known(many.band_range(branch.closed, tolerance))
     outside = ~(np.abs(offset) <= tolerance * (1 + ROUNDING))
     left, right = outside[:here].nonzero()[0], outside[here:].nonzero()[0]
     low = _edge(motion, offset, int(left[-1]), 1, tolerance) if len(left) else float(motion[0])
     high = _edge(motion, offset, here + int(right[0]), -1, tolerance) if len(right) else float(motion[-1])
     return high - low
+
+
+def _known(values: FloatArray) -> float:
+    """Return the only value.
+
+    Raises
+    ------
+    Undefined
+        If it is none: the model gives no force at the places that are asked about.
+    """
+    value = float(values[0])
+    if not isfinite(value):
+        raise Undefined("there is no equilibrium at the place it is measured against")
+    return value
 
 
 def _edge(motion: FloatArray, offset: FloatArray, bad: int, inward: int, tolerance: float) -> float:
@@ -125,12 +143,22 @@ def usable_interval(cycle: Cycle) -> Interval | None:
     """
     reference = cycle.frame.target or _mean(cycle)
     travel = (max(b.extent[0] for b in cycle.branches), min(b.extent[1] for b in cycle.branches))
+    if cycle.closed and len(cycle.frame.valid or ()) == 1:
+        return _solved_interval(cycle, reference)
     bad = sorted(interval for branch in cycle.branches for interval in _bad(branch, reference))
     allowed = cycle.frame.valid if cycle.frame.valid is not None else (travel,)
     gaps = [gap for lo, hi in allowed for gap in _gaps(max(lo, travel[0]), min(hi, travel[1]), bad)]
     longest = max((high - low for low, high in gaps), default=0.0)
     # the first of those that are equally long but for rounding
     return next((gap for gap in gaps if gap[1] - gap[0] >= longest * (1 - 1e-9)), None)
+
+
+def _solved_interval(cycle: Cycle, reference: float) -> Interval | None:
+    """Return `usable_interval` of branches that are known at every place."""
+    start, end = many.usable_interval(
+        cycle.closed, np.array([reference]), cycle.frame.band, np.array([(cycle.frame.valid or ((0.0, 0.0),))[0][0]])
+    )
+    return None if np.isnan(start[0]) else (float(start[0]), float(end[0]))
 
 
 def _mean(cycle: Cycle) -> float:

@@ -5,17 +5,19 @@ Everything that several metrics need is computed once, when it is first asked fo
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, field
+from functools import cached_property, partial
 from math import isfinite
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from cfmkit.metrics.many import ManyBranches
 from cfmkit.metrics.traces import Trace, Undefined, Window, covers, restrict, traces
 
 if TYPE_CHECKING:
     from cfmkit.curves import Curve, FloatArray, Kind
+    from cfmkit.results import ClosedForm
 
 
 @dataclass(frozen=True)
@@ -36,6 +38,8 @@ class Frame:
         Intervals of the motion in which the mechanism works as intended; None: everywhere.
     load_cases : tuple of Curve
         Whose stress counts beside the curve's own.
+    closed : ClosedForm or None
+        The model at every place, for metrics that are places.
     """
 
     target: float | None = None
@@ -44,6 +48,7 @@ class Frame:
     band: float = 0.05
     valid: tuple[tuple[float, float], ...] | None = None
     load_cases: tuple[Curve, ...] = ()
+    closed: ClosedForm | None = field(default=None, compare=False)
 
     def needed_target(self) -> float:
         """Return the target, which may not be zero.
@@ -198,6 +203,17 @@ class Branch:
         motion = np.concatenate((motion[:index], [place], motion[index:]))
         return motion, np.concatenate((offset[:index], [0.0], offset[index:])), index
 
+    @cached_property
+    def closed(self) -> ManyBranches | None:
+        """The branch at every place, where the model gives that: one row, over the window's ends."""
+        model = self.frame.closed
+        if model is None:
+            return None
+        places, (low, high) = model.places[None, :], self.ends
+        exact = partial(model.effort, self.name)
+        stress = partial(model.excess_stress, self.name) if self.frame.allowable_stress is not None else None
+        return ManyBranches(places, exact(places), np.array([low]), np.array([high]), exact, stress)
+
     @property
     def reference(self) -> float:
         """Motion of the reference pose."""
@@ -237,6 +253,11 @@ class Cycle:
 
     branches: tuple[Branch, ...]
     frame: Frame
+
+    @property
+    def closed(self) -> tuple[ManyBranches, ...]:
+        """All branches at every place; empty where the model does not give them."""
+        return tuple(branch.closed for branch in self.branches if branch.closed is not None)
 
     @cached_property
     def usable(self) -> tuple[float, float] | None:

@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 TOLERANCE = 1e-9
 """How far a sample may miss an end of the window and still count as on it, as a fraction of the window."""
 
+ROUNDING = 1e-12
+"""A force on the edge of a band is inside it, whatever the last bits of the division say."""
+
 
 class Undefined(Exception):
     """A metric has no value on this curve; `reason` says why. Caught where metrics are evaluated."""

@@ -15,9 +15,9 @@ import numpy as np
 from cfmkit.bodies.cam_cut import WholeCamUndercut, cut
 from cfmkit.bodies.cam_path import reach
 from cfmkit.bodies.cam_profile import SlopeLaw
-from cfmkit.bodies.cam_track import Track
+from cfmkit.bodies.cam_track import Pivot, Track, pivot_angle
 from cfmkit.bodies.track_states import NoTrack
-from cfmkit.families.cam.block_forces import Forces, Slab, tangents
+from cfmkit.families.cam.block_forces import Forces, Slab, force_at, tangents
 from cfmkit.families.cam.build import CLOSE
 from cfmkit.families.cam.statics import jams
 from cfmkit.numerics import sampled
@@ -148,6 +148,30 @@ class CornerSlab(Slab):
     def jam_travel(self) -> FloatArray:
         """Travel at the start over which friction lets no force move the slider up [m]."""
         return np.array([next((high for low, high in each if low <= 0), 0.0) for each in self.jams])
+
+    def exact(self, branch: str, travel: FloatArray) -> FloatArray:
+        """Return the force of a branch at travels of each design, on the corner or the flank, (designs, m) [N]."""
+        force, corner = super().exact(branch, travel), travel < self.corner_travel[:, None]
+        rows = np.flatnonzero(corner.any(axis=1))
+        if not rows.size:
+            return force
+        cams, pivot = self.designs.take(rows), Pivot(*(part[rows, None] for part in self.pivots))
+        angle = pivot_angle(self.starts[rows, None] + np.maximum(travel[rows], 0.0), pivot)
+        angle = np.where(travel[rows] <= 0.0, pivot.low, angle)
+        stretch = pivot.x + pivot.radius * np.sin(angle) - cams.x0[:, None]
+        moved = force_at(cams, stretch, np.tan(angle), 1.0 if branch == "load" else -1.0)
+        force[rows] = np.where(corner[rows], moved, force[rows])
+        return force
+
+    @cached_property
+    def pivots(self) -> Pivot:
+        """How the roller of each design pivots on its corner."""
+        return Pivot(*np.array([one.track.pivot for one in self.found]).T[:, self.which])
+
+    @cached_property
+    def starts(self) -> FloatArray:
+        """Position of the slider at the start of each design's track [m]."""
+        return np.array([one.track.start for one in self.found])[self.which]
 
     @property
     def jammed(self) -> NDArray[np.bool_]:

@@ -12,14 +12,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cfmkit.families.cam.block_windows import Spread
+from cfmkit.families.cam.places import nodes
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from numpy.typing import NDArray
 
     from cfmkit.curves import FloatArray
-
-_SLACK = 1e-9
 
 
 def tangents(x: FloatArray, brace: FloatArray) -> FloatArray:
@@ -111,6 +112,7 @@ class Slab:
         """Remember what is asked."""
         self.designs, self.points, self.contacts, self.band = designs, points, contacts, band
         self.usable: tuple[FloatArray, FloatArray] | None = None
+        self._known: dict[str, FloatArray] = {}
         self.spreads: dict[tuple[str, Any], Spread] = {}
 
     @cached_property
@@ -173,6 +175,30 @@ class Slab:
         return Forces(slider, contact, np.asarray((lever[:, 1:] > 0).all(axis=1)))
 
     @cached_property
+    def places(self) -> FloatArray:
+        """Travels at which metrics that are places look at the force, (designs, n) [m]."""
+        return nodes(self.travel[:, -1], self.corner_travel)
+
+    def everywhere(self, branch: str) -> FloatArray:
+        """Return the force of a branch at `places` [N]."""
+        if branch not in self._known:
+            self._known[branch] = self.exact(branch, self.places)
+        return self._known[branch]
+
+    def exact(self, branch: str, travel: FloatArray) -> FloatArray:
+        """Return the force of a branch at travels of each design, (designs, m) [N]; NaN where friction holds a roller.
+
+        Parameters
+        ----------
+        branch : {"load", "unload"}
+            On the way up, or down.
+        travel : (designs, m) array
+            On the flank [m].
+        """
+        stretch, slope = _on_flank(self.designs, np.minimum(np.maximum(travel, 0.0), self.travel[:, -1:]))
+        return force_at(self.designs, stretch, slope, 1.0 if branch == "load" else -1.0)
+
+    @cached_property
     def flank(self) -> NDArray[np.bool_]:
         """Where the roller runs on the flank, which broadcasts to (designs, points)."""
         return np.ones((1, 1), dtype=bool)
@@ -229,56 +255,18 @@ class Slab:
         return self.spreads[branch, window]
 
 
-class Spread:
-    """The forces of one branch inside a window."""
-
-    def __init__(self, travel: FloatArray, force: FloatArray, window: tuple[float, float] | None) -> None:
-        """Cut the window out."""
-        self.motion, self.force = (travel, force) if window is None else _inside(travel, force, window)
-
-    @cached_property
-    def mean(self) -> FloatArray:
-        """Mean force of each design [N]."""
-        return np.asarray(self.force.mean(axis=1))
-
-    @cached_property
-    def max(self) -> FloatArray:
-        """Largest force [N]."""
-        return np.asarray(self.force.max(axis=1))
-
-    @cached_property
-    def min(self) -> FloatArray:
-        """Smallest force [N]."""
-        return np.asarray(self.force.min(axis=1))
-
-    @cached_property
-    def deviation(self) -> FloatArray:
-        """Standard deviation (n - 1) of the force [N]."""
-        offset = self.force - self.mean[:, None]
-        return np.asarray(np.sqrt(np.einsum("ij,ij->i", offset, offset) / (offset.shape[1] - 1)))
-
-    @cached_property
-    def work(self) -> FloatArray:
-        """Integral of the force over the travel [J]."""
-        steps = np.diff(self.motion, axis=1)
-        return np.asarray(np.einsum("ij,ij->i", steps, 0.5 * (self.force[:, 1:] + self.force[:, :-1])))
+def _on_flank(cams: Designs, travel: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the springs' stretch on one side [m] and the slope of the path at travels, (designs, m) [m]."""
+    stretch = (2.0 * cams.constant[:, None] * travel) ** 0.5
+    return stretch, stretch / cams.constant[:, None] + tangents(cams.x0[:, None] + stretch, cams.brace[:, None])
 
 
-def _inside(travel: FloatArray, force: FloatArray, window: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
-    """Return the samples in a window with its interpolated ends; all curves have the same travel."""
-    low, high = window
-    slack, first = _SLACK * (high - low), travel[0]
-    start, stop = int(np.searchsorted(first, low - slack)), int(np.searchsorted(first, high + slack, side="right"))
-    parts = [(travel[:, start:stop], force[:, start:stop])]
-    if start < stop and first[start] > low + slack:
-        parts.insert(0, _between(travel, force, start, low))
-    if start < stop and first[stop - 1] < high - slack and stop < travel.shape[1]:
-        parts.append(_between(travel, force, stop, high))
-    return np.hstack([motion for motion, _ in parts]), np.hstack([effort for _, effort in parts])
-
-
-def _between(travel: FloatArray, force: FloatArray, after: int, place: float) -> tuple[FloatArray, FloatArray]:
-    left, right = travel[:, after - 1], travel[:, after]
-    share = (place - left) / (right - left)
-    effort = force[:, after - 1] + share * (force[:, after] - force[:, after - 1])
-    return np.full((len(travel), 1), place), effort[:, None]
+def force_at(cams: Designs, stretch: FloatArray, slope: FloatArray, way: float) -> FloatArray:
+    """Return the force on the slider on the way up (1) or down (-1) [N]; NaN where friction holds a roller."""
+    mu, tangent = way * cams.friction[:, None], tangents(cams.x0[:, None] + stretch, cams.brace[:, None])
+    turn = 1.0 + mu * slope
+    lever, spring = slope - mu - tangent * turn, 4.0 * cams.stiffness[:, None] * np.maximum(stretch, 0.0) * turn
+    force = np.where(lever > 0, spring / np.where(lever > 0, lever, 1.0), np.where(spring == 0, 0.0, np.nan))
+    # A start without friction has no lever and no load: the limit is the constant force.
+    limit = (stretch == 0) & (mu == 0) & (np.abs(lever) < 1e-13)
+    return np.asarray(np.where(limit, 4.0 * cams.stiffness[:, None] * cams.constant[:, None], force))

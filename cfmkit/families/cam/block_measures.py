@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,7 +16,8 @@ if TYPE_CHECKING:
 
     from cfmkit.curves import FloatArray
     from cfmkit.families.base import Measure
-    from cfmkit.families.cam.block_forces import Designs, Slab, Spread
+    from cfmkit.families.cam.block_forces import Designs, Slab
+    from cfmkit.families.cam.block_windows import Spread
 
     Window = tuple[float, float] | None
 
@@ -33,10 +35,10 @@ def measured(cams: Slab, measure: Measure) -> Mapping[str, FloatArray]:
     if measure.name in METRICS:
         function = METRICS[measure.name]
         return {branch: function(cams.spread(branch, measure.window), cams.designs) for branch in BRANCHES}
-    branches = {branch: _branch(cams, branch, measure.window) for branch in BRANCHES}
     if measure.name == RMS:
-        return {branch: rms_to_target(many, cams.designs.target) for branch, many in branches.items()}
-    return {branch: RANGES[measure.name](many) for branch, many in branches.items()}
+        sampled = {branch: _branch(cams, branch, measure.window) for branch in BRANCHES}
+        return {branch: rms_to_target(many, cams.designs.target) for branch, many in sampled.items()}
+    return {branch: RANGES[measure.name](_everywhere(cams, branch, measure.window)) for branch in BRANCHES}
 
 
 def _branch(cams: Slab, branch: str, window: Window) -> ManyBranches:
@@ -45,6 +47,14 @@ def _branch(cams: Slab, branch: str, window: Window) -> ManyBranches:
         return ManyBranches(cams.travel, effort, cams.travel[:, 0], cams.travel[:, -1])
     low, high = (np.full(len(cams.designs), end) for end in window)
     return ManyBranches(cams.travel, effort, low, high)
+
+
+def _everywhere(cams: Slab, branch: str, window: Window) -> ManyBranches:
+    """Return a branch that is known at every place: metrics that are places do not depend on the samples."""
+    ends = window if window is not None else (0.0, np.inf)
+    low = np.full(len(cams.designs), ends[0])
+    high = np.minimum(np.full(len(cams.designs), ends[1]), cams.travel[:, -1])
+    return ManyBranches(cams.places, cams.everywhere(branch), low, high, partial(cams.exact, branch))
 
 
 def _ripple(one: Spread, _cams: Designs) -> FloatArray:
@@ -84,7 +94,7 @@ def _hysteresis(cams: Slab, window: Window) -> FloatArray:
 
 def _usable(cams: Slab) -> tuple[FloatArray, FloatArray]:
     if cams.usable is None:
-        branches = [_branch(cams, branch, None) for branch in BRANCHES]
+        branches = [_everywhere(cams, branch, None) for branch in BRANCHES]
         cams.usable = usable_interval(branches, cams.designs.target, cams.band, cams.corner_travel)
     return cams.usable
 

@@ -25,6 +25,7 @@ from cfmkit.families.cam.build import CLOSE, Assembly, assemble, displacement_or
 from cfmkit.families.cam.checks import findings_of, left_out
 from cfmkit.families.cam.existence import check_first_pose, check_springs
 from cfmkit.families.cam.findings import finding
+from cfmkit.families.cam.places import Places
 from cfmkit.families.cam.statics import Forces, forces, jams
 from cfmkit.families.cam.values import theoretical_force, values_of
 from cfmkit.families.findings import mm
@@ -148,6 +149,7 @@ def analyze(spec: CamSpec, run: Run) -> Result:
         travel=(solution.origin, solution.origin + _requested(solution, bool(shortfalls))),
         valid=((solution.corner_travel + solution.origin, float(solution.travel[-1]) + solution.origin),),
         target=spec.design.force if spec.design else theoretical_force(solution),
+        closed=Places(solution),
         state=solution,
     )
 
