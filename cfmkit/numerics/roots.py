@@ -4,18 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cfmkit.curves import FloatArray
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
 Evaluate = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
 EPS = float(np.finfo(float).eps)
-_PARTS = 48
 
 
 def invert_increasing(
@@ -125,43 +120,3 @@ def _next_share(a: float, b: float, c: float, fa: float, fb: float, fc: float) -
     if phi**2 < xi and (1.0 - phi) ** 2 < 1.0 - xi:
         return fa / (fb - fa) * fc / (fb - fc) + (c - a) / (b - a) * fa / (fc - fa) * fb / (fc - fb)
     return 0.5
-
-
-def boundary(
-    holds: Callable[[FloatArray], NDArray[np.bool_]], inside: FloatArray, outside: FloatArray, rounds: int = 7
-) -> FloatArray:
-    """Return how far a condition holds from places inside towards places outside, row by row.
-
-    Each round cuts the way into parts and keeps the first in which the condition is lost, so
-    that it ends at the loss nearest to `inside`, and where the condition is not a number as well.
-
-    Parameters
-    ----------
-    holds : callable
-        ``holds(places)``, (d, m) -> (d, m) of bool.
-    inside, outside : (d,) array
-        Where it holds, and where it does not; equal where there is nothing to look for.
-    rounds : int
-        Each makes the way 48 times as short: seven make a millimetre as short as rounding.
-
-    Returns
-    -------
-    (d,) array
-        The last place at which it still holds.
-
-    Examples
-    --------
-    >>> boundary(lambda x: x * x <= 2.0, np.array([0.0]), np.array([2.0])).round(12)
-    array([1.41421356])
-    """
-    share, rows = np.arange(1, _PARTS) / _PARTS, np.arange(len(inside))
-    near, far = np.array(inside), np.array(outside)
-    for _ in range(rounds):
-        places = near[:, None] + (far - near)[:, None] * share
-        lost = ~holds(places)
-        first = np.where(lost.any(axis=1), lost.argmax(axis=1), _PARTS - 1)
-        near, far = (
-            np.where(first > 0, places[rows, np.maximum(first - 1, 0)], near),
-            np.where(first < _PARTS - 1, places[rows, np.minimum(first, _PARTS - 2)], far),
-        )
-    return near
