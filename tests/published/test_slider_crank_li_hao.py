@@ -351,7 +351,7 @@ def test_least_squares_over_the_same_window_is_worse_at_its_ends():
 
 def test_the_widest_window_is_half_as_wide_again_as_the_published_one():
     """2.71 deg -> 4.21 deg at 0.5 %, with slider and slider pin only, in the ratio 32.43 N cm/rad per N/cm."""
-    found = designed(tolerance="0.5 %")
+    found = designed(tolerance="0.5 %", angle_within=("-5 deg", "14 deg"))  # the paper's; elsewhere are wider ones
     result = values(found.spec)
     assert result["constant_angle"] / DEG == pytest.approx(4.2148, abs=5e-4)
     assert result["constant_angle_start"] / DEG == pytest.approx(0.8079, abs=2e-3)
@@ -368,7 +368,9 @@ WIDEST = {-2: 2.59, -10: 6.92, -20: 12.44, -30: 18.25, -45: 28.91}
 
 @pytest.mark.parametrize("start", WIDEST)
 def test_wider_windows_for_other_starts(start):
-    spec = config("li2019", mechanism__unloaded_angle=start * DEG, design={"torque": "2 N*mm", "tolerance": "0.5 %"})
+    end = start * DEG + 2.4 * (T2 - start * DEG)  # as far beyond the stretched position as [LH] looks from -5 deg
+    near = {"torque": "2 N*mm", "tolerance": "0.5 %", "angle_within": (start * DEG, end)}
+    spec = config("li2019", mechanism__unloaded_angle=start * DEG, design=near)
     found = values(cfmkit.design(spec).spec.replace({"analysis.angle": (start * DEG, 60 * DEG)}))
     assert found["constant_angle"] / DEG > WIDEST[start]
     assert found["constant_angle"] / DEG < 1.02 * WIDEST[start]

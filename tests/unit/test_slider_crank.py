@@ -300,6 +300,7 @@ def test_slack_lets_other_wishes_decide():
     assert soft.mechanism.springs.slider < best.spec.mechanism.springs.slider
 
 
+@pytest.mark.slow  # a search of lengths
 def test_limits_of_the_joints_bound_the_window():
     design = {"torque": "2 N*mm", "tolerance": "0.5 %", "unloaded_offset": ("-48 deg", "-8 deg")}
     free = cfmkit.design(config("li2019", design=design, analysis__angle=None)).spec

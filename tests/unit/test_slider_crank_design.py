@@ -7,6 +7,7 @@ import pytest
 from slider_crank import config
 
 import cfmkit
+from cfmkit.errors import SpecError
 
 
 @pytest.mark.parametrize(
@@ -113,7 +114,7 @@ def test_the_law_for_small_angles_holds_from_either_side_and_after_a_turn():
 def test_springs_that_fail_at_the_stretched_position_get_a_window_elsewhere(limited, least):
     design = {"torque": "2 N*mm", "tolerance": "0.5 %"} | limited
     found = cfmkit.design(config("li2019", analysis__angle=None, design=design))
-    assert "window_not_proven" in {item.name for item in found.warnings}
+    assert "window_not_proven" not in {item.name for item in found.warnings}
     result = cfmkit.analyze(found.spec)
     low, high = (result.values[f"constant_angle_{end}"].value for end in ("start", "end"))
     assert np.rad2deg(high - low) > least
@@ -128,3 +129,60 @@ def test_a_window_that_moves_on_while_it_is_searched_grows_to_the_tolerance():
     changes = {"mechanism__unloaded_angle": None, "mechanism__unloaded_offset": 0.5}
     found = cfmkit.design(config("bilancia2019", design=design, **changes))
     assert "at most 0.5 %" in found.message
+
+
+EVERYWHERE = {
+    "crank_length": "26 mm", "coupler_length": "142.3 mm", "offset": "80.6 mm", "unloaded_angle": "25.75 deg",
+    "limits": {"pivot": "60 deg", "crank_pin": "60 deg", "slider_pin": "60 deg"},
+}  # fmt: skip
+
+
+def test_the_widest_window_is_the_widest_of_the_whole_motion():
+    """Next to the stretched position 2.4 deg are the most; far from it the same springs' places allow 22 deg."""
+    about = {f"mechanism__{name}": value for name, value in EVERYWHERE.items()}
+    found = cfmkit.design(config("li2019", **about, analysis={}, design={"torque": "2 N*mm", "tolerance": "2 %"}))
+    low, high = np.rad2deg(found.spec.analysis.window)
+    assert high - low > 22.0
+    assert found.warnings == () or "window_not_proven" not in {item.name for item in found.warnings}
+    result = cfmkit.analyze(found.spec)
+    assert "joint_overrotated" not in {item.name for item in result.warnings} or high > 79.0
+    assert cfmkit.evaluate(result, ["half_band"])["half_band"].value < 0.0202
+
+
+@pytest.mark.slow  # some thousand linear programmes
+@pytest.mark.parametrize("seed", range(6))
+def test_no_window_anywhere_is_wider_than_the_widest(seed):
+    from cfmkit.families.slider_crank.targets import task_of
+    from cfmkit.families.slider_crank.windows import judged, widest_of_all
+
+    random = np.random.default_rng(seed)
+    about = {
+        "mechanism__crank_length": random.uniform(0.01, 0.05), "mechanism__coupler_length": random.uniform(0.06, 0.2),
+        "mechanism__offset": random.uniform(-0.05, 0.05), "mechanism__unloaded_angle": random.uniform(-1.0, 1.0),
+        "mechanism__limits": {name: random.uniform(0.4, 1.6) for name in ("pivot", "crank_pin", "slider_pin")},
+    }  # fmt: skip
+    task = task_of(config("li2019", **about, analysis={}, design={"torque": "2 N*mm", "tolerance": "1 %"}))
+    found, proven = widest_of_all(task, 0.01)
+    assert proven
+    assert found.deviation <= 0.01
+    first, last = task.searched
+    width = 1.01 * found.width
+    others = [judged(task, low, low + width) for low in np.linspace(first, last - width, 60) if width < last - first]
+    assert all(item is None or item.deviation > 0.01 for item in others)
+
+
+def test_a_design_without_a_window_is_judged_over_the_one_that_was_found():
+    found = cfmkit.design(config("li2019", analysis={}, design={"torque": "2 N*mm", "tolerance": "0.5 %"})).spec
+    result = cfmkit.analyze(found)
+    ripple = cfmkit.evaluate(result, ["torque_ripple"])["torque_ripple"].value
+    assert ripple < 0.0101  # over a full turn it would be more than the torque
+    low, high = found.analysis.window
+    assert result.values["constant_angle"].value == pytest.approx(high - low, rel=2e-3)
+
+
+def test_the_widest_window_stays_where_it_is_looked_for():
+    near = {"torque": "2 N*mm", "tolerance": "0.5 %", "angle_within": ("1 deg", "4 deg")}
+    low, high = np.rad2deg(cfmkit.design(config("li2019", design=near)).spec.analysis.window)
+    assert (low, high) == (pytest.approx(1.0, abs=1e-3), pytest.approx(4.0, abs=1e-3))
+    with pytest.raises(SpecError, match="travel_within"):
+        config("li2019", design={"torque": "2 N*mm", "tolerance": "1 %", "travel_within": ("1 mm", "2 mm")})

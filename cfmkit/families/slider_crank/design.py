@@ -36,9 +36,10 @@ from cfmkit.families.slider_crank.solved import (
     too_far,
 )
 from cfmkit.families.slider_crank.targets import DENSE, FREE, task_of, with_lengths
-from cfmkit.families.slider_crank.windows import widest
+from cfmkit.families.slider_crank.windows import widest, widest_of_all
 from cfmkit.numerics.boxes import Axis, Lowest, lowest
 from cfmkit.results import Design, Status
+from cfmkit.units import Place
 
 if TYPE_CHECKING:
     from cfmkit.families.base import Run
@@ -82,8 +83,8 @@ def design(spec: SliderCrankSpec, run: Run) -> Design:
     except CannotBuild as problem:
         return no_design(problem.finding)
     warnings = (*about_springs(solved), *alternatives(solved, search))
-    if wanted.window is None:
-        warnings = (*warnings, not_proven(solved))
+    if wanted.window is None and (search is not None or not solved.proven):
+        warnings = (*warnings, not_proven(solved, search is not None))
     return Design(_written(solved), Status.COMPLETE, message(solved), active_bounds(solved, wanted), warnings=warnings)
 
 
@@ -148,9 +149,9 @@ def solve(task: Task) -> Solved:
     Infeasible
         If nothing keeps the tolerance, or the window cannot be reached.
     """
-    wanted = task.wanted
+    wanted, proven = task.wanted, True
     if wanted.window is None:
-        found = widest(task, wanted.tolerance or 0.0)
+        found, proven = widest_of_all(task, wanted.tolerance or 0.0)
         if found is None:
             raise Infeasible(nowhere(task))
         window = found.low, found.high
@@ -173,7 +174,7 @@ def solve(task: Task) -> Solved:
         raise Infeasible(hopeless(task, deviation))
     if wanted.window is not None and wanted.tolerance is not None and deviation > wanted.tolerance:
         raise Infeasible(*too_far(task, deviation))
-    return Solved(task, window, rates, deviation, goal.rms(rates))
+    return Solved(task, window, rates, deviation, goal.rms(rates), proven)
 
 
 def _written(solved: Solved) -> SliderCrankSpec:
@@ -184,7 +185,10 @@ def _written(solved: Solved) -> SliderCrankSpec:
     if any(getattr(wanted, name) is not None for name in ("crank_length", "offset")):
         mechanism = solved.task.spec.mechanism.model_copy(update={"springs": springs})
     assembly = solved.task.assembly
-    written = {"drive": assembly.drive, f"reference_{assembly.motion_name}": _reference(solved)} | _seen(solved)
+    written: dict[str, object] = {"drive": assembly.drive, f"reference_{assembly.motion_name}": _reference(solved)}
+    if wanted.window is None or spec.analysis.window is None:
+        written["window"] = tuple(Place(end, assembly.dimension) for end in solved.window)
+    written |= _seen(solved)
     analysis = spec.analysis.model_copy(update=written)
     return spec.model_copy(update={"mechanism": mechanism, "analysis": analysis})
 

@@ -34,7 +34,7 @@ FINDINGS = {
     "spring_at_bound": "a spring's rate is at the end of what it may be",
     "spring_dropped": "the best rate of a spring is zero: the design does without it",
     "near_optima": "many designs are as good: which one is chosen was decided by something else",
-    "window_not_proven": "the widest window found by a local search: a wider one may exist",
+    "window_not_proven": "a widest window of which not all others were ruled out: a wider one may exist",
     **OF_PARTS,
 }
 

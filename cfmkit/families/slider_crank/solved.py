@@ -34,6 +34,8 @@ class Solved:
         Of the springs of one leg [N m/rad; the last N/m].
     deviation, rms : float
         Largest and root mean square deviation, as fractions of the target.
+    proven : bool
+        Of a widest window: whether all others were ruled out.
     """
 
     task: Task
@@ -41,6 +43,7 @@ class Solved:
     rates: FloatArray
     deviation: float
     rms: float
+    proven: bool = True
 
 
 def check_reach(task: Task, window: tuple[float, float]) -> None:
@@ -134,14 +137,15 @@ def about_springs(solved: Solved) -> tuple[Finding, ...]:
     return tuple(found)
 
 
-def not_proven(solved: Solved) -> Finding:
-    """Return what to say about a widest window."""
+def not_proven(solved: Solved, of_lengths: bool) -> Finding:
+    """Return what to say about a widest window that may not be the widest of all."""
     low, high = (_place(solved, end) for end in solved.window)
-    return finding(
-        "window_not_proven",
-        f"{low} to {high} is the widest window that a local search found, from the stretched position or from the "
-        "flattest place; wider ones may exist",
-    )
+    if of_lengths:
+        text = "is the widest window for the lengths chosen, which a local search compared: others may have wider ones"
+    else:
+        name = f"'design.{solved.task.assembly.motion_name}_within'"
+        text = f"is the widest window found, and the search of the whole motion was cut short; {name} narrows it"
+    return finding("window_not_proven", f"{low} to {high} {text}")
 
 
 def _place(solved: Solved, motion: float) -> str:

@@ -91,6 +91,12 @@ class CrankDesign(PrintedDesign):
     travel: tuple[Length, Length] | None = Field(
         None, description="slider travel over which the force is wanted; without window: the widest at `tolerance`"
     )
+    angle_within: tuple[Angle, Angle] | None = Field(
+        None, description="crank angles among which the widest window is looked for; default: all that can be reached"
+    )
+    travel_within: tuple[Length, Length] | None = Field(
+        None, description="slider travel in which the widest window is looked for; default: all that can be reached"
+    )
     tolerance: Annotated[Ratio, Field(gt=0, lt=1)] | None = Field(
         None, description="largest deviation allowed, as a fraction of what is wanted"
     )
@@ -135,6 +141,8 @@ class CrankDesign(PrintedDesign):
             raise ValueError("'angle', 'stiffness' and 'hold_stiffness' belong to 'torque'; with 'force' give 'travel'")
         if self.force is None and self.travel:
             raise ValueError("'travel' belongs to 'force'; with 'torque' give 'angle'")
+        if (self.angle_within and self.torque is None) or (self.travel_within and self.force is None):
+            raise ValueError("'angle_within' belongs to 'torque', 'travel_within' to 'force'")
         return self
 
     @model_validator(mode="after")
@@ -149,7 +157,7 @@ class CrankDesign(PrintedDesign):
 
     @model_validator(mode="after")
     def _ranges(self) -> Self:
-        for name in ("angle", "travel", "crank_length", "offset", "unloaded_offset"):
+        for name in ("angle", "travel", "angle_within", "travel_within", "crank_length", "offset", "unloaded_offset"):
             ends = getattr(self, name)
             if ends is not None and not ends[0] < ends[1]:
                 raise ValueError(f"'{name}' must be increasing")
@@ -161,6 +169,11 @@ class CrankDesign(PrintedDesign):
     def window(self) -> tuple[float, float] | None:
         """Where the target is wanted [rad or m]; None: as wide as possible."""
         return self.angle if self.torque is not None else self.travel
+
+    @property
+    def within(self) -> tuple[float, float] | None:
+        """Where the widest window is looked for [rad or m]; None: everywhere."""
+        return self.angle_within if self.torque is not None else self.travel_within
 
     @property
     def target(self) -> float:

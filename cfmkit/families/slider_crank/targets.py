@@ -67,6 +67,13 @@ class Task:
         most = np.array([getattr(limits, name) or math.inf for name in JOINTS])
         return self._kept((low, start), most)[0], self._kept((start, high), most)[1]
 
+    @property
+    def searched(self) -> tuple[float, float]:
+        """Ends of the motion in which the widest window is looked for [rad or m]."""
+        low, high = self.allowed
+        within = self.wanted.within
+        return (low, high) if within is None else (max(low, within[0]), min(high, within[1]))
+
     def _kept(self, ends: tuple[float, float], most: FloatArray) -> tuple[float, float]:
         """Return the part of an interval next to the unloaded position in which no joint is moved too far."""
         places = np.linspace(*ends, PROBES)

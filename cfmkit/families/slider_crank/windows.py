@@ -1,16 +1,23 @@
 """The widest window in which springs can keep an effort within a tolerance.
 
-For a width, the place of the window with the smallest largest deviation is searched; the width is then found by
-steps in the law deviation ~ width^3 inside a shrinking bracket. A local search from the
-neighbourhood of the stretched position, or, where that has none, from the flattest place of
-the motion: wider windows may exist elsewhere.
+First a local search, from the neighbourhood of the stretched position, or, where that has none, from the flattest place
+of the motion: for a width the place with the smallest largest deviation, the width by steps in the law
+deviation ~ width^3 inside a shrinking bracket.
+
+Then all other places are ruled out, or found to be better. A part of a window never deviates more than the window. So
+if a window that begins in [a, b] is to be wider than w, springs must keep the tolerance from b to a + w: one linear
+programme says whether they do. Where they do, the interval is halved, and windows from its middle are tried.
 """
 
 from __future__ import annotations
 
+import itertools
 import math
+from collections import deque
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from cfmkit.families.slider_crank.rates import minimax
 from cfmkit.families.slider_crank.targets import DENSE
@@ -29,6 +36,12 @@ STEPS = 24
 
 CLOSE = 1.0 - 1e-4
 """A deviation between this share of the tolerance and all of it ends the search: the width is then right to 3e-5."""
+
+GAIN, NARROWEST = 1e-3, 5e-4
+"""A window wider by less than the first share is not looked for; nor one below the second share of the motion."""
+
+BEGINNINGS, PROGRAMMES = 32, 4000
+"""Intervals of beginnings that the search of the whole motion starts with, and its largest number of programmes."""
 
 NARROW = 0.08
 """Once a window is found, the next one is looked for so near, as a share of its width."""
@@ -66,8 +79,8 @@ class Window:
 
 
 def widest(task: Task, tolerance: float) -> Window | None:
-    """Return the widest window found with no deviation above a tolerance; None if there is none."""
-    first, last = task.allowed
+    """Return a wide window with no deviation above a tolerance, by the local search; None if that finds none."""
+    first, last = task.searched
     if not last > first:
         return None
     tolerance *= KEPT
@@ -81,9 +94,74 @@ def widest(task: Task, tolerance: float) -> Window | None:
     return max((item for item in (best, found) if item is not None), key=lambda item: item.width, default=None)
 
 
+def widest_of_all(task: Task, tolerance: float) -> tuple[Window | None, bool]:
+    """Return the widest window of the whole motion, and whether all that are wider by `GAIN` are ruled out."""
+    first, last = task.searched
+    if not last > first:
+        return None, True
+    search = _Everywhere(task, tolerance * KEPT)
+    found = search.run()
+    if found is None:
+        return widest(task, tolerance), search.finished
+    low, high = found
+    return _grown(task, tolerance * KEPT, high - low, 0.5 * (low + high), NARROW), search.finished
+
+
+class _Everywhere:
+    """The search of all beginnings of a window for the widest one."""
+
+    def __init__(self, task: Task, tolerance: float) -> None:
+        self.task, self.tolerance = task, tolerance
+        self.first, self.last = task.searched
+        self.width = NARROWEST * (self.last - self.first)
+        self.left, self.finished = PROGRAMMES, True
+
+    def run(self) -> tuple[float, float] | None:
+        """Return the widest window, judged on `COARSE` places; None if there is none above `NARROWEST`."""
+        best: tuple[float, float] | None = None
+        ends = np.linspace(self.first, self.last, BEGINNINGS + 1).tolist()
+        queue = deque(itertools.pairwise(ends))
+        while queue:
+            low, high = queue.popleft()
+            wanted = self.width * (1.0 + GAIN)
+            if low + wanted > self.last or not self._may(low, min(high, self.last - wanted), wanted):
+                continue
+            if self.left <= 0:
+                self.finished = False
+                break
+            middle = 0.5 * (low + high)
+            if middle + wanted <= self.last and self._keeps(middle, middle + wanted):
+                best = middle, self._end(middle, middle + wanted)
+                self.width = best[1] - best[0]
+            if high - low > 0.5 * self.width * (GAIN if best else 1.0):
+                queue += [(low, middle), (middle, high)]
+        return best
+
+    def _may(self, low: float, high: float, width: float) -> bool:
+        """Return whether a window of a width may begin in an interval: its part common to all of them must keep."""
+        return low + width <= high or self._keeps(high, low + width)
+
+    def _keeps(self, low: float, high: float) -> bool:
+        """Return whether springs keep the tolerance over a window."""
+        self.left -= 1
+        found = _solved(self.task, low, high, COARSE)
+        return found is not None and found.deviation <= self.tolerance
+
+    def _end(self, low: float, high: float) -> float:
+        """Return where the widest window from its beginning ends: double, then halve."""
+        step, bad = high - low, math.inf
+        while high < self.last and bad - high > 0.25 * GAIN * (high - low):
+            trial = min(high + step, self.last) if math.isinf(bad) else 0.5 * (high + bad)
+            if self._keeps(low, trial):
+                high, step = trial, 2.0 * step
+            else:
+                bad = trial
+        return high
+
+
 def _flattest(task: Task, width: float) -> float | None:
     """Return the middle of the window of a width with the smallest deviation, of some all over the motion."""
-    first, last = task.allowed
+    first, last = task.searched
     places = (first + (last - width - first) * k / (PLACES - 1) for k in range(PLACES))
     found = [item for item in (_solved(task, low, low + width, COARSE) for low in places) if item is not None]
     best = min(found, key=lambda item: item.deviation, default=None)
@@ -92,7 +170,7 @@ def _flattest(task: Task, width: float) -> float | None:
 
 def _grown(task: Task, tolerance: float, width: float, middle: float, look: float) -> Window | None:
     """Return the widest window found from a width and a middle on, looking aside by a share of the width."""
-    first, last = task.allowed
+    first, last = task.searched
     best: Window | None = None
     low, high = 0.0, last - first
     for _ in range(STEPS):
@@ -116,7 +194,7 @@ def _grown(task: Task, tolerance: float, width: float, middle: float, look: floa
 
 def _first_guess(task: Task, tolerance: float) -> tuple[float, float]:
     """Return width and middle from the law for small angles, or a tenth of the motion next to its start."""
-    first, last = task.allowed
+    first, last = task.searched
     assembly = task.assembly
     lead = assembly.stretched - assembly.start
     if assembly.drive == "torque" and abs(lead) > 1e-6:
@@ -137,7 +215,7 @@ def _best_place(task: Task, width: float, middle: float, look: float) -> Window 
     """Return the window of a width with the smallest largest deviation near a place, by shares of the width."""
     from scipy.optimize import minimize_scalar
 
-    first, last = task.allowed
+    first, last = task.searched
     room = last - width
     if room <= first:
         return judged(task, first, last)
