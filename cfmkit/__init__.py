@@ -12,13 +12,29 @@ first used, so that ``import cfmkit`` itself costs nothing.
 
 from __future__ import annotations
 
+import sys
 from importlib import import_module
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from cfmkit._version import __version__
 
 if TYPE_CHECKING:
-    from cfmkit.api import analyze, check, design, drawing, dumps, evaluate, load, loads, measure, sensitivity, sweep
+    from cfmkit.api import (
+        analyze,
+        calibrate,
+        check,
+        design,
+        drawing,
+        dumps,
+        evaluate,
+        export,
+        load,
+        loads,
+        measure,
+        sensitivity,
+        sweep,
+    )
     from cfmkit.curves import Curve
     from cfmkit.errors import (
         CfmError,
@@ -44,11 +60,13 @@ if TYPE_CHECKING:
 _HOMES = {
     "cfmkit.api": (
         "analyze",
+        "calibrate",
         "check",
         "design",
         "drawing",
         "dumps",
         "evaluate",
+        "export",
         "load",
         "loads",
         "measure",
@@ -105,11 +123,13 @@ __all__ = [
     "UsageError",
     "__version__",
     "analyze",
+    "calibrate",
     "check",
     "design",
     "drawing",
     "dumps",
     "evaluate",
+    "export",
     "load",
     "loads",
     "measure",
@@ -125,6 +145,22 @@ def __getattr__(name: str) -> Any:
     value = getattr(import_module(_HOME[name]), name)
     globals()[name] = value
     return value
+
+
+class _Package(ModuleType):
+    """The package `cfmkit`, whose name `export` stays the function when the package of that name is imported."""
+
+    @property
+    def export(self) -> Any:
+        """The function `cfmkit.api.export`."""
+        return import_module("cfmkit.api").export
+
+    @export.setter
+    def export(self, package: ModuleType) -> None:
+        """Leave it at that: the import system sets packages as attributes, and this one is found without."""
+
+
+sys.modules[__name__].__class__ = _Package
 
 
 def __dir__() -> list[str]:

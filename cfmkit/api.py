@@ -1,6 +1,6 @@
 """The functions of ``import cfmkit``: from a specification to curves, designs, metrics and drawings.
 
-Everything is a value: nothing here prints, plots or writes to a disk.
+Everything is a value: nothing here prints or plots, and a disk is written to only where a folder is named.
 """
 
 from __future__ import annotations
@@ -14,17 +14,23 @@ from cfmkit.families import family
 from cfmkit.families.base import Run
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping
+    from collections.abc import Callable, Iterable, Mapping, Sequence
+    from typing import TypeAlias
 
     from matplotlib.figure import Figure
 
+    from cfmkit.experiment.calibration import Calibration
+    from cfmkit.experiment.measured import Measured
     from cfmkit.experiment.reading import Recording
     from cfmkit.experiment.report import MeasureReport
     from cfmkit.geometry import Drawing
     from cfmkit.metrics import Outcome, Window
+    from cfmkit.numerics.fit import Loss
     from cfmkit.results import Design, Quantity, Result
     from cfmkit.spec import Spec
     from cfmkit.studies.outcome import StudyResult
+
+    AnySpec: TypeAlias = Spec | str | os.PathLike[str]
 
 
 def load(path: str | os.PathLike[str], changes: Iterable[str] = ()) -> Spec:
@@ -86,29 +92,59 @@ def dumps(spec: Spec, complete: bool = False) -> str:
     return dump(spec, complete)
 
 
-def analyze(spec: Spec, run: Run | None = None) -> Result:
+def spec_of(spec: AnySpec) -> Spec:
+    """Return a specification, or the one in the file of that name.
+
+    Raises
+    ------
+    cfmkit.errors.UsageError
+        If it is neither, or the file cannot be read.
+    cfmkit.errors.SpecError
+        With every problem in the file.
+    """
+    from cfmkit.spec import Spec
+
+    if isinstance(spec, Spec):
+        return spec
+    if isinstance(spec, str | os.PathLike):
+        return load(spec)
+    raise UsageError(
+        f"a specification or the path of its YAML file is needed, not {type(spec).__name__}; "
+        "cfmkit.load reads a file, cfmkit.loads reads text"
+    )
+
+
+def _result_of(result: Result | AnySpec) -> Result:
+    """Return a result, or that of a specification."""
+    from cfmkit.results import Result
+
+    return result if isinstance(result, Result) else analyze(result)
+
+
+def analyze(spec: AnySpec, run: Run | None = None) -> Result:
     """Return the curves of a mechanism, its scalar results and what is wrong with it.
 
     Parameters
     ----------
-    spec : Spec
-        Of any family.
+    spec : Spec or path-like
+        Of any family, or its file.
     run : Run, optional
         Seed, progress report, time budget.
 
     Examples
     --------
     >>> import cfmkit
-    >>> result = cfmkit.analyze(cfmkit.load("configs/cam.yaml"))
+    >>> result = cfmkit.analyze("configs/cam.yaml")
     >>> result.status.key, len(result.curve.branches)
     ('complete', 2)
     """
     from cfmkit.metrics import windows_judged
 
+    spec = spec_of(spec)
     return windows_judged(family(spec.family).analyze(spec, run or Run()))
 
 
-def design(spec: Spec, run: Run | None = None) -> Design:
+def design(spec: AnySpec, run: Run | None = None) -> Design:
     """Return a complete specification that meets the targets of the `design` block, or why there is none.
 
     Raises
@@ -116,19 +152,22 @@ def design(spec: Spec, run: Run | None = None) -> Design:
     cfmkit.errors.UsageError
         If the family has nothing to design.
     """
+    spec = spec_of(spec)
     record = family(spec.family)
     if record.design is None:
         raise UsageError(f"a {spec.family} mechanism cannot be designed, only analysed")
     return record.design(spec, run or Run())
 
 
-def evaluate(result: Result, names: Iterable[str] | None = None, window: Window | None = None) -> dict[str, Quantity]:
+def evaluate(
+    result: Result | AnySpec, names: Iterable[str] | None = None, window: Window | None = None
+) -> dict[str, Quantity]:
     """Return constant-force metrics and the family's own scalar results, by name, in SI.
 
     Parameters
     ----------
-    result : Result
-        Of any status.
+    result : Result, Spec or path-like
+        Of any status; a specification is analysed.
     names : iterable of str, optional
         Only these; ``[branch]`` picks a branch. Default: all.
     window : Window, optional
@@ -141,30 +180,32 @@ def evaluate(result: Result, names: Iterable[str] | None = None, window: Window 
     """
     from cfmkit.metrics import evaluate as measured
 
-    return measured(result, names, window)
+    return measured(_result_of(result), names, window)
 
 
-def check(result: Result) -> tuple[Outcome, ...]:
-    """Return what became of each requirement of the specification."""
+def check(result: Result | AnySpec) -> tuple[Outcome, ...]:
+    """Return what became of each requirement of the specification; one that is not analysed yet is."""
     from cfmkit.metrics import check as checked
     from cfmkit.metrics import values_of_family
 
+    result = _result_of(result)
     values = values_of_family(family(result.spec.family).values)
     return checked(result.spec.requirements, result, values)
 
 
-def sweep(spec: Spec, jobs: int = 1, **block: Any) -> StudyResult:
+def sweep(spec: AnySpec, jobs: int = 1, **block: Any) -> StudyResult:
     """Return a mechanism in many variants: one row a point, whatever becomes of it.
 
     Parameters
     ----------
-    spec : Spec
+    spec : Spec or path-like
         What is varied.
     jobs : int
         Processes.
     **block
-        As in the specification's block `sweep`, which they replace: `vary` (path -> ``"start:stop:n"`` or a
-        list), `combine`, `samples`, `metrics`, `design`, `curves`; and `seed`. Without them the block counts.
+        As in the specification's block `sweep`, which they replace: `vary` (path -> ``"start:stop:n"``, a list of
+        texts with units, or a NumPy array in SI units), `combine`, `samples`, `metrics`, `design`, `curves`; and
+        `seed`. Without them the block counts.
 
     Raises
     ------
@@ -183,15 +224,15 @@ def sweep(spec: Spec, jobs: int = 1, **block: Any) -> StudyResult:
     """
     from cfmkit.studies.outcome import swept
 
-    return swept(spec, jobs, block)
+    return swept(spec_of(spec), jobs, block)
 
 
-def sensitivity(spec: Spec, jobs: int = 1, **block: Any) -> StudyResult:
+def sensitivity(spec: AnySpec, jobs: int = 1, **block: Any) -> StudyResult:
     """Return which value matters most, or how many made parts will meet the requirements.
 
     Parameters
     ----------
-    spec : Spec
+    spec : Spec or path-like
         What is varied.
     jobs : int
         Processes.
@@ -219,7 +260,7 @@ def sensitivity(spec: Spec, jobs: int = 1, **block: Any) -> StudyResult:
     """
     from cfmkit.studies.outcome import examined
 
-    return examined(spec, jobs, block)
+    return examined(spec_of(spec), jobs, block)
 
 
 def measure(
@@ -291,8 +332,151 @@ def measure(
     return report_on(source, frame, place)
 
 
-def resolve(spec: Spec) -> Spec:
+def calibrate(
+    spec: AnySpec,
+    data: str | os.PathLike[str] | Recording | Measured,
+    fit: str | Sequence[str],
+    *,
+    bounds: Mapping[str, str | tuple[float, float]] | None = None,
+    loss: Loss = "soft_l1",
+    window: tuple[float, float] | None = None,
+    units: str | None = None,
+    tare: str | float | None = None,
+    zero: str | float | None = None,
+    flip: Iterable[str] = (),
+) -> Calibration:
+    """Return a specification whose model fits a measured curve: values, intervals, and what the data cannot tell.
+
+    Parameters
+    ----------
+    spec : Spec or path-like
+        Its values are the start; derived parts are written out first and keep their shape.
+    data : path-like, Recording or Measured
+        A lab file as for `measure`, or what was read of it.
+    fit : str or sequence of str
+        Dotted paths of numbers of the specification; ``data.force_offset``, ``data.displacement_offset`` and
+        ``data.drift`` are zeros of the recording.
+    bounds : mapping, optional
+        Path -> ``"low:high"`` with units, or two numbers in SI units.
+    loss : {"soft_l1", "linear", "huber", "cauchy"}
+        How large errors count.
+    window : (float, float), optional
+        Where to compare [m or rad]; default: ``analysis.window``.
+    units, tare, zero, flip
+        As for `measure`.
+
+    Raises
+    ------
+    cfmkit.errors.UsageError
+        If the file cannot be read, or there is nothing to fit at a path.
+    cfmkit.errors.DataError
+        If the data hold no curve, or one that cannot be compared.
+    cfmkit.errors.SolutionError
+        If the start has no solution, or the data do not determine the values.
+
+    Examples
+    --------
+    >>> import cfmkit
+    >>> spec = cfmkit.load("configs/cam.yaml", ["analysis.window=[40 mm, 120 mm]"])
+    >>> found = cfmkit.calibrate(spec, "configs/synthetic/cam_loop.csv", "mechanism.rolling_friction")
+    >>> round(found.spec.mechanism.rolling_friction, 5)
+    0.00224
+    """
+    from cfmkit.experiment.calibration import calibrate as fitted
+    from cfmkit.experiment.corrections import corrected
+    from cfmkit.experiment.measured import LEFT_OUT, Measured, measured, read_measured
+    from cfmkit.experiment.parameters import parameters, read_bounds
+    from cfmkit.experiment.reading import Recording
+    from cfmkit.metrics import Window
+    from cfmkit.numerics.fit import LOSSES
+
+    if loss not in LOSSES:
+        raise UsageError(f"--loss: there is no {loss!r}; there are {', '.join(LOSSES)}")
+    start = resolve(spec)
+    if isinstance(data, Recording):
+        source = measured(corrected(data, tare, zero, tuple(flip)), None, LEFT_OUT)
+    else:
+        source = data if isinstance(data, Measured) else read_measured(data, units, tare, zero, tuple(flip))
+    given = bounds or {}
+    texts = [f"{path}={ends}" for path, ends in given.items() if isinstance(ends, str)]
+    numbers = {path: ends for path, ends in given.items() if not isinstance(ends, str)}
+    limits = read_bounds(texts, start, source.recording) | numbers
+    paths = fit.split(",") if isinstance(fit, str) else fit
+    chosen = parameters(start, paths, limits, source.recording)
+    return fitted(start, source, chosen, loss, Window(*window) if window else None)
+
+
+def export(
+    spec: AnySpec,
+    out: str | os.PathLike[str] | None = None,
+    *,
+    kerf: str | float | None = None,
+    tolerance: str | float | None = None,
+) -> dict[str, bytes]:
+    """Return what is to be cut or printed as files, by name: DXF, SVG and CSV.
+
+    Parameters
+    ----------
+    spec : Spec or path-like
+        The mechanism as it is.
+    out : path-like, optional
+        A folder to write the files to, with a manifest, as the verb does.
+    kerf : str or float, optional
+        Width of the cut: a text with its unit, or a number [m]; adds a DXF moved by half of it.
+    tolerance : str or float, optional
+        Largest distance from the exact curves, likewise; default: 0.005 mm.
+
+    Raises
+    ------
+    cfmkit.errors.UsageError
+        If the family has nothing to cut, or a length is not above zero.
+    cfmkit.errors.SolutionError
+        If the mechanism cannot exist as described.
+    cfmkit.errors.OutputError
+        If the folder cannot be written.
+
+    Examples
+    --------
+    >>> import cfmkit
+    >>> sorted(cfmkit.export("configs/cam.yaml"))[:3]
+    ['cam-left.csv', 'cam-right.csv', 'cam.dxf']
+    """
+    from cfmkit.export import files
+
+    spec = spec_of(spec)
+    wishes = {"kerf": _length(kerf, "--kerf"), "tolerance": _length(tolerance, "--tolerance")}
+    given = {key: value for key, value in wishes.items() if value is not None}
+    drawn = files(drawing(spec, wishes["tolerance"]), **given)
+    if out is not None:
+        from cfmkit.store import RunFolder, stable_hash
+
+        with RunFolder(os.fspath(out)) as folder:
+            for name, content in drawn.items():
+                folder.write(name, content)
+            source = {"source": spec.name, "sha256": stable_hash(spec.model_dump(mode="json"))}
+            folder.commit({"command": "export", "arguments": [], "spec": source, "status": "complete", "exit_code": 0})
+    return drawn
+
+
+def _length(length: str | float | None, option: str) -> float | None:
+    """Return a length above zero [m]; None for None."""
+    from cfmkit.errors import QuantityError
+    from cfmkit.units import read_quantity
+
+    if length is None:
+        return None
+    try:
+        value = read_quantity(length, "length") if isinstance(length, str) else float(length)
+    except QuantityError as error:
+        raise UsageError(f"{option}: {error}") from None
+    if not value > 0:
+        raise UsageError(f"{option}: {length} is not allowed: must be > 0")
+    return value
+
+
+def resolve(spec: AnySpec) -> Spec:
     """Return the specification with every derived part written out."""
+    spec = spec_of(spec)
     record = family(spec.family)
     resolved: Spec = record.resolve(spec) if record.resolve else spec
     return resolved
@@ -315,6 +499,7 @@ def drawing(spec: Spec, tolerance: float | None = None) -> Drawing:
     cfmkit.errors.SolutionError
         If the mechanism cannot exist as described.
     """
+    spec = spec_of(spec)
     record = family(spec.family)
     if record.outline is None:
         raise UsageError(f"a {spec.family} mechanism has no part to draw")

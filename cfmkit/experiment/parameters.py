@@ -225,6 +225,23 @@ def read_bounds(
     return found
 
 
+def split_bounds(options: Iterable[str]) -> dict[str, str]:
+    """Return what ``--bounds a.b=low:high`` says as text, by path.
+
+    Raises
+    ------
+    cfmkit.errors.UsageError
+        If one has no ``=``.
+    """
+    found = {}
+    for option in options:
+        path, equals, text = (part.strip() for part in option.partition("="))
+        if not equals:
+            raise UsageError(f"--bounds: {option!r} is not 'a.b=low:high'")
+        found[path] = text
+    return found
+
+
 def _bound(text: str, path: str, spec: Spec, recording: Recording | None) -> float:
     """Return a bound of a value of the specification or of the recording, SI."""
     from cfmkit.units import read_quantity

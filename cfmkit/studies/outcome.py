@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from cfmkit.errors import UsageError
+import numpy as np
+
+from cfmkit.errors import QuantityError, UsageError
 from cfmkit.studies.executors import serial
+from cfmkit.studies.leaves import CannotVary, leaf
 from cfmkit.tables import read_csv
+from cfmkit.units import format_quantity
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from cfmkit.spec import Spec
     from cfmkit.studies.engine import Records, Work
     from cfmkit.studies.executors import Executor
@@ -54,6 +57,8 @@ def swept(spec: Spec, jobs: int, block: Mapping[str, Any]) -> StudyResult:
 
     asked = dict(block)
     seed = _seed(asked.pop("seed", 0))
+    if isinstance(asked.get("vary"), Mapping):
+        asked["vary"] = {path: in_words(values, spec, path) for path, values in asked["vary"].items()}
     if asked:
         spec = spec.replace({"sweep": asked})
     request = Request(seed=seed)
@@ -72,13 +77,57 @@ def examined(spec: Spec, jobs: int, block: Mapping[str, Any]) -> StudyResult:
     from cfmkit.studies.sensitivity.setup import prepare
 
     if block:
-        spec = spec.replace({"sensitivity": with_options(spec.sensitivity, dict(block))})
+        asked = dict(block)
+        if isinstance(asked.get("parameters"), Mapping):
+            asked["parameters"] = {path: in_words(it, spec, path) for path, it in asked["parameters"].items()}
+        spec = spec.replace({"sensitivity": with_options(spec.sensitivity, asked)})
     executor = _executor(jobs)
 
     def compute(work: Work) -> Records:
         return run(work, executor)
 
     return _read(outputs(carry_out(prepare(spec), compute)))
+
+
+def in_words(values: Any, spec: Spec, path: str) -> Any:
+    """Return what a file would say for values from NumPy: numbers of a dimension are in SI units, as in results.
+
+    What is not from NumPy stays as it is: a bare number in a list has no unit, as in a file.
+
+    Raises
+    ------
+    cfmkit.errors.UsageError
+        If an array has more than one dimension, or a value is not finite.
+    """
+    if isinstance(values, Mapping):
+        return {key: in_words(value, spec, path) for key, value in values.items()}
+    if isinstance(values, list | tuple) and any(isinstance(value, np.generic | np.ndarray) for value in values):
+        return [in_words(value, spec, path) for value in values]
+    if isinstance(values, np.ndarray):
+        if values.ndim > 1:
+            raise UsageError(f"{path}: an array of {values.ndim} dimensions is no list of values; flatten it")
+        values = values[()]
+    if isinstance(values, np.ndarray):
+        return [in_words(value, spec, path) for value in values]
+    if not isinstance(values, np.generic):
+        return values
+    dimension = _dimension(spec, path)
+    plain = values.item()
+    if dimension in (None, "ratio") or not isinstance(plain, int | float) or isinstance(plain, bool):
+        return plain
+    try:
+        return format_quantity(plain, dimension)
+    except QuantityError as error:
+        raise UsageError(f"{path}: {error}") from None
+
+
+def _dimension(spec: Spec, path: str) -> str | None:
+    """Return the dimension of a value; None where it has none, or the path is wrong, which others tell better."""
+    try:
+        quantity = leaf(type(spec), path).quantity
+    except CannotVary:
+        return None
+    return quantity.dimensions[0] if quantity else None
 
 
 def _seed(seed: Any) -> int:

@@ -2,6 +2,7 @@
 
 import json
 
+import numpy as np
 import pytest
 
 import cfmkit
@@ -22,6 +23,45 @@ def test_a_sweep_gives_the_rows_of_results_csv(cli, tmp_path, jobs):
     assert found.summary == json.loads((tmp_path / "out" / "metrics.json").read_text())
     assert found.table["status"] == ("complete",) * 5
     assert (found.curves, found.indices) == (None, None)
+
+
+@pytest.mark.parametrize(
+    ("path", "values", "texts"),
+    [
+        (RADIUS, np.array([8e-3, 12e-3, 16e-3]), ["8 mm", "12 mm", "16 mm"]),
+        (RADIUS, list(np.array([8e-3, 16e-3])), ["8 mm", "16 mm"]),
+        ("mechanism.rolling_friction", np.array([0.001, 0.003]), [0.001, 0.003]),
+        ("mechanism.springs.count", np.arange(1, 3), [1, 2]),
+        ("mechanism.springs.stiffness", np.array(["0.5 N/mm", "1 N/mm"]), ["0.5 N/mm", "1 N/mm"]),
+        ("analysis.gravity", np.array([True, False]), [True, False]),
+    ],
+)
+def test_arrays_are_values_in_si_units(path, values, texts):
+    one, other = (cfmkit.sweep(CAM, vary={path: each}, metrics=["force_mean"]) for each in (values, texts))
+    assert to_csv(one.table) == to_csv(other.table)
+    assert one.table["status"] == ("complete",) * len(texts)
+
+
+def test_arrays_are_taken_by_a_sensitivity_study():
+    stiffness = {"mechanism.springs.stiffness": {"uniform": np.float64(20.0)}}
+    texts = {"mechanism.springs.stiffness": {"uniform": "0.02 N/mm"}}
+    one, other = (
+        cfmkit.sensitivity(CAM, method="tolerance", samples=4, parameters=item, metrics=["force_mean"])
+        for item in (stiffness, texts)
+    )
+    assert to_csv(one.table) == to_csv(other.table)
+
+
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        (np.ones((2, 2)), "an array of 2 dimensions is no list of values; flatten it"),
+        (np.array([0.01, np.nan]), "mechanism.roller_radius: nan cannot be written"),
+    ],
+)
+def test_arrays_that_are_no_values_are_refused(values, words):
+    with pytest.raises(cfmkit.UsageError, match=words):
+        cfmkit.sweep(CAM, vary={RADIUS: values})
 
 
 def test_without_arguments_the_block_of_the_specification_counts():

@@ -7,6 +7,7 @@ import pytest
 from cam_support import analyze, cam, fixed
 from experiment_support import triangle
 
+import cfmkit
 from cfmkit.errors import DataError, SolutionError, UsageError
 from cfmkit.experiment.calibration import calibrate, resolved
 from cfmkit.experiment.comparison import compare
@@ -234,3 +235,16 @@ def test_what_a_recording_does_not_have_is_a_usage_error(path, kind, complaint):
     motion = triangle(1) / 1e3
     with pytest.raises(UsageError, match=complaint):
         parameters(built(), [path], None, Recording("made.csv", motion, 50 + motion, kind=kind))
+
+
+def test_python_calibrates_from_a_recording_with_bounds_as_text_or_numbers():
+    case = recording(built(0.00225), 0.05).recording
+    one, other = (
+        cfmkit.calibrate(built(0.002), case, [FRICTION], bounds={FRICTION: ends})
+        for ends in ("0.001:0.003", (0.001, 0.003))
+    )
+    assert one.fit.values == pytest.approx([0.00225], abs=2e-5)
+    assert one.fit.values == other.fit.values
+    assert one.spec.at(FRICTION) == one.fit.values[0]
+    with pytest.raises(UsageError, match="there is no 'least'; there are linear, soft_l1, huber, cauchy"):
+        cfmkit.calibrate(built(), case, FRICTION, loss="least")

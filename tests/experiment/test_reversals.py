@@ -6,8 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from experiment_support import lossy_loop, reference_case, triangle
+from experiment_support import lossy_loop, reference_case, rows, triangle
 
+import cfmkit
 from cfmkit.experiment.measured import LEFT_OUT, measured, numbers_of
 from cfmkit.experiment.reading import Recording
 from cfmkit.metrics import Window
@@ -164,3 +165,18 @@ def test_a_corner_that_every_stroke_shows_is_no_spike():
     detent = 5.0 * (np.abs(1e3 * case.motion - 60.0) < 0.2)
     source = measured(replace(case, effort=case.effort + extra + detent), leave_out=LEFT_OUT)
     assert source.warnings == ()
+
+
+def test_python_measures_files_and_arrays_alike(tmp_path):
+    case = lossy_loop(triangle(2), elastic=1.0)
+    (tmp_path / "rig.csv").write_text(
+        "t [s];s [mm];F [N]\n" + rows((case.time, 1e3 * case.motion, case.effort), digits=12)
+    )
+    window = {"window": "10 mm:90 mm", "filter": "2 Hz", "target": "50 N"}
+    one, other = cfmkit.measure(tmp_path / "rig.csv", **window), cfmkit.measure(case, **window)
+    si = cfmkit.measure(case, window=(0.01, 0.09), filter="2 Hz", target=50.0)
+    for found in (other, si):
+        for name, value in one.numbers.filtered.items():
+            assert found.numbers.filtered[name].value == pytest.approx(value.value, rel=1e-9, abs=1e-12), name
+    assert names(*one.warnings) == {"reversals"}
+    assert one.data["metrics"]["force_mean[load]"]["unit"] == "N"

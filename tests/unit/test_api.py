@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -186,3 +188,42 @@ def test_a_requirement_that_cannot_be_read_is_complained_about_once():
 def test_the_name_of_an_option_stands_for_the_option_that_it_is_short_for():
     error = cfmkit.SpecError([cfmkit.Problem("--set a", 0, 0, "a", "wrong"), cfmkit.Problem("f", 1, 1, "b", "wrong")])
     assert [one.source for one in specfile.renamed(error, "--set a", "--a").problems] == ["--a", "f"]
+
+
+def test_functions_take_the_path_of_a_file_as_well_as_a_specification(spec, result):
+    for path in (CAM, str(CAM)):
+        assert np.array_equal(cfmkit.analyze(path).curve.force, result.curve.force, equal_nan=True)
+    assert cfmkit.check(CAM) == cfmkit.check(spec) == cfmkit.check(result)
+    assert cfmkit.evaluate(CAM, ["force_mean"]) == cfmkit.evaluate(result, ["force_mean"])
+    assert cfmkit.design(CAM).spec == cfmkit.design(spec).spec
+    assert cfmkit.drawing(CAM).name == cfmkit.drawing(spec).name
+
+
+@pytest.mark.parametrize(
+    "name", ["analyze", "design", "sweep", "sensitivity", "check", "evaluate", "drawing", "export"]
+)
+@pytest.mark.parametrize("wrong", [None, 3, {"family": "cam"}, b"cam.yaml"])
+def test_what_is_neither_a_specification_nor_a_path_is_refused_in_one_line(name, wrong):
+    with pytest.raises(cfmkit.UsageError, match=f"needed, not {type(wrong).__name__}; cfmkit.load reads a file"):
+        getattr(cfmkit, name)(wrong)
+
+
+def test_export_is_the_function_before_and_after_the_package_of_that_name_is_imported():
+    code = (
+        "import cfmkit; before = cfmkit.export; from cfmkit.export import files; import cfmkit.export.dxf; "
+        "assert cfmkit.export is before and callable(before) and callable(files); "
+        "from cfmkit import export; assert export is before"
+    )
+    subprocess.run([sys.executable, "-W", "error", "-c", code], check=True)
+
+
+def test_export_gives_the_files_and_writes_them_where_a_folder_is_named(tmp_path):
+    found = cfmkit.export(CAM, kerf="0.2 mm")
+    assert {"cam.dxf", "cam.svg", "cam-kerf.dxf"} <= set(found)
+    assert found == cfmkit.export(CAM, kerf=0.2e-3)
+    written = cfmkit.export(CAM, tmp_path / "out")
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {*written, "manifest.json"}
+    assert all((tmp_path / "out" / name).read_bytes() == data for name, data in written.items())
+    for kerf in (0.0, "0 mm", float("nan")):
+        with pytest.raises(cfmkit.UsageError, match="must be > 0"):
+            cfmkit.export(CAM, kerf=kerf)

@@ -71,15 +71,13 @@ def run(options: Options, terminal: Terminal) -> Answer:
 
 def compute(options: Options, source: Measured, spec: Spec, run: Run) -> Report:
     """Return the report on the fitted mechanism."""
-    from cfmkit.experiment.calibration import calibrate, resolved
-    from cfmkit.experiment.parameters import parameters, read_bounds
+    from cfmkit import api
+    from cfmkit.experiment.parameters import split_bounds
     from cfmkit.numerics.fit import LOSSES
 
-    start = resolved(spec)
-    bounds = read_bounds(options.bounds or (), start, source.recording)
-    chosen = parameters(start, options.fit.split(","), bounds, source.recording)
     loss = next(name for name in LOSSES if name == options.loss)
-    return report(calibrate(start, source, chosen, loss), source)
+    bounds = split_bounds(options.bounds or ())
+    return report(api.calibrate(spec, source, options.fit, bounds=bounds, loss=loss), source)
 
 
 def report(calibration: Calibration, source: Measured) -> Report:

@@ -45,42 +45,17 @@ def run(options: Options, terminal: Terminal) -> Answer:
     """Write what is to be cut or printed, as it stands in a spec: DXF, SVG, CSV."""
     from cfmkit import api
     from cfmkit.cli.runs import folder_of, provenance
-    from cfmkit.export import files
     from cfmkit.specfile import bind, read_spec
     from cfmkit.store import RunFolder
 
     out = folder_of(options, "export")
     spec = bind(read_spec(options.spec, options.changes))
-    wishes = {"kerf": _length(options.kerf, "--kerf"), "tolerance": _length(options.tolerance, "--tolerance")}
-    given = {key: value for key, value in wishes.items() if value is not None}
     with RunFolder(out) as folder:
-        for name, data in files(api.drawing(spec, wishes["tolerance"]), **given).items():
+        for name, data in api.export(spec, kerf=options.kerf, tolerance=options.tolerance).items():
             folder.write(name, data)
         origin = provenance("export", spec, options.spec, terminal)
         manifest = folder.commit(origin | {"status": "complete", "exit_code": 0})
     return _answer(out, [*manifest.files, "manifest.json"])
-
-
-def _length(text: str | None, option: str) -> float | None:
-    """Return a length above zero in m.
-
-    Raises
-    ------
-    cfmkit.errors.UsageError
-        If the text is not one.
-    """
-    from cfmkit.errors import QuantityError, UsageError
-    from cfmkit.units import read_quantity
-
-    if text is None:
-        return None
-    try:
-        value = read_quantity(text, "length")
-    except QuantityError as error:
-        raise UsageError(f"{option}: {error}") from None
-    if value <= 0:
-        raise UsageError(f"{option}: {text} is not allowed: must be > 0")
-    return value
 
 
 def _answer(out: str, names: list[str]) -> Answer:
