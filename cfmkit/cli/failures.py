@@ -31,6 +31,15 @@ class Stopped(BaseException):
         self.told = "interrupted" if number == signal.SIGINT else "terminated"
         super().__init__(self.told)
 
+    def goes_on(self, fresh: bool) -> None:
+        """Add that what is finished is kept; a command that was to reuse nothing goes on without that option."""
+        self.told += f"; what is finished is kept: {go_on(fresh)}"
+
+
+def go_on(fresh: bool) -> str:
+    """Return how a run that keeps what it has finished goes on."""
+    return f"run the same command again{' without --fresh' if fresh else ''} to go on"
+
 
 def fail(error: BaseException, terminal: Terminal) -> ExitCode:
     """Tell the user what ended the command; return the exit code."""

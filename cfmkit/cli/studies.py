@@ -103,6 +103,21 @@ def commit(place: Desk, made: Made, terminal: Terminal, code: ExitCode) -> Manif
     return place.folder.commit(about)
 
 
+@contextmanager
+def noting(folder: RunFolder, fresh: bool = False) -> Iterator[Journal]:
+    """Yield the open journal of a folder; a signal that ends the block says whether the same command goes on."""
+    from cfmkit.cli.failures import Stopped
+    from cfmkit.studies.journal import Journal
+
+    with Journal(folder.journal, fresh) as journal:
+        try:
+            yield journal
+        except Stopped as stop:
+            if journal.held:
+                stop.goes_on(fresh)
+            raise
+
+
 def finish(place: Desk, pieces: Sequence[Records]) -> None:
     """Make the journal small, once every point of a study has its row and the files are in place."""
     from cfmkit.studies.engine import compact
@@ -129,9 +144,8 @@ def desk(out: str, terminal: Terminal, fresh: bool = False) -> Iterator[Desk]:
     """Lock the folder and open the journal, to reuse nothing if `fresh`; Ctrl-C asks to stop inside the block."""
     from cfmkit.cli.progress import watching
     from cfmkit.store import RunFolder
-    from cfmkit.studies.journal import Journal
 
-    with RunFolder(out) as folder, Journal(folder.journal, fresh) as journal, watching(terminal) as progress:
+    with RunFolder(out) as folder, noting(folder, fresh) as journal, watching(terminal) as progress:
         if journal.damaged:
             terminal.complain([f"journal  {journal.damaged} damaged records are computed again"])
         yield Desk(folder, journal, progress)
@@ -191,6 +205,8 @@ class Ending:
         What was written.
     seconds : float
         How long it took.
+    fresh : bool
+        Whether it reused nothing.
     """
 
     records: Records
@@ -199,6 +215,7 @@ class Ending:
     folder: str
     files: tuple[str, ...]
     seconds: float
+    fresh: bool = False
 
     @property
     def interrupted(self) -> bool:
@@ -221,10 +238,12 @@ def answer(ending: Ending, source: str) -> Answer:
 
 
 def _complaints(ending: Ending) -> Iterator[str]:
+    from cfmkit.cli.failures import go_on
+
     records = ending.records
     if ending.interrupted:
         missing = len(records) - records.finished
-        yield f"interrupted  {missing} of {len(records)} points were not computed; run the same command again to go on"
+        yield f"interrupted  {missing} of {len(records)} points were not computed; {go_on(ending.fresh)}"
     if records.bugs:
         yield f"error    {records.bugs} points hit a bug in cfmkit; -vv shows the first"
 

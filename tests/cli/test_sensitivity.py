@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import re
 import shutil
 import signal
 import time
@@ -231,9 +232,13 @@ def test_an_interrupted_study_exits_130_and_goes_on_where_it_stopped(cli, study)
         assert process.poll() is None
         time.sleep(0.02)
     process.send_signal(signal.SIGINT)
-    process.communicate(timeout=60)
+    _, err = process.communicate(timeout=60)
     assert process.returncode == 130
     rows = table(cli.folder / "out" / "results.csv")
+    missing, every = map(int, re.search(rb"(\d+) of (\d+) samples were not computed", err).groups())
+    assert (every - missing, missing > 0) == (len(rows), True)
+    samples = json.loads((cli.folder / "out" / "metrics.json").read_text())["samples"]
+    assert (samples["evaluated"], samples["missing"]) == (len(rows), missing)
     assert 0 < len(rows) < 200
     assert not (cli.folder / "out" / "indices.csv").exists()
     again = cli(*command, *slow, "--json")

@@ -10,6 +10,11 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from cfmkit.cli.failures import Stopped
+from cfmkit.cli.verbs.design import long_run
+from cfmkit.families.base import Run
+from cfmkit.store import RunFolder
+
 if TYPE_CHECKING:
     import subprocess
 
@@ -71,3 +76,19 @@ def test_an_interrupted_run_is_a_json_document_too(cli, cam):
     assert process.returncode == 130
     assert b'"status": "interrupted"' in out
     assert b'"exit_code": 130' in out
+
+
+@pytest.mark.parametrize("finished", [True, False])
+def test_a_search_that_is_ended_says_that_it_goes_on_if_it_does(tmp_path, finished):
+    """Only where a start is noted: a design that keeps nothing begins anew."""
+    told = []
+    with RunFolder(tmp_path / "out") as folder:
+        try:
+            with long_run(1, False, folder, Run()) as run:
+                if finished:
+                    run.notes.add("0" * 32, {"found": {}})
+                raise Stopped(signal.SIGTERM)
+        except Stopped as stop:
+            told.append(stop.told)
+    more = "; what is finished is kept: run the same command again to go on"
+    assert told == [f"terminated{more if finished else ''}"]

@@ -194,6 +194,20 @@ def test_ctrl_c_writes_what_is_there_and_the_same_command_goes_on(cli, tmp_path)
     assert [row for row in whole if row in part] == part
 
 
+@pytest.mark.parametrize(
+    ("options", "told"), [((), b"again to go on"), (("--fresh",), b"again without --fresh to go on")]
+)
+def test_a_study_that_is_terminated_says_how_it_goes_on(cli, tmp_path, options, told):
+    command = ("sweep", str(CAM), *MANY, "-o", "out", *FEW, "-j", "2", *options)
+    process = cli.start(*command, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    journal = tmp_path / "out" / JOURNAL
+    until(lambda: journal.exists() and journal.stat().st_size > 2_000)
+    process.send_signal(signal.SIGTERM)
+    _, complaints = process.communicate(timeout=30)
+    assert process.returncode == 143
+    assert b"terminated; what is finished is kept: run the same command " + told in complaints
+
+
 def test_ctrl_c_twice_ends_at_once_and_keeps_the_journal(cli, tmp_path):
     """Points of seconds run when it is struck: that none of them is finished shows that nobody waited for them."""
     slow = ("--vary", "analysis.points=[21, 999999, 1000000]", "-o", "out", "--no-plots", "-j", "2")

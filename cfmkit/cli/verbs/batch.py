@@ -81,7 +81,6 @@ def run(options: Options, terminal: Terminal) -> Answer:
     from cfmkit.specfile import addressed
     from cfmkit.store import RunFolder
     from cfmkit.studies.batch import folders, sources
-    from cfmkit.studies.journal import Journal
     from cfmkit.studies.junit import junit
     from cfmkit.studies.kept import KeptRuns
 
@@ -96,7 +95,7 @@ def run(options: Options, terminal: Terminal) -> Answer:
     work = _work(options, out, terminal)
     with (
         RunFolder(out) as folder,
-        Journal(folder.journal, options.fresh) as journal,
+        studies.noting(folder, options.fresh) as journal,
         watching(terminal, "specs") as progress,
     ):
         folder.check("results.csv", "requirements.csv", "metrics.json")
@@ -106,7 +105,7 @@ def run(options: Options, terminal: Terminal) -> Answer:
         written = _write(folder, entries, _about(options, terminal, code))
     if report is not None:
         report(junit(entries))
-    return _answer(entries, code, Ending(out, written, options.junit, studies.now() - start), terminal)
+    return _answer(entries, code, Ending(out, written, options.junit, studies.now() - start, options.fresh), terminal)
 
 
 def _folder(options: Options) -> str:
@@ -172,16 +171,18 @@ def _data(entries: Sequence[Entry], code: ExitCode) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Ending:
-    """Where a batch was written, and how long it took."""
+    """Where a batch was written, how long it took, and whether it reused nothing."""
 
     folder: str
     files: tuple[str, ...]
     junit: str | None
     seconds: float
+    fresh: bool = False
 
 
 def _answer(entries: Sequence[Entry], code: ExitCode, ending: Ending, terminal: Terminal) -> Answer:
     from cfmkit.cli.batch import complaints
+    from cfmkit.cli.failures import go_on
     from cfmkit.studies.batch import message
 
     data = _data(entries, code) | {"out": ending.folder, "files": list(ending.files), "junit": ending.junit}
@@ -193,5 +194,8 @@ def _answer(entries: Sequence[Entry], code: ExitCode, ending: Ending, terminal: 
         show_batch(entries, ending, screen)
 
     told = tuple(complaints(entries, terminal.tracebacks))
+    if code is ExitCode.INTERRUPTED:
+        left = sum(one.skipped for one in entries)
+        told += (f"interrupted  {left} of {len(entries)} specs were not run; {go_on(ending.fresh)}",)
     quiet = () if code is ExitCode.OK else (message(entries),)
     return Answer(data, view, code, told, quiet, tuple({"message": line} for one in entries for line in one.errors))

@@ -44,11 +44,11 @@ def run(options: Options, terminal: Terminal) -> Answer:
 @contextmanager
 def long_run(jobs: int, fresh: bool, folder: RunFolder, plain: Run) -> Iterator[Run]:
     """Yield a run that works in several processes and notes what it has finished in the folder's journal."""
+    from cfmkit.cli.studies import noting
     from cfmkit.studies.executors import serial
-    from cfmkit.studies.journal import Journal
     from cfmkit.studies.pool import Pool
 
-    with Journal(folder.journal, fresh) as journal:
+    with noting(folder, fresh) as journal:
         yield replace(plain, executor=serial if jobs == 1 else Pool(jobs), notes=journal)
 
 

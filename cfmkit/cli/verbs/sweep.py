@@ -91,7 +91,8 @@ def run(options: Options, terminal: Terminal) -> Answer:
         studies.finish(place, [records])
         told = summary.as_json(records)
     written = (*manifest.files, "manifest.json")
-    return studies.answer(studies.Ending(records, code, told, out, written, studies.now() - start), options.spec)
+    ending = studies.Ending(records, code, told, out, written, studies.now() - start, options.fresh)
+    return studies.answer(ending, options.spec)
 
 
 def request(options: Options) -> Request:

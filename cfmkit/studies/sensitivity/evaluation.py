@@ -108,6 +108,8 @@ class Evaluator:
         )
         self.pieces.append(piece)
         if piece.records.finished < len(piece.records):
+            for _, rows in piece.records.batches():
+                self._numbers(rows)
             raise Interrupted
         outputs = np.empty((count * size, len(self.study.metrics) + len(self.study.spec.requirements)))
         for indices, rows in piece.records.batches():
@@ -129,6 +131,11 @@ class Evaluator:
     def count(self) -> int:
         """Samples that were evaluated."""
         return sum(self.ends.values())
+
+    @property
+    def missing(self) -> int:
+        """Samples that were asked for and not evaluated, since the user stopped."""
+        return sum(len(piece.records) - piece.records.finished for piece in self.pieces)
 
     @property
     def failed(self) -> int:

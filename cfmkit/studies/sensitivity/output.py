@@ -100,7 +100,8 @@ def message(found: Findings) -> str:
     evaluator = found.evaluator
     told = f"{found.setup.method}: {evaluator.count} samples"
     if found.interrupted:
-        return f"{told}; interrupted: run the same command again to go on"
+        of = f"{evaluator.missing} of {evaluator.count + evaluator.missing} samples"
+        return f"{told}; interrupted: {of} were not computed; run the same command again to go on"
     if evaluator.failed:
         told += f", {evaluator.failed} without a result (the first: {evaluator.first_failure})"
     if found.unstated:
@@ -197,7 +198,9 @@ def _known(value: float) -> float | None:
 def _samples(found: Findings) -> dict[str, Any]:
     evaluator, setup = found.evaluator, found.setup
     ends = {status.key: count for status, count in evaluator.ends.items() if count}
-    about = {"blocks": setup.samples, "evaluated": evaluator.count, "failed": evaluator.failed}
+    about: dict[str, Any] = {"blocks": setup.samples, "evaluated": evaluator.count, "failed": evaluator.failed}
+    if found.interrupted:
+        about["missing"] = evaluator.missing
     return about | {
         "replaced_blocks": found.replaced,
         "by_status": ends,
