@@ -23,11 +23,15 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Displacement:
-    """A node is moved along a direction [rad] by `points` [m]; the effort is the force along it [N]."""
+    """A node is moved along a direction [rad] by `points` [m]; the effort is the force along it [N].
+
+    `loads` grow with it, by so much for one metre.
+    """
 
     node: str
     direction: float
     points: FloatArray
+    loads: tuple[LoadOn, ...] = ()
 
     def __post_init__(self) -> None:
         """Freeze and check the points."""
@@ -36,10 +40,14 @@ class Displacement:
 
 @dataclass(frozen=True)
 class Rotation:
-    """A node is turned by `points` [rad]; the effort is the moment [N m]."""
+    """A node is turned by `points` [rad]; the effort is the moment [N m].
+
+    `loads` grow with it, by so much for one radian.
+    """
 
     node: str
     points: FloatArray
+    loads: tuple[LoadOn, ...] = ()
 
     def __post_init__(self) -> None:
         """Freeze and check the points."""

@@ -147,7 +147,7 @@ class Layout:
         return self.load_values
 
     def _given(self, when: int) -> tuple[LoadOn, ...]:
-        return self.network.loads if when == 0 else self.drive.loads  # type: ignore[union-attr]
+        return self.network.loads if when == 0 else self.drive.loads
 
     @cached_property
     def units(self) -> Any:

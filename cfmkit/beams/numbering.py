@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.beams.drive import Loading
 from cfmkit.beams.network import PointLoad, SlideSpring, TorsionSpring
 from cfmkit.errors import InputError
 
@@ -137,7 +136,7 @@ class Builder:
         ends = [[self._beam_place(k, name, side) for side in (0, 1)] for k, name in enumerate(names)]
         springs = [self._spring(k, spring) for k, spring in enumerate(self.network.springs)]
         load_of, line_of, line_beam, loads = [], [], [], []
-        driving = self.drive.loads if isinstance(self.drive, Loading) else ()
+        driving = self.drive.loads
         for when, given in enumerate((self.network.loads, driving)):
             for k, load in enumerate(given):
                 if isinstance(load, PointLoad):

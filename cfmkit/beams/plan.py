@@ -81,7 +81,7 @@ def _key(network: Network, drive: Drive, moved: tuple[str, int, float] | None) -
         key += [network.links, away]
     if network.springs:
         key.append(tuple(_spring_key(spring) for spring in network.springs))
-    driving = drive.loads if isinstance(drive, Loading) else ()
+    driving = drive.loads
     if network.loads or driving:
         key += [tuple(_load_key(load) for load in loads) for loads in (network.loads, driving)]
     return tuple(key)

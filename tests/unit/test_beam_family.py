@@ -522,3 +522,106 @@ def test_the_last_point_of_a_drive_to_the_negative_side_counts():
     largest = result.curve.extra["max_stress"].values.max()
     assert value(result, "stress_max") == pytest.approx(largest)
     assert f"is {largest / 1e6:.4g} MPa" in warned(result)["overstressed"]
+
+
+LOADED = (
+    (
+        "  drive:",
+        "  loads:\n    - {kind: point, node: tip, fx: 0.02 N, fy: -0.05 N}\n"
+        "    - {kind: line, beam: beam, wy: -0.1 N/m}\n  drive:",
+    ),
+)
+
+
+@pytest.mark.parametrize(
+    "drive",
+    [
+        (),
+        (
+            ("{kind: displacement, node: tip, direction: -90 deg}", "{kind: force, node: tip, direction: -90 deg}"),
+            ("travel: 100 mm", "force: 0.08 N"),
+        ),
+        (
+            ("{kind: displacement, node: tip, direction: -90 deg}", "{kind: rotation, node: tip}"),
+            ("travel: 100 mm", "travel: 40 deg"),
+        ),
+    ],
+    ids=["displacement", "force", "rotation"],
+)
+def test_loads_that_grow_with_the_drive_are_whole_at_its_end_and_zero_at_rest(drive):
+    drive = tuple((old, new) for old, new in drive)
+    first, grown = (
+        cfmkit.analyze(cantilever(*LOADED, *drive, ("points: 21", f"points: 21\n  loads_first: {when}")))
+        for when in ("true", "false")
+    )
+    assert first.status is grown.status is Status.COMPLETE
+    assert grown.curve.motion[0] == 0
+    assert abs(grown.curve.effort[0]) < 1e-9
+    assert grown.curve.motion[-1] == pytest.approx(first.curve.motion[-1], rel=1e-6)
+    assert grown.curve.effort[-1] == pytest.approx(first.curve.effort[-1], rel=1e-6)
+    halfway = grown.spec.replace({"mechanism.loads": [{"kind": "point", "node": "tip", "fx": 0.01, "fy": -0.025},
+        {"kind": "line", "beam": "beam", "wy": -0.05}], "analysis.loads_first": True})  # fmt: skip
+    half = cfmkit.analyze(halfway)
+    assert grown.curve.effort[10] == pytest.approx(half.curve.effort[10], rel=1e-6)
+    assert grown.curve.motion[10] == pytest.approx(half.curve.motion[10], rel=1e-6)
+
+
+def test_a_node_that_is_driven_holds_the_loads_that_come_first():
+    held = cfmkit.analyze(cantilever(*LOADED))
+    assert held.curve.effort[0] == pytest.approx(-0.05 - 0.1 * 0.4 * 3 / 8, rel=1e-2)  # a propped cantilever
+
+
+TAUT = """
+cfmkit: 1
+family: beam
+mechanism:
+  material: {youngs_modulus: 2 GPa}
+  thickness: 0.5 mm
+  width: 10 mm
+  nodes:
+    a: {at: [0 mm, 0 mm], support: pinned}
+    b: {at: [60 mm, 0 mm], support: roller, direction: 0 deg}
+  beams:
+    s: {start: a, end: b, shape: {kind: arc, sweep: 60 deg}}
+  drive: {kind: displacement, node: b, direction: 0 deg}
+analysis:
+  travel: 8 mm
+  points: 61
+"""
+
+
+@pytest.mark.parametrize("support", ["pinned", "clamped"])
+def test_beams_that_are_pulled_taut_have_no_limit_point(support):
+    result = cfmkit.analyze(cfmkit.loads(TAUT.replace("support: pinned", f"support: {support}")))
+    assert result.status is Status.PARTIAL
+    assert "the beams are taut at 2." in result.message
+    assert "allow stretching (mechanism.axial)" in result.message
+    assert "limit point" not in result.message
+    (early,) = (item for item in result.warnings if item.name == "ends_early")
+    assert early.cures == ("analysis.fidelity=extensible",)
+    freed = cfmkit.analyze(result.spec.replace({"analysis.fidelity": "extensible", "mechanism.axial": True}))
+    assert freed.curve.motion[-1] == pytest.approx(8 * MM)
+
+
+@pytest.mark.parametrize(
+    ("changes", "keys"),
+    [
+        (
+            (("support: clamped}",
+              "support: clamped}\n    end: {at: [400 mm, 9 mm], support: clamped, moved: {along: 9 m}}"),
+             ("{start: root, end: tip}", "{start: root, end: tip}\n    more: {start: tip, end: end}")),
+            ("mechanism.nodes.end.moved", "mechanism.axial"),
+        ),
+        (
+            (("tip: {at: [400 mm, 0 mm]}", "tip: {at: [400 mm, 0 mm], support: guided, direction: 0 deg}"),
+             ("direction: -90 deg", "direction: 0 deg")),
+            ("mechanism.drive", "mechanism.nodes.tip.support", "mechanism.axial"),
+        ),
+    ],
+    ids=["moved", "rigid"],
+)  # fmt: skip
+def test_without_a_first_pose_the_keys_that_may_be_in_the_way_are_named(changes, keys):
+    result = cfmkit.analyze(cantilever(*changes))
+    assert result.status is Status.NO_EQUILIBRIUM
+    assert all(key in result.message for key in keys), result.message
+    assert " at 0 m" not in result.message  # a share of the loads is no place of the drive

@@ -68,13 +68,22 @@ class Assembly:
         spec, drive = self.spec, self.spec.mechanism.drive
         points = np.linspace(0.0, spec.extent, spec.analysis.points)
         if drive.kind == "displacement":
-            return engine.Displacement(self.driven, self.direction, points)
+            return engine.Displacement(self.driven, self.direction, points, self._growing(spec.extent))
         if drive.kind == "rotation":
-            return engine.Rotation(self.driven, points)
-        if drive.kind == "moment":
-            return engine.Loading((engine.PointLoad(self.driven, moment=1.0),), points / self.parallel)
+            return engine.Rotation(self.driven, points, self._growing(spec.extent))
         x, y = math.cos(self.direction), math.sin(self.direction)
-        return engine.Loading((engine.PointLoad(self.driven, x, y, follows=drive.follows),), points / self.parallel)
+        own = (
+            engine.PointLoad(self.driven, moment=1.0)
+            if drive.kind == "moment"
+            else engine.PointLoad(self.driven, x, y, follows=drive.follows)
+        )
+        return engine.Loading((own, *self._growing(spec.extent / self.parallel)), points / self.parallel)
+
+    def _growing(self, end: float) -> tuple[LoadOn, ...]:
+        """Return the constant loads per unit of the drive, where they grow with it and are whole at its end."""
+        if self.spec.analysis.loads_first:
+            return ()
+        return tuple(_load(load, 1.0 / end) for load in self.spec.mechanism.loads)
 
     def control(self) -> engine.Control:
         """Return how the path is followed."""
@@ -97,7 +106,7 @@ def assemble(spec: BeamSpec) -> Assembly:
         beams={name: _beam(spec, beam) for name, beam in mechanism.beams.items()},
         links=tuple(engine.Link(link.master, link.node) for link in mechanism.links),
         springs=tuple(_spring(spring) for spring in mechanism.springs.values()),
-        loads=tuple(_load(load) for load in mechanism.loads),
+        loads=tuple(_load(load) for load in mechanism.loads) if spec.analysis.loads_first else (),
     )
     if mechanism.closure == "chain":
         network = chained(network)
@@ -209,10 +218,11 @@ def _spring(spring: SpringSpec) -> Spring:
     return engine.SlideSpring(spring.node, spring.direction, spring.stiffness, spring.free_displacement)
 
 
-def _load(load: LoadSpec) -> LoadOn:
+def _load(load: LoadSpec, share: float = 1.0) -> LoadOn:
+    """Return a share of a load."""
     if load.kind == "point":
-        return engine.PointLoad(load.node, load.fx, load.fy, load.moment, load.follows)
-    return engine.LineLoad(load.beam, load.wx, load.wy)
+        return engine.PointLoad(load.node, share * load.fx, share * load.fy, share * load.moment, load.follows)
+    return engine.LineLoad(load.beam, share * load.wx, share * load.wy)
 
 
 def resolve(spec: BeamSpec) -> BeamSpec:

@@ -1,7 +1,8 @@
 """The closure "chain": beams keep their shapes and lengths, and the nodes go where the beams end.
 
 From the nodes that are held in place, each beam in the given order whose one end is placed carries its other end with
-it; a beam between two nodes that are placed already is turned and scaled.
+it; a beam between two nodes that are placed already is turned and scaled. A guided node is carried like a free one: its
+guide goes with it, as in the reference values of Table 3.
 """
 
 from __future__ import annotations

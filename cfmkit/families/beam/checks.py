@@ -8,6 +8,7 @@ import numpy as np
 
 from cfmkit.beams import PathStatus
 from cfmkit.families.beam.build import thickest_of, thinnest_of
+from cfmkit.families.beam.endings import ending_of
 from cfmkit.families.beam.findings import finding
 from cfmkit.families.beam.values import window_of, within
 from cfmkit.families.beam.words import drive_text, in_units, percent
@@ -37,13 +38,20 @@ def findings_of(solution: Solution) -> tuple[Finding, ...]:
 def _ending(solution: Solution) -> Iterator[Finding]:
     path = solution.path
     if path.status not in (PathStatus.COMPLETE, PathStatus.INACCURATE):
-        yield finding("ends_early", in_units(solution.assembly, path.message or path.status.value))
+        why = ending_of(solution)
+        yield finding("ends_early", why.message, *why.cures)
 
 
 def _closure(solution: Solution) -> Iterator[Finding]:
     """Say how each beam was fitted, or what it costs to force it."""
     if moved := _moved(solution):
         yield finding("closure_adjusted", f"nodes were moved to where the beams end: {', '.join(moved)}")
+        nodes = solution.spec.mechanism.nodes
+        guided = [one.split(" ")[0] for one in moved if nodes[one.split(" ")[0]].support in ("guided", "roller")]
+        if guided:
+            yield finding(
+                "closure_adjusted", f"the guides of nodes that were carried along went with them: {', '.join(guided)}"
+            )
     beams = solution.path.layout.network.beams
     fits = {
         name: one

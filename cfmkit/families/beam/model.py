@@ -21,6 +21,7 @@ from cfmkit.beams import Path, PathStatus, trace
 from cfmkit.curves import Column, Curve, read_only
 from cfmkit.families.beam.build import Assembly, assemble, mirror_axis, resolve, thickest_of
 from cfmkit.families.beam.checks import findings_of
+from cfmkit.families.beam.endings import ending_of
 from cfmkit.families.beam.strips import Gap, mirrored, smallest_gap
 from cfmkit.families.beam.surface.ride import curve_of, findings_along, ride, values_along
 from cfmkit.families.beam.values import travel_of, values_of
@@ -73,6 +74,11 @@ class Solution:
         angle = self.assembly.direction
         along = moved[:, 0] * np.cos(angle) + moved[:, 1] * np.sin(angle)
         return read_only(np.where(np.abs(along) > _NOTHING * np.abs(along).max(), along, 0.0))
+
+    @property
+    def motion_dimension(self) -> str:
+        """The dimension of the motion: "length" or "angle"."""
+        return "angle" if self.spec.mechanism.drive.kind in ("rotation", "moment") else "length"
 
     @cached_property
     def effort(self) -> FloatArray:
@@ -150,7 +156,7 @@ def analyze(spec: BeamSpec, run: Run) -> Result:
     """
     solution, resolved = solve(spec), resolve(spec)
     if len(solution.keep) < 2:
-        message = f"no curve: {in_units(solution.assembly, solution.path.message or solution.path.status.value)}"
+        message = f"no curve: {ending_of(solution).message}"
         return Result(resolved, Status.NO_EQUILIBRIUM, message, warnings=findings_of(solution))
     status, message = _ending(solution)
     curves: tuple[Curve, ...] = (_curve(solution),)
@@ -192,7 +198,7 @@ def _ending(solution: Solution) -> tuple[Status, str]:
     path = solution.path
     if path.status is PathStatus.COMPLETE:
         return Status.COMPLETE, ""
-    return Status.PARTIAL, in_units(solution.assembly, path.message or path.status.value)
+    return Status.PARTIAL, ending_of(solution).message
 
 
 def _target(spec: BeamSpec) -> float | None:

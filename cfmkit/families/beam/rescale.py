@@ -56,12 +56,20 @@ def rescaled(spec: BeamSpec, wanted: Rescale) -> Design:
             changed = _to_allowable_stress(changed)
         force = _force(changed)
         if force is None:
-            return Design(None, Status.NO_EQUILIBRIUM, "the mechanism has no force at the end of its window to scale")
+            return Design(
+                None,
+                Status.NO_EQUILIBRIUM,
+                "the mechanism has no force at the end of its window (analysis.window) to scale",
+            )
         if wanted.force is None:
             break
         again, reached = _corrected(changed, wanted, force)
         if reached is None:
-            return Design(None, Status.INFEASIBLE, f"no {wanted.free} gives {format_short(wanted.force, 'force')}")
+            return Design(
+                None,
+                Status.INFEASIBLE,
+                f"no mechanism.{wanted.free} gives design.rescale.force = {format_short(wanted.force, 'force')}",
+            )
         changed = again
         if changed == before or not wanted.to_allowable_stress:
             break

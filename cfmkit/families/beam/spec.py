@@ -45,8 +45,8 @@ class Mechanism(Model):
     closure: Literal["rotscale", "chain", "raw"] = Field(
         "rotscale",
         description=(
-            "how beams are fitted between rounded nodes: turned and scaled, nodes moved to the beams' ends, "
-            "or forced into place (prestressed)"
+            "how beams are fitted between rounded nodes: turned and scaled, nodes that are not held moved to the "
+            "beams' ends (guides with them), or forced into place (prestressed)"
         ),
     )
     nodes: dict[str, NodeSpec] = Field(min_length=2, description="by name: {n1: {at: [0 mm, 0 mm], support: clamped}}")
@@ -126,6 +126,11 @@ class BeamAnalysis(Analysis):
         "stable", description="where to go at a bifurcation: a stable branch, or straight on"
     )
     other_side: bool = Field(False, description="take the other one of two mirror-image branches")
+    loads_first: bool = Field(
+        True,
+        description="constant loads come before the drive, which holds its node; false: they grow with the drive and "
+        "are whole at its end",
+    )
     surface: Surface | None = Field(None, description="a surface to follow: adds the contact force along it")
     imperfection: Length = Field(
         0.0, description="bend the unloaded beams by so much in the first buckling mode; 0: perfect"
@@ -154,7 +159,9 @@ class BeamSpec(Spec):
     @model_validator(mode="after")
     def _can_be_optimised(self) -> Self:
         if self.design is not None and self.design.optimise is not None:
-            found = optimise_faults(self.design.optimise, self.mechanism)
+            found = [*optimise_faults(self.design.optimise, self.mechanism)]
+            if self.mechanism.loads and not self.analysis.loads_first:
+                found.append(((), "shapes are searched with constant loads applied first: drop analysis.loads_first"))
             refuse("BeamSpec", {("design", "optimise", *place): message for place, message in found})
         return self
 

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from cfmkit.families.beam.build import Assembly
 
 _NUMBER = r"(-?\d[\d.]*(?:e[+-]?\d+)?)"
-_PLACE = re.compile(rf"\b(at|near) {_NUMBER}")
+_PLACE = re.compile(rf"\b(at|near) {_NUMBER}(?![\d.e]| of )")  # not a share: "lost at 0.4 of the constant loads"
 _LENGTH = re.compile(rf"{_NUMBER} m\b")
 _DIMENSIONS = {"displacement": "length", "rotation": "angle", "force": "force", "moment": "torque"}
 

@@ -89,6 +89,7 @@ def task_of(spec: BeamSpec, wanted: Optimise) -> Task:
         compared=None if wanted.compare is None else (wanted.compare[0] / layers, wanted.compare[1] / layers),
         fidelity=spec.fidelity,
         total_stress=spec.stress == "total",
+        safety_factor=mechanism.safety_factor,
         layers=layers,
     )
 
@@ -131,7 +132,10 @@ def _best(spec: BeamSpec, task: Task, result: Explored, plan: Plan) -> Judged | 
         if not some:
             return _nothing(result, plan)
         if plan.late():
-            said = f"none of {len(some)} starts met all limits in the time allowed: give it more, or run again to go on"
+            said = (
+                f"none of {len(some)} starts met all limits in the time allowed: give it more "
+                "(design.optimise.time_budget), or run again to go on"
+            )
             return Design(None, Status.INFEASIBLE, said)
         free = replace(plan, deadline=None)
         why = blocked(task, some, free)
@@ -145,7 +149,7 @@ def _best(spec: BeamSpec, task: Task, result: Explored, plan: Plan) -> Judged | 
         flattest = min(candidates, key=lambda one: one.objective)
         said = (
             f"no shape of {len(result.found)} starts keeps the force within ± {percent(task.half_band)} over the "
-            f"window asked for; the flattest keeps it within ± {percent(flattest.objective)}"
+            f"window asked for (design.optimise.window); the flattest keeps it within ± {percent(flattest.objective)}"
         )
         nearest = {"design.optimise.half_band": f"at least {percent(1.02 * flattest.objective)}"}
         return Design(None, Status.INFEASIBLE, said, nearest_feasible=nearest)
@@ -163,10 +167,15 @@ def _nothing(result: Explored, plan: Plan) -> Design:
     if result.lost:
         return Design(None, Status.CRASHED, f"no start came to an end: {'; '.join(result.lost)}")
     if result.missing or plan.late():
-        return Design(None, Status.INFEASIBLE, "the time budget ended before any start led to a design: give it more")
+        return Design(
+            None,
+            Status.INFEASIBLE,
+            "the time budget ended before any start led to a design: give it more (design.optimise.time_budget)",
+        )
     said = (
         "no random network could be followed over the window without losing stability or crossing beams: "
-        "widen the envelope or the ranges of the free nodes, or shorten the window"
+        "widen the envelope (design.optimise.limits.envelope) or the ranges of the free nodes (design.optimise.free), "
+        "or shorten the window (design.optimise.window)"
     )
     return Design(None, Status.INFEASIBLE, said)
 

@@ -104,8 +104,11 @@ def held_by(task: Task, found: Found, close: float = 2e-3) -> tuple[str, ...]:
 
 
 def _stress(task: Task, slack: float) -> dict[str, str]:
-    allowed = (task.limits.stress or 0.0) * (1 + slack)
-    return {"allowable stress": f"at least {format_short(allowed, 'stress')}"}
+    factor = task.safety_factor / (1 + slack)
+    if factor >= 1:
+        return {"mechanism.safety_factor": f"at most {factor:.4g}"}
+    strength = (task.allowable_stress or 0.0) * (1 + slack)
+    return {"mechanism.material.yield_strength": f"at least {format_short(strength, 'stress')}, without safety factor"}
 
 
 def _force(task: Task, slack: float) -> dict[str, str]:

@@ -107,6 +107,8 @@ class Task:
         The model of the network, as ``analysis.fidelity`` names it.
     total_stress : bool
         Whether the axial part counts as stress, too: as in the analysis of the design.
+    safety_factor : float
+        Yield strength over allowable stress [1].
     layers : int
         How many of the network stand in series in the mechanism: its displacements are so many times as large.
     """
@@ -127,6 +129,7 @@ class Task:
     points: int = 17
     fidelity: str = "inextensible"
     total_stress: bool = False
+    safety_factor: float = 1.0
     layers: int = 1
 
     @property
