@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from cfmkit import families
+from cfmkit.cli import lookup
+from cfmkit.cli.pages import Column, Page, Section, field
 from cfmkit.errors import UsageError
 
 if TYPE_CHECKING:
@@ -14,46 +16,13 @@ if TYPE_CHECKING:
     Record = Mapping[str, Any]
 
 
-@dataclass(frozen=True)
-class Column:
-    """One column of a table: its head, and the cell of a record."""
-
-    head: str
-    cell: Callable[[Any], str]
-    wraps: bool = False
-
-
-@dataclass(frozen=True)
-class Section:
-    """A table under a heading."""
-
-    heading: str
-    records: Sequence[Record]
-    columns: tuple[Column, ...]
-
-
-@dataclass(frozen=True)
-class Page:
-    """Everything about one topic: tables for people, and the records behind them by name."""
-
-    title: str
-    text: str
-    sections: tuple[Section, ...]
-    data: Mapping[str, Sequence[Record]]
-
-
-def field(name: str, head: str | None = None, wraps: bool = False) -> Column:
-    """Return a column that shows one field of a record."""
-    return Column(name if head is None else head, lambda record: str(record[name]), wraps)
-
-
 def page(name: str | None) -> Page:
-    """Return the page on a topic or a family; without a name the list of both.
+    """Return the page on a topic, a family, or whatever else has that name; without a name the list of topics.
 
     Raises
     ------
     cfmkit.errors.UsageError
-        If there is neither; the message names the nearest.
+        If there is none; the message names the nearest.
     """
     if name is None:
         return overview()
@@ -61,12 +30,14 @@ def page(name: str | None) -> Page:
         return TOPICS[name][1]()
     if name in families.names():
         return family_page(name)
+    if (found := lookup.found(name)) is not None:
+        return found
     from cfmkit.yamlio import did_you_mean
 
     known = [*TOPICS, *families.names()]
-    raise UsageError(
-        f"there is nothing to show about {name!r}; {did_you_mean(name, known) or 'there are ' + ', '.join(known)}"
-    )
+    every = f"there are {', '.join(known)}, and materials, metrics, values, warnings, units and papers by their names"
+    hint = did_you_mean(name, [*known, *lookup.names()]) or every
+    raise UsageError(f"there is nothing to show about {name!r}; {hint}")
 
 
 def overview() -> Page:
@@ -152,6 +123,13 @@ def materials_page() -> Page:
     return Page("materials", text, sections, {"materials": records})
 
 
+def references_page() -> Page:
+    """Return the papers behind all families."""
+    records = lookup.references()
+    columns = (field("name"), field("family"), field("reference", wraps=True))
+    return Page("references", "", (Section("", records, columns),), {"references": records})
+
+
 def family_page(name: str) -> Page:
     """Return what a spec of a family may say, what a run can report, and where it comes from."""
     from cfmkit.keys import keys
@@ -215,4 +193,5 @@ TOPICS: Mapping[str, tuple[str, Callable[[], Page]]] = {
     "units": ("the units that a spec may use, and those that files are written in", units_page),
     "metrics": ("the constant-force metrics: name, unit, definition", metrics_page),
     "materials": ("the named materials, with scatter and source", materials_page),
+    "references": ("the papers behind the families", references_page),
 }

@@ -204,7 +204,48 @@ def test_show_materials_gives_every_property_with_its_source(cli):
     pom = next(item for item in document["materials"] if item["name"] == "pom")
     assert pom["youngs_modulus"] == 2.8e9
     assert pom["source"]
-    assert "2.5 ... 3.2" in cli("show", "materials").out
+    page = cli("show", "materials").out
+    assert "2.5 ... 3.2" in page
+    assert " yield_strength" in page
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "words"),
+    [
+        ("pla", "materials", "yield_strength = 45 MPa"),
+        ("delrin", "materials", "Polyoxymethylene"),
+        ("force_ripple", "metrics", "(max - min)/max"),
+        ("torque_mean", "metrics", "N*mm"),
+        ("force_mean[load]", "metrics", "mean force"),
+        ("spring_elongation_max", "values", "cam"),
+        ("overstressed", "findings", "vcfm"),
+        ("MPa", "units", "megapascal"),
+        ("N*mm/deg", "dimensions", "torque per angle"),
+        ("rotational stiffness", "dimensions", "N*mm/rad"),
+        ("lan", "references", "lan-2010"),
+        ("ding-2022", "references", "Robotica"),
+    ],
+)
+def test_show_explains_whatever_has_a_name(cli, name, kind, words):
+    done = cli("show", name)
+    assert done.code == 0
+    assert words in " ".join(done.out.split())
+    assert cli("show", name, "--json").document[kind]
+
+
+@pytest.mark.parametrize(
+    ("typed", "meant"),
+    [("PLA", "pla"), ("force_riple", "force_ripple"), ("overstresed", "overstressed"), ("ding-2021", "ding-2022")],
+)
+def test_show_names_what_was_probably_meant(cli, typed, meant):
+    done = cli("show", typed)
+    assert done.code == 2
+    assert f"did you mean '{meant}'?" in done.err
+
+
+def test_show_references_lists_the_papers_of_every_family(cli):
+    document = cli("show", "references", "--json").document
+    assert {item["family"] for item in document["references"]} == set(families.names())
 
 
 @pytest.mark.parametrize("columns", [40, 60, 80, 300])

@@ -15,16 +15,16 @@ if TYPE_CHECKING:
 
     from rich.console import RenderableType
 
+    from cfmkit.cli.pages import Page, Section
     from cfmkit.cli.terminal import Terminal
-    from cfmkit.cli.topics import Page, Section
 
 PLACE = 60
 
 Topic = Annotated[
     str | None,
     typer.Argument(
-        metavar="[FAMILY|units|metrics|materials]",
-        help="What to explain; default: list what there is.",
+        metavar="[FAMILY|units|metrics|materials|references|NAME]",
+        help="What to explain: a topic, or anything by its name: pla, force_ripple, MPa; default: list what there is.",
         show_default=False,
     ),
 ]
@@ -38,7 +38,7 @@ class Options(Common):
 
 
 def run(options: Options, terminal: Terminal) -> Answer:
-    """Explain a family with every key of its spec, or list units, metrics or materials."""
+    """Explain a family with every key of its spec, list units, metrics, materials or papers, or explain one by name."""
     from cfmkit.cli.topics import page
 
     found = page(options.topic)
