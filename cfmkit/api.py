@@ -441,12 +441,8 @@ def export(
     >>> sorted(cfmkit.export("configs/cam.yaml"))[:3]
     ['cam-left.csv', 'cam-right.csv', 'cam.dxf']
     """
-    from cfmkit.export import files
-
     spec = spec_of(spec)
-    wishes = {"kerf": _length(kerf, "--kerf"), "tolerance": _length(tolerance, "--tolerance")}
-    given = {key: value for key, value in wishes.items() if value is not None}
-    drawn = files(drawing(spec, wishes["tolerance"]), **given)
+    drawn, _ = drawn_files(spec, kerf, tolerance)
     if out is not None:
         from cfmkit.store import RunFolder, stable_hash
 
@@ -480,6 +476,17 @@ def resolve(spec: AnySpec) -> Spec:
     record = family(spec.family)
     resolved: Spec = record.resolve(spec) if record.resolve else spec
     return resolved
+
+
+def drawn_files(
+    spec: Spec, kerf: str | float | None = None, tolerance: str | float | None = None
+) -> tuple[dict[str, bytes], tuple[str, ...]]:
+    """Return the files of `export`, and what they do not show: how often a part is to be made."""
+    from cfmkit.export import files
+
+    wishes = {"kerf": _length(kerf, "--kerf"), "tolerance": _length(tolerance, "--tolerance")}
+    drawn = drawing(spec, wishes["tolerance"])
+    return files(drawn, **{key: value for key, value in wishes.items() if value is not None}), drawn.notes
 
 
 def drawing(spec: Spec, tolerance: float | None = None) -> Drawing:

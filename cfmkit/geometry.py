@@ -175,12 +175,14 @@ class Curve2D:
 class Drawing:
     """Everything about a part that can be cut: contours for DXF and SVG, tables for CSV.
 
-    `name` is the file stem; `cut`, `path` and `reference` are the usual layers.
+    `name` is the file stem; `cut`, `path` and `reference` are the usual layers. `notes` say what the contours do not
+    show: how often a part is to be made.
     """
 
     name: str
     contours: tuple[Contour, ...]
     tables: tuple[Curve2D, ...] = ()
+    notes: tuple[str, ...] = ()
 
     def with_reference_square(self, size: float = 0.05) -> Drawing:
         """Return the drawing with a reference square [m] to its right, unless it has a reference already."""

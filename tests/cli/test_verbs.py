@@ -275,6 +275,21 @@ def test_export_writes_the_geometry_of_a_spec(cli, cam):
     assert "cam-kerf.dxf" not in names
 
 
+@pytest.mark.parametrize(
+    ("config", "change", "told"),
+    [
+        ("slider_crank_tapered", "mechanism.legs=8", "one of 8 equal legs is drawn"),
+        ("slider_crank_bilancia2019", "mechanism.legs=3", "one of 3 equal legs is drawn"),
+        ("vcfm_folded", "mechanism.bistable.half_beams=4", "one half of the eight folded beams is drawn"),
+        ("vcfm_ding2022", "mechanism.bistable.half_beams=3", "4 instead of 3"),
+    ],
+)
+def test_export_says_how_often_a_part_is_to_be_made(cli, config, change, told):
+    spec = str(CONFIGS[0].parent / f"{config}.yaml")
+    assert told in cli("export", spec, "--set", change).out
+    assert told in cli("export", spec, "--set", change, "--json").document["notes"][0]
+
+
 def test_export_gives_the_same_geometry_as_design(cli, cam):
     cli("design", cam, "-o", "one", "--no-plots")
     cli("export", "one/design.yaml", "-o", "two")

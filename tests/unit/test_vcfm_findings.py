@@ -34,6 +34,7 @@ CASES = {
     "out_of_plane_buckling": (leaf(width="1.9 mm"), "1.9 mm wide and 1 mm thick"),
     "overstressed": (["mechanism.material.yield_strength=22 MPa"], "passes 22 MPa at 4.2 mm"),
     "imperfection": (leaf(waviness="0.1 mm"), "10 % of the thickness"),
+    "spring_closed": (["mechanism.frame.corner=1 mm"], "compressed by 4.843 mm, with a preload of 0 mm at 4.843 mm"),
     "theory_range": (leaf(angle="16 deg"), "16 deg: beyond 15 deg"),
     "truss_law": (["analysis.fidelity=truss"], "35.9 % higher at 2 times the travel"),
     "measured_contradiction": ([], "the force is K_p h = 5.972 N; 11.15 N needs 2.614 N/mm"),
@@ -151,6 +152,50 @@ def test_no_constant_force_is_stated_where_no_number_stands_for_the_curve():
     assert analyzed().values["constant_force"].value == pytest.approx(13.66, abs=5e-3)
 
 
+def test_a_spring_that_closes_ends_the_curve_there():
+    """Its blocks meet after 2 L1 sin(theta1) + the corner less the rims, whatever presses it: preload or travel."""
+    room = 2 * 25 * np.sin(np.radians(7)) + 12 - 1.5 * 1.5
+    for model in ("analytic", "exact"):
+        found = analyzed(f"analysis.fidelity={model}", preloads="[0 mm, 12 mm]")
+        assert found.status is Status.PARTIAL
+        assert found.curves[0].motion[-1] == pytest.approx(6 * MM)
+        assert room - 12 - 0.02 < found.curves[1].motion[-1] / MM <= room - 12
+        (told,) = [one for one in found.warnings if one.name == "spring_closed"]
+        assert analyzed(*told.cures, preloads="[0 mm, 12 mm]").status is Status.COMPLETE
+    closed = analyzed(preloads="[30 mm]")
+    assert closed.status is Status.NO_EQUILIBRIUM
+    assert "'analysis.preloads'" in closed.message
+    assert "before the shuttle moves" in closed.message
+
+
+def test_thin_leaves_do_not_return_by_the_force_at_rest():
+    """Their peak lies before the second point: the least force is looked for behind it, not at rest (3e-16 N)."""
+    thin = leaf(thickness="0.1 mm")
+    found = analyzed(*thin, "analysis.points=61")
+    assert found.values["least_force"].value > 1e-3
+    few = analyzed(*thin, "analysis.points=61", "mechanism.positive.width=1e-9 mm")
+    assert few.values["least_force"].value < 0
+    assert "stays there until it is pulled back" in message(few, "bistable")
+
+
+REFUSED = {
+    "design.stroke=5.8 mm": ("'design.stroke'", "'design.rise'"),
+    "design.min_thickness=1.2 mm": ("'design.min_thickness'",),
+    "design.min_thickness=2 mm": ("'design.min_thickness'", "'design.rise'"),
+    "design.leaf_length=25 mm": ("'design.leaf_length'",),
+    "design.max_span=50 mm": ("'design.max_span'",),
+    "design.max_width=8 mm": ("'design.max_width'",),
+    "mechanism.bistable.half_beams=8": ("'design.leaf_length'",),
+    "mechanism.bistable.guided=false": ("'mechanism.bistable.guided",),
+}
+
+
+@pytest.mark.parametrize("change", REFUSED)
+def test_a_refused_design_names_the_key_that_blocks_it(change):
+    told = designed(change).message
+    assert all(key in told for key in REFUSED[change])
+
+
 def test_stress_is_that_of_the_worst_preload():
     """The preload of 7.5 mm doubles the stress of the spring: 60.7 MPa at 4 mm, 71.2 MPa at the end of the travel."""
     strength = "mechanism.material.yield_strength=30 MPa"
@@ -245,7 +290,7 @@ def test_the_least_force_is_that_past_the_peak_of_the_leaves():
     ],
 )
 def test_a_spring_beyond_its_closed_form_is_told(changes, preload, words):
-    changes = ("requirements=[]", *changes)
+    changes = ("requirements=[]", "mechanism.frame.corner=60 mm", *changes)  # which 36 mm do not close
     assert words in message(analyzed(*changes, preloads=f"[{preload}]"), "theory_range")
     assert "theory_range" not in names(analyzed(*changes, "analysis.fidelity=exact", preloads=f"[{preload}]"))
 

@@ -51,18 +51,21 @@ def run(options: Options, terminal: Terminal) -> Answer:
     out = folder_of(options, "export")
     spec = bind(read_spec(options.spec, options.changes))
     with RunFolder(out) as folder:
-        for name, data in api.export(spec, kerf=options.kerf, tolerance=options.tolerance).items():
+        drawn, notes = api.drawn_files(spec, options.kerf, options.tolerance)
+        for name, data in drawn.items():
             folder.write(name, data)
         origin = provenance("export", spec, options.spec, terminal)
         manifest = folder.commit(origin | {"status": "complete", "exit_code": 0})
-    return _answer(out, [*manifest.files, "manifest.json"])
+    return _answer(out, [*manifest.files, "manifest.json"], notes)
 
 
-def _answer(out: str, names: list[str]) -> Answer:
+def _answer(out: str, names: list[str], notes: tuple[str, ...]) -> Answer:
     def view(screen: Terminal) -> None:
-        from cfmkit.cli.layout import written
+        from cfmkit.cli.layout import paragraph, written
 
+        for note in notes:
+            screen.show(*paragraph("note", note, screen.width))
         screen.show(*written(out, names, screen))
 
-    data: dict[str, Any] = {"out": out, "files": names}
+    data: dict[str, Any] = {"out": out, "files": names, "notes": list(notes)}
     return Answer(data, view)

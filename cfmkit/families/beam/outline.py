@@ -68,7 +68,9 @@ def drawing(spec: BeamSpec, tolerance: float = TOLERANCE) -> Drawing:
     contours = merged(pieces, fillet, holes, rough=min(ROUGH, SHARE * tolerance))
     paths = tuple(Contour((line,), "path") for line in lines)
     tables = tuple(_table(f"beam-{name}", found) for name, found in beams.items())
-    return Drawing("beams", (*contours, *paths), tables)
+    legs = spec.mechanism.copies.legs if spec.mechanism.copies else 1
+    notes = (f"one of {legs} equal parts side by side is drawn: make it {legs} times",) if legs > 1 else ()
+    return Drawing("beams", (*contours, *paths), tables, notes)
 
 
 def _mirrored_line(line: Smooth, at: complex, direction: float) -> Smooth:

@@ -7,7 +7,7 @@ end and at the slider, links wider than any flexure, eyes around the pins of the
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -39,6 +39,13 @@ def drawing(spec: SliderCrankSpec, tolerance: float = TOLERANCE) -> Drawing:
     cfmkit.families.refusals.CannotBuild
         If it cannot be assembled.
     """
+    legs = spec.mechanism.legs
+    notes = (f"one of {legs} equal legs is drawn: make it {legs} times",) if legs > 1 else ()
+    return replace(_outline(spec), notes=notes)
+
+
+def _outline(spec: SliderCrankSpec) -> Drawing:
+    """Return the outlines of one leg."""
     spec = resolve(spec)
     linkage = linkage_of(spec.mechanism)
     if spec.fidelity == "prb":

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.families.base import BlockAnswer
-from cfmkit.families.vcfm.parts import share_of
+from cfmkit.families.vcfm.parts import RIM, share_of
 from cfmkit.families.vcfm.springs import Diamond
 from cfmkit.families.vcfm.strip import Strip
 from cfmkit.families.vcfm.truss import TrussDiamond, TrussLeaf
@@ -90,10 +90,17 @@ def _sound(spec: VcfmSpec, block: Block, names: set[str]) -> NDArray[np.bool_]:
         done &= (given >= 1) & (given <= 1000) if path.endswith("half_beams") else given > 0
         if path.endswith("angle"):
             done &= given <= np.radians(40)
+    done &= np.ravel(np.broadcast_to(_room(spec, block) >= spec.travel, (block.size, 1)))
     if names & {"negative_stiffness", "constant_force"} and spec.analysis.fidelity == "analytic":
         whole = Slab.of(spec, block.values, block.size)
         done &= np.ravel(whole.leaf.strip.slenderness > LINEAR_ABOVE)
     return done
+
+
+def _room(spec: VcfmSpec, block: Block) -> FloatArray:
+    """Return how far the spring of each variant can be compressed [m]."""
+    strip = Slab.of(spec, block.values, block.size).spring.strip
+    return np.asarray(2.0 * strip.rise + spec.mechanism.frame.corner - 2.0 * RIM * strip.thickness)
 
 
 def _slabs(chosen: NDArray[np.intp], points: int) -> list[NDArray[np.intp]]:

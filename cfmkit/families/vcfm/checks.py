@@ -10,6 +10,7 @@ import numpy as np
 from cfmkit.families.findings import at_least, at_most, mm, mpa, newton, percent, rate
 from cfmkit.families.vcfm.findings import finding
 from cfmkit.families.vcfm.hybrid import HybridLeaf
+from cfmkit.families.vcfm.parts import spring_room
 from cfmkit.families.vcfm.preload import measured_stiffness_for
 from cfmkit.families.vcfm.sbranch import POLE
 from cfmkit.families.vcfm.springs import Diamond
@@ -58,7 +59,19 @@ EXACT_FORM = 2e-4
 
 def findings_of(solution: Solution) -> tuple[Finding, ...]:
     """Return every finding about a solved mechanism, the gravest first."""
-    checks = (_measured, _truss, _leaf_shape, _flatness, _returns, _preloads, _strength, _buckling, _imperfect, _range)
+    checks = (
+        _measured,
+        spring_closed,
+        _truss,
+        _leaf_shape,
+        _flatness,
+        _returns,
+        _preloads,
+        _strength,
+        _buckling,
+        _imperfect,
+        _range,
+    )
     return tuple(found for check in checks for found in check(solution))
 
 
@@ -326,6 +339,27 @@ def _spring_range(solution: Solution) -> Iterator[Finding]:
         "theory_range",
         f"{told}; the closed form's constant stiffness is off by percents: verify with 'analysis.fidelity: exact'",
         "analysis.fidelity=exact",
+    )
+
+
+def spring_closed(solution: Solution) -> Iterator[Finding]:
+    """Yield that the spring is pressed together, with the travel up to which the worst preload leaves it open."""
+    spec, room = solution.spec, spring_room(solution.spec)
+    most = max(spec.analysis.preloads)
+    if most + spec.travel <= room * (1 + ROUNDING):
+        return
+    positive, needed = spec.mechanism.positive, most + spec.travel - room
+    place = f"at {mm(room - most)} of the travel" if room > most else "before the shuttle moves"
+    if positive.structure == "diamond":
+        key, size = "mechanism.frame.corner", at_least(spec.mechanism.frame.corner + needed)
+    else:
+        key, size = "mechanism.positive.radius", at_least(float(positive.radius or 0.0) + 0.5 * needed)
+    yield finding(
+        "spring_closed",
+        f"the spring closes: its blocks meet when it is compressed by {mm(room)}, with a preload of {mm(most)} "
+        f"{place}, and curves end there; use less preload ('analysis.preloads') or travel ('analysis.travel'), or "
+        f"'{key}' of {size}",
+        f"{key}={size}",
     )
 
 

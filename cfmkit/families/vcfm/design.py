@@ -22,12 +22,13 @@ from cfmkit.families.vcfm.limits import (
     shortest_leaf,
     thickness_for,
 )
-from cfmkit.families.vcfm.parts import share_of
+from cfmkit.families.vcfm.parts import share_of, spring_room
 from cfmkit.families.vcfm.springs import Diamond
 from cfmkit.families.vcfm.strip import Strip
 from cfmkit.families.vcfm.vbeam import critical_force, onset_and_exit, overrated
 from cfmkit.results import Design, Status
 from cfmkit.units import format_short
+from cfmkit.units.windows import Share
 
 if TYPE_CHECKING:
     from cfmkit.families.base import Run
@@ -103,8 +104,9 @@ def closed_form(spec: VcfmSpec, target: VcfmDesign) -> Sizes:
         raise Infeasible(
             finding(
                 "overstressed",
-                f"leaves of {mm(length)} would be stressed beyond {mpa(spec.mechanism.allowable_stress or 0.0)}, or be "
-                f"steeper than 15 deg: the shortest allowed is {mm(shortest)}",
+                f"leaves of {mm(length)} ('design.leaf_length') would be stressed beyond "
+                f"{mpa(spec.mechanism.allowable_stress or 0.0)}, or be steeper than 15 deg: the shortest allowed is "
+                f"{mm(shortest)}",
             ),
             {"design.leaf_length": at_least(shortest)},
         )
@@ -139,8 +141,8 @@ def check_guide(spec: VcfmSpec) -> None:
         raise Infeasible(
             finding(
                 "asymmetric_buckling",
-                "the shuttle can turn, so the leaves buckle at half the load and the force is not constant: use two "
-                "Vs at a distance, or a guide",
+                "the shuttle can turn ('mechanism.bistable.guided: false'), so the leaves buckle at half the load and "
+                "the force is not constant: use two Vs at a distance, or a guide",
             ),
             {"mechanism.bistable.guided": "true"},
         )
@@ -157,7 +159,7 @@ def check_width(spec: VcfmSpec, target: VcfmDesign, leaf: Strip) -> None:
         finding(
             "out_of_plane_buckling",
             f"leaves of {mm(leaf.length)} would be {mm(leaf.width)} wide and {mm(leaf.thickness)} thick: below "
-            f"twice the thickness they buckle out of the plane; leaves of {at_least(longer)} are wide enough",
+            f"twice the thickness they buckle out of the plane; a 'design.leaf_length' of {at_least(longer)} is enough",
         ),
         {"design.leaf_length": at_least(longer)},
     )
@@ -181,7 +183,8 @@ def completed(spec: VcfmSpec, target: VcfmDesign, sizes: Sizes) -> VcfmSpec:
     if analysis.window is None:
         changes["analysis.window"] = inside
     if analysis.travel is None:
-        changes["analysis.travel"] = inside[1] if analysis.window is None else max(inside[1], float(analysis.window[1]))
+        ends = [float(end) for end in analysis.window or () if not isinstance(end, Share)]
+        changes["analysis.travel"] = max([inside[1], *ends])
     if "requirements" not in spec.model_fields_set:
         most, least = (format_short(target.adjustment * (1.0 + share), "force", 6) for share in (flat, -flat))
         allowed = f"{100.0 * flat:.6g} %"
@@ -191,7 +194,12 @@ def completed(spec: VcfmSpec, target: VcfmDesign, sizes: Sizes) -> VcfmSpec:
             {"metric": "force_change_max", "min": least, "max": most},
             {"metric": "safety_factor", "min": f"{floor(1e3 * (1.0 - overrated(sizes.leaf.angle))) / 1e3:.3f}"},
         )
-    return written(spec, sizes).replace(changes)
+    made = written(spec, sizes).replace(changes)
+    closing = made.travel + max(target.preload_stroke, *made.analysis.preloads) - spring_room(made)
+    if closing <= 0 or "corner" in spec.mechanism.frame.model_fields_set:
+        return made
+    # higher corners, so that the spring stays open: a rigid part, which no force depends on
+    return made.replace({"mechanism.frame.corner": at_least(made.mechanism.frame.corner + 1.1 * closing)})
 
 
 def written(spec: VcfmSpec, sizes: Sizes) -> VcfmSpec:

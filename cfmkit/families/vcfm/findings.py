@@ -17,6 +17,7 @@ FINDINGS = {
     "out_of_plane_buckling": "the leaves are so narrow that they would rather buckle out of the plane",
     "overstressed": "the stress exceeds the allowable one",
     "imperfection": "waviness of the leaves as made spoils the flatness",
+    "spring_closed": "the preload and the travel press the spring together until its rigid blocks meet",
     "theory_range": "an angle or a travel beyond what the closed forms are good for",
     "unstable_branch": "the force shown is that of an unstable form, which a real leaf leaves",
     "truss_law": "the paper's law of a bar without bending: force and flatness are not those of the mechanism",

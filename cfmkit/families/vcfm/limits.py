@@ -50,8 +50,8 @@ def thickness_for(target: VcfmDesign) -> float:
         raise Infeasible(
             finding(
                 "stroke_unreachable",
-                f"a stroke of {mm(stroke)} needs leaves with a rise above {mm(0.75 * stroke)}; force, adjustment and "
-                f"preload give {mm(rise)}: with that no stroke reaches {mm(4.0 * rise / 3.0)}",
+                f"a stroke of {mm(stroke)} ('design.stroke') needs leaves with a rise above {mm(0.75 * stroke)}; "
+                f"{_given(target)} {mm(rise)}: with that no stroke reaches {mm(4.0 * rise / 3.0)}",
             ),
             {"design.stroke": at_most(longest)} if not least else {"design.stroke": at_most(_stroke_for(rise, least))},
         )
@@ -61,11 +61,18 @@ def thickness_for(target: VcfmDesign) -> float:
             finding(
                 "too_thin",
                 f"a stroke of {mm(stroke)} from a rise of {mm(rise)} needs leaves of {mm(thickness)}, thinner than "
-                f"{mm(least)}",
+                f"{mm(least)} ('design.min_thickness')",
             ),
             {"design.stroke": at_most(_stroke_for(rise, least))},
         )
     return thickness
+
+
+def _given(target: VcfmDesign) -> str:
+    """Return what states the rise of the leaves, up to the number."""
+    if target.rise is not None:
+        return "'design.rise' is"
+    return "'design.force', 'design.adjustment' and 'design.preload' give"
 
 
 def _stroke_for(rise: float, thickness: float) -> float:
@@ -75,8 +82,8 @@ def _stroke_for(rise: float, thickness: float) -> float:
         raise Infeasible(
             finding(
                 "too_thin",
-                f"leaves of {mm(thickness)} with a rise of {mm(rise)} do not buckle at all: ask for more force per "
-                f"adjustment, or a longer preload, for a rise above {mm(pi * thickness)}",
+                f"leaves of {mm(thickness)} ('design.min_thickness') with a rise of {mm(rise)} do not buckle at all: "
+                f"request a rise above {mm(pi * thickness)}, by 'design.rise' or a longer 'design.preload'",
             )
         )
     return 4.0 * rise / 3.0 * sqrt(free)
@@ -108,6 +115,6 @@ def check_room(target: VcfmDesign, sizes: Sizes) -> None:
             words = "across the motion" if path == "max_span" else "out of the plane"
             verb = "need" if name == "leaves" else "needs"
             raise Infeasible(
-                finding("envelope", f"the {name} {verb} {mm(found[name])} {words}, there are {mm(limit)}"),
+                finding("envelope", f"the {name} {verb} {mm(found[name])} {words}, 'design.{path}' gives {mm(limit)}"),
                 {f"design.{path}": at_least(ROOM * found[name])},
             )

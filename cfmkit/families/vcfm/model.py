@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.curves import Column, Curve
-from cfmkit.families.vcfm.checks import findings_of
-from cfmkit.families.vcfm.parts import parts
+from cfmkit.families.vcfm.checks import findings_of, spring_closed
+from cfmkit.families.vcfm.parts import parts, spring_room
 from cfmkit.families.vcfm.samples import LawSampler
 from cfmkit.families.vcfm.tables import adjustability, readings
 from cfmkit.families.vcfm.values import values_of
@@ -183,14 +183,15 @@ def analyze(spec: VcfmSpec, run: Run) -> Result:
     """
     solution = solve(spec)
     if len(solution.nominal.travel) < LEAST:
-        return Result(spec, Status.NO_EQUILIBRIUM, solution.sampler.problem)
-    short = solution.nominal.travel[-1] < spec.travel * (1 - 1e-9) or bool(solution.sampler.problem)
+        closed = tuple(spring_closed(solution))
+        return Result(spec, Status.NO_EQUILIBRIUM, _shortfall(solution), warnings=closed)
+    short = solution.nominal.travel[-1] < spec.travel * (1 - 1e-9) or bool(_shortfall(solution))
     status = Status.PARTIAL if short else Status.COMPLETE
     curves = tuple(_curve(push) for push in solution.pushes)
     return Result(
         spec=_as_run(spec),
         status=status,
-        message=solution.sampler.problem if short else "",
+        message=_shortfall(solution) if short else "",
         curves=curves,
         values=values_of(solution),
         warnings=findings_of(solution),
@@ -204,6 +205,13 @@ def analyze(spec: VcfmSpec, run: Run) -> Result:
     )
 
 
+def _shortfall(solution: Solution) -> str:
+    """Return why a curve ends before the travel does; empty if none does."""
+    if solution.sampler.problem:
+        return solution.sampler.problem
+    return next((found.message for found in spring_closed(solution)), "")
+
+
 def solve(spec: VcfmSpec) -> Solution:
     """Return the curves at all preloads by the model that the analysis asks for."""
     made = parts(spec)
@@ -215,8 +223,9 @@ def solve(spec: VcfmSpec) -> Solution:
         # the closed form says how far back the shuttle goes; the real one is within a few percent of it
         rests = [rest_of(sampler, preload, grid) for preload in spec.analysis.preloads]
         sampler = ExactSampler(spec, spec.travel, 1.2 * max([-(rest or 0.0) for rest in rests] + [0.0]))
-    nominal, *others = (_push(sampler, preload, grid) for preload in spec.analysis.preloads)
-    # a preload at which the spring cannot be followed has no curve; the sampler's problem says so
+    room = spring_room(spec)
+    nominal, *others = (_push(sampler, preload, grid, room) for preload in spec.analysis.preloads)
+    # a preload at which the spring cannot be followed, or is closed, has no curve; a message says so
     pushes = (nominal, *(push for push in others if len(push.travel) >= LEAST))
     return Solution(spec, made, sampler, sampler.character, pushes)
 
@@ -253,7 +262,7 @@ def _balanced(sampler: Sampler, preload: float, low: float, high: float) -> floa
     return bracketed_root(force, float(low), float(high))
 
 
-def _push(sampler: Sampler, preload: float, grid: FloatArray) -> Push:
+def _push(sampler: Sampler, preload: float, grid: FloatArray, room: float) -> Push:
     rest = rest_of(sampler, preload, grid)
     start = rest or 0.0
     if start < 0:
@@ -263,7 +272,7 @@ def _push(sampler: Sampler, preload: float, grid: FloatArray) -> Push:
     travel = np.concatenate([[start], grid[grid > start + 1e-12]])
     leaves = sampler.leaves(travel)
     force, stress = sampler.spring(travel + preload)
-    known = np.isfinite(leaves.force + force)
+    known = np.isfinite(leaves.force + force) & (travel + preload <= room * (1 + 1e-12))
     if not known.all():
         travel, force, stress = travel[known], force[known], stress[known]
         leaves = type(leaves)(leaves.force[known], leaves.stress[known], leaves.stable[known], leaves.buckled[known])

@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.vcfm.parts import strip_of
+from cfmkit.families.vcfm.parts import RIM, strip_of
 from cfmkit.geometry import TOLERANCE, Arc, Contour, Curve2D, Drawing, Edge, Line, Smooth
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from cfmkit.curves import FloatArray
     from cfmkit.families.vcfm.spec import VcfmSpec
@@ -25,9 +25,6 @@ GAP = 0.01
 
 POINTS = 201
 """Of the edge of a cosine arch."""
-
-RIM = 0.75
-"""Half height of rigid blocks beyond the middle of a leaf, in its thicknesses."""
 
 Point = tuple[float, float]
 Item = Point | Arc | Smooth
@@ -39,7 +36,16 @@ def drawing(spec: VcfmSpec, tolerance: float = TOLERANCE) -> Drawing:
     leaves, low = leaves_contours(spec)
     places, heights, _ = _centre_line(spec)
     table = Curve2D("leaf", {"x": (places, "length"), "y": (heights, "length")})
-    return Drawing("vcfm", (*leaves, *spring_contours(spec, low - GAP)), (table,))
+    return Drawing("vcfm", (*leaves, *spring_contours(spec, low - GAP)), (table,), tuple(_notes(spec)))
+
+
+def _notes(spec: VcfmSpec) -> Iterator[str]:
+    """Yield what the contours do not show."""
+    about, count = spec.mechanism.positive, spec.mechanism.bistable.half_beams
+    if about.structure == "folded" and about.loaded == "whole":
+        yield "one half of the eight folded beams is drawn: make it twice"
+    if count % 2:
+        yield f"leaves are drawn as whole Vs: {count + 1} instead of {count}; leave one off"
 
 
 def leaves_contours(spec: VcfmSpec) -> tuple[list[Contour], float]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from math import inf, sin
 from typing import TYPE_CHECKING, Any
 
 from cfmkit.families.vcfm.arch import CosineArch
@@ -18,6 +19,9 @@ if TYPE_CHECKING:
 
     from cfmkit.families.vcfm.spec import Bistable, LeafMaterial, Positive, VcfmSpec
     from cfmkit.families.vcfm.springs import Spring
+
+RIM = 0.75
+"""Half height of rigid blocks beyond the middle of a leaf, in its thicknesses."""
 
 Leaf = VBeam | CosineArch | HybridLeaf | TrussLeaf
 
@@ -81,6 +85,15 @@ def strip_of(leaf: Positive | Bistable, made_of: LeafMaterial) -> Strip:
 def share_of(positive: Positive) -> float:
     """Return the loaded part of the spring."""
     return 0.5 if positive.loaded == "half" else 1.0
+
+
+def spring_room(spec: VcfmSpec) -> float:
+    """Return how far the spring can be compressed until its rigid blocks meet [m]; infinite where none do."""
+    about = spec.mechanism.positive
+    rims = 2.0 * RIM * about.thickness
+    if about.structure == "diamond":
+        return 2.0 * about.length * sin(about.angle) + spec.mechanism.frame.corner - rims
+    return 2.0 * about.radius - rims if about.structure == "u-shape" and about.radius else inf
 
 
 def parts(spec: VcfmSpec) -> Parts:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.findings import at_least, mpa
+from cfmkit.families.findings import at_least, mm, mpa
 from cfmkit.families.refusals import Infeasible
 from cfmkit.families.vcfm.design import sized_leaf, written
 from cfmkit.families.vcfm.exact import ExactSampler
@@ -54,7 +54,11 @@ def refined(spec: VcfmSpec, target: VcfmDesign, sizes: Sizes) -> Sizes:
         sizes = Sizes(leaf, side, sizes.linear)
     worst = max(stresses)
     raise Infeasible(
-        finding("stress_unreachable", f"the exact stress is {mpa(worst)}, {mpa(allowable)} is allowed"),
+        finding(
+            "stress_unreachable",
+            f"the exact stress of leaves of {mm(float(sizes.leaf.length))} ('design.leaf_length') is {mpa(worst)}, "
+            f"{mpa(allowable)} is allowed ('mechanism.material')",
+        ),
         {"design.leaf_length": at_least(float(sizes.leaf.length) * sqrt(1.001 * max(over)))},
     )
 
@@ -79,7 +83,10 @@ def fit_widths(spec: VcfmSpec, target: VcfmDesign, sizes: Sizes) -> tuple[Sizes,
     sampler = ExactSampler(made, last, 1.2 * back)
     if sampler.problem:
         raise Infeasible(
-            finding("no_linear_region", f"the exact model does not confirm the design: {sampler.problem}"),
+            finding(
+                "no_linear_region",
+                f"the exact model does not confirm the 'design.stroke' of {mm(target.stroke)}: {sampler.problem}",
+            ),
             followable_stroke(target.height, sizes.leaf),
         )
     leaves, spring = sampler.leaves(places).force, sampler.spring(places)[0]

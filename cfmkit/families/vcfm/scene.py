@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.families.vcfm.outline import RIM
+from cfmkit.families.vcfm.parts import RIM
 from cfmkit.families.vcfm.shapes import bent_leaf, centre_line, u_chain
 
 if TYPE_CHECKING:
