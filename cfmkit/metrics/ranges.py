@@ -9,6 +9,7 @@ is known at every place (`cfmkit.results.ClosedForm`) places are solved for, wha
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import isfinite
 from typing import TYPE_CHECKING
 
@@ -67,8 +68,9 @@ def _crossing(motion: Interval, height: tuple[float, float]) -> float:
 def band_range(branch: Branch, tolerance: float) -> float:
     """Return the widest interval around the reference pose in which ``|F / F_ref - 1|`` is within the tolerance."""
     motion, offset, here = branch.around
-    if branch.closed is not None and branch.frame.reference is None:
-        return _known(many.band_range(branch.closed, tolerance))
+    if branch.closed is not None:
+        pose = np.array([branch.reference])
+        return _known(many.band_range(replace(branch.closed, low=pose, high=pose), tolerance))
     outside = ~(np.abs(offset) <= tolerance * (1 + ROUNDING))
     left, right = outside[:here].nonzero()[0], outside[here:].nonzero()[0]
     low = _edge(motion, offset, int(left[-1]), 1, tolerance) if len(left) else float(motion[0])
@@ -143,8 +145,8 @@ def usable_interval(cycle: Cycle) -> Interval | None:
     """
     reference = cycle.frame.target or _mean(cycle)
     travel = (max(b.extent[0] for b in cycle.branches), min(b.extent[1] for b in cycle.branches))
-    if cycle.closed and len(cycle.frame.valid or ()) == 1:
-        return _solved_interval(cycle, reference)
+    if cycle.closed and len(cycle.frame.valid or (travel,)) == 1:
+        return _solved_interval(cycle, reference, (cycle.frame.valid or (travel,))[0][0])
     bad = sorted(interval for branch in cycle.branches for interval in _bad(branch, reference))
     allowed = cycle.frame.valid if cycle.frame.valid is not None else (travel,)
     gaps = [gap for lo, hi in allowed for gap in _gaps(max(lo, travel[0]), min(hi, travel[1]), bad)]
@@ -153,11 +155,9 @@ def usable_interval(cycle: Cycle) -> Interval | None:
     return next((gap for gap in gaps if gap[1] - gap[0] >= longest * (1 - 1e-9)), None)
 
 
-def _solved_interval(cycle: Cycle, reference: float) -> Interval | None:
-    """Return `usable_interval` of branches that are known at every place."""
-    start, end = many.usable_interval(
-        cycle.closed, np.array([reference]), cycle.frame.band, np.array([(cycle.frame.valid or ((0.0, 0.0),))[0][0]])
-    )
+def _solved_interval(cycle: Cycle, reference: float, valid: float) -> Interval | None:
+    """Return `usable_interval` of branches that are known at every place, from where the mechanism works on."""
+    start, end = many.usable_interval(cycle.closed, np.array([reference]), cycle.frame.band, np.array([valid]))
     return None if np.isnan(start[0]) else (float(start[0]), float(end[0]))
 
 

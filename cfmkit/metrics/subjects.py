@@ -20,6 +20,10 @@ if TYPE_CHECKING:
     from cfmkit.results import ClosedForm
 
 
+ZERO = 1e-9
+"""An effort at the reference pose below this share of the largest is rounding: a band of per cent of it is nothing."""
+
+
 @dataclass(frozen=True)
 class Frame:
     """What a curve is measured against.
@@ -197,7 +201,7 @@ class Branch:
         """
         place = self.reference
         here, (motion, effort) = self.at(place), self.function
-        if here == 0:
+        if abs(here) <= ZERO * float(np.nanmax(np.abs(effort))):
             raise Undefined(f"the {self.kind} at the reference pose is zero")
         index, offset = int(motion.searchsorted(place)), effort / here - 1
         motion = np.concatenate((motion[:index], [place], motion[index:]))

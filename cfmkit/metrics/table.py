@@ -142,7 +142,8 @@ _RANGES = (
         Definition(
             name,
             "motion",
-            f"widest interval around the reference pose (default: the centre of the window) in which the {{effort}} "
+            f"widest interval around the reference pose (default: the centre of the window; for the springs of a "
+            f"slider-crank the stretched position, or half the travel of a force) in which the {{effort}} "
             f"is within {percent} % of that at the pose [Li, Hao 2019, eq. 32]",
             function,
             "smallest",

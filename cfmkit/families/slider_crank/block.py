@@ -1,7 +1,7 @@
 """Many slider-cranks at once that differ in their springs: the unit curves are the same, and everything is a product.
 
 Metrics are those of the curve at the analysis's points, as for one mechanism; class, drop and
-equilibria come from a grid that is sharpened at its turning points; ends of the constant band are
+equilibria come from a grid that is sharpened at its turning points; ends of constant bands are
 found on the closed form, for all designs side by side.
 """
 
@@ -16,7 +16,7 @@ import numpy as np
 from cfmkit.bodies.slider_crank_springs import JOINTS
 from cfmkit.families.base import BlockAnswer
 from cfmkit.families.refusals import CannotBuild
-from cfmkit.families.slider_crank.block_bands import edges, linear_band
+from cfmkit.families.slider_crank.block_bands import edges
 from cfmkit.families.slider_crank.block_metrics import CURVE, PLAIN, of_curve
 from cfmkit.families.slider_crank.build import assemble, resolve
 from cfmkit.families.slider_crank.classes import Classified, classify
@@ -222,14 +222,17 @@ class Slab:
     @cached_property
     def band(self) -> tuple[FloatArray, FloatArray]:
         """Ends of the constant band around the reference; NaN where there is none."""
+        return self.within(self.base.spec.analysis.tolerance)
+
+    def within(self, tolerance: float) -> tuple[FloatArray, FloatArray]:
+        """Return the ends of a band around the reference; NaN where there is none."""
         base = self.base
         grid = base.nodes[0]
         if not base.low <= base.reference <= base.high:
             return np.full(len(self.rates), np.nan), np.full(len(self.rates), np.nan)
         level = self.rates @ base.assembly.units(np.array([base.reference])).effort[:, 0]
         level = np.where(np.abs(level) > 1e-9 * np.abs(self.sharp).max(axis=1), level, np.nan)
-        around, tolerance = (base.reference, level), base.spec.analysis.tolerance
-        return edges(base.assembly, self.rates, (grid, self.sharp), around, tolerance)
+        return edges(base.assembly, self.rates, (grid, self.sharp), (base.reference, level), tolerance)
 
     def at(self, motion: float, rows: str = "effort") -> FloatArray:
         """Return effort or stiffness of all designs at one place."""
@@ -242,7 +245,8 @@ class Slab:
         if name in VALUES:
             return VALUES[name](self)
         if name in BANDS:
-            return linear_band(self.base.motion, self.effort, self.base.reference, BANDS[name])
+            low, high = self.within(BANDS[name])
+            return high - low
         effort = self.effort if measure.window is None else self.rates @ self.base.inside(measure.window)
         return of_curve(name, effort)
 

@@ -1,4 +1,4 @@
-"""Constant bands of many designs side by side: exact, and by linear interpolation as the metric has it."""
+"""Constant bands of many designs side by side, on the closed form."""
 
 from __future__ import annotations
 
@@ -16,39 +16,7 @@ if TYPE_CHECKING:
     from cfmkit.curves import FloatArray
     from cfmkit.families.slider_crank.build import Assembly
 
-ROUNDING = 1e-12
-"""An effort on the edge of a band is inside it, as for the metric of one curve."""
-
 Sampled = tuple["FloatArray", "FloatArray"]
-
-
-def linear_band(motion: FloatArray, effort: FloatArray, reference: float, tolerance: float) -> FloatArray:
-    """Return the width around a reference in which efforts stay within a tolerance, ends interpolated linearly.
-
-    Parameters
-    ----------
-    motion : (n,) array
-        Increasing.
-    effort : (m, n) array
-        Of m designs.
-    reference : float
-        Where the band is taken.
-    tolerance : float
-        Half width as a fraction of the effort there.
-    """
-    if not motion[0] <= reference <= motion[-1]:
-        return np.full(len(effort), np.nan)
-    after = min(max(int(motion.searchsorted(reference)), 1), len(motion) - 1)
-    part = (reference - motion[after - 1]) / (motion[after] - motion[after - 1])
-    level = effort[:, after - 1] + part * (effort[:, after] - effort[:, after - 1])
-    level = np.where(level == 0.0, np.nan, level)
-    here = int(motion.searchsorted(reference))
-    places = np.insert(motion, here, reference)
-    offset = np.insert(effort / level[:, None] - 1.0, here, 0.0, axis=1)
-    outside = ~(np.abs(offset) <= tolerance * (1 + ROUNDING))
-    low, high = _nearest(outside, here)
-    ends = [_linear_end(places, offset, bad, inward, tolerance) for bad, inward in ((low, 1), (high, -1))]
-    return np.where(np.isfinite(level), ends[1] - ends[0], np.nan)
 
 
 def _nearest(outside: NDArray[np.bool_], here: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
@@ -56,18 +24,6 @@ def _nearest(outside: NDArray[np.bool_], here: int) -> tuple[NDArray[np.intp], N
     left, right = outside[:, :here][:, ::-1], outside[:, here:]
     low = np.where(left.any(axis=1), here - 1 - left.argmax(axis=1), -1) if here else np.full(len(outside), -1)
     return low, np.where(right.any(axis=1), here + right.argmax(axis=1), -1)
-
-
-def _linear_end(
-    places: FloatArray, offset: FloatArray, bad: NDArray[np.intp], inward: int, tolerance: float
-) -> FloatArray:
-    rows, there = np.arange(len(offset)), bad >= 0
-    good = np.where(there, bad + inward, 0)
-    level = np.where(offset[rows, bad] > 0, tolerance, -tolerance)
-    outer, inner = offset[rows, bad] - level, offset[rows, good] - level
-    with np.errstate(divide="ignore", invalid="ignore"):
-        end = places[bad] - outer * (places[good] - places[bad]) / (inner - outer)
-    return np.where(there, end, places[0] if inward > 0 else places[-1])
 
 
 def edges(

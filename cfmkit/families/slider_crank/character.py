@@ -120,7 +120,12 @@ class Character:
 
     def effort(self, motion: float) -> float:
         """Return torque [N m] or force [N] at one place."""
-        return float(_summed(self.assembly.rates, self.assembly.units(np.array([motion])).effort)[0, 0])
+        return float(self.efforts(np.array([motion]))[0])
+
+    def efforts(self, motion: FloatArray) -> FloatArray:
+        """Return torque [N m] or force [N] at some places, (n,)."""
+        efforts: FloatArray = _summed(self.assembly.rates, self.assembly.units(motion).effort)[0]
+        return efforts
 
     def stiffness(self, motion: float) -> float:
         """Return the slope of the effort at one place [N m/rad or N/m]."""

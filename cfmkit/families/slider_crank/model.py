@@ -115,6 +115,33 @@ class Solution:
         return min(others, key=lambda item: abs(item.motion - start), default=None)
 
 
+@dataclass(frozen=True)
+class ClosedForm:
+    """The effort at every place of the motion, for metrics that are places.
+
+    Attributes
+    ----------
+    character : Character
+        Of the mechanism over the motion.
+    """
+
+    character: Character
+
+    @property
+    def places(self) -> FloatArray:
+        """Places of a fine grid, and those of the turning points [rad or m]."""
+        places: FloatArray = self.character.curve.place[0]
+        return places
+
+    def effort(self, _branch: str, places: FloatArray, /) -> FloatArray:
+        """Return torque [N m] or force [N] at places of any shape."""
+        return self.character.efforts(np.ravel(places)).reshape(np.shape(places))
+
+    def excess_stress(self, _branch: str, places: FloatArray, /) -> FloatArray:
+        """Return zeros: springs have no stress here."""
+        return np.zeros(np.shape(places))
+
+
 def _weighed(rates: FloatArray, unit: FloatArray) -> FloatArray:
     """Return rates times unit curves; a spring that is not there does nothing, even at a pole."""
     with np.errstate(invalid="ignore"):
@@ -159,6 +186,7 @@ def analyze(spec: SliderCrankSpec, run: Run) -> Result:
         travel=asked_motion(spec, assembly),
         target=target_of(spec),
         reference=solution.reference,
+        closed=ClosedForm(solution.character),
         state=solution,
     )
 
