@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.plots.findings import Findings, Line, Scale
+from cfmkit.plots.findings import PERCENT, Findings, Line, Scale
 from cfmkit.plots.study import figures
 from cfmkit.plots.style import png
 from cfmkit.tables import Table, TableColumn, border_values, read_csv
@@ -39,12 +39,25 @@ def findings(records: Records, summary: Summary) -> Findings:
     metrics = [_drawn(study.metrics[column], values[:, k]) for k, column in enumerate(summary.shown)]
     drawn = [metric for metric in metrics if np.isfinite(metric.values).any()]
     varied = [_scale(item, shown) for item, shown in zip(plan.variables, plan.shown(0, len(plan)), strict=True)]
-    return Findings(tuple(varied), tuple(drawn), _shape(plan), meets, summary.best)
+    return Findings(tuple(varied), tuple(drawn), _shape(plan), meets, summary.best, study.spec.name, _best(summary))
+
+
+def _best(summary: Summary) -> str:
+    """Return what makes the best point the best, for the key."""
+    told = summary.best_by
+    if told is None:
+        return ""
+    name, sense = told
+    more = f", first of {summary.ties} as good" if summary.ties > 1 else ""
+    return f"best: {sense} {name.replace('_', ' ')}{more}"
 
 
 def _drawn(metric: Metric, values: FloatArray) -> Scale:
-    shown = values if metric.words else border_values(values, metric.dimension)
-    return Scale(metric.name, metric.dimension, shown, metric.words)
+    if metric.words:
+        return Scale(metric.name, metric.dimension, values, metric.words)
+    if metric.dimension == "ratio":  # as the page says it
+        return Scale(metric.name, PERCENT, 100.0 * values)
+    return Scale(metric.name, metric.dimension, border_values(values, metric.dimension))
 
 
 def _scale(item: Variable, shown: np.ndarray) -> Scale:
@@ -73,12 +86,17 @@ def curves(records: Records, found: Findings) -> tuple[list[Line], tuple[str, st
 
 
 def _nominal(table: Table) -> Table:
-    """Return the rows of the first curve, without the columns that tell curves of one point apart (a preload)."""
+    """Return branch, motion and effort of the first curve; columns before them tell curves of one point apart."""
     labels = [column.name for column in table.columns].index("branch")
     rows = list(zip(*(column.cells() for column in table.columns[:labels]), strict=True)) or [()] * len(table)
     first = [number for number, row in enumerate(rows) if row == rows[0]]
-    kept = (TableColumn(one.name, tuple(one.cells()[k] for k in first), one.unit) for one in table.columns[labels:])
-    return Table(tuple(kept))
+    # the cells of a column once, not once a row: a study has thousands of these
+    return Table(tuple(_taken(one, first) for one in table.columns[labels : labels + 3]))
+
+
+def _taken(column: TableColumn, rows: list[int]) -> TableColumn:
+    cells = column.cells()
+    return TableColumn(column.name, tuple(cells[k] for k in rows), column.unit)
 
 
 def _branches(table: Table) -> dict[str, tuple[FloatArray, FloatArray]]:

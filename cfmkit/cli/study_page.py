@@ -71,7 +71,7 @@ def _best(grid: Table, ending: Ending, everything: bool) -> None:
     grid.add_row()
     grid.add_row(
         Text("  best", LABEL),
-        Text(f"point {best['point']}"),
+        Text(f"point {best['point']}" + (f", first of {best['ties']} as good" if best["ties"] > 1 else "")),
         Text(f"{best['sense']} {_words(best['by'])}" + _among(best), FAINT),
     )
     for path, value in best["values"].items():

@@ -16,6 +16,10 @@ if TYPE_CHECKING:
     from cfmkit.curves import FloatArray
 
 
+PERCENT = "percent"
+"""Dimension of shares that are drawn in per cent."""
+
+
 @dataclass(frozen=True)
 class Scale:
     """Something that is drawn: a parameter or a metric, in border units.
@@ -39,8 +43,22 @@ class Scale:
     def label(self) -> str:
         """What is written on the axis: the last part of a path, with its unit."""
         short = self.name.rpartition(".")[2]
+        if self.dimension == PERCENT:
+            return f"{short.replace('_', ' ')} [%]"
         known = self.dimension not in ("text", "count")
         return axis_label(short, self.dimension) if known else short.replace("_", " ")
+
+    @property
+    def plain(self) -> str:
+        """The label without the unit, for sentences."""
+        return self.label.partition(" [")[0]
+
+    def text(self, value: float) -> str:
+        """Return one of the values with its unit, or as its word."""
+        if self.words:
+            return self.words[int(value)]
+        unit = "" if self.dimension in ("text", "count") else self.label.partition(" [")[2].removesuffix("]")
+        return f"{value:.4g}" + (f" {unit}" if unit not in ("", "1") else "")
 
 
 @dataclass(frozen=True)
@@ -57,6 +75,10 @@ class Findings:
         Whether a point was solved and meets every requirement.
     best : int or None
         Index of the best point.
+    name : str
+        Whose study it is, for the heading.
+    best_words : str
+        What makes the best point the best, for the key.
     """
 
     varied: tuple[Scale, ...]
@@ -64,6 +86,8 @@ class Findings:
     shape: tuple[int, ...]
     meets: NDArray[np.bool_]
     best: int | None = None
+    name: str = ""
+    best_words: str = ""
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,7 @@ import numpy as np
 
 from cfmkit.plots.rounding import is_level
 from cfmkit.plots.style import BAND, BLUE, INK, SMALL, TROUBLE, axes_mm, new_figure, styled
-from cfmkit.plots.text import axis_label
-from cfmkit.tables import border_values
+from cfmkit.plots.text import metric_label, metric_values
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -28,7 +27,7 @@ def draw_histogram(found: Findings, number: int) -> Figure:
     setup = found.setup
     metric = setup.study.metrics[number]
     drawn = found.outputs[:, 0, number] if found.outputs is not None else np.empty(0)
-    known = border_values(drawn[np.isfinite(drawn)], metric.dimension)
+    known = metric_values(drawn[np.isfinite(drawn)], metric.dimension)
     figure = new_figure(140, 84)
     axes = axes_mm(figure, (18, 14, 116, 56))
     title = f"{setup.study.spec.name}: {metric.label.replace('_', ' ')}"
@@ -38,7 +37,7 @@ def draw_histogram(found: Findings, number: int) -> Figure:
         axes.hist(known, _edges(known).tolist(), color=BLUE, alpha=0.85)
     axes.set_ylim(0, 1.22 * max(1.0, axes.get_ylim()[1]))
     limits = [limit for one in setup.limits(metric) for limit in _ends(one)]
-    nominal = float(border_values(setup.nominal.values[number], metric.dimension))
+    nominal = float(metric_values(setup.nominal.values[number], metric.dimension))
     _frame(axes, [*known.tolist(), *limits, nominal])
     _limits(axes, setup.limits(metric))
     axes.axvline(nominal, color=INK, linewidth=1.0, linestyle="--")
@@ -51,7 +50,7 @@ def draw_histogram(found: Findings, number: int) -> Figure:
         size=SMALL,
         va="top",
     )
-    axes.set(xlabel=axis_label(metric.name.replace("[", " ").replace("]", ""), metric.dimension), ylabel="parts")
+    axes.set(xlabel=metric_label(metric.name, metric.dimension), ylabel="parts")
     return figure
 
 
@@ -65,7 +64,7 @@ def _edges(values: FloatArray) -> FloatArray:
 
 
 def _ends(limits: Limits) -> list[float]:
-    return [float(border_values(end, limits.dimension)) for end in (limits.min, limits.max) if end is not None]
+    return [float(metric_values(end, limits.dimension)) for end in (limits.min, limits.max) if end is not None]
 
 
 def _frame(axes: Axes, shown: list[float]) -> None:
@@ -79,7 +78,7 @@ def _limits(axes: Axes, each: tuple[Limits, ...]) -> None:
     low, high = axes.get_xlim()
     for limits in each:
         ends = [
-            None if end is None else float(border_values(end, limits.dimension)) for end in (limits.min, limits.max)
+            None if end is None else float(metric_values(end, limits.dimension)) for end in (limits.min, limits.max)
         ]
         inside = low if ends[0] is None else ends[0], high if ends[1] is None else ends[1]
         axes.axvspan(*inside, color=BAND, alpha=0.10, linewidth=0, zorder=0)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from cfmkit.plots.marks import COLOURS, EMPTY, HATCH, edges, star, ticks
+from cfmkit.plots.marks import COLOURS, EMPTY, HATCH, HEAD, edges, head, key_of, star, ticks
 from cfmkit.plots.rounding import is_level, levelled
 from cfmkit.plots.style import SMALL, axes_mm, new_figure, styled
 
@@ -30,7 +30,7 @@ FINE = 80
 @styled
 def draw_map(found: Findings, metric: Scale) -> Figure:
     """Return one metric over two parameters: colours and level lines."""
-    figure = new_figure(140, 100)
+    figure = new_figure(140, 100 + HEAD)
     axes = axes_mm(figure, (18, 14, 92, 80))
     down, across = found.varied
     up, along = _places(down, found.shape[0], found.shape[1]), _places(across, found.shape[1], 1)
@@ -51,8 +51,10 @@ def draw_map(found: Findings, metric: Scale) -> Figure:
     axes.set(xlabel=across.label, ylabel=down.label)
     along.dress(axes, "x")
     up.dress(axes, "y")
-    if found.best is not None:
-        star(axes, across.values[found.best], down.values[found.best])
+    best = found.best
+    starred = best is not None and star(axes, across.values[best], down.values[best])
+    key = key_of(found, starred, not meets.all(), not np.isfinite(values).all())
+    head(figure, found, f"{metric.plain} over {across.plain} and {down.plain}", key)
     return figure
 
 
@@ -72,7 +74,6 @@ def _classes(axes: Axes, map_: tuple[FloatArray, FloatArray, FloatArray], metric
     bar = key.figure.colorbar(mesh, cax=key)
     bar.set_ticks(range(len(there)), labels=[metric.words[k] for k in there])
     bar.ax.tick_params(length=0)
-    axes.set_title(metric.label, fontsize=SMALL, loc="left")
 
 
 @dataclass(frozen=True)

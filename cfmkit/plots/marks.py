@@ -6,13 +6,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.plots.style import VERMILLION
+from cfmkit.plots.style import GREY, MM, SMALL, VERMILLION, styled
+from cfmkit.plots.text import LEFT, Heading, write_heading
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
     from cfmkit.curves import FloatArray
-    from cfmkit.plots.findings import Scale
+    from cfmkit.plots.findings import Findings, Scale
 
 COLOURS = "viridis"
 EMPTY = "#EFEFEF"
@@ -20,6 +25,48 @@ EMPTY = "#EFEFEF"
 
 HATCH = "////"
 """Where a requirement is missed."""
+
+
+HEAD = 12.0
+"""Room at the top of a picture of a study for its heading and its key [mm]."""
+
+
+@styled
+def head(figure: Figure, found: Findings, subject: str, key: Sequence[Artist] = ()) -> None:
+    """Write above a picture whose study it is, what it shows, and what its marks mean."""
+    write_heading(figure, Heading(found.name, subject) if found.name else Heading(subject, "all points"))
+    if key:
+        width, height = figure.get_size_inches() / MM
+        figure.legend(
+            handles=list(key),
+            loc="upper left",
+            bbox_to_anchor=((LEFT - 1.0) / width, 1.0 - 6.0 / height),
+            ncols=len(key),
+            frameon=False,
+            fontsize=SMALL,
+            borderpad=0.0,
+            borderaxespad=0.0,
+            handletextpad=0.4,
+            columnspacing=1.2,
+        )
+
+
+def key_of(found: Findings, starred: bool, hatched: bool, empty: bool = False) -> list[Artist]:
+    """Return what stands in the key: those marks that occur."""
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    entries: list[Artist] = []
+    if starred:
+        look = {"marker": "*", "markersize": 9, "color": VERMILLION, "markeredgecolor": "white", "linestyle": ""}
+        entries.append(Line2D([], [], label=found.best_words or "best point", **look))  # type: ignore[arg-type]
+    if hatched:
+        entries.append(
+            Patch(facecolor=EMPTY, edgecolor=GREY, hatch=HATCH, linewidth=0, label="requirement missed, or not solved")
+        )
+    if empty:
+        entries.append(Patch(facecolor=EMPTY, label="no value"))
+    return entries
 
 
 def edges(centers: FloatArray) -> FloatArray:
@@ -41,9 +88,11 @@ def ticks(axis: Any, parameter: Scale) -> None:
         axis.set_ticks(range(len(parameter.words)), labels=list(parameter.words))
 
 
-def star(axes: Axes, x: float, y: float) -> None:
-    """Mark the best point, if it has a place."""
-    if np.isfinite([x, y]).all():
+def star(axes: Axes, x: float, y: float) -> bool:
+    """Mark the best point, and return whether it has a place."""
+    has_place = bool(np.isfinite([x, y]).all())
+    if has_place:
         axes.plot(
             [x], [y], marker="*", markersize=12, color=VERMILLION, markeredgecolor="white", clip_on=False, zorder=5
         )
+    return has_place

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.plots.diagram import padded
+from cfmkit.plots.marks import head
 from cfmkit.plots.place import Label, place_labels
 from cfmkit.plots.style import LINES, SMALL, axes_mm, new_figure, styled
 from cfmkit.plots.text import finite_range
@@ -35,13 +36,14 @@ def draw_panels(found: Findings, lines: Sequence[Line], labels: tuple[str, str])
     first, second = found.varied
     panels = sorted({line.panel for line in lines if line.panel is not None})
     rows = -(-len(panels) // 2)
-    figure = new_figure(160.0, 14.0 + 52.0 * rows)
+    figure = new_figure(160.0, 20.0 + 52.0 * rows)
     for number, value in enumerate(panels):
         row, column = divmod(number, 2)
         ax = axes_mm(figure, (17.0 + 74.0 * column, 14.0 + 52.0 * (rows - 1 - row), 62.0, 42.0))
         _draw_panel(ax, [line for line in lines if line.panel == value], second)
-        ax.set_title(f"{first.label.split(' [')[0]}: {_words(first, value)}", fontsize=SMALL, loc="left")
-        ax.set(xlabel=labels[0] if row == rows - 1 else "", ylabel=labels[1] if column == 0 else "")
+        ax.set_title(f"{first.plain}: {first.text(value)}", fontsize=SMALL, loc="left")
+        ax.set(xlabel=labels[0] if number + 2 >= len(panels) else "", ylabel=labels[1] if column == 0 else "")
+    head(figure, found, f"curves by {first.plain}, each line a value of {second.plain}")
     return figure
 
 
@@ -53,12 +55,8 @@ def _draw_panel(ax: Axes, lines: Sequence[Line], second: Scale) -> None:
         for motion, effort in line.branches.values():
             ax.plot(motion, effort, color=color, linewidth=1.2)
         motion, effort = next(iter(line.branches.values()))
-        names.append(Label(_words(second, line.parameter), color, np.column_stack([motion, effort]), prefer=0.6))
+        names.append(Label(second.text(line.parameter), color, np.column_stack([motion, effort]), prefer=0.6))
     efforts = np.concatenate([effort for line in lines for _, effort in line.branches.values()])
     low, high = finite_range(efforts) or (0.0, 1.0)
     ax.set_ylim(*padded((min(low, 0.0), max(high, 0.0)), 0.05, 0.15))
     place_labels(ax, names)
-
-
-def _words(scale: Scale, value: float) -> str:
-    return scale.words[int(value)] if scale.words else f"{value:.4g}"

@@ -16,7 +16,7 @@ import numpy as np
 from cfmkit.plots.histogram import draw_histogram
 from cfmkit.plots.rounding import levelled
 from cfmkit.plots.style import BLUE, GREY, INK, LINES, SMALL, VERMILLION, axes_mm, new_figure, styled
-from cfmkit.tables import border_values
+from cfmkit.plots.text import metric_label, metric_values
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -159,7 +159,10 @@ def draw_gains(found: Findings) -> Figure:
     figure, axes = _bar_axes(len(order), f"{found.setup.study.spec.name}: {told}; which tolerance to tighten first")
     _draw_bars(axes, lines, order, (BLUE, "", 0.0, 0.6))
     _rows(axes, [lines[k].parameter for k in order])
-    axes.set_xlabel("change of the yield when the tolerance is halved [1], 95 % interval")
+    from matplotlib.ticker import PercentFormatter
+
+    axes.xaxis.set_major_formatter(PercentFormatter(1.0, symbol=""))
+    axes.set_xlabel("change of the yield when the tolerance is halved,\n95 % interval [percentage points]")
     return figure
 
 
@@ -178,7 +181,7 @@ def draw_oat(found: Findings, number: int) -> Figure:
     curves, bars = (axes_mm(figure, (left, 14, width, room)) for left, width in ((18, 72), (132, 52)))
     figure.text(0.02, 1.0 - 2.0 / (room + 24), _title(found, metric), va="top", weight="bold")
     every_output = np.empty((len(swings), 0)) if found.outputs is None else found.outputs[:, :, number]
-    shown = levelled(border_values(np.append(setup.nominal.values[number], every_output), metric.dimension))
+    shown = levelled(metric_values(np.append(setup.nominal.values[number], every_output), metric.dimension))
     nominal, outputs = float(shown[0]), shown[1:].reshape(every_output.shape)
     bars.axvline(nominal, color=GREY, linewidth=0.8)
     for row, k in enumerate(order):
@@ -213,9 +216,7 @@ def _tornado(axes: Axes, row: int, swing: Line, ends: tuple[float, float, float]
 
 
 def _unit(metric: Metric) -> str:
-    from cfmkit.plots.text import axis_label
-
-    return axis_label(metric.name.replace("[", " ").replace("]", ""), metric.dimension)
+    return metric_label(metric.name, metric.dimension)
 
 
 @styled
@@ -226,17 +227,17 @@ def draw_morris(found: Findings, number: int) -> Figure:
     figure = new_figure(160, 90)
     axes = axes_mm(figure, (20, 14, 84, 66))
     figure.text(0.02, 0.98, _title(found, metric), va="top", weight="bold")
-    top = 0.0
+    top, factor = 0.0, 100.0 if metric.dimension == "ratio" else 1.0
     for row, k in enumerate(_ranked(sizes)):
         size, scatter = sizes[k], scatters[k]
         label = "\n".join(textwrap.wrap(short(size.parameter), 26))
         if size.value is None or scatter.value is None:
             axes.plot([], [], linestyle="", label=f"{label}\n(not stated)")
             continue
-        colour, ends = LINES[row % len(LINES)], _numbers(size)[2:]
-        axes.plot(size.value, scatter.value, MARKERS[row], label=label, linestyle="", color=colour, ms=5)
-        axes.plot(ends, (scatter.value,) * 2, marker="|", markersize=4, color=colour, linewidth=1.0)
-        top = max(top, size.high or 0.0, scatter.value)
+        colour, ends, up = LINES[row % len(LINES)], [factor * end for end in _numbers(size)[2:]], factor * scatter.value
+        axes.plot(factor * size.value, up, MARKERS[row], label=label, linestyle="", color=colour, ms=5)
+        axes.plot(ends, (up,) * 2, marker="|", markersize=4, color=colour, linewidth=1.0)
+        top = max(top, factor * (size.high or 0.0), up)
     if top:
         look = {"textcoords": "offset points", "ha": "right", "size": SMALL, "color": GREY}
         axes.plot((0, top), (0, top), color=GREY, linewidth=0.6, linestyle="--")

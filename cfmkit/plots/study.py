@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.plots.maps import draw_map
-from cfmkit.plots.marks import COLOURS, EMPTY, HATCH, edges, star, ticks
+from cfmkit.plots.marks import COLOURS, EMPTY, HATCH, HEAD, edges, head, key_of, star, ticks
 from cfmkit.plots.panels import draw_panels, fit_panels
 from cfmkit.plots.rounding import is_level, levelled
 from cfmkit.plots.style import BLUE, GREY, INK, SMALL, VERMILLION, axes_mm, new_figure, styled
@@ -19,6 +19,7 @@ from cfmkit.plots.style import BLUE, GREY, INK, SMALL, VERMILLION, axes_mm, new_
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
@@ -28,6 +29,9 @@ if TYPE_CHECKING:
 
 MOST_LINES = 1500
 """Lines of a picture with parallel axes; more are thinned out evenly."""
+
+MISSED = "#D5D5D5"
+"""Colour of points that miss a requirement, where lines show them."""
 
 
 def figures(
@@ -71,8 +75,8 @@ def draw_curves(found: Findings, lines: Sequence[Line], labels: tuple[str, str])
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
 
-    figure = new_figure()
-    axes = axes_mm(figure, (16, 14, 112, 78))
+    figure = new_figure(160.0, 100.0 + HEAD)
+    axes = axes_mm(figure, (16, 14, 112, 82))
     (parameter,) = found.varied
     given = [line.parameter for line in lines]
     scale = Normalize(min(given), max(given) if max(given) > min(given) else min(given) + 1)
@@ -81,10 +85,11 @@ def draw_curves(found: Findings, lines: Sequence[Line], labels: tuple[str, str])
             axes.plot(motion, effort, color=colormaps[COLOURS](scale(line.parameter)), linewidth=1.0)
     axes.set(xlabel=labels[0], ylabel=labels[1])
     _clear_of_poles(axes, lines)
-    bar = figure.colorbar(ScalarMappable(scale, COLOURS), cax=axes_mm(figure, (133, 14, 4, 78)))
+    bar = figure.colorbar(ScalarMappable(scale, COLOURS), cax=axes_mm(figure, (133, 14, 4, 82)))
     bar.set_label(parameter.label)
     if parameter.words:
         bar.set_ticks(range(len(parameter.words)), labels=list(parameter.words))
+    head(figure, found, f"curves, coloured by {parameter.plain}")
     return figure
 
 
@@ -102,7 +107,7 @@ def _clear_of_poles(axes: Axes, lines: Sequence[Line]) -> None:
 @styled
 def draw_metric(found: Findings, metric: Scale) -> Figure:
     """Return one metric over the only parameter."""
-    figure = new_figure(120, 75)
+    figure = new_figure(120, 75 + HEAD)
     axes = axes_mm(figure, (28, 13, 86, 56) if metric.words else (18, 13, 96, 56))
     (parameter,) = found.varied
     order = np.argsort(parameter.values, kind="stable")
@@ -113,10 +118,9 @@ def draw_metric(found: Findings, metric: Scale) -> Figure:
     axes.ticklabel_format(axis="y", useOffset=True)
     ticks(axes.xaxis, parameter)
     ticks(axes.yaxis, metric)
-    if metric.words:
-        axes.set_title(metric.label, fontsize=SMALL, loc="left")
-    if found.best is not None:
-        star(axes, parameter.values[found.best], levelled(metric.values)[found.best])
+    best = found.best
+    starred = best is not None and star(axes, parameter.values[best], levelled(metric.values)[best])
+    head(figure, found, f"{metric.plain} over {parameter.plain}", key_of(found, starred, not found.meets.all()))
     return figure
 
 
@@ -133,7 +137,7 @@ def draw_parallel(found: Findings) -> Figure:
     from matplotlib import colormaps
 
     scales = (*found.varied, *found.metrics)
-    figure = new_figure(max(120.0, 26.0 * len(scales) + 30), 100)
+    figure = new_figure(max(120.0, 26.0 * len(scales) + 30), 100 + HEAD)
     width = figure.get_size_inches()[0] * 25.4
     axes = axes_mm(figure, (14, 22, width - 28, 66))
     heights = np.column_stack([_share(scale) for scale in scales])
@@ -142,12 +146,24 @@ def draw_parallel(found: Findings) -> Figure:
         chosen[np.linspace(0, len(chosen) - 1, min(len(chosen), MOST_LINES)).astype(int)] if len(chosen) else chosen
     )
     for k in sorted(thinned.tolist(), key=lambda k: bool(found.meets[k])):
-        colour = colormaps[COLOURS](heights[k, len(found.varied)]) if found.meets[k] else "#D5D5D5"
+        colour = colormaps[COLOURS](heights[k, len(found.varied)]) if found.meets[k] else MISSED
         axes.plot(heights[k], color=colour, linewidth=0.6, alpha=0.7)
     if found.best is not None:
         axes.plot(heights[found.best], color=VERMILLION, linewidth=2.0)
     _parallel_axes(axes, scales)
+    head(figure, found, f"coloured by {found.metrics[0].plain}", _parallel_key(found))
     return figure
+
+
+def _parallel_key(found: Findings) -> list[Artist]:
+    from matplotlib.lines import Line2D
+
+    entries: list[Artist] = []
+    if found.best is not None:
+        entries.append(Line2D([], [], color=VERMILLION, linewidth=2.0, label=found.best_words or "best point"))
+    if not found.meets.all():
+        entries.append(Line2D([], [], color=MISSED, label="requirement missed, or not solved"))
+    return entries
 
 
 def _share(scale: Scale) -> FloatArray:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.plots.style import GREY, MM, NORMAL, SMALL, TROUBLE, styled
+from cfmkit.tables import border_values
 from cfmkit.units import border_unit, format_short
 
 if TYPE_CHECKING:
@@ -42,6 +43,24 @@ def axis_label(name: str, dimension: str) -> str:
     """
     unit = border_unit(dimension)
     return f"{name.replace('_', ' ')} [{unit}]" if unit else name.replace("_", " ")
+
+
+def metric_label(name: str, dimension: str) -> str:
+    """Return the label of a metric of a study: shares in per cent, as the pages have them.
+
+    Examples
+    --------
+    >>> metric_label("force_ripple", "ratio"), metric_label("force_mean[load]", "force")
+    ('force ripple [%]', 'force mean load [N]')
+    """
+    plain = name.replace("[", " ").replace("]", "")
+    return f"{plain.replace('_', ' ')} [%]" if dimension == "ratio" else axis_label(plain, dimension)
+
+
+def metric_values(values: Any, dimension: str) -> FloatArray:
+    """Return SI values of a metric in the unit of `metric_label`."""
+    shown: FloatArray = 100.0 * np.asarray(values) if dimension == "ratio" else border_values(values, dimension)
+    return shown
 
 
 def value_text(value: float, dimension: str) -> str:

@@ -33,6 +33,10 @@ MOST_SHOWN = 4
 """Metrics that are drawn."""
 
 
+TIE = 1e-9
+"""Points whose values differ by less than this are as good, relative to the value."""
+
+
 @dataclass(frozen=True)
 class Objective:
     """What makes a point better than another: the column of a metric, and whether more is better."""
@@ -75,6 +79,8 @@ class Summary:
         Columns whose values are kept for pictures.
     counts : Counter
         Points by status.
+    ties : int
+        Points that are as good as the best, it included: to 1e-9 of its value, which is what rounding leaves.
     gapped, first_gap : int, str
         Complete points without a value over some window, and what the first of them says.
     best, best_value, best_meets : int, float, bool
@@ -89,6 +95,7 @@ class Summary:
     gapped: int = 0
     first_gap: str = ""
     best: int | None = None
+    ties: int = 0
     best_values: FloatArray | None = None
     best_meets: bool = False
     kept: list[tuple[NDArray[np.int64], FloatArray, NDArray[np.bool_]]] = field(default_factory=list)
@@ -127,10 +134,22 @@ class Summary:
             inside = np.where(group, score, np.nan)
             if np.isnan(inside).all() or (self.best_meets and not meeting):
                 continue
-            at = int(np.nanargmin(inside))
-            if self.best is None or meeting > self.best_meets or inside[at] < self._best_score():
+            at, before = int(np.nanargmin(inside)), self._best_score()
+            best = float(inside[at])
+            same = self.best is not None and self.best_meets == meeting and abs(best - before) <= TIE * abs(before)
+            if self.best is None or meeting > self.best_meets or best < before:
                 self.best, self.best_meets = int(indices[at]), meeting
                 self.best_values = rows.values[at].copy()
+                self.ties = self.ties if same else 0
+            score_now = self._best_score()
+            self.ties += int((np.abs(inside - score_now) <= TIE * abs(score_now)).sum())
+
+    @property
+    def best_by(self) -> tuple[str, str] | None:
+        """Name of the metric that the best point is chosen by, and which of its values is the best."""
+        if self._goal is None or self.best is None:
+            return None
+        return self.study.names[self._goal.column], "largest" if self._goal.largest else "smallest"
 
     def _best_score(self) -> float:
         if self._goal is None or self.best_values is None:
@@ -199,6 +218,7 @@ class Summary:
             "values": {item.path: written(value, item.dimension) for item, value in values},
             "by": self.study.names[self._goal.column],
             "sense": "largest" if self._goal.largest else "smallest",
+            "ties": self.ties,
             "requirements_met": self.best_meets if len(self.met) else None,
         }
 

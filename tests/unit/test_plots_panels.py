@@ -25,7 +25,7 @@ def test_every_value_of_the_first_parameter_has_a_panel_with_a_line_for_each_of_
     found, lines = study(3, 2)
     figure = draw_panels(found, lines, ("displacement [mm]", "force [N]"))
     assert [len(ax.lines) for ax in figure.axes] == [2, 2, 2]
-    assert [ax.get_title(loc="left") for ax in figure.axes] == ["b: 0", "b: 1", "b: 2"]
+    assert [ax.get_title(loc="left") for ax in figure.axes] == ["b: 0 mm", "b: 1 mm", "b: 2 mm"]
     assert all({"kind 0", "kind 1"} <= {text.get_text() for text in ax.texts} for ax in figure.axes)
 
 

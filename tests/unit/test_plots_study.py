@@ -1,11 +1,19 @@
 """Pictures of studies: which there are, what they mark, and that their bytes repeat."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+import cfmkit
+from cfmkit.cli.study_figures import _nominal, findings
 from cfmkit.plots.findings import Findings, Line, Scale
 from cfmkit.plots.study import figures
 from cfmkit.plots.style import png
+from cfmkit.studies.engine import run
+from cfmkit.studies.sweep import Request, prepare, summary_of
+from cfmkit.studies.variation import wishes
+from cfmkit.tables import Table, TableColumn
 
 X = np.repeat(np.linspace(1.0, 3.0, 5), 4)
 Y = np.tile(np.array([4.0, 3.0, 2.0, 1.0]), 5)
@@ -167,3 +175,63 @@ def test_a_count_has_whole_numbers_on_its_axis():
     for values in (np.array([2.0, 3.0, 2.0]), np.array([2.0, 2.0, 2.0])):
         _, axes = _one_metric(values, "count")
         assert all(float(tick).is_integer() for tick in axes.get_yticks())
+
+
+def _texts(figure):
+    return [text.get_text() for text in figure.texts]
+
+
+@pytest.mark.parametrize(("count", "shape"), [(1, (20,)), (2, (5, 4)), (2, ()), (3, (5, 2, 2))])
+def test_every_picture_of_a_sweep_says_whose_it_is_and_what_its_marks_mean(count, shape):
+    case = replace(found(count, shape), name="my-cam", best_words="best: smallest force ripple, first of 4 as good")
+    for draw in figures(case).values():
+        figure = draw()
+        assert any(text.startswith("my-cam: ") for text in _texts(figure))
+        (key,) = figure.legends
+        assert [text.get_text() for text in key.get_texts()] == [
+            "best: smallest force ripple, first of 4 as good",
+            "requirement missed, or not solved",
+        ]
+
+
+def test_a_key_has_only_the_marks_that_occur():
+    case = replace(found(2, (5, 4)), meets=np.ones(20, bool), best=None)
+    (draw,) = figures(case).values()
+    assert not draw().legends
+
+
+def test_shares_are_drawn_in_per_cent_as_the_page_has_them():
+    spec = cfmkit.load("configs/cam.yaml").replace({"requirements": ()})
+    wish = wishes({"mechanism.rolling_friction": (0.001, 0.002)})
+    work = prepare(spec, Request(vary=wish, metrics=("force_ripple", "force_mean")))
+    records = run(work)
+    summary = summary_of(records)
+    for batch in records.batches():
+        summary.add(*batch)
+    ripple = next(one for one in findings(records, summary).metrics if one.name == "force_ripple")
+    assert ripple.label == "force ripple [%]"
+    assert ripple.values == pytest.approx(100 * summary.kept[0][1][:, 0])
+
+
+def test_points_that_are_as_good_as_the_best_are_counted():
+    spec = cfmkit.load("configs/cam.yaml")
+    wish = wishes({"mechanism.contact.width": ("8 mm", "9 mm", "10 mm")})
+    records = run(prepare(spec, Request(vary=wish, metrics=("force_ripple",))))
+    summary = summary_of(records)
+    for batch in records.batches(1):  # one at a time: ties are counted across batches
+        summary.add(*batch)
+    assert (summary.best, summary.ties) == (0, 3)
+    assert summary.as_json(records)["best"]["ties"] == 3
+
+
+def test_the_nominal_curve_is_read_in_one_pass_over_the_cells(monkeypatch):
+    """Cells of a column are made once: once a row took 28 times the time of the study."""
+    rows = 500
+    columns = ("preload", "branch", "displacement", "force", "more")
+    values = [0.0] * rows, ["load"] * rows, list(range(rows)), [1.0] * rows, [2.0] * rows
+    table = Table(tuple(TableColumn(name, tuple(one)) for name, one in zip(columns, values, strict=True)))
+    calls, plain = [], TableColumn.cells
+    monkeypatch.setattr(TableColumn, "cells", lambda self: calls.append(self.name) or plain(self))
+    nominal = _nominal(table)
+    assert len(nominal) == rows
+    assert len(calls) <= len(columns)
