@@ -512,7 +512,7 @@ def test_places_of_the_drive_are_told_with_units_and_for_all_copies():
 
 def test_a_window_that_is_wider_than_the_curve_is_told():
     wide = cfmkit.analyze(cantilever(("points: 21", "points: 21\n  window: [50 mm, 120 mm]")))
-    assert "50 mm to 120 mm is not within the curve, 0 mm to 100 mm" in warned(wide)["window_outside"]
+    assert "50 ... 120 mm is not within the curve, 0 ... 100 mm" in warned(wide)["window_outside"]
     exact = cfmkit.analyze(cantilever(("points: 21", "points: 21\n  window: [0 mm, 100 mm]")))
     assert "window_outside" not in warned(exact)
 
