@@ -15,7 +15,10 @@ import numpy as np
 from cfmkit.beams import branch_ends
 from cfmkit.beams.discretise import LOADS, PRESTRESS, assemble_model
 from cfmkit.beams.kernels.march import DONE, LONG, SHORT, STALLED
+from cfmkit.beams.layout import Layout
+from cfmkit.beams.network import Network
 from cfmkit.beams.path import Event, PathStatus
+from cfmkit.beams.section import Taper
 from cfmkit.beams.solver import Spot, march_options
 
 if TYPE_CHECKING:
@@ -23,6 +26,8 @@ if TYPE_CHECKING:
     from cfmkit.beams.run import Run
 
 _ROOM = 400  # points on the way to the constant loads
+_SOFTER = (3.0, 1.0, 0.3, 0.1)  # times as thick, with the same bending stiffness
+_ENOUGH = 16  # segments of a beam with which such a way is found
 _STEP, _TURN = 0.25, 0.35  # first step, as a share of them; largest change of a pose in a step
 
 
@@ -44,7 +49,47 @@ def start(run: Run) -> tuple[Spot | None, float, int]:
         spot = spot if found is None else found[0]
     if spot is None or not (network.loads or run.layout.held):
         return spot, float(spot is not None), DONE if spot is not None else STALLED
-    return _loaded(run, spot, indifferent)
+    found = _loaded(run, spot, indifferent)
+    if found[0] is not None or found[2] in (DONE, LONG) or _stretches(run):
+        return found
+    near = _by_stretching(run)
+    if near is not None:
+        return near, 1.0, DONE
+    return (None, found[1], LONG) if run.mesh.segments < _ENOUGH else found  # coarse segments hide the way
+
+
+def _stretches(run: Run) -> bool:
+    return all(beam.section.axial for beam in run.layout.network.beams.values())
+
+
+def _by_stretching(run: Run) -> Spot | None:
+    """Return a stable equilibrium under the constant loads and displacements near that of beams that stretch; or None.
+
+    A straight beam that does not stretch has no way to where both of its ends are held closer together: its rotations
+    would have to grow with the root of what is applied. One that stretches has, and then stretches less and less.
+    """
+    control = replace(run.control, branch="stable")
+    soft = type(run)(Layout(_softer(run.layout.network, _SOFTER[0]), run.layout.drive), run.mesh, control)
+    spot = start(soft)[0]
+    for factor in _SOFTER[1:]:
+        if spot is None:
+            return None
+        solver = type(run.solver)(Layout(_softer(run.layout.network, factor), run.layout.drive), run.mesh)
+        spot = solver.solve(spot.y, 0.0)
+    near = None if spot is None else run.solver.solve(spot.y, 0.0)
+    return near if near is not None and near.unstable <= 0 else None
+
+
+def _softer(network: Network, factor: float) -> Network:
+    """Return the network with beams that stretch, by the square of a factor more than theirs, and bend as they do."""
+    beams = {}
+    for name, beam in network.beams.items():
+        section = beam.section
+        thick = section.thickness
+        wider = replace(thick, values=factor * thick.values) if isinstance(thick, Taper) else factor * thick
+        soft = replace(section, youngs_modulus=section.youngs_modulus / factor**3, thickness=wider, axial=True)
+        beams[name] = replace(beam, section=soft)
+    return Network(network.nodes, beams, network.links, network.springs, network.loads)
 
 
 def _loaded(run: Run, spot: Spot, indifferent: bool) -> tuple[Spot | None, float, int]:

@@ -625,3 +625,46 @@ def test_without_a_first_pose_the_keys_that_may_be_in_the_way_are_named(changes,
     assert result.status is Status.NO_EQUILIBRIUM
     assert all(key in result.message for key in keys), result.message
     assert " at 0 m" not in result.message  # a share of the loads is no place of the drive
+
+
+HELD = """
+cfmkit: 1
+family: beam
+mechanism:
+  material: {youngs_modulus: 2 GPa}
+  thickness: 0.5 mm
+  width: 10 mm
+  nodes:
+    a: {at: [0 mm, 0 mm], support: clamped}
+    b: {at: [60 mm, 0 mm], support: clamped, moved: MOVED}
+    c: {at: [60 mm, 30 mm], support: guided, direction: 90 deg}
+  beams:
+    straight: {start: a, end: b}
+    curved: {start: b, end: c, shape: {kind: arc, sweep: 60 deg}}
+  drive: {kind: displacement, node: c, direction: -90 deg}
+analysis:
+  travel: 3 mm
+  points: 11
+"""
+
+
+@pytest.mark.parametrize(
+    "moved",
+    ["{along: -3 mm, across: 2 mm, rotation: 20 deg}", "{along: -6 mm, across: 2 mm}", "{along: -3 mm}"],
+)
+def test_an_end_of_a_straight_beam_whose_motions_are_all_prescribed_has_a_start(moved):
+    """Without stretching the rotations grow with the root of the motion: there is no path to follow from rest."""
+    stiff, soft = (
+        cfmkit.analyze(cfmkit.loads(HELD.replace("MOVED", moved) + f"  fidelity: {fidelity}\n"))
+        for fidelity in ("inextensible", "extensible")
+    )
+    assert stiff.status is Status.COMPLETE
+    assert stiff.curve.stable.all()
+    for name in ("straight_force_x", "curved_force_y"):
+        np.testing.assert_allclose(stiff.curve.extra[name].values, soft.curve.extra[name].values, rtol=0.02, atol=5e-3)
+
+
+def test_an_end_that_would_have_to_stretch_its_beam_has_no_start():
+    result = cfmkit.analyze(cfmkit.loads(HELD.replace("MOVED", "{along: 2 mm}")))
+    assert result.status is Status.NO_EQUILIBRIUM
+    assert "mechanism.nodes.b.moved" in result.message

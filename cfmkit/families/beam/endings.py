@@ -73,6 +73,4 @@ def _in_the_way(solution: Solution) -> str:
     said = f"look at {', '.join(keys)}"
     if spec.fidelity != "inextensible":
         return said
-    if moved:
-        said += "; a straight beam whose ends are both held cannot bend to where its end is moved without stretching"
     return f"{said}; beams do not stretch: mechanism.axial allows it"
