@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.plots.place import Label
-from cfmkit.plots.style import GREY, INK, ORANGE, SMALL, VERMILLION, axes_mm, styled
+from cfmkit.plots.style import GREY, INK, OCHRE, SMALL, VERMILLION, axes_mm, styled
 from cfmkit.units import to_border
 
 if TYPE_CHECKING:
@@ -91,7 +91,7 @@ def spring(ax: Axes, start: Point, end: Point, width: float, gid: str = "spring"
     side = np.zeros(len(share))
     side[2:-2] = np.where(np.arange(len(share) - 4) % 2 == 0, 0.5, -0.5)
     points = a + np.outer(share, along) + np.outer(side, across)
-    ax.plot(*mm(points).T, color=ORANGE, linewidth=0.9, zorder=2.6, gid=gid, solid_joinstyle="round")
+    ax.plot(*mm(points).T, color=OCHRE, linewidth=0.9, zorder=2.6, gid=gid, solid_joinstyle="round")
 
 
 @styled

@@ -48,8 +48,8 @@ BLUE, VERMILLION, BLACK, PURPLE, TAN, BROWN = "#0072B2", "#D55E00", "#1A1A1A", "
 LINES = (BLUE, VERMILLION, BLACK, PURPLE, TAN, BROWN)
 """Colours of lines, in this order; as dark as they must be to be read as text, too."""
 
-ORANGE = "#C98500"
-"""Springs."""
+OCHRE = "#B78C66"
+"""Springs. It stands beside every line but TAN, and beside GREY."""
 
 INK, GREY = "#262626", "#6B6B6B"
 BAND, TROUBLE = "#00855F", "#A50F15"

@@ -22,7 +22,7 @@ from cfmkit.plots.curves import plot_curve
 from cfmkit.plots.loop import loop_figure
 from cfmkit.plots.place import Label, place_labels
 from cfmkit.plots.render import render
-from cfmkit.plots.style import BAND, GREY, INK, LINES, TROUBLE, new_figure, png, style
+from cfmkit.plots.style import BAND, GREY, INK, LINES, OCHRE, TAN, TROUBLE, new_figure, png, style
 from cfmkit.plots.text import Heading, axis_label, top_axis, value_text, write_heading
 from cfmkit.results import Result, Status
 from cfmkit.spec import Spec
@@ -153,7 +153,14 @@ def test_line_colours_differ_for_every_kind_of_colour_vision(sight):
     assert min(np.linalg.norm(a - b) for a, b in itertools.combinations(seen, 2)) > 30
 
 
-@pytest.mark.parametrize("color", [*LINES, BAND, TROUBLE, GREY, INK])
+@pytest.mark.parametrize("sight", SIGHT)
+@pytest.mark.parametrize("other", [*(line for line in LINES if line != TAN), GREY])
+def test_springs_differ_from_the_lines_beside_them_for_every_kind_of_colour_vision(sight, other):
+    spring, beside = (lightness_and_hue(np.array(SIGHT[sight]) @ linear(color)) for color in (OCHRE, other))
+    assert np.linalg.norm(spring - beside) > (28 if other == GREY else 30)  # what is grey is dashed, too
+
+
+@pytest.mark.parametrize("color", [*LINES, OCHRE, BAND, TROUBLE, GREY, INK])
 def test_every_colour_of_text_stands_out_from_paper(color):
     luminance = np.array([0.2126, 0.7152, 0.0722]) @ linear(color)
     assert 1.05 / (luminance + 0.05) > 3.0

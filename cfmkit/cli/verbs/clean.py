@@ -68,10 +68,10 @@ def run(options: Options, terminal: Terminal) -> Answer:
 def _refuse_what_is_no_folder(name: str) -> None:
     import os
 
-    from cfmkit.specfile import shown
+    from cfmkit.errors import visible
 
     if not name or "\0" in name or not os.path.isdir(name):
-        raise UsageError(f"{shown(name)!s}: there is no such folder")
+        raise UsageError(f"{visible(name)}: there is no such folder")
 
 
 def _agreed(found: Sequence[Remains], terminal: Terminal) -> bool:

@@ -17,7 +17,7 @@ from cfmkit.plots.curves import Look, plot_curve
 from cfmkit.plots.diagram import Diagram, Limit, Region, Scale, Series, diagram_figure
 from cfmkit.plots.loop import loop_figure
 from cfmkit.plots.place import place_labels
-from cfmkit.plots.style import BLUE, GREY, ORANGE, PURPLE, TROUBLE, VERMILLION, new_figure, styled
+from cfmkit.plots.style import BLUE, GREY, OCHRE, PURPLE, TROUBLE, VERMILLION, new_figure, styled
 from cfmkit.plots.text import Heading, finite_range, right_axis, top_axis, value_text, write_heading
 from cfmkit.units import to_border
 
@@ -155,7 +155,7 @@ def _names_of_parts(solution: Solution, index: int, view: Scene) -> list[Label]:
         parts.part_name("slider", [pin], (-1.0, 0.2)),
         parts.part_name("brace", pin + np.linspace(0.2, 0.8, 20)[:, None] * (roller - pin), (1.0, 0.5)),
         parts.part_name("roller", parts.ring(here.roller, radius, 25), (0.0, -1.0)),
-        parts.part_name("spring" if number == 1 else f"{number} springs", spring, (0.0, -1.0), ORANGE),
+        parts.part_name("spring" if number == 1 else f"{number} springs", spring, (0.0, -1.0), OCHRE),
     ]
 
 

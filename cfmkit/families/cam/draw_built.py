@@ -9,7 +9,7 @@ import numpy as np
 
 from cfmkit.plots.diagram import Diagram, Scale, Series, diagram_figure
 from cfmkit.plots.loop import loop_figure
-from cfmkit.plots.style import BLUE, ORANGE, PURPLE, VERMILLION
+from cfmkit.plots.style import BLUE, OCHRE, PURPLE, VERMILLION
 from cfmkit.plots.text import Heading
 
 if TYPE_CHECKING:
@@ -67,7 +67,7 @@ def shares(result: Result) -> Figure:
         Series(parts["friction_down"], "friction, down", PURPLE, prefer=0.6),
     ]
     if np.abs(parts["rest"]).max() > 0:
-        series.append(Series(parts["rest"], "rest length", ORANGE, prefer=0.8))
+        series.append(Series(parts["rest"], "rest length", OCHRE, prefer=0.8))
     over = built.travel + built.origin
     diagram = Diagram(over, Scale("displacement", "length"), Scale("force added to the design's", "force"), series)
     return diagram_figure(Heading.of(result, "where the force comes from"), [diagram])

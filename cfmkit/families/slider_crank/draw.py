@@ -17,7 +17,7 @@ from cfmkit.plots.curves import Look, plot_curve
 from cfmkit.plots.diagram import Diagram, Limit, Scale, Series, diagram_figure
 from cfmkit.plots.loop import loop_figure
 from cfmkit.plots.place import Label, place_labels
-from cfmkit.plots.style import BLUE, BROWN, GREY, INK, ORANGE, PURPLE, VERMILLION, axes_mm, new_figure, styled
+from cfmkit.plots.style import BLUE, BROWN, GREY, INK, OCHRE, PURPLE, VERMILLION, axes_mm, new_figure, styled
 from cfmkit.plots.text import Heading, value_text, write_heading
 from cfmkit.units import to_border
 
@@ -233,7 +233,7 @@ def draw_linkage(solution: Solution, key: Key, ax: Axes, view: Scene) -> Axes:
     parts.plate(ax, [base], "ground")
     for rate, joint, direction in zip(rates[:3], key.joints, key.directions, strict=True):
         if rate > 0.0:
-            parts.edge(ax, torsion_spring(joint, direction, 0.55 * size), "torsion-spring", color=ORANGE, zorder=3.6)
+            parts.edge(ax, torsion_spring(joint, direction, 0.55 * size), "torsion-spring", color=OCHRE, zorder=3.6)
     if solution.assembly.drive == "force":
         tail = end[0] + 2.6 * size * link.branch, end[1]
         parts.force_arrow(ax, tail, (end[0] + 0.6 * size * link.branch, end[1]))

@@ -23,7 +23,7 @@ from cfmkit.plots.style import (
     BLUE,
     GREY,
     LINES,
-    ORANGE,
+    OCHRE,
     PURPLE,
     SMALL,
     VERMILLION,
@@ -84,7 +84,7 @@ def split(result: Result) -> Figure:
     push = solution.nominal
     series = [
         Series(push.force, "sum", BLACK, prefer=0.55),
-        Series(push.spring_force, "spring", ORANGE, prefer=0.85),
+        Series(push.spring_force, "spring", OCHRE, prefer=0.85),
         Series(push.leaves.force, "leaves", BLUE, prefer=0.35),
     ]
     if solution.spec.mechanism.bistable.structure == "v-beam" and not isinstance(solution.parts.leaf, TrussLeaf):
@@ -106,7 +106,7 @@ def stress(result: Result) -> Figure:
     over = most.travel
     series = [
         Series(np.interp(over, nominal.travel, nominal.leaves.stress, left=np.nan), "leaves", BLUE, prefer=0.5),
-        Series(np.interp(over, nominal.travel, nominal.spring_stress, left=np.nan), "spring", ORANGE, prefer=0.6),
+        Series(np.interp(over, nominal.travel, nominal.spring_stress, left=np.nan), "spring", OCHRE, prefer=0.6),
     ]
     if most is not nominal:
         text = f"spring, preload {value_text(most.preload, 'length')}"
@@ -264,6 +264,6 @@ def _poses(solution: Solution) -> list[tuple[str, float, float]]:
 def _draw(ax: Axes, one: Scene) -> None:
     """Draw the parts in one pose."""
     parts.plate(ax, one.rigid, "rigid")
-    for name, outlines, color in (("leaf", one.leaves, BLUE), ("spring", one.spring, ORANGE)):
+    for name, outlines, color in (("leaf", one.leaves, BLUE), ("spring", one.spring, OCHRE)):
         for outline in outlines:
             ax.fill(*parts.mm(outline).T, color=color, linewidth=0.4, zorder=2.0, gid=name)

@@ -12,7 +12,7 @@ from cfmkit.plots import parts
 from cfmkit.plots.diagram import Diagram, Limit, Scale, Series, diagram_figure
 from cfmkit.plots.loop import loop_figure
 from cfmkit.plots.place import Label, place_labels
-from cfmkit.plots.style import BLUE, GREY, INK, ORANGE, PURPLE, VERMILLION, axes_mm, new_figure, styled
+from cfmkit.plots.style import BLUE, GREY, INK, OCHRE, PURPLE, VERMILLION, axes_mm, new_figure, styled
 from cfmkit.plots.text import Heading, value_text, write_heading
 
 if TYPE_CHECKING:
@@ -64,9 +64,9 @@ def guide(result: Result) -> Figure:
     """Return what the slider's guide carries beside the force."""
     solution: Printed = result.state
     over = Scale("travel of the slider", "length")
-    forces = [Series(solution.force, "force", INK), Series(solution.side_force, "on the guide, across the way", ORANGE)]
+    forces = [Series(solution.force, "force", INK), Series(solution.side_force, "on the guide, across the way", OCHRE)]
     upper = Diagram(solution.travel, over, Scale("force", "force"), forces)
-    moment = [Series(solution.guide_moment, "on the guide", ORANGE)]
+    moment = [Series(solution.guide_moment, "on the guide", OCHRE)]
     lower = Diagram(solution.travel, over, Scale("moment", "torque"), moment)
     return diagram_figure(Heading.of(result, "what the guide of the slider carries"), [upper, lower])
 
