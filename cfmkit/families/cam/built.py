@@ -24,8 +24,9 @@ from cfmkit.bodies.cam_profile import brace_tangent
 from cfmkit.curves import Column, Curve
 from cfmkit.errors import DataError
 from cfmkit.families.cam.build import Assembly, assemble, displacement_origin
-from cfmkit.families.cam.built_values import findings_of_built, requested_travel, values_of_built
+from cfmkit.families.cam.built_values import findings_of_built, pressure_of, requested_travel, values_of_built
 from cfmkit.families.cam.checks import left_out
+from cfmkit.families.cam.contact import allowable_stress, stress
 from cfmkit.families.cam.existence import check_first_pose, check_springs, until_overlap
 from cfmkit.families.cam.findings import finding
 from cfmkit.families.cam.values import DEFINITIONS, design_values, largest
@@ -163,6 +164,7 @@ def analyze_built(spec: CamSpec) -> Result:
         travel=requested_travel(built),
         valid=((float(travel[0]) + built.origin, float(travel[-1]) + built.origin),),
         target=spec.design.force if spec.design else float(built.shares["design"][-1]),
+        allowable_stress=allowable_stress(spec.mechanism),
         state=built,
     )
 
@@ -301,6 +303,8 @@ def _values(built: Built) -> Mapping[str, Quantity]:
         "contact_force_max": largest(*pressed_up, *pressed_down),
         "friction_half_gap_max": largest((up - down)[known] / (up + down)[known]),
     }
+    if built.assembly.spec.mechanism.contact:
+        numbers["contact_pressure_max"] = largest(pressure_of(built, 1.0))
     shared = {name: Quantity(value, *DEFINITIONS[name]) for name, value in numbers.items()}
     return shared | dict(values_of_built(built))
 
@@ -324,6 +328,9 @@ def _curve(built: Built) -> Curve:
         "added_by_profile": Column(loop(shares["profile"]), "force"),
         "added_by_friction": Column(loop(shares["friction_up"], shares["friction_down"]), "force"),
     }
+    if built.assembly.spec.mechanism.contact:
+        pressed = loop(pressure_of(built, 1.0), pressure_of(built, -1.0))
+        extra |= {"contact_pressure": Column(pressed, "stress"), "max_stress": Column(stress(pressed), "stress")}
     with np.errstate(invalid="ignore"):
         stable = (loop(up[1], down[1]) > 0) & (loop(up[2], down[2]) > 0)
     branch = np.repeat(["load", "unload"], len(built.travel))

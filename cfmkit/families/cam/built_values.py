@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.families.cam.contact import flank_pressure, overstressed, worst
 from cfmkit.families.cam.findings import finding
 from cfmkit.families.findings import mm
 from cfmkit.numerics.robust import neighbour_noise
@@ -87,6 +88,12 @@ def values_of_built(built: Built) -> Mapping[str, Quantity]:
     return {name: Quantity(value, *BUILT_DEFINITIONS[name]) for name, value in numbers.items()}
 
 
+def pressure_of(built: Built, way: float) -> FloatArray:
+    """Return the larger pressure of both contacts on the way up (1) or down (-1), the flank curved as designed [Pa]."""
+    track, forces = built.assembly.track, built.forces(way)
+    return flank_pressure(built.assembly, track.states(track.start + built.travel), np.maximum(forces[1], forces[2]))
+
+
 def window_mask(built: Built) -> NDArray[np.bool_]:
     """Return which travels lie in ``analysis.window``."""
     place, window = built.travel + built.origin, built.assembly.spec.analysis.window
@@ -139,6 +146,11 @@ def _mechanics(built: Built) -> Iterator[Finding]:
     if (slack := built.elongation < 0).any():
         last = float(built.travel[slack][-1])
         yield finding("spring_slack", f"the springs carry nothing up to {mm(last)} of travel: they are too long")
+    pressed = pressure_of(built, 1.0)
+    if (top := worst(pressed)) is not None:
+        place = f"at {mm(float(built.travel[top]))} of travel"
+        if told := overstressed(built.assembly.spec.mechanism, float(pressed[top]), place):
+            yield told
     held = ~np.isfinite(built.forces(1.0)[0])
     if held.any():
         friction, places = built.assembly.spec.mechanism.rolling_friction, built.travel[held]

@@ -6,7 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.families.cam.contact import overstressed, worst
 from cfmkit.families.cam.findings import finding
+from cfmkit.families.cam.values import contact_pressure
 from cfmkit.families.findings import mm
 
 if TYPE_CHECKING:
@@ -22,7 +24,7 @@ if TYPE_CHECKING:
 
 def findings_of(solution: Solution) -> tuple[Finding, ...]:
     """Return every finding about a solved mechanism, the gravest first."""
-    checks = (_undercut, _jam, _dead_point, _springs, _contact)
+    checks = (_undercut, _jam, _dead_point, _springs, _contact, _pressure)
     return tuple(found for check in checks for found in check(solution))
 
 
@@ -137,6 +139,14 @@ def _contact(solution: Solution) -> Iterator[Finding]:
                 f"on the way {way} the force on the slider is not positive from {_where(solution.travel, slack)} "
                 "of travel: a cable would go slack",
             )
+
+
+def _pressure(solution: Solution) -> Iterator[Finding]:
+    pressed = contact_pressure(solution)
+    if (top := worst(pressed)) is not None:
+        place = f"at {mm(float(solution.travel[top]))} of travel"
+        if told := overstressed(solution.assembly.spec.mechanism, float(pressed[top]), place):
+            yield told
 
 
 def _where(travel: FloatArray, mask: NDArray[np.bool_]) -> str:

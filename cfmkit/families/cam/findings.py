@@ -16,6 +16,7 @@ FINDINGS = {
     "undercut_total": "the roller is so large that nothing of the flank remains",
     "contact_not_single_valued": "while the roller pivots on the corner the contact does not move with the slider",
     "corner_pressure": "on the sharp corner the contact pressure has no bound",
+    "overstressed": "the contact pressure exceeds the one at which the material first yields below the surface",
     "up_jam": "friction holds the roller: no force moves the slider up",
     "dead_point": "the slider cannot move the roller at the start: forces other than the springs' diverge",
     "spring_slack": "the springs are shorter than their rest length and carry nothing",

@@ -23,11 +23,12 @@ from cfmkit.bodies.cam_profile import brace_tangent
 from cfmkit.curves import Column, Curve, FloatArray
 from cfmkit.families.cam.build import CLOSE, Assembly, assemble, displacement_origin
 from cfmkit.families.cam.checks import findings_of, left_out
+from cfmkit.families.cam.contact import allowable_stress, stress
 from cfmkit.families.cam.existence import check_first_pose, check_springs
 from cfmkit.families.cam.findings import finding
 from cfmkit.families.cam.places import Places
 from cfmkit.families.cam.statics import Forces, forces, jams
-from cfmkit.families.cam.values import theoretical_force, values_of
+from cfmkit.families.cam.values import contact_pressure, theoretical_force, values_of
 from cfmkit.families.findings import mm
 from cfmkit.families.refusals import CannotBuild, no_result
 from cfmkit.results import Result, Status
@@ -149,6 +150,7 @@ def analyze(spec: CamSpec, run: Run) -> Result:
         travel=(solution.origin, solution.origin + _requested(solution, bool(shortfalls))),
         valid=((solution.corner_travel + solution.origin, float(solution.travel[-1]) + solution.origin),),
         target=spec.design.force if spec.design else theoretical_force(solution),
+        allowable_stress=allowable_stress(spec.mechanism),
         closed=Places(solution),
         state=solution,
     )
@@ -237,5 +239,8 @@ def _curve(solution: Solution) -> Curve:
         "roller_y": Column(loop(states.y), "length"),
         "contact": Column(loop(np.where(states.on_corner, "corner", "flank")), "text"),
     }
+    if solution.assembly.spec.mechanism.contact:
+        pressed = loop(contact_pressure(solution), contact_pressure(solution, down))
+        extra |= {"contact_pressure": Column(pressed, "stress"), "max_stress": Column(stress(pressed), "stress")}
     branch = np.repeat(["load", "unload"], points)
     return Curve(loop(solution.travel) + solution.origin, force, branch, stable, extra)

@@ -13,11 +13,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.families.cam.contact import allowable_stress, flank_pressure, stress
 from cfmkit.families.cam.statics import forces
 
 if TYPE_CHECKING:
+    from cfmkit.bodies.track_states import TrackStates
     from cfmkit.curves import FloatArray
     from cfmkit.families.cam.model import Solution
+    from cfmkit.families.cam.statics import Forces
 
 _SHARES = np.concatenate(
     [np.geomspace(1e-14, 1e-4, 51), np.linspace(0.0, 1.0, 181) ** 2, 1.0 - np.geomspace(1e-9, 0.03, 24)]
@@ -52,13 +55,22 @@ class Places:
 
     def effort(self, branch: str, places: FloatArray) -> FloatArray:
         """Return the force on the way up or down at displacements of any shape [N]."""
+        return np.asarray(self._at(branch, places)[1].slider.reshape(np.shape(places)))
+
+    def excess_stress(self, branch: str, places: FloatArray) -> FloatArray:
+        """Return by how much the stress exceeds what is allowed at displacements of any shape [Pa]."""
+        solution, mechanism = self.solution, self.solution.assembly.spec.mechanism
+        allowed = allowable_stress(mechanism)
+        if mechanism.contact is None or allowed is None:
+            return np.full(np.shape(places), -np.inf)
+        states, found = self._at(branch, places)
+        excess = stress(flank_pressure(solution.assembly, states, found.contact)) - allowed * (1 + 1e-12)
+        return np.asarray(excess.reshape(np.shape(places)))
+
+    def _at(self, branch: str, places: FloatArray) -> tuple[TrackStates, Forces]:
+        """Return where the rollers are at displacements, and the forces there, as one row."""
         solution = self.solution
         track, friction = solution.assembly.track, solution.assembly.spec.mechanism.rolling_friction
         travel = np.clip(np.ravel(places) - solution.origin, 0.0, solution.travel[-1])
         states = track.states(track.start + travel)
-        found = forces(states, solution.assembly.loads, friction if branch == "load" else -friction)
-        return np.asarray(found.slider.reshape(np.shape(places)))
-
-    def excess_stress(self, branch: str, places: FloatArray) -> FloatArray:
-        """Return by how much the stress exceeds what is allowed at displacements of any shape [Pa]."""
-        raise NotImplementedError
+        return states, forces(states, solution.assembly.loads, friction if branch == "load" else -friction)

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from cfmkit.families.cam.manufacturing.spec import Manufacturing
-from cfmkit.materials.spec import MaterialField, MaterialSpec
+from cfmkit.materials.spec import MaterialField, MaterialSpec, SafetyFactor
 from cfmkit.spec import Analysis, Model, Spec
 from cfmkit.tables.source import DataSource
 from cfmkit.units import Angle, Force, Inertia, Length, Mass, Ratio, Stiffness, Time
@@ -172,6 +172,7 @@ class Mechanism(Model):
     errors: Errors | None = Field(None, description="flanks at a wrong angle; for the dynamic model")
     plate: Plate = Field(default_factory=Plate, description="what closes the contour of the part")
     contact: Contact | None = Field(None, description="for the contact pressure")
+    safety_factor: SafetyFactor = 1.0
 
     @field_validator("springs", mode="before")
     @classmethod

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.families.cam.built_values import BUILT_DEFINITIONS
+from cfmkit.families.cam.contact import flank_pressure
 from cfmkit.families.cam.statics import forces
 from cfmkit.numerics import sampled
 from cfmkit.results import Quantity
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from cfmkit.curves import FloatArray
     from cfmkit.families.cam.build import Assembly
     from cfmkit.families.cam.model import Solution
+    from cfmkit.families.cam.statics import Forces
 
 DEFINITIONS = {
     "force_constant": ("length", "A of the cut profile; the force is 4 K A [SS, eq. 1]"),
@@ -43,7 +45,10 @@ DEFINITIONS = {
         "ratio",
         "largest (up - down)/(up + down) on the flank: set by friction and geometry, no choice of profile removes it",
     ),
-    "contact_pressure_max": ("stress", "largest Hertzian pressure of the line contact on the flank"),
+    "contact_pressure_max": (
+        "stress",
+        "largest Hertzian pressure of the line contact on the flank, on the way up; in motion, of both sides",
+    ),
     "contact_force_min": ("force", "smallest contact force during a motion: below zero the roller would leave the cam"),
     "brace_force_max": ("force", "largest force of a motion in a brace, at the roller's axis"),
     "roller_speed_max": ("angular_velocity", "largest speed at which a roller turns"),
@@ -108,23 +113,9 @@ def constant_force(assembly: Assembly) -> float:
     return 4.0 * loads.stiffness * law.force_constant + loads.slider_weight
 
 
-def contact_pressure(solution: Solution) -> FloatArray:
-    """Return the Hertzian pressure of the line contact on the way up [Pa]; NaN on the corner.
-
-    p0 = sqrt(N E* / (pi b R)), E* = E / (2 (1 - nu^2)), 1/R = 1/r + 1/rho_cam.
-    """
-    assembly = solution.assembly
-    contact = assembly.spec.mechanism.contact
-    if contact is None:
-        return np.full_like(solution.travel, np.nan)
-    solid = contact.material
-    modulus = solid.modulus / (2.0 * (1.0 - solid.poisson**2))
-    path_radius = assembly.profile.path.law.curvature_radius(solution.states.parameter)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        cam_radius = path_radius - assembly.profile.roller_radius + assembly.spec.mechanism.profile.offset
-        curvature = 1.0 / assembly.spec.mechanism.roller_radius + 1.0 / cam_radius
-        pressure = np.sqrt(solution.up.contact * modulus * curvature / (np.pi * contact.width))
-    return np.where(solution.states.on_corner, np.nan, pressure)
+def contact_pressure(solution: Solution, forces: Forces | None = None) -> FloatArray:
+    """Return the pressure of the line contact, on the way up if nothing else is said [Pa]; NaN on the corner."""
+    return flank_pressure(solution.assembly, solution.states, (forces or solution.up).contact)
 
 
 def largest(*arrays: FloatArray) -> float | None:

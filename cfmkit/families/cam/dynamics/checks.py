@@ -6,7 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.families.cam.contact import overstressed, worst
 from cfmkit.families.cam.dynamics.build import slender_rod, solid_cylinder
+from cfmkit.families.cam.dynamics.values import contact_pressure
 from cfmkit.families.cam.findings import finding
 from cfmkit.families.findings import mm, newton
 from cfmkit.units import format_short
@@ -29,7 +31,7 @@ BRACE_SHARE = (0.1, 3.0)
 
 def findings_of(moved: Moved) -> tuple[Finding, ...]:
     """Return every finding about a motion, the gravest first."""
-    checks = (_slack_cable, _held, _on_corner, _springs, _inertias, _friction)
+    checks = (_pressure, _slack_cable, _held, _on_corner, _springs, _inertias, _friction)
     return tuple(found for check in checks for found in check(moved))
 
 
@@ -51,6 +53,14 @@ def runs_on_corner(parts: Build) -> Finding:
         "on the corner of the cam the contact is no function of its height, as the nine-coordinate model needs it: "
         f"start above {mm(above)}, or use 'analysis.dynamics.method: direct'",
     )
+
+
+def _pressure(moved: Moved) -> Iterator[Finding]:
+    pressed = contact_pressure(moved)
+    top = worst(pressed)
+    told = None if top is None else overstressed(moved.spec.mechanism, float(pressed[top]), f"at {_moment(moved, top)}")
+    if told:
+        yield told
 
 
 def _slack_cable(moved: Moved) -> Iterator[Finding]:

@@ -18,13 +18,14 @@ import numpy as np
 
 from cfmkit.curves import Column, Curve
 from cfmkit.families.cam.build import displacement_origin
+from cfmkit.families.cam.contact import allowable_stress, stress
 from cfmkit.families.cam.dynamics.build import Build, build, stated_motion
 from cfmkit.families.cam.dynamics.checks import findings_of, outside, runs_on_corner
 from cfmkit.families.cam.dynamics.direct import statics
 from cfmkit.families.cam.dynamics.ending import ending
 from cfmkit.families.cam.dynamics.history import History, direct_history, multibody_history
 from cfmkit.families.cam.dynamics.multibody import CornerContact
-from cfmkit.families.cam.dynamics.values import slow_force, values_of
+from cfmkit.families.cam.dynamics.values import contact_pressure, slow_force, values_of
 from cfmkit.families.cam.values import constant_force
 from cfmkit.families.refusals import CannotBuild, no_result
 from cfmkit.results import Result, Status
@@ -102,6 +103,7 @@ def analyze(spec: CamSpec, run: Run) -> Result:
         warnings=(*missing, *findings_of(moved)),
         travel=_requested(parts),
         target=spec.design.force if spec.design else constant_force(parts.right),
+        allowable_stress=allowable_stress(spec.mechanism),
         state=moved,
     )
 
@@ -199,6 +201,9 @@ def _curve(moved: Moved) -> Curve:
         extra |= {f"{name}_{side}": Column(row, dimension) for side, row in zip(("right", "left"), rows, strict=True)}
     extra["spring_elongation"] = Column(history.elongation, "length")
     extra["contact"] = Column(np.where(history.on_corner, "corner", "flank"), "text")
+    if moved.spec.mechanism.contact:
+        pressed = contact_pressure(moved)
+        extra |= {"contact_pressure": Column(pressed, "stress"), "max_stress": Column(stress(pressed), "stress")}
     branch = np.full(len(history.times), "load" if moved.build.motion.stroke > 0 else "unload")
     with np.errstate(invalid="ignore"):
         stable = (history.contact[0] > 0) & (history.contact[1] > 0)

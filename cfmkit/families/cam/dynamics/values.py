@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.families.cam.contact import pressure
 from cfmkit.families.cam.dynamics.direct import respond, statics
 from cfmkit.families.cam.statics import GRAVITY
 from cfmkit.families.cam.values import DEFINITIONS, constant_force
@@ -46,7 +47,9 @@ def _own(moved: Moved) -> dict[str, float]:
     history, machine = moved.history, moved.build.machine
     moving = respond(machine, history.moment)
     ratio = history.force / moved.static
+    pressed = contact_pressure(moved)
     return {
+        **({"contact_pressure_max": _largest(pressed)} if moved.spec.mechanism.contact else {}),
         "contact_force_min": -_largest(-history.contact),
         "brace_force_max": _largest(history.brace),
         "roller_speed_max": _largest(np.abs(history.spin)),
@@ -59,6 +62,24 @@ def _own(moved: Moved) -> dict[str, float]:
         "force_peak_over_slow": _largest(history.force / slow_force(moved)) - 1.0,
         "angle_error_effect": _angle_effect(moved),
     }
+
+
+def contact_pressure(moved: Moved) -> FloatArray:
+    """Return the larger pressure of both contacts over the motion [Pa]; NaN on a corner, and without a contact.
+
+    The axis of a roller with radius r runs at that distance from the cam: where its path has the curvature k
+    the cam's radius is 1/k - r, and the sum of both curvatures 1/(r (1 - k r)).
+    """
+    contact, history = moved.spec.mechanism.contact, moved.history
+    if contact is None:
+        return np.full(len(history.times), np.nan)
+    machine = moved.build.machine
+    low, high = machine.span
+    stances = machine.stances(np.clip(history.moment.position, low, high))
+    radius, bend = machine.constants.radius, np.array([one.curvature for one in stances])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        pressed = pressure(history.contact, 1.0 / (radius * (1.0 - bend * radius)), contact).max(axis=0)
+    return np.where(history.on_corner, np.nan, pressed)
 
 
 def slow_force(moved: Moved) -> FloatArray:
