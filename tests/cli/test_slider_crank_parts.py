@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from cfmkit.tables import read_csv
 
@@ -43,3 +45,37 @@ def test_springs_flexures_and_strip_stand_side_by_side_with_their_differences(cl
     assert 0.27 < force["beam"] - force["lumped"] < 0.31
     told = json.loads((cli.folder / "out/metrics.json").read_text())["metrics"]
     assert told["fidelity_mean[lumped]"]["value"] < -0.28
+
+
+DESIGNS = (
+    "slider_crank_li2019_widest",
+    "slider_crank_bilancia2019_optimum",
+    "slider_crank_lumped",
+    "slider_crank_strip",
+)
+
+
+@pytest.mark.parametrize("name", [*DESIGNS, *(pytest.param(name, marks=pytest.mark.slow) for name in LONG)])
+def test_a_design_has_the_metrics_of_its_analysis_and_what_only_the_search_knows_apart(cli, name):
+    """To the last digit; the search's block shares no name with a metric, and says of which model and window it is."""
+    designed = cli("design", str(CONFIGS / f"{name}.yaml"), "-o", "one", "--no-plots", "--json")
+    analysed = cli("analyze", "one/design.yaml", "-o", "two", "--no-plots", "--json")
+    assert designed.code == analysed.code == 0
+    assert designed.document["metrics"] == analysed.document["metrics"]
+    searched = designed.document.get("search", {})
+    assert searched or name == "slider_crank_strip"  # thickness and width are closed forms there
+    assert "search" not in analysed.document
+    for key, item in searched.items():
+        assert key not in analysed.document["metrics"]
+        assert item["model"] in ("prb", "lumped", "beam")
+        assert len(item["window"]) == 2
+
+
+@pytest.mark.slow
+def test_what_a_strip_is_said_to_keep_is_what_its_analysis_says(cli):
+    page = cli("design", str(CONFIGS / "slider_crank_taper_design.yaml"), "-o", "one", "--no-plots").out
+    said = re.search(r"within ([0-9.]+) % from", " ".join(page.split()))
+    found = cli("analyze", "one/design.yaml", "-o", "two", "--no-plots", "--json").document["metrics"]
+    assert said is not None
+    assert float(said.group(1)) == pytest.approx(100 * found["deviation_from_target"]["value"], abs=5e-4)
+    assert found["stress_max"]["value"] <= 42.5

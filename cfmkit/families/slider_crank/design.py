@@ -33,6 +33,7 @@ from cfmkit.families.slider_crank.solved import (
     message,
     not_proven,
     nowhere,
+    search_of,
     too_far,
 )
 from cfmkit.families.slider_crank.targets import DENSE, FREE, task_of, with_lengths
@@ -85,7 +86,14 @@ def design(spec: SliderCrankSpec, run: Run) -> Design:
     warnings = (*about_springs(solved), *alternatives(solved, search))
     if wanted.window is None and (search is not None or not solved.proven):
         warnings = (*warnings, not_proven(solved, search is not None))
-    return Design(_written(solved), Status.COMPLETE, message(solved), active_bounds(solved, wanted), warnings=warnings)
+    return Design(
+        _written(solved),
+        Status.COMPLETE,
+        message(solved),
+        active_bounds(solved, wanted),
+        warnings=warnings,
+        search=search_of(solved),
+    )
 
 
 def _searched(spec: SliderCrankSpec, wanted: CrankDesign, run: Run) -> tuple[Solved, Lowest | None]:
@@ -174,7 +182,7 @@ def solve(task: Task) -> Solved:
         raise Infeasible(hopeless(task, deviation))
     if wanted.window is not None and wanted.tolerance is not None and deviation > wanted.tolerance:
         raise Infeasible(*too_far(task, deviation))
-    return Solved(task, window, rates, deviation, goal.rms(rates), proven)
+    return Solved(task, window, rates, deviation, goal.rms(rates), proven, len(goal.wanted))
 
 
 def _written(solved: Solved) -> SliderCrankSpec:

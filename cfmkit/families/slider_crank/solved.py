@@ -11,6 +11,7 @@ from cfmkit.families.refusals import Infeasible
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.targets import FREE
 from cfmkit.families.slider_crank.windows import widest
+from cfmkit.results import Quantity, Searched
 from cfmkit.units import format_short
 
 if TYPE_CHECKING:
@@ -36,6 +37,8 @@ class Solved:
         Largest and root mean square deviation, as fractions of the target.
     proven : bool
         Of a widest window: whether all others were ruled out.
+    places : int
+        At so many of the window the deviations were looked at.
     """
 
     task: Task
@@ -44,6 +47,7 @@ class Solved:
     deviation: float
     rms: float
     proven: bool = True
+    places: int = 0
 
 
 def check_reach(task: Task, window: tuple[float, float]) -> None:
@@ -156,4 +160,23 @@ def message(solved: Solved) -> str:
     """Return the outcome in one sentence."""
     low, high = (_place(solved, end) for end in solved.window)
     rms = f"rms {percent(solved.rms)}"
-    return f"off by at most {percent(solved.deviation)} ({rms}) over {low} to {high}"
+    return f"off by at most {percent(solved.deviation)} ({rms}) at {solved.places} places of {low} to {high}"
+
+
+def search_of(solved: Solved) -> dict[str, Searched]:
+    """Return what only the search knows: how far the springs are off at the places that it looked at."""
+    about = {
+        "largest_miss": (
+            solved.deviation,
+            f"farthest from the target, over it, at the {solved.places} places searched",
+        ),
+        "mean_square_miss": (
+            solved.rms,
+            f"root mean square distance from the target, over it, at those {solved.places}",
+        ),
+    }
+    dimension = solved.task.assembly.dimension
+    return {
+        name: Searched(Quantity(value, "ratio", text), "prb", solved.window, dimension)
+        for name, (value, text) in about.items()
+    }

@@ -10,7 +10,7 @@ Reference
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -23,13 +23,14 @@ from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.flexures.assembly import corners, elasticity, pins_of, travel_direction
 from cfmkit.families.slider_crank.flexures.infeasible import infeasible
 from cfmkit.families.slider_crank.flexures.judged import Judged, judge, rounded
-from cfmkit.families.slider_crank.flexures.model import slider_reach
+from cfmkit.families.slider_crank.flexures.model import analyze, slider_reach
 from cfmkit.families.slider_crank.flexures.resize import design_flexures
 from cfmkit.families.slider_crank.flexures.search import LOOSE, SHORTEST, Found, Ranges, search, uniform_for_stroke
 from cfmkit.families.slider_crank.flexures.spec import StripSpec
 from cfmkit.families.slider_crank.flexures.task import Form, Task
+from cfmkit.metrics import Window, evaluate
 from cfmkit.numerics.sqp import Ending
-from cfmkit.results import Design, Finding, Status
+from cfmkit.results import Design, Finding, Quantity, Searched, Status
 
 if TYPE_CHECKING:
     from cfmkit.bodies.slider_crank import Linkage
@@ -93,7 +94,12 @@ def _strip(spec: SliderCrankSpec, linkage: Linkage, unloaded: float, run: Run) -
     form, ranges = form_of(spec, wanted, task, linkage, unloaded)
     if wanted.shape == "uniform" and task.goal != "stroke":
         return _closed(spec, wanted, task, ranges)
-    judged, pins, allowed = None, pins_of(spec.mechanism, linkage, unloaded), task.material.allowable_stress
+    judged, reported, pins, allowed = (
+        None,
+        None,
+        pins_of(spec.mechanism, linkage, unloaded),
+        task.material.allowable_stress,
+    )
     for reserve in RESERVES:
         made_of = replace(task.material, allowable_stress=allowed)
         kept = replace(task, ripple=task.ripple - reserve, material=made_of)
@@ -103,18 +109,85 @@ def _strip(spec: SliderCrankSpec, linkage: Linkage, unloaded: float, run: Run) -
         judged = judge(rounded(found.values, ranges.form), found, _limits(spec), pins)
         if judged is not None and allowed is not None:
             allowed /= max(1.0, judged.overstress)
+        reported = None if judged is None else _reported(_written(spec, judged, wanted), judged, run)
         good = judged is None or judged.window[1] > ENOUGH * found.program.stroke(found.descent.z)
+        good = good and (reported is None or reported.keeps(*_limits(spec)))
         if good and allowed == made_of.allowable_stress:
             break
-    if judged is None:
+    if judged is None or reported is None:
         return infeasible(found)
     return Design(
-        _written(spec, judged, wanted),
+        reported.spec,
         Status.COMPLETE,
-        _message(found, judged),
+        _message(found, judged, reported),
         active_bounds=judged.active,
         warnings=_warnings(found, judged),
+        search=_search_of(found, judged),
     )
+
+
+@dataclass(frozen=True)
+class Reported:
+    """What the analysis of a finished strip says of it: what is told of a design are these numbers.
+
+    Attributes
+    ----------
+    spec : SliderCrankSpec
+        With the strip.
+    deviation, rms : float or None
+        Over the window: as a share of the force, and in N; None where the analysis ends before it.
+    stress : float or None
+        Largest one in the window [Pa].
+    opinion : (float, float) or None
+        Differences of corotational elements in force and stress, where the analysis computes them.
+    """
+
+    spec: SliderCrankSpec
+    deviation: float | None
+    rms: float | None
+    stress: float | None
+    opinion: tuple[float, float] | None
+
+    def keeps(self, ripple: float | None, stress: float | None) -> bool:
+        """Return whether the strip is within its band and below its stress at the points of its analysis, too."""
+        pairs = (self.deviation, ripple), (self.stress, stress)
+        return all(limit is None or (value is not None and value <= limit) for value, limit in pairs)
+
+
+def _reported(spec: SliderCrankSpec, judged: Judged, run: Run) -> Reported:
+    result = analyze(spec, run)
+    names = ("deviation_from_target", "rms_to_target", "stress_max", "recheck_force", "recheck_stress")
+    found = evaluate(result, names, Window(*judged.window)) if result.curves else {}
+    deviation, rms, stress, *opinion = (found[name].value if found else None for name in names)
+    said = None if None in opinion else (float(opinion[0] or 0.0), float(opinion[1] or 0.0))
+    return Reported(spec, deviation, rms, stress, said)
+
+
+def _search_of(found: Found, judged: Judged) -> dict[str, Searched]:
+    """Return what only the search knows."""
+    numbers = {
+        "strips_tried": (float(found.descent.evaluations), "count", "strips that the last descent pressed"),
+        "elements_force": (
+            judged.opinion.force,
+            "ratio",
+            "most that corotational elements differ in force in the audit",
+        ),
+        "elements_stress": (judged.opinion.stress, "ratio", "most that they differ in stress in the audit"),
+    }
+    if _compared(found):
+        text = "longest travel that a strip of one thickness reaches within the band and the stress"
+        numbers["one_thickness_travel"] = (_one_thickness(found), "length", text)
+    return {name: Searched(Quantity(*about), "beam", judged.window) for name, about in numbers.items()}
+
+
+def _compared(found: Found) -> bool:
+    """Return whether a strip of one thickness is known to compare with."""
+    return found.uniform is not None and found.uniform.feasible and found.form.count > 1 and found.task.goal == "stroke"
+
+
+def _one_thickness(found: Found) -> float:
+    """Return the stroke of a strip of one thickness [m]."""
+    return 0.0 if found.uniform is None else 0.01 * float(found.uniform.z[-1])
 
 
 def task_of(spec: SliderCrankSpec, linkage: Linkage, unloaded: float) -> Task:
@@ -249,24 +322,24 @@ def _written(spec: SliderCrankSpec, judged: Judged, wanted: StripDesign) -> Slid
     return _with_part(spec, part, judged.window)
 
 
-def _message(found: Found, judged: Judged) -> str:
+def _message(found: Found, judged: Judged, reported: Reported) -> str:
     descent, count = found.descent, found.form.count
     what = "one thickness" if count == 1 else f"{count} thicknesses"
     if found.task.goal == "rms":
-        head = f"root mean square {newton(judged.rms)} over {mm(judged.window[1])}"
+        head = f"root mean square {newton(reported.rms or 0.0)} over {mm(judged.window[1])}"
     else:
-        head = f"within {percent(judged.ripple)} from {mm(judged.window[0])} to {mm(judged.window[1])}"
+        head = f"within {percent(reported.deviation or 0.0)} from {mm(judged.window[0])} to {mm(judged.window[1])}"
     compared = ""
-    if found.uniform is not None and found.uniform.feasible and count > 1 and found.task.goal == "stroke":
+    if _compared(found):
         within = percent(max(found.task.ripple, LOOSE))
-        compared = f"; one thickness reaches {mm(0.01 * float(found.uniform.z[-1]))} within {within}"
+        compared = f"; one thickness reaches {mm(_one_thickness(found))} within {within}"
+    force, stress = reported.opinion or (judged.opinion.force, judged.opinion.stress)
     opinion, shown = judged.opinion, judged.active[:TOLD]
     more = f" and {len(judged.active) - TOLD} more" if len(judged.active) > TOLD else ""
     held = f"; held by {', '.join(shown)}{more}" if shown else ""
     return (
         f"{what}, {head}{compared}; {descent.ending.value} after {descent.evaluations} strips{held}; "
-        f"{opinion.elements} corotational elements: force {100 * opinion.force:+.2g} %, "
-        f"stress {100 * opinion.stress:+.2g} %"
+        f"{opinion.elements} corotational elements: force {100 * force:+.2g} %, stress {100 * stress:+.2g} %"
     )
 
 

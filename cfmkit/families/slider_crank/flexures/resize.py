@@ -26,7 +26,7 @@ from cfmkit.families.slider_crank.flexures.assembly import FLEXURE_SHARE, chain_
 from cfmkit.families.slider_crank.flexures.pressing import Ending
 from cfmkit.families.slider_crank.flexures.sizing import PEAK_FACTOR, Flexure, rotations, sized
 from cfmkit.families.slider_crank.flexures.spec import Flexures, FlexureSpec
-from cfmkit.results import Design, Status
+from cfmkit.results import Design, Quantity, Searched, Status
 from cfmkit.units import format_short
 
 if TYPE_CHECKING:
@@ -97,7 +97,20 @@ def design_flexures(spec: SliderCrankSpec, linkage: Linkage, unloaded: float) ->
         return no_design(
             finding("not_converged", "the flexures of the closed forms have no equilibrium over the stroke")
         )
-    return Design(_written(spec, found.flexures, stroke), Status.COMPLETE, _message(found, wanted.flexures.exact))
+    over = (
+        "over that of the springs, on average, of flexures by the closed forms",
+        "over that of pure bending, of those",
+    )
+    factors = {
+        "closed_form_force": Quantity(found.force_factor, "factor", f"force {over[0]}"),
+        "closed_form_stress": Quantity(found.stress_factor, "factor", f"largest stress {over[1]}"),
+    }
+    return Design(
+        _written(spec, found.flexures, stroke),
+        Status.COMPLETE,
+        _message(found, wanted.flexures.exact),
+        search={name: Searched(item, "lumped", (0.1 * stroke, stroke)) for name, item in factors.items()},
+    )
 
 
 def one_width(
