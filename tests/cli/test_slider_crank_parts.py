@@ -47,12 +47,8 @@ def test_springs_flexures_and_strip_stand_side_by_side_with_their_differences(cl
     assert told["fidelity_mean[lumped]"]["value"] < -0.28
 
 
-DESIGNS = (
-    "slider_crank_li2019_widest",
-    "slider_crank_bilancia2019_optimum",
-    "slider_crank_lumped",
-    "slider_crank_strip",
-)
+DESIGNS = "slider_crank_li2019_widest", "slider_crank_bilancia2019_optimum", "slider_crank_lumped"
+LONG = "slider_crank_strip", "slider_crank_taper_design"
 
 
 @pytest.mark.parametrize("name", [*DESIGNS, *(pytest.param(name, marks=pytest.mark.slow) for name in LONG)])
