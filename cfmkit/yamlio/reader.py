@@ -7,6 +7,7 @@ exist here.
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -39,6 +40,7 @@ _LOADERS: list[Any] = [*filter(None, [getattr(yaml, "CSafeLoader", None)]), yaml
 DEEPEST = 32
 MOST_NODES = 100_000
 MOST_FAULTS = 1000
+_WHOLE, _DIGITS = re.compile("[-+]?[0-9]+"), re.compile("[0-9]")
 
 
 @dataclass
@@ -115,7 +117,7 @@ class _Builder:
             return self._scalar(event, path)
         if isinstance(event, SequenceStartEvent):
             return self._sequence(path)
-        return self._mapping(path) if isinstance(event, MappingStartEvent) else None
+        return self._mapping(path, bool(event.flow_style)) if isinstance(event, MappingStartEvent) else None
 
     def _count(self, event: Event, path: Path) -> None:
         self.nodes += 1
@@ -147,18 +149,31 @@ class _Builder:
             items.append(self._node(event, (*path, len(items))))
         return tuple(items)
 
-    def _mapping(self, path: Path) -> dict[str, Any]:
+    def _mapping(self, path: Path, flow: bool) -> dict[str, Any]:
         block: dict[str, Any] = {}
+        last, key = None, ""  # the value before, and its key
         while not isinstance(event := next(self.events), MappingEndEvent):
+            if flow and last is not None and _goes_on(last, event):
+                self._decimal_comma(last, event, (*path, key))
+                if not _is_empty(following := next(self.events)):
+                    self._node(following, (*path, ""))
+                continue
             key = self._key(event, path)
             here = (*path, key)
             if first := self.reading.keys.get(here):
                 told = f"the key {shown(key)} was given in line {first[0]} already; keep one"
                 self._complain(event, here, told, spoils=False)
             self.reading.keys.setdefault(here, _place(event))
-            value = self._node(next(self.events), here)
-            block.setdefault(key, value)
+            last = next(self.events)
+            block.setdefault(key, self._node(last, here))
         return block
+
+    def _decimal_comma(self, whole: Event, rest: Event, path: Path) -> None:
+        """Complain about a number that YAML ended at its decimal comma: ``{pivot: 28,303 N*mm/rad}``."""
+        before, after = getattr(whole, "value", ""), getattr(rest, "value", "")
+        told = f"{shown(f'{before},{after}')} has a decimal comma; write {before}.{after}"
+        if not any(fault.path == path for fault in self.reading.faults):  # thousands have more than one
+            self._complain(whole, path, told)
 
     def _key(self, event: Event, path: Path) -> str:
         """Return a key; what is not a plain name is complained about and replaced by its text."""
@@ -178,6 +193,17 @@ class _Builder:
         if len(self.reading.faults) >= MOST_FAULTS:
             raise Unreadable(_fault(event, (), f"more than {MOST_FAULTS} faults; reading stopped here"))
         self.reading.faults.append(Fault(*_place(event), path, message, spoils))
+
+
+def _goes_on(value: Event, key: Event) -> bool:
+    """Tell whether what stands where a key should be is the rest of the number before it."""
+    if not isinstance(value, ScalarEvent) or not isinstance(key, ScalarEvent) or value.style or key.style:
+        return False
+    return bool(_WHOLE.fullmatch(value.value) and _DIGITS.match(key.value))
+
+
+def _is_empty(event: Event) -> bool:
+    return isinstance(event, ScalarEvent) and not event.value and not event.style
 
 
 def _place(event: Event) -> tuple[int, int]:

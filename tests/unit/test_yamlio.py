@@ -354,3 +354,26 @@ def test_reading_common_units_needs_no(heavy: str) -> None:
         f"assert {heavy!r} not in sys.modules"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+@pytest.mark.parametrize(
+    ("flow", "told"),
+    [
+        ("{pivot: 28,303 N*mm/rad, other: 1 mm}", "'28,303 N*mm/rad' has a decimal comma; write 28.303 N*mm/rad"),
+        ("{pivot: -0,69 N/mm}", "'-0,69 N/mm' has a decimal comma; write -0.69 N/mm"),
+        ("{pivot: 0, 5 %, other: 2}", "'0,5 %' has a decimal comma; write 0.5 %"),
+        ("{pivot: 1,234,567 N}", "'1,234' has a decimal comma; write 1.234"),
+    ],
+)
+def test_a_decimal_comma_in_a_flow_block_is_called_one(flow, told):
+    found = read_document(f"cfmkit: 1\nsprings: {flow}\n", "a.yaml").problems
+    assert [(problem.line, problem.column, problem.path, problem.message) for problem in found] == [
+        (2, 18, "springs.pivot", told)
+    ]
+
+
+@pytest.mark.parametrize(
+    "text", ["a: 5\n1: 6\n", "a: {b: 5, c: 1}\n", "a: {b: '5', 1 mm: 2}\n", "a: {b: x, 1 mm: 2}\n"]
+)
+def test_digits_where_a_key_should_be_are_no_decimal_comma_elsewhere(text):
+    assert not [one for one in read_document(text, "a.yaml").problems if "decimal comma" in one.message]

@@ -49,14 +49,15 @@ WORDS = st.sampled_from(
     ["true", "010", "1e-3", "1:30", "5 mm", "null", "~", "yes", "a: b", "- a", "#x", "", " ", "<<", "a'b", "..."]
 )
 TEXTS = st.text(st.characters(exclude_categories=["Cc", "Cs"]), max_size=20) | WORDS
-PLACES = st.builds(Place, NUMBERS, st.sampled_from(["length", "angle"]))
+ANGLES = NUMBERS.map(lambda value: value * 6e-8)  # at most 10 000 turns
+PLACES = st.builds(Place, NUMBERS, st.just("length")) | st.builds(Place, ANGLES, st.just("angle"))
 LOADS = st.builds(Spring, force=NUMBERS) | st.builds(Weight, height=NUMBERS) | st.just(Weight())
 SHEETS = st.builds(
     Sheet,
     name=TEXTS.filter(bool),
     description=TEXTS,
     width=NUMBERS,
-    angle=NUMBERS,
+    angle=ANGLES,
     slip=NUMBERS,
     count=st.integers(-(10**18), 10**18),
     mirrored=st.booleans(),
