@@ -55,6 +55,37 @@ def test_a_block_has_the_numbers_of_single_runs(name):
     assert len(kinds) >= 3
 
 
+@pytest.mark.parametrize(
+    ("name", "changes", "expected"),
+    [
+        ("li2019", {}, {"reference_zero"}),
+        ("li2019", {"analysis__window": ["8 deg", "13 deg"]}, {"stretched_outside_window"}),
+        ("li2019_full_turn", {}, {"spring_winds_up"}),
+        ("li2019_from_singularity", {}, set()),
+        ("li2019", {"analysis__angle": ["-5 deg", "8 deg"]}, {"second_stable_outside"}),
+        ("li2019", {"analysis__window": ["-4 deg", "13 deg"]}, {"effort_changes_sign"}),
+        ("bilancia2019", {}, set()),
+        ("bilancia2019", {"analysis__reference_travel": "0 mm"}, set()),
+    ],
+)
+def test_a_block_names_the_warnings_of_single_runs(name, changes, expected):
+    spec, count = config(name, **changes), 24
+    rng = np.random.default_rng(5)
+    kind = "bilancia2019" if name == "bilancia2019" else "li2019"
+    # Springs that are not there at all are what some warnings are about.
+    spread = rng.uniform(0.0, 1.3, (4, count)) * (rng.random((4, count)) < 0.6)
+    spread[3] += 0.1
+    values = {path: rate * row for path, rate, row in zip(PATHS, RATES[kind], spread, strict=True)}
+    metric = "torque_max" if spec.analysis.drive == "torque" else "force_max"
+    found = analyze_block(spec, Block(values, (Measure(metric),), count))
+    assert found.done.any()
+    for index in np.flatnonzero(found.done):
+        single = cfmkit.analyze(spec.replace({path: float(row[index]) for path, row in values.items()}))
+        names = {item.name for item in single.warnings}
+        assert {name for name, mask in found.warnings.items() if mask[index]} == names, (index, spread[:, index])
+    assert expected <= {name for name, mask in found.warnings.items() if mask.any()}
+
+
 def test_a_block_leaves_what_it_cannot_do():
     spec = config("li2019")
     values = {"mechanism.springs.slider": np.array([100.0, -1.0, np.nan])}

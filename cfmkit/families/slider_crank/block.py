@@ -64,7 +64,10 @@ def analyze_block(spec: SliderCrankSpec, block: Block) -> BlockAnswer | None:
     base = _base(spec) if set(block.values) <= {*RATES, LEGS} else None
     if base is None or not all(base.knows(measure) for measure in block.measures):
         return None
+    from cfmkit.families.slider_crank.block_findings import of_linkage, of_springs, undecided
+
     rates, done = _rates(spec, block)
+    warnings = {name: done.copy() for name in of_linkage(base)}
     values = tuple({"": np.full(block.size, np.nan)} for _ in block.measures)
     size = max(1, SLAB // base.points)
     chosen = np.flatnonzero(done)
@@ -73,8 +76,12 @@ def analyze_block(spec: SliderCrankSpec, block: Block) -> BlockAnswer | None:
         slab = Slab(base, rates[rows])
         for measure, found in zip(block.measures, values, strict=True):
             found[""][rows] = slab.measured(measure)
+        for name, warned in of_springs(slab):
+            warnings.setdefault(name, np.zeros(block.size, dtype=bool))[rows] = warned
+        done[rows[undecided(slab)]] = False
     target = target_of(spec)
-    return BlockAnswer(done, values, None if target is None else np.full(block.size, target), base.assembly.drive)
+    targets = None if target is None else np.full(block.size, target)
+    return BlockAnswer(done, values, targets, base.assembly.drive, warnings)
 
 
 def _rates(spec: SliderCrankSpec, block: Block) -> tuple[FloatArray, NDArray[np.bool_]]:
@@ -220,6 +227,12 @@ class Slab:
         return classify(curves, assembly.start, spec.analysis.tolerance, window_of(spec, assembly), assembly.rest)
 
     @cached_property
+    def level(self) -> FloatArray:
+        """Efforts at the reference; NaN where they are zero but for rounding."""
+        level = self.rates @ self.base.assembly.units(np.array([self.base.reference])).effort[:, 0]
+        return np.where(np.abs(level) > 1e-9 * np.abs(self.sharp).max(axis=1), level, np.nan)
+
+    @cached_property
     def band(self) -> tuple[FloatArray, FloatArray]:
         """Ends of the constant band around the reference; NaN where there is none."""
         return self.within(self.base.spec.analysis.tolerance)
@@ -230,9 +243,7 @@ class Slab:
         grid = base.nodes[0]
         if not base.low <= base.reference <= base.high:
             return np.full(len(self.rates), np.nan), np.full(len(self.rates), np.nan)
-        level = self.rates @ base.assembly.units(np.array([base.reference])).effort[:, 0]
-        level = np.where(np.abs(level) > 1e-9 * np.abs(self.sharp).max(axis=1), level, np.nan)
-        return edges(base.assembly, self.rates, (grid, self.sharp), (base.reference, level), tolerance)
+        return edges(base.assembly, self.rates, (grid, self.sharp), (base.reference, self.level), tolerance)
 
     def at(self, motion: float, rows: str = "effort") -> FloatArray:
         """Return effort or stiffness of all designs at one place."""
