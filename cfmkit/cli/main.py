@@ -84,6 +84,8 @@ def _answer(given: list[str], terminal: Terminal) -> ExitCode:
         quiet=getattr(request.options, "quiet", False),
         verbose=request.options.verbose,
     )
+    if wishes.verbose:
+        _tell_more()
     answer = request.run(request.options, wishes)
     hidden = wishes.json or wishes.quiet
     wishes.complain((*answer.complaints, *(answer.quiet_complaints if hidden else ())))
@@ -92,6 +94,16 @@ def _answer(given: list[str], terminal: Terminal) -> ExitCode:
     elif not wishes.quiet:
         answer.view(wishes)
     return answer.exit_code
+
+
+def _tell_more() -> None:
+    """Let the parts of the program say on standard error what they do beside their work: where they keep files."""
+    import logging
+
+    teller, log = logging.StreamHandler(), logging.getLogger("cfmkit")
+    teller.setFormatter(logging.Formatter("%(message)s"))
+    log.handlers, log.propagate = [teller], False
+    log.setLevel(logging.INFO)
 
 
 def _failed(error: Exception, terminal: Terminal) -> ExitCode:

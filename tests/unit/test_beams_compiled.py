@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import logging
+import os
+import subprocess
+import sys
 from functools import partial
 from pathlib import Path
 
@@ -127,3 +130,78 @@ def test_nothing_is_compiled_twice() -> None:
         assert np.isfinite(slopes.stress_extremes("y")).all()
     for door in (entry._real, entry.slopes, entry.row_slopes, entry.held_slopes):
         assert len(door.signatures) == 1
+
+
+_NOWHERE = """
+import logging, os, stat, sys
+import numba.core.caching as caching
+caching.CacheImpl._locator_classes = [caching.UserProvidedCacheLocator]  # neither package nor home is writable
+logging.basicConfig(level=logging.INFO, format="%(message)s")
+from cfmkit.beams.kernels.compiler import door
+
+@door("0123456789abcdef")
+def twice(x):
+    return 2.0 * x
+
+@door("0123456789abcdef")
+def thrice(x):
+    return 3.0 * x
+
+assert (twice(2.0), thrice(2.0)) == (4.0, 6.0)
+print(twice.stats.cache_path, sum(twice.stats.cache_hits.values()))
+"""
+
+
+def _without_folders(folder):
+    environment = {key: value for key, value in os.environ.items() if key != "NUMBA_CACHE_DIR"}
+    script = folder / "script.py"
+    if not script.exists():  # kept code is of a file at its time
+        script.write_text(_NOWHERE)
+    command = [sys.executable, str(script)]
+    done = subprocess.run(
+        command, env=environment | {"TMPDIR": str(folder)}, capture_output=True, text=True, check=True
+    )
+    kept, hits = done.stdout.split()
+    return Path(kept), int(hits), done.stderr
+
+
+def test_compiled_code_is_kept_in_a_private_folder_where_nothing_else_is_writable(tmp_path):
+    kept, hits, told = _without_folders(tmp_path)
+    private = tmp_path / f"cfmkit-compiled-{os.getuid()}"
+    assert private in kept.parents
+    assert private.stat().st_mode & 0o777 == 0o700
+    assert hits == 0
+    assert told.count("compiled code is kept in") == 1
+    again, hits, _ = _without_folders(tmp_path)
+    assert (again, hits) == (kept, 1)
+
+
+@pytest.mark.parametrize("trap", ["writable by others", "a link", "a file"])
+def test_code_is_never_loaded_from_a_folder_that_others_could_have_prepared(tmp_path, trap):
+    private = tmp_path / f"cfmkit-compiled-{os.getuid()}"
+    if trap == "writable by others":
+        private.mkdir()
+        private.chmod(0o777)
+    elif trap == "a link":
+        (tmp_path / "elsewhere").mkdir(mode=0o700)
+        private.symlink_to(tmp_path / "elsewhere")
+    else:
+        private.touch()
+    kept, _, _ = _without_folders(tmp_path)
+    assert private not in kept.parents
+    (other,) = (folder for folder in kept.parents if folder.parent == tmp_path)
+    assert other.stat().st_mode & 0o777 == 0o700
+
+
+def test_without_any_folder_code_is_compiled_and_not_kept(monkeypatch):
+    from cfmkit.beams.kernels import compiler
+
+    monkeypatch.setattr(compiler, "private_folder", lambda _name: None)
+    monkeypatch.setattr("numba.core.caching.CacheImpl._locator_classes", [])
+
+    @compiler.door("0123456789abcdef")
+    def half(x):
+        return 0.5 * x
+
+    assert half(3.0) == 1.5
+    assert half.stats.cache_path is None

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import contextlib
+import logging
+import os
 import sys
 from typing import Any
 
 import numba
+
+from cfmkit.store.private import private_folder
 
 _ARRAYS = "numba.np.arraymath"
 
@@ -75,6 +79,26 @@ def door(stamp: str) -> Any:
 
     def decorate(function: Any) -> Any:
         function.__qualname__ = f"{function.__name__}_{stamp[:16]}"
-        return numba.njit(**_DOOR)(function)
+        for options in (_DOOR, _DOOR):
+            try:
+                return numba.njit(**options)(function)
+            except RuntimeError as error:  # neither the package nor the home of this user can be written
+                if "cannot cache" not in str(error) or not _keep_among_temporary_files():
+                    break
+        return numba.njit(**{**_DOOR, "cache": False})(function)
 
     return decorate
+
+
+def _keep_among_temporary_files() -> bool:
+    """Let the compiler, and that of child processes, keep its code in a private folder; return whether there is one."""
+    folder = private_folder("compiled")
+    if folder is None:
+        logging.getLogger("cfmkit.beams").info("no folder is writable: compiled code is not kept")
+        return False
+    os.environ["NUMBA_CACHE_DIR"] = str(folder)
+    vars(numba.config)["CACHE_DIR"] = str(folder)
+    logging.getLogger("cfmkit.beams").info(
+        "neither the package nor the home folder is writable: compiled code is kept in %s", folder
+    )
+    return True

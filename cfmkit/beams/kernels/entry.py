@@ -79,10 +79,14 @@ _real, states, slopes, row_slopes, held_slopes = _doors(STAMP)
 
 def announce() -> None:
     """Say so, once, where the engine has not been compiled yet from these sources."""
-    mark = Path(_real.stats.cache_path) / f"beams-{STAMP[:16]}.compiled"
-    if mark.exists():
+    kept = _real.stats.cache_path
+    mark = None if kept is None else Path(kept) / f"beams-{STAMP[:16]}.compiled"
+    if mark is not None and mark.exists():
         return
-    logging.getLogger("cfmkit.beams").warning("compiling the beam engine: once, about half a minute")
+    often = "in every process, nothing can be kept on disk" if mark is None else "once"
+    logging.getLogger("cfmkit.beams").warning("compiling the beam engine: %s, about half a minute", often)
+    if mark is None:
+        return
     with contextlib.suppress(OSError):
         mark.parent.mkdir(parents=True, exist_ok=True)
         mark.touch()

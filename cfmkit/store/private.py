@@ -1,0 +1,45 @@
+"""A folder among the temporary files that nobody else can write to: where neither package nor home is writable."""
+
+from __future__ import annotations
+
+import os
+import stat
+import tempfile
+from pathlib import Path
+
+
+def private_folder(name: str) -> Path | None:
+    """Return a folder for files that this user's later runs may use again; None where there is no room for any.
+
+    It has a fixed name, so that it serves every process of the user. What stands there and belongs to somebody
+    else, or can be written by others, is not trusted (code is loaded from it): then the folder is a new one.
+
+    Parameters
+    ----------
+    name : str
+        What it is for, in a few letters.
+    """
+    try:
+        folder = Path(tempfile.gettempdir()) / f"cfmkit-{name}-{_user()}"
+        try:
+            folder.mkdir(mode=0o700)
+        except FileExistsError:
+            if not _is_ours(folder):
+                return Path(tempfile.mkdtemp(prefix=f"cfmkit-{name}-"))
+        return folder
+    except OSError:
+        return None
+
+
+def _user() -> str:
+    return str(os.getuid()) if hasattr(os, "getuid") else "user"
+
+
+def _is_ours(folder: Path) -> bool:
+    """Return whether it is a real folder of this user that nobody else may write to, and that can be written."""
+    about = folder.lstat()
+    if not stat.S_ISDIR(about.st_mode):
+        return False
+    if hasattr(os, "getuid") and (about.st_uid != os.getuid() or about.st_mode & 0o022):
+        return False
+    return os.access(folder, os.W_OK | os.X_OK)
