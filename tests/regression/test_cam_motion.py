@@ -11,7 +11,7 @@ from cam_motion import change_at_rest, moving, peak_over_one_second, response, w
 from cam_support import analyze
 
 from cfmkit.families.cam.dynamics.build import build
-from cfmkit.families.cam.dynamics.direct import respond, statics
+from cfmkit.families.cam.dynamics.inverse import respond, statics
 from cfmkit.families.cam.dynamics.motion import Moment
 
 WIDE_ROLLER = {"masses__roller_inertia": 4.61e-5}

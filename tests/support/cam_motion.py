@@ -8,7 +8,7 @@ import numpy as np
 from cam_support import cam
 
 from cfmkit.families.cam.dynamics.build import build
-from cfmkit.families.cam.dynamics.direct import Response, respond, statics
+from cfmkit.families.cam.dynamics.inverse import Response, respond, statics
 
 if TYPE_CHECKING:
     from cfmkit.families.cam.spec import CamSpec

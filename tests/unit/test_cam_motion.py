@@ -13,8 +13,8 @@ from cam_support import analyze, cam
 from cfmkit.errors import SpecError
 from cfmkit.families.cam.build import assemble
 from cfmkit.families.cam.dynamics.build import build
-from cfmkit.families.cam.dynamics.direct import respond, statics
-from cfmkit.families.cam.dynamics.history import direct_history, multibody_history
+from cfmkit.families.cam.dynamics.history import inverse_history, multibody_history
+from cfmkit.families.cam.dynamics.inverse import respond, statics
 from cfmkit.families.cam.dynamics.motion import Cycloid, Moment
 from cfmkit.families.cam.dynamics.multibody import CornerContact, NineCoordinates, Scheme
 from cfmkit.families.cam.statics import forces
@@ -56,7 +56,7 @@ def relative(a, b):
 def test_the_two_formulations_agree_in_every_force_and_speed(changes):
     parts = build(moving(**changes))
     scheme = Scheme(steps=8)
-    exact = direct_history(parts.machine, parts.motion, parts.motion.times(101))
+    exact = inverse_history(parts.machine, parts.motion, parts.motion.times(101))
     other = multibody_history(parts.machine, parts.motion, 101, scheme)
     for name in ("force", "contact", "spin", "brace", "pin", "elongation", "center"):
         assert relative(getattr(other, name), getattr(exact, name)) < 1e-9, name
@@ -223,7 +223,7 @@ def test_a_motion_ends_where_a_roller_leaves_the_cam_whatever_the_number_of_poin
 
 def test_the_nine_coordinates_end_at_the_same_place():
     direct, other = (
-        analyze(moving(**LIFTS_OFF, analysis__dynamics__method=method)) for method in ("direct", "multibody")
+        analyze(moving(**LIFTS_OFF, analysis__dynamics__method=method)) for method in ("inverse", "multibody")
     )
     assert other.status is Status.PARTIAL
     assert len(other.curve) == len(direct.curve) - 1
@@ -271,7 +271,7 @@ def test_a_motion_outside_the_profile_has_no_equilibrium():
     assert "428" in result.message
 
 
-def test_on_the_corner_the_direct_method_works_and_the_other_says_why_not():
+def test_on_the_corner_the_closed_method_works_and_the_other_says_why_not():
     low = {"analysis__dynamics__slider_position": "188.2 mm", "analysis__dynamics__stroke": "20 mm"}
     direct = analyze(moving(**low))
     assert direct.status is Status.COMPLETE
@@ -286,7 +286,7 @@ def test_on_the_corner_the_direct_method_works_and_the_other_says_why_not():
 
 
 def test_the_method_is_a_value_of_the_specification():
-    direct, other = (analyze(moving(analysis__dynamics__method=name)) for name in ("direct", "multibody"))
+    direct, other = (analyze(moving(analysis__dynamics__method=name)) for name in ("inverse", "multibody"))
     np.testing.assert_allclose(other.curve.force, direct.curve.force, rtol=1e-9)
     for name, column in direct.curve.extra.items():
         if column.dimension != "text":
@@ -397,3 +397,10 @@ def test_every_picture_is_drawn_twice_with_the_same_bytes(changes):
     first = {name: png(draw()) for name, draw in figures(result).items()}
     assert set(first) == {"motion", "motion_force", "motion_contact", "motion_rollers"}
     assert first == {name: png(draw()) for name, draw in figures(result).items()}
+
+
+def test_the_old_word_for_inverse_dynamics_is_understood_with_a_note():
+    old, new = (analyze(moving(analysis__dynamics__method=name)) for name in ("direct", "inverse"))
+    assert np.array_equal(old.curve.force, new.curve.force)
+    assert set(names(old)) - set(names(new)) == {"old_word"}
+    assert old.spec.analysis.dynamics.method == "inverse"

@@ -228,9 +228,18 @@ class Dynamics(Model):
     origin: Literal["path-start", "cam-start"] = Field(
         "path-start", description="where heights are zero: at the first point of the roller path, or of the cam"
     )
-    method: Literal["direct", "multibody"] = Field(
-        "direct", description="closed kinematics and power balance, or nine coordinates with Lagrange multipliers"
+    method: Literal["inverse", "multibody", "direct"] = Field(
+        "inverse",
+        description=(
+            "inverse dynamics with closed kinematics, or nine coordinates with Lagrange multipliers; "
+            "'direct' is an old word for 'inverse'"
+        ),
     )
+
+    @property
+    def closed(self) -> bool:
+        """Whether the kinematics are closed: `method` is 'inverse', by its own word or the old one."""
+        return self.method != "multibody"
 
     @field_validator("stroke")
     @classmethod

@@ -1,6 +1,6 @@
 """Dynamics of a cam mechanism: two sides without symmetry, moved by a slider.
 
-`direct` is the product route, `multibody` the paper's formulation and its check.
+`inverse` is the product route, `multibody` the paper's formulation and its check.
 """
 
 from __future__ import annotations

@@ -88,7 +88,7 @@ def _machine(spec: CamSpec, sides: tuple[Assembly, Assembly], lift: float) -> Ma
         stiffness=mechanism.springs.total,
         rest_length=2.0 * mechanism.rest_half_width,
         gravity=GRAVITY if spec.gravity else 0.0,
-        friction=mechanism.rolling_friction if stated_motion(spec).method == "direct" else 0.0,
+        friction=mechanism.rolling_friction if stated_motion(spec).closed else 0.0,
     )
 
 

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
     from cfmkit.families.cam.dynamics.build import Build
     from cfmkit.families.cam.dynamics.model import Moved
+    from cfmkit.families.cam.spec import CamSpec
     from cfmkit.results import Finding
 
 ROLLER_SHARE = (0.25, 2.0)
@@ -33,6 +34,18 @@ def findings_of(moved: Moved) -> tuple[Finding, ...]:
     """Return every finding about a motion, the gravest first."""
     checks = (_pressure, _slack_cable, _held, _on_corner, _springs, _inertias, _friction)
     return tuple(found for check in checks for found in check(moved))
+
+
+def old_word(spec: CamSpec) -> tuple[Finding, ...]:
+    """Return what to say where the method has its old name."""
+    dynamics = spec.analysis.dynamics
+    if dynamics is None or dynamics.method != "direct":
+        return ()
+    message = (
+        "'analysis.dynamics.method: direct' is the old word for 'inverse': forces follow from a given motion, which is "
+        "inverse dynamics; the next version will not know it any more"
+    )
+    return (finding("old_word", message, "analysis.dynamics.method=inverse"),)
 
 
 def outside(parts: Build, span: tuple[float, float]) -> Finding:
@@ -51,7 +64,7 @@ def runs_on_corner(parts: Build) -> Finding:
     return finding(
         "contact_not_single_valued",
         "on the corner of the cam the contact is no function of its height, as the nine-coordinate model needs it: "
-        f"start above {mm(above)}, or use 'analysis.dynamics.method: direct'",
+        f"start above {mm(above)}, or use 'analysis.dynamics.method: inverse'",
     )
 
 
@@ -144,7 +157,7 @@ def _friction(moved: Moved) -> Iterator[Finding]:
         yield finding(
             "friction_left_out",
             "the nine-coordinate model has no rolling resistance: 'mechanism.rolling_friction' = "
-            f"{moved.spec.mechanism.rolling_friction:g} is left out; 'analysis.dynamics.method: direct' has it",
+            f"{moved.spec.mechanism.rolling_friction:g} is left out; 'analysis.dynamics.method: inverse' has it",
         )
 
 

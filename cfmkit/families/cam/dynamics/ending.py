@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.cam.dynamics.direct import respond
+from cfmkit.families.cam.dynamics.inverse import respond
 from cfmkit.families.cam.existence import flanks_cross, rollers_overlap
 from cfmkit.families.cam.findings import finding
 from cfmkit.families.findings import mm, newton

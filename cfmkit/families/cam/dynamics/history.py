@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.cam.dynamics.direct import respond
+from cfmkit.families.cam.dynamics.inverse import respond
 from cfmkit.families.cam.dynamics.motion import Moment
 from cfmkit.families.cam.dynamics.multibody import NineCoordinates
 from cfmkit.families.cam.dynamics.reactions import reactions
@@ -73,8 +73,8 @@ class History:
         return History(moment=Moment(*(values[:count] for values in self.moment)), **cut)
 
 
-def direct_history(machine: Machine, motion: Cycloid, times: FloatArray) -> History:
-    """Return the history by the direct formulation."""
+def inverse_history(machine: Machine, motion: Cycloid, times: FloatArray) -> History:
+    """Return the history by inverse dynamics."""
     found = respond(machine, motion.at(times))
     return History(
         times=times,

@@ -20,10 +20,10 @@ from cfmkit.curves import Column, Curve
 from cfmkit.families.cam.build import displacement_origin
 from cfmkit.families.cam.contact import allowable_stress, stress
 from cfmkit.families.cam.dynamics.build import Build, build, stated_motion
-from cfmkit.families.cam.dynamics.checks import findings_of, outside, runs_on_corner
-from cfmkit.families.cam.dynamics.direct import statics
+from cfmkit.families.cam.dynamics.checks import findings_of, old_word, outside, runs_on_corner
 from cfmkit.families.cam.dynamics.ending import ending
-from cfmkit.families.cam.dynamics.history import History, direct_history, multibody_history
+from cfmkit.families.cam.dynamics.history import History, inverse_history, multibody_history
+from cfmkit.families.cam.dynamics.inverse import statics
 from cfmkit.families.cam.dynamics.multibody import CornerContact
 from cfmkit.families.cam.dynamics.values import contact_pressure, slow_force, values_of
 from cfmkit.families.cam.values import constant_force
@@ -100,7 +100,7 @@ def analyze(spec: CamSpec, run: Run) -> Result:
         message=message,
         curves=(_curve(moved),),
         values=values_of(moved),
-        warnings=(*missing, *findings_of(moved)),
+        warnings=(*missing, *findings_of(moved), *old_word(spec)),
         travel=_requested(parts),
         target=spec.design.force if spec.design else constant_force(parts.right),
         allowable_stress=allowable_stress(spec.mechanism),
@@ -151,8 +151,8 @@ def _requested(parts: Build) -> tuple[float, float]:
 
 
 def _history(spec: CamSpec, parts: Build, times: FloatArray) -> History:
-    if stated_motion(spec).method == "direct":
-        return direct_history(parts.machine, parts.motion, times)
+    if stated_motion(spec).closed:
+        return inverse_history(parts.machine, parts.motion, times)
     try:
         whole = multibody_history(parts.machine, parts.motion, stated_motion(spec).points)
         return whole.first(len(times))
@@ -164,7 +164,10 @@ def _history(spec: CamSpec, parts: Build, times: FloatArray) -> History:
 def _as_run(spec: CamSpec, parts: Build) -> CamSpec:
     """Return the spec with what the analysis fell back on written out."""
     resolved, masses = parts.right.spec, spec.mechanism.masses
-    analysis = spec.analysis.model_copy(update={"fidelity": "dynamic", "gravity": spec.gravity})
+    method = "inverse" if stated_motion(spec).closed else "multibody"
+    dynamics = stated_motion(spec).model_copy(update={"method": method})
+    written_out = {"fidelity": "dynamic", "gravity": spec.gravity, "dynamics": dynamics}
+    analysis = spec.analysis.model_copy(update=written_out)
     changes: dict[str, object] = {"analysis": analysis}
     if masses is not None:
         own = parts.machine.right.parts

@@ -5,7 +5,7 @@ Baumgarte's stabilisation [SS, eq. 19 to 22] by the classical Runge-Kutta method
 their second derivatives [eq. 23 to 25], the multipliers from inverse dynamics [eq. 28];
 the force on the slider is minus the last one.
 
-This is a check on `cfmkit.families.cam.dynamics.direct`, which needs no integration. It has
+This is a check on `cfmkit.families.cam.dynamics.inverse`, which needs no integration. It has
 no rolling resistance, like the paper's model, and starts beyond the corner of an undercut cam.
 
 Reference

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.families.cam.contact import pressure
-from cfmkit.families.cam.dynamics.direct import respond, statics
+from cfmkit.families.cam.dynamics.inverse import respond, statics
 from cfmkit.families.cam.statics import GRAVITY
 from cfmkit.families.cam.values import DEFINITIONS, constant_force
 from cfmkit.results import Quantity
