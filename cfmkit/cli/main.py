@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import os
 import signal
 import sys
 import threading
@@ -37,10 +38,22 @@ _MADE_BETWEEN_COLLECTIONS = 250_000
 
 def entry() -> int:
     """Run the program as the whole of a process; return its exit code."""
+    _one_thread()
     gc.set_threshold(_MADE_BETWEEN_COLLECTIONS, 10, 10)
     code = main()
     gc.disable()  # the process ends: nothing more is to be collected
     return code
+
+
+def _one_thread() -> None:
+    """Keep numerical libraries to one thread, unless the user says otherwise: they read this when they are imported.
+
+    Matrices here are small: threads cost more than they bring, five times as much where other programs run.
+    """
+    from cfmkit.studies.executors import ONE_THREAD
+
+    for name, value in ONE_THREAD.items():
+        os.environ.setdefault(name, value)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -10,10 +10,11 @@ import signal
 import sys
 import time
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from cfmkit.cli import streams
 from cfmkit.cli.failures import Stopped
+from cfmkit.cli.terminal import Bar
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -44,7 +45,7 @@ class StudyProgress:
         """Know whom to tell, and what is counted."""
         self._things = things
         self._tells = not (terminal.json or terminal.quiet)
-        self._bar = _StudyBar() if self._tells and sys.stderr is not None and sys.stderr.isatty() else None
+        self._bar = Bar() if self._tells and sys.stderr is not None and sys.stderr.isatty() else None
         self.stopped = False
         self._all = self._done = self._failed = self._reused = 0
         self._start = self._told = time.monotonic()
@@ -70,7 +71,8 @@ class StudyProgress:
 
     def _tell(self, now: float) -> None:
         if self._bar is not None:
-            self._bar.show(self._done, self._all, self._sentence(now))
+            text = f"{self._done} of {self._all} {self._things}, {self._sentence(now)}"
+            self._bar.show(self._done, self._all, text)
         else:
             streams.complain(f"{self._done} of {self._all} {self._things}, {self._sentence(now)}\n")
 
@@ -123,30 +125,3 @@ def watching(terminal: Terminal, things: str = "points") -> Iterator[StudyProgre
         monitor.close()
         if not monitor.stopped:
             signal.signal(signal.SIGINT, before)
-
-
-class _StudyBar:
-    """A progress bar that appears with the first report and leaves nothing behind."""
-
-    def __init__(self) -> None:
-        self._progress: Any = None
-        self._task: Any = None
-
-    def show(self, done: int, total: int, text: str) -> None:
-        if self._progress is None:
-            self._start(total)
-        self._progress.update(self._task, completed=done, description=text)
-
-    def close(self) -> None:
-        if self._progress is not None:
-            self._progress.stop()
-            self._progress = None
-
-    def _start(self, total: int) -> None:
-        from rich.console import Console
-        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
-
-        columns = BarColumn(), MofNCompleteColumn(), TextColumn("{task.description}")
-        self._progress = Progress(*columns, console=Console(stderr=True), transient=True)
-        self._task = self._progress.add_task("", total=total)
-        self._progress.start()

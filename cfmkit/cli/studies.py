@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import time
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -129,14 +128,6 @@ def finish(place: Desk, pieces: Sequence[Records]) -> None:
 def names(text: str | None) -> tuple[str, ...]:
     """Return what an option lists with commas."""
     return tuple(name.strip() for name in (text or "").split(",") if name.strip())
-
-
-def prepare_process() -> None:
-    """Keep numerical libraries to one thread; call it before the first import of numpy."""
-    from cfmkit.studies.executors import ONE_THREAD
-
-    for name, value in ONE_THREAD.items():
-        os.environ.setdefault(name, value)
 
 
 @contextmanager

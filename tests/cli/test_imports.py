@@ -66,3 +66,25 @@ def test_help_is_independent_of_the_folder_it_is_asked_in(tmp_path):
     command = Path(sys.executable).parent / "cfmkit"
     done = subprocess.run([command, "--help"], cwd=tmp_path, capture_output=True, env=dict(os.environ), check=False)
     assert done.returncode == 0
+
+
+_ALONE = """
+import os, sys
+from cfmkit.cli.main import entry
+assert "numpy" not in sys.modules
+code = entry()
+status = open("/proc/self/status").read() if os.path.exists("/proc/self/status") else "Threads:\\t1"
+print(code, os.environ["OPENBLAS_NUM_THREADS"], status.partition("Threads:")[2].split()[0])
+"""
+
+
+@pytest.mark.parametrize("given", [None, "2"])
+def test_an_analysis_keeps_numerical_libraries_to_one_thread_unless_told_otherwise(tmp_path, given):
+    environment = {key: value for key, value in os.environ.items() if not key.endswith("_NUM_THREADS")}
+    environment |= {} if given is None else {"OPENBLAS_NUM_THREADS": given}
+    spec = Path(__file__).parents[2] / "configs" / "slider_crank_li2019.yaml"
+    command = [sys.executable, "-c", _ALONE, "analyze", str(spec), "--no-plots", "-q", "-o", str(tmp_path / "out")]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+    code, threads, running = done.stdout.split()
+    assert (code, threads) == ("0", given or "1")
+    assert given or running == "1"

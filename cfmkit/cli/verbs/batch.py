@@ -73,10 +73,7 @@ def run(options: Options, terminal: Terminal) -> Answer:
     A spec that an earlier batch has finished is reused as long as nothing has changed: neither spec nor options, nor
     cfmkit, nor a file that was written.
     """
-    from cfmkit.cli import studies
-
-    studies.prepare_process()
-    from cfmkit.cli import batch
+    from cfmkit.cli import batch, studies
     from cfmkit.cli.progress import watching
     from cfmkit.specfile import addressed
     from cfmkit.store import RunFolder

@@ -102,8 +102,6 @@ def run(options: Options, terminal: Terminal) -> Answer:
     interruption the same command goes on.
     """
     from cfmkit.cli import studies
-
-    studies.prepare_process()
     from cfmkit.cli.runs import folder_of
     from cfmkit.cli.sensitivity_page import answer
     from cfmkit.studies.sensitivity.methods import carry_out

@@ -69,8 +69,6 @@ def run(options: Options, terminal: Terminal) -> Answer:
     Finished points are noted in the folder: after an interruption the same command goes on.
     """
     from cfmkit.cli import studies
-
-    studies.prepare_process()
     from cfmkit.cli.runs import folder_of, spec_of
     from cfmkit.studies.sweep import prepare, summary_of, writes_curves
 
