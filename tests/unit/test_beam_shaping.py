@@ -158,6 +158,22 @@ def test_a_window_that_is_not_kept_between_the_poses_is_cut_to_where_it_is() -> 
     assert wider.half_band(kept.start - 2e-5) > 0.05
 
 
+def test_a_widened_window_goes_as_far_as_the_force_keeps_the_band() -> None:
+    task, found = seen_at(17)
+    task = replace(task, limits=Limits(), objective="range", half_band=0.05)
+    kept = confirmed(task, replace(found, start=6.7e-3, objective=0.04), Plan(), lambda _, design: design)
+    assert kept.start < 6.7e-3
+    assert 0.0495 < kept.objective <= 0.05
+    mean = 9.6  # of the force from 6.7 mm on; it is less over a wider window
+    kept = confirmed(
+        replace(task, limits=Limits(force_min=mean)),
+        replace(found, start=6.7e-3, objective=0.04),
+        Plan(),
+        lambda _, design: design,
+    )
+    assert kept.start == 6.7e-3
+
+
 def test_stress_that_is_missed_at_few_poses_is_a_limit_that_is_missed() -> None:
     task, found = seen_at(17)
     task = replace(task, limits=Limits(stress=40e6))

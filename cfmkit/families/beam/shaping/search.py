@@ -204,12 +204,16 @@ def _as_seen(task: Task, found: Found, view: CloseView | None) -> Found:
     found = replace(found, violation=max(found.violation, _overstress(task, view)))
     if task.objective == "paper":
         return found
-    start = found.start
-    if task.objective == "range":  # no less than the window that was asked for
-        start = min(max(start, view.widest(task.half_band)), task.window[0])
-    violation = found.violation
-    if start > found.start:  # the mean force is over another window
-        violation = max(violation, worst_of(Shaping(Variables(task, found.order), start, Flattest()), found.x))
+    starts = [found.start]
+    if task.objective == "range":
+        widest = min(view.widest(task.half_band), task.window[0])  # no less than the window that was asked for
+        wider = found.start < task.window[0]  # one that was not widened yet is left as flat as it is
+        starts = [widest, found.start] if wider and widest < found.start else [max(widest, found.start)]
+    for start in starts:  # the mean force is over another window
+        program = Shaping(Variables(task, found.order), start, Flattest())
+        violation = found.violation if start == found.start else max(found.violation, worst_of(program, found.x))
+        if violation <= VIOLATION:
+            break
     return replace(found, start=start, objective=view.half_band(start), violation=violation)
 
 
