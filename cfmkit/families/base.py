@@ -141,15 +141,15 @@ class BlockAnswer:
         Force or torque that each curve should have [N or N m].
     kind : {"force", "torque"}, optional
         What the effort of the curves is; None: as the names of the metrics say.
-    warnings : mapping of str to (n,) array of bool
-        Name of a finding -> the variants whose analysis would warn of it.
+    warnings : mapping of str to (n,) array of bool, optional
+        Name of a finding -> the variants whose analysis would warn of it; None: the model does not know.
     """
 
     done: NDArray[Any]
     values: tuple[Mapping[str, FloatArray], ...]
     target: FloatArray | None = None
     kind: Kind | None = None
-    warnings: Mapping[str, NDArray[Any]] = field(default_factory=dict)
+    warnings: Mapping[str, NDArray[Any]] | None = None
 
 
 @dataclass(frozen=True)

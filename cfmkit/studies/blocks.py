@@ -28,6 +28,9 @@ if TYPE_CHECKING:
 BLOCK = 4096
 """Points that are evaluated and noted together."""
 
+NOT_JUDGED = "not_judged"
+"""In place of warnings where a block model does not know them: an empty cell would say that there are none."""
+
 
 def vectorised(study: Study, plan: Plan) -> bool:
     """Return whether the family's block model can do this study."""
@@ -63,8 +66,9 @@ def evaluate_block(study: Study, plan: Plan, start: int, stop: int) -> Rows:
 def _warned(answer: BlockAnswer, singly: list[int], rest: Rows) -> dict[str, NDArray[np.bool_]]:
     """Return which rows have which warnings: those of the block model, of the rows analysed one by one their own."""
     warned = {}
-    for name in sorted({*answer.warnings, *rest.warned}):
-        mask = np.array(answer.warnings.get(name, np.zeros(len(answer.done))), dtype=bool)
+    told = {NOT_JUDGED: answer.done} if answer.warnings is None else answer.warnings
+    for name in sorted({*told, *rest.warned}):
+        mask = np.array(told.get(name, np.zeros(len(answer.done))), dtype=bool)
         mask[singly] = rest.warned.get(name, False)
         if mask.any():
             warned[name] = mask

@@ -180,10 +180,11 @@ def test_blocks_are_noted_and_reused_whole(tmp_path):
     with Journal(tmp_path / "journal") as journal:
         first = np.concatenate([rows.values for _, rows in run(many, journal=journal).batches()])
     with Journal(tmp_path / "journal") as journal:
-        assert len(journal) == 65
+        # blocks of 64: their size is a power of two, so that a study with a few more points has the same ones
+        assert len(journal) == 79
         again = run(many, journal=journal)
         assert again.reused == 5000
-        assert again.work.step == 78
+        assert again.work.step == 64
         assert np.array_equal(np.concatenate([rows.values for _, rows in again.batches()]), first, equal_nan=True)
         assert np.array_equal(again.row(4999).values[0], first[4999], equal_nan=True)
 

@@ -252,6 +252,19 @@ def test_a_journal_that_cannot_be_made_small_stays_as_it_is(tmp_path, monkeypatc
     assert [item.name for item in tmp_path.iterdir()] == ["journal"]
 
 
+def test_warnings_that_a_block_model_does_not_know_are_not_told_as_none(monkeypatch):
+    def block(spec, asked):
+        return BlockAnswer(np.arange(asked.size) < 1, tuple({"": np.zeros(asked.size)} for _ in asked.measures))
+
+    def single(spec, run):
+        return dataclasses.replace(family("cam").analyze(spec, run), warnings=())
+
+    fake = dataclasses.replace(family("cam"), analyze=single, analyze_block=block)
+    monkeypatch.setattr("cfmkit.studies.blocks.family", lambda _name: fake)
+    monkeypatch.setattr("cfmkit.studies.study.family", lambda _name: fake)
+    assert warnings(run(work(FRICTION, names=("theoretical_force",)))) == ["not_judged", None]
+
+
 def table(records):
     return b"".join(results_csv(records))
 
