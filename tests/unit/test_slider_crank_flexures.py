@@ -310,6 +310,30 @@ def test_flexures_longer_than_their_links_are_refused() -> None:
         spec("strip", "mechanism.beam.centreline=[[0 mm, 0 mm], [0 mm, 0 mm], [1 mm, 0 mm]]")
 
 
+@pytest.mark.parametrize("model", ["strip", "lumped"])
+def test_a_chain_is_not_pressed_through_its_own_anchor(model: str) -> None:
+    """Without an offset the slider runs onto the anchor; lines without thickness would let it pass."""
+    lengths = ["mechanism.offset=0 mm", "mechanism.unloaded_angle=null", "mechanism.unloaded_offset=1 deg"]
+    about = ["analysis.travel=[0 mm, 150 mm]", "analysis.points=61", "analysis.recheck=false"]
+    result = api.analyze(spec(model, *lengths, *about))
+    assert result.status is Status.PARTIAL
+    assert result.warnings[0].name == "meets_itself"
+    assert 0.07 < result.curve.displacement[-1] < 0.105
+    beside = api.analyze(spec(model, *about))  # 60 mm beside the anchor there is room
+    assert "meets_itself" not in names(beside)
+
+
+def test_flexures_longer_than_their_link_are_refused_at_their_place(tmp_path: Path) -> None:
+    text = (CONFIGS / "slider_crank_lumped.yaml").read_text()
+    for joint, line in (("pivot", 15), ("slider_pin", 17)):
+        path = tmp_path / f"{joint}.yaml"
+        path.write_text(text.replace(f"{joint}: {{length: 10.8 mm", f"{joint}: {{length: 200 mm"))
+        with pytest.raises(cfmkit.SpecError, match="make them shorter") as caught:
+            cfmkit.load(path)
+        problem = caught.value.problems[0]
+        assert (problem.path, problem.line) == (f"mechanism.flexures.{joint}.length", line)
+
+
 def test_findings_of_parts_are_findings_of_the_family() -> None:
     assert set(OF_PARTS) <= set(FINDINGS)
 

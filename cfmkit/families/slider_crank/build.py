@@ -153,7 +153,8 @@ def coupler_length(mechanism: Mechanism) -> float:
             finding(
                 "not_assemblable",
                 f"pivot and slider pin are {mm(reach)} apart when stretched, and the crank alone is "
-                f"{mm(mechanism.crank_length)}: nothing is left for the coupler; use a shorter crank",
+                f"{mm(mechanism.crank_length)}: nothing is left for the coupler; make "
+                "'mechanism.crank_length' shorter, or 'mechanism.stretched_position' longer",
             )
         )
     return reach - mechanism.crank_length
@@ -174,7 +175,8 @@ def linkage_of(mechanism: Mechanism) -> Linkage:
             finding(
                 "not_assemblable",
                 f"crank and coupler together are {mm(linkage.crank + linkage.coupler)}, but the slider's way passes "
-                f"the pivot at {mm(abs(linkage.offset))}; make the links longer or the offset smaller",
+                f"the pivot at {mm(abs(linkage.offset))}; make the links longer or the "
+                "offset smaller: 'mechanism.coupler_length' or 'mechanism.offset'",
             )
         )
     return linkage
@@ -196,7 +198,7 @@ def unloaded_angle(mechanism: Mechanism, linkage: Linkage) -> float:
             finding(
                 "not_assemblable",
                 f"with the crank at {deg(angle)} the coupler of {mm(linkage.coupler)} does not reach the slider's way; "
-                f"the unloaded position must be between {deg(low)} and {deg(high)}",
+                f"'mechanism.unloaded_angle' must be between {deg(low)} and {deg(high)}",
             )
         )
     return angle

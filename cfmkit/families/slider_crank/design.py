@@ -113,7 +113,8 @@ def _searched(spec: SliderCrankSpec, wanted: CrankDesign, run: Run) -> tuple[Sol
     grid, fine = EFFORT["widest" if wanted.window is None else wanted.objective]
     found = lowest(height, tuple(axes.values()), grid if len(axes) < 3 else min(grid, 7), fine)
     if not math.isfinite(found.value):
-        text = "no lengths in the ranges given reach the window within the limits of the joints; widen the ranges"
+        names = " or ".join(f"'design.{name}'" for name in axes)
+        text = f"no lengths in the ranges given reach the window within the limits of the joints; widen {names}"
         raise Infeasible(finding("infeasible_targets", text))
     place = even_best(spec, tuple(axes), found) if wanted.slack else found.place
     return solve(task_of(with_lengths(spec, dict(zip(axes, place, strict=True))))), found
@@ -169,6 +170,7 @@ def solve(task: Task) -> Solved:
     goal = task.goal(window, None if wanted.objective == "least-squares" else DENSE)
     if goal is None:
         text = "in the window the effort has no bound: a dead point, or the stretched position, lies in it"
+        text += f"; change 'design.{task.assembly.motion_name}'"
         raise Infeasible(finding("infeasible_targets", text))
     rates = least_squares(goal) if wanted.objective == "least-squares" else minimax(goal)
     if rates is None:

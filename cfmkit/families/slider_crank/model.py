@@ -258,7 +258,7 @@ def _shortfalls(assembly: Assembly, asked: Ends, run: Ends) -> Iterator[Finding]
         yield finding(
             "out_of_reach",
             f"from the unloaded position the slider can travel {mm(reach[0])} to {mm(reach[1])}, and {mm(asked[0])} to "
-            f"{mm(asked[1])} are asked for",
+            f"{mm(asked[1])} are asked for; change 'analysis.travel'",
         )
     if poles:
         yield unbounded(poles)
@@ -269,8 +269,9 @@ def _dead_point(assembly: Assembly, asked: Ends, reach: Ends) -> Finding:
     return finding(
         "no_full_turn" if whole else "coupler_dead_point",
         f"the crank reaches {deg(reach[0])} to {deg(reach[1])}, and {deg(asked[0])} to {deg(asked[1])} are asked "
-        "for: at the ends the coupler stands across the slider's way; ask for less, or lengthen the coupler "
-        f"beyond {mm(assembly.linkage.crank + abs(assembly.linkage.offset))} for full turns",
+        "for: at the ends the coupler stands across the slider's way; ask for less in 'analysis.angle', or "
+        f"make 'mechanism.coupler_length' more than {mm(assembly.linkage.crank + abs(assembly.linkage.offset))} "
+        "for full turns",
     )
 
 

@@ -59,14 +59,16 @@ def check_reach(task: Task, window: tuple[float, float]) -> None:
     ends = [format_short(end, task.assembly.dimension) for end in (*window, first, last)]
     text = (
         f"the window {ends[0]} to {ends[1]} is not reached: linkage and limits of the joints allow {ends[2]} to "
-        f"{ends[3]}; ask for less, or change the lengths"
+        f"{ends[3]}; change 'design.{task.assembly.motion_name}', the lengths, or 'mechanism.limits'"
     )
     raise Infeasible(finding("infeasible_targets", text))
 
 
 def cannot_hold(task: Task) -> Finding:
     """Return why a slope in the stretched position cannot be had."""
-    text = "no springs, none of them negative, have that slope in the stretched position within their largest rates"
+    text = (
+        "no springs, none of them negative, have 'design.stiffness' in the stretched position within 'design.max_rates'"
+    )
     if task.assembly.stretched == task.assembly.start:
         text += ": the springs are relaxed there, and only positive slopes exist"
     elif task.goal((task.assembly.start, task.assembly.stretched)) is not None and "slider" not in task.wanted.springs:
@@ -83,12 +85,13 @@ def nowhere(task: Task) -> Finding:
         text = f"in the window torsion springs turn the crank the other way; ask for 'design.torque: {other}'"
         return finding("infeasible_targets", text)
     if "slider" not in task.wanted.springs and task.assembly.drive == "torque":
-        text = "torsion springs alone give no constant torque next to the stretched position; use the slider's, too"
+        text = "torsion springs alone give no constant torque next to the stretched position; "
+        text += "use the slider's, too, in 'design.springs'"
         return finding("no_zero_stiffness", text)
     if window is not None:
         text = f"in the window the best springs are none: no others come closer to a constant {task.assembly.drive}"
-        return finding("infeasible_targets", f"{text}; ask for another window, or allow other springs")
-    return finding("infeasible_targets", "no window keeps the tolerance; allow more, or change the lengths")
+        return finding("infeasible_targets", f"{text}; change 'design.{task.assembly.motion_name}' or 'design.springs'")
+    return finding("infeasible_targets", "no window keeps 'design.tolerance'; allow more, or change the lengths")
 
 
 def hopeless(task: Task, deviation: float) -> Finding:
@@ -98,14 +101,15 @@ def hopeless(task: Task, deviation: float) -> Finding:
     if task.assembly.drive == "torque" and ahead <= 0.0:
         text += "; the stretched position does not lie ahead of the unloaded one, and the torque only rises there"
         return finding("no_zero_stiffness", text)
-    return finding("infeasible_targets", f"{text}; ask for a narrower window, or change the lengths")
+    return finding("infeasible_targets", f"{text}; narrow 'design.{task.assembly.motion_name}', or change the lengths")
 
 
 def too_far(task: Task, deviation: float) -> tuple[Finding, dict[str, str]]:
     """Return that a window is too wide for its tolerance, and what would be feasible."""
     wanted = task.wanted
     nearest = {"design.tolerance": f"{100 * deviation:.4g} %"}
-    text = f"the best springs are off by {percent(deviation)}, and {percent(wanted.tolerance or 0)} are allowed"
+    allowed = f"'design.tolerance' allows {percent(wanted.tolerance or 0)}"
+    text = f"the best springs are off by {percent(deviation)}, and {allowed}"
     found = widest(task, wanted.tolerance or 0.0)
     if found is not None:
         low, high = (format_short(end, task.assembly.dimension) for end in (found.low, found.high))

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
 from cfmkit.families.slider_crank.flexures.spec import Printed, PrintedAnalysis, PrintedDesign
-from cfmkit.spec import Model, Spec
+from cfmkit.spec import Model, Spec, refuse
 from cfmkit.units import Angle, Force, Length, Ratio, RotationalStiffness, Stiffness, Torque
 
 PositiveLength = Annotated[Length, Field(gt=0)]
@@ -228,13 +229,34 @@ class SliderCrankSpec(Spec):
 
     @property
     def motion(self) -> Literal["length", "angle"]:
-        """What the curve runs over: the slider's travel, or the angle of the crank."""
-        return "length" if self.analysis.drive == "force" else "angle"
+        """What the curve runs over: the slider's travel, or the angle of the crank; printed parts are pressed."""
+        return "length" if self.analysis.drive == "force" or self.fidelity != "prb" else "angle"
 
     @property
     def fidelity(self) -> Literal["prb", "lumped", "beam"]:
         """The model that the analysis uses."""
         return self.analysis.fidelity or self.mechanism.finest
+
+    @model_validator(mode="after")
+    def _flexures_fit_their_links(self) -> Self:
+        part = self.mechanism
+        if part.flexures is None:
+            return self
+        coupler = part.coupler_length
+        if coupler is None:
+            coupler = math.hypot(part.stretched_position or 0.0, part.offset) - part.crank_length
+        own, names = part.flexures.all, ("pivot", "crank_pin", "slider_pin")
+        faults: dict[tuple[str | int, ...], str] = {}
+        for k, (link, room) in enumerate((("crank", part.crank_length), ("coupler", coupler))):
+            shares = (1.0 - own[k].before) * own[k].length, own[k + 1].before * own[k + 1].length
+            if 0.0 < room * (1.0 + 1e-12) < sum(shares):
+                longer = names[k] if shares[0] >= shares[1] else names[k + 1]
+                faults["mechanism", "flexures", longer, "length"] = (
+                    f"the flexures at its ends take {1e3 * sum(shares):.4g} mm of the {link}, which has "
+                    f"{1e3 * room:.4g} mm: make them shorter"
+                )
+        refuse("Spec", faults)
+        return self
 
     @model_validator(mode="after")
     def _fidelity_has_its_part(self) -> Self:

@@ -277,18 +277,22 @@ def _closed(spec: SliderCrankSpec, wanted: StripDesign, task: Task, ranges: Rang
     found = uniform_for_stroke(task)
     if found is None:
         return no_design(
-            finding("target_unreachable", "the strip has no equilibrium over the travel, or no stress limit")
+            finding(
+                "target_unreachable",
+                "the strip has no equilibrium over 'design.travel', or 'mechanism.material' no yield strength",
+            )
         )
     thickness, width = found
     low, high = ranges.form[0] / 1e3
     if not low <= thickness <= high:
-        text = f"the stress asks for a thickness of {mm(thickness)}, outside {mm(low)} to {mm(high)}"
+        text = f"the stress asks for a thickness of {mm(thickness)}, outside 'design.beam.thickness', "
+        text += f"{mm(low)} to {mm(high)}"
         return no_design(finding("target_unreachable", text), {"design.beam.thickness": mm(thickness)})
     if isinstance(wanted.width, tuple) and not wanted.width[0] <= width <= wanted.width[1]:
         reached = task.force * np.clip(width, *wanted.width) / width
         text = (
-            f"{newton(task.force)} need a width of {mm(width)}; within {mm(wanted.width[0])} to "
-            f"{mm(wanted.width[1])} the nearest is {newton(float(reached))}"
+            f"{newton(task.force)} need a width of {mm(width)}; within 'design.beam.width', {mm(wanted.width[0])} to "
+            f"{mm(wanted.width[1])}, the nearest is {newton(float(reached))}"
         )
         nearest = {"design.force": newton(float(reached)), "design.beam.width": mm(width)}
         return no_design(finding("target_unreachable", text), nearest)

@@ -6,6 +6,7 @@ FINDINGS = {
     "straight_start": "the chain is exactly straight: it buckles, and only chance or a guide says to which side",
     "kink_too_small": "the kink that sends the chain to one side is smaller than the process can make",
     "long_run_in": "the kink is so large that the force needs much of the travel to reach its level",
+    "meets_itself": "the chain is pressed through its own anchor, or crosses itself: the curve ends before",
     "wrong_branch": "the chain bends to the other side than asked for: the force is another one",
     "unstable": "the equilibrium is unstable while the slider is held: the chain would jump",
     "limit_point": "the slider cannot be pressed further in equilibrium",

@@ -25,6 +25,7 @@ from cfmkit.families.slider_crank.flexures.assembly import (
     travel_direction,
 )
 from cfmkit.families.slider_crank.flexures.checks import findings_of
+from cfmkit.families.slider_crank.flexures.clearance import kept_clear
 from cfmkit.families.slider_crank.flexures.definitions import DEFINITIONS
 from cfmkit.families.slider_crank.flexures.pressing import Ending
 from cfmkit.families.slider_crank.flexures.solution import Printed
@@ -51,6 +52,7 @@ _NAMES = {
     Ending.NOT_CONVERGED: "not_converged",
     Ending.WRONG_BRANCH: "wrong_branch",
     Ending.CROSSES: "wrong_branch",
+    Ending.BLOCKED: "meets_itself",
     Ending.STARTS_LATE: "branch_begins_late",
 }
 
@@ -87,6 +89,7 @@ def analyze(spec: SliderCrankSpec, run: Run) -> Result:
         return no_result(spec, pulled)
     side = side_of(spec, linkage, unloaded) if spec.analysis.side is not None else 0
     pressed = chain.press(np.linspace(low, high, spec.analysis.points), side, spec.analysis.accuracy)
+    pressed = kept_clear(pressed, _thickness(chain))
     usable = len(pressed.travel) > 1 and pressed.ending is not Ending.WRONG_BRANCH
     told = () if pressed.ending is Ending.COMPLETE else (finding(_NAMES[pressed.ending], pressed.message),)
     if not usable:
@@ -115,6 +118,14 @@ def analyze(spec: SliderCrankSpec, run: Run) -> Result:
         allowable_stress=solution.material.allowable_stress,
         state=solution,
     )
+
+
+def _thickness(chain: Chain) -> float:
+    """Return the mean thickness of both ends of a chain [m]."""
+    beams = list(chain.build(chain.points).beams.values())
+    given = [beam.section.thickness for beam in (beams[0], beams[-1])]
+    first, last = ([one] if isinstance(one, float) else one.values for one in given)
+    return 0.5 * (float(first[0]) + float(last[-1]))
 
 
 def chain_of(spec: SliderCrankSpec, linkage: Linkage, unloaded: float) -> Chain:

@@ -52,6 +52,7 @@ class Ending(Enum):
     NOT_CONVERGED = "no step converged, or the tolerance was not reached"
     WRONG_BRANCH = "the chain bends to the other side than asked for"
     CROSSES = "the chain goes over to the other side than asked for"
+    BLOCKED = "the chain meets its own anchor, or itself"
     STARTS_LATE = "this branch exists only beyond some travel"
 
 
@@ -230,7 +231,7 @@ class Chain:
             return Pressed(path, Ending.WRONG_BRANCH, Ending.WRONG_BRANCH.value, -wanted)
         places = path.drive[path.at_asked][first - 1 : first + 1] * 1e3
         text = f"between {places[0]:.4g} and {places[1]:.4g} mm the chain goes over to the other side than asked for"
-        kept = _part(path, np.isin(path.asked, path.asked[path.at_asked][:first]))
+        kept = part_of(path, np.isin(path.asked, path.asked[path.at_asked][:first]))
         return Pressed(kept, Ending.CROSSES, text, wanted)
 
 
@@ -251,10 +252,10 @@ def _beginning(path: Path, drive: Displacement) -> int:
 
 def _since(path: Path, first: int) -> Path:
     """Return a path from the point with a number on."""
-    return _part(path, path.asked >= first)
+    return part_of(path, path.asked >= first)
 
 
-def _part(path: Path, keep: NDArray[np.bool_]) -> Path:
+def part_of(path: Path, keep: NDArray[np.bool_]) -> Path:
     """Return some of the points of a path."""
     return replace(
         path,
