@@ -4,3 +4,7 @@
 draw force over displacement, `bands` the requirements on it, `diagram` everything
 else over a common axis, `parts` mechanical parts to scale, `render` all of it as PNG.
 """
+
+from cfmkit.plots.home import find_room
+
+find_room()  # before any file of this package imports matplotlib, which reads where it may write

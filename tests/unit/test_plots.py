@@ -315,3 +315,21 @@ def test_a_family_without_pictures_of_its_own_still_gets_its_curve():
 def test_nothing_solved_is_nothing_drawn():
     family = Family("any", "", Spec, lambda spec, run: result_of())
     assert render(family, Result(result_of().spec, Status.INFEASIBLE)) == {}
+
+
+@pytest.mark.parametrize("named", [False, True])
+def test_pictures_need_no_folder_of_the_user_that_can_be_written(tmp_path, named):
+    """A service account has none: matplotlib complained on standard error and listed all fonts in every run."""
+    program = (
+        "import os, cfmkit.plots.style as look; figure = look.new_figure(); figure.text(0, 0, 'a'); look.png(figure); "
+        "print(os.environ['MPLCONFIGDIR'])"
+    )
+    hidden = {"XDG_CONFIG_HOME", "XDG_CACHE_HOME", "MPLCONFIGDIR"}
+    environment = {key: value for key, value in os.environ.items() if key not in hidden}
+    environment |= {"HOME": "/dev/null", "TMPDIR": str(tmp_path)}
+    environment |= {"MPLCONFIGDIR": str(tmp_path / "own")} if named else {}
+    done = subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=True)
+    kept = Path(done.stdout.strip())
+    assert kept == (tmp_path / "own" if named else tmp_path / f"cfmkit-fonts-{os.getuid()}")
+    assert "Matplotlib" not in done.stderr
+    assert list(kept.glob("fontlist*"))
