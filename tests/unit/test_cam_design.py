@@ -246,3 +246,17 @@ def test_a_spring_whose_cam_would_jam_within_the_stroke_is_refused():
 
 def test_an_undercut_design_is_made_and_its_analysis_warns():
     assert "14.4" in message(analyze(designed(targets())), "undercut")
+
+
+def test_a_design_says_which_values_of_the_profile_it_replaces():
+    def told(**profile):
+        found = design(targets({f"profile__{key}": value for key, value in profile.items()}))
+        return [item.message for item in found.warnings if item.name == "overwritten"]
+
+    assert told() == []
+    assert told(rest_half_width="68 mm", force_constant="7 mm", stroke="100 mm") == []
+    (one,) = told(rest_half_width="70 mm")
+    assert "'mechanism.profile.rest_half_width' (70 mm) is replaced by 68 mm" in one
+    assert len(told(roller_radius="10 mm", brace_length="190 mm", friction=0.002)) == 3
+    (cutting,) = told(offset="0.1 mm")
+    assert "without errors of cutting" in cutting

@@ -430,3 +430,27 @@ def test_a_travel_beyond_the_profile_ends_the_curve_at_its_end():
         result = run(analysis__travel=harmless, **FITS)
         assert result.status is Status.COMPLETE
         assert names(result) == []
+
+
+def test_material_missing_beyond_the_radius_of_curvature_asks_for_no_negative_roller():
+    told = message(run(profile__offset="-20 mm"), "undercut")
+    assert "Use less missing material or A >= " in told
+    assert "roller <= " not in told
+    assert "Use a roller <= 9.328 mm" in message(run(profile__offset="-1 mm"), "undercut")
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"rest_half_width": "210 mm"},
+        {"roller_radius": "250 mm"},
+        {"roller_radius": "150 mm"},
+        {"profile__friction": -0.4},
+        {"profile__stroke": "0.1 mm"},
+        {"rest_half_width": "9 mm"},
+    ],
+)
+def test_who_cannot_build_a_mechanism_names_the_key_that_blocks(changes):
+    result = run(**changes)
+    assert result.status is Status.NO_EQUILIBRIUM
+    assert "mechanism." in result.message

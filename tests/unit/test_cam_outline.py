@@ -7,6 +7,7 @@ import pytest
 from cam_support import cam, fixed
 
 import cfmkit
+from cfmkit.errors import SpecError
 from cfmkit.export.arcs import outlines
 from cfmkit.families import family
 from cfmkit.families.refusals import CannotBuild
@@ -84,3 +85,33 @@ def test_what_the_left_flank_leaves_out_is_written_out():
     profile = family("cam").resolve(cam(left=left)).mechanism.left.profile
     numbers = (profile.brace_length, profile.rest_half_width, profile.roller_radius, profile.stroke)
     assert numbers == pytest.approx((0.205, 0.068, 0.016, 0.24))
+
+
+def test_a_tab_that_would_cut_into_the_rollers_is_refused_with_the_room_there_is():
+    with pytest.raises(SpecError, match="leave 104 mm between them") as caught:
+        cam(plate={"base_width": "120 mm"})
+    assert caught.value.problems[0].path == "mechanism.plate.base_width"
+    drawn = cfmkit.drawing(cam(plate={"base_width": "104 mm"}))
+    plate = next(contour for contour in drawn.contours if contour.closed and not contour.hole)
+    below = [end for edge in plate.edges if not isinstance(edge, Smooth) for end in edge.ends if end.imag < 0]
+    assert max(end.real for end in below) == pytest.approx(0.052)
+    left = {"roller_radius": "18 mm", "profile": {"force_constant": "9 mm", "rest_half_width": "66 mm"}}
+    with pytest.raises(SpecError, match="leave 96 mm between them"):
+        cam(plate={"base_width": "100 mm"}, left=left)
+
+
+@pytest.mark.parametrize(
+    ("plate", "words"),
+    [
+        ({"hole_diameter": "20 mm"}, ["holes of the tab are left out"]),
+        ({"base_height": "10 mm"}, ["holes of the tab are left out"]),
+        ({"hole_diameter": "60 mm"}, ["holes of the tab are left out", "near the top are left out"]),
+        ({}, []),
+        ({"hole_diameter": "0"}, []),
+        ({"base_height": "0"}, []),
+    ],
+)
+def test_holes_that_find_no_room_are_not_left_out_in_silence(plate, words):
+    notes = cfmkit.drawing(cam(plate=plate)).notes
+    assert len(notes) == len(words)
+    assert all(word in note for word, note in zip(words, notes, strict=True))

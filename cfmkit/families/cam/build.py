@@ -184,7 +184,7 @@ def check_start(law: SlopeLaw, *rollers: tuple[float, float]) -> None:
             finding(
                 "brace_too_short",
                 f"the braces ({mm(shortest)}) do not reach from the axis to the rollers, which start at "
-                f"{mm(x0)} from it; use a brace longer than {mm(x0)}",
+                f"{mm(x0)} from it; use a brace longer than {mm(x0)} ('mechanism.brace_length')",
             )
         )
     for radius, brace in rollers:
@@ -193,7 +193,7 @@ def check_start(law: SlopeLaw, *rollers: tuple[float, float]) -> None:
                 finding(
                     "rollers_collide",
                     f"there is no room for two rollers with a radius of {mm(radius)} on braces of {mm(brace)}; "
-                    "use smaller rollers",
+                    "use smaller rollers ('mechanism.roller_radius')",
                 )
             )
     p = float(law.frictionless(x0))
@@ -202,7 +202,7 @@ def check_start(law: SlopeLaw, *rollers: tuple[float, float]) -> None:
             finding(
                 "design_singular",
                 f"a profile cut for a friction of {law.friction:g} has no upward start: |friction| must stay below "
-                f"{p if law.friction <= 0 else 1 / p:.3g}",
+                f"{p if law.friction <= 0 else 1 / p:.3g} ('friction' of 'mechanism.profile', or of 'design')",
             )
         )
 
@@ -223,7 +223,9 @@ def _shortfall(law: SlopeLaw, stroke: float, reached: float) -> Finding | None:
             finding(
                 "design_singular",
                 f"a profile cut for a friction of {law.friction:g} holds its roller: nowhere does the slider rise as "
-                "the rollers move out; use less friction or a smaller force constant",
+                "the rollers move out; use less friction or a smaller force constant ('friction' and "
+                "'force_constant' of "
+                "'mechanism.profile')",
             )
         )
     return finding(
@@ -243,7 +245,8 @@ def _cut(path: Path, roller_radius: float, end: float) -> CamProfile:
                 "undercut_total",
                 f"nothing of the flank remains: the {mm(roller_radius)} roller is larger than the path's radius of "
                 f"curvature ({mm(smallest)} at the start), and the stroke ends before it would leave the cam's corner; "
-                "use a smaller roller, a larger force constant or a longer stroke",
+                "use a smaller roller ('mechanism.roller_radius'), a larger force constant or a longer stroke "
+                "('force_constant' and 'stroke' of 'mechanism.profile')",
             )
         ) from None
 
@@ -258,7 +261,8 @@ def _track(profile: CamProfile, mechanism: Mechanism) -> Track:
                 finding(
                     "brace_too_short",
                     f"the braces ({mm(brace)}) do not reach from the axis to the rollers, which start at "
-                    f"{mm(problem.start)} from it on this cam; use a brace longer than {mm(problem.start)}",
+                    f"{mm(problem.start)} from it on this cam; use a brace longer than {mm(problem.start)} "
+                    "('mechanism.brace_length')",
                 )
             ) from None
         if problem.reason == "crossed":
@@ -266,14 +270,17 @@ def _track(profile: CamProfile, mechanism: Mechanism) -> Track:
                 finding(
                     "flanks_collide",
                     f"on this cam the right roller would start at x = {mm(problem.start)}, across the axis; use a cam "
-                    "with a larger rest half width, or rollers nearer to those it is cut for",
+                    "with a larger rest half width ('mechanism.profile.rest_half_width'), or rollers nearer to "
+                    "those it "
+                    "is cut for ('mechanism.roller_radius')",
                 )
             ) from None
         raise CannotBuild(
             finding(
                 "dead_point",
                 f"with a brace of {mm(brace)} the slider does not rise above its start while the rollers move out on "
-                "this cam; use a longer brace, or a cam cut for this one",
+                "this cam; use a longer brace ('mechanism.brace_length'), or a cam cut for this one "
+                "('mechanism.profile.brace_length')",
             )
         ) from None
 

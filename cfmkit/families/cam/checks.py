@@ -54,11 +54,12 @@ def _undercut(solution: Solution) -> Iterator[Finding]:
     roller += f", with {mm(missing)} of the flank missing," if missing else ""
     cure = law.smallest_force_constant(profile.roller_radius)
     larger = f" or A >= {mm(cure)}" if cure else ""
+    fits = f"a roller <= {mm(radius - missing)}" if radius > missing else "less missing material"
     yield finding(
         "undercut",
         f"{roller} is larger than the path's smallest radius of curvature "
         f"({mm(radius)}, at the start); the first {mm(corner)} run on a corner, without the constant force. "
-        f"Use a roller <= {mm(radius - missing)}{larger}",
+        f"Use {fits}{larger}",
         *(["design.avoid_undercut=true"] if cure and solution.assembly.spec.design else []),
     )
     yield finding(

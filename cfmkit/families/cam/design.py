@@ -13,15 +13,17 @@ Reference
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import isclose
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cfmkit.bodies.cam_path import reach
 from cfmkit.bodies.cam_profile import SlopeLaw, brace_tangent
-from cfmkit.families.cam.build import CLOSE, check_start, hanging_weights
+from cfmkit.families.cam.build import CLOSE, assemble_sides, check_start, hanging_weights
 from cfmkit.families.cam.existence import rollers_overlap
 from cfmkit.families.cam.findings import finding
+from cfmkit.families.cam.outline import plate_notes
 from cfmkit.families.findings import at_least, at_most, mm, newton, rate
 from cfmkit.families.refusals import CannotBuild, Infeasible, no_design
 from cfmkit.results import Design, Status
@@ -31,6 +33,7 @@ if TYPE_CHECKING:
 
     from cfmkit.families.base import Run
     from cfmkit.families.cam.spec import CamDesign, CamSpec, CatalogueSpring, Springs
+    from cfmkit.results import Finding
 
 
 @dataclass(frozen=True)
@@ -76,7 +79,9 @@ def _design(spec: CamSpec, target: CamDesign) -> Design:
     choice = ways[target.choose](spec, target, pull, factor, smallest)
     law = _law(spec, target, choice.force_constant, factor)
     _check_stroke(law, target, choice.springs)
-    return Design(_written(spec, target, choice, factor), Status.COMPLETE, choice.note, active_bounds=choice.active)
+    written = _written(spec, target, choice, factor)
+    told = (*_overwritten(spec, written), *_plate_lacks(written))
+    return Design(written, Status.COMPLETE, choice.note, active_bounds=choice.active, warnings=told)
 
 
 def shaping(spec: CamSpec, target: CamDesign) -> tuple[float, float]:
@@ -90,7 +95,8 @@ def shaping(spec: CamSpec, target: CamDesign) -> tuple[float, float]:
             finding(
                 "weight_too_large",
                 f"the moving parts weigh {newton(least)}: a force of "
-                f"{newton(target.force)} does not even carry them; ask for more, or lighten the parts",
+                f"{newton(target.force)} does not even carry them; request more ('design.force'), or lighten "
+                "the parts ('mechanism.masses')",
             ),
             {"design.force": f"more than {newton(least)}"},
         )
@@ -136,7 +142,8 @@ def _smallest_constant(spec: CamSpec, target: CamDesign, factor: float) -> float
             finding(
                 "undercut",
                 f"no force constant avoids undercut: the {mm(mechanism.roller_radius)} roller is larger than the "
-                f"radius of curvature that the brace alone gives ({largest}); use a smaller roller",
+                f"radius of curvature that the brace alone gives ({largest}); use a smaller roller "
+                "('mechanism.roller_radius')",
             ),
             {"mechanism.roller_radius": f"less than {largest}"},
         )
@@ -164,7 +171,8 @@ def _from_constant(spec: CamSpec, target: CamDesign, pull: float, factor: float,
         raise Infeasible(
             finding(
                 "force_constant_too_small",
-                f"the force constant {mm(constant)} is below {mm(smallest)}, the smallest that avoids undercut",
+                f"the force constant {mm(constant)} is below {mm(smallest)}, the smallest that avoids undercut "
+                "('design.avoid_undercut')",
             ),
             {"design.force_constant": at_least(smallest)},
         )
@@ -245,7 +253,11 @@ def _check_stroke(law: SlopeLaw, target: CamDesign, springs: Springs) -> None:
         if reached <= 0:  # cut for so much friction on the way down that the slider never rises
             name = "design_singular"
         raise Infeasible(
-            finding(name, f"with A = {mm(law.force_constant)} the stroke ends at {mm(reached)} of {mm(target.stroke)}"),
+            finding(
+                name,
+                f"with A = {mm(law.force_constant)} the stroke ends at {mm(reached)} of {mm(target.stroke)} "
+                "('design.stroke')",
+            ),
             {"design.stroke": at_most(reached)},
         )
     elongation, limit = 2.0 * (end - law.rest_half_width), springs.max_elongation
@@ -254,11 +266,45 @@ def _check_stroke(law: SlopeLaw, target: CamDesign, springs: Springs) -> None:
         raise Infeasible(
             finding(
                 "spring_overstretched",
-                f"at full stroke the springs would be stretched by {mm(elongation)}, their limit is {mm(limit)}; "
-                f"the stroke they allow is {mm(shorter)}",
+                f"at full stroke the springs would be stretched by {mm(elongation)}, their limit is {mm(limit)} "
+                f"('mechanism.springs.max_elongation'); the stroke they allow is {mm(shorter)}",
             ),
             {"design.stroke": at_most(shorter)},
         )
+
+
+_SOURCES = {"friction": "design.friction", "slope_factor": "design.gravity", "offset": "", "file": "", "noise": ""}
+"""What decides a value of a designed profile that does not follow the mechanism's of the same name."""
+
+
+def _overwritten(spec: CamSpec, written: CamSpec) -> Iterator[Finding]:
+    """Yield what to say about values of the profile that the user gave and the design replaces."""
+    given, new = spec.mechanism.profile, written.mechanism.profile
+    # What the design is for, its force constant and stroke, is meant to be replaced.
+    for name in sorted(given.model_fields_set - {"force_constant", "stroke"}):
+        old, now = getattr(given, name), getattr(new, name)
+        if old is not None and old != now and not (isinstance(old, float) and isclose(old, now or 0.0, rel_tol=1e-12)):
+            values = [f"{item:g}" if name in ("friction", "slope_factor") else _length(item) for item in (old, now)]
+            source = _SOURCES.get(name, f"mechanism.{name}")
+            yield finding(
+                "overwritten",
+                f"'mechanism.profile.{name}' ({values[0]}) is replaced by {values[1]}: the designed profile "
+                + (f"follows '{source}'; change that one" if source else "is as drawn, without errors of cutting"),
+            )
+
+
+def _length(value: object) -> str:
+    return mm(value) if isinstance(value, float) else "none" if value is None else str(value)
+
+
+def _plate_lacks(spec: CamSpec) -> Iterator[Finding]:
+    """Yield what the plate lacks for want of room."""
+    try:
+        sides = assemble_sides(spec)
+    except CannotBuild:
+        return
+    for note in plate_notes((sides[0].profile, sides[1].profile), spec.mechanism.plate):
+        yield finding("plate_incomplete", note)
 
 
 def _written(spec: CamSpec, target: CamDesign, choice: Choice, factor: float) -> CamSpec:

@@ -29,6 +29,8 @@ FINDINGS = {
     "inertia_mismatch": "a moment of inertia does not fit the mass and the size of its part",
     "symmetric_model": "the quasi-static model leaves out what makes the two sides differ",
     "friction_left_out": "the nine-coordinate model has no rolling resistance",
+    "overwritten": "a value of the profile that the design replaces by its own",
+    "plate_incomplete": "there is no room for the tab of the plate, or for its fixing holes",
     "old_word": "a word of the specification that the next version will not know any more",
     "weight_too_large": "the force wanted does not even carry the weight of the moving parts",
     "force_constant_too_small": "the force constant needed is below the one that avoids undercut",

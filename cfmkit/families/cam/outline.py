@@ -14,6 +14,7 @@ import numpy as np
 
 from cfmkit.families.cam.build import assemble_sides
 from cfmkit.families.cam.existence import flanks_crossing
+from cfmkit.families.findings import mm
 from cfmkit.families.refusals import CannotBuild
 from cfmkit.geometry import TOLERANCE, Arc, Contour, Curve2D, Drawing, Edge, Line, Smooth
 
@@ -46,8 +47,9 @@ def drawing(spec: CamSpec, tolerance: float = TOLERANCE) -> Drawing:
         if crossing := flanks_crossing(profile):
             raise CannotBuild(crossing)
     paths = Contour((path_edge(profiles[0]),), "path"), Contour((path_edge(profiles[1]).mirrored(),), "path")
-    contours = (*plate_contours(profiles, sides[0].spec.mechanism.plate), *paths)
-    return Drawing("cam", contours, tuple(_tables(profiles)))
+    plate = sides[0].spec.mechanism.plate
+    contours = (*plate_contours(profiles, plate), *paths)
+    return Drawing("cam", contours, tuple(_tables(profiles)), plate_notes(profiles, plate))
 
 
 def plate_contours(profiles: Profiles, plate: Plate) -> tuple[Contour, ...]:
@@ -129,17 +131,50 @@ def tab_width(plate: Plate, profiles: Profiles) -> float:
 def holes(flanks: tuple[Smooth, Smooth], plate: Plate, profiles: Profiles) -> list[Contour]:
     """Return the fixing holes: two in the tab and two near the top, where there is room for them."""
     diameter, width = plate.hole_diameter, tab_width(plate, profiles)
-    if not diameter:
-        return []
-    bottom, top = (min(flank.points[0, 1] for flank in flanks), max(flank.points[-1, 1] for flank in flanks))
-    across = min(float(flank.points[-1, 0]) for flank in flanks)
-    top += plate.top_margin
+    bottom, top, across = _extents(flanks, plate)
     centers: list[tuple[float, float]] = []
-    if plate.base_height >= 2.0 * diameter and width >= 6.0 * diameter:
+    if _room_in_tab(plate, width):
         centers += [(side * 0.3 * width, bottom - 0.5 * plate.base_height) for side in (-1.0, 1.0)]
-    if top - bottom >= 6.0 * diameter and across >= 4.0 * diameter:
+    if _room_at_top(plate, top - bottom, across):
         centers += [(side * 0.5 * across, top - 2.0 * diameter) for side in (-1.0, 1.0)]
     return [_circle(center, 0.5 * diameter) for center in centers]
+
+
+def _extents(flanks: tuple[Smooth, Smooth], plate: Plate) -> tuple[float, float, float]:
+    """Return the heights of the cam's bottom and of the plate's top, and half its width there [m]."""
+    bottom, top = min(flank.points[0, 1] for flank in flanks), max(flank.points[-1, 1] for flank in flanks)
+    return bottom, top + plate.top_margin, min(float(flank.points[-1, 0]) for flank in flanks)
+
+
+def _room_in_tab(plate: Plate, width: float) -> bool:
+    return bool(
+        plate.hole_diameter and plate.base_height >= 2.0 * plate.hole_diameter and width >= 6.0 * plate.hole_diameter
+    )
+
+
+def _room_at_top(plate: Plate, height: float, across: float) -> bool:
+    return bool(plate.hole_diameter and height >= 6.0 * plate.hole_diameter and across >= 4.0 * plate.hole_diameter)
+
+
+def plate_notes(profiles: Profiles, plate: Plate) -> tuple[str, ...]:
+    """Return what the plate lacks for want of room: its tab, or some of its fixing holes."""
+    flanks, diameter = (flank_edge(profiles[0]), flank_edge(profiles[1])), plate.hole_diameter
+    width, (bottom, top, across) = tab_width(plate, profiles), _extents(flanks, plate)
+    found = []
+    if plate.base_height and not width:
+        found.append("the rollers leave no room for the tab below the cam: the plate has none ('mechanism.plate')")
+    elif plate.base_height and diameter and not _room_in_tab(plate, width):
+        found.append(
+            f"the two {mm(diameter)} holes of the tab are left out: they need a tab of {mm(6 * diameter)} by "
+            f"{mm(2 * diameter)}, it is {mm(width)} by {mm(plate.base_height)} ('mechanism.plate.base_width', "
+            "'.base_height', '.hole_diameter')"
+        )
+    if diameter and not _room_at_top(plate, top - bottom, across):
+        found.append(
+            f"the two {mm(diameter)} holes near the top are left out: they need a cam {mm(6 * diameter)} high and "
+            f"{mm(8 * diameter)} wide, it is {mm(top - bottom)} by {mm(2 * across)} ('mechanism.plate.hole_diameter')"
+        )
+    return tuple(found)
 
 
 def _circle(center: tuple[float, float], radius: float) -> Contour:

@@ -9,9 +9,9 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from cfmkit.families.cam.manufacturing.spec import Manufacturing
 from cfmkit.materials.spec import MaterialField, MaterialSpec, SafetyFactor
-from cfmkit.spec import Analysis, Model, Spec
+from cfmkit.spec import Analysis, Model, Spec, refuse
 from cfmkit.tables.source import DataSource
-from cfmkit.units import Angle, Force, Inertia, Length, Mass, Ratio, Stiffness, Time
+from cfmkit.units import Angle, Force, Inertia, Length, Mass, Ratio, Stiffness, Time, format_short
 
 Positive = Field(gt=0)
 PositiveLength = Annotated[Length, Field(gt=0)]
@@ -173,6 +173,23 @@ class Mechanism(Model):
     plate: Plate = Field(default_factory=Plate, description="what closes the contour of the part")
     contact: Contact | None = Field(None, description="for the contact pressure")
     safety_factor: SafetyFactor = 1.0
+
+    @model_validator(mode="after")
+    def _tab_passes_between_the_rollers(self) -> Self:
+        if self.plate.base_width is None:
+            return self
+        sides = [(self.profile.rest_half_width, self.profile.roller_radius, self.roller_radius)]
+        if left := self.left:
+            own = left.profile or self.profile
+            sides.append((own.rest_half_width, own.roller_radius, left.roller_radius or self.roller_radius))
+        room = 2.0 * min((x0 or self.rest_half_width) - max(cut or 0.0, built) for x0, cut, built in sides)
+        if self.plate.base_width > room > 0:
+            told = (
+                f"a tab of {format_short(self.plate.base_width, 'length')} cuts into the rollers: they leave "
+                f"{format_short(room, 'length')} between them at the start"
+            )
+            refuse("Mechanism", {("plate", "base_width"): told})
+        return self
 
     @field_validator("springs", mode="before")
     @classmethod

@@ -54,7 +54,8 @@ def outside(parts: Build, span: tuple[float, float]) -> Finding:
     return finding(
         "outside_profile",
         f"the slider is to move from {mm(ends[0])} to {mm(ends[1])}, but profile and braces hold it between "
-        f"{mm(span[0])} and {mm(span[1])} only (heights above 'analysis.dynamics.origin')",
+        f"{mm(span[0])} and {mm(span[1])} only (heights above 'analysis.dynamics.origin'; change "
+        "'slider_position' or 'stroke' there)",
     )
 
 
@@ -64,7 +65,7 @@ def runs_on_corner(parts: Build) -> Finding:
     return finding(
         "contact_not_single_valued",
         "on the corner of the cam the contact is no function of its height, as the nine-coordinate model needs it: "
-        f"start above {mm(above)}, or use 'analysis.dynamics.method: inverse'",
+        f"start above {mm(above)} ('analysis.dynamics.slider_position'), or use 'analysis.dynamics.method: inverse'",
     )
 
 
