@@ -22,7 +22,6 @@ from cfmkit._version import __version__
 if TYPE_CHECKING:
     from cfmkit.api import (
         analyze,
-        calibrate,
         check,
         design,
         drawing,
@@ -31,10 +30,10 @@ if TYPE_CHECKING:
         export,
         load,
         loads,
-        measure,
         sensitivity,
         sweep,
     )
+    from cfmkit.batches import BatchResult, batch
     from cfmkit.curves import Curve
     from cfmkit.errors import (
         CfmError,
@@ -53,6 +52,7 @@ if TYPE_CHECKING:
     from cfmkit.experiment.reading import Recording
     from cfmkit.experiment.report import MeasureReport
     from cfmkit.families.base import Run
+    from cfmkit.recordings import calibrate, measure
     from cfmkit.results import Design, Finding, Quantity, Result, Status
     from cfmkit.spec import Spec
     from cfmkit.studies.outcome import StudyResult
@@ -60,7 +60,6 @@ if TYPE_CHECKING:
 _HOMES = {
     "cfmkit.api": (
         "analyze",
-        "calibrate",
         "check",
         "design",
         "drawing",
@@ -69,10 +68,10 @@ _HOMES = {
         "export",
         "load",
         "loads",
-        "measure",
         "sensitivity",
         "sweep",
     ),
+    "cfmkit.batches": ("BatchResult", "batch"),
     "cfmkit.curves": ("Curve",),
     "cfmkit.errors": (
         "CfmError",
@@ -91,6 +90,7 @@ _HOMES = {
     "cfmkit.experiment.reading": ("Recording",),
     "cfmkit.experiment.report": ("MeasureReport",),
     "cfmkit.families.base": ("Run",),
+    "cfmkit.recordings": ("calibrate", "measure"),
     "cfmkit.results": ("Design", "Finding", "Quantity", "Result", "Status"),
     "cfmkit.spec": ("Spec",),
     "cfmkit.studies.outcome": ("StudyResult",),
@@ -98,6 +98,7 @@ _HOMES = {
 _HOME = {name: module for module, names in _HOMES.items() for name in names}
 
 __all__ = [
+    "BatchResult",
     "CfmError",
     "Curve",
     "DataError",
@@ -123,6 +124,7 @@ __all__ = [
     "UsageError",
     "__version__",
     "analyze",
+    "batch",
     "calibrate",
     "check",
     "design",

@@ -138,3 +138,28 @@ class FolderInUse(CfmError):
     """Another live run owns the output folder."""
 
     exit_code = ExitCode.IN_USE
+
+
+def code_of(error: BaseException) -> ExitCode:
+    """Return the exit code that an exception stands for."""
+    if isinstance(error, CfmError):
+        return error.exit_code
+    return ExitCode.IO if isinstance(error, OSError) else ExitCode.BUG
+
+
+def sentence_of(error: BaseException) -> str:
+    """Return what an exception says to a user, in one line."""
+    if isinstance(error, CfmError):
+        return " ".join(str(error).split())
+    if isinstance(error, OSError):
+        place = f"{error.filename}: " if error.filename else ""
+        return f"{place}{(error.strerror or str(error)).lower()}"
+    told = " ".join(f"{type(error).__name__}: {error}".split())
+    return f"this is a bug in cfmkit: {told}; -vv shows where"
+
+
+def lines_of(error: BaseException) -> tuple[str, ...]:
+    """Return what standard error shows of an exception; faults of a file start with their place, as editors want it."""
+    if isinstance(error, SpecError):
+        return tuple(map(str, error.problems))
+    return (f"error    {shortened(sentence_of(error))}",)

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+from cfmkit import errors
 from cfmkit.cli.answer import Answer, document
-from cfmkit.errors import CfmError, ExitCode, OutputError, SpecError, shortened
+from cfmkit.errors import ExitCode, OutputError, SpecError, shortened
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -65,15 +66,13 @@ def code_of(error: BaseException) -> ExitCode:
     """Return the exit code that an exception becomes."""
     if isinstance(error, ParserError):
         return ExitCode.USAGE
-    if isinstance(error, CfmError | Stopped):
-        return error.exit_code
-    return ExitCode.IO if isinstance(error, OSError) else ExitCode.BUG
+    return error.exit_code if isinstance(error, Stopped) else errors.code_of(error)
 
 
 def _lines(error: BaseException) -> Iterator[str]:
     """Yield what standard error shows; faults of a file start with their place, as editors want it."""
     if isinstance(error, SpecError):
-        yield from map(str, error.problems)
+        yield from errors.lines_of(error)
         return
     for entry in _entries(error):
         yield f"error    {entry['message']}"
@@ -95,13 +94,7 @@ def _told(error: BaseException) -> str:
         return _of_the_parser(error)
     if isinstance(error, Stopped):
         return error.told
-    if isinstance(error, OSError):
-        place = f"{error.filename}: " if error.filename else ""
-        return f"{place}{(error.strerror or str(error)).lower()}"
-    if code_of(error) is not ExitCode.BUG:
-        return " ".join(str(error).split())
-    told = " ".join(f"{type(error).__name__}: {error}".split())
-    return f"this is a bug in cfmkit: {told}; -vv shows where"
+    return errors.sentence_of(error)
 
 
 def _of_the_parser(error: Any) -> str:

@@ -11,8 +11,10 @@ ROOT = Path(__file__).parents[2] / "cfmkit"
 
 LAYERS = (
     ("cli", "__main__"),
+    ("batches",),
+    ("runs",),
     ("report",),
-    ("api", "specfile", "keys"),
+    ("api", "recordings", "specfile", "keys"),
     ("plots", "export", "studies", "experiment"),
     ("families",),
     ("beams", "bodies"),

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
 
+import cfmkit
 from cfmkit.errors import ExitCode, UsageError
 from cfmkit.store import RunFolder, file_hash, origin
 from cfmkit.studies.batch import Entry, folders, message, requirements_table, results_table, sources
@@ -263,3 +265,20 @@ def test_what_was_saved_while_it_was_computed_is_not_kept(tmp_path, monkeypatch)
     Path("a.yaml").write_text(SPEC_TEXT)
     keep(replace(DONE, data=()), edit=lambda: Path("a.yaml").write_text("family: beam\n"))
     assert recalled() is None
+
+
+def test_python_runs_a_batch_and_reuses_what_an_earlier_one_has_finished(tmp_path):
+
+    configs = Path(__file__).parents[2] / "configs"
+    (tmp_path / "good.yaml").write_text((configs / "cam.yaml").read_text())
+    (tmp_path / "bad.yaml").write_text("cfmkit: 1\nfamily: cam\n")
+    first = cfmkit.batch(tmp_path, tmp_path / "out", plots=False, changes=["analysis.points=61"])
+    again = cfmkit.batch([tmp_path / "*.yaml"], tmp_path / "out", plots=False, changes=["analysis.points=61"])
+    assert first.exit_code == cfmkit.ExitCode.INVALID
+    assert [(one.name, one.status) for one in first.entries] == [("", "invalid"), ("sanchez-salinas-2022", "complete")]
+    assert [one.reused for one in first.entries + again.entries] == [False, False, False, True]
+    assert first.table["status"] == ("invalid", "complete")
+    assert first.summary == json.loads((tmp_path / "out" / "metrics.json").read_text())
+    assert (tmp_path / "out" / "good" / "design.yaml").exists()
+    with pytest.raises(cfmkit.UsageError, match="no such file"):
+        cfmkit.batch(tmp_path / "none.yaml", tmp_path / "out")

@@ -9,7 +9,7 @@ import pytest
 
 import cfmkit
 from cfmkit import api
-from cfmkit.cli.verbs.design import compute
+from cfmkit.runs import designed as compute
 from cfmkit.errors import ExitCode
 from cfmkit.families.base import Run
 from cfmkit.families.beam.shaping import multistart

@@ -46,8 +46,9 @@ class Options(Computing, Measuring, Common):
 def run(options: Options, terminal: Terminal) -> Answer:
     """Analyse a mechanism as it is: curve, metrics, requirements, figures; beside a measured curve if there is one."""
     from cfmkit.cli.runs import Verb, execute
+    from cfmkit.runs import analysed
 
-    work, inputs = compute, {}
+    work, inputs = analysed, {}
     if options.data is not None:
         from cfmkit.cli.measuring import data_record, read_measured
 
@@ -62,21 +63,14 @@ def run(options: Options, terminal: Terminal) -> Answer:
     return execute(Verb("analyze", "analysed", work, inputs), options, terminal)
 
 
-def compute(spec: Spec, run: Run) -> Report:
-    """Return the report on a mechanism as it is."""
-    from cfmkit import api
-    from cfmkit.report import report_on
-
-    return report_on(api.analyze(spec, run))
-
-
 def compute_beside(source: Measured, spec: Spec, run: Run) -> Report:
     """Return the report on a mechanism beside its measured curve."""
     from cfmkit.experiment.comparison import compare
     from cfmkit.experiment.supplements import causes_lines, comparison_data, comparison_files, comparison_lines
     from cfmkit.report import Supplement
+    from cfmkit.runs import analysed
 
-    found = compute(spec, run)
+    found = analysed(spec, run)
     if not found.result.curves:
         return found
     comparison = compare(found.result, source)

@@ -71,13 +71,13 @@ def run(options: Options, terminal: Terminal) -> Answer:
 
 def compute(options: Options, source: Measured, spec: Spec, run: Run) -> Report:
     """Return the report on the fitted mechanism."""
-    from cfmkit import api
     from cfmkit.experiment.parameters import split_bounds
     from cfmkit.numerics.fit import LOSSES
+    from cfmkit.recordings import calibrate
 
     loss = next(name for name in LOSSES if name == options.loss)
     bounds = split_bounds(options.bounds or ())
-    return report(api.calibrate(spec, source, options.fit, bounds=bounds, loss=loss), source)
+    return report(calibrate(spec, source, options.fit, bounds=bounds, loss=loss), source)
 
 
 def report(calibration: Calibration, source: Measured) -> Report:

@@ -44,7 +44,8 @@ class Options(OneSpec, Common):
 def run(options: Options, terminal: Terminal) -> Answer:
     """Write what is to be cut or printed, as it stands in a spec: DXF, SVG, CSV."""
     from cfmkit import api
-    from cfmkit.cli.runs import folder_of, provenance
+    from cfmkit.cli.runs import folder_of
+    from cfmkit.runs import provenance
     from cfmkit.specfile import bind, read_spec
     from cfmkit.store import RunFolder
 
@@ -54,7 +55,7 @@ def run(options: Options, terminal: Terminal) -> Answer:
         drawn, notes = api.drawn_files(spec, options.kerf, options.tolerance)
         for name, data in drawn.items():
             folder.write(name, data)
-        origin = provenance("export", spec, options.spec, terminal)
+        origin = provenance("export", spec, options.spec, terminal.arguments)
         manifest = folder.commit(origin | {"status": "complete", "exit_code": 0})
     return _answer(out, [*manifest.files, "manifest.json"], notes)
 

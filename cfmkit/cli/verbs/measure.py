@@ -111,9 +111,9 @@ def _folder(options: Options) -> str:
 
 
 def _report(options: Options) -> MeasureReport:
-    from cfmkit import api
+    from cfmkit.recordings import measure
 
-    return api.measure(
+    return measure(
         options.data,
         units=options.units,
         window=options.window,

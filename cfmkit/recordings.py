@@ -1,0 +1,162 @@
+"""The functions of ``import cfmkit`` that take recordings of a test rig: what they say, and models fitted to them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from cfmkit.api import resolve
+from cfmkit.errors import UsageError
+
+if TYPE_CHECKING:
+    import os
+    from collections.abc import Iterable, Mapping, Sequence
+
+    from cfmkit.api import AnySpec
+    from cfmkit.experiment.calibration import Calibration
+    from cfmkit.experiment.measured import Measured
+    from cfmkit.experiment.reading import Recording
+    from cfmkit.experiment.report import MeasureReport
+    from cfmkit.numerics.fit import Loss
+
+
+def measure(
+    data: str | os.PathLike[str] | Recording,
+    *,
+    units: str | None = None,
+    window: str | tuple[float, float] | None = None,
+    filter: str = "default",
+    target: str | float | None = None,
+    tare: str | float | None = None,
+    zero: str | float | None = None,
+    flip: Iterable[str] = (),
+    as_recorded: bool = False,
+    one_branch: bool = False,
+) -> MeasureReport:
+    """Return what a measured force curve says: branches, metrics raw and filtered, hysteresis, repeatability.
+
+    Parameters
+    ----------
+    data : path-like or Recording
+        A lab file with displacement and force, or angle and torque, perhaps time; or the arrays themselves.
+    units : str, optional
+        Units that the header does not name: ``"s=mm,F=N"``.
+    window : str or (float, float), optional
+        Where to measure: ``"40 mm:210 mm"``, or numbers in m or rad. Default: all that every branch covers.
+    filter : str
+        Low-pass of each branch: ``"2 Hz"``, ``"0.24 1/mm, order 3"``, ``"2 Hz, corrected"`` or ``"none"``.
+    target : str or float, optional
+        Force [N] or torque [N m] that it should have.
+    tare, zero : str or float, optional
+        What the sensors show without load [N or N m] and at the mechanism's zero [m or rad]; ``"start"``: at first.
+    flip : iterable of str
+        ``"force"``, ``"displacement"``, ``"torque"``, ``"angle"``: what is recorded with the other sign.
+    as_recorded : bool
+        Leave out neither spikes nor points next to reversals.
+    one_branch : bool
+        Accept a recording that has no way back.
+
+    Raises
+    ------
+    cfmkit.errors.UsageError
+        If the file cannot be read, or an option is malformed.
+    cfmkit.errors.DataError
+        If it holds no curve, or the window was not measured.
+
+    Examples
+    --------
+    >>> import cfmkit
+    >>> found = cfmkit.measure("configs/synthetic/cam_loop.csv", window="40 mm:120 mm", filter="2 Hz")
+    >>> round(found.numbers.filtered["force_mean[load]"].value, 2)
+    50.46
+    """
+    from cfmkit.experiment.corrections import corrected
+    from cfmkit.experiment.filtering import read_filter
+    from cfmkit.experiment.measured import LEFT_OUT, measured, require_loop
+    from cfmkit.experiment.options import read_target, read_window
+    from cfmkit.experiment.reading import Recording, read_recording
+    from cfmkit.experiment.report import report_on
+    from cfmkit.metrics import Frame
+
+    low_pass = filter if filter == "default" else read_filter(filter)
+    recording = data if isinstance(data, Recording) else read_recording(data, units)
+    place = read_window(window, recording.kind)
+    frame = Frame(target=read_target(target, recording.kind))
+    recording = corrected(recording, tare, zero, tuple(flip))
+    source = measured(recording, low_pass, () if as_recorded else LEFT_OUT)
+    if not one_branch:
+        require_loop(source)
+    return report_on(source, frame, place)
+
+
+def calibrate(
+    spec: AnySpec,
+    data: str | os.PathLike[str] | Recording | Measured,
+    fit: str | Sequence[str],
+    *,
+    bounds: Mapping[str, str | tuple[float, float]] | None = None,
+    loss: Loss = "soft_l1",
+    window: tuple[float, float] | None = None,
+    units: str | None = None,
+    tare: str | float | None = None,
+    zero: str | float | None = None,
+    flip: Iterable[str] = (),
+) -> Calibration:
+    """Return a specification whose model fits a measured curve: values, intervals, and what the data cannot tell.
+
+    Parameters
+    ----------
+    spec : Spec or path-like
+        Its values are the start; derived parts are written out first and keep their shape.
+    data : path-like, Recording or Measured
+        A lab file as for `measure`, or what was read of it.
+    fit : str or sequence of str
+        Dotted paths of numbers of the specification; ``data.force_offset``, ``data.displacement_offset`` and
+        ``data.drift`` are zeros of the recording.
+    bounds : mapping, optional
+        Path -> ``"low:high"`` with units, or two numbers in SI units.
+    loss : {"soft_l1", "linear", "huber", "cauchy"}
+        How large errors count.
+    window : (float, float), optional
+        Where to compare [m or rad]; default: ``analysis.window``.
+    units, tare, zero, flip
+        As for `measure`.
+
+    Raises
+    ------
+    cfmkit.errors.UsageError
+        If the file cannot be read, or there is nothing to fit at a path.
+    cfmkit.errors.DataError
+        If the data hold no curve, or one that cannot be compared.
+    cfmkit.errors.SolutionError
+        If the start has no solution, or the data do not determine the values.
+
+    Examples
+    --------
+    >>> import cfmkit
+    >>> spec = cfmkit.load("configs/cam.yaml", ["analysis.window=[40 mm, 120 mm]"])
+    >>> found = cfmkit.calibrate(spec, "configs/synthetic/cam_loop.csv", "mechanism.rolling_friction")
+    >>> round(found.spec.mechanism.rolling_friction, 5)
+    0.00224
+    """
+    from cfmkit.experiment.calibration import calibrate as fitted
+    from cfmkit.experiment.corrections import corrected
+    from cfmkit.experiment.measured import LEFT_OUT, Measured, measured, read_measured
+    from cfmkit.experiment.parameters import parameters, read_bounds
+    from cfmkit.experiment.reading import Recording
+    from cfmkit.metrics import Window
+    from cfmkit.numerics.fit import LOSSES
+
+    if loss not in LOSSES:
+        raise UsageError(f"--loss: there is no {loss!r}; there are {', '.join(LOSSES)}")
+    start = resolve(spec)
+    if isinstance(data, Recording):
+        source = measured(corrected(data, tare, zero, tuple(flip)), None, LEFT_OUT)
+    else:
+        source = data if isinstance(data, Measured) else read_measured(data, units, tare, zero, tuple(flip))
+    given = bounds or {}
+    texts = [f"{path}={ends}" for path, ends in given.items() if isinstance(ends, str)]
+    numbers = {path: ends for path, ends in given.items() if not isinstance(ends, str)}
+    limits = read_bounds(texts, start, source.recording) | numbers
+    paths = fit.split(",") if isinstance(fit, str) else fit
+    chosen = parameters(start, paths, limits, source.recording)
+    return fitted(start, source, chosen, loss, Window(*window) if window else None)
