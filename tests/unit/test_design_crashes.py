@@ -9,12 +9,12 @@ import pytest
 
 import cfmkit
 from cfmkit import api
-from cfmkit.runs import designed as compute
 from cfmkit.errors import ExitCode
 from cfmkit.families.base import Run
 from cfmkit.families.beam.shaping import multistart
 from cfmkit.families.slider_crank.flexures import search
 from cfmkit.results import Status
+from cfmkit.runs import designed as compute
 from cfmkit.studies.executors import Lost, serial
 
 if TYPE_CHECKING:
