@@ -178,6 +178,25 @@ def test_a_block_has_the_numbers_of_its_points(model, window):
         assert not wrong.any(), [(NAMES[m], block[m], values[m]) for m in np.flatnonzero(wrong)]
 
 
+@pytest.mark.parametrize("model", ["truss", "analytic"])
+@pytest.mark.parametrize("window", ["[2 mm, 4 mm]", "null"])
+def test_a_block_has_the_warnings_of_its_points(model, window):
+    spec = table_i(
+        f"analysis.fidelity={model}", f"analysis.window={window}", "analysis.points=101", "requirements=[]",
+        "mechanism.material={youngs_modulus: 1477 MPa, yield_strength: 30 MPa}", "analysis.flatness=5 %",
+    )  # fmt: skip
+    ranges = RANGES | {"mechanism.bistable.angle": "4 deg:17 deg", "mechanism.bistable.thickness": "0.4 mm:4 mm"}
+    plan = sampled(axes(spec, wishes(ranges), drawn=True), Draw("sobol", 64))
+    many = Work(Study(spec, plan.paths, metrics_of(spec, ["force_mean", "rise"])), plan)
+    assert many.vectorised
+    together, seen = run(many), set()
+    for k in range(0, 64, 2):
+        alone = many.study.evaluate(many.plan.point(k)).warnings
+        assert sorted({name for name, mask in together.row(k).warned.items() if mask[0]}) == sorted(set(alone)), k
+        seen |= set(alone)
+    assert len(seen) > (2 if model == "truss" else 6)
+
+
 def test_every_size_that_a_block_varies_is_one_of_the_spec():
     spec = table_i("mechanism.material={youngs_modulus: 1477 MPa}")
     for path in VARIED:

@@ -13,11 +13,22 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.families.base import BlockAnswer
+from cfmkit.families.vcfm.checks import PRESSED, ROUNDING
 from cfmkit.families.vcfm.parts import RIM, share_of
+from cfmkit.families.vcfm.preload import measured_stiffness_for
 from cfmkit.families.vcfm.springs import Diamond
 from cfmkit.families.vcfm.strip import Strip
 from cfmkit.families.vcfm.truss import TrussDiamond, TrussLeaf
-from cfmkit.families.vcfm.vbeam import LINEAR_ABOVE, VBeam
+from cfmkit.families.vcfm.vbeam import (
+    BISTABLE_ABOVE,
+    FLAT_BUCKLED_ABOVE,
+    LINEAR_ABOVE,
+    NEGATIVE_ABOVE,
+    RELIABLE,
+    STEEP,
+    VBeam,
+    overrated,
+)
 from cfmkit.families.vcfm.windows import flat_window
 
 if TYPE_CHECKING:
@@ -57,15 +68,18 @@ def analyze_block(spec: VcfmSpec, block: Block) -> BlockAnswer | None:
         return None
     values = [np.full(block.size, np.nan) for _ in block.measures]
     done = _sound(spec, block, names)
+    warnings: dict[str, NDArray[np.bool_]] = {}
     for chosen in _slabs(np.flatnonzero(done), spec.analysis.points):
         slab = Slab.of(spec, {path: np.asarray(item)[chosen] for path, item in block.values.items()}, len(chosen))
         for measure, found in zip(block.measures, values, strict=True):
             found[chosen] = _measured(slab, measure)
             if measure.name in METRICS:
                 done[chosen] &= slab.spread(measure.window).mean > 0
+        for name, mask in warned(spec, slab).items():
+            warnings.setdefault(name, np.zeros(block.size, dtype=bool))[chosen] = mask
     named = [{"load" if one.name in METRICS else "": found} for one, found in zip(block.measures, values, strict=True)]
     target = None if spec.design is None else np.full(block.size, spec.design.force)
-    return BlockAnswer(done, tuple(named), target)
+    return BlockAnswer(done, tuple(named), target, warnings=warnings)
 
 
 def _applies(spec: VcfmSpec, block: Block) -> bool:
@@ -258,3 +272,81 @@ SCALARS: dict[str, Callable[[Slab], Any]] = {
     "window_end": lambda slab: slab.window[1][:, None],
     "window_length": _window_length,
 }
+
+
+@np.errstate(all="ignore")
+def warned(spec: VcfmSpec, slab: Slab) -> dict[str, NDArray[np.bool_]]:
+    """Return the names of findings, each with which designs of a slab have it, (k,) of bool."""
+    leaf, spring, about = slab.leaf.strip, slab.spring.strip, spec.mechanism.bistable
+    size, paper, travel = len(slab.force), spec.analysis.fidelity == "truss", float(slab.grid[-1])
+    q, rise = leaf.slenderness, leaf.rise
+    top, bottom = _extremes(slab, *_window(spec, slab))
+    alone = slab.force - slab.spring.force(slab.grid)
+    end = np.asarray(slab.leaf.linear[1])
+    rises = slab.force[:, -1:] - _at(slab, np.broadcast_to(end, (size, 1)))
+    found = {
+        "truss_law": np.array(paper),
+        "no_negative_stiffness": (q < NEGATIVE_ABOVE) & (not paper),
+        "no_linear_region": (q >= NEGATIVE_ABOVE) & (q <= LINEAR_ABOVE) & (not paper),
+        "not_flat": (top > 0) & ((top - bottom) / top > slab.flatness),
+        "force_reversal": bottom <= 0,
+        "bistable": (q > BISTABLE_ABOVE) & (np.diff(alone) < 0).any(axis=1, keepdims=True),
+        "overload": (travel > end * (1 + ROUNDING)) & (rises > slab.flatness * np.abs(slab.force[:, -1:])),
+        "asymmetric_buckling": np.array(not about.guided),
+        "out_of_plane_buckling": leaf.width < 2.0 * leaf.thickness,
+        "imperfection": np.array(about.waviness > 0),
+        "theory_range": (
+            (leaf.angle > STEEP)
+            | (travel > RELIABLE * rise * (1 + ROUNDING))
+            | (spring.angle > STEEP)
+            | (travel / (2.0 * spring.length) > PRESSED)
+        )
+        & (not paper),
+        "overstressed": _overstressed(spec, slab),
+        "measured_contradiction": np.array(False),
+    }
+    if (told := spec.analysis.measured) is not None:
+        apart = np.abs(told.positive_stiffness / measured_stiffness_for(told.force, rise) - 1.0)
+        found["measured_contradiction"] = (q >= FLAT_BUCKLED_ABOVE) & (apart > slab.flatness)
+    return {name: np.ravel(np.broadcast_to(mask, (size, 1))) for name, mask in found.items()}
+
+
+def _overstressed(spec: VcfmSpec, slab: Slab) -> NDArray[np.bool_]:
+    allowed = spec.mechanism.allowable_stress
+    if allowed is None:
+        return np.array(False)
+    leaves, spring = (np.asarray(part.stress(slab.grid[None, :])) for part in (slab.leaf, slab.spring))
+    largest = np.maximum(leaves.max(axis=1, keepdims=True), spring.max(axis=1, keepdims=True))
+    return np.asarray(largest > allowed * (1 + overrated(slab.leaf.strip.angle)))
+
+
+def _window(spec: VcfmSpec, slab: Slab) -> tuple[FloatArray, FloatArray]:
+    """Return the ends of the windows in which forces are compared, (k, 1) [m]: as `Solution.window` has them."""
+    size, travel = len(slab.force), float(slab.grid[-1])
+    if spec.analysis.window is not None:
+        low, high = (np.full((size, 1), float(end)) for end in spec.analysis.window)
+        return low, high
+    first, last = (np.broadcast_to(end, (size, 1)) for end in slab.leaf.linear)
+    start, stop = (end[:, None] for end in slab.window)
+    straight, flat = np.isfinite(first) & (first < travel), np.isfinite(start)
+    low = np.where(straight, first, np.where(flat, start, 0.0))
+    return low, np.where(straight, np.minimum(last, travel), np.where(flat, stop, travel))
+
+
+def _extremes(slab: Slab, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the largest and smallest force in windows, with their interpolated ends, (k, 1) [N]."""
+    inside = (slab.grid > low) & (slab.grid < high)
+    ends = np.hstack([_at(slab, low), _at(slab, high)])
+    force = np.hstack([np.where(inside, slab.force, np.nan), ends])
+    known = np.isfinite(force)
+    top, bottom = np.where(known, force, -np.inf), np.where(known, force, np.inf)
+    return top.max(axis=1, keepdims=True), bottom.min(axis=1, keepdims=True)
+
+
+def _at(slab: Slab, place: FloatArray) -> FloatArray:
+    """Return the forces at one place of each design between its samples, (k, 1) [N]; NaN beyond them."""
+    grid = slab.grid
+    before = np.clip(np.searchsorted(grid, place) - 1, 0, len(grid) - 2)
+    share = (place - grid[before]) / (grid[before + 1] - grid[before])
+    low, high = (np.take_along_axis(slab.force, before + k, 1) for k in (0, 1))
+    return np.asarray(np.where((place >= grid[0]) & (place <= grid[-1]), low + share * (high - low), np.nan))
