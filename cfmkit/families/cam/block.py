@@ -4,22 +4,27 @@ Such a cam carries its roller along s = (x - x0)^2 / 2A, so that the state at ev
 is explicit, and whole arrays of designs are one array operation. The formulas are those
 of `cam_profile` and `statics`, in the same order, for a cam with its own brace and
 roller, without weight. An undercut cam is one of these from the end of its corner on (`block_corner`).
+One cut cam with other braces, rollers and springs around it has a solver of its own (`block_built`).
 Everything else (a stroke that the brace does not reach, a jam) is left to the model of one cam.
 """
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cfmkit.families.base import BlockAnswer
+from cfmkit.families.cam.block_built import BuiltSlab
 from cfmkit.families.cam.block_corner import CornerSlab, shapes
 from cfmkit.families.cam.block_forces import Designs, Slab
-from cfmkit.families.cam.block_measures import BRANCHES, CYCLES, KNOWN, WINDOWED, measured
+from cfmkit.families.cam.block_measures import BRANCHES, CYCLES, KNOWN, KNOWN_OF_BUILT, WINDOWED, measured
+from cfmkit.families.cam.build import assemble
+from cfmkit.families.refusals import CannotBuild
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterable, Iterator
 
     from numpy.typing import NDArray
 
@@ -56,16 +61,26 @@ def analyze_block(spec: CamSpec, block: Block) -> BlockAnswer | None:
     block : Block
         The variants and the measures.
     """
-    names = [measure.name for measure in block.measures]
-    if not _applies(spec, block) or not set(names) <= KNOWN:
-        return None
-    designs = _designs(spec, block)
+    names = {measure.name for measure in block.measures}
+    settings = spec.analysis.points, "contact_force_max" in names, spec.analysis.band
+    if _applies(spec, block) and names <= KNOWN:
+        designs = _designs(spec, block)
+        return _answer(spec, block, designs, (*_plain(designs, settings), *_undercut(designs, settings)))
+    if _one_cam(spec, block) and names <= KNOWN_OF_BUILT:
+        built = _designs_around(spec, block)
+        return _answer(spec, block, built, _around(spec, built, settings))
+    return None
+
+
+def _answer(
+    spec: CamSpec, block: Block, designs: Designs, slabs: Iterable[tuple[NDArray[np.intp], Slab]]
+) -> BlockAnswer:
+    """Return what is asked, from designs that are worked on together: their places, and the designs."""
     done = np.zeros(block.size, dtype=bool)
     values = [_empty(measure.name, block.size) for measure in block.measures]
-    settings = spec.analysis.points, "contact_force_max" in names, spec.analysis.band
     warnings: dict[str, NDArray[np.bool_]] = {}
     limit = spec.mechanism.springs.max_elongation
-    for chosen, cams in (*_plain(designs, settings), *_undercut(designs, settings)):
+    for chosen, cams in slabs:
         done[chosen] = cams.solved
         for name, warned in cams.warned(limit):
             warnings.setdefault(name, np.zeros(block.size, dtype=bool))[chosen] = warned
@@ -93,9 +108,10 @@ def _undercut(designs: Designs, settings: Settings) -> Iterator[tuple[NDArray[np
             yield chosen[kept], slab.with_shapes(there, place[which[kept]])
 
 
-def _applies(spec: CamSpec, block: Block) -> bool:
+def _symmetric_closed(spec: CamSpec) -> bool:
+    """Return whether the cam is cut for no friction and no weight, and runs so, both sides alike."""
     mechanism, profile = spec.mechanism, spec.mechanism.profile
-    plain = (
+    return (
         spec.fidelity == "quasi-static"
         and not spec.gravity
         and not (mechanism.contact or mechanism.left or mechanism.errors or profile.file)
@@ -104,10 +120,14 @@ def _applies(spec: CamSpec, block: Block) -> bool:
         and profile.offset == 0
         and spec.analysis.path_method == "quadrature"
         and spec.analysis.origin == "path-start"
-        and spec.analysis.travel is None
         and spec.analysis.manufacturing is None
         and profile.stroke is not None
     )
+
+
+def _applies(spec: CamSpec, block: Block) -> bool:
+    mechanism = spec.mechanism
+    plain = _symmetric_closed(spec) and spec.analysis.travel is None
     if not plain or not set(block.values) <= set(VARIED):
         return False
     if isinstance(mechanism.springs.stiffness, tuple) or (spec.design is None and "design.force" in block.values):
@@ -149,6 +169,60 @@ def _designs(spec: CamSpec, block: Block) -> Designs:
     force = 4.0 * full["stiffness"] * full["constant"]
     target = given.get("target", force if spec.design is None else np.full(block.size, spec.design.force))
     return Designs(**(full | {"target": target}))
+
+
+_AROUND = {path: name for path, name in VARIED.items() if name in ("brace", "x0", "radius", "friction", "stiffness")}
+_SPRING = re.compile(r"mechanism\.springs\.stiffness\.(\d+)")
+
+
+def _one_cam(spec: CamSpec, block: Block) -> bool:
+    """Return whether all variants are built around one cam that is cut, with parts of their own."""
+    mechanism, profile, travel = spec.mechanism, spec.mechanism.profile, spec.analysis.travel
+    fixed = None not in (profile.stroke, profile.brace_length, profile.rest_half_width, profile.roller_radius)
+    if travel is None or not fixed or not _symmetric_closed(spec):
+        return False
+    listed = isinstance(mechanism.springs.stiffness, tuple)
+    known = all(_SPRING.fullmatch(path) if listed and "stiffness" in path else path in _AROUND for path in block.values)
+    windows = [measure.window for measure in block.measures if measure.window]
+    return known and all(low >= 0 and high <= travel for low, high in windows)
+
+
+def _designs_around(spec: CamSpec, block: Block) -> Designs:
+    """Return the parts around a cam; `x0` is where their springs are at rest."""
+    mechanism, profile = spec.mechanism, spec.mechanism.profile
+    given = {_AROUND[path]: np.asarray(values, float) for path, values in block.values.items() if path in _AROUND}
+    springs = mechanism.springs.stiffness
+    each = springs if isinstance(springs, tuple) else (springs,)
+    total, number = np.zeros(block.size), 1 if isinstance(springs, tuple) else mechanism.springs.count or 1
+    for index, stated in enumerate(each):
+        one = block.values.get(f"mechanism.springs.stiffness.{index}", given.get("stiffness", stated))
+        total = total + np.where(np.asarray(one, float) > 0, one, np.nan)
+    values: dict[str, Any] = {
+        "brace": mechanism.brace_length,
+        "x0": mechanism.rest_half_width,
+        "radius": mechanism.roller_radius,
+        "friction": mechanism.rolling_friction,
+    }
+    full = {name: np.broadcast_to(np.float64(value), block.size) for name, value in values.items()} | given
+    full |= {"stiffness": total * number, "constant": np.full(block.size, profile.force_constant)}
+    force = 4.0 * full["stiffness"] * full["constant"]
+    target = force if spec.design is None else np.full(block.size, spec.design.force)
+    return Designs(**(full | {"stroke": np.full(block.size, profile.stroke), "target": target}))
+
+
+def _around(spec: CamSpec, designs: Designs, settings: Settings) -> Iterator[tuple[NDArray[np.intp], Slab]]:
+    """Yield (places, mechanisms around the specification's cam), few at a time; none if there is no such cam."""
+    try:
+        cam = assemble(spec)
+    except CannotBuild:
+        return
+    profile, reach = cam.profile, float(spec.analysis.travel or 0.0)
+    end = profile.end + np.abs(designs.radius - profile.roller_radius)
+    fits = (designs.radius > 0) & (designs.brace > 1.001 * end) & (designs.x0 > 0) & (designs.stiffness > 0)
+    fits &= (designs.friction >= 0) & (designs.friction < 1) & (cam.shortfall is None)
+    for chosen in _slabs(np.flatnonzero(fits), settings[0]):
+        slab = BuiltSlab(designs.take(chosen), *settings).with_cam(profile, reach)
+        yield chosen, slab
 
 
 def _slabs(chosen: NDArray[np.intp], points: int) -> list[NDArray[np.intp]]:

@@ -162,3 +162,21 @@ WINDOWED = frozenset((*METRICS, *CYCLES, *RANGES, RMS))
 
 KNOWN = WINDOWED | frozenset(DEFINITIONS)
 """Everything that can be asked."""
+
+KNOWN_OF_BUILT = frozenset(
+    (
+        *METRICS,
+        RMS,
+        "hysteresis_area",
+        "force_constant",
+        "spring_stiffness",
+        "theoretical_force",
+        "undercut_travel",
+        "spring_elongation_max",
+        "contact_force_max",
+        "pressure_angle_max",
+        "brace_angle_max",
+        "friction_half_gap_max",
+    )
+)
+"""What can be asked of mechanisms around one cam that is cut for other parts."""
