@@ -51,7 +51,7 @@ class Verbs(TyperGroup):
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """Find the verb that the arguments begin with."""
-        if args and args[0] not in names() and not args[0].startswith("-"):
+        if args and args[0] not in names() and not args[0].startswith("-") and not ctx.resilient_parsing:
             ctx.fail(_unknown(args[0]))
         return super().resolve_command(ctx, args)
 
@@ -121,6 +121,6 @@ def parse(app: typer.Typer, arguments: list[str]) -> Request | None:
 
 def program(callback: Callable[..., Any], text: str, epilog: str) -> typer.Typer:
     """Return the program: the group of all verbs, with what stands before them as `callback`."""
-    app = typer.Typer(cls=Verbs, **_STYLE)
+    app = typer.Typer(cls=Verbs, **(_STYLE | {"add_completion": True}))
     app.callback(invoke_without_command=True, help=text, epilog=epilog)(callback)
     return app

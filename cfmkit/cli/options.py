@@ -7,8 +7,16 @@ from typing import Annotated
 
 import typer
 
+from cfmkit.cli import completion
+
 SpecFile = Annotated[
-    str, typer.Argument(metavar="SPEC", help="YAML file of one mechanism; - reads standard input.", show_default=False)
+    str,
+    typer.Argument(
+        metavar="SPEC",
+        help="YAML file of one mechanism; - reads standard input.",
+        show_default=False,
+        autocompletion=completion.specs,
+    ),
 ]
 OutFolder = Annotated[
     str | None,

@@ -326,3 +326,30 @@ def test_a_kerf_or_tolerance_that_makes_no_sense_is_refused(cli, cam, option, va
     assert done.code == code
     assert len(done.err.splitlines()) == 1
     assert not (cli.folder / "cfm-out").exists()
+
+
+def completed(cli, words):
+    """Return what bash is told to complete the last of some words with."""
+    typed = {"_CFMKIT_COMPLETE": "complete_bash", "COMP_WORDS": words, "COMP_CWORD": str(words.count(" "))}
+    return set(cli(**typed).out.split())
+
+
+def test_a_shell_completes_verbs_families_topics_and_files(cli, cam):
+    (cli.folder / "data.csv").touch()
+    (cli.folder / "more").mkdir()
+    assert completed(cli, "cfmkit sw") == {"sweep"}
+    assert completed(cli, "cfmkit new ") == set(families.names())
+    assert completed(cli, "cfmkit schema v") == {"vcfm"}
+    assert {"materials", "metrics"} < completed(cli, "cfmkit show m")
+    assert completed(cli, "cfmkit show force_rip") == {"force_ripple"}
+    for verb in ("analyze", "design", "check", "batch", "sweep", "sensitivity", "export"):
+        assert completed(cli, f"cfmkit {verb} ") == {cam, "more/"}
+    assert completed(cli, "cfmkit measure d") == {"data.csv"}
+    assert completed(cli, "cfmkit analyze nothing-begins-so") == set()
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_the_completion_of_a_shell_can_be_shown_and_installed(cli, shell):
+    assert {"--install-completion", "--show-completion"} <= set(cli("--help").out.split())
+    script = cli(**{"_CFMKIT_COMPLETE": f"source_{shell}"})
+    assert "_CFMKIT_COMPLETE" in script.out

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+from cfmkit.cli import completion
 from cfmkit.cli.answer import Answer
 from cfmkit.cli.options import Changing, Common, Fidelity, NoPlots, Quiet, Seed
 from cfmkit.cli.studies import Fresh, Jobs, Timeout
@@ -24,6 +25,7 @@ Specs = Annotated[
         metavar="SPEC...",
         help="YAML files, folders, or quoted patterns such as 'configs/**/*.yaml'.",
         show_default=False,
+        autocompletion=completion.specs,
     ),
 ]
 VerbOption = Annotated[

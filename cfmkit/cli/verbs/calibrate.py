@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from cfmkit.cli import completion
 from cfmkit.cli.measuring import Measuring
 from cfmkit.cli.options import Common, Computing
 
@@ -23,7 +24,13 @@ if TYPE_CHECKING:
 PLACE = 34
 
 DataFile = Annotated[
-    str, typer.Argument(metavar="DATA.csv", help="The measured curve, as for `measure`.", show_default=False)
+    str,
+    typer.Argument(
+        metavar="DATA.csv",
+        help="The measured curve, as for `measure`.",
+        show_default=False,
+        autocompletion=completion.tables,
+    ),
 ]
 Fit = Annotated[
     str,

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from cfmkit.cli import completion
 from cfmkit.cli.answer import Answer
 from cfmkit.cli.failures import answer_to
 from cfmkit.cli.options import Changing, Common, Quiet
@@ -23,7 +24,13 @@ if TYPE_CHECKING:
 PLACE = 40
 
 SpecFiles = Annotated[
-    list[str], typer.Argument(metavar="SPEC...", help="YAML files; - reads standard input.", show_default=False)
+    list[str],
+    typer.Argument(
+        metavar="SPEC...",
+        help="YAML files; - reads standard input.",
+        show_default=False,
+        autocompletion=completion.specs,
+    ),
 ]
 
 

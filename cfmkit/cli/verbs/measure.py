@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from cfmkit.cli import completion
 from cfmkit.cli.answer import Answer
 from cfmkit.cli.measuring import Measuring, data_record
 from cfmkit.cli.options import Common, NoPlots, Quiet
@@ -24,7 +25,12 @@ PLACE = 32
 
 DataFile = Annotated[
     str,
-    typer.Argument(metavar="DATA.csv", help="Columns with displacement and force, perhaps time.", show_default=False),
+    typer.Argument(
+        metavar="DATA.csv",
+        help="Columns with displacement and force, perhaps time.",
+        show_default=False,
+        autocompletion=completion.tables,
+    ),
 ]
 MeasureFolder = Annotated[
     str | None,

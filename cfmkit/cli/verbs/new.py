@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from cfmkit.cli import completion
 from cfmkit.cli.answer import Answer
 from cfmkit.cli.options import Common
 from cfmkit.errors import visible
@@ -18,7 +19,13 @@ if TYPE_CHECKING:
 PLACE = 50
 
 FamilyName = Annotated[
-    str, typer.Argument(metavar="FAMILY", help="A family of mechanisms; `cfmkit show` lists them.", show_default=False)
+    str,
+    typer.Argument(
+        metavar="FAMILY",
+        help="A family of mechanisms; `cfmkit show` lists them.",
+        show_default=False,
+        autocompletion=completion.families,
+    ),
 ]
 OutFile = Annotated[
     str | None,

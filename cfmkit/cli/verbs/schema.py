@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from cfmkit.cli import completion
 from cfmkit.cli.answer import Answer
 from cfmkit.cli.options import Common
 
@@ -16,7 +17,13 @@ if TYPE_CHECKING:
 PLACE = 70
 
 FamilyName = Annotated[
-    str | None, typer.Argument(metavar="[FAMILY]", help="One family only; default: all.", show_default=False)
+    str | None,
+    typer.Argument(
+        metavar="[FAMILY]",
+        help="One family only; default: all.",
+        show_default=False,
+        autocompletion=completion.families,
+    ),
 ]
 
 

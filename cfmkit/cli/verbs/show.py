@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from cfmkit.cli import completion
 from cfmkit.cli.answer import Answer
 from cfmkit.cli.options import Common
 
@@ -26,6 +27,7 @@ Topic = Annotated[
         metavar="[FAMILY|units|metrics|materials|references|NAME]",
         help="What to explain: a topic, or anything by its name: pla, force_ripple, MPa; default: list what there is.",
         show_default=False,
+        autocompletion=completion.topics,
     ),
 ]
 
