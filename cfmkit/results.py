@@ -262,3 +262,11 @@ class Design:
         """Fall back to the status's sentence."""
         if not self.message:
             object.__setattr__(self, "message", self.status.value)
+
+    @property
+    def explanation(self) -> str:
+        """The message, with the keys that stand in the way of a design and the nearest values that do not."""
+        if self.spec is not None or not self.nearest_feasible:
+            return self.message
+        nearest = ", ".join(f"{path}: {value}" for path, value in self.nearest_feasible.items())
+        return f"{self.message}; nearest feasible: {nearest}"

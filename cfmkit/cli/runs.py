@@ -51,7 +51,9 @@ def _complaints(found: Report) -> list[str]:
     """Return what a user must hear who has asked to hear nothing else."""
     status = found.status
     if not status.usable:
-        return [f"error    {status.key.replace('_', ' ')}: {found.message}"]
+        design = found.design
+        told = design.explanation if design is not None and design.spec is None else found.message
+        return [f"error    {status.key.replace('_', ' ')}: {told}"]
     partial = [] if status.exit_code == 0 else [f"partial  {found.message}"]
     return [*partial, *(f"missed   {outcome.sentence.removesuffix(': missed')}" for outcome in found.missed)]
 

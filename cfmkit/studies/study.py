@@ -189,7 +189,7 @@ class Study:
             return windows_judged(record.analyze(spec, run))
         design = record.design(spec, run)
         if design.spec is None:
-            return Result(spec, design.status, design.message, warnings=design.warnings)
+            return Result(spec, design.status, design.explanation, warnings=design.warnings)
         result = windows_judged(record.analyze(design.spec, run))
         return replace(result, warnings=(*design.warnings, *result.warnings))
 

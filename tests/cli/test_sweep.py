@@ -354,3 +354,13 @@ def test_windows_in_shares_of_the_travel_follow_a_swept_stroke(cli, tmp_path):
     assert all(float(row["force_ripple [1]"]) > 0 for row in found)
     assert [(row["requirements_met"], row["message"]) for row in found] == [("true", "")] * 3
     assert json.loads((tmp_path / "out" / "metrics.json").read_text())["warnings"] == []
+
+
+def test_a_design_that_is_impossible_names_the_key_that_blocks_in_tables_and_when_quiet(cli, tmp_path):
+    short = ("--set", "mechanism.brace_length=60 mm", "--no-plots", "-o", "out")
+    key = "nearest feasible: mechanism.brace_length: more than 68 mm"
+    done = cli("design", str(CAM), *short, "-q")
+    assert done.code == 4
+    assert key in done.err
+    cli("sweep", str(CAM), "--design", "--vary", "design.force=[40 N, 50 N]", *short[:-1], "swept")
+    assert all(row["message"].endswith(key) for row in rows(tmp_path / "swept"))
