@@ -10,6 +10,7 @@ import numpy as np
 
 from cfmkit.beams.corotational import recheck as by_elements
 from cfmkit.families.slider_crank.flexures.chain import SLIDER, STRIP
+from cfmkit.families.slider_crank.flexures.pressing import Ending
 
 if TYPE_CHECKING:
     from cfmkit.curves import FloatArray
@@ -17,6 +18,9 @@ if TYPE_CHECKING:
     from cfmkit.families.slider_crank.flexures.pressing import Chain, Pressed
 
 Model = Literal["lumped", "beam"]
+
+NEAREST, RISING = 1e-5, 49
+"""Where the force is looked at while it comes up: from this share of the travel on, at so many places."""
 
 CHECKED = 6
 """Places at which the second opinion is asked for."""
@@ -137,6 +141,19 @@ class Printed:
         inside = (self.travel >= low) & (self.travel <= high)
         chosen = inside if inside.any() else np.ones(len(self.travel), dtype=bool)
         return float(self.force[chosen].mean())
+
+    @cached_property
+    def beginning(self) -> tuple[FloatArray, FloatArray]:
+        """Travel and force from rest on, at places that stand dense where the force comes up [m, N].
+
+        The points of the curve where the chain does not start from rest, or has no whole curve.
+        """
+        if self.travel[0] > 0.0 or self.pressed.ending is not Ending.COMPLETE:
+            return self.travel, self.force
+        found = self.chain.press(float(self.travel[-1]) * np.geomspace(NEAREST, 1.0, RISING), self.pressed.side)
+        if found.ending is not Ending.COMPLETE:
+            return self.travel, self.force
+        return found.travel, self.legs * found.force
 
     @cached_property
     def width_ratio(self) -> float:

@@ -20,7 +20,7 @@ def numbers(solution: Printed) -> Iterator[tuple[str, float | None, str]]:
     yield "kink", kink(solution.chain.pins), ""
     level = solution.level
     for name, share in (("run_in_95", 0.95), ("run_in_98", 0.98)):
-        place = first_at(solution.travel, solution.force, share * level)
+        place = run_in(solution, share * level)
         yield name, place, "" if place is not None else "the force does not reach it"
     yield "side_force_max", _largest(solution.side_force), ""
     yield "guide_moment_max", _largest(solution.guide_moment), ""
@@ -34,6 +34,23 @@ def numbers(solution: Printed) -> Iterator[tuple[str, float | None, str]]:
     why = "set 'analysis.recheck' to compute it"
     yield "recheck_force", None if check is None else check.force, why
     yield "recheck_stress", None if check is None else check.stress, why
+
+
+def run_in(solution: Printed, level: float) -> float | None:
+    """Return the travel at which the force first reaches a level [m], whatever the points of the curve.
+
+    The force comes up within a thousandth of the travel: it is looked at on a logarithmic scale of its own.
+    """
+    from scipy.interpolate import CubicSpline
+
+    from cfmkit.numerics.roots import bracketed_root
+
+    travel, force = solution.beginning
+    above = np.flatnonzero(force >= level)
+    if not len(above) or above[0] == 0 or travel[0] == 0.0:
+        return first_at(travel, force, level)
+    course, k = CubicSpline(np.log(travel), force - level), int(above[0])
+    return float(np.exp(bracketed_root(lambda at: float(course(at)), *np.log(travel[k - 1 : k + 1]).tolist())))
 
 
 def stress_stroke(solution: Printed) -> tuple[float | None, str]:
