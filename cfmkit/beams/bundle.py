@@ -140,18 +140,19 @@ class Bundle:
         stiff = [float(np.real(beam.section.rigidities(np.array([0.5]), 0.5)[0][0])) for beam in others]
         return np.append(lengths, far), np.append(middles, stiff)
 
-    def table(self, powers: Any, units: FloatArray) -> Any:
-        """Return the table of the plain beams at n places of the arc, (plain, n, 5), in units (4,) of all but angles.
+    def table(self, powers: Any, shares: Any, units: FloatArray) -> Any:
+        """Return the table of the plain beams at n rows of their steps, (plain, n, 6), in units (5,) of all but angles.
 
-        powers (m, n): of the places; see `cfmkit.beams.kernels.model.Model` for what the table holds.
+        powers (m, n), shares (n, 5): see `cfmkit.beams.discretise.Grid.rows`; `cfmkit.beams.kernels.model.Model` says
+        what the table holds.
         """
         if self._compliances is None:
             g = self.length
-            self._compliances = np.array([g, g / self.bending, g * self.stretch, g * self.slip]).T * units
+            self._compliances = np.array([g, g / self.bending, g * self.stretch, g * self.slip, g]).T * units
         kind = (self.coefficients if self.coefficients.dtype.kind == "c" else self._compliances).dtype
-        out = np.empty((len(self.plain), powers.shape[1], 5), dtype=kind)
+        out = np.empty((len(self.plain), powers.shape[1], 6), dtype=kind)
         np.matmul(self.coefficients, powers, out=out[:, :, 0])
-        out[:, :, 1:] = self._compliances[:, None]
+        np.multiply(self._compliances[:, None], shares, out=out[:, :, 1:])
         return out
 
 

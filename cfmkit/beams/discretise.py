@@ -11,7 +11,7 @@ import numpy as np
 
 from cfmkit.beams.beam import SAME
 from cfmkit.beams.kernels.model import TABLE_COLUMNS, Model
-from cfmkit.beams.kernels.rk8 import NODES, STAGES
+from cfmkit.beams.kernels.splitting import DRIFTS, KICKS, NODES, ROWS
 from cfmkit.beams.numbering import LINE, SLIDE, TURN
 from cfmkit.beams.section import Taper
 
@@ -19,12 +19,13 @@ if TYPE_CHECKING:
     from cfmkit.beams.layout import Layout
     from cfmkit.curves import FloatArray
 
+_GAUSS = np.polynomial.legendre.leggauss(5)
 PRESTRESS, LOADS = "prestress", "constant loads"  # what may be applied before the drive begins
 
 
 @dataclass(frozen=True)
 class Mesh:
-    """How many segments each beam has and how many Runge-Kutta steps a segment has."""
+    """How many segments each beam has and how many steps of the splitting a segment has."""
 
     segments: int = 2
     steps: int = 2
@@ -64,28 +65,26 @@ class Grid:
     beam_of_step: Any
     piece: Any
 
-    def stages(self, steps: Any) -> FloatArray:
-        """Return the parameters of all stages of some steps, one after the other."""
-        edges = self.edges[steps]
-        places: FloatArray = (edges[:, :1] + (edges[:, 1:] - edges[:, :1]) * NODES).ravel()
-        return places
+    def rows(self, count: int, beam: int) -> tuple[FloatArray, FloatArray]:
+        """Return what the rows of a beam's steps are to a shape whose parameter is the fraction of the arc length.
 
-    def powers(self, count: int, beam: int) -> FloatArray:
-        """Return the powers (count, n) of the parameters of all stages of a beam."""
-        known = self._powers.get((count, beam))
+        The powers (count, n) of the parameters of the kicks, and (n, 5) how much of the parameter the kicks take, the
+        drifts before them, twice the kicks again, and how far the kicks are from the start of their step: what the
+        table's columns but the angle are in units of the length and of the length times compliances.
+        """
+        known = self._rows.get((count, beam))
         if known is None:
-            places = self.stages(self.beam_of_step == beam)
-            known = self._powers[count, beam] = np.vander(places, count, increasing=True).T.copy()
+            edges = self.edges[self.beam_of_step == beam]
+            width = edges[:, 1:] - edges[:, :1]
+            places = (edges[:, :1] + width * NODES).ravel()
+            shares = np.stack([KICKS, DRIFTS, KICKS, KICKS, NODES], axis=-1)
+            powers = np.vander(places, count, increasing=True).T.copy()
+            known = self._rows[count, beam] = powers, (width[:, :, None] * shares).reshape(-1, 5)
         return known
 
     @cached_property
-    def _powers(self) -> dict[tuple[int, int], FloatArray]:
+    def _rows(self) -> dict[tuple[int, int], tuple[FloatArray, FloatArray]]:
         return {}
-
-    @cached_property
-    def width(self) -> FloatArray:
-        """Widths of the steps in the parameter."""
-        return np.ascontiguousarray(self.edges[:, 1] - self.edges[:, 0])
 
 
 def grid(layout: Layout, mesh: Mesh) -> Grid:
@@ -144,7 +143,7 @@ def _cut(breaks: list[tuple[FloatArray, FloatArray]], mesh: Mesh) -> Grid:
 
 
 def table(layout: Layout, cut: Grid, known: Any = None) -> Any:
-    """Return the reference angle, speed and compliances at the stages of all steps, dimensionless.
+    """Return what the drifts and kicks of all steps take, dimensionless: see `cfmkit.beams.kernels.model.Model`.
 
     `known` is the table of the layout that this one took fits over from: the rows of beams that are neither plain nor
     changed are taken over too.
@@ -152,10 +151,10 @@ def table(layout: Layout, cut: Grid, known: Any = None) -> Any:
     bundle, units = layout.bundle, layout.units
     plain: Any = None
     if bundle.plain:
-        plain = bundle.table(cut.powers(bundle.coefficients.shape[1], bundle.plain[0]), units[1:])
-        plain = plain.reshape(len(bundle.plain), -1, STAGES, TABLE_COLUMNS)
+        plain = bundle.table(*cut.rows(bundle.coefficients.shape[1], bundle.plain[0]), units[1:])
+        plain = plain.reshape(len(bundle.plain), -1, ROWS, TABLE_COLUMNS)
     if not bundle.others:
-        return plain.reshape(-1, STAGES, TABLE_COLUMNS)
+        return plain.reshape(-1, ROWS, TABLE_COLUMNS)
     blocks: list[Any] = [None] * len(bundle.beams)
     for place, number in enumerate(bundle.plain):
         blocks[number] = plain[place]
@@ -169,28 +168,48 @@ def _other(layout: Layout, name: str, cut: Grid, steps: Any, known: Any) -> Any:
     """Return the table of one beam in SI; what is known of it is not computed again."""
     if known is None or layout.known is None or layout.fits[name] is not layout.known.fits[name]:
         return _si_table(layout, name, cut, steps)
-    scales = layout.scales
-    units = np.array([1.0, scales.length, scales.length / scales.rigidity, *[scales.length / scales.force] * 2])
-    return known[steps] * units
+    return known[steps] / layout.units
 
 
 def _si_table(layout: Layout, name: str, cut: Grid, steps: Any) -> Any:
-    """Return the table of one beam in SI: angle, g, g L0/EI-like compliances before scaling."""
-    fitted, section = layout.fits[name], layout.network.beams[name].section
+    """Return the table of one beam in SI."""
     blocks = []
     pieces = cut.piece[steps]
     for piece in np.unique(pieces):
         own = steps[pieces == piece]
-        left, right = cut.edges[own, :1], cut.edges[own, 1:]
-        t = left + (right - left) * NODES
-        middle, inside = cut.middle[own[0]], cut.inside[own[0]]
-        angle, speed = fitted.angle(t, middle), fitted.speed(t, middle)
-        place = fitted.arc(t) if isinstance(section.thickness, Taper) else t
-        bending, axial, shear = section.rigidities(place, inside)
-        blocks.append(
-            np.stack(np.broadcast_arrays(angle, speed, speed / bending, speed * axial, speed * shear), axis=-1)
-        )
+        where = cut.middle[own[0]], cut.inside[own[0]]
+        blocks.append(si_rows(layout, name, cut.edges[own, :1], cut.edges[own, 1:], where))
     return np.concatenate(blocks)
+
+
+def si_rows(layout: Layout, name: str, left: FloatArray, right: FloatArray, where: tuple[float, float]) -> Any:
+    """Return the rows of steps on one smooth piece of a beam in SI, (n, rows, 6): see `Model.table`.
+
+    left, right: parameters (n, 1) at the ends of the steps; where: a parameter on the piece and the fraction of the
+    arc length there.
+    """
+    fitted, section, (middle, inside) = layout.fits[name], layout.network.beams[name].section, where
+    width = right - left
+    t = left + width * NODES
+    before = np.concatenate([left, t[:, :-1]], axis=1)
+    speed = fitted.speed(t, middle)
+    length = width * KICKS * speed
+    tapers = isinstance(section.thickness, Taper)
+    place = fitted.arc(t) if tapers else t
+    _, axial, shear = section.rigidities(place, inside)
+    if fitted.course.uniform:
+        drift = width * DRIFTS * speed
+        start = fitted.arc(before) if tapers else before
+        turn = drift * section.mean_compliance(start, place, inside)
+    else:  # along the shape's own parameter: the drifts are short: exact to rounding
+        half = 0.5 * (t - before)[..., None]
+        inner = before[..., None] + half * (1 + _GAUSS[0])
+        speeds = fitted.speed(inner, middle) * half * _GAUSS[1]
+        drift = speeds.sum(axis=-1)
+        bending = section.rigidities(fitted.arc(inner) if tapers else inner, inside)[0]
+        turn = (speeds / bending).sum(axis=-1)
+    columns = fitted.angle(t, middle), length, turn, length * axial, length * shear, np.cumsum(drift, axis=1)
+    return np.stack(np.broadcast_arrays(*columns), axis=-1)
 
 
 def model(layout: Layout, mesh: Mesh, ramp: str = "") -> Model:
@@ -217,7 +236,6 @@ def assemble_model(layout: Layout, cut: Grid, values: Any, ramp: str = "") -> Mo
         springs = _relaxed(layout, springs)
     return Model(
         table=values,
-        width=cut.width,
         segment_step=cut.segment_step,
         beam_segment=cut.beam_segment,
         beam_end=plan.beam_end,

@@ -151,9 +151,9 @@ class Layout:
 
     @cached_property
     def units(self) -> Any:
-        """Factors that make the columns of a table dimensionless, (5,): angle, speed and speed times compliances."""
+        """Factors that make the columns of a table dimensionless, (6,): see `cfmkit.beams.kernels.model.Model`."""
         length, force = self.scales.length, self.scales.force
-        return np.array([1.0, 1 / length, self.scales.rigidity / length, force / length, force / length])
+        return np.array([1.0, 1 / length, self.scales.rigidity / length, force / length, force / length, 1 / length])
 
     def _scales(self) -> Scales:
         lengths, middles = self.bundle.sizes(self.fits if self.bundle.others else None)

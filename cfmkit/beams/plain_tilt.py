@@ -14,7 +14,7 @@ import numpy as np
 
 from cfmkit.beams.beam import GAUSS
 from cfmkit.beams.bundle import is_plain, powers
-from cfmkit.beams.kernels.model import Tilt
+from cfmkit.beams.kernels.model import TABLE_COLUMNS, Tilt
 from cfmkit.beams.numbering import NOWHERE
 
 if TYPE_CHECKING:
@@ -64,13 +64,14 @@ class PlainTilt:
         layout, count = self.layout, len(self.origin)
         beams = self.coefficients.shape[1]
         touched = self.coefficients.any(axis=2) | self.sections.any(axis=2) | (self.rotation != 0) | (self.length != 0)
-        places, rest = cut.powers(self.coefficients.shape[2], 0).T, self._compliances()
+        powers, shares = cut.rows(self.coefficients.shape[2], 0)
+        places, rest = powers.T, self._compliances()
         own = [np.arange(count) if every else np.flatnonzero(touched[:, e]) for e in range(beams)]
         blocks = []
         for e, variables in enumerate(own):
-            block = np.empty((len(places), 5, len(variables)))
+            block = np.empty((len(places), TABLE_COLUMNS, len(variables)))
             block[:, 0] = places @ self.coefficients[variables, e].T + self.rotation[variables, e]
-            block[:, 1:] = rest[variables, e].T
+            block[:, 1:] = shares[:, :, None] * rest[variables, e].T
             blocks.append(block.ravel())
         first = np.cumsum([0, *map(len, own)])
         shifts: Any = self.origin.any(axis=2) | self.arm.any(axis=2)
@@ -81,7 +82,7 @@ class PlainTilt:
             variable=np.concatenate(own),
             first=first,
             table=np.concatenate(blocks),
-            begin=first[:-1] * (len(places) * 5),
+            begin=first[:-1] * (len(places) * TABLE_COLUMNS),
             moves=shifts.any(axis=1),
             shifts=shifts,
             touches=(touched | shifts[:, layout.beam_end].any(axis=2)).T,
@@ -96,7 +97,7 @@ class PlainTilt:
         )
 
     def _compliances(self) -> FloatArray:
-        """Return the derivatives of speed and of the three compliances times speed, (k, b, 4), dimensionless."""
+        """Return the derivatives of the length, of it times the three compliances, and of it again, (k, b, 5)."""
         bundle, scales = self.layout.bundle, self.layout.scales
         young, width, thickness, _, _, poisson, factor = bundle.sections
         by = self.sections
@@ -105,8 +106,8 @@ class PlainTilt:
         pull = longer - stiff
         slide = pull + by[..., 5] / (1 + poisson) - by[..., 6] / factor
         g, force = bundle.length / scales.length, scales.force
-        out = np.empty((*longer.shape, 4))
-        out[..., 0] = g * longer
+        out = np.empty((*longer.shape, 5))
+        out[..., 0] = out[..., 4] = g * longer
         out[..., 1] = g * scales.rigidity / bundle.bending * (pull - 2 * by[..., 2] / thickness)
         out[..., 2] = g * force * bundle.stretch * pull
         out[..., 3] = g * force * bundle.slip * slide

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.beams.discretise import Mesh, assemble_model, grid, table
-from cfmkit.beams.kernels.rk8 import NODES, WEIGHTS
+from cfmkit.beams.discretise import Mesh, assemble_model, grid, si_rows, table
+from cfmkit.beams.kernels.model import TABLE_COLUMNS
+from cfmkit.beams.kernels.splitting import ROWS
 
 if TYPE_CHECKING:
     from cfmkit.beams.layout import Layout
@@ -79,9 +80,8 @@ class Sampler:
 
     def rest(self, m: Any) -> Any:
         """Return the rows' places before any load, (rows, 2), dimensionless; for tilted models too."""
-        turn, speed = m.table[:, :, 0], m.table[:, :, 1]
-        runs = np.stack([(f(turn) * speed) @ WEIGHTS for f in (np.cos, np.sin)], axis=1)
-        runs *= (self.cut.edges[:, 1] - self.cut.edges[:, 0])[:, None]
+        turn, length = m.table[:, :, 0], m.table[:, :, 1]
+        runs = np.stack([(f(turn) * length).sum(axis=1) for f in (np.cos, np.sin)], axis=1)
         whole = np.result_type(runs, m.place_origin)
         out = np.empty((len(runs) + len(m.segment_step) - 1, 2), dtype=whole)
         for beam, place in enumerate(m.beam_end[:, 0]):
@@ -111,12 +111,10 @@ class Sampler:
         from cfmkit.beams.kernels import entry
 
         count, m = len(t), self.model
-        width = t - rows.t[start]
-        values = self.stage_table(beam, rows.step[start], rows.t[start][:, None] + np.outer(width, NODES))
+        values = self.step_table(beam, rows.step[start], rows.t[start], t)
         load = self.load(beam, points)
         single = m._replace(
             table=values,
-            width=width,
             segment_step=np.arange(count + 1),
             beam_segment=np.arange(count + 1),
             beam_end=np.zeros((count, 2), np.int64),
@@ -133,21 +131,16 @@ class Sampler:
         own = self.model.line_load[beam]
         return own[0] + np.outer(self.drive[points], own[1])
 
-    def stage_table(self, beam: int, step: Any, t: FloatArray) -> Any:
-        """Return the table of `cfmkit.beams.kernels.model.Model` at parameters t (k, stages) on steps (k,)."""
-        layout, cut, scales = self.layout, self.cut, self.layout.scales
-        name = list(layout.network.beams)[beam]
-        fitted, section = layout.fits[name], layout.network.beams[name].section
-        place, out, pieces = self.place(beam, t), np.empty((*t.shape, 5)), cut.piece[step]
+    def step_table(self, beam: int, step: Any, left: FloatArray, right: FloatArray) -> Any:
+        """Return the table of `cfmkit.beams.kernels.model.Model` from one parameter (k,) to another, on steps (k,)."""
+        cut, name = self.cut, list(self.layout.network.beams)[beam]
+        out, pieces = np.empty((len(step), ROWS, TABLE_COLUMNS)), cut.piece[step]
         for piece in np.unique(pieces):
             own = pieces == piece
             first = int(step[own][0])
-            speed = fitted.speed(t[own], cut.middle[first]) / scales.length
-            bending, axial, shear = section.rigidities(place[own], cut.inside[first])
-            out[own, :, 0], out[own, :, 1] = fitted.angle(t[own], cut.middle[first]), speed
-            out[own, :, 2] = speed / bending * scales.rigidity
-            out[own, :, 3], out[own, :, 4] = speed * axial * scales.force, speed * shear * scales.force
-        return out
+            where = cut.middle[first], cut.inside[first]
+            out[own] = si_rows(self.layout, name, left[own, None], right[own, None], where)
+        return out * self.layout.units
 
     def place(self, beam: int, t: FloatArray) -> FloatArray:
         """Return the fractions of the arc length at parameters."""

@@ -123,6 +123,14 @@ class Section:
         shear = (1.0 if self.shear else 0.0) / (modulus * area)
         return bending, axial, shear
 
+    def mean_compliance(self, start: Any, end: Any, inside: float) -> Any:
+        """Return the mean of 1/EI [1/(N m2)] over the arc between places on the piece that holds `inside`.
+
+        With a thickness that is linear between a and b the mean of 1/t^3 is (a + b) / (2 a^2 b^2).
+        """
+        a, b = self.thickness_at(start, inside), self.thickness_at(end, inside)
+        return 6 * (a + b) / (self.youngs_modulus * self.width * (a * b) ** 2)
+
 
 def _positive(name: str, value: Any) -> None:
     if not (0 < value.real < inf and abs(value.imag) < inf):

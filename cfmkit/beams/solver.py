@@ -11,7 +11,6 @@ from cfmkit.beams.discretise import PRESTRESS, Mesh, assemble_model, grid, table
 from cfmkit.beams.kernels import entry
 from cfmkit.beams.kernels.march import INFO
 from cfmkit.beams.kernels.newton import SOLVED
-from cfmkit.beams.kernels.rk8 import WEIGHTS
 
 if TYPE_CHECKING:
     from cfmkit.beams.kernels.model import Model
@@ -101,7 +100,7 @@ class Solver:
         fine.mesh, fine.tolerance = self.mesh.finer(), tolerance
         fine.cut = cut = grid(self.layout, fine.mesh)
         fine.table = table(self.layout, cut)
-        fine.model = self.model._replace(table=fine.table, width=cut.width, segment_step=cut.segment_step)
+        fine.model = self.model._replace(table=fine.table, segment_step=cut.segment_step)
         fine.limits = np.array([tolerance, float(ITERATIONS)])
         return fine
 
@@ -128,9 +127,9 @@ class Solver:
 
     def unstressed(self) -> FloatArray:
         """Return the unknowns of the network at rest, before any load or displacement."""
-        m, cut, y = self.model, self.cut, np.zeros(self.size)
+        m, y = self.model, np.zeros(self.size)
         turns = np.exp(1j * m.table[:, :, 0]) * m.table[:, :, 1]
-        runs = np.add.reduceat((turns @ WEIGHTS) * cut.width, m.segment_step[:-1])
+        runs = np.add.reduceat(turns.sum(axis=1), m.segment_step[:-1])
         places = m.beam_end[:, 0]
         first = (m.place_origin[places] + m.place_arm[places]) @ np.array([1.0, 1j])
         before = np.cumsum(runs) - runs

@@ -50,7 +50,7 @@ def _drive_column(m, e, steps, start, load, dp):
     h = 1e-30
     tilted = (load[0] + 1j * h * m.line_load[e, 1, 0], load[1] + 1j * h * m.line_load[e, 1, 1])
     begin = (start[0] + 0j, start[1] + 0j, start[2] + 0j, start[3] + 0j)
-    plain_flow(m.table, m.width, steps, begin, tilted, states)
+    plain_flow(m.table, steps, begin, tilted, states)
     last = states[-1]
     dp[0], dp[1], dp[2] = last[2].imag / h, last[3].imag / h, last[0].imag / h
     dp[3], dp[4], dp[5] = last[4].imag / h, last[5].imag / h, last[1].imag / h
@@ -68,7 +68,7 @@ def _start_of(m, j, e, y, n, drive):
 @inlined
 def flows(m, y, n, drive, work):
     """Integrate over all segments, two at a time; their outcomes go into the work space."""
-    room, outs = work[0], work[3]
+    outs = work[3]
     count, first, j, e = m.segment_step.shape[0] - 1, m.segment_step, 0, 0
     while j < count:
         while m.beam_segment[e + 1] <= j:
@@ -79,7 +79,7 @@ def flows(m, y, n, drive, work):
             while m.beam_segment[other + 1] <= k:
                 other += 1
         (one, a), (two, b) = _start_of(m, j, e, y, n, drive), _start_of(m, k, other, y, n, drive)
-        flow(m.table, m.width, (first[j], first[k], steps), (one, two), (a, b), (outs[j], outs[k]), room)
+        flow(m.table, (first[j], first[k], steps), (one, two), (a, b), (outs[j], outs[k]))
         j, e = k + 1, other
 
 

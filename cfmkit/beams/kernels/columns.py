@@ -3,7 +3,7 @@
 A `cfmkit.beams.kernels.model.Tilt` holds how the arrays of a model change with each variable. At an equilibrium the
 residual stays zero, so the unknowns change by the solution of a linear system with the tangent that Newton's method
 uses; its right sides are the changes of the residual at unchanged unknowns. Along a beam those come from the
-Runge-Kutta steps of the state, differentiated: one sweep for all the variables that a beam depends on.
+drifts and kicks of the state, differentiated: one sweep for all the variables that a beam depends on.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy as np
 from cfmkit.beams.kernels.chain import BEFORE, E2, SMALL, E, F, G, places_of, pose_of
 from cfmkit.beams.kernels.compiler import inlined, kernel, maker
 from cfmkit.beams.kernels.dense import clear, lu_solve
-from cfmkit.beams.kernels.flow_slopes import flow_slopes, work_space
+from cfmkit.beams.kernels.flow_slopes import flow_slopes
 from cfmkit.beams.kernels.force_slopes import (
     load_slopes,
     pose_slope,
@@ -22,12 +22,13 @@ from cfmkit.beams.kernels.force_slopes import (
     value_changes,
     value_slopes,
 )
+from cfmkit.beams.kernels.model import TABLE_COLUMNS
 from cfmkit.beams.kernels.newton import assemble
-from cfmkit.beams.kernels.rk8 import STAGES
+from cfmkit.beams.kernels.splitting import ROWS
 
 
 @kernel
-def _segment_slopes(m, tilt, e, y, n, drive, ends, none, work):
+def _segment_slopes(m, tilt, e, y, n, drive, ends, none):
     """Set the derivatives of the end states of a beam's segments at unchanged starts: ends (segments, 9 count)."""
     begin, count = m.beam_segment[e], tilt.first[e + 1] - tilt.first[e]
     load = (m.line_load[e, 0, 0] + drive * m.line_load[e, 1, 0], m.line_load[e, 0, 1] + drive * m.line_load[e, 1, 1])
@@ -42,8 +43,8 @@ def _segment_slopes(m, tilt, e, y, n, drive, ends, none, work):
                 state[(7 + r) * count + q] = tilt.line[k, e, 0, r] + drive * tilt.line[k, e, 1, r]
         o = n + 6 * j
         start = (y[o + 2], y[o + 3], y[o + 4], y[o + 5])
-        at = tilt.begin[e] + (first - m.segment_step[begin]) * STAGES * 5 * count
-        flow_slopes(m.table, m.width, (first, m.segment_step[j + 1]), start, load, tilt.table, at, state, none, work)
+        at = tilt.begin[e] + (first - m.segment_step[begin]) * ROWS * TABLE_COLUMNS * count
+        flow_slopes(m.table, (first, m.segment_step[j + 1]), start, load, tilt.table, at, state, none)
 
 
 @kernel
@@ -193,7 +194,7 @@ def slopes(m, tilt, n_free, ys, drives, out, pushes, scratch):
         most = max(most, tilt.first[e + 1] - tilt.first[e])
         wide = max(wide, m.beam_segment[e + 1] - m.beam_segment[e])
     moved = np.empty((wide, 9 * most))
-    none, work_of_flow = np.empty((1, 1)), work_space(most)
+    none = np.empty((1, 1))
     dofs, pose, others = values.shape[0], np.zeros(7), m.load_place.shape[0] + m.spring_kind.shape[0] > 0
     room = (np.zeros(dofs), np.zeros(dofs), np.zeros((12, 7)), pose)
     frames, matrix, rhs, dpb = np.empty((beams, 2, 4)), np.empty((n, n)), np.empty((n, count)), np.empty(3)
@@ -211,7 +212,7 @@ def slopes(m, tilt, n_free, ys, drives, out, pushes, scratch):
             own = tilt.first[e + 1] - tilt.first[e]
             if own > 0:
                 block = moved[:, : 9 * own]
-                _segment_slopes(m, tilt, e, y, n, drive, block, none, work_of_flow)
+                _segment_slopes(m, tilt, e, y, n, drive, block, none)
                 _chain_slopes(m, tilt, e, block, store, c[e], d[e], parts)
         _beam_sides(m, tilt, y, drive, n_free, values, frames, rel, c, d, rhs, push, room)
         for k in range(count):

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 IntArray = NDArray[Any]
 
-TABLE_COLUMNS = 5  # reference angle, speed g = ds/dt, g/EI, g/EA, g/GA
+TABLE_COLUMNS = 6  # see `Model`
 
 
 class Model(NamedTuple):
@@ -32,10 +32,10 @@ class Model(NamedTuple):
 
     Attributes
     ----------
-    table : (steps, stages, 5) array
-        Reference angle and g, g/EI, g/EA, g/GA at the stages of every Runge-Kutta step.
-    width : (steps,) array
-        Width of the step in the shape's own parameter.
+    table : (steps, rows, 6) array
+        What the drifts and kicks of every step take, see `cfmkit.beams.kernels.splitting`: the reference angle at the
+        kick; the arc length L of the kick; the integral of ds/EI over the drift before it; L/EA and L/GA of the kick;
+        the arc length from the step's start to the kick. The last row is the closing drift, without a kick.
     segment_step : (segments + 1,) int array
         First step of each segment.
     beam_segment : (beams + 1,) int array
@@ -58,7 +58,6 @@ class Model(NamedTuple):
     """
 
     table: FloatArray
-    width: FloatArray
     segment_step: IntArray
     beam_segment: IntArray
     beam_end: IntArray
@@ -88,7 +87,7 @@ class Tilt(NamedTuple):
     first : (beams + 1,) int array
         Where each beam begins in `variable`.
     table : (n,) array
-        Per beam its steps x stages x 5 table columns x its variables, flattened.
+        Per beam its steps x rows x 6 table columns x its variables, flattened.
     begin : (beams,) int array
         Where each beam begins in `table`.
     moves : (k,) bool array

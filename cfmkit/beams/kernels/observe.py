@@ -67,7 +67,7 @@ def states(m, n_free, y, drive, out):
             steps = (m.segment_step[j], m.segment_step[j + 1])
             rows = steps[1] - steps[0] + 1
             part = out[row : row + rows]
-            plain_flow(m.table, m.width, steps, (y[at + 2], y[at + 3], y[at + 4], y[at + 5]), load, part)
+            plain_flow(m.table, steps, (y[at + 2], y[at + 3], y[at + 4], y[at + 5]), load, part)
             for k in range(rows):
                 phi, moment, x, yy = part[k, 0], part[k, 1], part[k, 2], part[k, 3]
                 part[k, 0], part[k, 1], part[k, 2], part[k, 3] = y[at] + x, y[at + 1] + yy, phi, moment

@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from cfmkit.beams.kernels.compiler import maker
-from cfmkit.beams.kernels.flow_slopes import flow_slopes, work_space
+from cfmkit.beams.kernels.flow_slopes import flow_slopes
 from cfmkit.beams.kernels.force_slopes import beam_slopes, load_slopes, spring_slopes, value_slopes
+from cfmkit.beams.kernels.model import TABLE_COLUMNS
 from cfmkit.beams.kernels.newton import all_values
-from cfmkit.beams.kernels.rk8 import STAGES
+from cfmkit.beams.kernels.splitting import ROWS
 
 
 @maker
@@ -46,7 +47,7 @@ def row_slopes(m, tilt, n_free, y, drive, dy, out):
     energy, h, v, each by all variables.
     """
     n, count = n_free + 3 * m.beam_end.shape[0], dy.shape[1]
-    state, work = np.zeros(9 * count), work_space(count)
+    state = np.zeros(9 * count)
     row = 0
     for e in range(m.beam_end.shape[0]):
         load = (
@@ -63,7 +64,7 @@ def row_slopes(m, tilt, n_free, y, drive, dy, out):
                 for r in range(2):
                     state[(7 + r) * count + k] = tilt.line[k, e, 0, r] + drive * tilt.line[k, e, 1, r]
             start = (y[o + 2], y[o + 3], y[o + 4], y[o + 5])
-            at = tilt.begin[e] + (first - begin) * STAGES * 5 * count
+            at = tilt.begin[e] + (first - begin) * ROWS * TABLE_COLUMNS * count
             rows = out[row : row + last - first + 1]
-            flow_slopes(m.table, m.width, (first, last), start, load, tilt.table, at, state, rows, work)
+            flow_slopes(m.table, (first, last), start, load, tilt.table, at, state, rows)
             row += last - first + 1
