@@ -47,62 +47,61 @@ def sincos(x):
 
 
 @inlined
-def _drift(w, a):
-    """Return a segment's state and columns after a drift; a: (phi, M, x, y) of the state, then by h, v and M."""
-    return (
-        (a[0] + w * a[1], a[1], a[2], a[3])
-        + (a[4] + w * a[5], a[5], a[6], a[7])
-        + (a[8] + w * a[9], a[9], a[10], a[11])
-        + (a[12] + w * a[13], a[13], a[14], a[15])
-    )
+def _drift(w, q):
+    """Return (phi, M, x, y), or a derivative of them, after a drift."""
+    return q[0] + w * q[1], q[1], q[2], q[3]
+
+
+@inlined
+def _drift_all(w, a):
+    """Return a segment's state and its derivatives by h, v and M after a drift."""
+    return _drift(w, a[0]), _drift(w, a[1]), _drift(w, a[2]), _drift(w, a[3])
+
+
+@inlined
+def _carry(q, by, dm, dx, dy):
+    """Return a derivative after a kick: `by` says how M, x and y change with the rotation, the rest is its own."""
+    return q[0], q[1] + (by[0] * q[0] + dm), q[2] + (by[1] * q[0] + dx), q[3] + (by[2] * q[0] + dy)
 
 
 @inlined
 def _kick(table, step, i, h, v, a):
-    """Return a segment's state and columns after the kick of a row, and how M, x and y change with the rotation.
-
-    a: as in `_drift`.
-    """
-    s, c = sincos(table[step, i, 0] + a[0])
+    """Return a segment's state and derivatives after the kick of a row, and how M, x and y change with the rotation."""
+    phi, moment, px, py = a[0]
+    s, c = sincos(table[step, i, 0] + phi)
     length, pull, slide = table[step, i, 1], table[step, i, 3], table[step, i, 4]
     normal, shear = h * c + v * s, v * c - h * s
     along, across = length + pull * normal, slide * shear
     x, y = along * c - across * s, along * s + across * c
     less, more = along - slide * normal, (pull - slide) * shear
     xt, yt = more * c - less * s, less * c + more * s
-    mt = h * yt - v * xt
+    by = (h * yt - v * xt, xt, yt)
     hh, hv, vv = pull * c * c + slide * s * s, (pull - slide) * c * s, pull * s * s + slide * c * c
     after = (
-        (a[0], a[1] + (h * y - v * x), a[2] + x, a[3] + y)
-        + (a[4], a[5] + (mt * a[4] - xt), a[6] + (xt * a[4] + hh), a[7] + (yt * a[4] + hv))
-        + (a[8], a[9] + (mt * a[8] - yt), a[10] + (xt * a[8] + hv), a[11] + (yt * a[8] + vv))
-        + (a[12], a[13] + mt * a[12], a[14] + xt * a[12], a[15] + yt * a[12])
+        (phi, moment + (h * y - v * x), px + x, py + y),
+        _carry(a[1], by, -xt, hh, hv),
+        _carry(a[2], by, -yt, hv, vv),
+        _carry(a[3], by, 0.0, 0.0, 0.0),
     )
-    return after, mt, xt, yt
+    return after, by
 
 
 @inlined
 def _begin(start):
-    """Return a segment's state and columns at its start."""
-    zero = 0.0 * start[0]
-    return (
-        (start[0], start[3], zero, zero)
-        + (zero, zero, zero, zero)
-        + (zero, zero, zero, zero)
-        + (zero, zero + 1.0, zero, zero)
-    )
+    """Return a segment's state and derivatives at its start: rotation, h, v, M."""
+    none = (0.0, 0.0, 0.0, 0.0)
+    return (start[0], start[3], 0.0, 0.0), none, none, (0.0, 1.0, 0.0, 0.0)
 
 
 @inlined
 def _end(h, v, a, out):
-    """Store the outcome of a segment without a line load; the column of the rotation is a turn of the whole."""
+    """Store the outcome of a segment without a line load; its turn as a whole tells the derivative by the rotation."""
     for k in range(4):
-        o = 0 if k == 0 else (5 if k == 1 else (10 if k == 2 else 15))
-        out[o], out[o + 2], out[o + 3], out[o + 4] = a[k], a[4 + k], a[8 + k], a[12 + k]
-        out[o + 1] = v * a[4 + k] - h * a[8 + k]
+        out[5 * k], out[5 * k + 2], out[5 * k + 3], out[5 * k + 4] = a[0][k], a[1][k], a[2][k], a[3][k]
+        out[5 * k + 1] = v * a[1][k] - h * a[2][k]
     out[1] += 1.0
-    out[11] -= a[3]
-    out[16] += a[2]
+    out[11] -= a[0][3]
+    out[16] += a[0][2]
     out[FORCE], out[FORCE + 1] = h, v
 
 
@@ -122,12 +121,12 @@ def flow(table, steps, starts, loads, outs):
     a, b = _begin(one), _begin(other)
     for step in range(steps[2]):
         for i in range(_CLOSING):
-            a = _drift(table[steps[0] + step, i, 2], a)
-            b = _drift(table[steps[1] + step, i, 2], b)
-            a, _, _, _ = _kick(table, steps[0] + step, i, one[1], one[2], a)
-            b, _, _, _ = _kick(table, steps[1] + step, i, other[1], other[2], b)
-        a = _drift(table[steps[0] + step, _CLOSING, 2], a)
-        b = _drift(table[steps[1] + step, _CLOSING, 2], b)
+            a = _drift_all(table[steps[0] + step, i, 2], a)
+            b = _drift_all(table[steps[1] + step, i, 2], b)
+            a, _ = _kick(table, steps[0] + step, i, one[1], one[2], a)
+            b, _ = _kick(table, steps[1] + step, i, other[1], other[2], b)
+        a = _drift_all(table[steps[0] + step, _CLOSING, 2], a)
+        b = _drift_all(table[steps[1] + step, _CLOSING, 2], b)
     _end(one[1], one[2], a, outs[0])
     _end(other[1], other[2], b, outs[1])
 
@@ -135,23 +134,19 @@ def flow(table, steps, starts, loads, outs):
 @kernel
 def _loaded(table, first, count, start, load, out):
     """Integrate over one segment under a line load, with derivatives; the load does not turn with the segment."""
-    a = _begin(start)
-    d, e, f, g = 1.0, 0.0, 0.0, 0.0  # derivatives of phi, M, X and Y by the rotation at the start
-    begin_h, begin_v = start[1], start[2]
+    a, turned = _begin(start), (1.0, 0.0, 0.0, 0.0)  # the latter is the derivative by the rotation at the start
+    h, v = start[1], start[2]
     for step in range(first, first + count):
         for i in range(_CLOSING):
             w, run = table[step, i, 2], table[step, i, 5]
-            h, v = begin_h - load[0] * run, begin_v - load[1] * run
-            a = _drift(w, a)
-            d += w * e
-            a, mt, xt, yt = _kick(table, step, i, h, v, a)
-            e, f, g = e + mt * d, f + xt * d, g + yt * d
+            a, by = _kick(table, step, i, h - load[0] * run, v - load[1] * run, _drift_all(w, a))
+            turned = _carry(_drift(w, turned), by, 0.0, 0.0, 0.0)
         w, run = table[step, _CLOSING, 2], table[step, _CLOSING, 5]
-        a = _drift(w, a)
-        d += w * e
-        begin_h, begin_v = begin_h - load[0] * run, begin_v - load[1] * run
-    _end(begin_h, begin_v, a, out)
-    out[1], out[6], out[11], out[16] = d, e, f, g
+        a, turned = _drift_all(w, a), _drift(w, turned)
+        h, v = h - load[0] * run, v - load[1] * run
+    _end(h, v, a, out)
+    for k in range(4):
+        out[5 * k + 1] = turned[k]
 
 
 @maker

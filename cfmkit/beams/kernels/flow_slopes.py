@@ -6,8 +6,6 @@ inner loops run over them.
 
 from __future__ import annotations
 
-import numpy as np
-
 from cfmkit.beams.kernels.compiler import inlined, kernel
 from cfmkit.beams.kernels.flow import sincos
 from cfmkit.beams.kernels.model import TABLE_COLUMNS
@@ -37,7 +35,9 @@ def flow_slopes(table, steps, start, load, changes, at, state, rows):
         for i in range(_CLOSING):
             phi += _drifted(table[step, i, 2], moment, (changes, o), state, count)
             run = table[step, i, 5]
-            moment += _kicked(table, step, i, (phi, h - load[0] * run, v - load[1] * run), run, load, (changes, o), state)
+            moment += _kicked(
+                table, step, i, (phi, h - load[0] * run, v - load[1] * run), run, load, (changes, o), state
+            )
             o += TABLE_COLUMNS * count
         phi += _drifted(table[step, _CLOSING, 2], moment, (changes, o), state, count)
         run = table[step, _CLOSING, 5]
@@ -63,12 +63,12 @@ def _drifted(turn, moment, changed, state, n):
 
 
 @kernel
-def _kicked(table, step, i, place, run, load, changed, state):
+def _kicked(table, step, i, place, load, changed, state):
     """Carry the derivatives over a kick at a place (phi, h, v); return by how much the moment grows in it."""
     (changes, o), n = changed, state.shape[0] // 9
     phi, h, v = place
     s, c = sincos(table[step, i, 0] + phi)
-    length, pulls, slides = table[step, i, 1], table[step, i, 3], table[step, i, 4]
+    length, pulls, slides, run = table[step, i, 1], table[step, i, 3], table[step, i, 4], table[step, i, 5]
     normal, shear = h * c + v * s, v * c - h * s
     along, across = length + pulls * normal, slides * shear
     x, y = along * c - across * s, along * s + across * c
