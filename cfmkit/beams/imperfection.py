@@ -12,17 +12,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.beams.discretise import Mesh
+from cfmkit.beams.expanded import ExpandedSolver
 from cfmkit.beams.network import Network
 from cfmkit.beams.shapes import Bent
 
 if TYPE_CHECKING:
     from cfmkit.beams.events import Singular
-    from cfmkit.beams.expanded import ExpandedSolver
     from cfmkit.beams.run import Run
     from cfmkit.curves import FloatArray
 
 _KICK = 1e-5  # of the mode, to difference its states
-_DEGREE = 14  # of the polynomials that the rotations are given as
+_DEGREE = 14  # of the polynomials that the rotations are given as,
+_PLACES = 32  # from so many places of a beam
 
 
 def imperfect(run: Run, size: float) -> tuple[Network, str]:
@@ -33,9 +35,11 @@ def imperfect(run: Run, size: float) -> tuple[Network, str]:
     network, run = run.layout.network, run.ramp or run
     if run.first is None:
         return network, "none: the perfect path has no bifurcation"
-    rotation, reach = _mode(run.fine, run.first)
+    sampled = Mesh(run.mesh.segments, max(run.mesh.steps, -(-_PLACES // run.mesh.segments)))
+    solver = ExpandedSolver(run.layout, sampled, ramped=run.ramped)  # the same unknowns, states at more places
+    rotation, reach = _mode(solver, run.first)
     share = size / (reach * run.layout.scales.length)
-    cut, beams, row = run.fine.cut, dict(network.beams), 0
+    cut, beams, row = solver.cut, dict(network.beams), 0
     for number, (name, beam) in enumerate(network.beams.items()):
         t: list[float] = []
         for segment in range(cut.beam_segment[number], cut.beam_segment[number + 1]):
