@@ -15,7 +15,6 @@ import pytest
 
 from cfmkit.beams import CLAMPED, Beam, Displacement, Network, Node, Section, Taper, gradient, trace
 from cfmkit.beams.kernels import dense, entry, predictor
-from cfmkit.beams.kernels.rk8 import COUPLING, NODES, SHARES, SOURCES, STAGES, TERMS, WEIGHTS
 
 _count, _solve, _predict = dense.positive_count, dense.lu_solve, predictor._predict
 
@@ -42,13 +41,6 @@ def test_the_next_point_is_foretold_exactly_where_the_path_is_a_polynomial(natur
     times, found = np.array([1.0, 0.7, 0.2]), np.empty(1)
     foretell(times, course(times)[:, None], course.deriv()(times)[:, None], natural, 1.3, found)
     assert found[0] == pytest.approx(course(1.3), rel=1e-12)
-
-
-def test_the_short_lists_of_the_runge_kutta_method_hold_all_its_coefficients() -> None:
-    for i, row in enumerate([*COUPLING, WEIGHTS]):
-        full = np.zeros(STAGES)
-        full[SOURCES[i, : TERMS[i]]] = SHARES[i, : TERMS[i]]
-        np.testing.assert_array_equal(full, row)
 
 
 def test_compiled_code_is_kept_under_the_digest_of_all_kernels() -> None:
@@ -82,13 +74,6 @@ def test_a_first_compilation_is_announced(caplog: pytest.LogCaptureFixture, monk
         entry.announce()
     mark.unlink(missing_ok=True)
     assert [record.message for record in caplog.records] == ["compiling the beam engine: once, about half a minute"]
-
-
-def test_the_runge_kutta_method_is_of_order_eight() -> None:
-    """Conditions of quadrature up to order 8 and of the row sums."""
-    np.testing.assert_allclose(COUPLING.sum(axis=1), NODES, atol=1e-14)
-    for k in range(8):
-        assert WEIGHTS @ NODES**k == pytest.approx(1 / (k + 1), abs=1e-14)
 
 
 @pytest.mark.parametrize("seed", range(8))

@@ -35,9 +35,8 @@ def flow_slopes(table, steps, start, load, changes, at, state, rows):
         for i in range(_CLOSING):
             phi += _drifted(table[step, i, 2], moment, (changes, o), state, count)
             run = table[step, i, 5]
-            moment += _kicked(
-                table, step, i, (phi, h - load[0] * run, v - load[1] * run), run, load, (changes, o), state
-            )
+            place = phi, h - load[0] * run, v - load[1] * run
+            moment += _kicked(table, step, i, place, load, (changes, o), state)
             o += TABLE_COLUMNS * count
         phi += _drifted(table[step, _CLOSING, 2], moment, (changes, o), state, count)
         run = table[step, _CLOSING, 5]
