@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from cfmkit.curves import FloatArray
 
 BESIDE = 1e-5  # share of the drive's range
+_AT = 1e-12  # and within which a point is at the bifurcation: its place is known no better, for rounding
 _SIDES = 4.0  # units of the tolerance, as a share of the range, from which it is sure on which side a point lies
 _LOOSEST = 1e-4  # tolerance to which a bifurcation is located: a point asked for near it would be in doubt
 _OFF, _LEAST = 0.3, 1e-6  # how far the solution may be from where it is foretold: as a share of its change, at least
@@ -86,13 +87,13 @@ def opening(run: Run, found: Singular, one: Spot, wide: Spot | None, name: str) 
     start, before = reduce(found.spot).y, reduce(one).y
     for _ in range(count(run, place, one.drive)):
         value = float(run.targets[run.asked()])
-        behind = (value - place) * (place - one.drive) > 0
+        behind = (value - place) * (place - one.drive) > 0 and abs(value - place) > _AT * run.span
         if behind and wide is not None:
             run.branch = name
             share = np.sqrt((value - place) / (wide.drive - place))
             _add(run, start, share * (reduce(wide).y - start), value, wide.unstable)
         else:
-            share = (value - place) / (one.drive - place)
+            share = 0.0 if abs(value - place) <= _AT * run.span else (value - place) / (one.drive - place)
             _add(run, start, share * (before - start), value, found.after if behind else found.before)
 
 

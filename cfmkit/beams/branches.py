@@ -23,7 +23,7 @@ _CLEAR = 0.01  # share of the drive's range from a bifurcation at which the path
 _SAME_PLACE = 1e-4  # share of the drive's range within which two searches found one bifurcation
 _TIMES = 12  # that one point may be taken back
 _SLIGHT = 1e-3  # share of a determinant that is hardly any
-_FINEST = 1e-5  # share of the range below which a change of stability is not looked into with shorter steps
+_FINEST = 1e-8  # share of the range below which a change of stability is not looked into with shorter steps
 
 
 def cross(run: Run) -> Spot | None:

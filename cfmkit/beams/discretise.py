@@ -237,6 +237,7 @@ def assemble_model(layout: Layout, cut: Grid, values: Any, ramp: str = "") -> Mo
     return Model(
         table=values,
         segment_step=cut.segment_step,
+        segment_turn=segment_turns(values, cut.segment_step),
         beam_segment=cut.beam_segment,
         beam_end=plan.beam_end,
         line_load=line,
@@ -254,6 +255,12 @@ def assemble_model(layout: Layout, cut: Grid, values: Any, ramp: str = "") -> Mo
         spring_kind=plan.spring_kind,
         spring_value=springs,
     )
+
+
+def segment_turns(values: Any, segment_step: Any) -> Any:
+    """Return the integrals of ds/EI over the segments, (segments,), from their table."""
+    turns: Any = np.add.reduceat(np.real(values[:, :, 2]).sum(axis=1), segment_step[:-1])
+    return turns
 
 
 def _held(layout: Layout) -> tuple[Any, Any]:

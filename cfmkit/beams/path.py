@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from cfmkit.beams.solver import Points, Solver
     from cfmkit.curves import FloatArray
 
+_TIE = 1e-9  # share by which stresses of two beams differ that are one but for rounding
+
 
 class PathStatus(Enum):
     """How a path ended."""
@@ -263,13 +265,16 @@ class Path:
         return signed_extremes(self.sampler, list(self.layout.network.beams).index(beam), axial)
 
     def peak_stress(self, axial: bool = True) -> StressPeak:
-        """Return the largest stress of the network at every point, with its place."""
+        """Return the largest stress of the network at every point, with its place.
+
+        Beams that meet have one stress there, but for rounding: it is reported of the beam that begins.
+        """
         names = list(self.layout.network.beams)
         found = [self.beam_stress(name, axial) for name in names]
         values = np.array([value for value, _ in found])
-        best = values.argmax(axis=0)
-        pick = np.arange(len(self))
         places = np.array([place for _, place in found])
+        best = np.where(values >= (1 - _TIE) * values.max(axis=0), -places, -np.inf).argmax(axis=0)
+        pick = np.arange(len(self))
         return StressPeak(
             read_only(values[best, pick]), read_only(np.array(names)[best], np.str_), read_only(places[best, pick])
         )

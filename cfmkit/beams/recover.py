@@ -116,6 +116,7 @@ class Sampler:
         single = m._replace(
             table=values,
             segment_step=np.arange(count + 1),
+            segment_turn=np.zeros(count),
             beam_segment=np.arange(count + 1),
             beam_end=np.zeros((count, 2), np.int64),
             line_load=np.stack([load, np.zeros_like(load)], axis=1),

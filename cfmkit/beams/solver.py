@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.beams.discretise import PRESTRESS, Mesh, assemble_model, grid, table
+from cfmkit.beams.discretise import PRESTRESS, Mesh, assemble_model, grid, segment_turns, table
 from cfmkit.beams.kernels import entry
 from cfmkit.beams.kernels.march import INFO
 from cfmkit.beams.kernels.newton import SOLVED
@@ -100,7 +100,8 @@ class Solver:
         fine.mesh, fine.tolerance = self.mesh.finer(), tolerance
         fine.cut = cut = grid(self.layout, fine.mesh)
         fine.table = table(self.layout, cut)
-        fine.model = self.model._replace(table=fine.table, segment_step=cut.segment_step)
+        turns = segment_turns(fine.table, cut.segment_step)
+        fine.model = self.model._replace(table=fine.table, segment_step=cut.segment_step, segment_turn=turns)
         fine.limits = np.array([tolerance, float(ITERATIONS)])
         return fine
 

@@ -27,7 +27,12 @@ _SHORT = 1e-4  # share of the drive's range that is a short step
 
 
 def taut(run: Run) -> bool:
-    """Tell whether a path has come to where a beam is drawn taut: eliminating is steady there, and forces soar."""
+    """Tell whether a path has come to where a beam is drawn taut: eliminating is steady there, and forces soar.
+
+    Where all beams stretch forces do not soar.
+    """
+    if all(beam.section.axial for beam in run.layout.network.beams.values()):
+        return False
     forces = run.points.y[-1:, run.solver.n_free : run.solver.n]
     return bool(np.abs(forces).max(initial=0.0) > _TAUT)
 

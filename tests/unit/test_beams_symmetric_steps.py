@@ -95,7 +95,6 @@ def test_a_segment_is_a_canonical_map_to_rounding(steps: int, load: bool, seed: 
 
 @pytest.mark.parametrize("mesh", [Mesh(1, 1), Mesh(2, 1), Mesh(3, 2)])
 def test_the_tangent_of_a_network_is_symmetric_on_any_mesh(mesh: Mesh) -> None:
-    """At states that are no equilibria, too: all beams are free to be anywhere and the load is dead."""
     section = Section(2e9, 8e-3, Taper(np.array([0.0, 1.0]), np.array([1.2e-3, 0.8e-3])), shear=True)
     nodes = {"a": Node(0, 0, CLAMPED), "b": Node(0.05, 0.03), "c": Node(0.1, 0.0, PINNED)}
     beams = {
@@ -104,9 +103,9 @@ def test_the_tangent_of_a_network_is_symmetric_on_any_mesh(mesh: Mesh) -> None:
     }
     network = Network(nodes, beams, loads=(LineLoad("ab", 1.0, -2.0),))
     solver = Solver(Layout(network, Displacement("b", 1.0, [1e-3])), mesh)
-    equilibrium = solver.solve(solver.unstressed(), 0.02)
+    equilibrium = solver.solve(solver.unstressed(), 0.002)
     assert equilibrium is not None
-    matrix, _ = solver.tangent_at(equilibrium.y, 0.02)
+    matrix, _ = solver.tangent_at(equilibrium.y, 0.002)
     np.testing.assert_allclose(matrix, matrix.T, atol=1e-10 * np.abs(matrix).max())
 
 
@@ -118,7 +117,7 @@ def test_mirror_images_of_a_symmetric_network_stay_mirror_images(mesh: Mesh) -> 
     beams = {"ab": Beam("a", "b", section), "bc": Beam("b", "c", section)}
     layout = Layout(Network(nodes, beams), Displacement("b", -np.pi / 2, [5e-3]))
     solver = ExpandedSolver(layout, mesh)
-    spot = solver.solve(solver.unstressed(), 0.05)
+    spot = solver.solve(solver.unstressed(), 0.01)
     assert spot is not None
     assert abs(spot.y[solver.n_free - 1]) < 1.0
     free = [spot.y[int(s)] for s in solver.model.slot[3:6] if s >= 0]

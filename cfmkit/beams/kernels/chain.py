@@ -17,7 +17,8 @@ from cfmkit.beams.kernels.compiler import inlined, kernel, maker
 from cfmkit.beams.kernels.flow import FORCE, flow, plain_flow
 
 E, F, E2, G, C_D, SMALL = 0, 1, 2, 3, 4, 5  # blocks of a relation; C_D: c in columns 0, 1
-TAUT = 1000.0  # dM1/dM0 of a segment under tension from which it counts as long: errors grow like that
+LARGEST, LIMIT = 3.0, 50.0  # values of a, see `sweep`, that larger ones count as: under thrust, in tension
+TAUT = 5.0  # cosh of a, see `sweep`, from which a segment in tension is long: Newton's method grows unsure like that
 BEFORE = 6  # of what is kept of a segment: E2 before it; its SMALL[2, 0] and E2[:, 2] hold the segment's own turns
 
 
@@ -88,8 +89,10 @@ def sweep(m, e, y, first_slot, drive, ends, rel, store, work):
     """Set the relation `rel` of beam e from its segments' outcomes and keep in `store` what `unfold` needs.
 
     ends: poses of the two ends; first_slot: index in y of the beam's last force followed by that of its segments.
-    Returns the change of the inertia by the eliminated unknowns and how short the segments are for their load: the
-    smallest dM1/dM0 of a segment under thrust, and the reciprocal of the largest under tension, in units of TAUT.
+    Returns the change of the inertia by the eliminated unknowns and how short the segments are for their load: with
+    a^2 the thrust of a segment times its length over its bending rigidity the smallest cos a, or TAUT / cosh a where it
+    is in tension. For a straight segment they are dM1/dM0 as the equations have it; a step that is too long for its load
+    has another one.
     """
     drv, outs = work[0][2, 4], work[3]
     grows = m.line_load[e, 1, 0] != 0.0 or m.line_load[e, 1, 1] != 0.0
@@ -122,7 +125,11 @@ def sweep(m, e, y, first_slot, drive, ends, rel, store, work):
         stiff = rel[F, 2, 2]
         denominator = _append(rel, store, j, out, rq, rp, drv)
         own = out[9]
-        least = min(least, own if own < 1.0 else TAUT / own)
+        pulled = m.segment_turn[j] * (y[at + 3] * out[10] + y[at + 4] * out[15])
+        if pulled < 0.0:
+            least = min(least, np.cos(min(np.sqrt(-pulled), LARGEST)))
+        elif pulled > 1.0:
+            least = min(least, TAUT / np.cosh(min(np.sqrt(pulled), LIMIT)))
         if j > begin and own != 0.0:
             gamma = -out[6] / own
             if gamma * stiff > 1.0:

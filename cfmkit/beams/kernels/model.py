@@ -38,6 +38,8 @@ class Model(NamedTuple):
         the arc length from the step's start to the kick. The last row is the closing drift, without a kick.
     segment_step : (segments + 1,) int array
         First step of each segment.
+    segment_turn : (segments,) array
+        Integral of ds/EI over each segment.
     beam_segment : (beams + 1,) int array
         First segment of each beam.
     beam_end : (beams, 2) int array
@@ -59,6 +61,7 @@ class Model(NamedTuple):
 
     table: FloatArray
     segment_step: IntArray
+    segment_turn: FloatArray
     beam_segment: IntArray
     beam_end: IntArray
     line_load: FloatArray
