@@ -112,7 +112,7 @@ def closing(run: Run, end: BranchEnd, spot: Spot) -> None:
 def _add(run: Run, start: FloatArray, change: FloatArray, value: float, unstable: int) -> None:
     """Add the next point asked for, solved on the fine mesh if that leads where it is foretold."""
     y = start + change
-    wide = run.fine.solve(run.fine.expand(y), value)
+    wide = run.fine.solve(run.fine.expand(y), value) if change.any() else None  # at a bifurcation it is what it is
     near = None if wide is None or wide.unstable != unstable else run.fine.reduce(wide)
     limit = _OFF * run.solver.pose_change(y, start) + _LEAST
     if near is None or run.solver.pose_change(near.y, y) > limit:

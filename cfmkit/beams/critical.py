@@ -21,6 +21,7 @@ from cfmkit.beams.solver import Spot
 if TYPE_CHECKING:
     from cfmkit.beams.run import Run
 
+_JUST = 1e-9  # share of the prestress or the constant loads that the start is just critical at
 _NEAR = 1e-4  # share of the drive's range in which there is nothing but the start
 _SIZES = (0.06 * 0.25 ** np.arange(4)).tolist()  # how far from the start the path is entered [rad]
 _BEFORE = 0.9  # share of the way to the first point asked for up to which it is
@@ -49,6 +50,22 @@ def left(run: Run, spot: Spot) -> Spot | None:
     run.append(run.as_points(near, -1))
     run.entry, run.closed = 0.5 * abs(near.drive), True
     return near
+
+
+def begun_again(run: Run) -> Spot | None:
+    """Leave a critical start from which a march went straight on, unstable; return where to go on, or None."""
+    if run.control.branch != "stable" or run.control.through_folds or not len(run.points) or not run.events:
+        return None
+    before = run.events[-1]
+    just = before.after > before.before and abs(before.drive - 1.0) <= _JUST and " under " in before.kind
+    if not just or run.points.info[0, 0] == 0:
+        return None
+    points, names = run.points, list(run.branches)
+    run.points, run.branches = points.take(slice(0, 1)), names[:1]
+    away = left(run, run.spot(0))
+    if away is None:
+        run.points, run.branches = points, names
+    return away
 
 
 def _done_before(run: Run) -> bool:

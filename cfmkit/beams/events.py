@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from cfmkit.curves import FloatArray
 
 _SEARCHES = 40
-_CLOSE = 1e-5  # share of the determinant at the ends that is near enough to interpolate the rest: the smallest,
+_CLOSE = 1e-4  # share of the determinant at the ends that is near enough to interpolate the rest: the smallest,
 _LOOSE = 10.0  # and in units of the tolerance
 _HUGE = 700.0  # logarithm of a number that is not too large
 _OUTSIDE = 0.1  # of a bracket: one end may lie at the singular point, on either side

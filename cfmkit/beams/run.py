@@ -11,6 +11,7 @@ import numpy as np
 
 from cfmkit.beams import beside, branch_ends, branches, corners, critical, endings, folds, preload
 from cfmkit.beams.accuracy import errors, largest_force
+from cfmkit.beams.discretise import Mesh
 from cfmkit.beams.expanded import ExpandedSolver
 from cfmkit.beams.kernels.march import DENIED, DONE, INERTIA, INFO, LONG, NO_START, STALLED
 from cfmkit.beams.path import Event, Path, PathStatus
@@ -18,13 +19,13 @@ from cfmkit.beams.solver import SENSE, TRIES, Points, Solver, Spot, march_option
 from cfmkit.beams.steady import steadier
 
 if TYPE_CHECKING:
-    from cfmkit.beams.discretise import Mesh
     from cfmkit.beams.drive import Control
     from cfmkit.beams.events import Singular
     from cfmkit.beams.layout import Layout
     from cfmkit.curves import FloatArray
 
 _HOPS = 60  # decisions on one path
+_FINE_STEPS = ((1e-5, 16), (1e-6, 24), (0.0, 48))  # of a beam, where singular points are looked for, by the tolerance
 _LOOSEST = 1e-7  # tolerance of Newton's method
 _TRIES = 6  # to land on a point asked for, before a bifurcation is looked for there
 _NEARBY = 0.01  # share of the drive's range
@@ -84,8 +85,11 @@ class Run:
 
     @cached_property
     def fine(self) -> ExpandedSolver:
-        """The same mesh with nothing eliminated: singular points are seen in full there."""
-        return ExpandedSolver(self.layout, self.mesh, 1e-11, self.ramped)
+        """The same segments with more steps and nothing eliminated: singular points are seen in full, and exactly."""
+        tolerance = 0.0 if self.to_first else self.control.tolerance
+        whole = next(steps for limit, steps in _FINE_STEPS if tolerance >= limit)
+        steps = max(-(-whole // self.mesh.segments), 2 * self.mesh.steps)
+        return ExpandedSolver(self.layout, Mesh(self.mesh.segments, steps), 1e-11, self.ramped)
 
     def follow(self) -> None:
         """Trace from rest to the last point asked for, or to where it ends, and name the branches."""
@@ -108,8 +112,12 @@ class Run:
         asked, hops, fresh = int(self.targets[0] == 0.0), 0, True
         while spot is not None and asked < len(self.targets) and hops < _HOPS:
             code, asked, spot = self._leg(spot, asked, fresh)
+            away = critical.begun_again(self) if fresh else None
             fresh = False
             hops += 1
+            if away is not None:
+                spot, asked = away, self.asked()
+                continue
             if code == DONE and asked == len(self.targets):
                 if asked == len(self.values):
                     break

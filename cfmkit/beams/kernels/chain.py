@@ -18,6 +18,7 @@ from cfmkit.beams.kernels.flow import FORCE, flow, plain_flow
 
 E, F, E2, G, C_D, SMALL = 0, 1, 2, 3, 4, 5  # blocks of a relation; C_D: c in columns 0, 1
 LARGEST, LIMIT = 3.0, 50.0  # values of a, see `sweep`, that larger ones count as: under thrust, in tension
+LEAST = 1e-8  # share of its terms that a pivot is at least: see `_append`
 TAUT = 5.0  # cosh of a, see `sweep`, from which a segment in tension is long: Newton's method grows unsure like that
 BEFORE = 6  # of what is kept of a segment: E2 before it; its SMALL[2, 0] and E2[:, 2] hold the segment's own turns
 
@@ -89,10 +90,9 @@ def sweep(m, e, y, first_slot, drive, ends, rel, store, work):
     """Set the relation `rel` of beam e from its segments' outcomes and keep in `store` what `unfold` needs.
 
     ends: poses of the two ends; first_slot: index in y of the beam's last force followed by that of its segments.
-    Returns the change of the inertia by the eliminated unknowns and how short the segments are for their load: with
-    a^2 the thrust of a segment times its length over its bending rigidity the smallest cos a, or TAUT / cosh a where it
-    is in tension. For a straight segment they are dM1/dM0 as the equations have it; a step that is too long for its load
-    has another one.
+    Returns the change of the inertia by the eliminated unknowns and how short the segments are for their load. With
+    a^2 the thrust of a segment times its length over its bending rigidity that is the smallest cos a, or TAUT / cosh a
+    in tension. The equations of a straight segment have dM1/dM0 = cos a; a step that is too long for its load has not.
     """
     drv, outs = work[0][2, 4], work[3]
     grows = m.line_load[e, 1, 0] != 0.0 or m.line_load[e, 1, 1] != 0.0
@@ -122,19 +122,16 @@ def sweep(m, e, y, first_slot, drive, ends, rel, store, work):
             ph, pv, pm = y[b], y[b + 1], y[b + 2]
         rq = (y[at] + out[10] - qx, y[at + 1] + out[15] - qy, out[0] - qr)
         rp = (h - ph, v - pv, out[5] - pm)
-        stiff = rel[F, 2, 2]
-        denominator = _append(rel, store, j, out, rq, rp, drv)
+        pivot = _append(rel, store, j, out, rq, rp, drv)
         own = out[9]
         pulled = m.segment_turn[j] * (y[at + 3] * out[10] + y[at + 4] * out[15])
         if pulled < 0.0:
             least = min(least, np.cos(min(np.sqrt(-pulled), LARGEST)))
         elif pulled > 1.0:
             least = min(least, TAUT / np.cosh(min(np.sqrt(pulled), LIMIT)))
-        if j > begin and own != 0.0:
-            gamma = -out[6] / own
-            if gamma * stiff > 1.0:
-                index += 1 if gamma > 0.0 else -1
-        if denominator == 0.0:
+        if j > begin and own != 0.0 and pivot / own < 0.0:
+            index += 1 if out[6] / own < 0.0 else -1
+        if pivot == 0.0:
             return index, np.nan
     return index, least
 
@@ -142,6 +139,11 @@ def sweep(m, e, y, first_slot, drive, ends, rel, store, work):
 @kernel
 def _append(rel, store, n, out, rq, rp, drv):
     """Append segment n to the relation; return the scalar pivot of the elimination.
+
+    The pivot vanishes where the beam up to here is critical as a cantilever. From a pin to where the moment is
+    largest it is so all along its bent path: there the pivot is rounding, and of no sign. The tangent with a pivot a
+    little off is that of a network with a slightly other rigidity: Newton's method converges with it, and its inertia
+    is right.
 
     Whole arrays with all their indices, here and below: views of them cost more than the arithmetic.
     """
@@ -152,6 +154,9 @@ def _append(rel, store, n, out, rq, rp, drv):
     turn = out[6]  # dM1 by the start's rotation: the only entry of dp1/dq0
     g0, g1 = out[7] + turn * rel[F, 2, 0], out[8] + turn * rel[F, 2, 1]
     pivot = out[9] + turn * rel[F, 2, 2]
+    floor = LEAST * (abs(out[9]) + abs(turn * rel[F, 2, 2]))
+    if abs(pivot) < floor:
+        pivot = -floor if pivot < 0.0 else floor
     if pivot == 0.0:
         return pivot
     # dp_j = W dp_{j+1} + e3 (hq . dq_a) + hb; W differs from 1 in its last row only
