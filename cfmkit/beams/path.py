@@ -265,16 +265,21 @@ class Path:
         return signed_extremes(self.sampler, list(self.layout.network.beams).index(beam), axial)
 
     def peak_stress(self, axial: bool = True) -> StressPeak:
-        """Return the largest stress of the network at every point, with its place.
-
-        Beams that meet have one stress there, but for rounding: it is reported of the beam that begins.
-        """
+        """Return the largest stress of the network at every point, with its place; see `most_stressed`."""
         names = list(self.layout.network.beams)
         found = [self.beam_stress(name, axial) for name in names]
         values = np.array([value for value, _ in found])
         places = np.array([place for _, place in found])
-        best = np.where(values >= (1 - _TIE) * values.max(axis=0), -places, -np.inf).argmax(axis=0)
+        best = most_stressed(values, places)
         pick = np.arange(len(self))
         return StressPeak(
             read_only(values[best, pick]), read_only(np.array(names)[best], np.str_), read_only(places[best, pick])
         )
+
+
+def most_stressed(values: FloatArray, places: FloatArray) -> Any:
+    """Return which beam (n,) has the largest of stresses (beams, n) at places (fractions of the length).
+
+    Beams that meet have one stress there, but for rounding: it is that of the beam that begins.
+    """
+    return np.where(values >= (1 - _TIE) * values.max(axis=0), -places, -np.inf).argmax(axis=0)

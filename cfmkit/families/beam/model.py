@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.beams import Path, PathStatus, trace
+from cfmkit.beams.path import most_stressed
 from cfmkit.curves import Column, Curve, read_only
 from cfmkit.families.beam.build import Assembly, assemble, mirror_axis, resolve, thickest_of
 from cfmkit.families.beam.checks import findings_of
@@ -109,7 +110,7 @@ class Solution:
     def stress_at(self) -> tuple[Any, FloatArray]:
         """The beam with the largest stress at every point of the curve, and the place on it."""
         values, places = (np.array(rows) for rows in zip(*self.stresses.values(), strict=True))
-        best, pick = values.argmax(axis=0), np.arange(len(self.keep))
+        best, pick = most_stressed(values, places), np.arange(len(self.keep))
         return read_only(np.array(list(self.stresses))[best], np.str_), read_only(places[best, pick])
 
     @cached_property
