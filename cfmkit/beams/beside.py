@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from cfmkit.curves import FloatArray
 
 BESIDE = 1e-5  # share of the drive's range
-_AT = 1e-12  # and within which a point is at the bifurcation: its place is known no better, for rounding
+_AT = 3e-11  # and within which a point is at the bifurcation, whose place is known to about 1e-11
 _SIDES = 4.0  # units of the tolerance, as a share of the range, from which it is sure on which side a point lies
 _LOOSEST = 1e-4  # tolerance to which a bifurcation is located: a point asked for near it would be in doubt
 _OFF, _LEAST = 0.3, 1e-6  # how far the solution may be from where it is foretold: as a share of its change, at least
