@@ -23,6 +23,8 @@ _CLEAR = 0.01  # share of the drive's range from a bifurcation at which the path
 _SAME_PLACE = 1e-4  # share of the drive's range within which two searches found one bifurcation
 _TIMES = 12  # that one point may be taken back
 _SLIGHT = 1e-3  # share of a determinant that is hardly any
+_ASIDE = 1e-3  # share of the ways to the points on both sides of a bifurcation at which the path is looked at,
+_STRAIGHT, _ROUNDING = 10.0, 1e-7  # largest change of a pose between, in that share of the whole one; what is rounding
 _FINEST = 1e-8  # share of the range below which a change of stability is not looked into with shorter steps
 
 
@@ -44,6 +46,8 @@ def cross(run: Run) -> Spot | None:
     senses = np.sign(run.points.info[[begun, -1], 4])
     fold = not run.natural and bool(senses[0] != senses[1])
     found = None if one is None or beyond is None else beside.located(run, one, beyond, fold)
+    if found is not None and run.natural and _too_far(run) and not _on_one_path(run, found, one, beyond):
+        found = None
     if found is None or one is None:
         before, after = (int(run.points.info[k, 0]) for k in (-2, -1))
         if after > before and _too_far(run) and not run.stuck:
@@ -65,6 +69,24 @@ def cross(run: Run) -> Spot | None:
     if run.first is None and not found.fold and found.after > found.before:
         run.first = found
     return _parted(run, found, one, other) if run.natural else other
+
+
+def _on_one_path(run: Run, found: Singular, one: Spot | None, beyond: Spot | None) -> bool:
+    """Tell whether a path goes straight on through a singular point that was found between two of its points.
+
+    A slightly imperfect part has a sharp corner there instead, and behind it a path of its own that is unstable.
+    """
+    if one is None or beyond is None:
+        return False
+    whole = run.fine.pose_change(one.y, beyond.y)
+    ends = []
+    for end in (one, beyond):
+        share = _ASIDE * (end.drive - found.spot.drive)
+        ends.append(run.fine.solve(found.spot.y + _ASIDE * (end.y - found.spot.y), found.spot.drive + share))
+    near, far = ends
+    if near is None or far is None or near.unstable > one.unstable:
+        return False
+    return run.fine.pose_change(near.y, far.y) <= _STRAIGHT * _ASIDE * whole + _ROUNDING
 
 
 def _last_step_before(run: Run) -> int:
