@@ -21,7 +21,7 @@ from cfmkit.beams.solver import Spot
 if TYPE_CHECKING:
     from cfmkit.beams.run import Run
 
-_JUST = 1e-9  # share of the prestress or the constant loads that the start is just critical at
+_JUST = 1e-10  # share of the prestress or the constant loads that the start is just critical at
 _NEAR = 1e-4  # share of the drive's range in which there is nothing but the start
 _SIZES = (0.06 * 0.25 ** np.arange(4)).tolist()  # how far from the start the path is entered [rad]
 _BEFORE = 0.9  # share of the way to the first point asked for up to which it is
