@@ -401,7 +401,7 @@ def test_a_tip_that_leaves_the_surface_is_not_out_of_reach():
     falls = solved("beam_end_effector", f"{PROFILE}.height=-x/2")
     assert falls.status is Status.PARTIAL
     assert {"tip_lifts_off"} == {"tip_lifts_off", "surface_out_of_reach"} & warned(falls).keys()
-    assert value(falls, "surface_reach") == pytest.approx(2 * 1.76 * MM, rel=1e-9)
+    assert value(falls, "surface_reach") == pytest.approx(2 * 1.76 * MM, rel=1e-8)  # forces hold the tolerance, 1e-6
     assert falls.curves[1].extra["contact_force"].values.min() >= 0
     far = solved("beam_end_effector", "analysis.surface.preload=3 mm")
     assert {"surface_out_of_reach"} == {"tip_lifts_off", "surface_out_of_reach"} & warned(far).keys()
