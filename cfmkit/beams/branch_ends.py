@@ -254,6 +254,9 @@ def relabel(run: Run, primary: Run) -> None:
         first = index
     if first > last:
         return
+    until = places[int(run.points.info[first, 1])]
+    if not primary.points.info[:until, 0].any():  # it was led onto the branch, which does not end
+        return
     before, after = (int(run.points.info[k, 0]) for k in (first - 1, first))
     if last + 1 < len(run.branches):  # the hop onto the primary path came too late
         run.events.pop()
