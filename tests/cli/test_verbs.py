@@ -12,7 +12,7 @@ from cfmkit import families
 from cfmkit._version import __version__
 
 CONFIGS = sorted((Path(__file__).parents[2] / "configs").glob("*.yaml"))
-VERBS = ["design", "analyze", "export", "check", "new", "show", "schema", "clean"]
+VERBS = ["design", "analyze", "export", "check", "new", "show", "schema", "clean", "warm"]
 
 
 def test_version_is_printed(cli):
@@ -353,3 +353,11 @@ def test_the_completion_of_a_shell_can_be_shown_and_installed(cli, shell):
     assert {"--install-completion", "--show-completion"} <= set(cli("--help").out.split())
     script = cli(**{"_CFMKIT_COMPLETE": f"source_{shell}"})
     assert "_CFMKIT_COMPLETE" in script.out
+
+
+def test_the_beam_engine_can_be_compiled_ahead(cli):
+    done = cli("warm", "--json")
+    parts = json.loads(done.out)["parts"]
+    assert done.code == 0
+    assert [part["name"] for part in parts][:2] == ["equilibria and paths", "states along beams"]
+    assert all(part["seconds"] >= 0 for part in parts)

@@ -15,6 +15,7 @@ import pytest
 
 from cfmkit.beams import CLAMPED, Beam, Displacement, Network, Node, Section, Taper, gradient, trace
 from cfmkit.beams.kernels import dense, entry, predictor
+from cfmkit.beams.warming import warm
 
 _count, _solve, _predict = dense.positive_count, dense.lu_solve, predictor._predict
 
@@ -190,3 +191,10 @@ def test_without_any_folder_code_is_compiled_and_not_kept(monkeypatch):
 
     assert half(3.0) == 1.5
     assert half.stats.cache_path is None
+
+
+def test_warming_loads_every_part_of_the_compiled_code() -> None:
+    parts = list(warm())
+    assert len({part.name for part in parts}) == len(parts) == 5
+    for door in (entry._real, entry.states, entry.slopes, entry.row_slopes, entry.held_slopes):
+        assert len(door.signatures) >= 1
