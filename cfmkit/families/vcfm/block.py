@@ -13,14 +13,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.families.base import BlockAnswer
-from cfmkit.families.vcfm.checks import PRESSED, ROUNDING
+from cfmkit.families.vcfm.checks import PRESSED, ROUNDING, returns
 from cfmkit.families.vcfm.parts import RIM, share_of
 from cfmkit.families.vcfm.preload import measured_stiffness_for
 from cfmkit.families.vcfm.springs import Diamond
 from cfmkit.families.vcfm.strip import Strip
 from cfmkit.families.vcfm.truss import TrussDiamond, TrussLeaf
 from cfmkit.families.vcfm.vbeam import (
-    BISTABLE_ABOVE,
     FLAT_BUCKLED_ABOVE,
     LINEAR_ABOVE,
     NEGATIVE_ABOVE,
@@ -29,7 +28,7 @@ from cfmkit.families.vcfm.vbeam import (
     VBeam,
     overrated,
 )
-from cfmkit.families.vcfm.windows import flat_window
+from cfmkit.families.vcfm.windows import extremes, flat_window
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -281,7 +280,6 @@ def warned(spec: VcfmSpec, slab: Slab) -> dict[str, NDArray[np.bool_]]:
     size, paper, travel = len(slab.force), spec.analysis.fidelity == "truss", float(slab.grid[-1])
     q, rise = leaf.slenderness, leaf.rise
     top, bottom = _extremes(slab, *_window(spec, slab))
-    alone = slab.force - slab.spring.force(slab.grid)
     end = np.asarray(slab.leaf.linear[1])
     rises = slab.force[:, -1:] - _at(slab, np.broadcast_to(end, (size, 1)))
     found = {
@@ -290,7 +288,7 @@ def warned(spec: VcfmSpec, slab: Slab) -> dict[str, NDArray[np.bool_]]:
         "no_linear_region": (q >= NEGATIVE_ABOVE) & (q <= LINEAR_ABOVE) & (not paper),
         "not_flat": (top > 0) & ((top - bottom) / top > slab.flatness),
         "force_reversal": bottom <= 0,
-        "bistable": (q > BISTABLE_ABOVE) & (np.diff(alone) < 0).any(axis=1, keepdims=True),
+        "bistable": _stays(slab),
         "overload": (travel > end * (1 + ROUNDING)) & (rises > slab.flatness * np.abs(slab.force[:, -1:])),
         "asymmetric_buckling": np.array(not about.guided),
         "out_of_plane_buckling": leaf.width < 2.0 * leaf.thickness,
@@ -309,6 +307,26 @@ def warned(spec: VcfmSpec, slab: Slab) -> dict[str, NDArray[np.bool_]]:
         apart = np.abs(told.positive_stiffness / measured_stiffness_for(told.force, rise) - 1.0)
         found["measured_contradiction"] = (q >= FLAT_BUCKLED_ABOVE) & (apart > slab.flatness)
     return {name: np.ravel(np.broadcast_to(mask, (size, 1))) for name, mask in found.items()}
+
+
+def _stays(slab: Slab) -> NDArray[np.bool_]:
+    """Return which mechanisms stay where they snap to, (k, 1): as `Solution.least` has them."""
+    grid, rows = slab.grid, np.arange(len(slab.force))
+
+    def alone(place: FloatArray) -> FloatArray:
+        return np.asarray(slab.half_beams * slab.leaf.force(place))
+
+    def pulled(place: FloatArray) -> FloatArray:
+        return -np.asarray(alone(place) + slab.spring.force(place))
+
+    falls = np.diff(alone(grid[None, :])) < 0
+    start, end, step = np.zeros(len(rows)), np.full(len(rows), grid[-1]), float(grid[-1] - grid[-2])
+    peak = extremes(alone, grid[falls.argmax(axis=1)], step, (start, end))
+    lowest = np.where(grid >= peak[:, None], slab.force, np.inf).argmin(axis=1)
+    place = extremes(pulled, np.maximum(grid[lowest], peak), step, (peak, end))
+    least = -pulled(place[:, None])
+    back = returns(least, np.abs(slab.force).max(axis=1, keepdims=True))
+    return np.asarray(falls.any(axis=1, keepdims=True) & ~back)
 
 
 def _overstressed(spec: VcfmSpec, slab: Slab) -> NDArray[np.bool_]:

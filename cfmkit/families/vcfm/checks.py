@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from math import degrees
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,7 +15,6 @@ from cfmkit.families.vcfm.preload import measured_stiffness_for
 from cfmkit.families.vcfm.sbranch import POLE
 from cfmkit.families.vcfm.springs import Diamond
 from cfmkit.families.vcfm.vbeam import (
-    BISTABLE_ABOVE,
     FLAT_BUCKLED_ABOVE,
     LINEAR_ABOVE,
     NEGATIVE_ABOVE,
@@ -173,17 +172,14 @@ def _better_width(solution: Solution) -> tuple[float, float]:
 
 def _returns(solution: Solution) -> Iterator[Finding]:
     push, (low, high) = solution.nominal, solution.window
-    q = float(solution.parts.strip.slenderness)
-    if solution.least and solution.spec.mechanism.bistable.structure == "v-beam" and q > BISTABLE_ABOVE:
+    if solution.least and not returns(solution.least[1], float(np.abs(push.force).max())):
         place, force = solution.least
-        end = mm(float(push.travel[-1]))
-        back = (
-            f"its force past the peak of the leaves is {newton(force)} at least (at {mm(place)}; followed to {end}), "
-            "so the mechanism returns by itself"
-            if force > ROUNDING * float(np.abs(push.force).max())
-            else f"its force falls to {newton(force)} at {mm(place)}: the mechanism stays there until it is pulled back"
+        yield finding(
+            "bistable",
+            f"past the peak of the leaves the force falls to {newton(force)} at {mm(place)} (followed to "
+            f"{mm(float(push.travel[-1]))}): the mechanism stays there until it is pulled back; use a stiffer spring, "
+            "thicker or fewer leaves, or a preload",
         )
-        yield finding("bistable", f"without the spring the leaves snap to a second stable pose; with it {back}")
     inside = push.inside((low, high))
     beyond = push.rest is None or push.rest > low
     if beyond or (len(inside) and inside.min() <= 0):
@@ -194,6 +190,17 @@ def _returns(solution: Solution) -> Iterator[Finding]:
             f"left; a preload above {mm(-solution.parts.balance)} and K_p >= K_n keep it positive",
         )
     yield from _overload(solution, push)
+
+
+def returns(least: FloatArray | float, largest: FloatArray | float) -> Any:
+    """Return whether a mechanism comes back by itself: its least force past the peak of the leaves is a real one.
+
+    Parameters
+    ----------
+    least, largest : float or array
+        That force, and the largest of the curve [N].
+    """
+    return np.asarray(least > ROUNDING * largest)
 
 
 def _overload(solution: Solution, push: Push) -> Iterator[Finding]:

@@ -9,7 +9,7 @@ FINDINGS = {
     "no_linear_region": "the leaves do not buckle: their negative stiffness is nowhere constant",
     "not_flat": "the positive and the negative stiffness do not cancel: the force is not constant",
     "force_reversal": "the force reaches zero within the window: the mechanism would not return",
-    "bistable": "without the spring the leaves have a second stable pose; whether the whole returns is said",
+    "bistable": "past the peak of the leaves no outward force is left: the mechanism stays in a second stable pose",
     "overload": "the travel goes beyond the linear range, where the force rises steeply",
     "preload_out_of_range": "a preload at which no outward force is left, or nothing holds the shuttle",
     "stroke_unreachable": "the rise is too small for the stroke asked for",

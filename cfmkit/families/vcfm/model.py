@@ -138,7 +138,8 @@ class Solution:
         step, end = float(push.travel[-1] - push.travel[-2]), float(push.travel[-1])
         # thin leaves have their peak between the first two points: it is looked for, not taken from them
         peak = extreme(sampler.leaf_force, float(push.travel[falls[0]]), step, (max(float(push.travel[0]), 0.0), end))
-        lowest = float(push.travel[int(falls[0] + np.argmin(push.force[falls[0] :]))])
+        beyond = np.flatnonzero(push.travel >= peak)
+        lowest = float(push.travel[beyond[push.force[beyond].argmin()]]) if len(beyond) else peak
         place = extreme(lambda travel: -force_of(sampler, travel, push.preload), max(lowest, peak), step, (peak, end))
         return place, float(force_of(sampler, np.array([place]), push.preload)[0])
 

@@ -31,9 +31,6 @@ NEGATIVE_ABOVE = 1.4246
 LINEAR_ABOVE = np.pi
 """Rise over thickness above which it buckles, and so has a linear negative stiffness."""
 
-BISTABLE_ABOVE = 3.195
-"""Rise over thickness above which a bare V-beam has a second stable pose."""
-
 FLAT_BUCKLED_ABOVE = 2.0 * np.pi / 3.0**0.5
 """Rise over thickness above which it is still buckled when flat, so that its force is zero there."""
 

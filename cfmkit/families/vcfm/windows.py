@@ -22,6 +22,29 @@ ZOOMS, CLOSER, AROUND = 6, 4.0, np.linspace(-2.0, 2.0, 17)
 """How often it is looked more closely, how much more each time, and where around a place, in steps."""
 
 
+def extremes(
+    function: Callable[[FloatArray], FloatArray], place: FloatArray, step: float, span: tuple[FloatArray, FloatArray]
+) -> FloatArray:
+    """Return where functions are largest near places, (k,), within spans; `step` says how far off these may be.
+
+    Parameters
+    ----------
+    function : callable
+        Values of each function, (k, m) -> (k, m).
+    place : (k,) array
+        Near which each is largest.
+    step : float
+        How far off that may be.
+    span : pair of (k,) array
+        Within which it is looked for.
+    """
+    (low, high), rows = span, np.arange(len(place))
+    for _ in range(2 * ZOOMS):
+        near = np.clip(place[:, None] + AROUND * step, low[:, None], high[:, None])
+        place, step = near[rows, function(near).argmax(axis=1)], step / CLOSER
+    return place
+
+
 def extreme(
     function: Callable[[FloatArray], FloatArray], place: float, step: float, span: tuple[float, float]
 ) -> float:
@@ -32,10 +55,8 @@ def extreme(
     >>> round(extreme(np.sin, 1.5, 0.25, (0.0, 3.0)), 4)
     1.5708
     """
-    for _ in range(2 * ZOOMS):
-        near = np.unique(np.clip(place + AROUND * step, *span))
-        place, step = float(near[function(near).argmax()]), step / CLOSER
-    return place
+    low, high = (np.array([end]) for end in span)
+    return float(extremes(lambda near: function(near[0])[None, :], np.array([place]), step, (low, high))[0])
 
 
 def flat_window(
