@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from cfmkit.beams.path import Path
     from cfmkit.beams.run import Run
 
-_EARLY = 0.1  # share of the points: segments that are too long before it are cut in four, later in two
+_EARLY = 0.1  # share of the drive's range: segments that are too long before it are cut in four, later in two
 _ROUNDS = 8  # meshes tried before giving up on the tolerance
 _GAIN = 0.005  # share of the drive's range, or of the constant loads, that is some
 _SURE = 1e-3  # error of a path that ends early from which on that may be the mesh's fault
@@ -73,7 +73,7 @@ def _solved(network: Network, drive: Drive, control: Control, to_first: bool = F
             endings.stop(run, STALLED)
         elif run.too_long and round_ < _ROUNDS - 1:
             before = run
-            mesh = mesh.shorter(4 if run.asked() < _EARLY * len(drive.points) else 2)
+            mesh = mesh.shorter(4 if _early(run) else 2)
             continue
         if run.status is PathStatus.NO_START and round_ < _STARTS and run.share > borne + _GAIN:
             mesh, borne = mesh.shorter(), run.share
@@ -84,6 +84,11 @@ def _solved(network: Network, drive: Drive, control: Control, to_first: bool = F
             break
         mesh = mesh.finer()
     return run
+
+
+def _early(run: Run) -> bool:
+    """Tell whether a run ended in the first part of the drive's range."""
+    return not len(run.points) or abs(float(run.points.drive[-1])) < _EARLY * run.span
 
 
 def _further(run: Run, before: Run) -> bool:
