@@ -131,8 +131,8 @@ class ClosedForm(Protocol):
         """Return the effort of a branch at places of any shape [N or N m]; NaN where there is no equilibrium."""
         ...
 
-    def excess_stress(self, branch: str, places: FloatArray, /) -> FloatArray:
-        """Return by how much the stress exceeds what is allowed [Pa]."""
+    def stress(self, branch: str, places: FloatArray, /) -> FloatArray:
+        """Return the largest stress [Pa] at places of any shape; NaN where it has no bound."""
         ...
 
 

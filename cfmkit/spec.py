@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
-from typing import Any, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
@@ -68,7 +68,9 @@ class Analysis(Model):
         description="where the metrics are taken, e.g. [2 mm, 240 mm] or, in shares of the travel, [1 %, 100 %]; "
         "default: the full travel",
     )
-    band: float = Field(0.05, gt=0, lt=1, description="half width of the force band of `usable_stroke`, as a fraction")
+    band: Annotated[Ratio, Field(gt=0, lt=1)] = Field(
+        0.05, description="half width of the force band of `usable_stroke`"
+    )
 
     @model_validator(mode="after")
     def _window_increases(self) -> Self:

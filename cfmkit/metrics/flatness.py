@@ -140,4 +140,6 @@ def safety_factor(branch: Branch) -> float:
 def _stress(trace: Trace) -> FloatArray:
     if trace.stress is None:
         raise Undefined("the curve has no column 'max_stress'")
+    if unknown := int(np.isnan(trace.stress).sum()):
+        raise Undefined(f"the stress has no bound at {unknown} of {len(trace.stress)} points in the window")
     return trace.stress

@@ -5,7 +5,7 @@ Everything that several metrics need is computed once, when it is first asked fo
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from math import isfinite
 from typing import TYPE_CHECKING, NamedTuple
@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from cfmkit.metrics.many import ManyBranches
-from cfmkit.metrics.traces import Trace, Undefined, Window, covers, restrict, traces
+from cfmkit.metrics.traces import ROUNDING, Trace, Undefined, Window, covers, restrict, traces
 
 if TYPE_CHECKING:
     from cfmkit.curves import Curve, FloatArray, Kind
@@ -151,8 +151,17 @@ class Branch:
     def part(self, window: Window) -> Trace | str:
         """Return the part of the branch in some window, or why there is none."""
         if covers(self.extent, window):
-            return restrict(self.trace, window)
+            return self._stressed(restrict(self.trace, window))
         return f"branch {self.name!r} covers {self.span(*self.extent)} only"
+
+    def _stressed(self, part: Trace) -> Trace:
+        """Return a part whose ends, between a sample with a stress and one without, have that of the model."""
+        model, found = self.frame.closed, part.stress
+        if model is None or found is None or not len(found) or np.isfinite(found[[0, -1]]).all():
+            return part
+        stress, ends = found.copy(), [end for end in (0, -1) if not isfinite(found[end])]
+        stress[ends] = model.stress(self.name, part.motion[ends])
+        return replace(part, stress=stress)
 
     @cached_property
     def beside(self) -> tuple[Trace, ...]:
@@ -215,8 +224,13 @@ class Branch:
             return None
         places, (low, high) = model.places[None, :], self.ends
         exact = partial(model.effort, self.name)
-        stress = partial(model.excess_stress, self.name) if self.frame.allowable_stress is not None else None
-        return ManyBranches(places, exact(places), np.array([low]), np.array([high]), exact, stress)
+        excess = None
+        if (allowed := self.frame.allowable_stress) is not None:
+
+            def excess(at: FloatArray) -> FloatArray:
+                return np.asarray(model.stress(self.name, at) - allowed * (1 + ROUNDING))
+
+        return ManyBranches(places, exact(places), np.array([low]), np.array([high]), exact, excess)
 
     @property
     def reference(self) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+import re
 from importlib import import_module
 from importlib.resources import files
 from pathlib import Path
@@ -62,6 +63,15 @@ def test_a_template_runs_and_is_designed_without_a_warning(name):
         done = report.report_on(cfmkit.analyze(found))
         assert [item.name for item in done.warnings] == []
         assert (done.status, not done.missed) == (Status.COMPLETE, True)
+
+
+@every_family
+def test_the_band_of_the_template_is_one_that_a_spec_takes(name):
+    text = files("cfmkit").joinpath("templates", families.family(name).template).read_text()
+    spec = cfmkit.loads(re.sub(r"(?m)^  # (band: \S+ ?%?).*$", r"  \1", text).encode())
+    assert text.count("# band: 5 %") == 1
+    assert spec.analysis.band == 0.05
+    assert spec.replace({"analysis.band": "2 %"}) == spec.replace({"analysis.band": 0.02})
 
 
 @every_family

@@ -46,6 +46,28 @@ def test_a_contact_that_yields_is_told_with_the_width_that_does_not():
     assert stresses(thin)[1] < 1
 
 
+@pytest.mark.parametrize("points", [31, 301, 481])
+def test_a_window_that_begins_just_beyond_the_corner_has_a_stress_whatever_the_points(points):
+    """Its first place lies between a sample on the corner, where the pressure has no bound, and one on the flank."""
+    spec = cam(contact={"width": "3 mm", "material": "pla"}).replace({"analysis.points": points})
+    result = analyze(spec)
+    corner = result.values["undercut_travel"].value
+    start, end = corner + 0.01 * MM, 0.2
+    found = stresses(result, Window(start, end))
+    sampled = result.curve.displacement
+    inside = result.curve.extra["max_stress"].values[(sampled > start) & (sampled <= end)].max()
+    first = at(spec, start)
+    path = first.assembly.profile.path.law.curvature_radius(first.x[0])
+    reduced = material("pla").youngs_modulus / (2 * (1 - material("pla").poisson_ratio ** 2))
+    curvature = 1 / 0.016 + 1 / (path - 0.016)
+    begins = np.sqrt(first.contact[0] * reduced * curvature / (np.pi * 3 * MM)) / 1.67
+    assert found[0] == pytest.approx(max(inside, begins), rel=1e-9)
+    assert found[1] == pytest.approx(material("pla").yield_strength / found[0], rel=1e-12)
+    on_it = evaluate(result, ("safety_factor",), Window(0.5 * corner, end))["safety_factor"]
+    assert on_it.value is None
+    assert "the stress has no bound at " in on_it.reason
+
+
 def test_the_safety_factor_of_the_mechanism_lowers_what_is_allowed():
     one, two = (analyze(cam(**PRESSED, safety_factor=factor)) for factor in (1, 2))
     assert stresses(two) == [pytest.approx(stresses(one)[0]), pytest.approx(stresses(one)[1] / 2)]

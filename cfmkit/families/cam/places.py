@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.cam.contact import allowable_stress, flank_pressure, stress
+from cfmkit.families.cam.contact import flank_pressure, stress
 from cfmkit.families.cam.statics import forces
 
 if TYPE_CHECKING:
@@ -57,15 +57,11 @@ class Places:
         """Return the force on the way up or down at displacements of any shape [N]."""
         return np.asarray(self._at(branch, places)[1].slider.reshape(np.shape(places)))
 
-    def excess_stress(self, branch: str, places: FloatArray) -> FloatArray:
-        """Return by how much the stress exceeds what is allowed at displacements of any shape [Pa]."""
-        solution, mechanism = self.solution, self.solution.assembly.spec.mechanism
-        allowed = allowable_stress(mechanism)
-        if mechanism.contact is None or allowed is None:
-            return np.full(np.shape(places), -np.inf)
+    def stress(self, branch: str, places: FloatArray) -> FloatArray:
+        """Return the stress below the contact at displacements of any shape [Pa]; NaN on the corner."""
         states, found = self._at(branch, places)
-        excess = stress(flank_pressure(solution.assembly, states, found.contact)) - allowed * (1 + 1e-12)
-        return np.asarray(excess.reshape(np.shape(places)))
+        pressed = flank_pressure(self.solution.assembly, states, found.contact)
+        return np.asarray(stress(pressed).reshape(np.shape(places)))
 
     def _at(self, branch: str, places: FloatArray) -> tuple[TrackStates, Forces]:
         """Return where the rollers are at displacements, and the forces there, as one row."""

@@ -137,7 +137,7 @@ class ClosedForm:
         """Return torque [N m] or force [N] at places of any shape."""
         return self.character.efforts(np.ravel(places)).reshape(np.shape(places))
 
-    def excess_stress(self, _branch: str, places: FloatArray, /) -> FloatArray:
+    def stress(self, _branch: str, places: FloatArray, /) -> FloatArray:
         """Return zeros: springs have no stress here."""
         return np.zeros(np.shape(places))
 
