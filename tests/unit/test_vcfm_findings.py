@@ -283,6 +283,11 @@ def test_a_pull_at_which_nothing_holds_the_shuttle_is_told_and_not_more():
         assert found.values["least_force"].value < 0
 
 
+def test_what_is_not_flat_is_told_of_the_part_of_the_window_that_the_curve_covers():
+    found = analyzed("analysis.window=[5 mm, 9 mm]", "requirements=[]")
+    assert "over 5 mm ... 6 mm the force varies by 23.3 %" in message(found, "not_flat")
+
+
 def test_a_window_beyond_the_travel_says_nothing_of_a_pull():
     found = analyzed("analysis.window=[7 mm, 9 mm]", "requirements=[]", preloads="[0 mm, -1 mm]")
     assert "preload_out_of_range" not in names(found)

@@ -38,7 +38,7 @@ def left_out(spec: CamSpec) -> tuple[Finding, ...]:
     if not found:
         return ()
     message = (
-        f"the quasi-static model is symmetric: {' and '.join(found)} count in the dynamic model only; "
+        f"the quasi-static model is symmetric: {' and '.join(found)} {'counts' if len(found) == 1 else 'count'} in the dynamic model only; "
         "give 'analysis.dynamics' a slow motion to see the effect"
     )
     return (finding("symmetric_model", message),)

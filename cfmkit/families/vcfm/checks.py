@@ -110,6 +110,7 @@ def _flatness(solution: Solution) -> Iterator[Finding]:
     alike = one.positive_stiffness > 0 and abs(one.negative_stiffness / one.positive_stiffness - 1.0) < ALIKE
     told = f"K_p = {rate(one.positive_stiffness)} and K_n = {rate(one.negative_stiffness)}"
     cause = f"{told} cancel, but not in the whole window" if alike else f"{told} do not cancel"
+    low, high = max(low, float(push.travel[0])), min(high, float(push.travel[-1]))  # what is beyond is not known
     words, cures = _flattening(solution, ripple)
     yield finding(
         "not_flat",
