@@ -37,8 +37,9 @@ def left_out(spec: CamSpec) -> tuple[Finding, ...]:
         found.append("'mechanism.left'")
     if not found:
         return ()
+    verb = "counts" if len(found) == 1 else "count"
     message = (
-        f"the quasi-static model is symmetric: {' and '.join(found)} {'counts' if len(found) == 1 else 'count'} in the dynamic model only; "
+        f"the quasi-static model is symmetric: {' and '.join(found)} {verb} in the dynamic model only; "
         "give 'analysis.dynamics' a slow motion to see the effect"
     )
     return (finding("symmetric_model", message),)
