@@ -5,11 +5,12 @@ from __future__ import annotations
 import os
 import time
 import traceback
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, Literal, Protocol
 
-from cfmkit.errors import CfmError, ExitCode, OutputError, UsageError, code_of, lines_of, visible
+from cfmkit.errors import CfmError, ExitCode, OutputError, SpecError, UsageError, code_of, lines_of, visible
 from cfmkit.report import worst
 from cfmkit.results import Status
 from cfmkit.runs import Outcome, Request, Verb, analysed, designed, journal_of, long_run, spec_of
@@ -17,7 +18,7 @@ from cfmkit.runs import carry_out as carried_out
 from cfmkit.studies.batch import LEFT, Entry
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from cfmkit.runs import Noting
     from cfmkit.spec import Spec
@@ -137,10 +138,19 @@ def _ended(entry: Entry, outcome: Outcome) -> Entry:
 
 
 def _failed(entry: Entry, error: Exception) -> Entry:
-    code, complaints = code_of(error), lines_of(error)
+    code, complaints = code_of(error), tuple(_of_one(entry, error))
     first, *more = complaints
     told = first.removeprefix("error    ") + (f" (and {len(more)} more)" if more else "")
     return replace(entry, status=code.name.lower(), code=code, message=told, errors=complaints)
+
+
+def _of_one(entry: Entry, error: Exception) -> Iterator[str]:
+    """Yield what standard error shows of a fault; of one in an option, too, which specification has it."""
+    if not isinstance(error, SpecError):
+        yield from lines_of(error)
+        return
+    for problem in error.problems:
+        yield str(problem) if not problem.source.startswith("--") else f"{visible(entry.spec)}: {problem}"
 
 
 def lost(job: Job, outcome: Lost) -> Entry:
@@ -403,14 +413,16 @@ def batch(
     from cfmkit.studies.junit import junit as junit_of
     from cfmkit.studies.kept import KeptRuns
 
-    place, given = os.fspath(out), tuple(changes)
+    place, given = os.fspath(out), (changes,) if isinstance(changes, str) else tuple(changes)
     if not place.strip():
         raise UsageError("--out is empty; give a folder")
+    if verb not in (None, "design", "analyze"):
+        raise UsageError(f"verb: {verb!r} is not one of 'design', 'analyze'")
     for change in given:
         addressed(change)
-    named = [os.fspath(one) for one in ([specs] if isinstance(specs, str | os.PathLike) else specs)]
+    named = _named(specs)
     files = sources(named, place)
-    work = BatchWork(Request("", place, given, fidelity, seed, plots), verb, tuple(arguments), fresh)
+    work = BatchWork(Request("", place, given, fidelity, seed, plots, of_many=True), verb, tuple(arguments), fresh)
     todo = [Job(k, *pair) for k, pair in enumerate(zip(files, folders(files), strict=True))]
     executor = executor_for(jobs, len(todo), timeout_per_point)
     report = None if junit is None else prepared(junit)
@@ -423,6 +435,29 @@ def batch(
     if report is not None:
         report(junit_of(entries))
     return BatchResult(entries, code, place, written)
+
+
+def _named(specs: Any) -> list[str]:
+    """Return the names of the files, folders and patterns that are given."""
+    if isinstance(specs, str | os.PathLike):
+        specs = [specs]
+    named = list(specs) if isinstance(specs, Iterable) else [specs]
+    if odd := [one for one in named if not isinstance(one, str | os.PathLike)]:
+        raise UsageError(f"a batch reads files: a path is needed, not {type(odd[0]).__name__}; cfmkit.dumps writes one")
+    if not named:
+        raise UsageError("there is no specification: name files, folders or patterns")
+    return [str(os.fspath(one)) for one in named]
+
+
+def unreached(entries: Sequence[Entry], changes: Iterable[str]) -> Iterator[str]:
+    """Yield the options that are for a family of which there is no specification."""
+    from cfmkit.specfile import addressed
+
+    families = {one.family for one in entries}
+    for change in changes if "" not in families else ():  # what is not valid may be of any family
+        family, _ = addressed(change)
+        if family is not None and family not in families:
+            yield f"warning  --set {visible(change)}: no specification is of the family {family!r}"
 
 
 def _about(work: BatchWork, named: Sequence[str], code: ExitCode) -> dict[str, Any]:

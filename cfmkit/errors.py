@@ -25,9 +25,18 @@ from enum import IntEnum
 _LONG_QUOTE = re.compile(r"(?P<quote>['\"])(?P<text>(?:(?!(?P=quote)).){200,})(?P=quote)", re.DOTALL)
 
 
+_LONG_WORD = re.compile(r"\S{400,}")
+"""Longer than the paths of files that people have; names of keys, files and options stand without quotes."""
+
+
 def shortened(message: str) -> str:
     """Return a message in which whatever somebody gave is quoted only as far as he needs to recognise it."""
-    return _LONG_QUOTE.sub(lambda found: f"{found['quote']}{found['text'][:47]}...{found['quote']}", message)
+    quoted = _LONG_QUOTE.sub(lambda found: f"{found['quote']}{found['text'][:47]}...{found['quote']}", message)
+    return _words_shortened(quoted)
+
+
+def _words_shortened(text: str) -> str:
+    return _LONG_WORD.sub(lambda found: f"{found[0][:60]}...{found[0][-20:]}", text)
 
 
 def visible(text: str) -> str:
@@ -94,7 +103,7 @@ class Problem:
     def __str__(self) -> str:
         """Return the one line that the user reads: ``file:line:col: path: message``."""
         place = f"{self.source}:{self.line}:{self.column}" if self.line else self.source
-        return ": ".join(part for part in (place, self.path, self.message) if part)
+        return ": ".join(part for part in (_words_shortened(place), _words_shortened(self.path), self.message) if part)
 
 
 class SpecError(InputError):

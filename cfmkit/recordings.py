@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import os
 from typing import TYPE_CHECKING
 
 from cfmkit.api import resolve
 from cfmkit.errors import UsageError
 
 if TYPE_CHECKING:
-    import os
     from collections.abc import Iterable, Mapping, Sequence
 
     from cfmkit.api import AnySpec
@@ -28,7 +28,7 @@ def measure(
     target: str | float | None = None,
     tare: str | float | None = None,
     zero: str | float | None = None,
-    flip: Iterable[str] = (),
+    flip: str | Iterable[str] = (),
     as_recorded: bool = False,
     one_branch: bool = False,
 ) -> MeasureReport:
@@ -48,7 +48,7 @@ def measure(
         Force [N] or torque [N m] that it should have.
     tare, zero : str or float, optional
         What the sensors show without load [N or N m] and at the mechanism's zero [m or rad]; ``"start"``: at first.
-    flip : iterable of str
+    flip : str or iterable of str
         ``"force"``, ``"displacement"``, ``"torque"``, ``"angle"``: what is recorded with the other sign.
     as_recorded : bool
         Leave out neither spikes nor points next to reversals.
@@ -78,14 +78,25 @@ def measure(
     from cfmkit.metrics import Frame
 
     low_pass = filter if filter == "default" else read_filter(filter)
-    recording = data if isinstance(data, Recording) else read_recording(data, units)
+    recording = data if isinstance(data, Recording) else read_recording(_file(data), units)
     place = read_window(window, recording.kind)
     frame = Frame(target=read_target(target, recording.kind))
-    recording = corrected(recording, tare, zero, tuple(flip))
+    recording = corrected(recording, tare, zero, _each(flip))
     source = measured(recording, low_pass, () if as_recorded else LEFT_OUT)
     if not one_branch:
         require_loop(source)
     return report_on(source, frame, place)
+
+
+def _file(data: str | os.PathLike[str]) -> str:
+    """Return the path of a file, if it is one."""
+    if isinstance(data, str | os.PathLike):
+        return str(os.fspath(data))
+    raise UsageError(f"the path of a data file or a cfmkit.Recording of arrays is needed, not {type(data).__name__}")
+
+
+def _each(names: str | Iterable[str]) -> tuple[str, ...]:
+    return (names,) if isinstance(names, str) else tuple(names)
 
 
 def calibrate(
@@ -99,7 +110,7 @@ def calibrate(
     units: str | None = None,
     tare: str | float | None = None,
     zero: str | float | None = None,
-    flip: Iterable[str] = (),
+    flip: str | Iterable[str] = (),
 ) -> Calibration:
     """Return a specification whose model fits a measured curve: values, intervals, and what the data cannot tell.
 
@@ -150,9 +161,9 @@ def calibrate(
         raise UsageError(f"--loss: there is no {loss!r}; there are {', '.join(LOSSES)}")
     start = resolve(spec)
     if isinstance(data, Recording):
-        source = measured(corrected(data, tare, zero, tuple(flip)), None, LEFT_OUT)
+        source = measured(corrected(data, tare, zero, _each(flip)), None, LEFT_OUT)
     else:
-        source = data if isinstance(data, Measured) else read_measured(data, units, tare, zero, tuple(flip))
+        source = data if isinstance(data, Measured) else read_measured(_file(data), units, tare, zero, _each(flip))
     given = bounds or {}
     texts = [f"{path}={ends}" for path, ends in given.items() if isinstance(ends, str)]
     numbers = {path: ends for path, ends in given.items() if not isinstance(ends, str)}

@@ -113,6 +113,8 @@ class Request:
         Of everything random.
     plots : bool
         Whether to draw.
+    of_many : bool
+        Whether it is one of many, and changes may be for others.
     """
 
     spec: str
@@ -121,6 +123,7 @@ class Request:
     fidelity: str | None = None
     seed: int = 0
     plots: bool = True
+    of_many: bool = False
 
 
 def carry_out(
@@ -161,11 +164,12 @@ def spec_of(wanted: Wish) -> Spec:
 
 
 def _document(wanted: Wish) -> Document:
+    of_many = getattr(wanted, "of_many", False)
     if wanted.fidelity is None:
-        return read_spec(wanted.spec, wanted.changes)
+        return read_spec(wanted.spec, wanted.changes, of_many)
     if not wanted.fidelity.strip():
         raise UsageError("--fidelity is empty; `cfmkit show` and the family's name lists what there is")
-    return read_spec(wanted.spec, (*wanted.changes, f"analysis.fidelity={wanted.fidelity}"))
+    return read_spec(wanted.spec, (*wanted.changes, f"analysis.fidelity={wanted.fidelity}"), of_many)
 
 
 def _bound(document: Document, wanted: Wish) -> Spec:

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 STDIN = "-"
 
 
-def read_spec(name: str, changes: Iterable[str] = ()) -> Document:
+def read_spec(name: str, changes: Iterable[str] = (), of_many: bool = False) -> Document:
     """Return what a file says, changed by options such as ``a.b=1 mm``; nothing is checked yet.
 
     Parameters
@@ -31,31 +31,38 @@ def read_spec(name: str, changes: Iterable[str] = ()) -> Document:
         Path of a YAML file; ``-`` is standard input.
     changes : iterable of str
         What ``--set`` takes.
+    of_many : bool
+        Whether there are other specifications, for which some options may be.
 
     Raises
     ------
     cfmkit.errors.UsageError
-        If the file cannot be read, or an option is malformed.
+        If the file cannot be read, or an option is malformed or for a specification of another family.
     """
     from cfmkit.yamlio import read_document
 
     if name == STDIN:
-        return changed(read_document(standard_input(), "stdin", Path.cwd()), changes)
-    return changed(read_document(content(name), name, Path(name).absolute().parent), changes)
+        return changed(read_document(standard_input(), "stdin", Path.cwd()), changes, of_many)
+    return changed(read_document(content(name), name, Path(name).absolute().parent), changes, of_many)
 
 
-def changed(document: Document, changes: Iterable[str]) -> Document:
-    """Return a document with options applied in their order, but those for specifications of another family.
+def changed(document: Document, changes: Iterable[str], of_many: bool = False) -> Document:
+    """Return a document with options applied in their order.
+
+    Options for specifications of another family are for others of many; of one alone they would change nothing.
 
     Raises
     ------
     cfmkit.errors.UsageError
-        If an option is malformed or is for a family that does not exist.
+        If an option is malformed, for a family that does not exist, or for none that there is.
     """
     for change in changes:
         family, option = addressed(change)
-        if family is None or family == _family_of(document):
+        own = _family_of(document)
+        if family in (None, own):
             document = document.set(option)
+        elif own is not None and not of_many:
+            raise UsageError(f"--set {visible(change)}: {visible(document.source)} is of the family {visible(own)!r}")
     return document
 
 

@@ -252,6 +252,11 @@ class Path:
         rows = self.sampler.rows(list(self.layout.network.beams).index(beam))
         return read_only(self.sampler.states[point, rows.index, :2] * self.layout.scales.length)
 
+    def places(self, beam: str) -> FloatArray:
+        """Return where the sampled places of a beam lie, (k,) [fraction of the arc length]."""
+        index = list(self.layout.network.beams).index(beam)
+        return self.sampler.place(index, self.sampler.rows(index).t)
+
     def sections(self, beam: str) -> Sections:
         """Return section forces and stresses along a beam at all points; arrays (n, k)."""
         return along_beam(self.sampler, list(self.layout.network.beams).index(beam))

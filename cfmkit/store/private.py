@@ -7,6 +7,8 @@ import stat
 import tempfile
 from pathlib import Path
 
+from cfmkit.store.disk import system
+
 
 def private_folder(name: str) -> Path | None:
     """Return a folder for files that this user's later runs may use again; None where there is no room for any.
@@ -22,7 +24,7 @@ def private_folder(name: str) -> Path | None:
     try:
         folder = Path(tempfile.gettempdir()) / f"cfmkit-{name}-{_user()}"
         try:
-            folder.mkdir(mode=0o700)
+            system.mkdir(folder, 0o700)
         except FileExistsError:
             if not _is_ours(folder):
                 return Path(tempfile.mkdtemp(prefix=f"cfmkit-{name}-"))

@@ -209,8 +209,22 @@ def test_an_option_for_one_family_leaves_the_others_alone(cli):
     done = batch(cli, "specs", "--set", "cam:mechanism.roller_radius=20 mm", "--verb", "analyze")
     assert done.code == 0, done.err
     assert "roller_radius: 20 mm" in (cli.folder / "out" / "good" / "resolved.yaml").read_text()
+    named = "specs/crank.yaml: --set mechanism.roller_radius: unknown key 'roller_radius'"
+    assert named in plain.err, "an error in an option names the specification that has it"
     refused = batch(cli, "specs", "--set", "cams:mechanism.roller_radius=20 mm")
     assert (refused.code, "there is no family 'cams'; did you mean 'cam'?" in refused.err) == (2, True)
+
+
+def test_an_option_for_a_family_that_is_not_there_is_not_lost_without_a_word(cli):
+    write(cli, "good")
+    option = "vcfm:mechanism.bistable.thickness=1 mm"
+    done = batch(cli, "specs", "--set", option, "--verb", "analyze")
+    assert (done.code, f"--set {option}: no specification is of the family 'vcfm'" in done.err) == (0, True)
+    for verb in ("analyze", "design", "export", "check", "sweep", "sensitivity"):
+        alone = cli(verb, "specs/good.yaml", "--set", option)
+        assert (alone.code, f"--set {option}: specs/good.yaml is of the family 'cam'" in alone.err) == (2, True)
+    (cli.folder / "specs" / "leaves.yaml").write_text((CONFIGS / "vcfm_pla.yaml").read_text())
+    assert cli("check", "specs/good.yaml", "specs/leaves.yaml", "--set", option).code == 0
 
 
 def test_a_run_that_takes_too_long_is_given_up(cli):

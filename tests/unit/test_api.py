@@ -208,6 +208,41 @@ def test_what_is_neither_a_specification_nor_a_path_is_refused_in_one_line(name,
         getattr(cfmkit, name)(wrong)
 
 
+@pytest.mark.parametrize("wrong", [None, ([0.0, 1.0], [5.0, 5.0])])
+def test_what_is_neither_a_recording_nor_a_path_is_refused_in_one_line(wrong):
+    for call in (lambda: cfmkit.measure(wrong), lambda: cfmkit.calibrate(CAM, wrong, "mechanism.rolling_friction")):
+        with pytest.raises(cfmkit.UsageError, match=f"Recording of arrays is needed, not {type(wrong).__name__}"):
+            call()
+
+
+def test_one_column_to_flip_needs_no_list():
+    recording = CAM.parent / "synthetic" / "cam_loop.csv"
+    turned = [cfmkit.measure(recording, flip=flip, one_branch=True) for flip in ("force", ["force"])]
+    assert turned[0].numbers == turned[1].numbers
+    plain = cfmkit.measure(recording).numbers.raw["force_mean[load]"].value
+    assert turned[0].numbers.raw["force_mean[load]"].value == pytest.approx(-plain, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("specs", "more", "words"),
+    [
+        ([], {}, "there is no specification: name files"),
+        (3, {}, "a path is needed, not int"),
+        ([None], {}, "a path is needed, not NoneType"),
+        (CAM, {"verb": "analyse"}, "'analyse' is not one of 'design', 'analyze'"),
+    ],
+)
+def test_a_batch_of_what_is_no_file_is_refused_before_anything_is_computed(tmp_path, specs, more, words):
+    with pytest.raises(cfmkit.UsageError, match=words):
+        cfmkit.batch(specs, tmp_path / "out", **more)
+    assert not (tmp_path / "out").exists()
+
+
+def test_one_change_of_a_batch_needs_no_list(tmp_path):
+    cfmkit.batch(CAM, tmp_path / "out", verb="analyze", changes="analysis.points=51", plots=False)
+    assert "points: 51" in (tmp_path / "out" / "cam" / "resolved.yaml").read_text()
+
+
 def test_export_is_the_function_before_and_after_the_package_of_that_name_is_imported():
     code = (
         "import cfmkit; before = cfmkit.export; from cfmkit.export import files; import cfmkit.export.dxf; "

@@ -14,7 +14,7 @@ from cfmkit.errors import ExitCode, SpecError, UsageError
 from cfmkit.families import family
 from cfmkit.plots.sensitivity import figures, short
 from cfmkit.plots.style import MM, png
-from cfmkit.studies.engine import run
+from cfmkit.studies.engine import MISSING, run
 from cfmkit.studies.sensitivity.evaluation import Evaluator
 from cfmkit.studies.sensitivity.methods import METHODS, carry_out
 from cfmkit.studies.sensitivity.output import as_json, exit_code, outputs
@@ -134,15 +134,18 @@ def test_a_family_that_knows_its_gradient_is_asked_for_it(monkeypatch):
 def test_an_interrupted_study_states_nothing_but_keeps_its_rows():
     def stops(work):
         records = run(work)
-        records._places[2:] = -1
+        records._places[work.step :] = MISSING  # what was under way when it was ended: whole jobs
+        done.append(work.step)
         return records
 
-    found = carry_out(prepare(spec()), stops)
+    done = []
+    found = carry_out(prepare(spec(samples=32)), stops)
     assert found.interrupted
     assert exit_code(found) is ExitCode.INTERRUPTED
     written = {name: data if isinstance(data, bytes) else b"".join(data) for name, data in outputs(found)}
     assert "indices.csv" not in written
-    assert len(written["results.csv"].splitlines()) == 3
+    assert done[0] < points_of("sobol", 32, 3, 2)
+    assert len(written["results.csv"].splitlines()) == 1 + done[0]
     assert as_json(found)["status"] == "interrupted"
 
 

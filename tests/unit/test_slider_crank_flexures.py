@@ -512,6 +512,24 @@ def _ray(at: complex, way: complex, start: complex, end: complex) -> float | Non
     return reach if 0 <= share <= 1 and reach > 0 else None
 
 
+@pytest.mark.parametrize(("change", "allowed"), [("0.0099 mm", False), ("0.0101 mm", True), ("1e-9 mm", False)])
+def test_a_strip_with_a_place_a_hundred_times_thinner_is_a_hinge_and_refused(change: str, allowed: bool) -> None:
+    values = f"mechanism.beam.thickness=[1 mm, 0.8 mm, {change}, 1 mm]"
+    if allowed:
+        assert min(spec("strip", values).mechanism.beam.values) == pytest.approx(1.01e-5)
+        return
+    with pytest.raises(cfmkit.SpecError, match=r"over 100 times the smallest.* is a hinge"):
+        spec("strip", values)
+
+
+def test_the_side_of_a_strip_is_found_without_its_stresses(monkeypatch: pytest.MonkeyPatch) -> None:
+    """They were computed along the whole strip at every point, for each point anew."""
+    calls: list[int] = []
+    monkeypatch.setattr("cfmkit.beams.path.along_beam", lambda *_: calls.append(1))
+    assert api.analyze(spec("strip", "analysis.points=7", "analysis.recheck=false")).status.usable
+    assert not calls
+
+
 def test_printing_allowance_is_not_drawn() -> None:
     thin = api.drawing(spec("strip", "mechanism.beam.offset=0.1 mm")).tables[0].columns["thickness"][0]
     np.testing.assert_allclose(thin, 0.97721 * MM)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
@@ -71,7 +71,7 @@ def run(options: Options, terminal: Terminal) -> Answer:
     A spec that an earlier batch has finished is reused as long as nothing has changed: neither spec nor options, nor
     cfmkit, nor a file that was written.
     """
-    from cfmkit.batches import batch
+    from cfmkit.batches import batch, unreached
     from cfmkit.cli import studies
     from cfmkit.cli.progress import watching
 
@@ -95,7 +95,8 @@ def run(options: Options, terminal: Terminal) -> Answer:
             noting=studies.noting,
         )
     seconds = studies.now() - start
-    return _answer(found, Ending(found.folder, found.files, options.junit, seconds, options.fresh), terminal)
+    answer = _answer(found, Ending(found.folder, found.files, options.junit, seconds, options.fresh), terminal)
+    return replace(answer, complaints=(*answer.complaints, *unreached(found.entries, options.changes)))
 
 
 @dataclass(frozen=True)

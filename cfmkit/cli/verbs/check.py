@@ -53,7 +53,7 @@ class Finding:
 
 def run(options: Options, terminal: Terminal) -> Answer:
     """Check specs without computing anything: every fault of every file, with its line and column."""
-    found = [_checked(name, options.changes) for name in options.specs]
+    found = [_checked(name, options.changes, len(options.specs) > 1) for name in options.specs]
 
     def view(terminal: Terminal) -> None:
         for line in _lines(found, terminal.verbose > 0):
@@ -69,11 +69,11 @@ def run(options: Options, terminal: Terminal) -> Answer:
     )
 
 
-def _checked(name: str, changes: tuple[str, ...]) -> Finding:
+def _checked(name: str, changes: tuple[str, ...], of_many: bool) -> Finding:
     from cfmkit.specfile import bind, read_spec
 
     try:
-        return Finding(name, bind(read_spec(name, changes)), Answer())
+        return Finding(name, bind(read_spec(name, changes, of_many)), Answer())
     except CfmError as error:
         return Finding(name, None, answer_to(error))
 

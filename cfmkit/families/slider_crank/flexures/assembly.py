@@ -154,5 +154,5 @@ def _unloaded_samples(path: Path) -> FloatArray:
     """
     line = np.asarray(path.layout.network.beams[STRIP].shape.points)  # type: ignore[union-attr]
     marks = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
-    place = path.sections(STRIP).place[0] * marks[-1]
+    place = path.places(STRIP) * marks[-1]
     return np.column_stack([np.interp(place, marks, line[:, 0]), np.interp(place, marks, line[:, 1])])

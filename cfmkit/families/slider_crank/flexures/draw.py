@@ -113,7 +113,7 @@ def _shapes(solution: Printed, index: int) -> Iterator[tuple[FloatArray, FloatAr
     for name in names:
         points = path.shape(name, index)
         thickness = path.layout.network.beams[name].section.thickness
-        place = path.sections(name).place[index]
+        place = path.places(name)
         if isinstance(thickness, float):
             half = np.full(len(points), 0.5 * thickness)
         else:

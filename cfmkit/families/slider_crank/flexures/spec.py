@@ -17,6 +17,10 @@ Point = tuple[Length, Length]
 LengthRange = tuple[PositiveLength, PositiveLength]
 ShareRange = tuple[Share, Share]
 
+MOST_TAPER = 100
+"""Largest thickness of a strip over its smallest: a million in stiffness. What is softer turns within its own length,
+and following its shape takes minutes for a curve that three flexures give at once."""
+
 
 class FlexureSpec(Model):
     """A flexure with a rectangular section across a joint."""
@@ -79,6 +83,11 @@ class StripSpec(Model):
             raise ValueError("'centreline' has the same corner twice in a row")
         if min(self.values) + self.offset <= 0:
             raise ValueError("'offset' leaves no thickness")
+        if max(self.values) + self.offset > MOST_TAPER * (min(self.values) + self.offset):
+            raise ValueError(
+                f"the largest thickness is over {MOST_TAPER} times the smallest: a place that is a million times as "
+                "soft is a hinge; make it thicker, or say 'flexures'"
+            )
         return self
 
 
