@@ -10,7 +10,7 @@ from beam_support import MM, at, cantilever, config, solved, value
 
 import cfmkit
 from cfmkit.beams import Section, Taper
-from cfmkit.errors import DataError
+from cfmkit.errors import DataError, SpecError
 from cfmkit.families.beam.build import thickest_of, thinnest_of
 from cfmkit.families.beam.surface.ride import DEFINITIONS as SURFACE
 from cfmkit.results import Status
@@ -668,3 +668,31 @@ def test_an_end_that_would_have_to_stretch_its_beam_has_no_start():
     result = cfmkit.analyze(cfmkit.loads(HELD.replace("MOVED", "{along: 2 mm}")))
     assert result.status is Status.NO_EQUILIBRIUM
     assert "mechanism.nodes.b.moved" in result.message
+
+
+def test_nodes_and_reactions_are_reported_where_they_are_requested():
+    """Of one of the two halves: the reactions balance, the driven node goes as it is driven."""
+    outputs = "analysis.outputs={nodes: [n3, n5], reactions: [n1, n2, n5]}"
+    result = solved("beam_lan2010", outputs, "analysis.points=11")
+    extra = result.curve.extra
+    for component in ("fx", "fy"):
+        total = sum(extra[f"{node}_{component}"].values for node in ("n1", "n2", "n5"))
+        np.testing.assert_allclose(total, 0.0, atol=1e-9 * np.abs(extra["n1_fx"].values).max())
+    np.testing.assert_allclose(extra["n5_y"].values, -result.curve.motion, atol=1e-12)
+    np.testing.assert_allclose(-extra["n5_fy"].values * 2, result.curve.force, atol=1e-7)
+    assert abs(extra["n3_rotation"].values[-1]) > 0.1
+    assert value(result, "parasitic_motion") == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("outputs", "place", "told"),
+    [
+        ("{nodes: [n9]}", "analysis.outputs.nodes.0", "there is no node 'n9'"),
+        ("{reactions: [n1, n3]}", "analysis.outputs.reactions.1", "nothing holds 'n3'"),
+    ],
+)
+def test_what_cannot_be_reported_is_refused_at_its_place(outputs, place, told):
+    with pytest.raises(SpecError) as caught:
+        solved("beam_lan2010", f"analysis.outputs={outputs}")
+    assert place in str(caught.value)
+    assert told in str(caught.value)

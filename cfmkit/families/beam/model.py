@@ -223,8 +223,24 @@ def _curve(solution: Solution) -> Curve:
             f"{name}_force_y": Column(y, "force"),
             f"{name}_moment": Column(moment, "torque"),
         }
+    extra |= _outputs(solution)
     kind: Kind = "torque" if solution.spec.mechanism.drive.kind in ("rotation", "moment") else "force"
     return Curve(solution.motion, solution.effort, np.repeat(["load"], len(keep)), solution.stable, extra, kind)
+
+
+def _outputs(solution: Solution) -> dict[str, Column]:
+    """Return the motions and reactions that the specification names, of one copy."""
+    keep, path, outputs = solution.keep, solution.path, solution.spec.analysis.outputs
+    columns: dict[str, Column] = {}
+    for name in outputs.nodes:
+        x, y, turn = path.motion(name)[keep].T
+        columns |= {f"{name}_x": Column(x, "length"), f"{name}_y": Column(y, "length")}
+        columns[f"{name}_rotation"] = Column(turn, "angle")
+    for name in outputs.reactions:
+        x, y, moment = path.reaction(name)[keep].T
+        columns |= {f"{name}_fx": Column(x, "force"), f"{name}_fy": Column(y, "force")}
+        columns[f"{name}_m"] = Column(moment, "torque")
+    return columns
 
 
 def _branches(solution: Solution) -> Any:

@@ -104,6 +104,15 @@ class BeamDesign(Model):
         return self
 
 
+class Outputs(Model):
+    """What else the curve is to have a column of."""
+
+    nodes: tuple[str, ...] = Field((), max_length=100, description="nodes whose motion is reported: [tip]")
+    reactions: tuple[str, ...] = Field(
+        (), max_length=100, description="nodes whose reactions are, of support and drive: [root]"
+    )
+
+
 class BeamAnalysis(Analysis):
     """How a beam mechanism is run."""
 
@@ -131,6 +140,7 @@ class BeamAnalysis(Analysis):
         description="constant loads come before the drive, which holds its node; false: they grow with the drive and "
         "are whole at its end",
     )
+    outputs: Outputs = Field(Outputs(), description="motions and reactions of nodes as columns of the curve")
     surface: Surface | None = Field(None, description="a surface to follow: adds the contact force along it")
     imperfection: Length = Field(
         0.0, description="bend the unloaded beams by so much in the first buckling mode; 0: perfect"
@@ -163,6 +173,11 @@ class BeamSpec(Spec):
             if self.mechanism.loads and not self.analysis.loads_first:
                 found.append(((), "shapes are searched with constant loads applied first: drop analysis.loads_first"))
             refuse("BeamSpec", {("design", "optimise", *place): message for place, message in found})
+        return self
+
+    @model_validator(mode="after")
+    def _has_what_is_reported(self) -> Self:
+        refuse("BeamSpec", {("analysis", "outputs", *place): text for place, text in _output_faults(self)})
         return self
 
     @property
@@ -208,6 +223,25 @@ def _extent_faults(spec: BeamSpec) -> Iterator[tuple[tuple[str, ...], str]]:
     dimension = {"displacement": "length", "rotation": "angle"}.get(kind)
     if value is not None and dimension and value.dimension != dimension:
         yield (wanted,), f"must be {DIMENSIONS[dimension].phrase} for a drive of kind {kind!r}"
+
+
+def _output_faults(spec: BeamSpec) -> Iterator[tuple[tuple[str | int, ...], str]]:
+    """Yield what is wrong with the nodes that are to be reported."""
+    mechanism, outputs = spec.mechanism, spec.analysis.outputs
+    moved = {link.node: link.master for link in mechanism.links}
+    for group in ("nodes", "reactions"):
+        for number, name in enumerate(getattr(outputs, group)):
+            if name not in mechanism.nodes:
+                known = ", ".join(repr(node) for node in list(mechanism.nodes)[:20])
+                yield (group, number), f"there is no node {name!r}; nodes: {known}"
+            elif group == "reactions" and name in moved:
+                yield (group, number), f"a link moves {name!r}: what is held is its master, {moved[name]!r}"
+            elif group == "reactions" and not (mechanism.nodes[name].support != "free" or name == mechanism.drive.node):
+                yield (group, number), f"nothing holds {name!r}: it has no support and is not driven"
+    for name in outputs.nodes:
+        for beam in mechanism.beams:
+            if name == f"{beam}_force":
+                yield ("nodes",), f"the columns of {name!r} would have the names of those of the beam {beam!r}"
 
 
 def _rescale_faults(spec: BeamSpec) -> Iterator[str]:

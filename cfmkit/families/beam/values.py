@@ -47,6 +47,8 @@ DEFINITIONS = {
     "gap_min": ("length", "smallest gap between two beams before any load, beside common nodes"),
     "gap_min_moving": ("length", "smallest gap between two beams at some places of the travel"),
     "travel_end": ("length", "displacement of the driven node at the end of the path"),
+    "parasitic_motion": ("length", "largest motion of the driven node across the drive, in the window"),
+    "parasitic_rotation": ("angle", "largest rotation of the driven node, in the window"),
     "strain_energy_max": ("energy", "largest strain energy on the path, of all copies"),
 }
 
@@ -61,6 +63,7 @@ def values_of(solution: Solution) -> Mapping[str, Quantity]:
         "gap_min_moving": None if solution.gaps[1] is None else solution.gaps[1].size,
         **_closure(solution),
         **_rest(solution),
+        **_parasitic(solution),
     }
     if solution.spec.mechanism.drive.kind in ("displacement", "force"):
         numbers["travel_end"] = float(solution.motion[-1])
@@ -161,6 +164,17 @@ def _rest(solution: Solution) -> dict[str, float | None]:
         "prestress_stress": _significant(solution.stress, solution.path.error),
         "stress_total_max": float(total[inside].max()) if inside.any() else None,
     }
+
+
+def _parasitic(solution: Solution) -> dict[str, float | None]:
+    """Return how far the driven node goes where it is not to; of drives that turn it, nothing."""
+    drive = solution.spec.mechanism.drive
+    inside = within(solution, *window_of(solution))
+    if drive.kind not in ("displacement", "force") or not inside.any():
+        return {}
+    x, y, turn = solution.path.motion(drive.node)[solution.keep][inside].T
+    across = np.cos(drive.direction) * y - np.sin(drive.direction) * x
+    return {"parasitic_motion": float(np.abs(across).max()), "parasitic_rotation": float(np.abs(turn).max())}
 
 
 def _significant(values: FloatArray, error: float) -> float:
