@@ -283,6 +283,14 @@ def test_a_pull_at_which_nothing_holds_the_shuttle_is_told_and_not_more():
         assert found.values["least_force"].value < 0
 
 
+@pytest.mark.parametrize(("thickness", "status"), [("0.003 mm", Status.PARTIAL), ("1e-6 mm", Status.NO_EQUILIBRIUM)])
+def test_leaves_too_thin_to_be_traced_are_said_to_be(thickness, status):
+    about = (*leaf(thickness=thickness), "analysis.fidelity=exact", "requirements=[]")
+    found = analyzed(*about, preloads="[0 mm, 2.5 mm]")
+    assert found.status is status
+    assert "the leaves were followed to 0 mm only" in found.message
+
+
 def test_what_is_not_flat_is_told_of_the_part_of_the_window_that_the_curve_covers():
     found = analyzed("analysis.window=[5 mm, 9 mm]", "requirements=[]")
     assert "over 5 mm ... 6 mm the force varies by 23.3 %" in message(found, "not_flat")

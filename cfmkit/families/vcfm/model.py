@@ -245,7 +245,8 @@ def rest_of(sampler: Sampler, preload: float, grid: FloatArray) -> float | None:
     if preload == 0:
         return 0.0
     if preload > 0:
-        there = sampler.spring(np.array([preload]))[0][0]
+        # no number where leaves too thin for the engine could not be moved at all
+        there = force_of(sampler, np.array([0.0]), preload)[0]
         return _balanced(sampler, preload, -preload, 0.0) if there > 0 else None
     force = sampler.leaf_force(grid) + sampler.spring(grid + preload)[0]
     beyond = np.flatnonzero(force >= 0)

@@ -235,6 +235,8 @@ def _points(path: Path, places: FloatArray) -> Points:
     size = np.sign(places[-1]) * drive
     farthest = np.maximum.accumulate(np.concatenate([[-1e-30], size[:-1]])) if len(size) else size
     kept = np.flatnonzero(np.asarray(path.accurate) & (size > farthest + 1e-15))
+    if not len(kept):
+        return Points(*(np.empty(0, kind) for kind in (float, float, float, bool, bool)))
     stress = np.max([path.beam_stress(name)[0] for name in path.layout.network.beams], axis=0)
     buckled = np.char.startswith(np.asarray(path.branch).astype(str), "bifurcated")
     return Points(drive[kept], path.effort[kept], stress[kept], path.stable[kept].astype(bool), buckled[kept])
