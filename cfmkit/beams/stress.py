@@ -128,7 +128,8 @@ def _highest(sampler: Sampler, rows: Rows, stress: FloatArray) -> Humps:
     Of two humps of nearly one height the lower one may have the higher sample; where two segments meet, each has a
     hump of its own.
     """
-    parts = stress.reshape(*stress.shape[:2], -1, sampler.per_segment)
+    segments = stress.shape[2] // sampler.per_segment  # said, since a path may have no point
+    parts = stress.reshape(*stress.shape[:2], segments, sampler.per_segment)
     rises, level = np.diff(parts, axis=3), np.zeros((*parts.shape[:3], 1))
     up = (np.concatenate([level, rises], axis=3) >= 0) & (np.concatenate([rises, level], axis=3) <= 0)
     ranked = np.where(up.reshape(stress.shape), stress, -np.inf)

@@ -159,3 +159,20 @@ def test_mutated_specs_end_with_an_exit_code_of_the_contract(quiet_folder, capsy
 @pytest.mark.parametrize("seed", range(10))
 def test_ten_thousand_mutated_specs_end_with_an_exit_code_of_the_contract(quiet_folder, capsys, seed):
     check_mutants(quiet_folder, 1000, seed, capsys)
+
+
+@pytest.mark.parametrize(
+    ("config", "change", "code", "words"),
+    [
+        ("vcfm_hybrid", "length=100 m", 4, "the leaves were followed to 0 mm only"),
+        ("vcfm_hybrid", "thickness=1e6 m", 3, "'thickness' must be smaller than 'length'"),
+        ("vcfm_cosine", "length=3.5e-8 mm", 3, "'thickness' must be smaller than 'length'"),
+        ("vcfm_cosine", "thickness=20 mm", 5, "missed"),
+    ],
+)
+def test_leaves_of_any_size_end_with_an_exit_code_of_the_contract(tmp_path, capsys, config, change, code, words):
+    source = str(CONFIGS[0].parent / f"{config}.yaml")
+    option = f"mechanism.bistable.{change}"
+    found = main(["analyze", source, "--set", option, "-o", str(tmp_path / "out"), "--no-plots", "-q"])
+    told = capsys.readouterr().err
+    assert (found, words in told) == (code, True), told

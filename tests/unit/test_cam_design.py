@@ -232,6 +232,8 @@ def test_a_catalogue_without_a_fitting_spring_says_why_each_is_refused():
     ]
     reason, _ = refused(targets(choose="catalogue", catalogue=offers, avoid_undercut=True))
     assert reason.name == "no_spring_fits"
+    assert "'design.catalogue'" in reason.message
+    assert "'design.stroke' or 'design.force'" in reason.message
     assert "2 x stiff: undercut (A = 3.125 mm < 14.46 mm)" in reason.message
     assert "2 x short: spring overstretched" in reason.message
 

@@ -29,7 +29,7 @@ from cfmkit.families.refusals import CannotBuild, Infeasible, no_design
 from cfmkit.results import Design, Status
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
     from cfmkit.families.base import Run
     from cfmkit.families.cam.spec import CamDesign, CamSpec, CatalogueSpring, Springs
@@ -198,8 +198,24 @@ def _from_catalogue(spec: CamSpec, target: CamDesign, pull: float, factor: float
             continue
         fitting.append((gap, Choice(constant, springs, note=f"{label} of the catalogue: A = {mm(constant)}")))
     if not fitting:
-        raise Infeasible(finding("no_spring_fits", "no spring of the catalogue fits: " + "; ".join(rejected)))
+        told = f"no spring of the catalogue fits: {'; '.join(rejected)}; add others to 'design.catalogue'"
+        raise Infeasible(finding("no_spring_fits", f"{told}, or change {_in_the_way(rejected)}"))
     return min(fitting, key=lambda pair: pair[0])[1]
+
+
+_LIMITS = {
+    "undercut": "'design.avoid_undercut'",
+    "brace too short": "'mechanism.brace_length'",
+    "spring overstretched": "their 'max_elongation'",
+    "friction": "'mechanism.rolling_friction'",
+}
+"""Which key blocks a spring of the catalogue that is refused for a reason."""
+
+
+def _in_the_way(rejected: Sequence[str]) -> str:
+    """Return the keys that block springs of the catalogue: those of their reasons, and what all of them are to do."""
+    keys = [key for word, key in _LIMITS.items() if any(f": {word}" in one for one in rejected)]
+    return ", ".join([*keys, "'design.stroke'"]) + " or 'design.force'"
 
 
 def _offers(target: CamDesign) -> Iterator[tuple[CatalogueSpring, int]]:

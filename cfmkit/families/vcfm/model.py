@@ -253,8 +253,8 @@ def rest_of(sampler: Sampler, preload: float, grid: FloatArray) -> float | None:
     return _balanced(sampler, preload, grid[beyond[0] - 1], grid[beyond[0]]) if len(beyond) and beyond[0] else None
 
 
-def _balanced(sampler: Sampler, preload: float, low: float, high: float) -> float:
-    """Return where the force vanishes between a place where it is negative and one where it is not."""
+def _balanced(sampler: Sampler, preload: float, low: float, high: float) -> float | None:
+    """Return where the force vanishes between a place where it is negative and one where it is not, if any."""
 
     def force(travel: float) -> float:
         place = np.array([travel])
@@ -262,6 +262,8 @@ def _balanced(sampler: Sampler, preload: float, low: float, high: float) -> floa
         # no value: farther back than the leaves were followed, where they pull still harder
         return found if np.isfinite(found) else -1e30
 
+    if force(low) > 0 or force(high) < 0:  # far outside of its range the closed form of arches pulls the wrong way
+        return None
     return bracketed_root(force, float(low), float(high))
 
 

@@ -36,6 +36,11 @@ class LeafMaterial(MaterialSpec):
         return self
 
 
+def _slender(length: float, thickness: float) -> None:
+    if thickness >= length:
+        raise ValueError("'thickness' must be smaller than 'length': a leaf is long and thin")
+
+
 class Positive(Model):
     """The spring: the structure with a positive stiffness, whose far end the preload moves."""
 
@@ -53,6 +58,7 @@ class Positive(Model):
 
     @model_validator(mode="after")
     def _bend_has_a_radius(self) -> Self:
+        _slender(self.length, self.thickness)
         if self.structure == "u-shape" and self.radius is None:
             raise ValueError("'structure: u-shape' needs 'radius', of its flexible semicircle")
         return self
@@ -96,6 +102,7 @@ class Bistable(Model):
 
     @model_validator(mode="after")
     def _flexures_fit(self) -> Self:
+        _slender(self.length, self.thickness)
         if self.structure == "hybrid" and self.flexure_length is None:
             raise ValueError("'structure: hybrid' needs 'flexure_length', of each of its two flexures")
         if self.flexure_length and 2.0 * self.flexure_length >= self.length:
