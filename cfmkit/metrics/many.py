@@ -28,7 +28,7 @@ _PARTS = 48
 def boundary(
     holds: Callable[[FloatArray], NDArray[np.bool_]], inside: FloatArray, outside: FloatArray, rounds: int = 7
 ) -> FloatArray:
-    """Return how far a condition holds from places inside towards places outside, row by row.
+    """Return how far a condition holds from places inside towards places outside, one by one.
 
     Each round cuts the way into parts and keeps the first in which the condition is lost, so
     that it ends at the loss nearest to `inside`, and where the condition is not a number as well.
@@ -36,31 +36,35 @@ def boundary(
     Parameters
     ----------
     holds : callable
-        ``holds(places)``, (d, m) -> (d, m) of bool.
-    inside, outside : (d,) array
-        Where it holds, and where it does not; equal where there is nothing to look for.
+        ``holds(places)``, (d, k m) -> (d, k m) of bool: m places for each of the k, one after the other.
+    inside, outside : (d, k) array
+        Where it holds, and where it does not; equal where there is nothing to look for. What is looked for
+        together costs hardly more than the first of it: calls of the model are what takes the time.
     rounds : int
         Each makes the way 48 times as short: seven make a millimetre as short as rounding.
 
     Returns
     -------
-    (d,) array
-        The last place at which it still holds.
+    (d, k) array
+        The last places at which it still holds.
 
     Examples
     --------
-    >>> boundary(lambda x: x * x <= 2.0, np.array([0.0]), np.array([2.0])).round(12)
-    array([1.41421356])
+    >>> boundary(lambda x: x * x <= 2.0, np.array([[0.0]]), np.array([[2.0]])).round(12)
+    array([[1.41421356]])
     """
-    share, rows = np.arange(1, _PARTS) / _PARTS, np.arange(len(inside))
+    share = np.arange(1, _PARTS) / _PARTS
     near, far = np.array(inside), np.array(outside)
     for _ in range(rounds):
-        places = near[:, None] + (far - near)[:, None] * share
-        lost = ~holds(places)
-        first = np.where(lost.any(axis=1), lost.argmax(axis=1), _PARTS - 1)
+        if (near == far).all():
+            break
+        places = near[..., None] + (far - near)[..., None] * share
+        lost = ~holds(places.reshape(len(places), -1)).reshape(places.shape)
+        first = np.where(lost.any(axis=-1), lost.argmax(axis=-1), _PARTS - 1)
+        last, next_ = np.maximum(first - 1, 0), np.minimum(first, _PARTS - 2)
         near, far = (
-            np.where(first > 0, places[rows, np.maximum(first - 1, 0)], near),
-            np.where(first < _PARTS - 1, places[rows, np.minimum(first, _PARTS - 2)], far),
+            np.where(first > 0, np.take_along_axis(places, last[..., None], axis=-1)[..., 0], near),
+            np.where(first < _PARTS - 1, np.take_along_axis(places, next_[..., None], axis=-1)[..., 0], far),
         )
     return near
 
@@ -133,7 +137,8 @@ def _first_95(many: ManyBranches) -> FloatArray:
     level = np.where(first < before, effort[rows, sample], nominal)
     if many.exact is not None:
         solve, wanted = many.exact, nominal[:, None]
-        crossed = boundary(lambda at: ~(solve(at) / wanted >= 0.95 - ROUNDING), motion[rows, earlier], place)
+        ends = motion[rows, earlier][:, None], place[:, None]
+        crossed = boundary(lambda at: ~(solve(at) / wanted >= 0.95 - ROUNDING), *ends)[:, 0]
     else:
         heights = effort[rows, earlier] - 0.95 * nominal, level - 0.95 * nominal
         crossed = _crossing((motion[rows, earlier], place), heights)
@@ -147,6 +152,8 @@ def _crossing(motion: tuple[FloatArray, FloatArray], height: tuple[FloatArray, F
 
 def band_range(many: ManyBranches, tolerance: float) -> FloatArray:
     """Return `ranges.band_range` of each row about the middle of its window, (d,)."""
+    if many.exact is not None:
+        return band_ranges(many, (tolerance,))[:, 0]
     motion, place = many.motion, (many.low + many.high) / 2
     here = many.at(place[:, None])[:, 0]
     offset = many.effort / here[:, None] - 1
@@ -177,13 +184,37 @@ def _edge(
         np.where(beside, place, many.motion[rows, inner]),
         np.where(beside, 0.0, offset[rows, inner]),
     )
-    if many.exact is not None:
-        solve, here = many.exact, many.exact(place[:, None])
-        return boundary(
-            lambda at: np.abs(solve(at) / here - 1) <= tolerance * (1 + ROUNDING), good, many.motion[rows, worst]
-        )
     level = np.where(offset[rows, worst] > 0, tolerance, -tolerance)
     return _crossing((many.motion[rows, worst], good), (offset[rows, worst] - level, height - level))
+
+
+def band_ranges(many: ManyBranches, tolerances: Sequence[float]) -> FloatArray:
+    """Return `band_range` of each row for each tolerance, (d, k), of branches that are known at every place."""
+    motion, place = many.motion, (many.low + many.high) / 2
+    here = many.at(place[:, None])
+    offset, last = np.abs(many.effort / here - 1), motion.shape[1] - 1
+    index, samples = (motion < place[:, None]).sum(axis=1)[:, None], np.arange(motion.shape[1])
+    inside, outside, ends = [], [], []
+    for tolerance in tolerances:
+        bad = ~(offset <= tolerance * (1 + ROUNDING))
+        for there, inward in ((bad & (samples < index), 1), (bad & (samples >= index), -1)):
+            worst = last - there[:, ::-1].argmax(axis=1) if inward > 0 else there.argmax(axis=1)
+            worst = worst[:, None]
+            inner = np.take_along_axis(motion, np.clip(worst + inward, 0, last), axis=1)
+            # The reference pose, with no offset, stands between the samples index - 1 and index.
+            good = np.where(worst == (index - 1 if inward > 0 else index), place[:, None], inner)
+            some = there.any(axis=1, keepdims=True)
+            ends.append(np.where(some, np.nan, motion[:, :1] if inward > 0 else motion[:, -1:]))
+            inside.append(good)
+            outside.append(np.where(some, np.take_along_axis(motion, worst, axis=1), good))
+    widths = np.repeat(np.asarray(tolerances) * (1 + ROUNDING), 2)
+
+    def holds(at: FloatArray) -> NDArray[np.bool_]:
+        return np.asarray(np.abs(many.at(at) / here - 1) <= np.repeat(widths, at.shape[1] // len(widths)))
+
+    solved = boundary(holds, np.hstack(inside), np.hstack(outside))
+    found = np.where(np.isnan(np.hstack(ends)), solved, np.hstack(ends))
+    return np.where(here == 0, np.nan, found[:, 1::2] - found[:, ::2])
 
 
 def usable_interval(
@@ -248,8 +279,8 @@ def _solved_interval(
     last = (length >= length.max(axis=1, keepdims=True) * (1 - 1e-9)).argmax(axis=1)
     first, some = since[rows, last], good.any(axis=1)
     before, after = np.maximum(first - 1, 0), np.minimum(last + 1, count - 1)
-    start = boundary(holds, motion[rows, first], motion[rows, before])
-    end = boundary(holds, motion[rows, last], motion[rows, after])
+    inside, outside = (np.stack([motion[rows, k] for k in pair], axis=1) for pair in ((first, last), (before, after)))
+    start, end = boundary(holds, inside, outside).T
     some &= end > start
     return np.where(some, start, np.nan), np.where(some, end, np.nan)
 

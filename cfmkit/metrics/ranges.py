@@ -9,7 +9,6 @@ is known at every place (`cfmkit.results.ClosedForm`) places are solved for, wha
 
 from __future__ import annotations
 
-from dataclasses import replace
 from math import isfinite
 from typing import TYPE_CHECKING
 
@@ -48,7 +47,7 @@ def _first_95(branch: Branch) -> float:
     if nominal == 0:
         raise Undefined(f"the {branch.kind} at the end is zero")
     if branch.closed is not None:
-        return _known(end - many.range_95(branch.closed))
+        return _known(end - branch.solved_range_95)
     motion, effort = branch.function
     before = int(motion.searchsorted(end))
     reached = effort[:before] / nominal >= 0.95 - ROUNDING
@@ -69,8 +68,7 @@ def band_range(branch: Branch, tolerance: float) -> float:
     """Return the widest interval around the reference pose in which ``|F / F_ref - 1|`` is within the tolerance."""
     motion, offset, here = branch.around
     if branch.closed is not None:
-        pose = np.array([branch.reference])
-        return _known(many.band_range(replace(branch.closed, low=pose, high=pose), tolerance))
+        return _known(branch.solved_bands[list(many.BAND_RANGES.values()).index(tolerance)])
     outside = ~(np.abs(offset) <= tolerance * (1 + ROUNDING))
     left, right = outside[:here].nonzero()[0], outside[here:].nonzero()[0]
     low = _edge(motion, offset, int(left[-1]), 1, tolerance) if len(left) else float(motion[0])
@@ -78,15 +76,14 @@ def band_range(branch: Branch, tolerance: float) -> float:
     return high - low
 
 
-def _known(values: FloatArray) -> float:
-    """Return the only value.
+def _known(value: float) -> float:
+    """Return a value that is solved for.
 
     Raises
     ------
     Undefined
         If it is none: the model gives no force at the places that are asked about.
     """
-    value = float(values[0])
     if not isfinite(value):
         raise Undefined("there is no equilibrium at the place it is measured against")
     return value

@@ -235,3 +235,20 @@ def test_flexures_on_the_left_bend_to_the_side_that_their_springs_take():
             cfmkit.analyze(config("lumped", **left, **about, analysis__fidelity=name)) for name in ("prb", "lumped")
         )
         assert flexures.curve.force[-1] == pytest.approx(springs.curve.force[-1], rel=3e-3)
+
+
+def test_places_of_all_metrics_are_solved_for_together(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Calls of the model are what a sweep's points cost: the ends of all bands take the seven rounds of one."""
+    result = cfmkit.analyze(cfmkit.load("configs/slider_crank_bilancia2019.yaml"))
+    assert result.closed is not None
+    places, effort = [], type(result.closed).effort
+
+    def counted(self: object, branch: str, at: np.ndarray) -> np.ndarray:
+        places.append(np.shape(at))
+        return effort(self, branch, at)
+
+    monkeypatch.setattr(type(result.closed), "effort", counted)
+    metrics = cfmkit.evaluate(result)
+    assert metrics["band_range_1pct"].value is not None
+    assert metrics["usable_stroke"].value is not None
+    assert len(places) <= 3 * 7 + 8

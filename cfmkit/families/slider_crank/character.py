@@ -85,7 +85,7 @@ class Character:
         rates = self.assembly.rates
         cut = monotone(self.grid, _summed(rates, units.effort), _summed(rates, units.stiffness))
         # The cubics say where to look; the values are those of the closed form.
-        return Monotone(cut.place, _summed(rates, self.assembly.units(cut.place[0]).effort))
+        return Monotone(cut.place, _summed(rates, self.assembly.forces(cut.place[0])))
 
     @cached_property
     def grid(self) -> FloatArray:
@@ -94,7 +94,7 @@ class Character:
         if self.assembly.drive == "force":  # the force runs like the square root of the travel from the stretched place
             share = share**2
         places = self.low + (self.high - self.low) * share
-        effort = _summed(self.assembly.rates, self.assembly.units(places).effort)[0]
+        effort = self.efforts(places)
         grid: FloatArray = places[np.isfinite(effort)]
         return grid
 
@@ -124,7 +124,7 @@ class Character:
 
     def efforts(self, motion: FloatArray) -> FloatArray:
         """Return torque [N m] or force [N] at some places, (n,)."""
-        efforts: FloatArray = _summed(self.assembly.rates, self.assembly.units(motion).effort)[0]
+        efforts: FloatArray = _summed(self.assembly.rates, self.assembly.forces(motion))[0]
         return efforts
 
     def stiffness(self, motion: float) -> float:
@@ -151,9 +151,9 @@ class Character:
         first, last = int(known[0]), int(known[-1])
         if first > 0:
             yield self._end(0, first), bool(sign[first] > 0)
-        for before, after in zip(known[:-1].tolist(), known[1:].tolist(), strict=True):
-            if sign[before] != sign[after]:
-                yield self._between(before, after), bool(sign[after] > 0)
+        for k in np.flatnonzero(sign[known[:-1]] != sign[known[1:]]).tolist():
+            before, after = int(known[k]), int(known[k + 1])
+            yield self._between(before, after), bool(sign[after] > 0)
         if last < len(place) - 1:
             yield self._end(-1, last), bool(sign[last] < 0)
 
