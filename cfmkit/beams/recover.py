@@ -19,7 +19,8 @@ if TYPE_CHECKING:
     from cfmkit.beams.solver import Points, Solver
     from cfmkit.curves import FloatArray
 
-_ROWS = 8  # samples of a segment
+_ROWS = 8  # samples of a segment,
+_TIGHT = 2e-12  # twice as many from this tolerance of Newton's method on: slopes of stresses are interpolated
 _CLOSED = np.array([989, 5888, -928, 10496, -4540, 10496, -928, 5888, 989]) / 28350  # Newton-Cotes on nine rows
 
 _STEP = 1e-30
@@ -44,7 +45,8 @@ class Sampler:
         from cfmkit.beams.kernels import entry
 
         self.solver, self.layout = solver, solver.layout
-        mesh = Mesh(solver.mesh.segments, max(_ROWS, solver.mesh.steps))
+        rows = _ROWS if solver.tolerance > _TIGHT else 2 * _ROWS
+        mesh = Mesh(solver.mesh.segments, max(rows, solver.mesh.steps))
         self.per_segment = mesh.steps + 1
         self.cut = grid(self.layout, mesh)
         self.model = assemble_model(self.layout, self.cut, table(self.layout, self.cut))

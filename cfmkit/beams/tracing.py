@@ -104,4 +104,4 @@ def first_mesh(layout: Layout, tolerance: float) -> Mesh:
     """Return the mesh that is tried first for a tolerance: straight beams need fewer segments than curved ones."""
     if tolerance >= 4e-6:
         return Mesh(3 if tolerance < 2e-5 and layout.bundle.curved else 2, 1)
-    return Mesh(2, 2 if tolerance >= 1e-7 else 6)
+    return Mesh(2, 2 if tolerance >= 1e-7 else 4)

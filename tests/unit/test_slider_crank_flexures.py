@@ -225,7 +225,7 @@ def test_slopes_of_the_program_are_those_of_differences(goal: Any, moving: bool)
 
 def test_a_strip_without_equilibrium_has_no_answer() -> None:
     program = StripProgram(Task(corners(), np.pi, ABS, 1.5, MM, 20 * MM, 0.01), Form(3, width=WIDTH))
-    assert program.values(np.array([1.0, 1.0, 1.0, 300.0])) is None
+    assert program.values(np.array([1.0, 1.0, 1.0, 1000.0])) is None  # [mm]; the strip is 125 mm long
 
 
 def test_polynomials_through_nodes_are_exact() -> None:

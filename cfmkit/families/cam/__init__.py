@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from cfmkit.families.base import Family
+from cfmkit.families.base import Family, Search
 from cfmkit.families.cam.block import analyze_block
 from cfmkit.families.cam.build import resolve
 from cfmkit.families.cam.design import design
@@ -17,6 +17,7 @@ FAMILY = Family(
     spec_type=CamSpec,
     analyze=analyze,
     design=design,
+    search=Search(findings=("overwritten", "plate_incomplete")),
     values=DEFINITIONS,
     resolve=resolve,
     attribution="cfmkit.families.cam.attribution",
