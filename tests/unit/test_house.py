@@ -1,0 +1,49 @@
+"""The figures of the house: what ties modules into a knot."""
+
+from __future__ import annotations
+
+import runpy
+from pathlib import Path
+
+import pytest
+
+HOUSE = runpy.run_path(str(Path(__file__).parents[2] / "tools" / "house.py"))
+
+
+@pytest.fixture
+def package(tmp_path):
+    """Make a package of the given files."""
+
+    def make(**files):
+        folder = tmp_path / "thing"
+        folder.mkdir()
+        for name, text in {"__init__": "", **files}.items():
+            (folder / f"{name}.py").write_text(text, encoding="utf-8")
+        return HOUSE["survey"](folder)
+
+    return make
+
+
+@pytest.mark.parametrize(
+    "way_back",
+    [
+        "from thing.a import x",
+        "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from thing.a import X",
+        "def f():\n    import thing.a",
+        'MODEL = "thing.a:solve"',
+        "from thing import a",
+    ],
+)
+def test_two_modules_that_need_each_other_in_any_way_are_a_knot(package, way_back):
+    assert package(a="import thing.b", b=way_back)["knots"] == [["thing.a", "thing.b"]]
+
+
+def test_a_long_circle_is_one_knot_and_a_chain_is_none(package):
+    chain = {"a": "import thing.b", "b": "import thing.c", "c": "", "d": "import thing.a"}
+    assert package(**chain)["knots"] == []
+    assert HOUSE["knots"]({"a": {"b"}, "b": {"c"}, "c": {"a"}, "d": {"a"}}) == [["a", "b", "c"]]
+
+
+def test_a_class_name_in_two_modules_is_reported(package):
+    figures = package(a="class Path: ...", b="class Path: ...", c="class Other: ...")
+    assert figures["class_names_in_several_modules"] == {"Path": ["thing.a", "thing.b"]}

@@ -1,0 +1,150 @@
+"""The house in figures: files, lines, knots of modules, and names that mean more than one thing.
+
+    python tools/house.py                    # a table, and every knot with the imports that tie it
+    python tools/house.py --json             # the same for a program
+    python tools/house.py --at-most-knots 3  # exit code 1 where there are more
+
+A knot is a strongly connected set of modules in the graph of *all* imports: those at the top of a file, inside
+functions and for types alone. A string that is exactly the dotted name of a module (``"cfmkit.families.cam.model"``,
+also with ``:function`` behind it) counts as an import of it: looking a module up by its name does not untie a knot.
+Importing ``cfmkit.a.b`` ties a file to ``b``, not to ``cfmkit/a/__init__.py``.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import json
+import sys
+from collections import Counter, defaultdict
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+
+
+def modules(package: Path) -> dict[str, Path]:
+    """Return dotted name -> file of every module below a package."""
+    found = {}
+    for path in sorted(package.rglob("*.py")):
+        parts = path.relative_to(package.parent).with_suffix("").parts
+        found[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
+    return found
+
+
+def imported(tree: ast.AST, known: dict[str, Path]) -> set[str]:
+    """Return the modules among the known ones that a syntax tree imports or names in a string."""
+    found = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            for alias in node.names:
+                inner = f"{node.module}.{alias.name}"
+                found.add(inner if inner in known else node.module)
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str) and "." in node.value:
+            found.add(node.value.split(":")[0])
+    return found & set(known)
+
+
+def knots(graph: dict[str, set[str]]) -> list[list[str]]:
+    """Return the strongly connected sets of two or more nodes, the largest first (Tarjan, without recursion)."""
+    order: dict[str, int] = {}
+    low: dict[str, int] = {}
+    stack: list[str] = []
+    found = []
+    for start in graph:
+        if start in order:
+            continue
+        order[start] = low[start] = len(order)
+        stack.append(start)
+        work = [(start, iter(sorted(graph[start])))]
+        while work:
+            node, rest = work[-1]
+            for child in rest:
+                if child not in order:
+                    order[child] = low[child] = len(order)
+                    stack.append(child)
+                    work.append((child, iter(sorted(graph[child]))))
+                    break
+                if child in stack:
+                    low[node] = min(low[node], order[child])
+            else:
+                work.pop()
+                if work:
+                    low[work[-1][0]] = min(low[work[-1][0]], low[node])
+                if low[node] == order[node]:
+                    place = stack.index(node)
+                    members, stack[place:] = sorted(stack[place:]), []
+                    if len(members) > 1:
+                        found.append(members)
+    return sorted(found, key=lambda members: (-len(members), members))
+
+
+def single_use(trees: dict[str, ast.AST]) -> int:
+    """Return how many private functions are named exactly once besides their definition."""
+    defined: Counter[str] = Counter()
+    used: Counter[str] = Counter()
+    for tree in trees.values():
+        for node in ast.walk(tree):
+            if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)) and node.name.startswith("_"):
+                defined[node.name] += not node.name.startswith("__")
+            elif isinstance(node, ast.Name):
+                used[node.id] += 1
+            elif isinstance(node, ast.Attribute):
+                used[node.attr] += 1
+    return sum(1 for name, count in defined.items() if count == 1 and used[name] == 1)
+
+
+def survey(package: Path) -> dict[str, object]:
+    """Return the figures of a package."""
+    known = modules(package)
+    texts = {name: path.read_text(encoding="utf-8") for name, path in known.items()}
+    trees = {name: ast.parse(text) for name, text in texts.items()}
+    graph = {name: imported(tree, known) - {name} for name, tree in trees.items()}
+    importers: Counter[str] = Counter(target for targets in graph.values() for target in targets)
+    classes: dict[str, list[str]] = defaultdict(list)
+    for name, tree in trees.items():
+        for node in ast.walk(tree):
+            if isinstance(node, ast.ClassDef):
+                classes[node.name].append(name)
+    top = [path for path in package.iterdir() if path.name != "__pycache__"]
+    tied = knots(graph)
+    return {
+        "files": len(known),
+        "lines": sum(text.count("\n") for text in texts.values()),
+        "top_folders": sum(path.is_dir() for path in top),
+        "top_files": sum(path.suffix == ".py" for path in top),
+        "modules_with_one_importer": sum(1 for count in importers.values() if count == 1),
+        "private_functions_used_once": single_use(trees),
+        "class_names_in_several_modules": {name: homes for name, homes in sorted(classes.items()) if len(homes) > 1},
+        "knots": tied,
+        "ties": [[f"{a} -> {b}" for a in members for b in sorted(graph[a] & set(members))] for members in tied],
+    }
+
+
+def table(figures: dict[str, object]) -> str:
+    """Return the figures as text."""
+    lines = [f"{key.replace('_', ' '):32}{value:>8}" for key, value in figures.items() if isinstance(value, int)]
+    shared = figures["class_names_in_several_modules"]
+    lines.append(f"{'class names in several modules':32}{len(shared):>8}")
+    lines += [f"    {name}: {', '.join(homes)}" for name, homes in shared.items()]
+    lines.append(f"{'knots':32}{len(figures['knots']):>8}")
+    for members, ties in zip(figures["knots"], figures["ties"], strict=True):
+        lines += [f"  {len(members)} modules", *(f"    {tie}" for tie in ties)]
+    return "\n".join(lines)
+
+
+def main() -> int:
+    """Print the figures; return 1 where there are more knots than allowed."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("package", nargs="?", type=Path, default=ROOT / "cfmkit", help="folder of the package")
+    parser.add_argument("--json", action="store_true", help="print JSON")
+    parser.add_argument("--at-most-knots", type=int, metavar="N", help="exit code 1 where there are more")
+    options = parser.parse_args()
+    figures = survey(options.package)
+    print(json.dumps(figures, indent=1) if options.json else table(figures))
+    return int(options.at_most_knots is not None and len(figures["knots"]) > options.at_most_knots)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
