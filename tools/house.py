@@ -34,6 +34,13 @@ def modules(package: Path) -> dict[str, Path]:
 def imported(tree: ast.AST, known: dict[str, Path]) -> set[str]:
     """Return the modules among the known ones that a syntax tree imports or names in a string."""
     found = set()
+    loggers = {
+        id(argument)
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Call)
+        for argument in node.args
+        if ast.unparse(node.func).endswith("getLogger")
+    }
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
@@ -41,7 +48,12 @@ def imported(tree: ast.AST, known: dict[str, Path]) -> set[str]:
             for alias in node.names:
                 inner = f"{node.module}.{alias.name}"
                 found.add(inner if inner in known else node.module)
-        elif isinstance(node, ast.Constant) and isinstance(node.value, str) and "." in node.value:
+        elif (
+            isinstance(node, ast.Constant)
+            and isinstance(node.value, str)
+            and "." in node.value
+            and id(node) not in loggers
+        ):
             found.add(node.value.split(":")[0])
     return found & set(known)
 
