@@ -87,6 +87,24 @@ class Linkage:
         near = math.sqrt((short - self.offset) * (short + self.offset))
         return (near, far) if self.branch * float(self.slider_position(np.asarray(angle))) >= 0.0 else (-far, -near)
 
+    def room(self, angle: float) -> tuple[float, float]:
+        """Return how far the slider is from the ends of its `way` at a crank angle [m], from the low and the high one.
+
+        Next to an end the difference of two places has no digits left; the knee angle psi has: x_s^2 - x^2 is
+        4 r1 r2 sin^2(psi/2), and x^2 exceeds that of the folded position by 4 r1 r2 cos^2(psi/2).
+        """
+        place, half = self.branch * float(self.slider_position(np.asarray(angle))), 0.5 * self.knee(angle)
+        square, far = 4.0 * self.crank * self.coupler, self.stretched_position
+
+        def to(end: float) -> float:
+            if end * place <= 0.0:
+                return abs(end - place)
+            share = math.sin(half) if abs(end) == far else math.cos(half)
+            return square * share**2 / abs(end + place)
+
+        low, high = self.way(angle)
+        return to(low), to(high)
+
     def arc(self, angle: float) -> tuple[float, float]:
         """Return the ends of the crank angles that can be reached from `angle` [rad]; infinite for a full turn.
 

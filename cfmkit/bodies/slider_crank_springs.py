@@ -243,19 +243,14 @@ class _SliderPath:
         self.gap = 4.0 * linkage.crank * linkage.coupler * math.sin(0.5 * self.start) ** 2
         square = max(xs**2 - self.gap, 0.0)
         self.x0 = place if square < NEAR_FOOT * xs**2 else math.copysign(math.sqrt(square), place)
-        self.low, self.high = linkage.way(unloaded)
+        self.inward, self.outward = linkage.room(unloaded)
         self.phi0, self.chi0 = _shares(linkage, np.sin(self.start), np.cos(self.start))
 
     def beyond(self, travel: FloatArray) -> NDArray[np.bool_]:
         """Return whether the slider cannot get there."""
         slack = 1e-12 * abs(self.x0)
-        found: NDArray[np.bool_] = (travel > self.x0 - self.low + slack) | (travel < -self._room() - slack)
+        found: NDArray[np.bool_] = (travel > self.inward + slack) | (travel < -self.outward - slack)
         return found
-
-    def _room(self) -> float:
-        """Return how far the slider can be pulled away from the unloaded position [m]."""
-        xs = self.linkage.stretched_position
-        return self.gap / (xs + self.x0) if self.x0 >= 0.0 and self.high == xs else self.high - self.x0
 
     def _to_stretched(self, travel: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the distances from the stretched positions on either side, x_s - x and x_s + x, without cancellation.

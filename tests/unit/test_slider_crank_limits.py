@@ -183,6 +183,48 @@ def test_sweeps_end_where_single_runs_do(name):
         assert largest == pytest.approx(single.curve.effort.max() * (1e3 if drive == "torque" else 1.0), rel=1e-12)
 
 
+@pytest.mark.parametrize("lead", [1e-3, 1e-5, 1e-7, 1e-9])
+@pytest.mark.parametrize("offset", [0.0, 12.0, -90.0])
+@pytest.mark.parametrize("folded", [True, False])
+def test_next_to_a_dead_point_the_force_is_that_at_the_same_share_of_the_way(lead, offset, folded):
+    """Springs relaxed just before it: the end of the curve has digits of its own, not those of two places' difference.
+
+    Along u = (distance from the dead point)/(that of the unloaded position) the force is F(u) = c (1 - 1/sqrt(u)).
+    """
+    link = Linkage(0.0951, 0.2362, 1e-3 * offset)
+    dead = link.folded_angle if folded else link.stretched_angle
+    mechanism = {
+        "crank_length": link.crank, "coupler_length": link.coupler, "offset": link.offset,
+        "unloaded_angle": dead + lead, "springs": {"pivot": 0.07, "crank_pin": 0.05, "slider_pin": 0.02},
+    }  # fmt: skip
+    ends = (-1e-3, 0.0) if not folded else (0.0, 1e-3)
+    about = {"family": "slider-crank", "mechanism": mechanism, "analysis": {"drive": "force", "travel": ends}}
+    result = cfmkit.analyze(SliderCrankSpec.model_validate(about))
+    assert "force_unbounded" in {item.name for item in result.warnings}
+    pole = result.state.assembly.reach[1 if folded else 0]
+    share = 1.0 - result.curve.displacement / pole
+    assert share.min() == pytest.approx(1e-3, rel=1e-9)
+    force = result.curve.force[share <= 0.25]
+    law = 1.0 - 1.0 / np.sqrt(share[share <= 0.25])
+    # the knee angle is known to 1e-16 rad, and a thousandth of the way is half of its square
+    tolerance = 20.0 * lead + 1e-12 / lead
+    np.testing.assert_allclose(force / force[0], law / law[0], rtol=tolerance)
+
+
+def test_relaxed_next_to_folded_and_driven_on_the_other_side_the_curve_ends_before_it():
+    """The crank pin is turned by a whole turn at the folded position: no finite force leads there."""
+    about = {
+        "analysis": {"drive": "force", "side": "before"},
+        "analysis__travel": ("-2 mm", "0 mm"),
+        "requirements": (),
+    }
+    folded = math.pi + math.asin(30 / 400)
+    result = cfmkit.analyze(config("li2019", **about, mechanism__unloaded_angle=folded - 1e-6))
+    assert result.status.key == "partial"
+    assert "force_unbounded" in {item.name for item in result.warnings}
+    assert np.abs(result.curve.force).max() < 200.0 * np.median(np.abs(result.curve.force))
+
+
 def test_no_random_force_curve_holds_a_number_made_of_rounding():
     """Travel from -5 to 5 mm whatever the lengths: half of these pass the stretched or the folded position."""
     random, cut = np.random.default_rng(60), 0

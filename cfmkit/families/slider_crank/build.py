@@ -90,10 +90,9 @@ class Assembly:
         """Ends of the motion that the linkage allows [rad or m]; infinite where the crank turns fully."""
         if self.drive == "torque":
             return self.linkage.arc(self.unloaded)
-        place = self.linkage.branch * float(self.linkage.slider_position(np.asarray(self.unloaded)))
-        low, high = self.linkage.way(self.unloaded)
+        inward, outward = self.linkage.room(self.unloaded)
         first, last = self._relaxed_ends
-        return 0.0 if first else place - high, 0.0 if last else place - low
+        return 0.0 if first else -outward, 0.0 if last else inward
 
     @property
     def _relaxed_ends(self) -> tuple[bool, bool]:
@@ -125,11 +124,26 @@ class Assembly:
         from the unloaded position before it: there the effort is some thirty times what it is elsewhere.
         """
         (first, last), (at_first, at_last) = self.reach, self.poles
-        if at_first and low < first + CLOSEST * (self.start - first):
-            first += SHORT_OF_END * (self.start - first)
-        if at_last and high > last - CLOSEST * (last - self.start):
-            last -= SHORT_OF_END * (last - self.start)
+        to_first, to_last = self._ways
+        if at_first and low < first + CLOSEST * to_first:
+            first += SHORT_OF_END * to_first
+        if at_last and high > last - CLOSEST * to_last:
+            last -= SHORT_OF_END * to_last
         return max(low, first), min(high, last)
+
+    @property
+    def _ways(self) -> tuple[float, float]:
+        """How far the motion is from the unloaded position to the first, and to the last place of the reach.
+
+        On the other side of the stretched position the slider gets to the folded one by way of the stretched one,
+        the springs turned all the way, however near to it the unloaded position is.
+        """
+        first, last = self.reach
+        ways = [self.start - first, last - self.start]
+        if self.drive == "force" and math.isnan(self.rest):
+            ends, far = self.linkage.way(self.unloaded)[::-1], self.linkage.stretched_position
+            ways = [way if abs(end) == far else last - first for way, end in zip(ways, ends, strict=True)]
+        return ways[0], ways[1]
 
     @property
     def stretched(self) -> float:
