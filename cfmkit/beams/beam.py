@@ -9,6 +9,7 @@ from __future__ import annotations
 import itertools
 from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import cached_property
+from math import ceil
 from numbers import Number
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -28,7 +29,8 @@ SAME = 1e-12
 """Parameters of a shape that differ by less count as one place."""
 
 _SLIGHT = 1e-9  # [rad] an angle that is no corner; [1] a share of the complex step that is rounding
-_PANELS = 8
+_PANELS = 8  # of a smooth piece at least
+_COILED = 2.0  # mean turn of a panel [rad] up to which twelve nodes integrate its sine and cosine to about 1e-12
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(12)
 GAUSS = (
     ((np.arange(_PANELS)[:, None] + 0.5 * (1 + _NODES)) / _PANELS).ravel(),
@@ -149,6 +151,11 @@ class Fit:
 
             self._parameters[fraction] = bracketed_root(lambda t: float(np.real(self.arc(t))) - fraction, 0.0, 1.0)
         return self._parameters[fraction]
+
+    @property
+    def turn(self) -> float:
+        """By how much the angle turns along the unloaded shape, to and fro added up, corners left out [rad]."""
+        return sum(_turn_of(self.course, left, right) for left, right in itertools.pairwise(self.course.breaks))
 
     @cached_property
     def _parameters(self) -> dict[float, float]:
@@ -272,17 +279,28 @@ def _change(course: Course) -> float:
     return float(max(*angles, *(abs(np.imag(course.speed(t, t)) / np.real(course.speed(t, t))) for t in middles)))
 
 
+def _turn_of(course: Course, left: Any, right: Any) -> float:
+    """Return by how much the angle turns between two neighbouring breaks, to and fro added up [rad].
+
+    The angle itself, unlike its sine, shows at a few places how far it runs.
+    """
+    places = np.linspace(np.real(left), np.real(right), _PANELS * len(_NODES))
+    angles = np.broadcast_to(np.real(course.angle(places, float(np.real(0.5 * (left + right))))), places.shape)
+    return float(np.abs(np.diff(angles)).sum())
+
+
 def _integral(course: Course) -> tuple[tuple[Any, Any], Any]:
     """Return the integrals of (cos, sin) of the angle and of the speed over a whole course."""
     x: Any = 0.0
     y: Any = 0.0
     length: Any = 0.0
     for left, right in itertools.pairwise(course.breaks):
-        panels = np.linspace(left, right, _PANELS + 1)
+        inside = float(np.real(0.5 * (left + right)))
+        count = max(_PANELS, ceil(_turn_of(course, left, right) / _COILED))
+        panels = np.linspace(left, right, count + 1)
         half = 0.5 * (panels[1] - panels[0])
         t = ((panels[:-1] + half)[:, None] + half * _NODES).ravel()
-        weights = np.tile(half * _WEIGHTS, _PANELS)
-        inside = float(np.real(0.5 * (left + right)))
+        weights = np.tile(half * _WEIGHTS, count)
         speed, angle = course.speed(t, inside) * weights, course.angle(t, inside)
         x = x + (speed * np.cos(angle)).sum()
         y = y + (speed * np.sin(angle)).sum()

@@ -23,6 +23,9 @@ if TYPE_CHECKING:
     from cfmkit.curves import FloatArray
 
 
+COILED = 16.0  # turn [rad] up to which GAUSS integrates sine and cosine of the angle to about 1e-12
+
+
 class Bundle:
     """The beams of a network between given ends.
 
@@ -157,8 +160,13 @@ class Bundle:
 
 
 def is_plain(beam: Beam) -> bool:
-    """Tell whether a beam has a polynomial angle and one thickness."""
-    return isinstance(beam.shape, Polynomial) and not isinstance(beam.section.thickness, Taper)
+    """Tell whether a beam has a polynomial angle, no coil of many turns, and one thickness."""
+    return isinstance(beam.shape, Polynomial) and not isinstance(beam.section.thickness, Taper) and not coils(beam)
+
+
+def coils(beam: Beam) -> bool:
+    """Tell whether the angle of a beam, a polynomial, may turn by more than COILED."""
+    return isinstance(beam.shape, Polynomial) and sum(abs(c.real) for c in beam.shape.coefficients[1:]) > COILED
 
 
 def _rigidities(s: Section) -> tuple[Any, Any, Any]:

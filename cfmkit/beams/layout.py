@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.beams.beam import Fit, fit, same_value
-from cfmkit.beams.bundle import Bundle
+from cfmkit.beams.bundle import Bundle, coils
 from cfmkit.beams.drive import Displacement, Drive, Rotation
 from cfmkit.beams.network import LineSpring, Network, PointLoad, SlideSpring, Spring, TorsionSpring
 from cfmkit.beams.numbering import NOWHERE
@@ -106,6 +106,12 @@ class Layout:
         if not self._fits:
             self._fits = {name: self._fit(name) for name in self.network.beams}
         return self._fits
+
+    @property
+    def turn(self) -> float:
+        """The largest turn of an unloaded beam, 0 where none is coiled up [rad]."""
+        beams = [name for name, beam in self.network.beams.items() if coils(beam)]
+        return max((self.fits[name].turn for name in beams), default=0.0)
 
     def _fit(self, name: str) -> Fit:
         known, beam = self.known, self.network.beams[name]

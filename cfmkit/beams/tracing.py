@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from math import ceil
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,6 +22,9 @@ _EARLY = 0.1  # share of the drive's range: segments that are too long before it
 _ROUNDS = 8  # meshes tried before giving up on the tolerance
 _GAIN = 0.005  # share of the drive's range, or of the constant loads, that is some
 _SURE = 1e-3  # error of a path that ends early from which on that may be the mesh's fault
+_COILED = (
+    4.0  # turn of an unloaded shape in one step [rad] up to which the step sees it: 14 kicks for two thirds of a turn
+)
 _STARTS = 4  # of them where nothing bears the constant loads, if each bears more of them than the one before
 
 
@@ -101,7 +105,12 @@ def _further(run: Run, before: Run) -> bool:
 
 
 def first_mesh(layout: Layout, tolerance: float) -> Mesh:
-    """Return the mesh that is tried first for a tolerance: straight beams need fewer segments than curved ones."""
+    """Return the mesh that is tried first for a tolerance: straight beams need fewer segments than curved ones.
+
+    Coils need more steps than their loads do.
+    """
     if tolerance >= 4e-6:
-        return Mesh(3 if tolerance < 2e-5 and layout.bundle.curved else 2, 1)
-    return Mesh(2, 2 if tolerance >= 1e-7 else 4)
+        mesh = Mesh(3 if tolerance < 2e-5 and layout.bundle.curved else 2, 1)
+    else:
+        mesh = Mesh(2, 2 if tolerance >= 1e-7 else 4)
+    return replace(mesh, steps=max(mesh.steps, ceil(layout.turn / (mesh.segments * _COILED))))

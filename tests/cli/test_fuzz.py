@@ -18,7 +18,7 @@ from cfmkit.cli.main import main
 
 CONFIGS = sorted((Path(__file__).parents[2] / "configs").glob("*.yaml"))
 ALLOWED = {0, 3, 4, 5, 6}
-LONGEST = 5.0  # [s] of a changed spec, or as long as the spec takes that it was made from: some design for seconds
+LONGEST = 2.0  # [s] of a changed spec, or as long as the spec takes that it was made from: some design for seconds
 HANGS = 10.0  # processor time after which a command is ended [s]
 NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?![\w.])")
 WORDS = [

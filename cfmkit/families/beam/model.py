@@ -18,8 +18,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.beams import Path, PathStatus, trace
+from cfmkit.beams.bundle import coils
+from cfmkit.beams.layout import Layout
 from cfmkit.beams.path import most_stressed
 from cfmkit.curves import Column, Curve, read_only
+from cfmkit.errors import InputError
 from cfmkit.families.beam.build import Assembly, assemble, mirror_axis, resolve, thickest_of
 from cfmkit.families.beam.checks import findings_of
 from cfmkit.families.beam.endings import ending_of
@@ -28,6 +31,7 @@ from cfmkit.families.beam.surface.ride import curve_of, findings_along, ride, va
 from cfmkit.families.beam.values import travel_of, values_of
 from cfmkit.families.beam.words import in_units
 from cfmkit.results import Result, Status
+from cfmkit.units import format_short
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -38,6 +42,7 @@ if TYPE_CHECKING:
 
 _NOTHING = 1e-15
 _POSES = 7
+_ALONG = np.linspace(0.0, 1.0, 1001)  # where a coil's radius is looked at: a polynomial of few terms
 
 
 @dataclass(frozen=True, eq=False)
@@ -185,8 +190,27 @@ def analyze(spec: BeamSpec, run: Run) -> Result:
 def solve(spec: BeamSpec) -> Solution:
     """Return the path of a mechanism as its specification asks for it."""
     assembly = assemble(spec)
+    _refuse_tight_coils(assembly)
     path = trace(assembly.network, assembly.drive(), assembly.control())
     return Solution(assembly, path, _kept(spec, path))
+
+
+def _refuse_tight_coils(assembly: Assembly) -> None:
+    """Refuse coils that are wound more tightly than strips of their thickness can be: the inside would have no length.
+
+    Thousands of steps would be needed to follow them.
+    """
+    network = assembly.network
+    wound = [name for name, beam in network.beams.items() if coils(beam)]
+    fits = Layout(network, assembly.drive()).fits if wound else {}
+    for name in wound:
+        turns = np.abs(np.diff(fits[name].angle(_ALONG, 0.5))) / np.diff(_ALONG)
+        radius, thick = float(fits[name].length / turns.max()), thickest_of(network.beams[name].section)
+        if radius < 0.5 * thick:
+            raise InputError(
+                f"mechanism.beams.{name}.shape winds the beam to a radius of {format_short(radius, 'length')}, less "
+                f"than half of its thickness of {format_short(thick, 'length')}: fewer turns, or a thinner beam"
+            )
 
 
 def _kept(spec: BeamSpec, path: Path) -> Any:
