@@ -34,17 +34,20 @@ class Panels:
     ----------
     ends : (k + 1,) array
         Of the panels, increasing.
+    spans : (k, 2) array
+        What each polynomial was made over: its panel, or the most of it where no value could be had at an end.
     coefficients : (k, NODES) array
         Of the Chebyshev polynomials; NaN where a node is not known.
     """
 
     ends: FloatArray
+    spans: FloatArray
     coefficients: FloatArray
 
     def at(self, x: FloatArray) -> FloatArray:
         """Return the function at some places, by Clenshaw's recurrence; beyond the ends by the nearest panel's."""
         panel = np.searchsorted(self.ends[1:-1], x, side="right")
-        low, high = self.ends[panel], self.ends[panel + 1]
+        low, high = self.spans[panel].T
         t = (2.0 * x - low - high) / (high - low)
         c, one, two = self.coefficients[panel], np.zeros(x.shape), np.zeros(x.shape)
         for k in range(NODES - 1, 0, -1):

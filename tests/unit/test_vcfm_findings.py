@@ -47,6 +47,18 @@ def test_a_failure_mode_is_found_with_its_numbers(name):
     assert words in message(analyzed(*changes), name)
 
 
+@pytest.mark.parametrize("structure", ["v-beam", "cosine"])
+@pytest.mark.parametrize(("thickness", "model", "words"), [
+    ("3.3 mm", "analytic", None), ("4 mm", "analytic", "11.4 % as thick as long"),
+    ("20 mm", "analytic", "no beams"), ("20 mm", "exact", "no beams"), ("4 mm", "exact", None),
+])  # fmt: skip
+def test_leaves_too_thick_for_a_model_are_said_to_be(structure, thickness, model, words):
+    """At 4 mm of 35 the closed forms are off by 4 % (V) and 6 % (cosine) up to the flat pose, by 10 % beyond."""
+    found = analyzed(*leaf(structure=structure, thickness=thickness), f"analysis.fidelity={model}")
+    told = [one.message for one in found.warnings if one.name == "theory_range"]
+    assert [words in one for one in told] == ([True] if words else [])
+
+
 def test_a_sound_mechanism_has_nothing_to_be_said_against_it():
     found = analyzed(FLAT, "analysis.travel=4.7 mm", "analysis.measured=null", "mechanism.bistable.width=6 mm")
     assert set(names(found)) == set()

@@ -291,6 +291,25 @@ def test_exact_leaves_are_those_of_a_path_through_the_very_points(structure, sle
     assert buckled.tolist() == [found.edges[1] < place < found.buckled_range[1] for place in path.drive[here]]
 
 
+@pytest.mark.parametrize(
+    ("structure", "angle", "length", "slenderness"),
+    [("v-beam", 7, 35, 3.14309), ("v-beam", 7, 35, 3.15), ("v-beam", 4, 50, 3.15124), ("cosine", 3, 80, 2.34064)],
+)
+def test_leaves_just_slender_enough_to_buckle_keep_to_the_buckled_branch(structure, angle, length, slenderness):
+    """Nodes requested next to a bifurcation led past the branch: the force was that of the unstable form."""
+    thickness = length * np.sin(np.radians(angle)) / slenderness
+    found = analyzed(
+        f"mechanism.bistable.thickness={thickness} mm", f"mechanism.bistable.structure={structure}",
+        f"mechanism.bistable.angle={angle} deg", f"mechanism.bistable.length={length} mm",
+        "analysis.fidelity=exact", "analysis.window=null", "analysis.travel=6 mm",
+    )  # fmt: skip
+    forms = found.curve.extra["leaf_form"].values.tolist()
+    assert found.curve.stable.all()
+    assert [form for form, before in zip(forms, ["", *forms], strict=False) if form != before] == [
+        "bent", "buckled", "bent",
+    ]  # fmt: skip
+
+
 def test_exact_leaves_have_their_force_where_a_coarse_sampling_cut_the_peak_off():
     """At 0.4 mm the four leaves carry 0.7147 N just before they buckle; interpolated from 127 points it was 0.55 N."""
     found = analyzed("analysis.fidelity=exact", "mechanism.bistable.thickness=0.4 mm", "analysis.points=4801")

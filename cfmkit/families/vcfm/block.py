@@ -25,6 +25,7 @@ from cfmkit.families.vcfm.vbeam import (
     NEGATIVE_ABOVE,
     RELIABLE,
     STEEP,
+    THICK,
     VBeam,
     overrated,
 )
@@ -295,6 +296,7 @@ def warned(spec: VcfmSpec, slab: Slab) -> dict[str, NDArray[np.bool_]]:
         "imperfection": np.array(about.waviness > 0),
         "theory_range": (
             (leaf.angle > STEEP)
+            | (leaf.thickness > THICK * leaf.length)
             | (travel > RELIABLE * rise * (1 + ROUNDING))
             | (spring.angle > STEEP)
             | (travel / (2.0 * spring.length) > PRESSED)

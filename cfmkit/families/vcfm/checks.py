@@ -20,6 +20,8 @@ from cfmkit.families.vcfm.vbeam import (
     NEGATIVE_ABOVE,
     RELIABLE,
     STEEP,
+    STOCKY,
+    THICK,
     VBeam,
     overrated,
 )
@@ -285,18 +287,28 @@ def _imperfect(solution: Solution) -> Iterator[Finding]:
     push = solution.nominal
     if not push.leaves.stable.all():
         lost = push.travel[~push.leaves.stable]
-        yield finding(
-            "unstable_branch",
-            f"from {mm(float(lost[0]))} to {mm(float(lost[-1]))} the leaves are in a form that they leave for another: "
-            "analysis.branch: stable follows them",
-            "analysis.branch=stable",
+        told = (
+            f"from {mm(float(lost[0]))} to {mm(float(lost[-1]))} the leaves are in a form that they leave for another"
         )
+        if solution.spec.analysis.branch == "stable":
+            yield finding("unstable_branch", f"{told}, which was not found")
+        else:
+            follow = "analysis.branch: stable follows them"
+            yield finding("unstable_branch", f"{told}: {follow}", "analysis.branch=stable")
 
 
 def _range(solution: Solution) -> Iterator[Finding]:
+    strip = solution.parts.strip
+    share = float(strip.thickness / strip.length)
+    if share > STOCKY and solution.spec.analysis.fidelity != "truss":
+        yield finding(
+            "theory_range",
+            f"leaves {percent(share)} as thick as long are no beams: no model here has their force or stress; "
+            "use longer or thinner leaves",
+        )
+        return
     if solution.spec.analysis.fidelity != "analytic":
         return
-    strip = solution.parts.strip
     angle, reach = float(strip.angle), RELIABLE * solution.parts.balance
     if isinstance(solution.parts.leaf, HybridLeaf):
         much = (
@@ -309,6 +321,13 @@ def _range(solution: Solution) -> Iterator[Finding]:
         yield finding(
             "theory_range",
             f"{much}; their stress is up to half too low. Verify with 'analysis.fidelity: exact'",
+            "analysis.fidelity=exact",
+        )
+    elif share > THICK:
+        yield finding(
+            "theory_range",
+            f"leaves {percent(share)} as thick as long: the closed forms are for thin ones, and off by 5 to 10 % and "
+            "more; verify with 'analysis.fidelity: exact'",
             "analysis.fidelity=exact",
         )
     elif angle > STEEP:

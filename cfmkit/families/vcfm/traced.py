@@ -39,8 +39,13 @@ leaves that are pulled straight there do not reach the first: the next is taken.
 RESOLVED = 3e-8
 """Size of a panel's last coefficients, relative to the largest force so far, at which it has converged."""
 
-WIDE, CORNERED = 4, 16
-"""Panels of a piece at first, and of one that may have corners."""
+WIDE, CORNERED = (4, 3, 5), 16
+"""Panels of a piece at first, the next number where a path left its branch; and of one that may have corners."""
+
+CLEAR, INWARDS = 5e-4, 0.05
+"""Nodes keep this share of the travel away from a bifurcation, but no more than that share of their panel: the engine
+misses a branch of leaves just above the critical slenderness where a point is requested at 1e-4 of the travel behind
+its beginning. From 0.05 of a panel inside, the polynomial at its end makes 450 times the rounding, 1e-9 of the peak."""
 
 HALVINGS = 12
 """At most so many: a corner left then is 1/16000 of its piece."""
@@ -102,14 +107,15 @@ class Traced:
         """1 for travels from zero up, -1 for those from zero down."""
         return -1.0 if self.edges[-1] < 0 else 1.0
 
-    def _piece(self, travel: FloatArray) -> Any:
+    def piece(self, travel: FloatArray) -> Any:
+        """Return the number of the piece that each travel is in."""
         inner = self.sense * np.array(self.edges[1:-1])
         return np.searchsorted(inner, self.sense * np.asarray(travel), side="right")
 
     @cached_property
     def _stresses(self) -> list[Callable[[FloatArray], FloatArray]]:
         """The stress on each piece, as a function of the travel's size."""
-        pieces, own = self._piece(self.points.places), self.sense * self.points.places
+        pieces, own = self.piece(self.points.places), self.sense * self.points.places
         ends = self.sense * np.array(self.edges)
         found = []
         for number, (low, high) in enumerate(pairwise(ends)):
@@ -119,7 +125,7 @@ class Traced:
 
     def at(self, travel: FloatArray) -> tuple[FloatArray, FloatArray, Any, Any]:
         """Return force, stress, stability and form at some travels [m]; NaN beyond the end."""
-        x, pieces = self.sense * np.asarray(travel, dtype=float), self._piece(travel)
+        x, pieces = self.sense * np.asarray(travel, dtype=float), self.piece(travel)
         force, stress = np.full(x.shape, np.nan), np.full(x.shape, np.nan)
         if self.panels is not None:
             force = self.panels.at(x)
@@ -130,27 +136,27 @@ class Traced:
                 stress[chosen] = law(x[chosen])
         beyond = x > self.sense * self.edges[-1] * (1 + 1e-9) + 1e-15
         force[beyond], stress[beyond] = np.nan, np.nan
-        return force, stress, self._stable[pieces], self._buckled[pieces]
+        return force, stress, self.stable[pieces], self.buckled[pieces]
 
     @property
     def buckled_range(self) -> tuple[float, float]:
         """Where another form than as made is taken, from and to [m]; NaN where none is."""
-        found = np.flatnonzero(self._buckled)
+        found = np.flatnonzero(self.buckled)
         return (self.edges[found[0]], self.edges[found[-1] + 1]) if len(found) else (np.nan, np.nan)
 
     @cached_property
-    def _buckled(self) -> Any:
+    def buckled(self) -> Any:
         """Whether each piece is on a branch that was not there as made."""
         return self._most(self.points.buckled, False)
 
     @cached_property
-    def _stable(self) -> Any:
+    def stable(self) -> Any:
         """Whether each piece is stable."""
         return self._most(self.points.stable, True)
 
     def _most(self, flags: Any, empty: bool) -> Any:
         """Return what most of the points of each piece are."""
-        pieces = self._piece(self.points.places)
+        pieces = self.piece(self.points.places)
         found = [flags[pieces == number] for number in range(len(self.edges) - 1)]
         return np.array([one.mean() > 0.5 if len(one) else empty for one in found])
 
@@ -178,14 +184,28 @@ def traced(network: Network, node: str, end: float, **control: Any) -> Traced:
     """Return what a network does while a node moves down by up to `end` [m], or up where that is negative."""
     route = Route(network, node, control)
     for count in GRIDS:
-        grid = end * np.arange(1, count + 1) / count
-        points, edges, problem = _begun(*route.through(grid))
-        gaps = np.abs(np.diff(edges[1:-1]))
+        first = _begun(route, end, count)
+        gaps = np.abs(np.diff(first.edges[1:-1]))
         # bifurcations close together may come from a point requested next to one: other points tell
-        if problem or not (gaps < CLOSE * abs(edges[-1])).any():
+        if first.problem or not (gaps < CLOSE * abs(end)).any():
             break
-    panels, points = _resolved(route, edges, points, grid) if edges[-1] else (None, points)
-    return Traced(points, panels, edges, problem)
+    if not first.edges[-1]:
+        return Traced(first.points, None, first.edges, first.problem)
+    for number in WIDE:
+        panels, points, kept = _resolved(route, first, number)
+        if kept:
+            break
+    return Traced(points, panels, first.edges, first.problem)
+
+
+@dataclass(frozen=True)
+class First:
+    """A first path: its points with that of zero, zero, bifurcations and end [m], what was requested, why it ends."""
+
+    points: Points
+    edges: tuple[float, ...]
+    grid: FloatArray
+    problem: str
 
 
 @dataclass
@@ -210,13 +230,15 @@ class Route:
         return path, places
 
 
-def _begun(path: Path, places: FloatArray) -> tuple[Points, tuple[float, ...], str]:
-    """Return the points of a first path with that of zero, its edges, and why it ends early."""
+def _begun(route: Route, end: float, count: int) -> First:
+    """Return a first path through so many places at equal distances up to `end` [m]."""
     from cfmkit.beams import PathStatus
 
-    sense, points = np.sign(places[-1]), _points(path, places)
+    places = end * np.arange(1, count + 1) / count
+    path, _ = route.through(places)
+    sense, points = np.sign(end), _points(path, places)
     reached = float(points.places[-1]) if len(points.places) else 0.0
-    whole = abs(reached - places[-1]) <= 1e-9 * abs(places[-1])
+    whole = abs(reached - end) <= 1e-9 * abs(end)
     events = sorted((e.drive for e in path.events if e.kind == "bifurcation"), key=abs)
     inner: list[float] = []
     for event in events:  # one that is found from both sides is one
@@ -224,7 +246,7 @@ def _begun(path: Path, places: FloatArray) -> tuple[Points, tuple[float, ...], s
             inner.append(event)
     problem = "" if path.status is PathStatus.COMPLETE and whole else path.message
     zero = Points(*(np.array([value]) for value in (0.0, 0.0, 0.0, True, False)))  # the pose as made
-    return zero.joined(points), (0.0, *inner, reached), problem
+    return First(zero.joined(points), (0.0, *inner, reached), places, problem)
 
 
 def _points(path: Path, places: FloatArray) -> Points:
@@ -242,25 +264,46 @@ def _points(path: Path, places: FloatArray) -> Points:
     return Points(drive[kept], path.effort[kept], stress[kept], path.stable[kept].astype(bool), buckled[kept])
 
 
-def _resolved(route: Route, edges: tuple[float, ...], points: Points, grid: FloatArray) -> tuple[Panels, Points]:
-    """Return the force as panels that have converged, and all points that were traced for them."""
-    sense = np.sign(edges[-1])
-    ends, count = sense * np.array(edges), CORNERED if route.control.get("imperfection") else WIDE
-    pieces = list(pairwise(ends.tolist()))
+def _resolved(route: Route, first: First, number: int) -> tuple[Panels, Points, bool]:
+    """Return the force as panels that have converged, all points traced for them, and whether these keep their branch.
+
+    Parameters
+    ----------
+    route : Route
+        What is traced.
+    first : First
+        The path that bifurcations are known from.
+    number : int
+        Panels of a piece at first.
+    """
+    points, sense = first.points, np.sign(first.edges[-1])
+    ends, count = sense * np.array(first.edges), CORNERED if route.control.get("imperfection") else number
+    pieces, apart = list(pairwise(ends.tolist())), CLEAR * float(ends[-1])
     # points in every piece and those of the first path: none that follows may step over a bifurcation that this one saw
     guards = [np.linspace(*piece, 5)[1:-1] for piece in pieces]
-    guards.append(sense * grid[np.abs(grid) < ends[-1]])
+    steps = sense * first.grid
+    near = np.abs(steps[:, None] - ends[1:-1]).min(axis=1, initial=np.inf) < apart
+    guards.append(steps[(steps < ends[-1]) & ~near])
     early = min(float(ends[1]), EARLY * float(ends[-1]))
     wanted = [panel for piece in pieces for panel in pairwise(np.linspace(*piece, count + 1).tolist())]
     done: dict[tuple[float, float], FloatArray] = {}
+
+    def inside(panel: tuple[float, float]) -> tuple[float, float]:
+        """Return the part of a panel that has nodes: clear of bifurcations."""
+        low, high = panel
+        margin = min(apart, INWARDS * (high - low))
+        return low + margin * (low in ends[1:-1]), high - margin * (high in ends[1:-1])
+
+    kept = True  # no path has left its branch
     for left in range(HALVINGS, -1, -1):
-        places = np.unique(np.concatenate([*guards, *(nodes_of(panel) for panel in wanted)]))
-        points = points.joined(_points(*route.through(sense * places)))
+        places = np.unique(np.concatenate([*guards, *(nodes_of(inside(panel)) for panel in wanted)]))
+        more = _points(*route.through(sense * places))
+        kept, points = kept and _alike(first, more), points.joined(more)
         size = sense * points.places
         largest = np.maximum.accumulate(np.abs(points.force))
         halves: list[tuple[float, float]] = []
         for panel in wanted:
-            found = coefficients(panel, size, points.force)
+            found = coefficients(inside(panel), size, points.force)
             scale = largest[np.searchsorted(size, max(panel[1], early), side="right") - 1]
             if left and np.abs(found[-3:]).max() > RESOLVED * scale:  # false where a node is missing
                 middle = 0.5 * (panel[0] + panel[1])
@@ -272,4 +315,12 @@ def _resolved(route: Route, edges: tuple[float, ...], points: Points, grid: Floa
         wanted = halves
     ordered = sorted(done)
     borders = np.array([low for low, _ in ordered] + [ordered[-1][1]])
-    return Panels(borders, np.array([done[panel] for panel in ordered])), points
+    spans = np.array([inside(panel) for panel in ordered])
+    return Panels(borders, spans, np.array([done[panel] for panel in ordered])), points, kept
+
+
+def _alike(first: First, points: Points) -> bool:
+    """Tell whether points are on the branch that a first path took in each piece, where it has points there."""
+    one, two = Traced(first.points, None, first.edges), Traced(points, None, first.edges)
+    both = np.isin(np.arange(len(first.edges) - 1), one.piece(first.points.places))
+    return bool(((one.stable == two.stable) & (one.buckled == two.buckled))[both].all())
