@@ -139,16 +139,35 @@ def _matches(name: str, out: str) -> list[str]:
             f"{name!r} is not a file: a batch reads files, folders and patterns such as 'configs/**/*.yaml'"
         )
     if os.path.isdir(name):
-        found = [os.path.join(name, one) for one in _search("**/*", out, name) if one.lower().endswith(ENDINGS)]
-        hint = f"{name}: there is no YAML file in this folder or below"
-    elif os.path.exists(name):
+        return files_below(name, out)
+    if os.path.exists(name):
         return [name]
-    elif not glob.has_magic(name):
+    if not glob.has_magic(name):
         raise UsageError(f"{name}: there is no such file")
-    else:
-        found, hint = _search(name, out), f"{name}: no file matches this pattern"
+    found = _search(name, out)
     if not found:
-        raise UsageError(hint)
+        raise UsageError(f"{name}: no file matches this pattern")
+    return found
+
+
+def files_below(folder: str, out: str = OUTPUTS) -> list[str]:
+    """Return the YAML files in a folder and below, those in folders of results left out.
+
+    Parameters
+    ----------
+    folder : str
+        Where to look.
+    out : str
+        An output folder, which is not searched.
+
+    Raises
+    ------
+    cfmkit.errors.UsageError
+        If there is none.
+    """
+    found = [os.path.join(folder, one) for one in _search("**/*", out, folder) if one.lower().endswith(ENDINGS)]
+    if not found:
+        raise UsageError(f"{folder}: there is no YAML file in this folder or below")
     return found
 
 

@@ -85,6 +85,25 @@ def test_check_reports_every_fault_of_every_file(cli, cam):
     ]
 
 
+def test_check_of_a_folder_is_that_of_all_files_in_it_and_below(cli, cam):
+    (cli.folder / "all" / "below" / "cfm-out").mkdir(parents=True)
+    text = (cli.folder / cam).read_text()
+    for name in ("all/b.yaml", "all/below/a.yml", "all/below/cfm-out/resolved.yaml"):
+        (cli.folder / name).write_text(text)
+    (cli.folder / "all" / "below" / "bad.yaml").write_text("family: cam\n")
+    done = cli("check", "all", cam)
+    assert done.code == 3
+    assert [line.split()[:2] for line in done.out.splitlines()] == [
+        ["all/b.yaml", "ok"],
+        ["all/below/a.yml", "ok"],
+        ["all/below/bad.yaml", "INVALID"],
+        [cam, "ok"],
+    ]
+    (cli.folder / "empty").mkdir()
+    done = cli("check", "empty")
+    assert (done.code, "no YAML file" in done.err) == (2, True)
+
+
 def test_check_goes_on_after_a_missing_file(cli, cam):
     done = cli("check", "nowhere.yaml", cam)
     assert done.code == 2

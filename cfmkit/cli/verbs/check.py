@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -27,7 +28,7 @@ SpecFiles = Annotated[
     list[str],
     typer.Argument(
         metavar="SPEC...",
-        help="YAML files; - reads standard input.",
+        help="YAML files, or folders with them; - reads standard input.",
         show_default=False,
         autocompletion=completion.specs,
     ),
@@ -53,7 +54,8 @@ class Finding:
 
 def run(options: Options, terminal: Terminal) -> Answer:
     """Check specs without computing anything: every fault of every file, with its line and column."""
-    found = [_checked(name, options.changes, len(options.specs) > 1) for name in options.specs]
+    files = _files(options.specs)
+    found = [_checked(name, options.changes, len(files) > 1) for name in files]
 
     def view(terminal: Terminal) -> None:
         for line in _lines(found, terminal.verbose > 0):
@@ -67,6 +69,16 @@ def run(options: Options, terminal: Terminal) -> Answer:
         complaints=tuple(line for item in found for line in item.failure.complaints),
         errors=tuple(entry for item in found for entry in item.failure.errors),
     )
+
+
+def _files(named: list[str]) -> list[str]:
+    """Return the files to check: a folder stands for all YAML files in it and below, as in a batch."""
+    from cfmkit.studies.batch import files_below
+
+    found: list[str] = []
+    for name in named:
+        found += files_below(name) if os.path.isdir(name) else [name]
+    return found
 
 
 def _checked(name: str, changes: tuple[str, ...], of_many: bool) -> Finding:
