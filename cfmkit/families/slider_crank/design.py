@@ -204,9 +204,14 @@ def _written(solved: Solved) -> SliderCrankSpec:
 
 
 def _seen(solved: Solved) -> dict[str, tuple[float, float]]:
-    """Return the motion of the analysis, if it has to be another one to show all of the window."""
+    """Return the motion of the analysis, if it has to be another one to show all of the window, and nothing forbidden.
+
+    Where none is asked for, the joints' limits are those of the motion, too.
+    """
     name = solved.task.assembly.motion_name
     asked: tuple[float, float] | None = getattr(solved.task.spec.analysis, name)
+    if asked is None and solved.task.spec.mechanism.limits is not None:
+        return {name: solved.task.allowed}
     low, high = asked or default_motion(solved.task.assembly)
     if low <= solved.window[0] and solved.window[1] <= high:
         return {}

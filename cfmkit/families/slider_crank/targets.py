@@ -26,6 +26,9 @@ FREE = ("crank_length", "offset", "unloaded_offset")
 PROBES = 721
 """Places at which the limits of the joints are looked at."""
 
+REFINED = 3
+"""Times that they are looked at, each between two neighbours of the last: a window may end where a limit is reached."""
+
 DENSE = 1001
 """Places of a window over which the largest deviation is kept."""
 
@@ -65,7 +68,7 @@ class Task:
         if limits is None:
             return low, high
         most = np.array([getattr(limits, name) or math.inf for name in JOINTS])
-        return self._kept((low, start), most)[0], self._kept((start, high), most)[1]
+        return self._farthest(low, most), self._farthest(high, most)
 
     @property
     def searched(self) -> tuple[float, float]:
@@ -74,16 +77,17 @@ class Task:
         within = self.wanted.within
         return (low, high) if within is None else (max(low, within[0]), min(high, within[1]))
 
-    def _kept(self, ends: tuple[float, float], most: FloatArray) -> tuple[float, float]:
-        """Return the part of an interval next to the unloaded position in which no joint is moved too far."""
-        places = np.linspace(*ends, PROBES)
-        turn = self.assembly.units(places).turn
-        bad = np.flatnonzero(~(np.abs(turn) <= most[:, None] * (1 + 1e-12)).all(axis=0))
-        if not len(bad):
-            return ends
-        if ends[1] == self.assembly.start:
-            return float(places[min(bad[-1] + 1, PROBES - 1)]), ends[1]
-        return ends[0], float(places[max(bad[0] - 1, 0)])
+    def _farthest(self, end: float, most: FloatArray) -> float:
+        """Return the last place from the unloaded position towards an end up to which no joint is moved too far."""
+        good = self.assembly.start
+        for _ in range(REFINED):
+            places = np.linspace(good, end, PROBES)
+            turn = self.assembly.units(places).turn
+            bad = np.flatnonzero(~(np.abs(turn) <= most[:, None] * (1 + 1e-12)).all(axis=0))
+            if not len(bad):
+                return end
+            good, end = float(places[max(bad[0] - 1, 0)]), float(places[bad[0]])
+        return good
 
     def places(self, window: tuple[float, float], count: int | None = None) -> FloatArray:
         """Return where the goal is looked at: at the `points` of the design, or on more places.
