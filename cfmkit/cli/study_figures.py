@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.plots.findings import PERCENT, Findings, Line, Scale
+from cfmkit.plots.findings import PERCENT, Findings, Line, Scale, short_names
 from cfmkit.plots.study import figures
 from cfmkit.plots.style import png
 from cfmkit.tables import Table, TableColumn, border_values, read_csv
@@ -38,7 +38,11 @@ def findings(records: Records, summary: Summary) -> Findings:
     meets = np.concatenate([meets for _, _, meets in summary.kept])
     metrics = [_drawn(study.metrics[column], values[:, k]) for k, column in enumerate(summary.shown)]
     drawn = [metric for metric in metrics if np.isfinite(metric.values).any()]
-    varied = [_scale(item, shown) for item, shown in zip(plan.variables, plan.shown(0, len(plan)), strict=True)]
+    names = short_names([item.path for item in plan.variables])
+    varied = [
+        _scale(item, shown, name)
+        for item, shown, name in zip(plan.variables, plan.shown(0, len(plan)), names, strict=True)
+    ]
     return Findings(tuple(varied), tuple(drawn), _shape(plan), meets, summary.best, study.spec.name, _best(summary))
 
 
@@ -60,11 +64,11 @@ def _drawn(metric: Metric, values: FloatArray) -> Scale:
     return Scale(metric.name, metric.dimension, border_values(values, metric.dimension))
 
 
-def _scale(item: Variable, shown: np.ndarray) -> Scale:
+def _scale(item: Variable, shown: np.ndarray, name: str) -> Scale:
     if item.dimension != "text":
-        return Scale(item.path, item.dimension, shown.astype(np.float64))
+        return Scale(item.path, item.dimension, shown.astype(np.float64), short=name)
     words = tuple(dict.fromkeys(map(str, item.shown)))
-    return Scale(item.path, item.dimension, np.array([float(words.index(str(one))) for one in shown]), words)
+    return Scale(item.path, item.dimension, np.array([float(words.index(str(one))) for one in shown]), words, name)
 
 
 def _shape(plan: Plan) -> tuple[int, ...]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from cfmkit.plots.text import axis_label
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     import numpy as np
     from numpy.typing import NDArray
@@ -32,17 +32,20 @@ class Scale:
         One for each point; indices into `words` where those are given.
     words : tuple of str
         Of a parameter or a metric that is no number.
+    short : str
+        What it is called beside others; the last part of the name where that is empty.
     """
 
     name: str
     dimension: str
     values: FloatArray
     words: tuple[str, ...] = ()
+    short: str = ""
 
     @property
     def label(self) -> str:
-        """What is written on the axis: the last part of a path, with its unit."""
-        short = self.name.rpartition(".")[2]
+        """What is written on the axis: the short name, with its unit."""
+        short = self.short or self.name.rpartition(".")[2]
         if self.dimension == PERCENT:
             return f"{short.replace('_', ' ')} [%]"
         known = self.dimension not in ("text", "count")
@@ -59,6 +62,27 @@ class Scale:
             return self.words[int(value)]
         unit = "" if self.dimension in ("text", "count") else self.label.partition(" [")[2].removesuffix("]")
         return f"{value:.4g}" + (f" {unit}" if unit not in ("", "1") else "")
+
+
+def short_names(paths: Sequence[str]) -> tuple[str, ...]:
+    """Return the last part of each path, with as many parts before it as tell it from the others.
+
+    Examples
+    --------
+    >>> short_names(["mechanism.bistable.length", "mechanism.positive.length", "mechanism.springs.stiffness.0"])
+    ('bistable length', 'positive length', 'stiffness 0')
+    """
+    parts = [path.split(".") for path in paths]
+    counts = [2 if one[-1].isdigit() else 1 for one in parts]
+    while True:
+        names = [" ".join(one[-count:]) for one, count in zip(parts, counts, strict=True)]
+        longer = [
+            count + (names.count(name) > 1 and count < len(one))
+            for one, name, count in zip(parts, names, counts, strict=True)
+        ]
+        if longer == counts:
+            return tuple(names)
+        counts = longer
 
 
 @dataclass(frozen=True)

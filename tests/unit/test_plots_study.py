@@ -235,3 +235,16 @@ def test_the_nominal_curve_is_read_in_one_pass_over_the_cells(monkeypatch):
     nominal = _nominal(table)
     assert len(nominal) == rows
     assert len(calls) <= len(columns)
+
+
+def test_parameters_of_the_same_last_name_are_told_apart():
+    """A map of two structures had 'structure' on both axes."""
+    spec = cfmkit.load("configs/vcfm_ding2022.yaml").replace({"requirements": ()})
+    wish = wishes({f"mechanism.{part}.width": ("5 mm", "6 mm") for part in ("bistable", "positive")})
+    records = run(prepare(spec, Request(vary=wish, metrics=("force_ripple",))))
+    summary = summary_of(records)
+    for batch in records.batches():
+        summary.add(*batch)
+    seen = findings(records, summary)
+    assert [one.label for one in seen.varied] == ["bistable width [mm]", "positive width [mm]"]
+    assert any("over bistable width and positive width" in text for text in _texts(figures(seen)["force_ripple"]()))
