@@ -247,4 +247,5 @@ def test_parameters_of_the_same_last_name_are_told_apart():
         summary.add(*batch)
     seen = findings(records, summary)
     assert [one.label for one in seen.varied] == ["bistable width [mm]", "positive width [mm]"]
-    assert any("over bistable width and positive width" in text for text in _texts(figures(seen)["force_ripple"]()))
+    title = next(text for text in _texts(figures(seen)["force_ripple"]()) if text.startswith("ding-2022: "))
+    assert " ".join(title.split()).endswith("force ripple over positive width and bistable width")
