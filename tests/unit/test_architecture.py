@@ -17,7 +17,7 @@ LAYERS = (
     ("api", "recordings", "specfile", "keys"),
     ("plots", "export", "studies", "experiment"),
     ("families",),
-    ("beams", "bodies"),
+    ("beams", "bodies", "solid"),
     ("numerics", "decimals"),
     ("yamlio",),
     ("spec", "metrics", "tables", "geometry", "store", "materials", "jsontext"),
@@ -127,7 +127,7 @@ ALLOWED = {
     "pint": lambda path: unit_of(path) == "units",
     "yaml": lambda path: unit_of(path) == "yamlio",
     "ezdxf": lambda path: unit_of(path) == "export",
-    "shapely": lambda path: unit_of(path) == "export",
+    "shapely": lambda path: unit_of(path) in ("export", "solid"),
     "pandas": lambda path: path.name in ("results.py", "outcome.py"),
 }
 

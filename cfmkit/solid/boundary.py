@@ -1,0 +1,230 @@
+"""The boundary of a part as closed chains of points, and how finely it must be meshed where.
+
+The chains are so dense that the true edge lies within the outline's tolerance of their lines. A vertex at which the
+direction turns by more than `CORNER` is a corner and becomes a node; everything else is a smooth edge, whose radius is
+read off the turn between neighbouring lines.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from cfmkit.curves import read_only
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from numpy.typing import NDArray
+
+    from cfmkit.curves import FloatArray
+
+CORNER = math.radians(25.0)
+"""Turn of a true corner [rad]. An arc of 0.5 mm within 1 um of its lines turns by 7 degrees a vertex, one of 0.1 mm
+by 16; sharp corners of parts are rounded by the cutter or stand at pads, square."""
+
+GRADING = 0.25
+"""How fast element sizes may grow [m per m]: 0.2 to 0.3 keeps triangles near the boundary above 25 degrees."""
+
+
+MOST_PLACES = 20_000
+"""Places round the boundary at which sizes are looked up; more take seconds."""
+
+
+@dataclass(frozen=True)
+class Ring:
+    """A closed chain of lines, the material on its left.
+
+    Attributes
+    ----------
+    points : (n, 2) array
+        Vertices, the first not repeated [m].
+    """
+
+    points: FloatArray
+
+    @classmethod
+    def of(cls, points: FloatArray, hole: bool) -> Ring:
+        """Return the ring through closed points (n, 2) [m], turned so that the material is on its left."""
+        ring = np.asarray(points, float)
+        ring = ring[:-1] if np.array_equal(ring[0], ring[-1]) else ring
+        x, y = ring.T
+        area = float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
+        return cls(read_only(ring if (area > 0) != hole else ring[::-1]))
+
+    @cached_property
+    def lengths(self) -> FloatArray:
+        """Lengths of the lines, each from its vertex to the next, (n,) [m]."""
+        return np.asarray(np.hypot(*(np.roll(self.points, -1, axis=0) - self.points).T))
+
+    @cached_property
+    def places(self) -> FloatArray:
+        """Arc lengths of the vertices, and of the first again, (n + 1,) [m]."""
+        return np.concatenate([[0.0], np.cumsum(self.lengths)])
+
+    @cached_property
+    def turns(self) -> FloatArray:
+        """Change of direction at each vertex, positive to the left, (n,) [rad]."""
+        along = np.roll(self.points, -1, axis=0) - self.points
+        angle = np.arctan2(along[:, 1], along[:, 0])
+        turn = angle - np.roll(angle, 1)
+        return np.asarray((turn + math.pi) % (2 * math.pi) - math.pi)
+
+    @cached_property
+    def corners(self) -> NDArray[np.int64]:
+        """Indices of the vertices that are corners."""
+        return np.flatnonzero(np.abs(self.turns) > CORNER)
+
+    @cached_property
+    def radii(self) -> FloatArray:
+        """Radius of the edge at each vertex, (n,) [m]; infinite at corners and where the edge is straight."""
+        reach = 0.5 * (self.lengths + np.roll(self.lengths, 1))
+        turn = np.where(np.abs(self.turns) > CORNER, 0.0, np.abs(self.turns))
+        with np.errstate(divide="ignore"):
+            return np.asarray(np.where(turn > 1e-9, reach / np.maximum(turn, 1e-300), math.inf))
+
+    def at(self, arc: FloatArray) -> FloatArray:
+        """Return the points (k, 2) [m] at arc lengths (k,) [m], taken round the ring."""
+        closed = np.concatenate([self.points, self.points[:1]])
+        s = np.mod(arc, self.places[-1])
+        return np.column_stack([np.interp(s, self.places, closed[:, k]) for k in (0, 1)])
+
+    def normals(self, arc: FloatArray, behind: bool = False) -> FloatArray:
+        """Return unit vectors (k, 2) into the material at arc lengths (k,) [m]; at vertices of the line after them.
+
+        With `behind` of the line before them.
+        """
+        line = np.searchsorted(self.places, np.mod(arc, self.places[-1]), side="left" if behind else "right") - 1
+        along = (np.roll(self.points, -1, axis=0) - self.points)[line] / self.lengths[line, None]
+        return np.column_stack([-along[:, 1], along[:, 0]])
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """How long the sides of elements should be [m], anywhere in the part.
+
+    Attributes
+    ----------
+    places : (m, 2) array
+        Along the boundary [m].
+    sizes : (m,) array
+        Wanted there [m]; they grow from place to place by `GRADING` at most.
+    largest : float
+        [m]
+    """
+
+    places: FloatArray
+    sizes: FloatArray
+    largest: float
+
+    @cached_property
+    def _tree(self) -> cKDTree:
+        return cKDTree(self.places)
+
+    def __call__(self, points: FloatArray) -> FloatArray:
+        """Return the sizes (k,) [m] at points (k, 2) [m]."""
+        distance, nearest = self._tree.query(points)
+        return np.minimum(self.sizes[nearest] + GRADING * distance, self.largest)
+
+    def clearance(self, points: FloatArray) -> FloatArray:
+        """Return distances (k,) [m] of points (k, 2) from the nearest place of the boundary."""
+        return np.asarray(self._tree.query(points)[0])
+
+
+def sizes(rings: tuple[Ring, ...], largest: float, share: float, across: float) -> Sizes:
+    """Return element sizes for a part.
+
+    Parameters
+    ----------
+    rings : tuple of Ring
+        Its boundary.
+    largest : float
+        Largest size [m].
+    share : float
+        Of the radius of a curved edge.
+    across : float
+        Elements across the thickness at least: two six-node triangles carry the bending stress of a strip to 1e-3.
+    """
+    coarse = _wanted(rings, 0.5 * largest, largest, share, across)[1]
+    around = sum(float(ring.places[-1]) for ring in rings)
+    step = 0.5 * max(min(largest, float(coarse.min())), around / MOST_PLACES)
+    places, wanted = _wanted(rings, step, largest, share, across)
+    return Sizes(places, _graded(places, wanted), largest)
+
+
+def _wanted(
+    rings: tuple[Ring, ...], step: float, largest: float, share: float, across: float
+) -> tuple[FloatArray, FloatArray]:
+    """Return places along the boundary (m, 2) no farther apart than a step, and what is wanted there (m,) [m]."""
+    arcs = [_dense(ring, step) for ring in rings]
+
+    def joined(found: Iterable[FloatArray]) -> FloatArray:
+        return np.concatenate(list(found))
+
+    places = joined(ring.at(arc) for ring, arc in zip(rings, arcs, strict=True))
+    wanted = joined(np.minimum(share * _radius_at(ring, arc), largest) for ring, arc in zip(rings, arcs, strict=True))
+    for behind in (False, True):
+        normals = joined(ring.normals(arc, behind) for ring, arc in zip(rings, arcs, strict=True))
+        wanted = np.minimum(wanted, _thickness(rings, places, normals, across * largest) / across)
+    return places, wanted
+
+
+def _dense(ring: Ring, step: float) -> FloatArray:
+    """Return arc lengths (k,) [m] along a ring: all vertices, and between them places no farther apart than `step`."""
+    pieces = np.maximum(1, np.ceil(ring.lengths / step)).astype(int)
+    return np.concatenate(
+        [start + np.arange(n) * length / n for start, n, length in zip(ring.places, pieces, ring.lengths, strict=False)]
+    )
+
+
+def _radius_at(ring: Ring, arc: FloatArray) -> FloatArray:
+    """Return the radius [m] at arc lengths: that of the vertex before or behind, whichever is smaller."""
+    line = np.clip(np.searchsorted(ring.places, arc, side="right") - 1, 0, len(ring.points) - 1)
+    vertex = np.isclose(arc, ring.places[line], rtol=0.0, atol=1e-12)
+    behind = ring.radii[(line + 1) % len(ring.points)]
+    inside = np.where(
+        np.isfinite(ring.radii[line]) & np.isfinite(behind), np.minimum(ring.radii[line], behind), math.inf
+    )
+    return np.asarray(np.where(vertex, ring.radii[line], inside))
+
+
+def _thickness(rings: tuple[Ring, ...], places: FloatArray, normals: FloatArray, reach: float) -> FloatArray:
+    """Return how far rays from places (m, 2) along normals run through material, (m,) [m]; infinite beyond `reach`."""
+    from shapely import STRtree, linestrings
+
+    starts = np.concatenate([ring.points for ring in rings])
+    along = np.concatenate([np.roll(ring.points, -1, axis=0) - ring.points for ring in rings])
+    tree = STRtree(linestrings(np.stack([starts, starts + along], 1)))
+    ray, line = tree.query(linestrings(np.stack([places, places + reach * normals], 1)))
+    way, side = starts[line] - places[ray], along[line]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        det = normals[ray, 0] * side[:, 1] - normals[ray, 1] * side[:, 0]
+        depth = (way[:, 0] * side[:, 1] - way[:, 1] * side[:, 0]) / det
+        share = (way[:, 0] * normals[ray, 1] - way[:, 1] * normals[ray, 0]) / det
+        # a wall looks back: lines that the ray meets at less than 45 degrees belong to a corner, not to a wall
+        steep = np.abs(det) > 0.7 * np.hypot(*side.T)
+    met = steep & (share >= 0) & (share <= 1) & (depth > 1e-6 * reach) & (depth <= reach)
+    found = np.full(len(places), math.inf)
+    np.minimum.at(found, ray[met], depth[met])
+    return found
+
+
+def _graded(places: FloatArray, wanted: FloatArray) -> FloatArray:
+    """Return sizes that nowhere grow faster than `GRADING`: the smallest of (size there + grading x distance)."""
+    order = np.argsort(wanted)
+    sizes = wanted.copy()
+    tree = cKDTree(places)
+    top = float(wanted.max())
+    for i in order:  # from the smallest size on, as in Dijkstra's way through a graph
+        reach = (top - sizes[i]) / GRADING
+        if reach <= 0 or sizes[i] < wanted[i]:
+            continue  # a smaller neighbour has been here, and its reach covers this one's
+        near = np.asarray(tree.query_ball_point(places[i], reach))
+        away = np.hypot(*(places[near] - places[i]).T)
+        sizes[near] = np.minimum(sizes[near], sizes[i] + GRADING * away)
+    return sizes

@@ -1,0 +1,174 @@
+"""Following a part's equilibria over its travel: step control, loss of stability, branch switching.
+
+Each pose is predicted along the tangent of the path and corrected by Newton's method. A step is halved where Newton
+fails, where the correction is not small beside the step (it has come to another branch), and where a direction has
+become unstable. When the step is at its smallest and the next pose is still unstable, the path has passed a
+bifurcation: from a little beyond it the part is pushed along its softest mode until a stable pose is found.
+"""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from cfmkit.curves import FloatArray
+    from cfmkit.solid.equilibrium import Balance, Problem
+
+SMALLEST = 2.0**-12
+"""Smallest step, in parts of the whole travel: a bifurcation's place is then known to 2.5e-4 of the travel."""
+STRAY = 0.5
+"""Largest correction, in parts of the step: on one branch it shrinks with the step's square."""
+GROWTH = 2.0
+"""Of the step after one that was easy."""
+PUSHES = np.geomspace(1e-4, 0.1, 13)
+"""Amplitudes along the softest mode, in parts of the part's size: a branch leaves its bifurcation like a root."""
+BEYOND = (2.0, 8.0, 32.0)
+"""How far beyond a bifurcation its branch is looked for, in smallest steps."""
+MODE_ROUNDS = 30
+"""Of inverse iteration: next to a bifurcation the lowest eigenvalue is hundreds of times smaller than the second."""
+SOFT = 30.0
+"""The path has a limit point where it ends while its tangent has grown by so much against the travel's first pose."""
+
+
+class Ending(enum.Enum):
+    """Why a path ended."""
+
+    COMPLETE = ""
+    LIMIT_POINT = "the part snaps: the travel has a limit point"
+    UNSTABLE = "the part loses its stability, and no stable branch was found"
+    LOST = "no equilibrium was found within the smallest step"
+    NO_START = "the part has no equilibrium at rest"
+
+
+@dataclass(frozen=True)
+class Course:
+    """Poses of a part in order of travel.
+
+    Attributes
+    ----------
+    poses : tuple of Balance
+        The requested ones as far as they were reached, those at bifurcations and the last one.
+    ending : Ending
+    bifurcations : tuple of float
+        Travels at which another branch was taken [m or rad].
+    """
+
+    poses: tuple[Balance, ...]
+    ending: Ending
+    bifurcations: tuple[float, ...] = ()
+
+    @property
+    def travel(self) -> FloatArray:
+        """Of the poses, (k,) [m or rad]."""
+        return np.array([pose.travel for pose in self.poses])
+
+    def effort(self, travel: FloatArray) -> FloatArray:
+        """Return the effort at travels (m,) [N or N m]: cubics with the efforts and stiffnesses of the poses."""
+        from scipy.interpolate import CubicHermiteSpline
+
+        efforts, slopes = np.array([(pose.effort, pose.stiffness) for pose in self.poses]).T
+        return np.asarray(CubicHermiteSpline(self.travel, efforts, slopes)(travel))
+
+
+def follow(problem: Problem, stops: Sequence[float], report: Callable[[float], None] = lambda _share: None) -> Course:
+    """Return the poses of a part at some travels, on its stable branch.
+
+    Parameters
+    ----------
+    problem : Problem
+        The part and its supports.
+    stops : sequence of float
+        Travels, from rest on in one direction [m or rad].
+    report : callable
+        Is given the share of the travel that is done.
+    """
+    start = problem.solve(np.zeros(problem.supports.size), stops[0])
+    if start is None:
+        return Course((), Ending.NO_START)
+    span = stops[-1] - stops[0]
+    course, state, step = Course((start,), Ending.COMPLETE), start, stops[1] - stops[0]
+    for stop in stops[1:]:
+        while state.travel != stop:
+            ahead = stop if abs(stop - state.travel) <= abs(step) * (1 + 1e-9) else state.travel + step
+            found = advanced(problem, state, ahead)
+            if found is not None and found.unstable <= state.unstable:
+                step = GROWTH * (ahead - state.travel)
+                state = found
+            elif abs(ahead - state.travel) > SMALLEST * abs(span):
+                step = 0.5 * (ahead - state.travel)
+            else:
+                branch = None if found is None else switched(problem, state, SMALLEST * span, stop)
+                if branch is None:
+                    return replace(course, poses=(*course.poses, state), ending=_ending(start, state, found))
+                course = replace(
+                    course, poses=(*course.poses, state, branch), bifurcations=(*course.bifurcations, state.travel)
+                )
+                state, step = branch, SMALLEST * span
+            report((state.travel - stops[0]) / span)
+        course = replace(course, poses=(*course.poses, state))
+    return replace(course, poses=_distinct(course.poses))
+
+
+def advanced(problem: Problem, state: Balance, travel: float) -> Balance | None:
+    """Return the pose at a travel that continues the path from a pose; None where there is none in reach."""
+    predicted = state.slope * (travel - state.travel)
+    found = problem.solve(state.unknowns + predicted, travel)
+    if found is None:
+        return None
+    correction = float(np.linalg.norm(found.unknowns - state.unknowns - predicted))
+    return found if correction <= STRAY * float(np.linalg.norm(predicted)) else None
+
+
+def softest(problem: Problem, state: Balance) -> FloatArray:
+    """Return the softest mode (q,), by inverse iteration; its largest displacement is 1 m."""
+    mode = np.random.default_rng(0).standard_normal(problem.supports.size)
+    for _ in range(MODE_ROUNDS):
+        mode = state.factors.solve(mode / np.linalg.norm(mode))
+    loose = np.abs(mode[: len(problem.supports.loose)]).max()
+    return np.asarray(mode / loose)
+
+
+def switched(problem: Problem, state: Balance, least: float, stop: float) -> Balance | None:
+    """Return the nearest stable pose beyond a bifurcation; None where pushing along the softest mode finds none.
+
+    Parameters
+    ----------
+    problem : Problem
+    state : Balance
+        The last stable pose before it.
+    least : float
+        Smallest step, with the sign of the travel's direction [m or rad].
+    stop : float
+        Travel that must not be passed [m or rad].
+    """
+    mode = softest(problem, state)
+    size = float(np.ptp(problem.elements.mesh.nodes, axis=0).max())
+    for travel in (state.travel + times * least for times in BEYOND):
+        if abs(travel - state.travel) > abs(stop - state.travel):
+            travel = stop
+        base = state.unknowns + state.slope * (travel - state.travel)
+        for push in PUSHES * size:
+            for sign in (1.0, -1.0):
+                found = problem.solve(base + sign * push * mode, travel)
+                if found is not None and found.unstable <= state.unstable:
+                    return found
+    return None
+
+
+def _ending(start: Balance, state: Balance, beyond: Balance | None) -> Ending:
+    """Return why a path cannot go on from a pose."""
+    if beyond is not None:
+        return Ending.UNSTABLE
+    grown = float(np.linalg.norm(state.slope) / np.linalg.norm(start.slope))
+    return Ending.LIMIT_POINT if grown > SOFT else Ending.LOST
+
+
+def _distinct(poses: tuple[Balance, ...]) -> tuple[Balance, ...]:
+    """Return the poses without those that stand at one travel twice."""
+    return tuple(pose for i, pose in enumerate(poses) if i == 0 or pose.travel != poses[i - 1].travel)

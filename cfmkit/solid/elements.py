@@ -1,0 +1,227 @@
+"""Six-node triangles in total Lagrangian form: forces, tangent and stresses of all elements at once.
+
+Arrays have the elements, and the points of quadrature in them, last: what is written for one is done for all.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.sparse import csc_array
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from cfmkit.curves import FloatArray
+    from cfmkit.solid.law import Law
+    from cfmkit.solid.mesh import Mesh
+
+# Three points inside [Strang, Fix, 1973]: exact to degree two, which is that of the strain energy of a straight-sided
+# element where strains are small.
+POINTS = np.array([[1 / 6, 1 / 6], [2 / 3, 1 / 6], [1 / 6, 2 / 3]])
+WEIGHTS = np.full(3, 1 / 6)
+CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [0.5, 0.0], [0.5, 0.5], [0.0, 0.5]])
+"""Where the nodes stand in the parent triangle."""
+
+
+def slopes(at: FloatArray) -> FloatArray:
+    """Return the derivatives of the shape functions, (points, 6, 2), at places (points, 2) of the parent triangle."""
+    r, s = np.asarray(at, float).T
+    t = 1 - r - s
+    zero = np.zeros_like(r)
+    along_r = [1 - 4 * t, 4 * r - 1, zero, 4 * (t - r), 4 * s, -4 * s]
+    along_s = [1 - 4 * t, zero, 4 * s - 1, -4 * r, 4 * r, 4 * (t - s)]
+    return np.stack([np.stack(along_r, -1), np.stack(along_s, -1)], -1)
+
+
+@dataclass(frozen=True)
+class Elements:
+    """All elements of a mesh, ready for many states.
+
+    Attributes
+    ----------
+    mesh : Mesh
+    law : Law
+    width : (m,) array
+        Out of the plane, by element [m].
+    """
+
+    mesh: Mesh
+    law: Law
+    width: FloatArray
+
+    def without(self, held: NDArray[np.bool_]) -> Elements:
+        """Return the elements of which not all nodes move as one: all others never strain."""
+        moving = ~held[self.mesh.triangles].all(axis=1)
+        mesh = replace(self.mesh, triangles=self.mesh.triangles[moving])
+        return Elements(mesh, self.law, self.width[moving])
+
+    @cached_property
+    def _parent(self) -> tuple[FloatArray, FloatArray]:
+        """Slopes of the shape functions in the plane, (6, 2, points x m) [1/m], and the volumes (points x m,) [m3]."""
+        return self._mapped(POINTS, WEIGHTS)
+
+    @cached_property
+    def _at_nodes(self) -> FloatArray:
+        """Slopes of the shape functions at the nodes of each element, (6, 2, 6 x m) [1/m]."""
+        return self._mapped(CORNERS, np.zeros(6))[0]
+
+    def _mapped(self, at: FloatArray, weights: FloatArray) -> tuple[FloatArray, FloatArray]:
+        x = self.mesh.nodes[self.mesh.triangles]  # (m, 6, 2)
+        parent = slopes(at)
+        jacobian = np.einsum("qai,maj->qmij", parent, x)
+        det = jacobian[..., 0, 0] * jacobian[..., 1, 1] - jacobian[..., 0, 1] * jacobian[..., 1, 0]
+        inverse = (
+            np.stack(
+                [
+                    np.stack([jacobian[..., 1, 1], -jacobian[..., 0, 1]], -1),
+                    np.stack([-jacobian[..., 1, 0], jacobian[..., 0, 0]], -1),
+                ],
+                -2,
+            )
+            / det[..., None, None]
+        )
+        gradient = np.einsum("qai,qmji->ajqm", parent, inverse)
+        volume = weights[:, None] * det * self.width
+        return np.ascontiguousarray(gradient.reshape(6, 2, -1)), volume.ravel()
+
+    @property
+    def smallest_jacobian(self) -> float:
+        """Smallest determinant of the map from the parent triangle at a node, in those of the straight element."""
+        x = self.mesh.nodes[self.mesh.triangles]
+        jacobian = np.einsum("qai,maj->qmij", slopes(CORNERS), x)
+        det = jacobian[..., 0, 0] * jacobian[..., 1, 1] - jacobian[..., 0, 1] * jacobian[..., 1, 0]
+        a, b, c = x[:, :3].swapaxes(0, 1)
+        straight = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
+        return float((det / straight).min())
+
+    def _strained(self, gradient: FloatArray, moved: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the deformation gradient (2, 2, k) and Green's strain (3, k) at points with these slopes."""
+        times = gradient.shape[-1] // len(self.mesh.triangles)
+        u = np.tile(moved[self.mesh.triangles].transpose(1, 2, 0), times)  # (6, 2, k)
+        f = np.einsum("aik,ajk->ijk", u, gradient)
+        f[0, 0] += 1.0
+        f[1, 1] += 1.0
+        strain = np.stack(
+            [
+                0.5 * (f[0, 0] ** 2 + f[1, 0] ** 2 - 1),
+                0.5 * (f[0, 1] ** 2 + f[1, 1] ** 2 - 1),
+                f[0, 0] * f[0, 1] + f[1, 0] * f[1, 1],
+            ]
+        )
+        return f, strain
+
+    def forces(self, moved: FloatArray) -> FloatArray:
+        """Return what holds the nodes in place (n, 2) [N], at displacements (n, 2) [m]."""
+        gradient, volume = self._parent
+        f, strain = self._strained(gradient, moved)
+        return self._gathered(f, volume * self.law(strain)[0])
+
+    def _gathered(self, f: FloatArray, s: FloatArray) -> FloatArray:
+        """Return nodal forces (n, 2) [N] from stress times volume (3, k) [N m]."""
+        gradient, _ = self._parent
+        p = np.stack([f[:, 0] * s[0] + f[:, 1] * s[2], f[:, 0] * s[2] + f[:, 1] * s[1]], 1)  # (2, 2, k): F S
+        each = np.einsum("ijk,ajk->aik", p, gradient).reshape(6, 2, len(POINTS), -1).sum(2)
+        nodes, count = self.mesh.triangles.T.ravel(), len(self.mesh.nodes)
+        return np.column_stack([np.bincount(nodes, each[:, k].ravel(), count) for k in (0, 1)])
+
+    def tangent(self, moved: FloatArray) -> tuple[FloatArray, csc_array]:
+        """Return forces (n, 2) [N] and their derivative (2n, 2n) [N/m] with respect to the displacements."""
+        gradient, volume = self._parent
+        f, strain = self._strained(gradient, moved)
+        stress, modulus, _ = self.law(strain)
+        s, d = volume * stress, volume * modulus
+        # B of a node: row 11: F[:,0] g0; row 22: F[:,1] g1; row 12: F[:,0] g1 + F[:,1] g0
+        b = np.stack(
+            [
+                f[:, 0] * gradient[:, None, 0],
+                f[:, 1] * gradient[:, None, 1],
+                f[:, 0] * gradient[:, None, 1] + f[:, 1] * gradient[:, None, 0],
+            ]
+        )  # (3, 6, 2, k)
+        m = len(self.mesh.triangles)
+        db = np.stack([d[i, 0] * b[0] + d[i, 1] * b[1] + d[i, 2] * b[2] for i in range(3)])
+        pg = np.stack([gradient[:, 0] * s[0] + gradient[:, 1] * s[2], gradient[:, 0] * s[2] + gradient[:, 1] * s[1]], 1)
+        blocks = np.empty((12, 12, m))
+        for a in range(6):
+            for c in range(a, 6):
+                spread = (gradient[a, 0] * pg[c, 0] + gradient[a, 1] * pg[c, 1]).reshape(len(POINTS), m).sum(0)
+                for i in (0, 1):
+                    for j in (0, 1):
+                        one = b[0, a, i] * db[0, c, j] + b[1, a, i] * db[1, c, j] + b[2, a, i] * db[2, c, j]
+                        value = one.reshape(len(POINTS), m).sum(0)
+                        if i == j:
+                            value += spread
+                        blocks[2 * a + i, 2 * c + j] = value
+                        blocks[2 * c + j, 2 * a + i] = value
+        return self._gathered(f, s), self._pattern.assembled(blocks.reshape(144, m))
+
+    @cached_property
+    def _pattern(self) -> Pattern:
+        unknowns = (2 * self.mesh.triangles[:, :, None] + np.arange(2)).reshape(len(self.mesh.triangles), 12).T
+        rows = np.repeat(unknowns, 12, axis=0)
+        columns = np.tile(unknowns, (12, 1))
+        return Pattern.of(rows.ravel(), columns.ravel(), 2 * len(self.mesh.nodes))
+
+    def stress(self, moved: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return Cauchy's stress at the nodes, averaged over the elements that meet there.
+
+        Returns
+        -------
+        stress : (3, n) array
+            11, 22, 12 [Pa].
+        spread : (n,) array
+            Largest difference of an element's stress from it, as the equivalent stress of the difference [Pa].
+        """
+        f, strain = self._strained(self._at_nodes, moved)
+        s, _, across = self.law(strain)
+        det = (f[0, 0] * f[1, 1] - f[0, 1] * f[1, 0]) * across
+        full = np.stack([np.stack([s[0], s[2]]), np.stack([s[2], s[1]])])
+        sigma = np.einsum("iak,abk,jbk->ijk", f, full, f) / det
+        each = np.stack([sigma[0, 0], sigma[1, 1], sigma[0, 1]])
+        # the points at nodes come node by node, all elements each
+        nodes, count = self.mesh.triangles.T.ravel(), len(self.mesh.nodes)
+        met = np.bincount(nodes, minlength=count)
+        mean = np.stack([np.bincount(nodes, one, count) / np.maximum(met, 1) for one in each])
+        spread = np.zeros(count)
+        np.maximum.at(spread, nodes, equivalent(each - mean[:, nodes]))
+        return mean, spread
+
+
+def equivalent(stress: FloatArray) -> FloatArray:
+    """Return von Mises' equivalent (k,) [Pa] of plane stresses (3, k); on a free edge it is the stress along it."""
+    xx, yy, xy = stress
+    return np.asarray(np.sqrt(xx * xx - xx * yy + yy * yy + 3 * xy * xy))
+
+
+@dataclass(frozen=True)
+class Pattern:
+    """Where the entries of elements go in a sparse matrix.
+
+    Attributes
+    ----------
+    slots : (k,) array of int
+        Of each entry.
+    indices, starts : arrays of int
+        Of the matrix in compressed columns.
+    """
+
+    slots: NDArray[np.int64]
+    indices: NDArray[np.int32]
+    starts: NDArray[np.int32]
+
+    @classmethod
+    def of(cls, rows: NDArray[np.int64], columns: NDArray[np.int64], size: int) -> Pattern:
+        """Return the pattern of a square matrix with entries in these rows and columns, several of them in one."""
+        keys, slots = np.unique(columns * size + rows, return_inverse=True)
+        starts = np.searchsorted(keys, np.arange(size + 1) * size)
+        return cls(slots, (keys % size).astype(np.int32), starts.astype(np.int32))
+
+    def assembled(self, entries: FloatArray) -> csc_array:
+        """Return the matrix with the sums of the entries."""
+        size = len(self.starts) - 1
+        data = np.bincount(self.slots, entries.ravel(), len(self.indices))
+        return csc_array((data, self.indices, self.starts), shape=(size, size))

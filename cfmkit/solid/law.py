@@ -1,0 +1,115 @@
+"""Plane-stress laws of isotropic elastic materials under large strain: stress and tangent from the deformation.
+
+Green's strain E = (F'F - 1)/2 and the second Piola-Kirchhoff stress S, in the order 11, 22, 12 with 2 E12. The stress
+across the plane is zero: the strain there is condensed out.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from cfmkit.curves import FloatArray
+
+ROUNDS = 20
+"""Of Newton's method for the stretch across the plane; from 1 it takes four to six."""
+
+
+class Law(Protocol):
+    """How a material answers to strain in its plane."""
+
+    def __call__(self, strain: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return stress, tangent and stretch across the plane.
+
+        Parameters
+        ----------
+        strain : (3, ...) array
+            Green's strain: 11, 22, 2 x 12.
+
+        Returns
+        -------
+        stress : (3, ...) array
+            Second Piola-Kirchhoff [Pa].
+        tangent : (3, 3, ...) array
+            Its derivative with respect to the strain [Pa].
+        across : (...) array
+            Stretch across the plane: the thickness of the sheet now, over what it was.
+        """
+
+
+@dataclass(frozen=True)
+class SaintVenantKirchhoff:
+    """Stress linear in Green's strain: Hooke's law where strains are small, whatever the rotation.
+
+    Attributes
+    ----------
+    youngs_modulus : float
+        [Pa]
+    poisson_ratio : float
+    """
+
+    youngs_modulus: float
+    poisson_ratio: float
+
+    def __call__(self, strain: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return stress, tangent and stretch across the plane: see `Law`."""
+        nu, stiffness = self.poisson_ratio, self.youngs_modulus / (1 - self.poisson_ratio**2)
+        matrix = stiffness * np.array([[1, nu, 0], [nu, 1, 0], [0, 0, 0.5 * (1 - nu)]])
+        stress = np.tensordot(matrix, strain, 1)
+        tangent = np.broadcast_to(matrix.reshape(3, 3, *[1] * (strain.ndim - 1)), (3, 3, *strain.shape[1:]))
+        across = np.sqrt(np.maximum(1 - 2 * nu / (1 - nu) * (strain[0] + strain[1]), 0.0))
+        return stress, tangent, across
+
+
+@dataclass(frozen=True)
+class NeoHookean:
+    """Energy mu/2 (tr C - 3) - mu ln J + lambda/2 (ln J)^2: softer than Hooke in tension, stiffer in compression.
+
+    Attributes
+    ----------
+    youngs_modulus : float
+        At no strain [Pa].
+    poisson_ratio : float
+        At no strain; below 0.5.
+    """
+
+    youngs_modulus: float
+    poisson_ratio: float
+
+    def __call__(self, strain: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return stress, tangent and stretch across the plane: see `Law`."""
+        mu = 0.5 * self.youngs_modulus / (1 + self.poisson_ratio)
+        lam = self.youngs_modulus * self.poisson_ratio / ((1 + self.poisson_ratio) * (1 - 2 * self.poisson_ratio))
+        c11, c22, c12 = 1 + 2 * strain[0], 1 + 2 * strain[1], strain[2]
+        det = c11 * c22 - c12**2
+        with np.errstate(invalid="ignore", divide="ignore"):
+            log = np.log(det)  # NaN where the material is turned inside out: no such state is accepted
+            c33 = np.ones_like(det)
+            for _ in range(ROUNDS):
+                # stress across, times c33: mu (c33 - 1) + lambda/2 ln(det c33) = 0, solved for ln c33
+                step = (mu * (c33 - 1) + 0.5 * lam * (log + np.log(c33))) / (mu * c33 + 0.5 * lam)
+                c33 = c33 * np.exp(-np.clip(step, -1.0, 1.0))
+                if not np.any(np.abs(step) > 1e-15):
+                    break
+            half = 0.5 * lam * (log + np.log(c33))  # lambda ln J
+            inverse = np.stack([c22 / det, c11 / det, -c12 / det])
+        stress = (half - mu) * inverse + np.array([mu, mu, 0.0]).reshape(3, *[1] * det.ndim)
+        # dS/dE = lambda C^-1 x C^-1 + 2 (mu - lambda ln J) I(C^-1), less what the strain across takes back
+        outer = inverse[:, None] * inverse[None]
+        i11, i22, i12 = inverse
+        mixed = np.stack(
+            [
+                np.stack([i11 * i11, i12 * i12, i11 * i12]),
+                np.stack([i12 * i12, i22 * i22, i22 * i12]),
+                np.stack([i11 * i12, i22 * i12, 0.5 * (i11 * i22 + i12 * i12)]),
+            ]
+        )
+        tangent = lam * outer + 2 * (mu - half) * mixed - lam**2 / (lam + 2 * (mu - half)) * outer
+        return stress, tangent, np.sqrt(c33)
+
+
+LAWS = {"st-venant-kirchhoff": SaintVenantKirchhoff, "neo-hookean": NeoHookean}
+"""By the words of `material.law`."""

@@ -1,0 +1,318 @@
+"""Six-node triangles on the outline of a part.
+
+Boundary nodes are laid along the true edges at the wanted sizes, points inside are thrown on a lattice, thinned to the
+wanted density and relaxed as a truss whose bars push [PS]; Delaunay's triangulation joins them. Where a boundary piece
+is not among its edges, the piece is halved. Nodes in the middle of boundary edges stand on the true edge.
+
+Reference
+---------
+[PS] P.-O. Persson, G. Strang, A simple mesh generator in MATLAB, SIAM Review 46 (2004) 329-345.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy.spatial import Delaunay, cKDTree
+
+from cfmkit.curves import read_only
+from cfmkit.errors import GeometryError
+from cfmkit.solid.boundary import Ring, Sizes, sizes
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from cfmkit.curves import FloatArray
+
+    IntArray = NDArray[np.int64]
+
+ROUNDS = 40
+"""Of relaxation; after 30 to 60 the smallest angle stays what it is."""
+PUSH = 1.2
+"""Bars want to be so much longer than the sizes [PS, sec. 4]: under pressure points spread everywhere."""
+STEP = 0.2
+"""Of the way that the bars push, a round [PS, sec. 4]."""
+ROOM = 0.55
+"""Points inside keep so many sizes from the boundary: less makes slivers on it, more leaves long triangles."""
+SEAM = 0.75
+"""Points inside keep so many sizes from those on a seam: the circles over its pieces are empty, so they are edges."""
+HALVINGS = 8
+"""Rounds of halving boundary pieces that are no edges; each mends what it finds, two are usual."""
+MOST_NODES = 400_000
+"""Of a mesh: beyond it the factors alone take more than 2 GB."""
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """A part in six-node triangles.
+
+    Attributes
+    ----------
+    nodes : (n, 2) array
+        [m]; corners of triangles first.
+    triangles : (m, 6) array of int
+        Corners counter-clockwise, then the nodes on the sides 0-1, 1-2, 2-0.
+    edges : (k, 3) array of int
+        Boundary: first corner, last corner, node between; the material is on the left.
+    rings : (k,) array of int
+        Ring of each boundary edge.
+    """
+
+    nodes: FloatArray
+    triangles: IntArray
+    edges: IntArray
+    rings: IntArray
+
+    @property
+    def area(self) -> float:
+        """Of the straight-sided triangles and the lunes between their sides and the true edge [m2]."""
+        x, y = self.nodes.T
+        a, b, m = self.edges.T
+        # Simpson's rule on x dy - y dx is exact for a parabola through three nodes
+        return float(
+            0.5
+            * sum(w * (x[p] * y[q] - x[q] * y[p]).sum() for p, q, w in ((a, m, 4 / 3), (m, b, 4 / 3), (a, b, -1 / 3)))
+        )
+
+
+def mesh(
+    rings: tuple[Ring, ...],
+    size: float,
+    share: float = 0.4,
+    across: float = 2.0,
+    seams: Sequence[FloatArray] = (),
+    seed: int = 0,
+) -> Mesh:
+    """Return a mesh of the part within some rings.
+
+    Parameters
+    ----------
+    rings : tuple of Ring
+        Boundary: around, and round every hole.
+    size : float
+        Side of an element where nothing asks for smaller ones [m]; single ones are up to 1.7 times as long.
+    share : float
+        The same on a curved edge, in its radii.
+    across : float
+        Elements across the thickness at least.
+    seams : sequence of (2, 2) array
+        Ends of lines through the part along which elements meet [m]: where a clamp begins.
+    seed : int
+        Of the points that are thrown.
+
+    Raises
+    ------
+    cfmkit.errors.GeometryError
+        If the boundary crosses itself, or the mesh would have more than `MOST_NODES`.
+    """
+    region = _region(rings)
+    field = sizes(rings, size, share, across)
+    laid = [_laid(ring, field) for ring in rings]
+    fixed = np.concatenate([ring.at(arc) for ring, arc in zip(rings, laid, strict=True)])
+    sewn = np.concatenate([np.zeros((0, 2)), *(_sewn(region, field, seam) for seam in seams)])
+    kept_from = Room(field, sewn)
+    inside = kept_from(_thrown(region, field, np.random.default_rng(seed)))
+    if 4 * (len(inside) + len(fixed)) > MOST_NODES:  # a node in the middle of each side: three to a corner
+        raise GeometryError(f"the mesh would have {4 * (len(inside) + len(fixed)):.1g} nodes: allow larger elements")
+    inside = _relaxed(region, kept_from, np.concatenate([fixed, sewn]), inside)
+    for _ in range(HALVINGS):
+        fixed = np.concatenate([ring.at(arc) for ring, arc in zip(rings, laid, strict=True)])
+        points = np.concatenate([fixed, sewn, inside])
+        corners = _triangles(region, points)
+        missing = _missing(corners, laid)
+        if not any(len(one) for one in missing):
+            return _six_nodes(points, corners, rings, laid)
+        laid = [_halved(ring, arc, at) for ring, arc, at in zip(rings, laid, missing, strict=True)]
+    raise GeometryError("the outline cannot be meshed: it touches itself, or is thinner than an element")
+
+
+def _region(rings: tuple[Ring, ...]) -> Any:
+    """Return the part as a polygon of shapely, prepared for questions."""
+    from shapely import MultiPolygon, Polygon, prepare
+    from shapely.geometry.polygon import signed_area
+    from shapely.validation import explain_validity
+
+    shells = [Polygon(ring.points) for ring in rings]
+    for shell in shells:
+        if not shell.is_valid:
+            raise GeometryError(f"the outline crosses itself: {explain_validity(shell)}")
+    holes = [shell for shell in shells if signed_area(shell.exterior) < 0]
+    region = MultiPolygon(
+        [
+            Polygon(shell.exterior, [hole.exterior for hole in holes if shell.covers(hole)])
+            for shell in shells
+            if signed_area(shell.exterior) > 0
+        ]
+    )
+    if not region.is_valid:
+        raise GeometryError(f"the outline crosses itself: {explain_validity(region)}")
+    prepare(region)
+    return region
+
+
+def _laid(ring: Ring, field: Sizes) -> FloatArray:
+    """Return the arc lengths (k,) [m] of the nodes on a ring: corners, and between them places by size."""
+    stops = ring.places[ring.corners] if len(ring.corners) else np.zeros(1)
+    ends = np.append(stops[1:], stops[0] + ring.places[-1])
+    found = []
+    for low, high in zip(stops, ends, strict=True):
+        fine = np.linspace(low, high, max(64, int(8 * (high - low) / field.sizes.min()) + 1))
+        density = 1.0 / field(ring.at(fine))
+        count = np.concatenate([[0.0], np.cumsum(0.5 * (density[1:] + density[:-1]) * np.diff(fine))])
+        pieces = max(1 if len(stops) > 2 else 3, round(float(count[-1])))
+        found.append(np.interp(np.arange(pieces) * count[-1] / pieces, count, fine))
+    return np.concatenate(found)
+
+
+def _thrown(region: Any, field: Sizes, random: np.random.Generator) -> FloatArray:
+    """Return points inside (k, 2) [m], as dense as the sizes ask: a lattice, thinned by chance [PS, step 2]."""
+    from shapely import contains_xy
+
+    least = float(field.sizes.min())
+    x0, y0, x1, y1 = region.bounds
+    found = []
+    for size in least * 2.0 ** np.arange(int(np.ceil(np.log2(field.largest / least))) + 1):
+        # one lattice for each octave of sizes, so that nothing is thinned to less than a quarter
+        x, y = np.meshgrid(np.arange(x0, x1 + size, size), np.arange(y0, y1 + size, size * np.sqrt(0.75)))
+        x[1::2] += 0.5 * size
+        points = np.column_stack([x.ravel(), y.ravel()])
+        points = points[contains_xy(region, points)]
+        wanted = field(points)
+        kept = (wanted >= size) & (wanted < 2 * size) & (random.random(len(points)) < (size / wanted) ** 2)
+        found.append(points[kept])
+    return np.concatenate(found)
+
+
+def _sewn(region: Any, field: Sizes, seam: FloatArray) -> FloatArray:
+    """Return points (k, 2) [m] by size along a line through the part, none of them close to its boundary."""
+    from shapely import contains_xy
+
+    fine = seam[0] + np.linspace(0.0, 1.0, 2000)[:, None] * (seam[1] - seam[0])
+    fine = fine[contains_xy(region, fine)]
+    way = np.hypot(*np.diff(fine, axis=0, prepend=fine[:1]).T)
+    jumps: list[int] = np.flatnonzero(way > 1.5 * np.median(way)).tolist() if len(fine) > 2 else []
+    found = [np.zeros((0, 2))]
+    for piece in np.split(fine, jumps):
+        if len(piece) > 2:
+            count = np.cumsum(np.hypot(*np.diff(piece, axis=0, prepend=piece[:1]).T) / field(piece))
+            places = np.linspace(0.0, count[-1], max(2, round(float(count[-1]))) + 1)[1:-1]
+            found.append(np.column_stack([np.interp(places, count, piece[:, k]) for k in (0, 1)]))
+    points = np.concatenate(found)
+    return points[field.clearance(points) > 0.5 * ROOM * field(points)]
+
+
+@dataclass(frozen=True)
+class Room:
+    """Keeps points away from the boundary and from seams.
+
+    Attributes
+    ----------
+    field : Sizes
+    sewn : (k, 2) array
+        Points on seams [m].
+    """
+
+    field: Sizes
+    sewn: FloatArray
+
+    def __call__(self, points: FloatArray) -> FloatArray:
+        """Return those of the points (k, 2) [m] that are far enough."""
+        room = ROOM * self.field(points)
+        far = self.field.clearance(points) > room
+        if len(self.sewn):
+            # half a size beside a seam's own points is further than that from the line between them
+            far &= cKDTree(self.sewn).query(points)[0] > SEAM * room / ROOM
+        return points[far]
+
+
+def _relaxed(region: Any, room: Room, fixed: FloatArray, inside: FloatArray) -> FloatArray:
+    """Return the points inside (k, 2) [m] where bars that push each other apart let them rest."""
+    from shapely import contains_xy
+
+    field = room.field
+    for _ in range(ROUNDS):
+        points = np.concatenate([fixed, inside])
+        corners = _triangles(region, points)
+        bars = np.unique(np.sort(corners[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
+        way = points[bars[:, 0]] - points[bars[:, 1]]
+        length = np.hypot(*way.T)
+        wanted = field(0.5 * (points[bars[:, 0]] + points[bars[:, 1]]))
+        wanted *= PUSH * np.sqrt((length**2).sum() / (wanted**2).sum())
+        push = (np.maximum(wanted - length, 0.0) / length)[:, None] * way
+        force = np.column_stack(
+            [np.bincount(bars.ravel("F"), np.concatenate([push[:, k], -push[:, k]]), len(points)) for k in (0, 1)]
+        )
+        inside = inside + STEP * force[len(fixed) :]
+        inside = room(inside[contains_xy(region, inside)])
+    return inside
+
+
+def _triangles(region: Any, points: FloatArray) -> IntArray:
+    """Return Delaunay's triangles (m, 3) in the part, counter-clockwise."""
+    from shapely import contains_xy
+
+    found = Delaunay(points).simplices.astype(np.int64)
+    found = found[contains_xy(region, points[found].mean(axis=1))]
+    a, b, c = points[found].swapaxes(0, 1)
+    twice = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
+    found[twice < 0] = found[twice < 0][:, [0, 2, 1]]
+    longest = np.max([((b - a) ** 2).sum(1), ((c - b) ** 2).sum(1), ((a - c) ** 2).sum(1)], axis=0)
+    flat = np.abs(twice) <= 1e-6 * longest  # along straight edges of the boundary
+    return np.asarray(found[~flat])
+
+
+def _pieces(laid: list[FloatArray]) -> list[IntArray]:
+    """Return the boundary pieces of each ring as pairs (k, 2) of points."""
+    found, first = [], 0
+    for arc in laid:
+        index = first + np.arange(len(arc))
+        found.append(np.column_stack([index, np.roll(index, -1)]))
+        first += len(arc)
+    return found
+
+
+def _missing(corners: IntArray, laid: list[FloatArray]) -> list[IntArray]:
+    """Return, ring by ring, which pieces of the boundary are not the edge of exactly one triangle."""
+    sides = corners[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    size = int(corners.max()) + 1
+    keys = np.sort(sides[:, 0] * size + sides[:, 1])
+    back = np.sort(sides[:, 1] * size + sides[:, 0])
+    missing = []
+    for pieces in _pieces(laid):
+        key = pieces[:, 0] * size + pieces[:, 1]
+        there = keys[np.clip(np.searchsorted(keys, key), 0, len(keys) - 1)] == key
+        double = back[np.clip(np.searchsorted(back, key), 0, len(back) - 1)] == key
+        missing.append(np.flatnonzero(~there | double))
+    return missing
+
+
+def _halved(ring: Ring, arc: FloatArray, pieces: IntArray) -> FloatArray:
+    """Return the arc lengths [m] of the nodes on a ring, with one more in the middle of some pieces."""
+    ends = np.append(arc[1:], arc[0] + ring.places[-1])
+    return np.sort(np.concatenate([arc, 0.5 * (arc[pieces] + ends[pieces])]))
+
+
+def _six_nodes(points: FloatArray, corners: IntArray, rings: tuple[Ring, ...], laid: list[FloatArray]) -> Mesh:
+    """Return the mesh with nodes on the sides; those of the boundary stand on the true edge."""
+    used, flat = np.unique(corners, return_inverse=True)
+    place = np.full(len(points), -1)
+    place[used] = np.arange(len(used))
+    corners, points = flat.reshape(-1, 3), points[used]
+    sides = np.sort(corners[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    unique, which = np.unique(sides, axis=0, return_inverse=True)
+    middles = points[unique].mean(axis=1)
+    edges, owners = [], []
+    keys = unique[:, 0] * len(points) + unique[:, 1]
+    for number, (ring, arc, pieces) in enumerate(zip(rings, laid, _pieces(laid), strict=True)):
+        ends = np.append(arc[1:], arc[0] + ring.places[-1])
+        a, b = place[pieces].T
+        side = np.searchsorted(keys, np.minimum(a, b) * len(points) + np.maximum(a, b))
+        middles[side] = ring.at(0.5 * (arc + ends))
+        edges.append(np.column_stack([a, b, len(points) + side]))
+        owners.append(np.full(len(arc), number))
+    triangles = np.column_stack([corners, len(points) + which.reshape(-1, 3)])
+    return Mesh(read_only(np.concatenate([points, middles])), triangles, np.concatenate(edges), np.concatenate(owners))

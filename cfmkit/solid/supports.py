@@ -1,0 +1,163 @@
+"""What holds and drives a part: groups of nodes that move as one rigid piece each.
+
+A group's three motions, two displacements and a turn about its centre, are a part that is driven times the travel,
+plus directions in which it is free. A clamp has neither; a guide is driven along and nothing else; a pin is free to
+turn.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.sparse import csc_array, hstack
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from cfmkit.curves import FloatArray
+
+
+@dataclass(frozen=True)
+class Group:
+    """Nodes that move as one.
+
+    Attributes
+    ----------
+    name : str
+        For messages and results.
+    nodes : (k,) array of int
+    center : (2,) array
+        About which it turns [m].
+    driven : (3,) array
+        Motion per unit of travel: x, y [m], turn [rad].
+    free : (3, f) array
+        Orthonormal columns: motions that are left to equilibrium.
+    """
+
+    name: str
+    nodes: NDArray[np.int64]
+    center: FloatArray
+    driven: FloatArray = field(default_factory=lambda: np.zeros(3))
+    free: FloatArray = field(default_factory=lambda: np.zeros((3, 0)))
+
+
+def turned(angle: float, derivative: int = 0) -> FloatArray:
+    """Return a rotation matrix, or its derivative with respect to the angle [rad]."""
+    c, s = np.cos(angle + derivative * np.pi / 2), np.sin(angle + derivative * np.pi / 2)
+    return np.array([[c, -s], [s, c]])
+
+
+@dataclass(frozen=True)
+class Supports:
+    """The unknowns of a held part: displacements of the nodes in no group, then the free motions of the groups.
+
+    Attributes
+    ----------
+    places : (n, 2) array
+        Nodes [m].
+    groups : tuple of Group
+        No node is in two of them.
+    """
+
+    places: FloatArray
+    groups: tuple[Group, ...]
+
+    @cached_property
+    def loose(self) -> NDArray[np.int64]:
+        """The displacements (2 x node + direction) that belong to no group."""
+        held = np.zeros(len(self.places), bool)
+        for group in self.groups:
+            held[group.nodes] = True
+        return np.flatnonzero(np.repeat(~held, 2))
+
+    @cached_property
+    def size(self) -> int:
+        """Number of unknowns."""
+        return int(len(self.loose) + sum(group.free.shape[1] for group in self.groups))
+
+    @cached_property
+    def _loose(self) -> csc_array:
+        count = len(self.loose)
+        return csc_array((np.ones(count), (self.loose, np.arange(count))), shape=(2 * len(self.places), count))
+
+    def motions(self, unknowns: FloatArray, travel: float) -> list[FloatArray]:
+        """Return x, y [m] and turn [rad] of every group."""
+        found, first = [], len(self.loose)
+        for group in self.groups:
+            last = first + group.free.shape[1]
+            found.append(group.driven * travel + group.free @ unknowns[first:last])
+            first = last
+        return found
+
+    def displaced(self, unknowns: FloatArray, travel: float) -> FloatArray:
+        """Return the displacements (n, 2) [m] of all nodes."""
+        moved = np.zeros((len(self.places), 2))
+        moved.ravel()[self.loose] = unknowns[: len(self.loose)]
+        for group, motion in zip(self.groups, self.motions(unknowns, travel), strict=True):
+            arm = self.places[group.nodes] - group.center
+            moved[group.nodes] = motion[:2] + arm @ (turned(motion[2]) - np.eye(2)).T
+        return moved
+
+    def _levers(self, motions: list[FloatArray]) -> list[FloatArray]:
+        """Return, for every group, how its nodes' displacements follow its motions, (2k, 3)."""
+        found = []
+        for group, motion in zip(self.groups, motions, strict=True):
+            arm = (self.places[group.nodes] - group.center) @ turned(motion[2], 1).T
+            lever = np.zeros((len(group.nodes), 2, 3))
+            lever[:, 0, 0] = lever[:, 1, 1] = 1.0
+            lever[:, :, 2] = arm
+            found.append(lever.reshape(-1, 3))
+        return found
+
+    def reactions(self, unknowns: FloatArray, travel: float, forces: FloatArray) -> FloatArray:
+        """Return force x, y [N] and moment about its centre [N m] on every group, (groups, 3), that hold it there."""
+        levers = self._levers(self.motions(unknowns, travel))
+        pairs = zip(self.groups, levers, strict=True)
+        return np.array([lever.T @ forces[group.nodes].ravel() for group, lever in pairs]).reshape(-1, 3)
+
+    def residual(self, unknowns: FloatArray, travel: float, forces: FloatArray) -> FloatArray:
+        """Return what is out of balance in each unknown [N or N m]."""
+        reactions = self.reactions(unknowns, travel, forces)
+        ends = [group.free.T @ reaction for group, reaction in zip(self.groups, reactions, strict=True)]
+        return np.concatenate([forces.ravel()[self.loose], *ends])
+
+    def condensed(
+        self, unknowns: FloatArray, travel: float, forces: FloatArray, stiffness: csc_array
+    ) -> tuple[csc_array, FloatArray, float]:
+        """Return the derivatives of the residual with respect to the unknowns and to the travel, and the effort's.
+
+        The last is the derivative of the effort on the drive with respect to the travel, the unknowns held.
+        """
+        motions = self.motions(unknowns, travel)
+        columns, curvatures = [self._loose], np.zeros(len(self.groups))
+        along = np.zeros(2 * len(self.places))
+        for k, (group, motion, lever) in enumerate(zip(self.groups, motions, self._levers(motions), strict=True)):
+            rows = (2 * group.nodes[:, None] + np.arange(2)).ravel()
+            along[rows] = lever @ group.driven
+            free = group.free.shape[1]
+            values = (lever @ group.free).ravel()
+            place = (np.repeat(rows, free), np.tile(np.arange(free), len(rows)))
+            columns.append(csc_array((values, place), shape=(2 * len(self.places), free)))
+            arm = (self.places[group.nodes] - group.center) @ turned(motion[2], 2).T
+            curvatures[k] = float((forces[group.nodes] * arm).sum())
+        every = csc_array(hstack(columns))
+        pulled = stiffness @ every
+        matrix, slope = csc_array(every.T @ pulled), pulled.T @ along
+        first = len(self.loose)
+        bent = np.zeros(self.size)
+        added: list[tuple[int, int, float]] = []
+        for group, curvature in zip(self.groups, curvatures, strict=True):
+            turns = group.free[2]
+            bent[first : first + len(turns)] = curvature * turns * group.driven[2]
+            added += [
+                (first + i, first + j, curvature * a * b) for i, a in enumerate(turns) for j, b in enumerate(turns)
+            ]
+            first += len(turns)
+        if added:
+            i, j, value = zip(*added, strict=True)
+            matrix = csc_array(matrix + csc_array((value, (i, j)), shape=matrix.shape))
+        turned_by = sum(c * group.driven[2] ** 2 for c, group in zip(curvatures, self.groups, strict=True))
+        return matrix, slope + bent, float(along @ (stiffness @ along) + turned_by)
