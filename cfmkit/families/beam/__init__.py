@@ -30,6 +30,8 @@ FAMILY = Family(
         "usable_stroke",
         "stress_max",
         "stress_limit_displacement",
+        "frequency_held_min",
+        "frequency_free_min",
     ),
     template="beam.yaml",
     findings=FINDINGS,

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, assert_never
 import numpy as np
 
 from cfmkit import beams as engine
+from cfmkit.beams.vibration import Masses
 from cfmkit.families.beam.chain import chained
 from cfmkit.families.beam.layers import stacked
 from cfmkit.families.beam.parts.faults import HELD
@@ -71,6 +72,8 @@ class Assembly:
             return engine.Displacement(self.driven, self.direction, points, self._growing(spec.extent))
         if drive.kind == "rotation":
             return engine.Rotation(self.driven, points, self._growing(spec.extent))
+        if drive.kind == "loads":
+            return engine.Loading((*map(_load, drive.loads), *self._growing(spec.extent)), points)
         x, y = math.cos(self.direction), math.sin(self.direction)
         own = (
             engine.PointLoad(self.driven, moment=1.0)
@@ -78,6 +81,30 @@ class Assembly:
             else engine.PointLoad(self.driven, x, y, follows=drive.follows)
         )
         return engine.Loading((own, *self._growing(spec.extent / self.parallel)), points / self.parallel)
+
+    @property
+    def effort_unit(self) -> float:
+        """Force or moment of all copies for one of the engine; of a drive by loads its reference [N]."""
+        drive = self.spec.mechanism.drive
+        return drive.reference if drive.kind == "loads" else float(self.parallel)
+
+    def masses(self) -> Masses | None:
+        """Return what the parts weigh; None where a density is not known."""
+        mechanism = self.spec.mechanism
+        # stages in series have the names of the first, with a number behind a dot
+        materials = {
+            name: mechanism.beams[name.split(".")[0]].material or mechanism.material for name in self.network.beams
+        }
+        density = {name: one.density for name, one in materials.items() if one.density is not None}
+        if len(density) < len(materials):
+            return None
+        nodes = {name: mechanism.nodes[name.split(".")[0]] for name in self.network.nodes}
+        return Masses(density, {name: (node.mass or 0.0, node.inertia or 0.0) for name, node in nodes.items()})
+
+    def hold(self) -> tuple[str, float | None]:
+        """Return what stands still while the drive is held: a node, along a direction [rad] or turned (None)."""
+        turned = self.spec.mechanism.drive.kind in ("rotation", "moment")
+        return self.driven, None if turned else self.direction
 
     def _growing(self, end: float) -> tuple[LoadOn, ...]:
         """Return the constant loads per unit of the drive, where they grow with it and are whole at its end."""

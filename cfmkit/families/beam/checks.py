@@ -131,10 +131,20 @@ def _stability(solution: Solution) -> Iterator[Finding]:
             f"{int(bad.sum())} of {len(bad)} points are not stable while the drive is held, from "
             f"{format_short(float(x.min()), dimension)} to {format_short(float(x.max()), dimension)}",
         )
-    if solution.path.solver.model.load_follows.any():
+    if not solution.follows or not len(solution.keep):
+        return
+    if solution.frequencies is None:
         yield finding(
             "flutter_not_judged",
-            "forces turn with their node: what is called stable does not diverge; flutter depends on masses",
+            "forces turn with their node: what is called stable does not diverge; flutter depends on masses: give "
+            "every material a density",
+        )
+    elif solution.frequencies.flutters.any():
+        first = int(solution.keep[int(solution.frequencies.flutters.argmax())])
+        yield finding(
+            "flutter",
+            f"two natural frequencies have met at {drive_text(solution.assembly, float(solution.path.drive[first]))}: "
+            "under forces that turn with their node it swings ever wider",
         )
 
 

@@ -12,7 +12,7 @@ from cfmkit.families.beam.build import mirror_axis
 from cfmkit.families.beam.posed import bent, rigid_parts, spring_lines
 from cfmkit.families.beam.strips import mirrored, strips
 from cfmkit.families.beam.surface.ride import ride
-from cfmkit.families.beam.values import window_of
+from cfmkit.families.beam.values import natural, window_of
 from cfmkit.plots import parts
 from cfmkit.plots.bands import limits_on
 from cfmkit.plots.curves import Look
@@ -41,6 +41,12 @@ KEY_MM = 5.0
 MOST_BEAMS = 6
 """So many beams have lines of their own: those with the largest force or stress."""
 
+MOST_MODES = 4
+"""So many modes have lines: held and free they are twice as many."""
+
+WIDE = 30.0
+"""Frequencies that differ by more than this factor stand on a logarithmic axis."""
+
 SAME = 1e-4
 """Lines closer than this share of their size are one."""
 
@@ -52,6 +58,8 @@ def figures(result: Result) -> dict[str, Callable[[], Figure]]:
     makers = [curve, shapes, reactions, stress]
     if result.spec.at("analysis.surface") is not None and len(result.curves) > 1:
         makers.append(surface)
+    if any(name.startswith("frequency_") for name in result.curve.extra):
+        makers.append(frequencies)
     return {maker.__name__: partial(maker, result) for maker in makers}
 
 
@@ -263,6 +271,24 @@ def stress(result: Result) -> Figure:
     return diagram_figure(
         Heading.of(result, f"largest stress of each beam ({part}){_left_out(solution.stresses)}"), [diagram]
     )
+
+
+def frequencies(result: Result) -> Figure:
+    """Return the natural frequencies over the motion, with the drive held and with it free."""
+    solution: Solution = result.state
+    series, both = [], natural(solution)
+    for number in range(min(MOST_MODES, solution.spec.analysis.modes)):
+        for name, dashed in (("held", False), ("free", True)):
+            values = both[name][:, number]
+            if np.isfinite(values).any():
+                prefer = (0.3 if dashed else 0.7) - 0.1 * (number % 2)
+                series.append(Series(values, f"{number + 1} {name}", LINES[number % len(LINES)], dashed, prefer))
+    most = f"; the lowest {MOST_MODES}" if solution.spec.analysis.modes > MOST_MODES else ""
+    heading = Heading.of(result, f"natural frequencies about each pose, drive held and free{most}")
+    values = np.concatenate([one.values[np.isfinite(one.values)] for one in series] or [np.ones(1)])
+    wide = bool(values.min() > 0 and values.max() > WIDE * values.min())
+    scale = Scale("frequency", "frequency", zero=not wide, log=wide)
+    return diagram_figure(heading, [Diagram(solution.motion, _motion(result), scale, series)])
 
 
 def surface(result: Result) -> Figure:

@@ -15,6 +15,7 @@ FINDINGS = {
     "limit_point": "the load has an extreme on the path: under a given load the mechanism snaps there",
     "bifurcation": "the path splits: the mechanism leaves the symmetric or straight form",
     "unstable": "a part of the path is not stable: the mechanism would leave it",
+    "flutter": "forces turn with their node, and two natural frequencies meet: it swings ever wider",
     "flutter_not_judged": "forces turn with their node: stability is judged against divergence, not against flutter",
     "imperfection": "the beams were bent in the first buckling mode, as asked",
     "overstressed": "the stress exceeds the allowable one within the window",

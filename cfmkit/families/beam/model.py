@@ -19,8 +19,10 @@ import numpy as np
 
 from cfmkit.beams import Path, PathStatus, trace
 from cfmkit.beams.bundle import coils
+from cfmkit.beams.crosswise import cross_stiffness
 from cfmkit.beams.layout import Layout
 from cfmkit.beams.path import most_stressed
+from cfmkit.beams.vibration import Frequencies, frequencies
 from cfmkit.curves import Column, Curve, read_only
 from cfmkit.errors import InputError
 from cfmkit.families.beam.build import Assembly, assemble, mirror_axis, resolve, thickest_of
@@ -28,7 +30,7 @@ from cfmkit.families.beam.checks import findings_of
 from cfmkit.families.beam.endings import ending_of
 from cfmkit.families.beam.strips import Gap, mirrored, smallest_gap
 from cfmkit.families.beam.surface.ride import curve_of, findings_along, ride, values_along
-from cfmkit.families.beam.values import travel_of, values_of
+from cfmkit.families.beam.values import natural, travel_of, values_of
 from cfmkit.families.beam.words import in_units
 from cfmkit.results import Result, Status
 from cfmkit.units import format_short
@@ -42,6 +44,7 @@ if TYPE_CHECKING:
 
 _NOTHING = 1e-15
 _POSES = 7
+_FLUTTER = 4  # modes among which two may meet: it is the lowest ones that do
 _ALONG = np.linspace(0.0, 1.0, 1001)  # where a coil's radius is looked at: a polynomial of few terms
 
 
@@ -91,7 +94,7 @@ class Solution:
         """Force [N] or torque [N m] of all copies; none where the tolerance is not reached."""
         by_motion = self.spec.mechanism.drive.kind in ("displacement", "rotation")
         effort = self.path.effort if by_motion else self.path.drive
-        return read_only(np.where(self.accurate, self.assembly.parallel * effort[self.keep], np.nan))
+        return read_only(np.where(self.accurate, self.assembly.effort_unit * effort[self.keep], np.nan))
 
     @cached_property
     def accurate(self) -> Any:
@@ -120,8 +123,36 @@ class Solution:
 
     @cached_property
     def stable(self) -> Any:
-        """Whether each point is a stable equilibrium that reaches the tolerance."""
-        return read_only(self.path.stable[self.keep] & self.accurate, np.bool_)
+        """Whether each point is a stable equilibrium that reaches the tolerance; one that flutters is not."""
+        stable = self.path.stable[self.keep] & self.accurate
+        found = self.frequencies
+        return read_only(stable if found is None else stable & ~found.flutters, np.bool_)
+
+    @cached_property
+    def follows(self) -> bool:
+        """Whether a load turns with its node: stability may then be lost by flutter."""
+        return bool(self.path.solver.model.load_follows.any())
+
+    @cached_property
+    def frequencies(self) -> Frequencies | None:
+        """Natural frequencies about every point of the curve; None where none are asked for and nothing can flutter."""
+        masses = self.assembly.masses()
+        count = self.spec.analysis.modes or (_FLUTTER if self.follows else 0)
+        if masses is None or not count or not len(self.keep):
+            return None
+        return frequencies(self.path, masses, count, self.keep, self.assembly.hold())
+
+    @cached_property
+    def cross_stiffness(self) -> FloatArray:
+        """Stiffness of the driven node across the drive at every point of the curve, of all copies [N/m].
+
+        nan where nothing gives way, where the tolerance is not reached, and of drives that turn.
+        """
+        if self.spec.mechanism.drive.kind in ("rotation", "moment") or not len(self.keep):
+            return read_only(np.full(len(self.keep), np.nan))
+        found = cross_stiffness(self.path, self.assembly.driven, self.assembly.direction, self.keep)
+        known = self.accurate & np.isfinite(found)
+        return read_only(np.where(known, self.assembly.parallel * found, np.nan))
 
     @cached_property
     def gaps(self) -> tuple[Gap | None, Gap | None]:
@@ -247,7 +278,7 @@ def _curve(solution: Solution) -> Curve:
             f"{name}_force_y": Column(y, "force"),
             f"{name}_moment": Column(moment, "torque"),
         }
-    extra |= _outputs(solution)
+    extra |= _outputs(solution) | _frequencies(solution)
     kind: Kind = "torque" if solution.spec.mechanism.drive.kind in ("rotation", "moment") else "force"
     return Curve(solution.motion, solution.effort, np.repeat(["load"], len(keep)), solution.stable, extra, kind)
 
@@ -264,6 +295,19 @@ def _outputs(solution: Solution) -> dict[str, Column]:
         x, y, moment = path.reaction(name)[keep].T
         columns |= {f"{name}_fx": Column(x, "force"), f"{name}_fy": Column(y, "force")}
         columns[f"{name}_m"] = Column(moment, "torque")
+    if outputs.cross_stiffness:
+        columns["cross_stiffness"] = Column(solution.cross_stiffness, "stiffness")
+    if solution.spec.mechanism.drive.kind == "loads":
+        columns["load_factor"] = Column(path.drive[keep], "factor")
+    return columns
+
+
+def _frequencies(solution: Solution) -> dict[str, Column]:
+    """Return the natural frequencies that were asked for: empty where a pose is not stable, or not accurate."""
+    found, columns = solution.frequencies, {}
+    for k in range(solution.spec.analysis.modes if found is not None else 0):
+        for name, values in natural(solution).items():
+            columns[f"frequency_{k + 1}_{name}"] = Column(values[:, k], "frequency")
     return columns
 
 

@@ -13,6 +13,7 @@ from cfmkit.families.beam.parts.spec import (
     DriveSpec,
     LinkSpec,
     LoadSpec,
+    MaterialField,
     MemberSpec,
     NodeSpec,
     PartSpec,
@@ -23,12 +24,12 @@ from cfmkit.families.beam.parts.spec import (
 )
 from cfmkit.families.beam.shaping.spec import Optimise, optimise_faults
 from cfmkit.families.beam.surface.spec import Surface
-from cfmkit.materials.spec import MaterialField, SafetyFactor
+from cfmkit.materials.spec import SafetyFactor
 from cfmkit.spec import Analysis, Displacement, Model, Spec, refuse
-from cfmkit.units import DIMENSIONS, Force, Length, Ratio, Torque
+from cfmkit.units import DIMENSIONS, Factor, Force, Length, Ratio, Torque
 
 Fidelity = Literal["inextensible", "extensible", "reissner"]
-_EXTENT = {"displacement": "travel", "rotation": "travel", "force": "force", "moment": "moment"}
+_EXTENT = {"displacement": "travel", "rotation": "travel", "force": "force", "moment": "moment", "loads": "factor"}
 
 
 class Mechanism(Model):
@@ -54,7 +55,7 @@ class Mechanism(Model):
     links: tuple[LinkSpec, ...] = Field((), description="rigid links: [{master: n1, node: n2}]")
     springs: dict[str, SpringSpec] = Field({}, description="by name; of `kind` line, torsion or slide")
     loads: tuple[LoadSpec, ...] = Field((), description="constant loads; of `kind` point or line")
-    drive: DriveSpec = Field(description="what is done to it; of `kind` displacement, rotation, force or moment")
+    drive: DriveSpec = Field(description="what is done to it; of `kind` displacement, rotation, force, moment or loads")
     copies: Copies | None = Field(None, description="how often what is described here occurs")
     part: PartSpec | None = Field(None, description="how it is cut: fillets, smallest gap and feature")
 
@@ -111,6 +112,7 @@ class Outputs(Model):
     reactions: tuple[str, ...] = Field(
         (), max_length=100, description="nodes whose reactions are, of support and drive: [root]"
     )
+    cross_stiffness: bool = Field(False, description="the stiffness of the driven node across the drive, along the way")
 
 
 class BeamAnalysis(Analysis):
@@ -120,6 +122,7 @@ class BeamAnalysis(Analysis):
     travel: Displacement | None = Field(None, description="displacement or angle to go to, for drives by motion")
     force: Force | None = Field(None, description="to go to, of all copies together, for a drive by a force")
     moment: Torque | None = Field(None, description="to go to, for a drive by a moment")
+    factor: Factor | None = Field(None, description="to go to, for a drive by loads: so many times what is given")
     reference: Displacement | None = Field(None, description="pose of the band ranges; default: centre of the window")
     fidelity: Fidelity | None = Field(
         None, description="model: bending only, with stretching, or with shear, too; default: as in the mechanism"
@@ -141,6 +144,13 @@ class BeamAnalysis(Analysis):
         "are whole at its end",
     )
     outputs: Outputs = Field(Outputs(), description="motions and reactions of nodes as columns of the curve")
+    modes: int = Field(
+        0,
+        ge=0,
+        le=50,
+        description="so many natural frequencies about each pose as columns, with the drive held and free; needs the "
+        "density of every material",
+    )
     surface: Surface | None = Field(None, description="a surface to follow: adds the contact force along it")
     imperfection: Length = Field(
         0.0, description="bend the unloaded beams by so much in the first buckling mode; 0: perfect"
@@ -178,6 +188,11 @@ class BeamSpec(Spec):
     @model_validator(mode="after")
     def _has_what_is_reported(self) -> Self:
         refuse("BeamSpec", {("analysis", "outputs", *place): text for place, text in _output_faults(self)})
+        return self
+
+    @model_validator(mode="after")
+    def _weighs_what_swings(self) -> Self:
+        refuse("BeamSpec", dict.fromkeys([("analysis", "modes")], text) if (text := _no_density(self)) else {})
         return self
 
     @property
@@ -238,10 +253,26 @@ def _output_faults(spec: BeamSpec) -> Iterator[tuple[tuple[str | int, ...], str]
                 yield (group, number), f"a link moves {name!r}: what is held is its master, {moved[name]!r}"
             elif group == "reactions" and not (mechanism.nodes[name].support != "free" or name == mechanism.drive.node):
                 yield (group, number), f"nothing holds {name!r}: it has no support and is not driven"
+    if outputs.cross_stiffness and mechanism.drive.kind in ("rotation", "moment"):
+        yield ("cross_stiffness",), f"a drive of kind {mechanism.drive.kind!r} has no axis to be across of"
     for name in outputs.nodes:
         for beam in mechanism.beams:
             if name == f"{beam}_force":
                 yield ("nodes",), f"the columns of {name!r} would have the names of those of the beam {beam!r}"
+
+
+def _no_density(spec: BeamSpec) -> str:
+    """Return which density is missing for natural frequencies; nothing if none is."""
+    if not spec.analysis.modes:
+        return ""
+    mechanism = spec.mechanism
+    keys = [
+        "mechanism.material.density" if beam.material is None else f"mechanism.beams.{name}.material.density"
+        for name, beam in mechanism.beams.items()
+        if (beam.material or mechanism.material).density is None
+    ]
+    listed = list(dict.fromkeys(keys))
+    return f"natural frequencies need a density: give {', '.join(listed[:5])}, such as 1410 kg/m^3" if listed else ""
 
 
 def _rescale_faults(spec: BeamSpec) -> Iterator[str]:

@@ -49,6 +49,13 @@ DEFINITIONS = {
     "travel_end": ("length", "displacement of the driven node at the end of the path"),
     "parasitic_motion": ("length", "largest motion of the driven node across the drive, in the window"),
     "parasitic_rotation": ("angle", "largest rotation of the driven node, in the window"),
+    "cross_stiffness": (
+        "stiffness",
+        "smallest stiffness in the window of the driven node across the drive: force by displacement, held along the "
+        "drive, its rotation as its support has it; without what guides it across, of all copies",
+    ),
+    "frequency_held_min": ("frequency", "lowest natural frequency in the window while the drive is held"),
+    "frequency_free_min": ("frequency", "lowest natural frequency in the window under the force that the drive has"),
     "strain_energy_max": ("energy", "largest strain energy on the path, of all copies"),
 }
 
@@ -64,8 +71,9 @@ def values_of(solution: Solution) -> Mapping[str, Quantity]:
         **_closure(solution),
         **_rest(solution),
         **_parasitic(solution),
+        **_swings(solution),
     }
-    if solution.spec.mechanism.drive.kind in ("displacement", "force"):
+    if solution.spec.mechanism.drive.kind in ("displacement", "force", "loads"):
         numbers["travel_end"] = float(solution.motion[-1])
         numbers |= _extremes(solution) | _events(solution)
     if solution.spec.mechanism.drive.kind == "displacement":
@@ -170,11 +178,38 @@ def _parasitic(solution: Solution) -> dict[str, float | None]:
     """Return how far the driven node goes where it is not to; of drives that turn it, nothing."""
     drive = solution.spec.mechanism.drive
     inside = within(solution, *window_of(solution))
-    if drive.kind not in ("displacement", "force") or not inside.any():
+    if drive.kind not in ("displacement", "force", "loads") or not inside.any():
         return {}
     x, y, turn = solution.path.motion(drive.node)[solution.keep][inside].T
     across = np.cos(drive.direction) * y - np.sin(drive.direction) * x
-    return {"parasitic_motion": float(np.abs(across).max()), "parasitic_rotation": float(np.abs(turn).max())}
+    stiffness = solution.cross_stiffness[inside]
+    return {
+        "parasitic_motion": float(np.abs(across).max()),
+        "parasitic_rotation": float(np.abs(turn).max()),
+        "cross_stiffness": float(np.nanmin(stiffness)) if np.isfinite(stiffness).any() else None,
+    }
+
+
+def natural(solution: Solution) -> dict[str, FloatArray]:
+    """Return the natural frequencies at every point with the drive "held" and "free", (n, modes) [Hz]; else nan."""
+    found = solution.frequencies
+    if found is None:
+        return {}
+    by_motion = solution.spec.mechanism.drive.kind in ("displacement", "rotation")
+    held = found.held if not by_motion else np.where(solution.stable[:, None], found.held, np.nan)
+    free = np.where(solution.stable[:, None], found.free, np.nan)
+    return {"held": np.where(solution.accurate[:, None], held, np.nan), "free": free}
+
+
+def _swings(solution: Solution) -> dict[str, float | None]:
+    """Return the lowest natural frequencies in the window; none where there is a pose without."""
+    if not solution.spec.analysis.modes:
+        return {}
+    inside, numbers = within(solution, *window_of(solution)), {}
+    for name, values in natural(solution).items():
+        first = values[inside, 0]
+        numbers[f"frequency_{name}_min"] = float(first.min()) if len(first) and np.isfinite(first).all() else None
+    return numbers
 
 
 def _significant(values: FloatArray, error: float) -> float:
@@ -199,8 +234,8 @@ def _extremes(solution: Solution) -> dict[str, float | None]:
 
 def _events(solution: Solution) -> dict[str, float | None]:
     """Return where the drive has its first limit point and its first bifurcation."""
-    kind = solution.spec.mechanism.drive.kind
-    unit = solution.assembly.parallel if kind == "force" else 1
+    kind = "displacement" if solution.spec.mechanism.drive.kind == "displacement" else "force"
+    unit = solution.assembly.effort_unit if kind == "force" else 1
     found: dict[str, float | None] = {}
     for name, event in (("limit", "limit point"), ("bifurcation", "bifurcation")):
         drive = next((one.drive for one in solution.path.events if one.kind == event), None)

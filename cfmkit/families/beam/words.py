@@ -30,6 +30,8 @@ def percent(share: float) -> str:
 def drive_text(assembly: Assembly, value: float) -> str:
     """Return a value of the drive [SI, of one copy] as the user reads it, of all copies together."""
     kind = assembly.spec.mechanism.drive.kind
+    if kind == "loads":
+        return f"{value:.5g} times the loads"
     unit = assembly.parallel if kind in ("force", "moment") else 1
     return format_short(unit * value, _DIMENSIONS[kind])
 

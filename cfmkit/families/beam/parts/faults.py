@@ -12,7 +12,7 @@ import numpy as np
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
-    from cfmkit.families.beam.parts.spec import MemberSpec
+    from cfmkit.families.beam.parts.spec import LoadSpec, MemberSpec
     from cfmkit.families.beam.spec import Mechanism
 
 Fault = tuple[tuple[str | int, ...], str]
@@ -75,9 +75,11 @@ def references(mechanism: Mechanism) -> Iterator[tuple[tuple[str | int, ...], st
         for key in ("start", "end", "node"):
             if (node := getattr(spring, key, None)) is not None:
                 yield ("springs", name, spring.kind, key), "node", node
-    for index, load in enumerate(mechanism.loads):
-        what = "node" if load.kind == "point" else "beam"
-        yield ("loads", index, load.kind, what), what, getattr(load, what)
+    driving = mechanism.drive.loads if mechanism.drive.kind == "loads" else ()
+    for place, loads in ((("loads",), mechanism.loads), (("drive", "loads", "loads"), driving)):
+        for index, load in enumerate(loads):
+            what = "node" if load.kind == "point" else "beam"
+            yield (*place, index, load.kind, what), what, getattr(load, what)
     yield ("drive", mechanism.drive.kind, "node"), "node", mechanism.drive.node
 
 
@@ -162,10 +164,18 @@ def _drive_faults(mechanism: Mechanism) -> Iterator[Fault]:
         if rotation:
             yield at, f"{drive.node!r} cannot turn: its support is {node.support!r}"
         return
+    if drive.kind == "loads" and not any(map(_acts, drive.loads)):
+        yield ("drive", "loads", "loads"), "every load is zero: nothing drives"
     if along and across:
         yield at, f"{drive.node!r} cannot move: its support is {node.support!r}"
     elif across and not parallel(drive.direction, node.direction or 0.0):
         yield ("drive", drive.kind, "direction"), f"{drive.node!r} slides along another direction"
+
+
+def _acts(load: LoadSpec) -> bool:
+    """Tell whether a load is not zero."""
+    values = (load.fx, load.fy, load.moment) if load.kind == "point" else (load.wx, load.wy)
+    return any(value != 0 for value in values)
 
 
 def parallel(one: float, other: float) -> bool:
@@ -177,7 +187,7 @@ def _copy_faults(mechanism: Mechanism) -> Iterator[Fault]:
     copies, drive = mechanism.copies, mechanism.drive
     if copies is None:
         return
-    if copies.mirror is not None and drive.kind not in ("displacement", "force"):
+    if copies.mirror is not None and drive.kind in ("rotation", "moment"):
         yield ("copies", "mirror"), f"two halves have no common {drive.kind}: drive them by a displacement or a force"
     if copies.layers == 1:
         return

@@ -8,14 +8,45 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, field_validator, model_validator
 
 from cfmkit.families.beam.parts.faults import HELD
-from cfmkit.materials.spec import MaterialField
+from cfmkit.materials.library import material
+from cfmkit.materials.spec import MaterialSpec, material_input
 from cfmkit.spec import Model
-from cfmkit.units import Angle, Force, Length, LineLoad, Ratio, RotationalStiffness, Stiffness, Torque
+from cfmkit.units import (
+    Angle,
+    Density,
+    Force,
+    Inertia,
+    Length,
+    LineLoad,
+    Mass,
+    Ratio,
+    RotationalStiffness,
+    Stiffness,
+    Torque,
+)
 
 PositiveLength = Annotated[Length, Field(gt=0)]
 Point = tuple[Length, Length]
 Station = tuple[Annotated[Ratio, Field(ge=0, le=1)], PositiveLength]
 Thickness = PositiveLength | Annotated[tuple[Station, ...], Field(min_length=2)]
+
+
+class BeamMaterial(MaterialSpec):
+    """A material of beams, which may also say what it weighs."""
+
+    density: Annotated[Density, Field(gt=0)] | None = Field(
+        None, description="for natural frequencies; default: the named material's, else none"
+    )
+
+    @model_validator(mode="after")
+    def _weighs_as_named(self) -> Self:
+        if self.density is None and self.name is not None:
+            object.__setattr__(self, "density", material(self.name).density)  # not counted as set, as in `MaterialSpec`
+        return self
+
+
+MaterialField = Annotated[BeamMaterial, material_input(BeamMaterial)]
+"""The type of a key that says what beams are made of."""
 
 
 class Moved(Model):
@@ -38,6 +69,10 @@ class NodeSpec(Model):
     )
     direction: Angle | None = Field(None, description="along which a guided node or a roller slides; from the x axis")
     moved: Moved | None = Field(None, description="a prescribed displacement of what the support holds")
+    mass: Annotated[Mass, Field(ge=0)] | None = Field(
+        None, description="what is fixed to the node weighs so much, for natural frequencies; it has no weight"
+    )
+    inertia: Annotated[Inertia, Field(ge=0)] | None = Field(None, description="its moment of inertia about the node")
 
     @model_validator(mode="after")
     def _direction_where_it_slides(self) -> Self:
@@ -260,7 +295,26 @@ class MomentDrive(Model):
     node: str = Field(description="node that is twisted")
 
 
-DriveSpec = Annotated[DisplacementDrive | RotationDrive | ForceDrive | MomentDrive, Field(discriminator="kind")]
+class LoadsDrive(Model):
+    """Several loads that grow together, in proportion, to `analysis.factor` times what is given here.
+
+    The curve runs over the displacement of one node; its force is the reference times the factor.
+    """
+
+    kind: Literal["loads"]
+    node: str = Field(description="node whose displacement along the direction the curve runs over")
+    direction: Angle = Field(description="from the x axis")
+    loads: Annotated[tuple[LoadSpec, ...], Field(min_length=1, max_length=1000)] = Field(
+        description="as in `mechanism.loads`, on each copy: what acts where the factor is one"
+    )
+    reference: Annotated[Force, Field(gt=0)] = Field(
+        1.0, description="force that the curve shows where the factor is one"
+    )
+
+
+DriveSpec = Annotated[
+    DisplacementDrive | RotationDrive | ForceDrive | MomentDrive | LoadsDrive, Field(discriminator="kind")
+]
 
 
 class Copies(Model):
