@@ -166,6 +166,12 @@ class Spec(Model):
     sensitivity: Sensitivity | None = Field(None, description="what `cfmkit sensitivity` varies")
 
     @property
+    def fidelity(self) -> str | None:
+        """The model that the analysis uses; None where its family has one only."""
+        found: str | None = getattr(getattr(self, "analysis", None), "fidelity", None)
+        return found
+
+    @property
     def motion(self) -> Literal["length", "angle"] | None:
         """What the curves run over: displacements, or angles; None where a family does not say."""
         return None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from importlib import import_module
 from typing import TYPE_CHECKING, Any, Protocol
 
 from cfmkit.results import WINDOW_OUTSIDE
@@ -169,6 +170,25 @@ class MeasuredLoop:
     down: FloatArray
 
 
+class Model(Protocol):
+    """One way to compute a mechanism."""
+
+    def __call__(self, spec: Any, run: Run, /) -> Result:
+        """Return the curves of a mechanism, its scalar results and what is wrong with it."""
+
+
+def function_named(name: str) -> Any:
+    """Return the function that ``"module:function"`` names; the module is imported for it.
+
+    Examples
+    --------
+    >>> function_named("math:hypot")(3.0, 4.0)
+    5.0
+    """
+    module, _, function = name.partition(":")
+    return getattr(import_module(module), function)
+
+
 SHARED = {WINDOW_OUTSIDE: "a window is not within the curve: what is measured over it has no value"}
 """Findings that are made of any family's result."""
 
@@ -199,8 +219,10 @@ class Family:
         As written in ``family:`` of a spec, and one line on what it is.
     spec_type : type of Spec
         What the YAML may say.
-    analyze : callable
-        ``analyze(spec, run) -> Result``.
+    models : mapping of str to Model or str
+        What `analysis.fidelity` may say, the coarsest first and the finest last, and the model that it picks:
+        ``model(spec, run) -> Result``, or its ``"module:function"``, imported when it is to run. A family with
+        one model gives it a name, too.
     design : callable, optional
         ``design(spec, run) -> Design``; its spec is analysed like any other.
     search : Search, optional
@@ -241,7 +263,7 @@ class Family:
     name: str
     summary: str
     spec_type: type[Spec]
-    analyze: Callable[[Any, Run], Result]
+    models: Mapping[str, Model | str]
     design: Callable[[Any, Run], Design] | None = None
     search: Search | None = None
     values: Mapping[str, tuple[str, str]] = field(default_factory=dict)
@@ -261,3 +283,10 @@ class Family:
     def __post_init__(self) -> None:
         """Add the findings that every family has."""
         object.__setattr__(self, "findings", {**self.findings, **SHARED})
+
+    def analyze(self, spec: Spec, run: Run) -> Result:
+        """Return what the model that a specification picks, or else the only one, makes of it."""
+        (only, *_) = self.models
+        model = self.models[spec.fidelity or only]
+        function: Model = function_named(model) if isinstance(model, str) else model
+        return function(spec, run)

@@ -1,6 +1,6 @@
 """One mechanism by every model that its family has: the curves, and how far each is from the finest one.
 
-The models are the choices of `analysis.fidelity`, the coarsest first and the finest
+The models are those of the family's record, which `analysis.fidelity` names, the coarsest first and the finest
 last. A choice that the specification has no data for is left out; a curve that fails
 keeps its status.
 """
@@ -19,7 +19,6 @@ from cfmkit.metrics import Undefined, Window, window_of, windows_judged
 from cfmkit.metrics.differences import Difference, counterpart, effort_at, largest, mean, overlap, rms, summarize
 from cfmkit.metrics.subjects import span_text
 from cfmkit.results import Finding, Status
-from cfmkit.studies.leaves import CannotVary, leaf
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -208,10 +207,7 @@ def choices_of(spec: Spec) -> Choices:
     cfmkit.errors.SpecError
         If the specification has data for one of them only.
     """
-    try:
-        names = tuple(map(str, leaf(type(spec), PATH).choices))
-    except CannotVary:
-        names = ()
+    names = tuple(family(spec.family).models)
     if len(names) < 2:
         raise UsageError(f"{OPTION}: a {spec.family} mechanism has one model only, there is nothing to compare")
     specs, obstacles = {}, {}

@@ -9,11 +9,13 @@ import numpy as np
 import pytest
 
 import cfmkit
+from cfmkit import families
 from cfmkit.curves import Curve
 from cfmkit.errors import SpecError, UsageError
-from cfmkit.families.base import Run
+from cfmkit.families.base import Run, function_named
 from cfmkit.results import Finding, Result, Status
 from cfmkit.studies.fidelity import PATH, Choices, Comparison, Variant, choices_of, compare, fidelity_of, lines_of
+from cfmkit.studies.leaves import CannotVary, leaf
 
 CONFIGS = sorted((Path(__file__).parents[2] / "configs").glob("*.yaml"))
 CAM = CONFIGS[0].parent / "cam.yaml"
@@ -43,6 +45,28 @@ def test_models_are_compared_or_one_sentence_says_why_not(path):
         assert item.result.spec.at(PATH) == item.name
     assert found.finest == [name for name in choices.names if name in choices.specs][-1]
     assert set(found.metrics()) >= {f"fidelity_rms[{item.name}]" for item in found.compared}
+
+
+@pytest.mark.parametrize("name", families.names())
+def test_the_models_of_a_family_are_the_words_of_its_fidelity(name):
+    record = families.family(name)
+    try:
+        words = tuple(leaf(record.spec_type, PATH).choices)
+    except CannotVary:
+        words = tuple(record.models)[:1]
+    assert tuple(record.models) == words
+    for model in record.models.values():
+        assert callable(function_named(model) if isinstance(model, str) else model)
+
+
+@pytest.mark.parametrize("path", CONFIGS, ids=lambda path: path.stem)
+def test_the_model_that_a_specification_picks_is_one_of_its_family(path):
+    spec = cfmkit.load(path)
+    record = families.family(spec.family)
+    asked = []
+    models = {name: lambda _spec, _run, name=name: asked.append(name) for name in record.models}
+    replace(record, models=models).analyze(spec, Run())
+    assert asked == [spec.fidelity or next(iter(record.models))]
 
 
 def test_some_configuration_has_data_for_several_models():

@@ -57,7 +57,9 @@ def test_a_bug_is_a_crashed_row_with_its_traceback_and_is_not_kept(monkeypatch, 
             raise ZeroDivisionError("oops")
         return record.analyze(spec, run)
 
-    monkeypatch.setattr("cfmkit.studies.study.family", lambda _name: dataclasses.replace(record, analyze=broken))
+    monkeypatch.setattr(
+        "cfmkit.studies.study.family", lambda _name: dataclasses.replace(record, models={"quasi-static": broken})
+    )
     with Journal(tmp_path / "journal") as journal:
         records = run(work(FRICTION), journal=journal)
         assert statuses(records) == [Status.COMPLETE, Status.CRASHED]
@@ -192,7 +194,7 @@ def test_the_warnings_of_a_block_are_those_of_its_model_and_of_single_analyses(m
         found = record.analyze(spec, run)
         return dataclasses.replace(found, warnings=(Finding("odd", "no matter"), Finding("odd", "again")))
 
-    fake = dataclasses.replace(record, analyze=single, analyze_block=block)
+    fake = dataclasses.replace(record, models={"quasi-static": single}, analyze_block=block)
     monkeypatch.setattr("cfmkit.studies.blocks.family", lambda _name: fake)
     monkeypatch.setattr("cfmkit.studies.study.family", lambda _name: fake)
     some = work("mechanism.profile.friction=[0, 0.001, 0.002, 0.003]", names=("theoretical_force",))
@@ -259,7 +261,7 @@ def test_warnings_that_a_block_model_does_not_know_are_not_told_as_none(monkeypa
     def single(spec, run):
         return dataclasses.replace(family("cam").analyze(spec, run), warnings=())
 
-    fake = dataclasses.replace(family("cam"), analyze=single, analyze_block=block)
+    fake = dataclasses.replace(family("cam"), models={"quasi-static": single}, analyze_block=block)
     monkeypatch.setattr("cfmkit.studies.blocks.family", lambda _name: fake)
     monkeypatch.setattr("cfmkit.studies.study.family", lambda _name: fake)
     assert warnings(run(work(FRICTION, names=("theoretical_force",)))) == ["not_judged", None]

@@ -15,7 +15,7 @@ FAMILY = Family(
     name="beam",
     summary="a planar network of slender beams in large deflection",
     spec_type=BeamSpec,
-    analyze=analyze,
+    models=dict.fromkeys(("inextensible", "extensible", "reissner"), analyze),
     design=design,
     search=Search(tables=("starts.csv",)),
     values=DEFINITIONS | SURFACE,

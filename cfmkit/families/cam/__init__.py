@@ -15,7 +15,7 @@ FAMILY = Family(
     name="cam",
     summary="two rollers on a cam, pulled together by springs and up by braces",
     spec_type=CamSpec,
-    analyze=analyze,
+    models={"quasi-static": analyze, "dynamic": "cfmkit.families.cam.dynamics:analyze"},
     design=design,
     search=Search(findings=("overwritten", "plate_incomplete")),
     values=DEFINITIONS,

@@ -101,7 +101,7 @@ class Solution:
 
 
 def analyze(spec: CamSpec, run: Run) -> Result:
-    """Return the force-displacement loop of a cam mechanism, with everything that is wrong with it.
+    """Return the force-displacement loop of a cam that is moved slowly, with everything that is wrong with it.
 
     Parameters
     ----------
@@ -116,10 +116,6 @@ def analyze(spec: CamSpec, run: Run) -> Result:
         Branches ``load`` (up) and ``unload`` (down). NO_EQUILIBRIUM if the mechanism cannot
         be built, PARTIAL if the curve ends before the travel asked for.
     """
-    if spec.fidelity == "dynamic":
-        from cfmkit.families.cam.dynamics import analyze as analyze_motion
-
-        return analyze_motion(spec, run)
     if spec.mechanism.profile.file is not None:
         from cfmkit.families.cam.built import analyze_built
 

@@ -13,11 +13,14 @@ from cfmkit.families.slider_crank.model import analyze
 from cfmkit.families.slider_crank.spec import SliderCrankSpec
 from cfmkit.families.slider_crank.values import DEFINITIONS
 
+PRINTED = "cfmkit.families.slider_crank.flexures.model:analyze"
+"""One model for flexures and strips: the chain is another one."""
+
 FAMILY = Family(
     name="slider-crank",
     summary="a crank, a coupler and a slider with a spring at each joint: constant torque or force",
     spec_type=SliderCrankSpec,
-    analyze=analyze,
+    models={"prb": analyze, "lumped": PRINTED, "beam": PRINTED},
     analyze_block=analyze_block,
     design=design,
     search=Search(findings=("near_optima", "spring_dropped", "window_not_proven")),

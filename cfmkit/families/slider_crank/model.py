@@ -165,10 +165,6 @@ def analyze(spec: SliderCrankSpec, run: Run) -> Result:
         One branch, ``load``. NO_EQUILIBRIUM if the mechanism cannot be built, PARTIAL if
         the linkage does not reach all of the motion asked for.
     """
-    if spec.fidelity != "prb":
-        from cfmkit.families.slider_crank.flexures.model import analyze as analyze_part
-
-        return analyze_part(spec, run)
     try:
         spec = resolve(spec)
         assembly = assemble(spec)

@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.families.findings import mm
-from cfmkit.families.vcfm.parts import share_of, strip_of
-from cfmkit.families.vcfm.samples import Character, Samples
+from cfmkit.families.vcfm.model import rest_of, result_of, solve, travel_grid
+from cfmkit.families.vcfm.parts import parts, share_of, strip_of
+from cfmkit.families.vcfm.samples import Character, LawSampler, Samples
 from cfmkit.families.vcfm.traced import traced
 
 if TYPE_CHECKING:
@@ -22,9 +23,11 @@ if TYPE_CHECKING:
 
     from cfmkit.beams import Network
     from cfmkit.curves import FloatArray
+    from cfmkit.families.base import Run
     from cfmkit.families.vcfm.spec import VcfmSpec
     from cfmkit.families.vcfm.strip import Strip
     from cfmkit.families.vcfm.traced import Traced
+    from cfmkit.results import Result
 
 DOWN = -0.5 * np.pi
 
@@ -179,3 +182,15 @@ def _problem(subject: str, paths: Sequence[Traced], travel: float) -> str:
     """Return how far a part was followed, in shares `travel` of its node, and why no farther; empty if to the end."""
     short = next((one for one in paths if one.problem), None)
     return "" if short is None else f"the {subject} followed to {mm(short.edges[-1] / travel)} only: {short.problem}"
+
+
+def analyze(spec: VcfmSpec, run: Run) -> Result:
+    """Return the curves of a mechanism of beams in large deflection, with everything that is wrong with it.
+
+    As `cfmkit.families.vcfm.model.analyze`; PARTIAL if a beam cannot be followed to the end of the travel.
+    """
+    made = parts(spec)
+    # the closed form says how far back the shuttle goes; the real one is within a few percent of it
+    rests = [rest_of(LawSampler(made), preload, travel_grid(spec)) for preload in spec.analysis.preloads]
+    back = 1.2 * max([-(rest or 0.0) for rest in rests] + [0.0])
+    return result_of(solve(spec, made, ExactSampler(spec, spec.travel, back)))

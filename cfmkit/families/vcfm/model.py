@@ -169,7 +169,7 @@ class Solution:
 
 
 def analyze(spec: VcfmSpec, run: Run) -> Result:
-    """Return the force-displacement curves of a mechanism at its preloads, with everything that is wrong with it.
+    """Return the force-displacement curves of a mechanism by closed forms, with everything that is wrong with it.
 
     Parameters
     ----------
@@ -181,9 +181,18 @@ def analyze(spec: VcfmSpec, run: Run) -> Result:
     Returns
     -------
     Result
-        One curve a preload, the nominal one first. PARTIAL if a beam cannot be followed to the end of the travel.
+        One curve a preload, the nominal one first. PARTIAL if the spring closes within the travel.
     """
-    solution = solve(spec)
+    made = parts(spec)
+    return result_of(solve(spec, made, LawSampler(made)))
+
+
+def result_of(solution: Solution) -> Result:
+    """Return the curves of a solved mechanism, with everything that is wrong with it.
+
+    PARTIAL if the spring closes within the travel, or a beam cannot be followed to its end.
+    """
+    spec = solution.spec
     if len(solution.nominal.travel) < LEAST:
         closed = tuple(spring_closed(solution))
         return Result(spec, Status.NO_EQUILIBRIUM, _shortfall(solution), warnings=closed)
@@ -214,17 +223,14 @@ def _shortfall(solution: Solution) -> str:
     return next((found.message for found in spring_closed(solution)), "")
 
 
-def solve(spec: VcfmSpec) -> Solution:
-    """Return the curves at all preloads by the model that the analysis asks for."""
-    made = parts(spec)
-    grid = spec.travel * (np.arange(spec.analysis.points) / (spec.analysis.points - 1.0))
-    sampler: Sampler = LawSampler(made)
-    if spec.analysis.fidelity == "exact":
-        from cfmkit.families.vcfm.exact import ExactSampler
+def travel_grid(spec: VcfmSpec) -> FloatArray:
+    """Return the travels of a curve that starts at the as-made pose [m]."""
+    return np.asarray(spec.travel * (np.arange(spec.analysis.points) / (spec.analysis.points - 1.0)))
 
-        # the closed form says how far back the shuttle goes; the real one is within a few percent of it
-        rests = [rest_of(sampler, preload, grid) for preload in spec.analysis.preloads]
-        sampler = ExactSampler(spec, spec.travel, 1.2 * max([-(rest or 0.0) for rest in rests] + [0.0]))
+
+def solve(spec: VcfmSpec, made: Parts, sampler: Sampler) -> Solution:
+    """Return the curves at all preloads by a model of leaves and spring."""
+    grid = travel_grid(spec)
     room = spring_room(spec)
     nominal, *others = (_push(sampler, preload, grid, room) for preload in spec.analysis.preloads)
     # a preload at which the spring cannot be followed, or is closed, has no curve; a message says so
