@@ -10,7 +10,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from cfmkit.errors import UsageError
-from cfmkit.families import family
+from cfmkit.families import family, origin
 from cfmkit.families.base import Run
 
 if TYPE_CHECKING:
@@ -150,7 +150,7 @@ def design(spec: AnySpec, run: Run | None = None) -> Design:
     spec = spec_of(spec)
     record = family(spec.family)
     if record.design is None:
-        raise UsageError(f"a {spec.family} mechanism cannot be designed, only analysed")
+        raise UsageError(f"{record.phrase} cannot be designed, only analysed")
     return record.design(spec, run or Run())
 
 
@@ -302,7 +302,9 @@ def export(
             for name, content in drawn.items():
                 folder.write(name, content)
             source = {"source": spec.name, "sha256": stable_hash(spec.model_dump(mode="json"))}
-            folder.commit({"command": "export", "arguments": [], "spec": source, "status": "complete", "exit_code": 0})
+            package = {"family": computed} if (computed := origin(spec.family)) else {}
+            about = {"command": "export", "arguments": [], "spec": source | package}
+            folder.commit({**about, "status": "complete", "exit_code": 0})
     return drawn
 
 
@@ -361,7 +363,7 @@ def drawing(spec: Spec, tolerance: float | None = None) -> Drawing:
     spec = spec_of(spec)
     record = family(spec.family)
     if record.outline is None:
-        raise UsageError(f"a {spec.family} mechanism has no part to draw")
+        raise UsageError(f"{record.phrase} has no part to draw")
     given = () if tolerance is None else (tolerance,)
     drawn: Drawing = import_module(record.outline).drawing(spec, *given)
     return drawn

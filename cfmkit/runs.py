@@ -186,9 +186,17 @@ def _computed(verb: Verb, spec: Spec, run: Run, document: Document) -> Report:
     return found
 
 
+def family_package(name: str) -> dict[str, Any]:
+    """Return what a manifest says about a family of another package; nothing about those of this one."""
+    from cfmkit.families import origin
+
+    found = origin(name)
+    return {"family": found} if found else {}
+
+
 def provenance(command: str, spec: Spec, source: str, arguments: Sequence[str]) -> dict[str, Any]:
     """Return what every manifest says about its run: the command line and the content of the spec."""
-    content = {"source": source, "sha256": stable_hash(spec.model_dump(mode="json"))}
+    content = {"source": source, "sha256": stable_hash(spec.model_dump(mode="json")), **family_package(spec.family)}
     return {"command": command, "arguments": list(arguments), "spec": content}
 
 

@@ -147,9 +147,7 @@ def bind(document: Document) -> Spec:
     cfmkit.errors.SpecError
         With every problem at once, those of the requirements' metrics included.
     """
-    from cfmkit import families
-
-    family = families.family(document.family(families.names()))
+    family = _family_record(document)
     try:
         spec = document.bind(family.spec_type)
     except SpecError as error:
@@ -162,6 +160,17 @@ def bind(document: Document) -> Spec:
     if found:
         raise SpecError(found)
     return spec
+
+
+def _family_record(document: Document) -> Family:
+    """Return the family that a document names; one that cannot be used is a problem at that place."""
+    from cfmkit import families
+
+    try:
+        named = _family_of(document)
+        return families.family(document.family((named,) if named in families.clashing() else families.names()))
+    except families.Unusable as problem:
+        raise SpecError([document.problem(("family",), str(problem))]) from None
 
 
 def _requirement_faults(

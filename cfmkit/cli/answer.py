@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from cfmkit.errors import ExitCode
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Mapping, Sequence
 
     from cfmkit.cli.terminal import Terminal
 
@@ -43,6 +43,15 @@ class Answer:
     complaints: tuple[str, ...] = ()
     quiet_complaints: tuple[str, ...] = ()
     errors: tuple[Mapping[str, Any], ...] = ()
+
+
+def told_of(skipped: Sequence[str], answer: Answer) -> Answer:
+    """Return an answer that also tells of the families that were skipped: one line each, and in the document."""
+    if not skipped:
+        return answer
+    data = {"warnings": [{"name": "family_skipped", "message": line} for line in skipped]}
+    lines = tuple(f"warning  {line}; skipped (see `cfmkit doctor`)" for line in skipped)
+    return replace(answer, data={**answer.data, **data}, complaints=(*answer.complaints, *lines))
 
 
 def document(answer: Answer) -> dict[str, Any]:

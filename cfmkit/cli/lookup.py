@@ -37,9 +37,9 @@ def names() -> list[str]:
 def references() -> list[dict[str, str]]:
     """Return the papers behind all families: name, family and the reference in full."""
     return [
-        {"name": _tag(text), "family": name, "reference": text}
-        for name in families.names()
-        for text in families.family(name).references
+        {"name": _tag(text), "family": record.name, "reference": text}
+        for record in families.records()
+        for text in record.references
     ]
 
 
@@ -95,17 +95,17 @@ def _values() -> Records:
     from cfmkit.units import border_unit
 
     return _gathered(
-        (key, {"name": key, "family": name, "unit": border_unit(dimension), "definition": definition})
-        for name in families.names()
-        for key, (dimension, definition) in families.family(name).values.items()
+        (key, {"name": key, "family": record.name, "unit": border_unit(dimension), "definition": definition})
+        for record in families.records()
+        for key, (dimension, definition) in record.values.items()
     )
 
 
 def _findings() -> Records:
     return _gathered(
-        (key, {"name": key, "family": name, "meaning": meaning})
-        for name in families.names()
-        for key, meaning in families.family(name).findings.items()
+        (key, {"name": key, "family": record.name, "meaning": meaning})
+        for record in families.records()
+        for key, meaning in record.findings.items()
     )
 
 

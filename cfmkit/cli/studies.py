@@ -88,13 +88,18 @@ class Made:
 
 def commit(place: Desk, made: Made, terminal: Terminal, code: ExitCode) -> Manifest:
     """Put the files in place with a manifest that says what was run."""
+    from cfmkit.runs import family_package
     from cfmkit.store import stable_hash
 
     about = {
         "command": made.command,
         "arguments": list(terminal.arguments),
         "seed": made.seed,
-        "spec": {"source": made.source, "sha256": stable_hash(made.spec.model_dump(mode="json"))},
+        "spec": {
+            "source": made.source,
+            "sha256": stable_hash(made.spec.model_dump(mode="json")),
+            **family_package(made.spec.family),
+        },
         "points": made.points,
         "status": code.name.lower(),
         "exit_code": int(code),

@@ -1,4 +1,4 @@
-"""The specs that `cfmkit new` starts from; they come with the package."""
+"""The specs that `cfmkit new` starts from; they come with the package that has the family."""
 
 from __future__ import annotations
 
@@ -19,4 +19,5 @@ def template(name: str) -> str:
     record = family(name)
     if not record.template:
         raise UsageError(f"the family {name!r} has no template; `cfmkit show {name}` lists its keys")
-    return files("cfmkit").joinpath("templates", record.template).read_text(encoding="utf-8")
+    package, _, path = record.template.partition(":")
+    return files(package).joinpath(path).read_text(encoding="utf-8")

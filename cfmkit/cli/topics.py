@@ -28,7 +28,7 @@ def page(name: str | None) -> Page:
         return overview()
     if name in TOPICS:
         return TOPICS[name][1]()
-    if name in families.names():
+    if name in families.names() or name in families.clashing():
         return family_page(name)
     if (found := lookup.found(name)) is not None:
         return found
@@ -40,9 +40,15 @@ def page(name: str | None) -> Page:
     raise UsageError(f"there is nothing to show about {name!r}; {hint}")
 
 
+def skipped(name: str | None) -> tuple[str, ...]:
+    """Return the families of other packages that a page cannot tell of; none where it tells of no family or one."""
+    whole = name not in {*families.names(), "units", "metrics", "materials"}
+    return families.skipped() if whole else ()
+
+
 def overview() -> Page:
     """Return the list of families and topics."""
-    mechanisms = [{"name": name, "summary": families.family(name).summary} for name in families.names()]
+    mechanisms = [{"name": record.name, "summary": record.summary} for record in families.records()]
     topics = [{"name": name, "summary": summary} for name, (summary, _) in TOPICS.items()]
     columns = (field("name", ""), field("summary", "", wraps=True))
     sections = (Section("families", mechanisms, columns), Section("topics", topics, columns))

@@ -1,4 +1,4 @@
-"""The registry of families: one line each, imported when first asked for."""
+"""The registry of families: one line each, imported when first asked for; other packages add theirs by entry points."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 from cfmkit.errors import UsageError
+from cfmkit.families import installed
+from cfmkit.families.installed import Unusable
 
 if TYPE_CHECKING:
     from cfmkit.families.base import Family
@@ -17,11 +19,18 @@ FAMILIES = {
     "slider-crank": "cfmkit.families.slider_crank",
     "vcfm": "cfmkit.families.vcfm",
 }
+"""Those of this package."""
 
 
 def names() -> tuple[str, ...]:
-    """Return the names of all families."""
-    return tuple(FAMILIES)
+    """Return the names of all families, those of other packages last; nothing is imported for it."""
+    return (*FAMILIES, *installed.usable_names(FAMILIES))
+
+
+def clashing() -> tuple[str, ...]:
+    """Return the names that more than one other package offers: none of those families can be used."""
+    known = names()
+    return tuple(dict.fromkeys(one.name for one in installed.offers() if one.name not in known))
 
 
 def family(name: str) -> Family:
@@ -29,12 +38,55 @@ def family(name: str) -> Family:
 
     Raises
     ------
+    cfmkit.families.Unusable
+        If another package has it, but it cannot be used; the message says why.
     cfmkit.errors.UsageError
         If there is none; the message names the nearest.
     """
-    if name not in FAMILIES:
-        near = get_close_matches(name, FAMILIES, n=1)
-        hint = f"; did you mean {near[0]!r}?" if near else ""
-        raise UsageError(f"unknown family {name!r}; known are {', '.join(FAMILIES)}{hint}")
-    record: Family = import_module(FAMILIES[name]).FAMILY
-    return record
+    if name in FAMILIES:
+        record: Family = import_module(FAMILIES[name]).FAMILY
+        return record
+    for offer in installed.offers():
+        if offer.name == name:
+            return installed.record_of(offer, FAMILIES)
+    near = get_close_matches(name, names(), n=1)
+    hint = f"; did you mean {near[0]!r}?" if near else ""
+    raise UsageError(f"unknown family {name!r}; known are {', '.join(names())}{hint}")
+
+
+def records() -> tuple[Family, ...]:
+    """Return all families that can be used, in the order of `names`; `skipped` says which cannot."""
+    return tuple(family(name) for name in FAMILIES) + tuple(
+        found for offer in installed.offers() if not isinstance(found := _tried(offer), str)
+    )
+
+
+def skipped() -> tuple[str, ...]:
+    """Return one line for each family of another package that cannot be used, with the reason."""
+    return tuple(found for offer in installed.offers() if isinstance(found := _tried(offer), str))
+
+
+def _tried(offer: installed.Offer) -> Family | str:
+    try:
+        return installed.record_of(offer, FAMILIES)
+    except Unusable as problem:
+        return str(problem)
+
+
+def origin(name: str) -> dict[str, str]:
+    """Return what computes a family of another package; empty for those of this package.
+
+    Returns
+    -------
+    dict
+        ``package``, ``version`` and ``content``, the SHA-256 of its files: what is kept for a later run is of these.
+    """
+    return next((installed.code_of(offer) for offer in installed.offers() if offer.name == name), {})
+
+
+def origins() -> dict[str, dict[str, str]]:
+    """Return what computes each family of another package."""
+    return {one.name: installed.code_of(one) for one in installed.offers() if one.name not in FAMILIES}
+
+
+__all__ = ["FAMILIES", "Unusable", "clashing", "family", "names", "origin", "origins", "records", "skipped"]

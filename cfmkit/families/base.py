@@ -170,6 +170,10 @@ class MeasuredLoop:
     down: FloatArray
 
 
+INTERFACE = 1
+"""Number of this record: changes when a family that was written for it would no longer work."""
+
+
 class Model(Protocol):
     """One way to compute a mechanism."""
 
@@ -187,6 +191,26 @@ def function_named(name: str) -> Any:
     """
     module, _, function = name.partition(":")
     return getattr(import_module(module), function)
+
+
+_SPELT = "aefhilmnorsx"
+"""Letters whose names begin with a vowel."""
+
+
+def article(word: str) -> str:
+    """Return ``a`` or ``an``, as a word is spoken: one letter or one without vowels is spelt out.
+
+    Examples
+    --------
+    >>> [article(word) for word in ("cam", "oblique", "vcfm", "s-curve", "u-spring", "unit", "rhs")]
+    ['a', 'an', 'a', 'an', 'a', 'a', 'an']
+    """
+    first = word.lower().partition("-")[0]
+    if len(first) == 1 or not set(first) & set("aeiouy"):
+        return "an" if first[:1] in tuple(_SPELT) else "a"
+    if first.startswith(("uni", "use", "usu", "eu", "one")):
+        return "a"
+    return "an" if first[0] in "aeiou" else "a"
 
 
 SHARED = {WINDOW_OUTSIDE: "a window is not within the curve: what is measured over it has no value"}
@@ -253,11 +277,13 @@ class Family:
     branches : tuple of str
         Every name that a branch of its curves may have; none where the curve decides.
     template : str
-        File name under ``cfmkit/templates/`` that ``cfmkit new`` starts from.
+        What ``cfmkit new`` starts from: a file of a package, ``"package:folder/file"``.
     findings : mapping of str to str
         Every warning or failure name the family can report, with its meaning.
     references : tuple of str
         The papers, in one line each.
+    interface : int, optional
+        The `INTERFACE` that a family of another package was written for, as a plain number.
     """
 
     name: str
@@ -279,10 +305,16 @@ class Family:
     template: str = ""
     findings: dict[str, str] = field(default_factory=dict)
     references: tuple[str, ...] = ()
+    interface: int | None = None
 
     def __post_init__(self) -> None:
         """Add the findings that every family has."""
         object.__setattr__(self, "findings", {**self.findings, **SHARED})
+
+    @property
+    def phrase(self) -> str:
+        """The mechanism with its article: ``a cam mechanism``."""
+        return f"{article(self.name)} {self.name} mechanism"
 
     def analyze(self, spec: Spec, run: Run) -> Result:
         """Return what the model that a specification picks, or else the only one, makes of it."""

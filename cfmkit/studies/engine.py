@@ -303,7 +303,7 @@ def run(
     """
     study = work.study
     if study.design and family(study.spec.family).design is None:
-        raise UsageError(f"a {study.spec.family} mechanism cannot be designed, only analysed")
+        raise UsageError(f"{family(study.spec.family).phrase} cannot be designed, only analysed")
     records, watch = Records(work, journal if journal is not None else Memory()), monitor or Silent()
     watch.total(len(work.plan))
     queue = work.jobs()

@@ -207,9 +207,10 @@ def choices_of(spec: Spec) -> Choices:
     cfmkit.errors.SpecError
         If the specification has data for one of them only.
     """
-    names = tuple(family(spec.family).models)
+    record = family(spec.family)
+    names = tuple(record.models)
     if len(names) < 2:
-        raise UsageError(f"{OPTION}: a {spec.family} mechanism has one model only, there is nothing to compare")
+        raise UsageError(f"{OPTION}: {record.phrase} has one model only, there is nothing to compare")
     specs, obstacles = {}, {}
     for name in names:
         try:
@@ -254,7 +255,7 @@ def fidelity_of(result: Result) -> str:
     # A result that failed early has the specification as it was given: there the family's own rule applies.
     name = result.spec.at(PATH) or getattr(result.spec, "fidelity", None)
     if not isinstance(name, str):
-        raise CfmError(f"a {result.spec.family} result does not say its {PATH}")
+        raise CfmError(f"a result of the family {result.spec.family} does not say its {PATH}")
     return name
 
 

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cfmkit.errors import ExitCode, OutputError
+from cfmkit.families import origins
 from cfmkit.results import Status
 from cfmkit.store import Manifest, file_hash, origin, stable_hash
 from cfmkit.store.lock import LOCK
@@ -49,7 +50,7 @@ class KeptRuns:
     def __init__(self, out: str, options: list[Any], notes: Notes) -> None:
         """Nothing is read yet."""
         self._out, self._notes = out, notes
-        self._about = stable_hash([RECORDS, options, origin(LIBRARIES)])
+        self._about = stable_hash([RECORDS, options, origin(LIBRARIES), origins()])
         self._asked: dict[str, str | None] = {}
 
     def recall(self, spec: str, folder: str) -> Entry | None:

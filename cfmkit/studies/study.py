@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 from cfmkit.errors import CfmError, SpecError
 from cfmkit.families import family
+from cfmkit.families import origin as family_origin
 from cfmkit.families.base import Run
 from cfmkit.metrics import check, evaluate, gaps, values_of_family, window_of, windows_judged
 from cfmkit.results import Result, Status
@@ -153,7 +154,8 @@ class Study:
         spec = self.spec.model_dump(mode="json", exclude=NOT_DECIDING)
         noted = [(one.name, one.over) for one in self.metrics]
         data = [[str(source), file_hash(source.path.resolve())] for source in named_in(self.spec.model_dump())]
-        about = [RECORDS, self.paths, noted, self.design, self.curves, self.seed, origin(), data]
+        computing = [origin(), family_origin(self.spec.family)]
+        about = [RECORDS, self.paths, noted, self.design, self.curves, self.seed, computing, data]
         return bytes.fromhex(stable_hash([spec, *about]))
 
     def key(self, values: Sequence[Any]) -> str:

@@ -86,7 +86,7 @@ def prepare(spec: Spec, request: Request) -> Work:
     drawn = request.pictures and len(plan.variables) == 1 and len(plan) <= MOST_CURVES
     curves = writes_curves(spec, request) or drawn
     if design and family(spec.family).design is None:
-        raise UsageError(f"a {spec.family} mechanism cannot be designed, only analysed")
+        raise UsageError(f"{family(spec.family).phrase} cannot be designed, only analysed")
     names = request.metrics or (block.metrics if block else ())
     metrics = metrics_of(spec, names, sample_curve(spec, plan, design))
     return Work(Study(spec, plan.paths, metrics, design, curves, request.seed), plan)

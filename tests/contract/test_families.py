@@ -5,7 +5,6 @@ from __future__ import annotations
 import pickle
 import re
 from importlib import import_module
-from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +14,7 @@ import spare_family
 import cfmkit
 from cfmkit import api, families, report
 from cfmkit.cli.main import main
+from cfmkit.cli.templates import template
 from cfmkit.geometry import Drawing
 from cfmkit.keys import keys
 from cfmkit.results import Status
@@ -52,13 +52,13 @@ def test_a_family_has_a_config_and_the_config_of_its_template(name):
     record = families.family(name)
     assert record.name == name
     assert {cfmkit.load(path).family for path in CONFIGS} >= {name}
-    spec = cfmkit.loads(files("cfmkit").joinpath("templates", record.template).read_bytes())
+    spec = cfmkit.loads(template(name))
     assert spec.family == name
 
 
 @every_family
 def test_a_template_runs_and_is_designed_without_a_warning(name):
-    spec = cfmkit.loads(files("cfmkit").joinpath("templates", families.family(name).template).read_bytes())
+    spec = cfmkit.loads(template(name))
     for found in (spec, cfmkit.design(spec).spec):
         done = report.report_on(cfmkit.analyze(found))
         assert [item.name for item in done.warnings] == []
@@ -67,7 +67,7 @@ def test_a_template_runs_and_is_designed_without_a_warning(name):
 
 @every_family
 def test_the_band_of_the_template_is_one_that_a_spec_takes(name):
-    text = files("cfmkit").joinpath("templates", families.family(name).template).read_text()
+    text = template(name)
     spec = cfmkit.loads(re.sub(r"(?m)^  # (band: \S+ ?%?).*$", r"  \1", text).encode())
     assert text.count("# band: 5 %") == 1
     assert spec.analysis.band == 0.05
@@ -76,7 +76,7 @@ def test_the_band_of_the_template_is_one_that_a_spec_takes(name):
 
 @every_family
 def test_the_template_mentions_every_key_of_the_mechanism_the_design_and_the_analysis(name):
-    text = files("cfmkit").joinpath("templates", families.family(name).template).read_text()
+    text = template(name)
     paths = [key.path.split(".") for key in keys(name)]
     named = {path[1] for path in paths if path[0] in ("mechanism", "design", "analysis") and len(path) == 2}
     assert {word for word in named if f"{word}:" not in text} == set()

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from cfmkit.cli import completion
-from cfmkit.cli.answer import Answer
+from cfmkit.cli.answer import Answer, told_of
 from cfmkit.cli.options import Common
 
 if TYPE_CHECKING:
@@ -39,5 +39,10 @@ def run(options: Options, terminal: Terminal) -> Answer:
     from cfmkit import families
     from cfmkit.keys import schema
 
-    found = schema(families.names() if options.family is None else [options.family])
+    if options.family is not None:
+        return _answer(schema([options.family]))
+    return told_of(families.skipped(), _answer(schema([one.name for one in families.records()])))
+
+
+def _answer(found: dict[str, Any]) -> Answer:
     return Answer({"schema": found}, lambda screen: screen.document(found))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cfmkit.cli import completion
-from cfmkit.cli.answer import Answer
+from cfmkit.cli.answer import Answer, told_of
 from cfmkit.cli.options import Common
 
 if TYPE_CHECKING:
@@ -41,10 +41,11 @@ class Options(Common):
 
 def run(options: Options, terminal: Terminal) -> Answer:
     """Explain a family with every key of its spec, list units, metrics, materials or papers, or explain one by name."""
-    from cfmkit.cli.topics import page
+    from cfmkit.cli.topics import page, skipped
 
     found = page(options.topic)
-    return Answer({"show": options.topic} | dict(found.data), lambda screen: screen.show(*_rendered(found)))
+    answer = Answer({"show": options.topic} | dict(found.data), lambda screen: screen.show(*_rendered(found)))
+    return told_of(skipped(options.topic), answer)
 
 
 def _rendered(found: Page) -> Iterator[RenderableType]:
