@@ -54,16 +54,26 @@ def family(name: str) -> Family:
     raise UsageError(f"unknown family {name!r}; known are {', '.join(names())}{hint}")
 
 
+def examined() -> tuple[tuple[installed.Offer | None, Family | str], ...]:
+    """Return every family with the offer of the package it is from, or the reason why it cannot be used.
+
+    Returns
+    -------
+    tuple of (Offer or None, Family or str)
+        Those of this package come first, without an offer. All others are imported.
+    """
+    own = tuple((None, family(name)) for name in FAMILIES)
+    return own + tuple((offer, _tried(offer)) for offer in installed.offers())
+
+
 def records() -> tuple[Family, ...]:
     """Return all families that can be used, in the order of `names`; `skipped` says which cannot."""
-    return tuple(family(name) for name in FAMILIES) + tuple(
-        found for offer in installed.offers() if not isinstance(found := _tried(offer), str)
-    )
+    return tuple(found for _, found in examined() if not isinstance(found, str))
 
 
 def skipped() -> tuple[str, ...]:
     """Return one line for each family of another package that cannot be used, with the reason."""
-    return tuple(found for offer in installed.offers() if isinstance(found := _tried(offer), str))
+    return tuple(found for _, found in examined() if isinstance(found, str))
 
 
 def _tried(offer: installed.Offer) -> Family | str:
@@ -89,4 +99,4 @@ def origins() -> dict[str, dict[str, str]]:
     return {one.name: installed.code_of(one) for one in installed.offers() if one.name not in FAMILIES}
 
 
-__all__ = ["FAMILIES", "Unusable", "clashing", "family", "names", "origin", "origins", "records", "skipped"]
+__all__ = ["FAMILIES", "Unusable", "clashing", "examined", "family", "names", "origin", "origins", "records", "skipped"]

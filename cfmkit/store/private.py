@@ -22,7 +22,7 @@ def private_folder(name: str) -> Path | None:
         What it is for, in a few letters.
     """
     try:
-        folder = Path(tempfile.gettempdir()) / f"cfmkit-{name}-{_user()}"
+        folder = place(name)
         try:
             system.mkdir(folder, 0o700)
         except FileExistsError:
@@ -31,6 +31,11 @@ def private_folder(name: str) -> Path | None:
         return folder
     except OSError:
         return None
+
+
+def place(name: str) -> Path:
+    """Return where such a folder is, whether it exists or not."""
+    return Path(tempfile.gettempdir()) / f"cfmkit-{name}-{_user()}"
 
 
 def _user() -> str:

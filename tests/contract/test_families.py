@@ -8,6 +8,7 @@ from importlib import import_module
 from pathlib import Path
 
 import numpy as np
+import plugin_support
 import pytest
 import spare_family
 
@@ -20,7 +21,7 @@ from cfmkit.keys import keys
 from cfmkit.results import Status
 from cfmkit.units import DIMENSIONS
 
-CONFIGS = sorted((Path(__file__).parents[2] / "configs").glob("*.yaml"))
+CONFIGS = [*sorted((Path(__file__).parents[2] / "configs").glob("*.yaml")), *plugin_support.CONFIGS]
 BY_NAME = {path.stem: path for path in CONFIGS}
 
 every_config = pytest.mark.parametrize("path", CONFIGS, ids=BY_NAME)

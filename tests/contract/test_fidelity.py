@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import plugin_support
 import pytest
 
 import cfmkit
@@ -17,7 +18,7 @@ from cfmkit.results import Finding, Result, Status
 from cfmkit.studies.fidelity import PATH, Choices, Comparison, Variant, choices_of, compare, fidelity_of, lines_of
 from cfmkit.studies.leaves import CannotVary, leaf
 
-CONFIGS = sorted((Path(__file__).parents[2] / "configs").glob("*.yaml"))
+CONFIGS = [*sorted((Path(__file__).parents[2] / "configs").glob("*.yaml")), *plugin_support.CONFIGS]
 CAM = CONFIGS[0].parent / "cam.yaml"
 
 

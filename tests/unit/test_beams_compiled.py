@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from cfmkit.beams import CLAMPED, Beam, Displacement, Network, Node, Section, Taper, gradient, trace
-from cfmkit.beams.kernels import dense, entry, predictor
+from cfmkit.beams.kernels import dense, entry, kept, predictor
 from cfmkit.beams.warming import warm
 
 _count, _solve, _predict = dense.positive_count, dense.lu_solve, predictor._predict
@@ -60,7 +60,7 @@ def _pulled_beam() -> tuple[Network, Displacement]:
 def test_a_changed_kernel_file_changes_the_digest(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for path in Path(entry.__file__).parent.glob("*.py"):
         (tmp_path / path.name).write_bytes(path.read_bytes())
-    monkeypatch.setattr(entry, "__file__", str(tmp_path / "entry.py"))
+    monkeypatch.setattr(kept, "__file__", str(tmp_path / "kept.py"))
     before = entry.digest()
     with (tmp_path / "chain.py").open("a") as file:
         file.write("# changed\n")

@@ -7,7 +7,6 @@ is used.
 from __future__ import annotations
 
 import contextlib
-import hashlib
 import logging
 from pathlib import Path
 from typing import Any
@@ -20,19 +19,12 @@ from cfmkit.beams.kernels import newton as _newton
 from cfmkit.beams.kernels import observe as _observe
 from cfmkit.beams.kernels import output_slopes as _outputs
 from cfmkit.beams.kernels.compiler import door
+from cfmkit.beams.kernels.kept import digest
 
 _follow, _solve, _each = _march.march, _newton.solve, _newton.solve_each
 _forces, _states = _observe.forces, _observe.states
 _tangent = _observe.tangent
 _slopes, _row_slopes, _held_slopes = _columns.slopes, _outputs.row_slopes, _outputs.held_slopes
-
-
-def digest() -> str:
-    """Return a digest of the sources of all kernels."""
-    whole = hashlib.sha256()
-    for path in sorted(Path(__file__).parent.glob("*.py")):
-        whole.update(path.read_bytes())
-    return whole.hexdigest()
 
 
 def _doors(stamp: str) -> tuple[Any, ...]:

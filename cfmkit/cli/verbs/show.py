@@ -44,11 +44,12 @@ def run(options: Options, terminal: Terminal) -> Answer:
     from cfmkit.cli.topics import page, skipped
 
     found = page(options.topic)
-    answer = Answer({"show": options.topic} | dict(found.data), lambda screen: screen.show(*_rendered(found)))
+    answer = Answer({"show": options.topic} | dict(found.data), lambda screen: screen.show(*rendered(found)))
     return told_of(skipped(options.topic), answer)
 
 
-def _rendered(found: Page) -> Iterator[RenderableType]:
+def rendered(found: Page) -> Iterator[RenderableType]:
+    """Yield the lines and tables of a page."""
     from rich.text import Text
 
     from cfmkit.cli.terminal import LABEL

@@ -1,0 +1,162 @@
+"""``cfmkit doctor``: what this installation has, and what is wrong with it."""
+
+from __future__ import annotations
+
+import os
+import platform
+import re
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from cfmkit._version import __version__
+from cfmkit.cli.answer import Answer
+from cfmkit.cli.options import Common
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    from cfmkit.cli.pages import Page
+    from cfmkit.cli.terminal import Terminal
+
+    Record = dict[str, Any]
+
+PLACE = 86
+
+
+@dataclass(frozen=True, kw_only=True)
+class Options(Common):
+    """Arguments and options."""
+
+
+def run(options: Options, terminal: Terminal) -> Answer:
+    """Say which versions, packages, folders, compiled code and families there are, and what is wrong with them.
+
+    Families of other packages are imported for it: installed code runs.
+    """
+    from cfmkit.cli.verbs.show import rendered
+
+    found = {
+        "versions": {"cfmkit": __version__, "python": platform.python_version(), "system": platform.platform()},
+        "packages": list(_packages()),
+        "folders": [_folder(what, path) for what, path in _folders().items()],
+        "solver": _solver(),
+        "families": list(_families()),
+    }
+    troubles = tuple(_troubles(found))
+    page = _page(found)
+    data = {"message": "; ".join(troubles) or "nothing is wrong", **found}
+    warnings = [{"name": "doctor", "message": trouble} for trouble in troubles]
+
+    def view(screen: Terminal) -> None:
+        screen.show(*rendered(page))
+        told = [f"warning  {one}" for one in troubles] or ["nothing is wrong"]
+        screen.text("\n".join(["", *told, ""]))
+
+    return Answer({**data, "warnings": warnings}, view)
+
+
+def _packages() -> Iterator[Record]:
+    """Yield what cfmkit uses, with the version that is there; None where it is missing."""
+    from importlib.metadata import PackageNotFoundError, requires, version
+
+    try:
+        needed = requires("cfmkit") or []
+    except PackageNotFoundError:  # run from its source, not installed
+        needed = []
+    for text in needed:
+        name = re.split(r"[^\w.-]", text, maxsplit=1)[0]
+        extra = re.search(r"extra == ['\"]([^'\"]+)", text)
+        if extra and extra[1] not in _EXTRAS:
+            continue
+        try:
+            found: str | None = version(name)
+        except PackageNotFoundError:
+            found = None
+        yield {"name": name, "version": found, "extra": extra[1] if extra else ""}
+
+
+_EXTRAS = ("cluster",)
+"""Optional parts that a user may want; those for tests and development are no matter of an installation."""
+
+
+def _folders() -> Mapping[str, Path]:
+    from cfmkit.beams.kernels.kept import folders
+
+    return {
+        "output (the current folder)": Path.cwd(),
+        "temporary files": Path(tempfile.gettempdir()),
+        "compiled solver": next((path for path in folders() if _writable(path)), folders()[0]),
+    }
+
+
+def _folder(what: str, path: Path) -> Record:
+    return {"name": what, "path": str(path), "writable": _writable(path)}
+
+
+def _writable(path: Path) -> bool:
+    """Return whether a folder, or the nearest one above it that is there, can be written to."""
+    while not path.exists() and path != path.parent:
+        path = path.parent
+    return path.is_dir() and os.access(path, os.W_OK | os.X_OK)
+
+
+def _solver() -> Record:
+    from cfmkit.beams.kernels.kept import kept_in
+
+    folder = kept_in()
+    return {"compiled": folder is not None, "folder": None if folder is None else str(folder)}
+
+
+def _families() -> Iterator[Record]:
+    """Yield every family that is offered, with what is wrong with it."""
+    from cfmkit import families
+
+    for offer, found in families.examined():
+        about = {"package": "cfmkit", "version": __version__} if offer is None else _source(offer)
+        if isinstance(found, str):
+            yield {"name": offer.name if offer else "", **about, "state": "skipped", "reason": found}
+        else:
+            yield {"name": found.name, **about, "state": "ok", "reason": ""}
+
+
+def _source(offer: Any) -> Record:
+    return {"package": offer.package, "version": offer.version}
+
+
+def _troubles(found: Mapping[str, Any]) -> Iterator[str]:
+    for one in found["packages"]:
+        if one["version"] is None and not one["extra"]:
+            yield f"the package {one['name']} is missing: install cfmkit again"
+    for one in found["folders"]:
+        if not one["writable"]:
+            yield f"{one['path']} cannot be written to: {one['name']}"
+    for one in found["families"]:
+        if one["reason"]:
+            yield one["reason"]
+
+
+def _page(found: Mapping[str, Any]) -> Page:
+    from cfmkit.cli.pages import Column, Page, Section, field
+
+    versions = [{"name": name, "version": version} for name, version in found["versions"].items()]
+    compiled = found["solver"]["folder"] or "not yet: about half a minute at the first use, or `cfmkit warm`"
+    state = Column("state", lambda one: one["reason"] or one["state"], wraps=True)
+    sections = (
+        Section("versions", versions, (field("name"), field("version", wraps=True))),
+        Section("packages", found["packages"], (field("name"), Column("version", _version))),
+        Section("folders", found["folders"], (field("name"), Column("", _access), field("path", wraps=True))),
+        Section("beam solver", [{"compiled": compiled}], (field("compiled", wraps=True),)),
+        Section("families", found["families"], (field("name"), field("package"), field("version"), state)),
+    )
+    return Page("cfmkit doctor", "what this installation has", sections, {})
+
+
+def _version(package: Mapping[str, Any]) -> str:
+    wanted = f"not installed; only for cfmkit[{package['extra']}]" if package["extra"] else "missing"
+    return str(package["version"] or wanted)
+
+
+def _access(folder: Mapping[str, Any]) -> str:
+    return "writable" if folder["writable"] else "cannot be written to"

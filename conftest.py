@@ -1,0 +1,18 @@
+"""Settings of all tests.
+
+The families in `plugins` take part, installed or not. Property tests try the same examples in every run, unless a
+search for new ones is asked for: ``CFMKIT_TEST_SEARCH=1 pytest`` draws new examples.
+"""
+
+from __future__ import annotations
+
+import os
+
+import plugin_support
+from hypothesis import settings
+
+REGISTERED = plugin_support.register()  # kept until the tests end
+
+settings.register_profile("repeat", derandomize=True)
+settings.register_profile("search", derandomize=False)
+settings.load_profile("search" if os.environ.get("CFMKIT_TEST_SEARCH") else "repeat")

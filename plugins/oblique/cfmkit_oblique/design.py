@@ -1,0 +1,96 @@
+"""Springs for a force that stays constant over a range, with zero stiffness in its middle.
+
+Zero stiffness makes the force's departure at d from the middle, over the force F there, a matter of shapes alone:
+
+    (F(d) - F) / F = g e (1 - 1 / sqrt(1 + e^2)) / ((1 - g) sqrt(1 - g^2)),    e = d / a, g = a / L0.
+
+It grows with g: the largest g within the tolerance has the shortest springs. g then gives h0, and h0 the stiffnesses.
+"""
+
+from __future__ import annotations
+
+from math import hypot, sqrt
+from typing import TYPE_CHECKING
+
+from cfmkit.families.findings import at_least, at_most, mm
+from cfmkit.families.refusals import Infeasible, no_design
+from cfmkit.numerics.roots import bracketed_root
+from cfmkit.results import Design, Status
+from cfmkit_oblique.model import finding
+
+if TYPE_CHECKING:
+    from cfmkit.families.base import Run
+    from cfmkit_oblique.spec import Mechanism, ObliqueDesign, ObliqueSpec
+
+LEAST, MOST = 0.01, 0.99
+"""Of a over L0: springs of a hundred half spans, and springs compressed by a hundredth, which play would use up."""
+
+
+def design(spec: ObliqueSpec, run: Run) -> Design:
+    """Return the shortest springs that keep the force within the tolerance over the range; the half span stays."""
+    wish, part = spec.design, spec.mechanism
+    if wish is None:
+        return Design(spec, Status.COMPLETE)
+    try:
+        free = part.half_span / _ratio(wish, part.half_span)
+        height = sqrt((free - part.half_span) * (free + part.half_span))
+        end = height + 0.5 * wish.range
+        _coils_stay_apart(part, end)
+    except Infeasible as problem:
+        return no_design(problem.finding, problem.nearest)
+    vertical = wish.force / height
+    changes: dict[str, object] = {
+        "mechanism.oblique.stiffness": 0.5 * vertical * part.half_span / (free - part.half_span),
+        "mechanism.oblique.free_length": free,
+        "mechanism.vertical.stiffness": vertical,
+        "analysis.window": (height - 0.5 * wish.range, end),
+    }
+    if spec.analysis.travel is not None:
+        changes["analysis.travel"] = max(spec.analysis.travel, end)
+    return Design(spec.replace(changes), Status.COMPLETE)
+
+
+def _ratio(wish: ObliqueDesign, half_span: float) -> float:
+    """Return the largest a over L0 that keeps the force within the tolerance."""
+    reach = 0.5 * wish.range / half_span
+    if departure(LEAST, reach) > wish.tolerance:
+        told = f"a range of {mm(wish.range)} needs springs of more than {mm(half_span / LEAST)}"
+        raise Infeasible(finding("no_room", told), {"design.range": _range(LEAST, wish, half_span)})
+    ratio = MOST
+    if departure(MOST, reach) > wish.tolerance:
+        ratio = bracketed_root(lambda g: departure(g, reach) - wish.tolerance, LEAST, MOST)
+    height = half_span * sqrt(1.0 / ratio**2 - 1.0)
+    if wish.height_max is not None and height > wish.height_max:
+        told = f"the slider has to start {mm(height)} above the anchors; allowed are {mm(wish.height_max)}"
+        flattest = half_span / hypot(half_span, wish.height_max)
+        nearest = {"design.height_max": at_least(height)}
+        if flattest <= MOST:
+            nearest["design.range"] = _range(flattest, wish, half_span)
+        raise Infeasible(finding("no_room", told), nearest)
+    return ratio
+
+
+def _range(ratio: float, wish: ObliqueDesign, half_span: float) -> str:
+    """Return the largest range that springs of some a over L0 have within the tolerance."""
+    # the departure at e is above e - 1 times this, which bounds the root
+    factor = ratio / ((1.0 - ratio) * sqrt(1.0 - ratio**2))
+    fits = bracketed_root(lambda e: departure(ratio, e) - wish.tolerance, 0.0, 2.0 + wish.tolerance / factor)
+    return at_most(2.0 * half_span * fits)
+
+
+def _coils_stay_apart(part: Mechanism, end: float) -> None:
+    """Refuse springs that are solid before the range ends."""
+    if part.oblique.solid_length > part.half_span:
+        told = f"the oblique springs are solid at {mm(part.oblique.solid_length)}, before they lie flat"
+        raise Infeasible(finding("coils_touch", told), {"mechanism.oblique.solid_length": at_most(part.half_span)})
+    if (room := part.vertical.free_length - part.vertical.solid_length) < end:
+        told = f"the vertical spring can be compressed by {mm(room)}; the range ends at {mm(end)}"
+        longer = at_least(part.vertical.solid_length + end)
+        raise Infeasible(finding("coils_touch", told), {"mechanism.vertical.free_length": longer})
+
+
+def departure(ratio: float, reach: float) -> float:
+    """Return how far the force is off at the end of a reach [half spans], as a fraction of that in the middle."""
+    # 1 - 1 / sqrt(1 + e^2), without the loss of digits near e = 0
+    root = hypot(1.0, reach)
+    return ratio * reach * (reach / root * (reach / (1.0 + root))) / ((1.0 - ratio) * sqrt(1.0 - ratio**2))

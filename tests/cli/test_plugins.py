@@ -1,0 +1,183 @@
+"""Families of other packages in every verb, those that cannot be used, and the doctor."""
+
+from __future__ import annotations
+
+import json
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import packages
+import plugin_support
+import pytest
+
+import cfmkit
+from cfmkit import families
+from cfmkit.cli import completion
+from cfmkit.cli.main import main
+from cfmkit.families import installed
+
+SPRINGS = str(plugin_support.PLUGINS[0] / "configs" / "oblique_carrella2007.yaml")
+
+
+@pytest.fixture
+def site(tmp_path, monkeypatch):
+    """An empty folder on the path of modules; the current folder is another one."""
+    folder, here = tmp_path / "site", tmp_path / "here"
+    folder.mkdir()
+    here.mkdir()
+    monkeypatch.syspath_prepend(str(folder))
+    monkeypatch.chdir(here)
+    installed._imported.cache_clear()
+    installed._offers_on.cache_clear()
+    yield folder
+    packages.forget(folder)
+    installed._imported.cache_clear()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "files"),
+    [
+        (("check", SPRINGS), ()),
+        (("new", "oblique"), ("oblique.yaml",)),
+        (("show", "oblique"), ()),
+        (("show", "plateau_force"), ()),
+        (("show", "carrella-2007"), ()),
+        (("show", "references"), ()),
+        (("schema", "oblique"), ()),
+        (("schema",), ()),
+        (("analyze", SPRINGS, "-o", "out"), ("out/curve.csv", "out/figures/loop.png", "out/figures/mechanism.png")),
+        (("analyze", SPRINGS, "-o", "out", "--compare-fidelity", "--no-plots"), ("out/curve.csv",)),
+        (("export", SPRINGS, "-o", "out"), ("out/oblique.dxf", "out/oblique.svg")),
+        (("sweep", SPRINGS, "-o", "out", "--vary", "mechanism.half_span=40mm:60mm:5", "-j", "1"), ("out/results.csv",)),
+        (("batch", SPRINGS, "-o", "out", "--no-plots"), ("out/results.csv",)),
+    ],
+    ids=lambda value: "-".join(value[:2]) if isinstance(value, tuple) and value and value[0].isalpha() else None,
+)
+def test_every_verb_works_for_a_family_of_another_package(site, arguments, files):
+    assert main(list(arguments)) == 0
+    assert [name for name in files if not Path(name).exists()] == []
+
+
+def test_workers_know_the_families_of_other_packages(site):
+    """Two processes have to start: 3 s."""
+    vary = ("--vary", "mechanism.half_span=40mm:60mm:5")
+    assert main(["sweep", SPRINGS, "-o", "out", *vary, "-j", "2", "--no-plots"]) == 0
+    assert Path("out/results.csv").read_text().count("complete") == 5
+
+
+def test_a_run_says_which_package_computed_it(site):
+    assert main(["analyze", SPRINGS, "-o", "out", "--no-plots"]) == 0
+    made = json.loads(Path("out/manifest.json").read_text())["spec"]["family"]
+    assert made == families.origin("oblique")
+    assert made["package"] == "cfmkit-oblique"
+    assert len(made["content"]) == 64
+
+
+def test_names_are_completed():
+    assert completion.families("ob") == ["oblique"]
+    assert "oblique" in completion.topics("obl")
+
+
+def test_a_family_has_its_article(monkeypatch):
+    record = families.family("oblique")
+    monkeypatch.setattr("cfmkit.api.family", lambda _name: replace(record, design=None, outline=None))
+    monkeypatch.setattr("cfmkit.studies.fidelity.family", lambda _name: replace(record, models={"exact": ""}))
+    with pytest.raises(cfmkit.UsageError, match=r"^an oblique mechanism cannot be designed"):
+        cfmkit.design(SPRINGS)
+    with pytest.raises(cfmkit.UsageError, match=r"^an oblique mechanism has no part"):
+        cfmkit.drawing(SPRINGS)
+    from cfmkit.studies.fidelity import choices_of
+
+    with pytest.raises(cfmkit.UsageError, match=r": an oblique mechanism has one model only"):
+        choices_of(cfmkit.load(SPRINGS))
+    assert families.family("cam").phrase == "a cam mechanism"
+
+
+LINE = "warning  the family 'broken' of the package broken-one 1.0 cannot be used: it cannot be imported: "
+
+
+@pytest.mark.parametrize("arguments", [("show",), ("show", "references"), ("show", "pla"), ("schema",)])
+def test_a_verb_that_tells_of_all_families_skips_a_broken_one_with_one_line(site, arguments, capsys):
+    packages.install(site, "broken-one", "import nowhere_to_be_found\n", "broken")
+    assert main(list(arguments)) == 0
+    out, err = capsys.readouterr()
+    assert [line for line in err.splitlines() if line.startswith(LINE)] == err.splitlines()
+    assert err.count("\n") == 1
+    assert "doctor" in err
+    assert "broken" not in out
+    assert main([*arguments, "--json"]) == 0
+    (told,) = json.loads(capsys.readouterr().out)["warnings"]
+    assert told["name"] == "family_skipped"
+
+
+@pytest.mark.parametrize(
+    "arguments", [("show", "cam"), ("show", "units"), ("new", "cam", "-o", "-"), ("schema", "cam"), ("check", SPRINGS)]
+)
+def test_a_verb_that_needs_no_other_family_does_not_import_a_broken_one(site, arguments, capsys):
+    module = packages.install(site, "broken-one", "raise SystemExit('imported')\n", "broken")
+    assert main(list(arguments)) == 0
+    assert "broken" not in capsys.readouterr().err
+    assert module not in sys.modules
+
+
+@pytest.mark.parametrize("arguments", [("new", "broken"), ("show", "broken"), ("schema", "broken")])
+def test_a_broken_family_by_its_name_is_a_usage_error_with_the_reason(site, arguments, capsys):
+    packages.install(site, "broken-one", packages.record("broken", 7), "broken")
+    assert main(list(arguments)) == 2
+    err = capsys.readouterr().err
+    assert err.count("\n") == 1
+    assert "is for interface 7, this cfmkit has interface 1" in err
+
+
+def test_a_specification_of_a_broken_family_is_invalid_at_that_place(site, capsys):
+    packages.install(site, "broken-one", "import nowhere_to_be_found\n", "broken")
+    Path("x.yaml").write_text("cfmkit: 1\nfamily: broken\n")
+    assert main(["check", "x.yaml"]) == 3
+    assert capsys.readouterr().err.startswith("x.yaml:2:9: family: the family 'broken' of the package broken-one")
+
+
+def test_the_doctor_says_why_a_family_is_skipped(site, capsys):
+    packages.install(site, "broken-one", "import nowhere_to_be_found\n", "broken")
+    for package in ("one-more", "another-one"):
+        packages.install(site, package, packages.record("twin"), "twin")
+    packages.install(site, "other-cam", packages.record("cam"), "cam")
+    assert main(["doctor"]) == 0
+    page = " ".join(capsys.readouterr().out.split())
+    assert "No module named 'nowhere_to_be_found'" in page
+    assert main(["doctor", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    state = {(one["name"], one["package"]): one["state"] for one in found["families"]}
+    assert state["cam", "cfmkit"] == state["oblique", "cfmkit-oblique"] == "ok"
+    skipped = {("broken", "broken-one"), ("twin", "one-more"), ("twin", "another-one"), ("cam", "other-cam")}
+    assert {key for key, word in state.items() if word == "skipped"} == skipped
+    assert len(found["warnings"]) == 4
+
+
+def test_the_doctor_knows_versions_folders_and_the_solver(site, capsys):
+    assert main(["doctor", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["versions"]["cfmkit"] == cfmkit.__version__
+    assert {"numpy", "numba"} <= {one["name"] for one in found["packages"] if one["version"]}
+    assert all(one["writable"] for one in found["folders"])
+    assert found["message"] == "nothing is wrong"
+    assert main(["doctor"]) == 0
+    assert capsys.readouterr().out.endswith("nothing is wrong\n")
+
+
+def test_the_doctor_sees_whether_the_solver_is_compiled(tmp_path, monkeypatch):
+    from cfmkit.beams.kernels import kept
+
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    assert kept.kept_in() is None
+    (tmp_path / "kernels").mkdir()
+    (tmp_path / "kernels" / "entry.real_0123456789abcdef-34.nbi").touch()
+    assert kept.kept_in() is None
+    (tmp_path / "kernels" / f"entry.real_{kept.digest()[:16]}-34.nbi").touch()
+    assert kept.kept_in() == tmp_path / "kernels"
+
+
+def test_the_doctor_finds_a_folder_that_cannot_be_written_to(site, monkeypatch, capsys):
+    monkeypatch.setattr("cfmkit.cli.verbs.doctor.os.access", lambda _path, _mode: False)
+    assert main(["doctor"]) == 0
+    assert "cannot be written to" in capsys.readouterr().out

@@ -1,0 +1,44 @@
+"""The families in `plugins`, as if they were installed: for whoever runs the tests without installing them."""
+
+from __future__ import annotations
+
+import os
+import sys
+import tempfile
+import tomllib
+from pathlib import Path
+
+from cfmkit.families import installed
+
+PLUGINS = sorted(path.parent for path in (Path(__file__).parents[2] / "plugins").glob("*/pyproject.toml"))
+CONFIGS = [path for plugin in PLUGINS for path in sorted((plugin / "configs").glob("*.yaml"))]
+
+
+def register() -> tempfile.TemporaryDirectory[str] | None:
+    """Put the packages that are not installed on the path, here and in child processes, with their entry points.
+
+    Returns
+    -------
+    TemporaryDirectory or None
+        Holds the entry points for as long as it lives; None if every package is installed.
+    """
+    known = {one.package for one in installed.offers()}
+    missing = [plugin for plugin in PLUGINS if _project(plugin)["name"] not in known]
+    if not missing:
+        return None
+    folder = tempfile.TemporaryDirectory(prefix="cfmkit-plugins-")
+    for plugin in missing:
+        project = _project(plugin)
+        info = Path(folder.name, f"{project['name'].replace('-', '_')}-{project['version']}.dist-info")
+        info.mkdir()
+        entries = project["entry-points"][installed.GROUP]
+        lines = [f"[{installed.GROUP}]", *(f"{name} = {target}" for name, target in entries.items())]
+        (info / "entry_points.txt").write_text("\n".join(lines) + "\n")
+    added = [folder.name, *map(str, missing)]
+    sys.path += added
+    os.environ["PYTHONPATH"] = os.pathsep.join([*filter(None, [os.environ.get("PYTHONPATH")]), *added])
+    return folder
+
+
+def _project(plugin: Path) -> dict:
+    return tomllib.loads((plugin / "pyproject.toml").read_text())["project"]
