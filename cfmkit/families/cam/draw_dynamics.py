@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cfmkit.curves import FloatArray
-    from cfmkit.families.cam.dynamics.model import Moved
+    from cfmkit.families.cam.dynamics.solution import Moved
     from cfmkit.results import Result
 
 TIME = Scale("time", "time")

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cfmkit.families.cam.dynamics.build import Build
-    from cfmkit.families.cam.dynamics.model import Moved
+    from cfmkit.families.cam.dynamics.solution import Moved
     from cfmkit.families.cam.spec import CamSpec
     from cfmkit.results import Finding
 

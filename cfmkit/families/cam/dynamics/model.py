@@ -11,7 +11,6 @@ Reference
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -25,6 +24,7 @@ from cfmkit.families.cam.dynamics.ending import ending
 from cfmkit.families.cam.dynamics.history import History, inverse_history, multibody_history
 from cfmkit.families.cam.dynamics.inverse import statics
 from cfmkit.families.cam.dynamics.multibody import CornerContact
+from cfmkit.families.cam.dynamics.solution import Moved
 from cfmkit.families.cam.dynamics.values import contact_pressure, slow_force, values_of
 from cfmkit.families.cam.values import constant_force
 from cfmkit.families.refusals import CannotBuild, no_result
@@ -35,31 +35,6 @@ if TYPE_CHECKING:
     from cfmkit.families.base import Run
     from cfmkit.families.cam.spec import CamSpec
     from cfmkit.results import Finding
-
-
-@dataclass(frozen=True)
-class Moved:
-    """A mechanism that went through a motion, as checks, values and pictures need it.
-
-    Attributes
-    ----------
-    spec : CamSpec
-        Resolved.
-    build : Build
-        The parts.
-    history : History
-        Forces and speeds over time.
-    static : (n,) array
-        Force on the slider at rest in the same places [N].
-    displacement : (n,) array
-        Of the slider, from the origin that the analysis asks for [m].
-    """
-
-    spec: CamSpec
-    build: Build
-    history: History
-    static: FloatArray
-    displacement: FloatArray
 
 
 def analyze(spec: CamSpec, run: Run) -> Result:

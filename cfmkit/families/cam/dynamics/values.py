@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from cfmkit.curves import FloatArray
     from cfmkit.families.cam.dynamics.machine import Machine
-    from cfmkit.families.cam.dynamics.model import Moved
+    from cfmkit.families.cam.dynamics.solution import Moved
 
 SLOW = 1.0
 """Duration of the motion that the paper compares with [s]."""
