@@ -19,5 +19,5 @@ def template(name: str) -> str:
     record = family(name)
     if not record.template:
         raise UsageError(f"the family {name!r} has no template; `cfmkit show {name}` lists its keys")
-    package, _, path = record.template.partition(":")
+    package, _, path = record.template.partition("/")
     return files(package).joinpath(path).read_text(encoding="utf-8")

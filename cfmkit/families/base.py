@@ -277,7 +277,7 @@ class Family:
     branches : tuple of str
         Every name that a branch of its curves may have; none where the curve decides.
     template : str
-        What ``cfmkit new`` starts from: a file of a package, ``"package:folder/file"``.
+        What ``cfmkit new`` starts from: a file of a package, ``"package/folder/file"``.
     findings : mapping of str to str
         Every warning or failure name the family can report, with its meaning.
     references : tuple of str

@@ -26,7 +26,8 @@ if TYPE_CHECKING:
 
     from cfmkit.families.base import Family
 
-GROUP = "cfmkit.families"
+SECTION = "[cfmkit.families]"
+"""What stands above the entry points of the group."""
 
 _INFO = re.compile(r"(?P<package>[^-]+)(?:-(?P<version>[^-]+))?.*\.(?:dist|egg)-info")
 """Folders in which an installer says what it has installed."""
@@ -91,19 +92,17 @@ def _installed_in(folder: str) -> Iterator[tuple[str, str, str]]:
 
 
 def _entries(info: str) -> Iterator[tuple[str, str]]:
-    """Yield (name, target) of the entry points of this group."""
+    """Yield (name, target) of the entry points of the group."""
     try:
         with open(os.path.join(info, "entry_points.txt"), encoding="utf-8", errors="replace") as file:
             text = file.read()
     except OSError:
         return
-    if GROUP not in text:
-        return
-    section = ""
-    for line in map(str.strip, text.splitlines()):
+    inside = False
+    for line in map(str.strip, text.splitlines() if SECTION in text else ()):
         if line.startswith("["):
-            section = line.strip("[] ")
-        elif section == GROUP and "=" in line and not line.startswith(("#", ";")):
+            inside = line == SECTION
+        elif inside and "=" in line and not line.startswith(("#", ";")):
             name, _, target = line.partition("=")
             yield name.strip(), target.partition("[")[0].strip()
 

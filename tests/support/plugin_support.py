@@ -10,6 +10,7 @@ from pathlib import Path
 
 from cfmkit.families import installed
 
+GROUP = "cfmkit.families"
 PLUGINS = sorted(path.parent for path in (Path(__file__).parents[2] / "plugins").glob("*/pyproject.toml"))
 CONFIGS = [path for plugin in PLUGINS for path in sorted((plugin / "configs").glob("*.yaml"))]
 
@@ -31,8 +32,8 @@ def register() -> tempfile.TemporaryDirectory[str] | None:
         project = _project(plugin)
         info = Path(folder.name, f"{project['name'].replace('-', '_')}-{project['version']}.dist-info")
         info.mkdir()
-        entries = project["entry-points"][installed.GROUP]
-        lines = [f"[{installed.GROUP}]", *(f"{name} = {target}" for name, target in entries.items())]
+        entries = project["entry-points"][GROUP]
+        lines = [f"[{GROUP}]", *(f"{name} = {target}" for name, target in entries.items())]
         (info / "entry_points.txt").write_text("\n".join(lines) + "\n")
     added = [folder.name, *map(str, missing)]
     sys.path += added

@@ -15,6 +15,7 @@ from cfmkit import families
 from cfmkit.families import installed
 from cfmkit.families.base import INTERFACE
 
+GROUP = "cfmkit.families"
 OLD = "\n".join(["cfmkit: 1", "family: {}", "mechanism: {{stiffness: 2 N/mm}}", ""])
 
 
@@ -58,7 +59,7 @@ def test_what_is_found_is_what_the_standard_library_finds(site):
     packages.install(site, "more-springs", "", "soft", "softer = more_springs:OTHER", "# hard = a:b")
     packages.install(site, "Other.Package", "", "hard", kind="egg")
     found = {(one.name, one.target) for one in installed.offers()}
-    assert found == {(one.name, one.value) for one in importlib.metadata.entry_points(group=installed.GROUP)}
+    assert found == {(one.name, one.value) for one in importlib.metadata.entry_points(group=GROUP)}
     assert {"soft", "softer", "hard"} <= {name for name, _ in found}
 
 

@@ -33,7 +33,7 @@ FAMILY = Family(
         "frequency_held_min",
         "frequency_free_min",
     ),
-    template="cfmkit:templates/beam.yaml",
+    template="cfmkit/templates/beam.yaml",
     findings=FINDINGS,
     references=(
         "C.-C. Lan, J.-H. Wang, Y.-H. Chen, A compliant constant-force mechanism for adaptive robot end-effector "

@@ -19,7 +19,7 @@ FAMILY = Family(
     outline="cfmkit_oblique.outline",
     headline=("plateau_force", "plateau_position", "plateau_stiffness", "stiffness_ratio", "band_range_1pct"),
     branches=("load",),
-    template="cfmkit_oblique:template.yaml",
+    template="cfmkit_oblique/template.yaml",
     findings=FINDINGS,
     references=(
         "A. Carrella, M.J. Brennan, T.P. Waters, Static analysis of a passive vibration isolator with "
