@@ -59,6 +59,19 @@ def test_leaves_too_thick_for_a_model_are_said_to_be(structure, thickness, model
     assert [words in one for one in told] == ([True] if words else [])
 
 
+@pytest.mark.parametrize("structure", ["v-beam", "cosine"])
+@pytest.mark.parametrize("flatness", ["3 %", "5 %"])
+def test_a_window_that_is_the_flat_part_itself_is_not_called_uneven(structure, flatness):
+    """No window stated, no buckling: by rounding, 5 % were more than 5 %, "1 times as wide" the cure."""
+    for width in np.linspace(2.0, 40.0, 12):
+        found = analyzed(
+            *leaf(structure=structure, thickness="2.1 mm", width=f"{width} mm"), "analysis.window=null",
+            f"analysis.flatness={flatness}", "analysis.travel=6 mm",
+        )  # fmt: skip
+        assert "no_linear_region" in names(found)
+        assert "not_flat" not in names(found)
+
+
 def test_a_sound_mechanism_has_nothing_to_be_said_against_it():
     found = analyzed(FLAT, "analysis.travel=4.7 mm", "analysis.measured=null", "mechanism.bistable.width=6 mm")
     assert set(names(found)) == set()

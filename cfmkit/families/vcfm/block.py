@@ -287,7 +287,7 @@ def warned(spec: VcfmSpec, slab: Slab) -> dict[str, NDArray[np.bool_]]:
         "truss_law": np.array(paper),
         "no_negative_stiffness": (q < NEGATIVE_ABOVE) & (not paper),
         "no_linear_region": (q >= NEGATIVE_ABOVE) & (q <= LINEAR_ABOVE) & (not paper),
-        "not_flat": (top > 0) & ((top - bottom) / top > slab.flatness),
+        "not_flat": (top > 0) & ((top - bottom) / top > slab.flatness) & ~_window_is_flat(spec, slab),
         "force_reversal": bottom <= 0,
         "bistable": _stays(slab),
         "overload": (travel > end * (1 + ROUNDING)) & (rises > slab.flatness * np.abs(slab.force[:, -1:])),
@@ -348,9 +348,20 @@ def _window(spec: VcfmSpec, slab: Slab) -> tuple[FloatArray, FloatArray]:
         return low, high
     first, last = (np.broadcast_to(end, (size, 1)) for end in slab.leaf.linear)
     start, stop = (end[:, None] for end in slab.window)
-    straight, flat = np.isfinite(first) & (first < travel), np.isfinite(start)
+    straight, flat = _straight(slab), np.isfinite(start)
     low = np.where(straight, first, np.where(flat, start, 0.0))
     return low, np.where(straight, np.minimum(last, travel), np.where(flat, stop, travel))
+
+
+def _straight(slab: Slab) -> NDArray[np.bool_]:
+    """Return which leaves buckle within the travel, (k, 1): as `Solution.is_linear` has them."""
+    first = np.broadcast_to(slab.leaf.linear[0], (len(slab.force), 1))
+    return np.asarray(np.isfinite(first) & (first < float(slab.grid[-1])))
+
+
+def _window_is_flat(spec: VcfmSpec, slab: Slab) -> NDArray[np.bool_]:
+    """Return of which designs the window is the longest flat stretch itself, (k, 1)."""
+    return ~_straight(slab) & np.isfinite(slab.window[0][:, None]) & (spec.analysis.window is None)
 
 
 def _extremes(slab: Slab, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:

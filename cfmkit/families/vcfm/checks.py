@@ -106,7 +106,7 @@ def _flatness(solution: Solution) -> Iterator[Finding]:
     if not len(force) or force.max() <= 0:
         return
     ripple, allowed = _ripple(force), solution.spec.analysis.flatness
-    if ripple <= allowed:
+    if ripple <= allowed or solution.window_is_flat:
         return
     one = solution.character
     alike = one.positive_stiffness > 0 and abs(one.negative_stiffness / one.positive_stiffness - 1.0) < ALIKE

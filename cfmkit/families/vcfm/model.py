@@ -163,9 +163,20 @@ class Solution:
         if self.spec.analysis.window is not None:
             return between(self.spec.analysis.window, self.course)
         low, high = self.character.linear
-        if np.isfinite(low) and low < self.spec.travel:
+        if self.is_linear:
             return low, min(high, self.spec.travel)
         return self.windows[0] or (0.0, self.spec.travel)
+
+    @property
+    def is_linear(self) -> bool:
+        """Whether the leaves buckle within the travel, and so have a range of constant negative stiffness."""
+        low = self.character.linear[0]
+        return bool(np.isfinite(low) and low < self.spec.travel)
+
+    @property
+    def window_is_flat(self) -> bool:
+        """Whether `window` is the longest flat stretch itself: flat by what it is, whatever the last digit says."""
+        return self.spec.analysis.window is None and not self.is_linear and self.windows[0] is not None
 
 
 def analyze(spec: VcfmSpec, run: Run) -> Result:
