@@ -162,7 +162,10 @@ def code_of(offer: Offer) -> dict[str, str]:
 
     from cfmkit.store.identity import file_hash, tree_hash
 
-    found = find_spec(offer.target.partition(":")[0].partition(".")[0])
+    try:
+        found = find_spec(offer.target.partition(":")[0].partition(".")[0])
+    except (ImportError, ValueError):  # no name of a module: then nothing is computed by it either
+        found = None
     content = ""
     if found is not None and found.submodule_search_locations:
         content = "".join(tree_hash(Path(folder)) for folder in found.submodule_search_locations)

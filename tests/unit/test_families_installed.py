@@ -138,6 +138,13 @@ def test_what_was_computed_by_other_code_of_a_package_is_not_reused(site, tmp_pa
     assert families.origin("cam") == {}
 
 
+@pytest.mark.parametrize("target", ["", ":", "no module:x", "module_that_is_not_there:x", ".:x"])
+def test_an_entry_point_that_names_no_module_breaks_nothing(site, target):
+    packages.install(site, "odd-one", "", f"odd = {target}")
+    assert "cannot be imported" in reason("odd")
+    assert families.origins()["odd"]["content"] == ""
+
+
 LIST = """
 import sys, time
 sys.path.insert(0, sys.argv[1])
