@@ -11,7 +11,7 @@ import os
 import plugin_support
 from hypothesis import settings
 
-REGISTERED = plugin_support.register()  # kept until the tests end
+plugin_support.register()
 
 settings.register_profile("repeat", derandomize=True)
 settings.register_profile("search", derandomize=False)

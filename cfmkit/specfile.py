@@ -162,13 +162,21 @@ def bind(document: Document) -> Spec:
     return spec
 
 
+def _known(named: str | None) -> Sequence[str]:
+    """Return the families among which one is looked for; other packages are not asked for one that is here."""
+    from cfmkit import families
+
+    if named in families.FAMILIES:
+        return tuple(families.FAMILIES)
+    return (named,) if named in families.clashing() else families.names()
+
+
 def _family_record(document: Document) -> Family:
     """Return the family that a document names; one that cannot be used is a problem at that place."""
     from cfmkit import families
 
     try:
-        named = _family_of(document)
-        return families.family(document.family((named,) if named in families.clashing() else families.names()))
+        return families.family(document.family(_known(_family_of(document))))
     except families.Unusable as problem:
         raise SpecError([document.problem(("family",), str(problem))]) from None
 

@@ -91,6 +91,8 @@ def origin(name: str) -> dict[str, str]:
     dict
         ``package``, ``version`` and ``content``, the SHA-256 of its files: what is kept for a later run is of these.
     """
+    if name in FAMILIES:
+        return {}
     return next((installed.code_of(offer) for offer in installed.offers() if offer.name == name), {})
 
 

@@ -174,7 +174,7 @@ INTERFACE = 1
 """Number of this record: changes when a family that was written for it would no longer work."""
 
 
-class Model(Protocol):
+class Analyzer(Protocol):
     """One way to compute a mechanism."""
 
     def __call__(self, spec: Any, run: Run, /) -> Result:
@@ -243,7 +243,7 @@ class Family:
         As written in ``family:`` of a spec, and one line on what it is.
     spec_type : type of Spec
         What the YAML may say.
-    models : mapping of str to Model or str
+    models : mapping of str to Analyzer or str
         What `analysis.fidelity` may say, the coarsest first and the finest last, and the model that it picks:
         ``model(spec, run) -> Result``, or its ``"module:function"``, imported when it is to run. A family with
         one model gives it a name, too.
@@ -289,7 +289,7 @@ class Family:
     name: str
     summary: str
     spec_type: type[Spec]
-    models: Mapping[str, Model | str]
+    models: Mapping[str, Analyzer | str]
     design: Callable[[Any, Run], Design] | None = None
     search: Search | None = None
     values: Mapping[str, tuple[str, str]] = field(default_factory=dict)
@@ -320,5 +320,5 @@ class Family:
         """Return what the model that a specification picks, or else the only one, makes of it."""
         (only, *_) = self.models
         model = self.models[spec.fidelity or only]
-        function: Model = function_named(model) if isinstance(model, str) else model
+        function: Analyzer = function_named(model) if isinstance(model, str) else model
         return function(spec, run)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import os
 import sys
 import tempfile
@@ -15,19 +16,14 @@ PLUGINS = sorted(path.parent for path in (Path(__file__).parents[2] / "plugins")
 CONFIGS = [path for plugin in PLUGINS for path in sorted((plugin / "configs").glob("*.yaml"))]
 
 
-def register() -> tempfile.TemporaryDirectory[str] | None:
-    """Put the packages that are not installed on the path, here and in child processes, with their entry points.
-
-    Returns
-    -------
-    TemporaryDirectory or None
-        Holds the entry points for as long as it lives; None if every package is installed.
-    """
+def register() -> None:
+    """Put the packages that are not installed on the path, here and in child processes, with their entry points."""
     known = {one.package for one in installed.offers()}
     missing = [plugin for plugin in PLUGINS if _project(plugin)["name"] not in known]
     if not missing:
-        return None
+        return
     folder = tempfile.TemporaryDirectory(prefix="cfmkit-plugins-")
+    atexit.register(folder.cleanup)
     for plugin in missing:
         project = _project(plugin)
         info = Path(folder.name, f"{project['name'].replace('-', '_')}-{project['version']}.dist-info")
@@ -38,7 +34,6 @@ def register() -> tempfile.TemporaryDirectory[str] | None:
     added = [folder.name, *map(str, missing)]
     sys.path += added
     os.environ["PYTHONPATH"] = os.pathsep.join([*filter(None, [os.environ.get("PYTHONPATH")]), *added])
-    return folder
 
 
 def _project(plugin: Path) -> dict:

@@ -122,6 +122,16 @@ def test_a_specification_of_a_family_that_cannot_be_used_says_why_at_its_place(s
     assert "No module named 'nowhere_to_be_found'" in problem.message
 
 
+def test_a_specification_of_a_family_that_is_here_asks_no_other_package(monkeypatch):
+    def offers():
+        raise AssertionError("packages were listed")
+
+    monkeypatch.setattr(installed, "offers", offers)
+    spec = cfmkit.load(Path(__file__).parents[2] / "configs" / "cam.yaml")
+    assert cfmkit.analyze(spec).status.usable
+    assert families.origin("cam") == {}
+
+
 def test_what_a_package_prints_while_it_is_imported_is_no_result(site, capsys):
     packages.install(site, "loud-one", "print('hello')\n" + packages.record("loud"), "loud")
     families.family("loud")

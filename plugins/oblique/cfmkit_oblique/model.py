@@ -23,7 +23,6 @@ import numpy as np
 
 from cfmkit.curves import Column, Curve
 from cfmkit.families.findings import finder, mm, newton, rate
-from cfmkit.families.refusals import no_result
 from cfmkit.results import Quantity, Result, Status
 
 if TYPE_CHECKING:
@@ -94,15 +93,24 @@ class Solution:
         """How far the slider is to go [m]."""
         return self.spec.analysis.travel or 2.0 * self.height
 
-    def lengths(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the lengths of an oblique spring and of the vertical one at displacements [m]."""
-        part = self.spec.mechanism
-        return np.hypot(part.half_span, x - self.height), part.vertical.free_length - x
+    @property
+    def contact(self) -> tuple[float, str]:
+        """Where the slider is when the first coils touch [m], and those of what."""
+        one, other, span = self.spec.mechanism.oblique, self.spec.mechanism.vertical, self.spec.mechanism.half_span
+        places = [(other.free_length - other.solid_length, "vertical spring")]
+        if one.solid_length > span:
+            up = float(np.sqrt((one.solid_length - span) * (one.solid_length + span)))
+            places.append((self.height - up, "oblique springs"))
+        return min(places)
+
+    def oblique_length(self, x: FloatArray) -> FloatArray:
+        """Return the length of an oblique spring at displacements [m]."""
+        return np.hypot(self.spec.mechanism.half_span, x - self.height)
 
     def exact(self, x: FloatArray) -> FloatArray:
         """Return the force at displacements [N]."""
         part, z = self.spec.mechanism, x - self.height
-        oblique = 2.0 * part.oblique.stiffness * z * (1.0 - part.oblique.free_length / self.lengths(x)[0])
+        oblique = 2.0 * part.oblique.stiffness * z * (1.0 - part.oblique.free_length / self.oblique_length(x))
         return part.vertical.stiffness * x + oblique
 
     def cubic(self, x: FloatArray) -> FloatArray:
@@ -128,15 +136,10 @@ def analyze_cubic(spec: ObliqueSpec, run: Run) -> Result:
 
 
 def _result(spec: ObliqueSpec, force: Callable[[FloatArray], FloatArray]) -> Result:
-    solution, part = Solution(resolve(spec)), spec.mechanism
-    x = np.linspace(0.0, solution.travel, spec.analysis.points)
-    oblique, vertical = solution.lengths(x)
-    touching = (oblique < part.oblique.solid_length) | (vertical < part.vertical.solid_length)
-    short = tuple(_touching(solution, x, touching))
-    x = x[: int(touching.argmax())] if short else x
-    if len(x) < 2:
-        return no_result(spec, short[0])
-    extra = {"oblique_length": Column(solution.lengths(x)[0], "length")}
+    solution = Solution(resolve(spec))
+    short = tuple(_touching(solution))
+    x = np.linspace(0.0, min(solution.travel, solution.contact[0]), spec.analysis.points)
+    extra = {"oblique_length": Column(solution.oblique_length(x), "length")}
     return Result(
         spec=solution.spec,
         status=Status.PARTIAL if short else Status.COMPLETE,
@@ -167,14 +170,11 @@ def _values(solution: Solution) -> dict[str, Quantity]:
     return {name: Quantity(value, *DEFINITIONS[name]) for name, value in zip(DEFINITIONS, found, strict=True)}
 
 
-def _touching(solution: Solution, x: FloatArray, touching: FloatArray) -> Iterator[Finding]:
-    if touching.any():
-        place = x[int(touching.argmax())]
-        oblique = solution.lengths(place)[0] < solution.spec.mechanism.oblique.solid_length
-        which = "oblique springs" if oblique else "vertical spring"
-        yield finding(
-            "coils_touch", f"the coils of the {which} touch at {mm(place)}, within the travel of {mm(solution.travel)}"
-        )
+def _touching(solution: Solution) -> Iterator[Finding]:
+    place, which = solution.contact
+    if place < solution.travel:
+        told = f"the coils of the {which} touch at {mm(place)}, within the travel of {mm(solution.travel)}"
+        yield finding("coils_touch", told)
 
 
 def _slope(solution: Solution) -> Iterator[Finding]:
