@@ -67,12 +67,6 @@ class Push:
         total: FloatArray = np.add(self.leaves.force, self.spring_force)
         return total
 
-    def largest_stress(self, end: float) -> tuple[float, float]:
-        """Return the largest stress of leaves and spring up to a travel [m], in Pa."""
-        before = self.travel <= end * (1 + 1e-9)
-        leaves, spring = (stress[before].max(initial=0.0) for stress in (self.leaves.stress, self.spring_stress))
-        return float(leaves), float(spring)
-
     def inside(self, window: tuple[float, float]) -> FloatArray:
         """Return the forces at the samples in a window, its interpolated ends included [N]."""
         low, high = window
@@ -142,6 +136,16 @@ class Solution:
         lowest = float(push.travel[beyond[push.force[beyond].argmin()]]) if len(beyond) else peak
         place = extreme(lambda travel: -force_of(sampler, travel, push.preload), max(lowest, peak), step, (peak, end))
         return place, float(force_of(sampler, np.array([place]), push.preload)[0])
+
+    def largest_stress(self, push: Push, end: float = np.inf) -> tuple[float, float]:
+        """Return the largest stress of leaves and spring of a curve up to a travel [m], that one included, in Pa."""
+        before = push.travel <= end
+        leaves, spring = push.leaves.stress[before], push.spring_stress[before]
+        if push.travel[0] < end < push.travel[-1]:
+            place = np.array([end])
+            leaves = np.append(leaves, self.sampler.leaves(place).stress)
+            spring = np.append(spring, self.sampler.spring(place + push.preload)[1])
+        return float(leaves.max(initial=0.0)), float(spring.max(initial=0.0))
 
     @property
     def window_force(self) -> float | None:

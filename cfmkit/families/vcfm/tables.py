@@ -48,7 +48,7 @@ _PRELOAD_COLUMNS = {
 def _at_preload(solution: Solution, number: int) -> dict[str, Any]:
     push, window = solution.pushes[number], solution.windows[number]
     force, nominal = forces(solution, push), forces(solution, solution.nominal)
-    leaves, spring = push.largest_stress(solution.window[1])
+    leaves, spring = solution.largest_stress(push, solution.window[1])
     row: dict[str, Any] = {"preload": push.preload, "rest_position": push.rest} | spread(force)
     row |= {"force_change": float(force.mean() - nominal.mean())}
     row |= {"spring_stress_max": spring, "bistable_stress_max": leaves}

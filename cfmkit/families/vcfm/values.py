@@ -56,8 +56,9 @@ def values_of(solution: Solution) -> Mapping[str, Quantity]:
     nominal, window = solution.nominal, solution.windows[0]
     force = solution.constant_force
     span = solution.window[1] - solution.window[0]
-    leaves, spring = np.max([push.largest_stress(solution.window[1]) for push in solution.pushes], axis=0).tolist()
-    over_travel = max(max(push.largest_stress(np.inf)) for push in solution.pushes)
+    end = solution.window[1]
+    leaves, spring = np.max([solution.largest_stress(push, end) for push in solution.pushes], axis=0).tolist()
+    over_travel = max(max(solution.largest_stress(push)) for push in solution.pushes)
     allowed = solution.spec.mechanism.allowable_stress
     numbers: dict[str, float | None] = {
         "positive_stiffness": one.positive_stiffness,
