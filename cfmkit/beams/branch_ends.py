@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.beams import beside
-from cfmkit.beams.kernels.march import DONE, INERTIA
+from cfmkit.beams.kernels.codes import DONE, INERTIA
 from cfmkit.beams.path import Event, PathStatus
 from cfmkit.beams.solver import LONGEST
 

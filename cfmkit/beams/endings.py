@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.beams.kernels.march import FULL, LONG, OUTSIDE
+from cfmkit.beams.kernels.codes import FULL, LONG, OUTSIDE
 from cfmkit.beams.path import PathStatus
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.beams.kernels.march import INERTIA
+from cfmkit.beams.kernels.codes import INERTIA
 from cfmkit.beams.solver import FORCE_WEIGHT, LONGEST, NATURAL
 
 if TYPE_CHECKING:

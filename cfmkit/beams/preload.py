@@ -14,7 +14,7 @@ import numpy as np
 
 from cfmkit.beams import branch_ends
 from cfmkit.beams.discretise import LOADS, PRESTRESS, assemble_model
-from cfmkit.beams.kernels.march import DONE, LONG, SHORT, STALLED
+from cfmkit.beams.kernels.codes import DONE, LONG, SHORT, STALLED
 from cfmkit.beams.layout import Layout
 from cfmkit.beams.network import Network
 from cfmkit.beams.path import Event, PathStatus

@@ -13,7 +13,7 @@ from cfmkit.beams import beside, branch_ends, branches, corners, critical, endin
 from cfmkit.beams.accuracy import errors, largest_force
 from cfmkit.beams.discretise import Mesh
 from cfmkit.beams.expanded import ExpandedSolver
-from cfmkit.beams.kernels.march import DENIED, DONE, INERTIA, INFO, LONG, NO_START, STALLED
+from cfmkit.beams.kernels.codes import DENIED, DONE, INERTIA, INFO, LONG, NO_START, STALLED
 from cfmkit.beams.path import Event, Path, PathStatus
 from cfmkit.beams.solver import SENSE, TRIES, Points, Solver, Spot, march_options
 from cfmkit.beams.steady import steadier

@@ -9,11 +9,12 @@ import numpy as np
 
 from cfmkit.beams.discretise import PRESTRESS, Mesh, assemble_model, grid, segment_turns, table
 from cfmkit.beams.kernels import entry
-from cfmkit.beams.kernels.march import INFO
-from cfmkit.beams.kernels.newton import SOLVED
+from cfmkit.beams.kernels.codes import INFO, SOLVED
+from cfmkit.beams.kernels.workspace import work_space
 
 if TYPE_CHECKING:
     from cfmkit.beams.kernels.model import Model
+    from cfmkit.beams.kernels.workspace import WorkSpace
     from cfmkit.beams.layout import Layout
     from cfmkit.curves import FloatArray
 
@@ -111,20 +112,8 @@ class Solver:
     def _count_free(self) -> int:
         return self.layout.plan.n_free
 
-    def _scratch(self) -> tuple[Any, ...]:
-        n, dofs = self.n + 1, self.n_dofs
-        return (
-            np.zeros((n, n)),
-            np.zeros((n, n)),
-            np.zeros((n, 2)),
-            np.zeros(dofs + 3 * self.n_beams),
-            np.zeros(dofs),
-            np.zeros((2, 3)),
-            np.zeros((self.n_beams, 6, 3, 3)),
-            np.zeros((self.n_segments, 7, 3, 3)),
-            (np.zeros((11, 12, 20)), np.zeros((2, 3, 4)), np.zeros((3, 3)), np.zeros((self.n_segments, 22))),
-            np.zeros(self.size),
-        )
+    def _scratch(self) -> WorkSpace:
+        return work_space(self.n, self.n_beams, self.n_dofs, self.n_segments)
 
     def unstressed(self) -> FloatArray:
         """Return the unknowns of the network at rest, before any load or displacement."""

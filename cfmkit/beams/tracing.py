@@ -64,7 +64,7 @@ def _solved(network: Network, drive: Drive, control: Control, to_first: bool = F
     """
     from cfmkit.beams import endings
     from cfmkit.beams.accuracy import estimate  # loads the compiler, as do the next two
-    from cfmkit.beams.kernels.march import STALLED
+    from cfmkit.beams.kernels.codes import STALLED
     from cfmkit.beams.path import PathStatus
     from cfmkit.beams.run import Run
 

@@ -39,6 +39,7 @@ _MADE_BETWEEN_COLLECTIONS = 250_000
 def entry() -> int:
     """Run the program as the whole of a process; return its exit code."""
     _one_thread()
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "1")  # to look for plugins it reads about every package there is
     gc.set_threshold(_MADE_BETWEEN_COLLECTIONS, 10, 10)
     code = main()
     gc.disable()  # the process ends: nothing more is to be collected

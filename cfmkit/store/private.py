@@ -10,7 +10,27 @@ from pathlib import Path
 from cfmkit.store.disk import system
 
 
-def private_folder(name: str) -> Path | None:
+def trusted(path: Path) -> bool:
+    """Return whether only this user, or the system's owner, can have put what stands at a path there.
+
+    Code is loaded only from such places. Everything on the way counts: who can rename a folder can put another one in
+    its place, unless the folder that it stands in lets nobody touch what is not theirs (as the temporary one does).
+    """
+    if not hasattr(os, "getuid"):
+        return True
+    try:
+        place = path.resolve(strict=True)
+        for step in (place, *place.parents):
+            about = step.stat()
+            shared = about.st_mode & 0o022 and not (step != place and about.st_mode & stat.S_ISVTX)
+            if shared or about.st_uid not in (os.getuid(), 0):
+                return False
+    except OSError:
+        return False
+    return True
+
+
+def private_folder(name: str, make: bool = True) -> Path | None:
     """Return a folder for files that this user's later runs may use again; None where there is no room for any.
 
     It has a fixed name, so that it serves every process of the user. What stands there and belongs to somebody
@@ -20,9 +40,13 @@ def private_folder(name: str) -> Path | None:
     ----------
     name : str
         What it is for, in a few letters.
+    make : bool
+        Whether to make one where there is none; otherwise None.
     """
     try:
-        folder = place(name)
+        folder = Path(tempfile.gettempdir()) / f"cfmkit-{name}-{_user()}"
+        if not make:
+            return folder if _is_ours(folder) else None
         try:
             system.mkdir(folder, 0o700)
         except FileExistsError:
@@ -31,11 +55,6 @@ def private_folder(name: str) -> Path | None:
         return folder
     except OSError:
         return None
-
-
-def place(name: str) -> Path:
-    """Return where such a folder is, whether it exists or not."""
-    return Path(tempfile.gettempdir()) / f"cfmkit-{name}-{_user()}"
 
 
 def _user() -> str:

@@ -1,21 +1,27 @@
-"""The compiled code: when it is used again and when not."""
+"""The compiled code: what it is kept as, what is checked before it is used, and that it is what numba makes of it."""
 
 from __future__ import annotations
 
+import copy
+import ctypes
 import logging
 import os
+import pickle
 import subprocess
 import sys
-from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numba
 import numpy as np
 import pytest
 
-from cfmkit.beams import CLAMPED, Beam, Displacement, Network, Node, Section, Taper, gradient, trace
-from cfmkit.beams.kernels import dense, entry, kept, predictor
+from cfmkit.beams import CLAMPED, Beam, Control, Displacement, Network, Node, Section, trace
+from cfmkit.beams.kernels import dense, entry, kept, machine, predictor
+from cfmkit.beams.kernels.packing import addresses, floats
+from cfmkit.beams.kernels.signatures import DOORS
 from cfmkit.beams.warming import warm
+from cfmkit.store.private import trusted
 
 _count, _solve, _predict = dense.positive_count, dense.lu_solve, predictor._predict
 
@@ -44,39 +50,6 @@ def test_the_next_point_is_foretold_exactly_where_the_path_is_a_polynomial(natur
     assert found[0] == pytest.approx(course(1.3), rel=1e-12)
 
 
-def test_compiled_code_is_kept_under_the_digest_of_all_kernels() -> None:
-    trace(*_pulled_beam())
-    for door in (entry._real, entry.states, entry.slopes, entry.row_slopes, entry.held_slopes):
-        assert entry.digest()[:16] in door.py_func.__qualname__
-    assert list(Path(entry._real.stats.cache_path).glob(f"*{entry.digest()[:16]}*.nbi"))
-
-
-def _pulled_beam() -> tuple[Network, Displacement]:
-    beam = Beam("a", "b", Section(2e9, 1e-2, 1e-3))
-    nodes = {"a": Node(0.0, 0.0, CLAMPED), "b": Node(0.1, 0.0)}
-    return Network(nodes, {"x": beam}), Displacement("b", 0.0, np.array([1e-4]))
-
-
-def test_a_changed_kernel_file_changes_the_digest(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    for path in Path(entry.__file__).parent.glob("*.py"):
-        (tmp_path / path.name).write_bytes(path.read_bytes())
-    monkeypatch.setattr(kept, "__file__", str(tmp_path / "kept.py"))
-    before = entry.digest()
-    with (tmp_path / "chain.py").open("a") as file:
-        file.write("# changed\n")
-    assert entry.digest() != before
-
-
-def test_a_first_compilation_is_announced(caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(entry, "STAMP", "never-compiled-before")
-    mark = Path(entry._real.stats.cache_path) / "beams-never-compiled-b.compiled"
-    with caplog.at_level(logging.WARNING):
-        entry.announce()
-        entry.announce()
-    mark.unlink(missing_ok=True)
-    assert [record.message for record in caplog.records] == ["compiling the beam engine: once, about half a minute"]
-
-
 @pytest.mark.parametrize("seed", range(8))
 def test_inertia_and_solution_of_random_symmetric_matrices(seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -97,73 +70,223 @@ def test_inertia_and_solution_of_random_symmetric_matrices(seed: int) -> None:
         np.testing.assert_allclose(a @ x, b, atol=1e-6)
 
 
-def test_nothing_is_compiled_twice() -> None:
-    """A second compilation for another order of an array in memory takes as long as the first."""
+def _pulled_beam() -> tuple[Network, Displacement]:
+    beam = Beam("a", "b", Section(2e9, 1e-2, 1e-3))
+    nodes = {"a": Node(0.0, 0.0, CLAMPED), "b": Node(0.1, 0.0)}
+    return Network(nodes, {"x": beam}), Displacement("b", 0.0, np.array([1e-4]))
 
-    def pulled(x: np.ndarray, tapered: bool) -> Network:
-        taper = Taper(np.array([0.0, 1.0]), np.array([x[1], 2 * x[1]]))
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Where alone code is kept in a test; what the test itself needs is loaded before."""
+    trace(*_pulled_beam())
+    monkeypatch.setattr(kept, "folders", lambda: iter([tmp_path]))
+    return tmp_path
+
+
+CODE = machine.Code(("cos",), b"machine\ncode")
+
+
+def test_code_is_kept_whole_and_for_this_user_alone(folder: Path) -> None:
+    assert kept.write("door", CODE) == folder
+    assert kept.read("door") == CODE
+    (file,) = folder.iterdir()
+    assert file.stat().st_mode & 0o022 == 0
+    assert kept.stamp()[:24] in file.name
+
+
+def test_a_changed_kernel_file_changes_the_digest(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for path in Path(kept.__file__).parent.glob("*.py"):
+        (tmp_path / path.name).write_bytes(path.read_bytes())
+    monkeypatch.setattr(kept, "__file__", str(tmp_path / "kept.py"))
+    before = kept.digest()
+    with (tmp_path / "chain.py").open("a") as file:
+        file.write("# changed\n")
+    assert kept.digest() != before
+
+
+@pytest.mark.parametrize("changed", ["sources", "python", "numba", "llvmlite", "numpy", "settings", "processor"])
+def test_code_of_another_origin_is_not_used(folder: Path, monkeypatch: pytest.MonkeyPatch, changed: str) -> None:
+    """Neither under the name that it would have, nor if it were renamed."""
+    kept.write("door", CODE)
+    (file,) = folder.iterdir()
+    origin = kept.origin() | {changed: "another"}
+    kept.stamp.cache_clear()
+    monkeypatch.setattr(kept, "origin", lambda: origin)
+    try:
+        assert kept.read("door") is None
+        file.rename(folder / f"door-{kept.stamp()[:24]}.code")
+        assert kept.read("door") is None
+    finally:
+        monkeypatch.undo()
+        kept.stamp.cache_clear()
+
+
+@pytest.mark.parametrize("damage", [lambda data: data[:-1], lambda data: data[:-1] + b"?", lambda _data: b""])
+def test_damaged_code_is_not_used(folder: Path, damage: Any) -> None:
+    kept.write("door", CODE)
+    (file,) = folder.iterdir()
+    file.write_bytes(damage(file.read_bytes()))
+    assert kept.read("door") is None
+
+
+@pytest.mark.parametrize("others", ["the folder", "the file", "a folder above"])
+def test_code_is_never_used_where_others_could_have_put_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, others: str
+) -> None:
+    place = tmp_path / "above" / "folder"
+    place.mkdir(parents=True)
+    monkeypatch.setattr(kept, "folders", lambda: iter([place]))
+    monkeypatch.setattr(kept, "private_folder", lambda _name, make=True: None)
+    kept.write("door", CODE)
+    (file,) = place.iterdir()
+    assert kept.read("door") == CODE
+    {"the folder": place, "the file": file, "a folder above": place.parent}[others].chmod(0o777)
+    assert kept.read("door") is None
+    if others != "the file":
+        assert kept.write("door", CODE) is None
+
+
+def test_a_file_of_another_user_is_not_trusted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "file").touch()
+    assert trusted(tmp_path / "file")
+    owner = os.getuid()
+    monkeypatch.setattr(os, "getuid", lambda: owner + 1)
+    assert trusted(tmp_path / "file") == (owner == 0)  # the system's owner may write everywhere anyhow
+    assert not trusted(tmp_path / "no such file")
+
+
+def test_what_the_linker_would_not_find_is_told_before_it_ends_the_process() -> None:
+    with pytest.raises(machine.Strange, match="no function no_such_function"):
+        machine.loaded(machine.Code(("no_such_function",), b""))
+
+
+def test_code_that_cannot_be_loaded_is_compiled_anew(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """Two seconds: the smallest door is compiled, once; its first compilation is announced."""
+    kept.write("states", machine.Code(("no_such_function",), b""))
+    with caplog.at_level(logging.WARNING):
+        _states_with(entry._got("states"))
+        _states_with(entry._got("states"))
+    said = [record.message for record in caplog.records]
+    assert said == ["compiling the beam engine, once: states along beams, a moment"]
+    assert len(list(folder.iterdir())) == 1
+
+
+def _states_with(call: Any) -> Any:
+    """Return the states along a bent beam by a loaded function."""
+    network, drive = _pulled_beam()
+    path = trace(network, drive, Control(tolerance=1e-4))
+    out = np.zeros((len(path), len(path.solver.cut.edges) + path.solver.n_segments, 7))
+    given = addresses((path.points.y, path.points.drive, out), (floats(2), floats(1), floats(3)))
+    block = entry._whole(path.solver.n_free) + path.solver.model.block + given
+    assert call(block, (ctypes.c_int64 * 2)()) == 0
+    assert out.any()
+    return out
+
+
+def test_kept_code_gives_to_the_last_bit_what_numba_gives() -> None:
+    """Two seconds: numba compiles the smallest door in its usual way. All doors: see the next test."""
+    from cfmkit.beams.kernels import build
+
+    usual = _states_with(machine.callable_at(build.called("states")))
+    assert _states_with(entry._got("states")).tobytes() == usual.tobytes()
+
+
+@pytest.mark.slow  # compiles everything in numba's usual way
+def test_curves_and_gradients_are_to_the_last_bit_those_of_numba(monkeypatch: pytest.MonkeyPatch) -> None:
+    from cfmkit.beams.kernels import build
+
+    def all_found() -> list[bytes]:
+        return [part.tobytes() for part in _curve_and_gradient()]
+
+    ours = all_found()
+    for name, door in entry._doors.items():
+        monkeypatch.setattr(door, "_call", machine.callable_at(build.called(name)))
+    assert all_found() == ours
+
+
+def _curve_and_gradient() -> list[Any]:
+    from cfmkit.beams import gradient
+
+    def bent(x: Any) -> Network:
         nodes = {"a": Node(0.0, 0.0, CLAMPED), "b": Node(x[0], 0.0), "c": Node(2 * x[0], x[2])}
-        other = Section(2e9, 1e-2, taper if tapered else x[1])
-        beams = {"x": Beam("a", "b", Section(2e9, 1e-2, x[1])), "y": Beam("b", "c", other)}
-        return Network(nodes, beams)
+        section = Section(2e9, 1e-2, x[1])
+        return Network(nodes, {"x": Beam("a", "b", section), "y": Beam("b", "c", section)})
 
     x = np.array([0.1, 2e-3, 0.01])
-    for tapered in (False, True):
-        build = partial(pulled, tapered=tapered)
-        slopes = gradient(trace(build(x), Displacement("c", 0.0, np.array([1e-4]))), build, x)
-        assert np.isfinite(slopes.effort).all()
-        assert np.isfinite(slopes.held).all()
-        assert np.isfinite(slopes.stress_extremes("y")).all()
-    for door in (entry._real, entry.slopes, entry.row_slopes, entry.held_slopes):
-        assert len(door.signatures) == 1
+    path = trace(bent(x), Displacement("c", 1.0, np.linspace(0, 2e-2, 9)[1:]))
+    slopes = gradient(path, bent, x)
+    return [path.points.y, path.effort, slopes.effort, slopes.held, slopes.stress_extremes("y")]
 
 
-_NOWHERE = """
-import logging, os, stat, sys
-import numba.core.caching as caching
-caching.CacheImpl._locator_classes = [caching.UserProvidedCacheLocator]  # neither package nor home is writable
-logging.basicConfig(level=logging.INFO, format="%(message)s")
-from cfmkit.beams.kernels.compiler import door
+def test_arrays_of_another_kind_are_refused() -> None:
+    """The compiled code cannot tell: it would read other memory."""
+    array = np.zeros((3, 4))
+    assert len(addresses([array], [floats(2)])) == 3 * 8
+    for other in (array.T, array[0], array.astype(np.float32), array[:, ::2], array.astype(int)):
+        with pytest.raises(TypeError, match="float64, 2 axes, C order: not"):
+            addresses([other], [floats(2)])
 
-@door("0123456789abcdef")
-def twice(x):
-    return 2.0 * x
 
-@door("0123456789abcdef")
-def thrice(x):
-    return 3.0 * x
+def test_copies_of_a_model_have_addresses_of_their_own() -> None:
+    model = trace(*_pulled_beam()).solver.model
+    assert model.block == addresses(model, model.kinds)
+    for other in (pickle.loads(pickle.dumps(model)), copy.deepcopy(model), model._replace(table=model.table.copy())):
+        assert other.block == addresses(other, other.kinds) != model.block
 
-assert (twice(2.0), thrice(2.0)) == (4.0, 6.0)
-print(twice.stats.cache_path, sum(twice.stats.cache_hits.values()))
+
+_ALONE = """
+import sys
+import numpy as np
+from cfmkit.beams import CLAMPED, Beam, Displacement, Network, Node, Section, gradient, trace
+def pulled(x):
+    return Network({"a": Node(0.0, 0.0, CLAMPED), "b": Node(0.1, 0.0)}, {"x": Beam("a", "b", Section(2e9, 1e-2, x[0]))})
+path = trace(pulled([1e-3]), Displacement("b", 0.0, np.array([1e-4])))
+path.peak_stress(), gradient(path, pulled, np.array([1e-3])).held
+sys.exit(any(name.split(".")[0] in ("numba", "scipy") for name in sys.modules))
 """
 
 
-def _without_folders(folder):
+def test_code_that_is_kept_runs_without_numba() -> None:
+    list(warm())
+    assert subprocess.run([sys.executable, "-c", _ALONE], check=False).returncode == 0
+
+
+_NOWHERE = """
+import logging, sys
+from pathlib import Path
+from cfmkit.beams.kernels import kept, machine
+logging.basicConfig(level=logging.INFO, format="%(message)s")
+kept.folders = lambda: iter([Path("/proc/none")])  # neither package nor home is writable
+code = machine.Code((), b"code")
+before = kept.read("door") == code
+print(kept.write("door", code), before, kept.read("door") == code)
+"""
+
+
+def _without_folders(folder: Path) -> tuple[Path, bool, bool, str]:
     environment = {key: value for key, value in os.environ.items() if key != "NUMBA_CACHE_DIR"}
-    script = folder / "script.py"
-    if not script.exists():  # kept code is of a file at its time
-        script.write_text(_NOWHERE)
-    command = [sys.executable, str(script)]
+    command = [sys.executable, "-c", _NOWHERE]
     done = subprocess.run(
         command, env=environment | {"TMPDIR": str(folder)}, capture_output=True, text=True, check=True
     )
-    kept, hits = done.stdout.split()
-    return Path(kept), int(hits), done.stderr
+    place, before, after = done.stdout.split()
+    return Path(place), before == "True", after == "True", done.stderr
 
 
-def test_compiled_code_is_kept_in_a_private_folder_where_nothing_else_is_writable(tmp_path):
-    kept, hits, told = _without_folders(tmp_path)
-    private = tmp_path / f"cfmkit-compiled-{os.getuid()}"
-    assert private in kept.parents
-    assert private.stat().st_mode & 0o777 == 0o700
-    assert hits == 0
+def test_compiled_code_is_kept_in_a_private_folder_where_nothing_else_is_writable(tmp_path: Path) -> None:
+    place, before, after, told = _without_folders(tmp_path)
+    assert place == tmp_path / f"cfmkit-compiled-{os.getuid()}"
+    assert place.stat().st_mode & 0o777 == 0o700
+    assert (before, after) == (False, True)
     assert told.count("compiled code is kept in") == 1
-    again, hits, _ = _without_folders(tmp_path)
-    assert (again, hits) == (kept, 1)
+    assert _without_folders(tmp_path)[:3] == (place, True, True)
 
 
 @pytest.mark.parametrize("trap", ["writable by others", "a link", "a file"])
-def test_code_is_never_loaded_from_a_folder_that_others_could_have_prepared(tmp_path, trap):
+def test_code_is_never_loaded_from_a_folder_that_others_could_have_prepared(tmp_path: Path, trap: str) -> None:
     private = tmp_path / f"cfmkit-compiled-{os.getuid()}"
     if trap == "writable by others":
         private.mkdir()
@@ -173,28 +296,21 @@ def test_code_is_never_loaded_from_a_folder_that_others_could_have_prepared(tmp_
         private.symlink_to(tmp_path / "elsewhere")
     else:
         private.touch()
-    kept, _, _ = _without_folders(tmp_path)
-    assert private not in kept.parents
-    (other,) = (folder for folder in kept.parents if folder.parent == tmp_path)
-    assert other.stat().st_mode & 0o777 == 0o700
+    place, before, after, _ = _without_folders(tmp_path)
+    assert place.parent == tmp_path
+    assert place != private
+    assert place.stat().st_mode & 0o777 == 0o700
+    assert (before, after) == (False, False)
 
 
-def test_without_any_folder_code_is_compiled_and_not_kept(monkeypatch):
-    from cfmkit.beams.kernels import compiler
-
-    monkeypatch.setattr(compiler, "private_folder", lambda _name: None)
-    monkeypatch.setattr("numba.core.caching.CacheImpl._locator_classes", [])
-
-    @compiler.door("0123456789abcdef")
-    def half(x):
-        return 0.5 * x
-
-    assert half(3.0) == 1.5
-    assert half.stats.cache_path is None
+def test_without_any_folder_code_is_compiled_and_not_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(kept, "folders", lambda: iter(()))
+    monkeypatch.setattr(kept, "private_folder", lambda _name, make=True: None)
+    assert kept.write("door", CODE) is None
+    assert kept.read("door") is None
 
 
 def test_warming_loads_every_part_of_the_compiled_code() -> None:
     parts = list(warm())
     assert len({part.name for part in parts}) == len(parts) == 5
-    for door in (entry._real, entry.states, entry.slopes, entry.row_slopes, entry.held_slopes):
-        assert len(door.signatures) >= 1
+    assert all(entry._doors[name]._call is not None for name in DOORS if name != "complex_states")

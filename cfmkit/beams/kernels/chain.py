@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cfmkit.beams.kernels.compiler import inlined, kernel, maker
+from cfmkit.beams.kernels.compiler import inlined, kernel
 from cfmkit.beams.kernels.flow import FORCE, flow, plain_flow
 
 E, F, E2, G, C_D, SMALL = 0, 1, 2, 3, 4, 5  # blocks of a relation; C_D: c in columns 0, 1
@@ -45,15 +45,17 @@ def pose_of(places, values, i, pose):
     return ox, oy
 
 
-@maker
-def _drive_column(m, e, steps, start, load, dp):
-    """Set the derivative of a segment's end pose and force by the drive, where a line load grows with it."""
-    states = np.empty((steps[1] - steps[0] + 1, 7), dtype=np.complex128)
+@kernel
+def _drive_column(m, e, steps, start, load, dp, states):
+    """Set the derivative of a segment's end pose and force by the drive, where a line load grows with it.
+
+    states (1, 7): complex room for the segment's end.
+    """
     h = 1e-30
     tilted = (load[0] + 1j * h * m.line_load[e, 1, 0], load[1] + 1j * h * m.line_load[e, 1, 1])
     begin = (start[0] + 0j, start[1] + 0j, start[2] + 0j, start[3] + 0j)
     plain_flow(m.table, steps, begin, tilted, states)
-    last = states[-1]
+    last = states[0]
     dp[0], dp[1], dp[2] = last[2].imag / h, last[3].imag / h, last[0].imag / h
     dp[3], dp[4], dp[5] = last[4].imag / h, last[5].imag / h, last[1].imag / h
 
@@ -112,7 +114,7 @@ def sweep(m, e, y, first_slot, drive, ends, rel, store, work):
         h, v = out[FORCE], out[FORCE + 1]
         if grows:
             start, load = _start_of(m, j, e, y, first_slot[1], drive)
-            _drive_column(m, e, (m.segment_step[j], m.segment_step[j + 1]), start, load, drv)
+            _drive_column(m, e, (m.segment_step[j], m.segment_step[j + 1]), start, load, drv, work[4])
         if j + 1 < end:
             qx, qy, qr = y[at + 6], y[at + 7], y[at + 8]
             ph, pv, pm = y[at + 9], y[at + 10], y[at + 11]

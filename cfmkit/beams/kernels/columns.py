@@ -8,10 +8,8 @@ drifts and kicks of the state, differentiated: one sweep for all the variables t
 
 from __future__ import annotations
 
-import numpy as np
-
 from cfmkit.beams.kernels.chain import BEFORE, E2, SMALL, E, F, G, places_of, pose_of
-from cfmkit.beams.kernels.compiler import inlined, kernel, maker
+from cfmkit.beams.kernels.compiler import inlined, kernel
 from cfmkit.beams.kernels.dense import clear, lu_solve
 from cfmkit.beams.kernels.flow_slopes import flow_slopes
 from cfmkit.beams.kernels.force_slopes import (
@@ -177,28 +175,20 @@ def _start_slope(m, tilt, e, k, frames, values, dvalues, pose):
     pose[2] = dvalues[m.place_dof[i, 3]]
 
 
-@maker
-def slopes(m, tilt, n_free, ys, drives, out, pushes, scratch):
+@kernel
+def slopes(m, tilt, n_free, ys, drives, out, pushes, scratch, spaces):
     """Set the derivatives of the unknowns at points by all variables; tell whether every tangent is regular.
 
     out (points, unknowns, k); pushes (points, k): derivatives of the force on what the drive moves, in the drive's
     sense, where the tangent is symmetric (no force turns with its node). If `out` has no points, only those are set:
-    one solution for the force (the adjoint) takes the place of one for each variable.
+    one solution for the force (the adjoint) takes the place of one for each variable. spaces: see
+    `cfmkit.beams.kernels.workspace`.
     """
     h, _, _, residual, values, ends, rel, store, work, _ = scratch
     n, count, beams = h.shape[0] - 1, tilt.moves.shape[0], m.beam_end.shape[0]
-    c, d = np.zeros((beams, count, 3)), np.zeros((beams, count, 3))
-    parts = np.zeros((m.segment_step.shape[0] - 1, count, 6))
-    most, wide = 0, 0
-    for e in range(beams):
-        most = max(most, tilt.first[e + 1] - tilt.first[e])
-        wide = max(wide, m.beam_segment[e + 1] - m.beam_segment[e])
-    moved = np.empty((wide, 9 * most))
-    none = np.empty((1, 1))
-    dofs, pose, others = values.shape[0], np.zeros(7), m.load_place.shape[0] + m.spring_kind.shape[0] > 0
-    room = (np.zeros(dofs), np.zeros(dofs), np.zeros((12, 7)), pose)
-    frames, matrix, rhs, dpb = np.empty((beams, 2, 4)), np.empty((n, n)), np.empty((n, count)), np.empty(3)
-    whole, adjoint = out.shape[0] > 0, np.empty((n, 1))
+    (c, d, parts, frames), (moved, none, matrix, rhs, adjoint), room, dpb = spaces
+    pose, others = room[3], m.load_place.shape[0] + m.spring_kind.shape[0] > 0
+    whole = out.shape[0] > 0
     for p in range(ys.shape[0]):
         y, drive, push = ys[p], drives[p], pushes[p]
         assemble(m, y, drive, n_free, h, residual, values, ends, rel, store, work)

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cfmkit.beams.kernels.compiler import inlined, kernel, maker
+from cfmkit.beams.kernels.compiler import inlined, kernel
 from cfmkit.beams.kernels.splitting import ROWS
 
 COLUMNS = 5  # the state itself, then its derivatives by the start's rotation, h, v and M
@@ -149,18 +149,20 @@ def _loaded(table, first, count, start, load, out):
         out[5 * k + 1] = turned[k]
 
 
-@maker
+@kernel
 def plain_flow(table, steps, start, load, states):
     """Integrate without derivatives; works on complex numbers too (derivatives by complex steps).
 
-    start: phi, h, v, M; states (n + 1, 7): phi, M, X, Y, h, v and strain energy at the step boundaries.
+    start: phi, h, v, M; states (n + 1, 7): phi, M, X, Y, h, v and strain energy at the step boundaries, or (1, 7)
+    those at the end alone.
     """
     first, last = steps
+    every = 1 if states.shape[0] > 1 else 0
     zero = start[0] * 0.0
     phi, moment, x, y, energy = start[0] + zero, start[3] + zero, zero, zero, zero
     begin_h, begin_v = start[1] + zero, start[2] + zero
     for step in range(first, last):
-        _set_row(states[step - first], phi, moment, x, y, begin_h, begin_v, energy)
+        _set_row(states[every * (step - first)], phi, moment, x, y, begin_h, begin_v, energy)
         for i in range(ROWS):
             w, run = table[step, i, 2], table[step, i, 5]
             h, v = begin_h - load[0] * run, begin_v - load[1] * run
@@ -178,7 +180,7 @@ def plain_flow(table, steps, start, load, states):
                 energy += 0.5 * (pull * normal * normal + slide * shear * shear)
             else:
                 begin_h, begin_v = h, v
-    _set_row(states[last - first], phi, moment, x, y, begin_h, begin_v, energy)
+    _set_row(states[every * (last - first)], phi, moment, x, y, begin_h, begin_v, energy)
 
 
 @kernel

@@ -1,10 +1,27 @@
-"""Where the compiled code is kept, and whether it is there: found out without compiling or loading it."""
+"""Compiled code on disk: where, under which name, and what is checked before any of it runs."""
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
+import json
+import logging
 import os
+import sys
+import tempfile
+from functools import lru_cache
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+from cfmkit.beams.kernels.machine import Code, processor
+from cfmkit.store.identity import installed
+from cfmkit.store.private import private_folder, trusted
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+_LOG = logging.getLogger("cfmkit.beams")
+_HEAD = b"cfmkit code 1\n"
 
 
 def digest() -> str:
@@ -15,20 +32,94 @@ def digest() -> str:
     return whole.hexdigest()
 
 
-def folders() -> tuple[Path, ...]:
-    """Return where the compiler may keep code, in the order in which it looks for a place that it can write to."""
-    from numba.misc.appdirs import AppDirs
+@lru_cache(maxsize=1)
+def origin() -> dict[str, str]:
+    """Return all that the machine code follows from: sources, compiler, its settings, processor."""
+    libraries = {name: str(installed(name)) for name in ("llvmlite", "numba", "numpy")}
+    settings = {name: value for name, value in os.environ.items() if name.startswith("NUMBA_") and name != _ELSEWHERE}
+    return {
+        "sources": digest(),
+        "python": sys.version,
+        **libraries,
+        "settings": json.dumps(settings, sort_keys=True),
+        "processor": processor(),
+    }
 
-    from cfmkit.store.private import place
 
-    if given := os.environ.get("NUMBA_CACHE_DIR"):
-        return (Path(given),)
-    home = Path(AppDirs(appname="numba", appauthor=False).user_cache_dir)
-    return (Path(__file__).parent / "__pycache__", home, place("compiled"))
+@lru_cache(maxsize=1)
+def stamp() -> str:
+    """Return a digest of the origin; code is kept in files named after it."""
+    return hashlib.sha256(json.dumps(origin(), sort_keys=True).encode()).hexdigest()
 
 
-def kept_in() -> Path | None:
-    """Return the folder that holds the code compiled from these sources; None if they have not been compiled yet."""
-    pattern = f"*_{digest()[:16]}*.nbi"
-    found = (path for folder in folders() if folder.is_dir() for path in folder.rglob(pattern))
-    return next((path.parent for path in found), None)
+_ELSEWHERE = "NUMBA_CACHE_DIR"
+
+
+def folders() -> Iterator[Path]:
+    """Yield where code may be kept, best first: where the user says, with the package, in the home folder."""
+    if elsewhere := os.environ.get(_ELSEWHERE):
+        yield Path(elsewhere)
+    yield Path(__file__).parent / "__pycache__"
+    caches = os.environ.get("LOCALAPPDATA") or os.environ.get("XDG_CACHE_HOME")
+    with contextlib.suppress(RuntimeError):  # no home folder
+        yield (Path(caches) if caches and os.path.isabs(caches) else Path.home() / ".cache") / "cfmkit"
+
+
+def read(name: str) -> Code | None:
+    """Return the code that is kept for a door, None if there is none that is of this origin, whole and trusted."""
+    file = f"{name}-{stamp()[:24]}.code"
+    for folder in (*folders(), None):
+        place = private_folder("compiled", make=False) if folder is None else folder
+        if place is None or not (place / file).exists():
+            continue
+        if not trusted(place / file):
+            _LOG.info("compiled code in %s is not used: others can write there", place)
+            continue
+        with contextlib.suppress(OSError, ValueError, KeyError):
+            return _parsed((place / file).read_bytes())
+    return None
+
+
+def write(name: str, code: Code) -> Path | None:
+    """Keep the code of a door; return where, None if there is no folder that only this user can write to."""
+    for folder in (*folders(), None):
+        with contextlib.suppress(OSError):
+            place = private_folder("compiled") if folder is None else folder
+            if place is None:
+                break
+            place.mkdir(mode=0o700, parents=True, exist_ok=True)
+            if not trusted(place):
+                continue
+            _replace(place / f"{name}-{stamp()[:24]}.code", _written(code))
+            if folder is None:
+                _LOG.info("neither the package nor the home folder is writable: compiled code is kept in %s", place)
+            return place
+    _LOG.info("no folder is writable: compiled code is not kept")
+    return None
+
+
+def _written(code: Code) -> bytes:
+    about = {"origin": origin(), "needs": code.needs, "content": hashlib.sha256(code.content).hexdigest()}
+    return _HEAD + json.dumps(about).encode() + b"\n" + code.content
+
+
+def _parsed(data: bytes) -> Code:
+    head, about, content = data.split(b"\n", 2)
+    told = json.loads(about)
+    if head + b"\n" != _HEAD or told["origin"] != origin() or told["content"] != hashlib.sha256(content).hexdigest():
+        raise ValueError("of another origin, or not whole")
+    return Code(tuple(told["needs"]), content)
+
+
+def _replace(path: Path, data: bytes) -> None:
+    """Write a file that appears whole or not at all, and that others cannot write to."""
+    handle, name = tempfile.mkstemp(prefix=".", dir=path.parent)
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(data)
+        os.chmod(name, 0o644)
+        os.replace(name, path)
+    except BaseException:
+        with contextlib.suppress(OSError):
+            os.unlink(name)
+        raise

@@ -4,29 +4,27 @@ from __future__ import annotations
 
 import numpy as np
 
-from cfmkit.beams.kernels.compiler import kernel, maker
-from cfmkit.beams.kernels.dense import copy
-from cfmkit.beams.kernels.newton import SOLVED, all_slopes, solve
-from cfmkit.beams.kernels.predictor import (
+from cfmkit.beams.kernels.codes import (
+    DENIED,
+    DONE,
+    FULL,
+    INERTIA,
     KEPT,
     KEPT_WITH_SLOPES,
-    MISSED,
-    aim,
-    changes,
-    misses,
-    pulls,
-    remember,
-    set_border,
+    LONG,
+    NO_START,
+    OUTSIDE,
+    SHORT,
+    SOLVED,
+    STALLED,
 )
-
-DONE, STALLED, INERTIA, LONG, FULL, OUTSIDE, NO_START, DENIED = range(8)
-"""Why a march ended: all asked points reached; the smallest step failed; the number of unstable directions changed;
-a segment is too long for its load; no room for more points; the drive left its range; no equilibrium to start from;
-an asked value was tried for so often in vain that it may lie at a bifurcation."""
+from cfmkit.beams.kernels.compiler import kernel
+from cfmkit.beams.kernels.dense import copy
+from cfmkit.beams.kernels.newton import all_slopes, solve
+from cfmkit.beams.kernels.predictor import MISSED, aim, changes, misses, pulls, remember, set_border
 
 VEER = 0.5  # cosine of the largest angle between the changes of poses at both ends of a step along the arc
 LOOKED_INTO = 0.01  # share of the longest step along the arc that is short enough to meet several things in
-SHORT = 0.25  # dM1/dM0 of a segment below which it must be split
 SECANT = 0.25  # of the last step: shorter ones go along the tangent, from which the secants of long ones differ
 STRETCH = 1.3  # factor on a step that lands on an asked value: rather than a short one after it
 CREEPING = 5e-5  # share of the drive's bounds that is a short step
@@ -34,7 +32,6 @@ CREEPS, TAUT = 400, 100.0  # short steps in a row that are enough; change of for
 NOISE = 30.0  # how far off a guess may be where points are solved to a tolerance of one
 AGAIN = 1e-5  # change of a pose between two solutions of one point
 SHORTER, APART = 4.0, 1e4  # lengths of steps that may yet be shorter; between bifurcations that are met one by one
-INFO = 6  # unstable directions, index of the asked point or -1, parameter, iterations, d(drive)/ds, shortness
 
 
 @kernel
@@ -166,23 +163,23 @@ def _strays(code, known, ahead, options, both, state, index, n_free, n):
     return along < VEER * np.sqrt(one * other)
 
 
-@maker
-def march(m, n_free, y, drive, tangent, targets, options, outs, scratch):
+@kernel
+def march(m, n_free, y, drive, tangent, targets, options, outs, scratch, room):
     """Follow the path from (y, drive) through the targets.
 
     options: tolerance, iterations, natural (1) or arc length (0), first, smallest and largest step, largest change of
     a pose in a step, weight of forces in the arc length, lowest and highest drive, whether to stop where the
     inertia changes, inertia at the start, sense, how often a landing on a target may be refused. A sense of 1 or -1
     says that the start is only near an equilibrium, which is solved for and stored first. A step that lands on a
-    target may be longer than the largest by STRETCH. Returns why the march ended and the number of points stored.
+    target may be longer than the largest by STRETCH. room: see `cfmkit.beams.kernels.workspace`.
+    Returns why the march ended and the number of points stored.
     """
     natural, step, smallest, greatest, turn = options[2] > 0.5, options[3], options[4], options[5], options[6]
     n, size = tangent.shape[0] - 1, y.shape[0]
-    kept = (np.zeros(KEPT), np.zeros((KEPT, size + 1)), np.zeros((KEPT, size + 1)))
+    kept, (new, guess, slope), state, (border, new_tangent, unit, unused), between = room
     times, past, slopes = kept
-    guess, new, state, slope = np.empty(size + 1), np.empty(size), np.zeros(6), np.zeros(size + 1)
-    border, new_tangent, unit, unused = np.empty(n + 1), np.empty(n + 1), np.zeros(n + 1), np.empty(n + 1)
-    unit[n] = 1.0
+    for i in range(state.shape[0]):
+        state[i] = 0.0
     stored, known = _begin(m, n_free, y, drive, natural, (state, unit, new, tangent, slope), options, outs, scratch)
     if stored < 0:
         return NO_START, 0
@@ -216,7 +213,8 @@ def march(m, n_free, y, drive, tangent, targets, options, outs, scratch):
         if slow > CREEPS:
             return STALLED, stored
         if not natural:
-            asked, stored = _between(m, n_free, old, new, state, targets, asked, stored, options, outs, unit, scratch)
+            spaces = (scratch, between)
+            asked, stored = _between(m, n_free, old, new, state, targets, asked, stored, options, outs, unit, spaces)
             if asked >= targets.shape[0]:
                 return DONE, stored
         t += ahead
@@ -235,8 +233,8 @@ def march(m, n_free, y, drive, tangent, targets, options, outs, scratch):
     return DONE, stored
 
 
-@maker
-def _between(m, n_free, old, new, state, targets, asked, stored, options, outs, unit, scratch):
+@kernel
+def _between(m, n_free, old, new, state, targets, asked, stored, options, outs, unit, spaces):
     """Solve at the asked values of the drive that a step of arc length has passed; return (asked, stored).
 
     Values in the direction of the first target count as asked once each; a value passed again on the way back
@@ -244,8 +242,8 @@ def _between(m, n_free, old, new, state, targets, asked, stored, options, outs, 
     """
     size = new.shape[0]
     n_all = targets.shape[0]
-    y, s = np.empty(size), np.zeros(6)
-    tangent = np.empty(unit.shape[0])
+    scratch, (y, s, tangent) = spaces
+    s[4] = s[5] = 0.0
     before, after = old[size], state[0]
     rising = after > before
     first = 0 if (rising == (targets[n_all - 1] > targets[0]) or n_all == 1) else n_all - 1

@@ -14,20 +14,41 @@ The start pose of a beam's first segment is that of its attachment and its slot 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from cfmkit.curves import FloatArray
+from cfmkit.beams.kernels.packing import Packed, floats, integers, truths
 
 IntArray = NDArray[Any]
 
 TABLE_COLUMNS = 6  # see `Model`
 
 
-class Model(NamedTuple):
+class _ModelArrays(NamedTuple):
+    table: Any
+    segment_step: Any
+    segment_turn: Any
+    beam_segment: Any
+    beam_end: Any
+    line_load: Any
+    place_dof: Any
+    place_frame: Any
+    place_origin: Any
+    place_arm: Any
+    base: Any
+    rate: Any
+    slot: Any
+    load_place: Any
+    load_value: Any
+    load_follows: Any
+    spring_place: Any
+    spring_kind: Any
+    spring_value: Any
+
+
+class Model(Packed, _ModelArrays):
     """A network, discretised.
 
     Attributes
@@ -59,28 +80,48 @@ class Model(NamedTuple):
         (n, 2) int attachments; (n,) int; (n, 5) values, see `cfmkit.beams.kernels.springs`.
     """
 
-    table: FloatArray
-    segment_step: IntArray
-    segment_turn: FloatArray
-    beam_segment: IntArray
-    beam_end: IntArray
-    line_load: FloatArray
-    place_dof: IntArray
-    place_frame: FloatArray
-    place_origin: FloatArray
-    place_arm: FloatArray
-    base: FloatArray
-    rate: FloatArray
-    slot: IntArray
-    load_place: IntArray
-    load_value: FloatArray
-    load_follows: IntArray
-    spring_place: IntArray
-    spring_kind: IntArray
-    spring_value: FloatArray
+    kinds = _ModelArrays(
+        table=floats(3),
+        segment_step=integers(1),
+        segment_turn=floats(1),
+        beam_segment=integers(1),
+        beam_end=integers(2),
+        line_load=floats(3),
+        place_dof=integers(2),
+        place_frame=floats(2),
+        place_origin=floats(2),
+        place_arm=floats(2),
+        base=floats(1),
+        rate=floats(1),
+        slot=integers(1),
+        load_place=integers(1),
+        load_value=floats(3),
+        load_follows=integers(1),
+        spring_place=integers(2),
+        spring_kind=integers(1),
+        spring_value=floats(2),
+    )
 
 
-class Tilt(NamedTuple):
+class _TiltArrays(NamedTuple):
+    variable: Any
+    first: Any
+    table: Any
+    begin: Any
+    moves: Any
+    shifts: Any
+    touches: Any
+    origin: Any
+    arm: Any
+    frame: Any
+    base: Any
+    rate: Any
+    spring: Any
+    load: Any
+    line: Any
+
+
+class Tilt(Packed, _TiltArrays):
     """Derivatives of a model's arrays by k design variables.
 
     Attributes
@@ -106,26 +147,28 @@ class Tilt(NamedTuple):
     line : (k, beams, 2, 2) array
     """
 
-    variable: IntArray
-    first: IntArray
-    table: FloatArray
-    begin: IntArray
-    moves: Any
-    shifts: Any
-    touches: Any
-    origin: FloatArray
-    arm: FloatArray
-    frame: FloatArray
-    base: FloatArray
-    rate: FloatArray
-    spring: FloatArray
-    load: FloatArray
-    line: FloatArray
+    kinds = _TiltArrays(
+        variable=integers(1),
+        first=integers(1),
+        table=floats(1),
+        begin=integers(1),
+        moves=truths(1),
+        shifts=truths(2),
+        touches=truths(2),
+        origin=floats(3),
+        arm=floats(3),
+        frame=floats(3),
+        base=floats(2),
+        rate=floats(2),
+        spring=floats(3),
+        load=floats(4),
+        line=floats(4),
+    )
 
 
 Arrays = TypeVar("Arrays", Model, Tilt)
 
 
 def in_order(arrays: Arrays) -> Arrays:
-    """Return the arrays with their entries in C order: for every other order the code is compiled again."""
+    """Return the arrays with their entries in C order: the compiled code takes no other."""
     return type(arrays)(*map(np.ascontiguousarray, arrays))

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from cfmkit.beams.kernels.chain import C_D, E2, SMALL, E, F, G, flows, places_of, pose_of, sweep, unfold
-from cfmkit.beams.kernels.compiler import inlined, kernel, maker
+from cfmkit.beams.kernels.codes import DIVERGED, SINGULAR, SLOW, SOLVED
+from cfmkit.beams.kernels.compiler import inlined, kernel
 from cfmkit.beams.kernels.dense import clear, copy_matrix, lu_solve, negative_determinant, positive_count
 from cfmkit.beams.kernels.springs import acts, add_block, add_force, add_loads, add_springs, jacobian, wires_of
 
-SOLVED, SINGULAR, DIVERGED, SLOW = 0, 1, 2, 3
 LARGEST_TURN = 1.0  # longest Newton step [rad or lengths]: longer ones are shortened, not refused
 
 
@@ -35,7 +35,7 @@ def assemble(m, y, drive, n_free, h, residual, values, ends, rel, store, work):
     n_beams = m.beam_end.shape[0]
     n_dofs = values.shape[0]
     n = n_free + 3 * n_beams
-    room, jacobians, _, _ = work
+    room, jacobians = work[0], work[1]
     ja, jb, force = jacobians[0], jacobians[1], room[4, 0]
     places, wires = places_of(m), wires_of(m)
     index, least = 0, 1.0
@@ -234,12 +234,11 @@ def solve(m, n_free, y, state, border, target, limits, tangent, scratch):
     return SLOW, int(limits[1])
 
 
-@maker
-def solve_each(m, n_free, ys, drives, limits, solved, scratch):
+@kernel
+def solve_each(m, n_free, ys, drives, limits, solved, scratch, room):
     """Solve for the equilibria near (ys, drives) at these drives; solved (points,) is set to one where it worked."""
-    n = scratch[0].shape[0] - 1
-    state, tangent, unit = np.zeros(6), np.empty(n + 1), np.zeros(n + 1)
-    unit[n] = 1.0
+    _, _, state, (_, tangent, unit, _), _ = room
+    state[5] = 0.0
     for p in range(ys.shape[0]):
         state[0], state[4] = drives[p], 0.0
         code, _ = solve(m, n_free, ys[p], state, unit, drives[p], limits, tangent, scratch)
@@ -250,7 +249,7 @@ def solve_each(m, n_free, ys, drives, limits, solved, scratch):
 def _unfold_all(m, n_free, errors, ddrive, dy, scratch):
     """Set the increments of the segments' unknowns from those of z (already in dy) and of the drive; see `unfold`."""
     h, _, _, _, values, _, _, store, work, _ = scratch
-    room, jacobians, _, _ = work
+    room, jacobians = work[0], work[1]
     n, dpose, jac, pose = h.shape[0] - 1, room[7, 0], jacobians[0], room[7, 1]
     places = places_of(m)
     for e in range(m.beam_end.shape[0]):
@@ -278,4 +277,4 @@ def all_slopes(m, n_free, tangent, slope, scratch):
     slope[slope.shape[0] - 1] = tangent[n]
 
 
-__all__ = ["DIVERGED", "SINGULAR", "SLOW", "SOLVED", "all_slopes", "all_values", "assemble", "solve", "solve_each"]
+__all__ = ["SOLVED", "all_slopes", "all_values", "assemble", "solve", "solve_each"]

@@ -19,7 +19,7 @@ def forces(m, n_free, ys, drives, out, scratch):
     """
     h, _, _, residual, values, _, _, _, work, _ = scratch
     n, beams = values.shape[0], m.beam_end.shape[0]
-    room, jacobians, _, _ = work
+    room, jacobians = work[0], work[1]
     pose, jac, force = room[4, 0], jacobians[0], room[4, 1]
     places, wires = places_of(m), wires_of(m)
     for p in range(ys.shape[0]):

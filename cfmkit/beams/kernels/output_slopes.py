@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import numpy as np
-
-from cfmkit.beams.kernels.compiler import maker
+from cfmkit.beams.kernels.compiler import kernel
 from cfmkit.beams.kernels.flow_slopes import flow_slopes
 from cfmkit.beams.kernels.force_slopes import beam_slopes, load_slopes, spring_slopes, value_slopes
 from cfmkit.beams.kernels.model import TABLE_COLUMNS
@@ -12,16 +10,15 @@ from cfmkit.beams.kernels.newton import all_values
 from cfmkit.beams.kernels.splitting import ROWS
 
 
-@maker
-def held_slopes(m, tilt, n_free, ys, drives, dys, out):
+@kernel
+def held_slopes(m, tilt, n_free, ys, drives, dys, out, room):
     """Set the derivatives of the forces on all degrees of freedom and of the springs' energy, (points, dofs + 1, k).
 
     The forces are those of `cfmkit.beams.kernels.observe.forces`.
     """
     count, beams, dofs = tilt.moves.shape[0], m.beam_end.shape[0], m.slot.shape[0]
     n = n_free + 3 * beams
-    values, dvalues, force, w = np.empty(dofs), np.empty(dofs), np.empty(dofs), np.zeros((12, 7))
-    dstart, dend = np.empty((beams, 3)), np.empty((beams, 3))
+    (values, dvalues, force), w, dstart, dend = room
     for p in range(ys.shape[0]):
         y, drive, dy = ys[p], drives[p], dys[p]
         all_values(m, y, drive, values)
@@ -39,15 +36,14 @@ def held_slopes(m, tilt, n_free, ys, drives, dys, out):
                 out[p, i, k] = force[i]
 
 
-@maker
-def row_slopes(m, tilt, n_free, y, drive, dy, out):
+@kernel
+def row_slopes(m, tilt, n_free, y, drive, dy, out, state):
     """Set the derivatives of the states at the step boundaries of all segments at one point by all variables.
 
     `tilt` pairs every beam with every variable. out (steps + segments, 7 k): phi, M, X, Y,
-    energy, h, v, each by all variables.
+    energy, h, v, each by all variables. state (9 k): room.
     """
     n, count = n_free + 3 * m.beam_end.shape[0], dy.shape[1]
-    state = np.zeros(9 * count)
     row = 0
     for e in range(m.beam_end.shape[0]):
         load = (

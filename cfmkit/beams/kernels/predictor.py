@@ -7,7 +7,6 @@ import numpy as np
 from cfmkit.beams.kernels.compiler import kernel
 from cfmkit.beams.kernels.dense import copy
 
-KEPT, KEPT_WITH_SLOPES = 6, 3  # points that the extrapolation uses
 MISSED = 0.4  # largest share of a step by which it may miss what the points before it, or its slopes, foretell
 
 

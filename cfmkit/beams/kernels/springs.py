@@ -78,7 +78,7 @@ def add_force(wires, h, residual, i, arm, jac, force):
 @kernel
 def add_loads(m, values, drive, h, residual, work):
     """Add the point loads, dead or turning with their node."""
-    room, jacobians, _, _ = work
+    room, jacobians = work[0], work[1]
     pose, jac, force, column = room[5, 0], jacobians[0], room[5, 1], room[5, 2]
     n = h.shape[0] - 1
     places, wires = places_of(m), wires_of(m)
@@ -168,7 +168,7 @@ def _tighten(wires, h, places, jacobians, kind, value, poses):
 @kernel
 def add_springs(m, values, drive, h, residual, work):
     """Add the springs; return their energy."""
-    room, jacobians, block, _ = work
+    room, jacobians, block = work[0], work[1], work[2]
     pa, pb, force, ja, jb = room[6, 0], room[6, 1], room[6, 2], jacobians[0], jacobians[1]
     places, wires = places_of(m), wires_of(m)
     energy = 0.0
