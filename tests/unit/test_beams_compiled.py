@@ -7,6 +7,7 @@ import ctypes
 import logging
 import os
 import pickle
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -171,7 +172,7 @@ def test_code_that_cannot_be_loaded_is_compiled_anew(
         _states_with(entry._got("states"))
     said = [record.message for record in caplog.records]
     assert said == ["compiling the beam engine, once: states along beams, a moment"]
-    assert len(list(folder.iterdir())) == 1
+    assert len(list(folder.glob("*.code"))) == 1
 
 
 def _states_with(call: Any) -> Any:
@@ -191,7 +192,69 @@ def test_kept_code_gives_to_the_last_bit_what_numba_gives() -> None:
     from cfmkit.beams.kernels import build
 
     usual = _states_with(machine.callable_at(build.called("states")))
-    assert _states_with(entry._got("states")).tobytes() == usual.tobytes()
+    _states_with(entry._got("states"))
+    code, path = kept.read("states"), kept.library("states")
+    assert code is not None
+    assert _states_with(machine.loaded(code)).tobytes() == usual.tobytes()
+    if path is not None:  # there is a C compiler
+        assert _states_with(machine.in_library(path)).tobytes() == usual.tobytes()
+
+
+_WAY_IN = "int cfmkit_door(const long long *block, long long *out) { out[0] = 2 * block[0]; return 0; }"
+
+
+@pytest.fixture
+def small(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A kept library of two machine instructions."""
+    linker = shutil.which("cc")
+    if linker is None:
+        pytest.skip("there is no C compiler")
+    room = tmp_path_factory.mktemp("source")
+    (room / "code.c").write_text(_WAY_IN)
+    subprocess.run([linker, "-fPIC", "-c", "code.c"], cwd=room, check=True)
+    kept.write("door", machine.Code((), (room / "code.o").read_bytes()))
+    path = kept.library("door")
+    assert path is not None
+    return path
+
+
+def _doubled(call: Any) -> int:
+    out = (ctypes.c_int64 * 2)()
+    assert call(np.array([21]).tobytes(), out) == 0
+    return int(out[0])
+
+
+def test_code_is_linked_where_there_is_a_compiler_and_runs_alike_where_there_is_none(
+    small: Path, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert _doubled(machine.in_library(small)) == 42
+    code = kept.read("door")
+    assert code is not None
+    assert _doubled(machine.loaded(code)) == 42
+    monkeypatch.setattr(shutil, "which", lambda _name: None)
+    kept.write("other", code)
+    assert kept.library("other") is None
+    assert kept.read("other") == code
+
+
+@pytest.mark.parametrize("damage", ["half of it", "of another origin", "others can write to it"])
+def test_a_damaged_or_strange_library_is_not_loaded(small: Path, damage: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    if damage == "half of it":
+        small.write_bytes(small.read_bytes()[: small.stat().st_size // 2])
+    elif damage == "of another origin":
+        kept.origin()
+        monkeypatch.setattr(kept, "stamp", lambda: "0" * 64)
+        for file in (small, small.with_suffix(".sha256")):
+            file.rename(small.with_name(f"door-{'0' * 24}{file.suffix}"))
+    else:
+        small.chmod(0o666)
+    assert kept.library("door") is None
+
+
+def test_what_is_no_library_is_said_to_be_strange(tmp_path: Path) -> None:
+    (tmp_path / "door.so").write_bytes(b"no library")
+    with pytest.raises(machine.Strange):
+        machine.in_library(tmp_path / "door.so")
 
 
 @pytest.mark.slow  # compiles everything in numba's usual way

@@ -54,6 +54,10 @@ class _Draft(codegen.JITCodeLibrary):
 class _Drafting(codegen.JITCPUCodegen):
     _library_class = _Draft
 
+    def _customize_tm_options(self, options: dict[str, Any]) -> None:
+        super()._customize_tm_options(options)
+        options |= {"reloc": "pic", "codemodel": "small"}  # for a shared library, which may lie anywhere
+
     def _add_module(self, module: Any) -> None:
         pass
 

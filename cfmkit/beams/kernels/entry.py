@@ -50,10 +50,12 @@ class Door:
 
 def _got(name: str) -> Callable[[bytes, Any], int]:
     """Return a door's code: what is kept, else what numba makes of the sources now."""
-    kept_code = kept.read(name)
-    if kept_code is not None:
-        with contextlib.suppress(machine.Strange):
-            return machine.loaded(kept_code)
+    with contextlib.suppress(machine.Strange):
+        if path := kept.library(name):
+            return machine.in_library(path)
+    with contextlib.suppress(machine.Strange):
+        if found := kept.read(name):
+            return machine.loaded(found)
     _announce(name)
     from cfmkit.beams.kernels import build
 

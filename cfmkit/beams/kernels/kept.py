@@ -13,7 +13,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cfmkit.beams.kernels.machine import Code, processor
+from cfmkit.beams.kernels.machine import Code, linked, processor
 from cfmkit.store.identity import installed
 from cfmkit.store.private import private_folder, trusted
 
@@ -65,18 +65,45 @@ def folders() -> Iterator[Path]:
         yield (Path(caches) if caches and os.path.isabs(caches) else Path.home() / ".cache") / "cfmkit"
 
 
+def _places() -> Iterator[Path]:
+    """Yield the folders, and last the one among the temporary files if it is there."""
+    yield from folders()
+    if private := private_folder("compiled", make=False):
+        yield private
+
+
+def _file(name: str, ending: str) -> str:
+    return f"{name}-{stamp()[:24]}.{ending}"
+
+
+def _found(name: str, ending: str) -> Iterator[Path]:
+    """Yield the files of a door that only this user, or the system's owner, can have written."""
+    for place in _places():
+        path = place / _file(name, ending)
+        if path.exists():
+            if trusted(path):
+                yield path
+            else:
+                _LOG.info("compiled code in %s is not used: others can write there", place)
+
+
+def library(name: str) -> Path | None:
+    """Return the shared library that is kept for a door, None if there is none that is of this origin and trusted.
+
+    Its seal stands beside it: half a file is none, and a renamed one neither.
+    """
+    for path in _found(name, "so"):
+        with contextlib.suppress(OSError):
+            if path.with_suffix(".sha256").read_text() == _seal(path.read_bytes()):
+                return path
+    return None
+
+
 def read(name: str) -> Code | None:
     """Return the code that is kept for a door, None if there is none that is of this origin, whole and trusted."""
-    file = f"{name}-{stamp()[:24]}.code"
-    for folder in (*folders(), None):
-        place = private_folder("compiled", make=False) if folder is None else folder
-        if place is None or not (place / file).exists():
-            continue
-        if not trusted(place / file):
-            _LOG.info("compiled code in %s is not used: others can write there", place)
-            continue
+    for path in _found(name, "code"):
         with contextlib.suppress(OSError, ValueError, KeyError):
-            return _parsed((place / file).read_bytes())
+            return _parsed(path.read_bytes())
     return None
 
 
@@ -90,12 +117,26 @@ def write(name: str, code: Code) -> Path | None:
             place.mkdir(mode=0o700, parents=True, exist_ok=True)
             if not trusted(place):
                 continue
-            _replace(place / f"{name}-{stamp()[:24]}.code", _written(code))
+            _replace(place / _file(name, "code"), _written(code))
+            _write_library(name, code, place)
             if folder is None:
                 _LOG.info("neither the package nor the home folder is writable: compiled code is kept in %s", place)
             return place
     _LOG.info("no folder is writable: compiled code is not kept")
     return None
+
+
+def _write_library(name: str, code: Code, place: Path) -> None:
+    with tempfile.TemporaryDirectory(prefix=".", dir=place) as room:
+        data = linked(code, Path(room))
+    if data is not None:
+        _replace(place / _file(name, "so"), data)
+        _replace(place / _file(name, "sha256"), _seal(data).encode())
+
+
+def _seal(library: bytes) -> str:
+    """Return what stands beside a shared library: what it follows from, and its own digest."""
+    return f"{stamp()} {hashlib.sha256(library).hexdigest()}\n"
 
 
 def _written(code: Code) -> bytes:
