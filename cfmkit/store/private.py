@@ -19,10 +19,10 @@ def trusted(path: Path) -> bool:
     if not hasattr(os, "getuid"):
         return True
     try:
-        place = path.resolve(strict=True)
-        for step in (place, *place.parents):
+        real = path.resolve(strict=True)
+        for step in (real, *real.parents):
             about = step.stat()
-            shared = about.st_mode & 0o022 and not (step != place and about.st_mode & stat.S_ISVTX)
+            shared = about.st_mode & 0o022 and not (step != real and about.st_mode & stat.S_ISVTX)
             if shared or about.st_uid not in (os.getuid(), 0):
                 return False
     except OSError:
@@ -44,7 +44,7 @@ def private_folder(name: str, make: bool = True) -> Path | None:
         Whether to make one where there is none; otherwise None.
     """
     try:
-        folder = Path(tempfile.gettempdir()) / f"cfmkit-{name}-{_user()}"
+        folder = place(name)
         if not make:
             return folder if _is_ours(folder) else None
         try:
@@ -55,6 +55,11 @@ def private_folder(name: str, make: bool = True) -> Path | None:
         return folder
     except OSError:
         return None
+
+
+def place(name: str) -> Path:
+    """Return where such a folder is, whether it exists or not."""
+    return Path(tempfile.gettempdir()) / f"cfmkit-{name}-{_user()}"
 
 
 def _user() -> str:

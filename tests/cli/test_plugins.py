@@ -166,15 +166,14 @@ def test_the_doctor_knows_versions_folders_and_the_solver(site, capsys):
 
 
 def test_the_doctor_sees_whether_the_solver_is_compiled(tmp_path, monkeypatch):
-    from cfmkit.beams.kernels import kept
+    from cfmkit.beams.kernels import kept, machine
 
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
     assert kept.kept_in() is None
-    (tmp_path / "kernels").mkdir()
-    (tmp_path / "kernels" / "entry.real_0123456789abcdef-34.nbi").touch()
+    (tmp_path / "solver-0123456789abcdef01234567.code").touch()
     assert kept.kept_in() is None
-    (tmp_path / "kernels" / f"entry.real_{kept.digest()[:16]}-34.nbi").touch()
-    assert kept.kept_in() == tmp_path / "kernels"
+    kept.write("solver", machine.Code((), b"code"))
+    assert kept.kept_in() == tmp_path
 
 
 def test_the_doctor_finds_a_folder_that_cannot_be_written_to(site, monkeypatch, capsys):

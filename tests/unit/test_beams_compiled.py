@@ -81,7 +81,7 @@ def _pulled_beam() -> tuple[Network, Displacement]:
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Where alone code is kept in a test; what the test itself needs is loaded before."""
     trace(*_pulled_beam())
-    monkeypatch.setattr(kept, "folders", lambda: iter([tmp_path]))
+    monkeypatch.setattr(kept, "_lasting", lambda: iter([tmp_path]))
     return tmp_path
 
 
@@ -137,7 +137,7 @@ def test_code_is_never_used_where_others_could_have_put_it(
 ) -> None:
     place = tmp_path / "above" / "folder"
     place.mkdir(parents=True)
-    monkeypatch.setattr(kept, "folders", lambda: iter([place]))
+    monkeypatch.setattr(kept, "_lasting", lambda: iter([place]))
     monkeypatch.setattr(kept, "private_folder", lambda _name, make=True: None)
     kept.write("door", CODE)
     (file,) = place.iterdir()
@@ -322,7 +322,7 @@ import logging, sys
 from pathlib import Path
 from cfmkit.beams.kernels import kept, machine
 logging.basicConfig(level=logging.INFO, format="%(message)s")
-kept.folders = lambda: iter([Path("/proc/none")])  # neither package nor home is writable
+kept._lasting = lambda: iter([Path("/proc/none")])  # neither package nor home is writable
 code = machine.Code((), b"code")
 before = kept.read("door") == code
 print(kept.write("door", code), before, kept.read("door") == code)
@@ -367,7 +367,7 @@ def test_code_is_never_loaded_from_a_folder_that_others_could_have_prepared(tmp_
 
 
 def test_without_any_folder_code_is_compiled_and_not_kept(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(kept, "folders", lambda: iter(()))
+    monkeypatch.setattr(kept, "_lasting", lambda: iter(()))
     monkeypatch.setattr(kept, "private_folder", lambda _name, make=True: None)
     assert kept.write("door", CODE) is None
     assert kept.read("door") is None

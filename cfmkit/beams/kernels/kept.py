@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 from cfmkit.beams.kernels.machine import Code, linked, processor
 from cfmkit.store.identity import installed
-from cfmkit.store.private import private_folder, trusted
+from cfmkit.store.private import place, private_folder, trusted
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -55,10 +55,21 @@ def stamp() -> str:
 _ELSEWHERE = "NUMBA_CACHE_DIR"
 
 
-def folders() -> Iterator[Path]:
-    """Yield where code may be kept, best first: where the user says, with the package, in the home folder."""
+def folders() -> tuple[Path, ...]:
+    """Return where code may be kept, best first."""
+    return (*_lasting(), place("compiled"))
+
+
+def kept_in() -> Path | None:
+    """Return the folder that holds the code compiled from these sources; None if they have not been compiled yet."""
+    return next((path.parent for path in _found("solver", "code")), None)
+
+
+def _lasting() -> Iterator[Path]:
+    """Yield the folders that stay: where the user says, else with the package, in the home folder."""
     if elsewhere := os.environ.get(_ELSEWHERE):
         yield Path(elsewhere)
+        return
     yield Path(__file__).parent / "__pycache__"
     caches = os.environ.get("LOCALAPPDATA") or os.environ.get("XDG_CACHE_HOME")
     with contextlib.suppress(RuntimeError):  # no home folder
@@ -67,7 +78,7 @@ def folders() -> Iterator[Path]:
 
 def _places() -> Iterator[Path]:
     """Yield the folders, and last the one among the temporary files if it is there."""
-    yield from folders()
+    yield from _lasting()
     if private := private_folder("compiled", make=False):
         yield private
 
@@ -78,13 +89,13 @@ def _file(name: str, ending: str) -> str:
 
 def _found(name: str, ending: str) -> Iterator[Path]:
     """Yield the files of a door that only this user, or the system's owner, can have written."""
-    for place in _places():
-        path = place / _file(name, ending)
+    for folder in _places():
+        path = folder / _file(name, ending)
         if path.exists():
             if trusted(path):
                 yield path
             else:
-                _LOG.info("compiled code in %s is not used: others can write there", place)
+                _LOG.info("compiled code in %s is not used: others can write there", folder)
 
 
 def library(name: str) -> Path | None:
@@ -109,29 +120,29 @@ def read(name: str) -> Code | None:
 
 def write(name: str, code: Code) -> Path | None:
     """Keep the code of a door; return where, None if there is no folder that only this user can write to."""
-    for folder in (*folders(), None):
+    for folder in (*_lasting(), None):
         with contextlib.suppress(OSError):
-            place = private_folder("compiled") if folder is None else folder
-            if place is None:
+            own = private_folder("compiled") if folder is None else folder
+            if own is None:
                 break
-            place.mkdir(mode=0o700, parents=True, exist_ok=True)
-            if not trusted(place):
+            own.mkdir(mode=0o700, parents=True, exist_ok=True)
+            if not trusted(own):
                 continue
-            _replace(place / _file(name, "code"), _written(code))
-            _write_library(name, code, place)
+            _replace(own / _file(name, "code"), _written(code))
+            _write_library(name, code, own)
             if folder is None:
-                _LOG.info("neither the package nor the home folder is writable: compiled code is kept in %s", place)
-            return place
+                _LOG.info("neither the package nor the home folder is writable: compiled code is kept in %s", own)
+            return own
     _LOG.info("no folder is writable: compiled code is not kept")
     return None
 
 
-def _write_library(name: str, code: Code, place: Path) -> None:
-    with tempfile.TemporaryDirectory(prefix=".", dir=place) as room:
+def _write_library(name: str, code: Code, folder: Path) -> None:
+    with tempfile.TemporaryDirectory(prefix=".", dir=folder) as room:
         data = linked(code, Path(room))
     if data is not None:
-        _replace(place / _file(name, "so"), data)
-        _replace(place / _file(name, "sha256"), _seal(data).encode())
+        _replace(folder / _file(name, "so"), data)
+        _replace(folder / _file(name, "sha256"), _seal(data).encode())
 
 
 def _seal(library: bytes) -> str:
