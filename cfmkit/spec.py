@@ -35,6 +35,14 @@ class Model(BaseModel):
     )
 
 
+class OldWords:
+    """Words of a closed choice that are still understood, and that nobody is to be told of (an annotation)."""
+
+    def __init__(self, *words: str) -> None:
+        """Keep them."""
+        self.old_words = words
+
+
 class Requirement(Model):
     """One condition that a finished run is checked against."""
 

@@ -9,6 +9,7 @@ import sys
 import threading
 import warnings
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -22,7 +23,7 @@ from cfmkit.cli.terminal import Terminal
 from cfmkit.errors import ExitCode
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
     from types import FrameType
 
 TEXT = "Design and analysis of constant-force mechanisms, from a YAML spec to a part that can be cut."
@@ -140,6 +141,23 @@ def _listen() -> None:
     if threading.current_thread() is threading.main_thread():
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, stop)
+        sys.unraisablehook = partial(_again, sys.unraisablehook, stop)
+
+
+AGAIN = 0.02
+"""Until a signal that was lost is sent again [s]: a compiler's callbacks are over sooner than anybody notices this."""
+
+
+def _again(plain: Callable[[Any], Any], stop: Callable[[int, FrameType | None], None], lost: Any) -> None:
+    """Send a signal again where its exception was raised in code that lets none out: callbacks, finalizers."""
+    if not isinstance(lost.exc_value, Stopped):
+        plain(lost)
+        return
+    number = lost.exc_value.exit_code - 128
+    signal.signal(number, stop)
+    timer = threading.Timer(AGAIN, os.kill, (os.getpid(), number))
+    timer.daemon = True
+    timer.start()
 
 
 def _before_the_verb(

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
 import sys
 import time
-from typing import TYPE_CHECKING
 
 import pytest
 
@@ -14,9 +14,6 @@ from cfmkit.cli.failures import Stopped
 from cfmkit.cli.verbs.design import long_run
 from cfmkit.families.base import Run
 from cfmkit.store import RunFolder
-
-if TYPE_CHECKING:
-    import subprocess
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
 
@@ -92,3 +89,28 @@ def test_a_search_that_is_ended_says_that_it_goes_on_if_it_does(tmp_path, finish
             told.append(stop.told)
     more = "; what is finished is kept: run the same command again to go on"
     assert told == [f"terminated{more if finished else ''}"]
+
+
+LOST = """
+import signal, time
+from cfmkit.cli import main
+from cfmkit.cli.failures import Stopped
+
+class Compiler:
+    def __del__(self):
+        signal.raise_signal(signal.SIGTERM)
+
+main._listen()
+try:
+    Compiler()
+    print("went on", flush=True)
+    time.sleep(20.0)
+except Stopped as stop:
+    print(stop.told)
+"""
+
+
+def test_a_signal_in_code_that_lets_no_exception_out_still_ends_the_run():
+    """As in a compiler's callbacks: nothing is printed of them, and the signal comes again when they are over."""
+    done = subprocess.run([sys.executable, "-c", LOST], capture_output=True, text=True, timeout=60, check=False)
+    assert (done.stdout, done.stderr) == ("went on\nterminated\n", "")

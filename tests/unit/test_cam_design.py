@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 from cam_support import MM, analyze, cam, design, message, names
@@ -204,6 +206,7 @@ def test_targets_that_cannot_be_met_are_refused_with_the_reason(mechanism, chang
     reason, _ = refused(targets(mechanism, **changes))
     assert reason.name == name
     assert words in reason.message
+    assert re.search(r"'(mechanism|design|analysis)\b", reason.message), "the key to change is not named"
 
 
 def test_a_refused_stroke_names_one_that_is_feasible():

@@ -59,6 +59,7 @@ def test_a_stroke_beyond_the_horizontal_brace_ends_there():
     result = run(profile__stroke="1 m", **FITS)
     assert result.status is Status.PARTIAL
     assert "the stroke ends at 961.8 mm of 1000 mm" in message(result, "brace_too_short")
+    assert "'mechanism.brace_length'" in message(result, "brace_too_short")
     assert result.curve.motion.max() == pytest.approx(961.8 * MM, rel=1e-3)
     assert run(profile__stroke="961 mm", **FITS).status is Status.COMPLETE
 
@@ -69,6 +70,7 @@ def test_a_short_brace_on_a_finished_cam_ends_where_the_slider_would_turn_back()
     assert result.status is Status.PARTIAL
     found = message(result, "brace_too_short")
     assert "a brace of 170 mm" in found
+    assert "'mechanism.brace_length'" in found
     assert f"after {result.curve.motion.max() / MM:.4g} mm" in found
     assert "brace_too_short" not in names(analyze(fixed(spec, brace_length="170 mm", analysis__travel="100 mm")))
     assert "brace_too_short" not in names(analyze(fixed(spec, brace_length="201 mm")))

@@ -404,3 +404,6 @@ def test_the_old_word_for_inverse_dynamics_is_understood_with_a_note():
     assert np.array_equal(old.curve.force, new.curve.force)
     assert set(names(old)) - set(names(new)) == {"old_word"}
     assert old.spec.analysis.dynamics.method == "inverse"
+    with pytest.raises(SpecError, match="'direkt' is not one of inverse, multibody") as refused:
+        moving(analysis__dynamics__method="direkt")
+    assert "direct" not in str(refused.value)

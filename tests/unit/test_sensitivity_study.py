@@ -17,7 +17,7 @@ from cfmkit.plots.style import MM, png
 from cfmkit.studies.engine import MISSING, run
 from cfmkit.studies.sensitivity.evaluation import Evaluator
 from cfmkit.studies.sensitivity.methods import METHODS, carry_out
-from cfmkit.studies.sensitivity.output import as_json, exit_code, outputs
+from cfmkit.studies.sensitivity.output import as_json, exit_code, message, outputs
 from cfmkit.studies.sensitivity.setup import points_of, prepare
 
 CONFIG = Path(__file__).parents[2] / "configs" / "studies" / "cam_tolerance.yaml"
@@ -146,6 +146,10 @@ def test_an_interrupted_study_states_nothing_but_keeps_its_rows():
     assert "indices.csv" not in written
     assert done[0] < points_of("sobol", 32, 3, 2)
     assert len(written["results.csv"].splitlines()) == 1 + done[0]
+    assert message(found).endswith("run the same command again to go on")
+    assert message(dataclasses.replace(found, fresh=True)).endswith(
+        "run the same command again without --fresh to go on"
+    )
     assert as_json(found)["status"] == "interrupted"
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
@@ -113,7 +113,7 @@ def run(options: Options, terminal: Terminal) -> Answer:
     setup = prepare(spec_of(options), options.seed, options.max_points)
     with studies.desk(out, terminal, options.fresh) as place:
         place.folder.check("results.csv", "indices.csv", "metrics.json", "resolved.yaml")
-        found = carry_out(setup, lambda work: studies.compute(work, options, place))
+        found = replace(carry_out(setup, lambda work: studies.compute(work, options, place)), fresh=options.fresh)
         for piece in found.evaluator.pieces:
             studies.tracebacks(piece.records, terminal)
         for name, data in files(found, not options.no_plots):

@@ -216,7 +216,8 @@ def _shortfall(law: SlopeLaw, stroke: float, reached: float) -> Finding | None:
         return finding(
             "path_vertical",
             f"cut for a friction of {law.friction:g} the path turns vertical at x = {mm(law.vertical_at)}: {ends}; "
-            "use less friction or a larger force constant",
+            "use less friction or a larger force constant ('friction' and 'force_constant' of 'mechanism.profile', or "
+            "of 'design')",
         )
     if reached <= 0:
         raise CannotBuild(
@@ -230,8 +231,9 @@ def _shortfall(law: SlopeLaw, stroke: float, reached: float) -> Finding | None:
         )
     return finding(
         "brace_too_short",
-        f"the brace of {mm(law.brace_length)} turns horizontal too early: {ends}; use a longer brace or a smaller "
-        "force constant",
+        f"the brace of {mm(law.brace_length)} turns horizontal too early: {ends}; use a longer brace "
+        "('mechanism.brace_length') or a smaller force constant ('force_constant' of 'mechanism.profile', or of "
+        "'design')",
     )
 
 

@@ -201,7 +201,7 @@ def _shortfalls(assembly: Assembly, solution: Solution) -> tuple[Finding, ...]:
                 "brace_too_short",
                 f"with a brace of {mm(assembly.track.brace_length)} on this cam the slider stops rising after "
                 f"{mm(reached)} of travel, before the flank ends, and the force has no bound there; use a longer "
-                "brace, or a cam cut for this one",
+                "brace ('mechanism.brace_length'), or a cam cut for this one ('mechanism.profile.brace_length')",
             )
         )
     elif asked is not None and short:
@@ -209,7 +209,7 @@ def _shortfalls(assembly: Assembly, solution: Solution) -> tuple[Finding, ...]:
             finding(
                 "outside_profile",
                 f"the travel asked for is {mm(asked)}, but the profile is cut for {mm(reached)} with these parts; "
-                "cut a longer profile or ask for less",
+                "cut a longer profile ('mechanism.profile.stroke') or ask for less ('analysis.travel')",
             )
         )
     return tuple(found)

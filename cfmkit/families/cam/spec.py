@@ -9,7 +9,7 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from cfmkit.families.cam.manufacturing.spec import Manufacturing
 from cfmkit.materials.spec import MaterialField, MaterialSpec, SafetyFactor
-from cfmkit.spec import Analysis, Model, Spec, refuse
+from cfmkit.spec import Analysis, Model, OldWords, Spec, refuse
 from cfmkit.tables.source import DataSource
 from cfmkit.units import Angle, Force, Inertia, Length, Mass, Ratio, Stiffness, Time, format_short
 
@@ -245,7 +245,7 @@ class Dynamics(Model):
     origin: Literal["path-start", "cam-start"] = Field(
         "path-start", description="where heights are zero: at the first point of the roller path, or of the cam"
     )
-    method: Literal["inverse", "multibody", "direct"] = Field(
+    method: Annotated[Literal["inverse", "multibody", "direct"], OldWords("direct")] = Field(
         "inverse",
         description=(
             "inverse dynamics with closed kinematics, or nine coordinates with Lagrange multipliers; "

@@ -91,7 +91,9 @@ def nowhere(task: Task) -> Finding:
     if window is not None:
         text = f"in the window the best springs are none: no others come closer to a constant {task.assembly.drive}"
         return finding("infeasible_targets", f"{text}; change 'design.{task.assembly.motion_name}' or 'design.springs'")
-    return finding("infeasible_targets", "no window keeps 'design.tolerance'; allow more, or change the lengths")
+    return finding(
+        "infeasible_targets", "no window keeps 'design.tolerance'; allow more, or change the lengths in 'mechanism'"
+    )
 
 
 def hopeless(task: Task, deviation: float) -> Finding:
@@ -99,9 +101,13 @@ def hopeless(task: Task, deviation: float) -> Finding:
     text = f"even the best springs are off by {percent(deviation)}: that is no constant {task.assembly.drive}"
     ahead = (task.assembly.stretched - task.assembly.start) * task.wanted.target
     if task.assembly.drive == "torque" and ahead <= 0.0:
-        text += "; the stretched position does not lie ahead of the unloaded one, and the torque only rises there"
+        text += "; the stretched position does not lie ahead of the unloaded one, and the torque only rises there; "
+        text += "change 'mechanism.unloaded_angle' (or 'unloaded_offset'), or the sign of 'design.torque'"
         return finding("no_zero_stiffness", text)
-    return finding("infeasible_targets", f"{text}; narrow 'design.{task.assembly.motion_name}', or change the lengths")
+    return finding(
+        "infeasible_targets",
+        f"{text}; narrow 'design.{task.assembly.motion_name}', or change the lengths in 'mechanism'",
+    )
 
 
 def too_far(task: Task, deviation: float) -> tuple[Finding, dict[str, str]]:
@@ -110,11 +116,12 @@ def too_far(task: Task, deviation: float) -> tuple[Finding, dict[str, str]]:
     nearest = {"design.tolerance": f"{100 * deviation:.4g} %"}
     allowed = f"'design.tolerance' allows {percent(wanted.tolerance or 0)}"
     text = f"the best springs are off by {percent(deviation)}, and {allowed}"
+    text += f"; allow more, or narrow 'design.{task.assembly.motion_name}'"
     found = widest(task, wanted.tolerance or 0.0)
     if found is not None:
         low, high = (format_short(end, task.assembly.dimension) for end in (found.low, found.high))
         nearest[f"design.{task.assembly.motion_name}"] = f"[{low}, {high}]"
-        text += f"; a window that keeps it is {low} to {high}"
+        text += f": a window that keeps it is {low} to {high}"
     return finding("infeasible_targets", text), nearest
 
 

@@ -78,6 +78,8 @@ class Findings:
         Of parts that meet one.
     interrupted : bool
         Whether the user stopped it: there are no indices.
+    fresh : bool
+        Whether it was to reuse nothing: then the same command would begin anew.
     """
 
     setup: Setup
@@ -90,6 +92,7 @@ class Findings:
     all_met: Yield | None = None
     each_met: tuple[Yield, ...] = ()
     interrupted: bool = False
+    fresh: bool = False
 
     @property
     def unstated(self) -> int:

@@ -101,7 +101,8 @@ def message(found: Findings) -> str:
     told = f"{found.setup.method}: {evaluator.count} samples"
     if found.interrupted:
         of = f"{evaluator.missing} of {evaluator.count + evaluator.missing} samples"
-        return f"{told}; interrupted: {of} were not computed; run the same command again to go on"
+        again = "run the same command again without --fresh" if found.fresh else "run the same command again"
+        return f"{told}; interrupted: {of} were not computed; {again} to go on"
     if evaluator.failed:
         told += f", {evaluator.failed} without a result (the first: {evaluator.first_failure})"
     if found.unstated:

@@ -20,11 +20,14 @@ def infeasible(found: Found) -> Design:
     """Return what the nearest strip misses, and the target that it would meet."""
     descent, program, task = found.descent, found.program, found.task
     if descent.ending is Ending.NO_ANSWER:
-        why = "could not begin: the first strip has no equilibrium over the travel"
+        why = "could not begin: the first strip has no equilibrium over 'design.travel'; ask for less of it, or "
+        why += "for other ranges in 'design.beam'"
         return no_design(finding("target_unreachable", f"the search {why}"))
     state = program.state(descent.z)
     if state is None:
-        return no_design(finding("target_unreachable", f"the search {descent.ending.value}"))
+        return no_design(
+            finding("target_unreachable", f"the search {descent.ending.value}; change 'design.travel' or 'design.beam'")
+        )
     low, high = float(state.force.min()), float(state.force.max())
     level, missed, nearest = 0.5 * (low + high), [], {}
     off, limit = max(high / task.force - 1.0, 1.0 - low / task.force), task.material.allowable_stress
@@ -39,6 +42,7 @@ def infeasible(found: Found) -> Design:
         nearest["allowable stress"] = mpa(worst)
     text = (
         f"no strip within the ranges keeps the force, the band and the stress: from {mm(task.start)} to "
-        f"{mm(program.stroke(descent.z))} the nearest {' and '.join(missed)} ({descent.ending.value})"
+        f"{mm(program.stroke(descent.z))} the nearest {' and '.join(missed)} ({descent.ending.value}); change "
+        "'design.force', 'design.travel' or the ranges in 'design.beam'"
     )
     return no_design(finding("target_unreachable", text), nearest)

@@ -89,13 +89,14 @@ def design_flexures(spec: SliderCrankSpec, linkage: Linkage, unloaded: float) ->
     stubby = next((one for one in first if one.length < _SLENDER * one.thickness), None)
     if stubby is not None:
         text = f"the stress would allow a thickness of {mm(stubby.thickness)} on a length of {mm(stubby.length)}"
-        return no_design(finding("target_unreachable", f"{text}: no flexure; make them longer, or the stroke larger"))
+        cure = "make them longer ('design.flexures.length'), or the stroke larger ('design.travel')"
+        return no_design(finding("target_unreachable", f"{text}: no flexure; {cure}"))
     travel = np.linspace(0.1 * stroke, stroke, _POINTS)
     springs_force = rates @ along_slider(linkage, unloaded, side, travel).effort[:3]
     found = corrected(first, made_of, (linkage, unloaded), travel, springs_force, wanted.flexures.exact)
     if found is None:
         return no_design(
-            finding("not_converged", "the flexures of the closed forms have no equilibrium over the stroke")
+            finding("not_converged", "the flexures of the closed forms have no equilibrium over 'design.travel'")
         )
     over = (
         "over that of the springs, on average, of flexures by the closed forms",
