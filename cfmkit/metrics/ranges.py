@@ -159,8 +159,8 @@ def _solved_interval(cycle: Cycle, reference: float, valid: float) -> Interval |
 
 
 def _mean(cycle: Cycle) -> float:
-    """Return the mean of the branches' means, each over its points in the window."""
-    value = sum(branch.spread.sign * branch.spread.mean for branch in cycle.branches) / len(cycle.branches)
+    """Return the mean of the branches' means, each over its points in the window, or the window where it is solved."""
+    value = sum(branch.level for branch in cycle.branches) / len(cycle.branches)
     if value == 0:
         raise Undefined("there is no target, and the mean is zero")
     return value

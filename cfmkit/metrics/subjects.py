@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from cfmkit.metrics import closed
 from cfmkit.metrics.many import BAND_RANGES, ManyBranches, band_ranges, range_95
 from cfmkit.metrics.traces import ROUNDING, Trace, Undefined, Window, covers, restrict, traces
 
@@ -184,6 +185,15 @@ class Branch:
         if mean < 0:
             return Spread(-mean, -low, -high, -1.0)
         return Spread(mean, high, low, 1.0)
+
+    @cached_property
+    def level(self) -> float:
+        """Mean effort in the window: over its points, or over the way where the model gives it at every place."""
+        model = self.frame.closed
+        if model is None:
+            return self.spread.sign * self.spread.mean
+        self.inside  # noqa: B018  (raises where the window is not covered)
+        return closed.mean(partial(model.effort, self.name), model.places, *self.ends)
 
     @cached_property
     def function(self) -> Function:

@@ -11,12 +11,15 @@ L. N. Trefethen, Approximation Theory and Approximation Practice, SIAM (2013), c
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.polynomial import chebyshev
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
     from cfmkit.curves import FloatArray
 
 NODES = 16
@@ -75,3 +78,51 @@ def coefficients(panel: tuple[float, float], x: FloatArray, values: FloatArray) 
     at = np.minimum(np.searchsorted(x, nodes), len(x) - 1)
     found: FloatArray = _TRANSFORM @ np.where(x[at] == nodes, values[at], np.nan)
     return found
+
+
+def resolved(
+    functions: Callable[[FloatArray], FloatArray], ends: FloatArray, close: Sequence[float], halvings: int
+) -> tuple[Panels, ...]:
+    """Return functions as panels, each halved until the polynomials of all functions have converged on it.
+
+    Parameters
+    ----------
+    functions : callable
+        All functions at increasing places, (n,) -> (m, n). Where halves lack a value, their panel is kept as it is.
+    ends : (k + 1,) array
+        Of the panels at first, increasing.
+    close : sequence of float
+        Size of the last coefficients of each function, relative to the largest value seen, at which it has converged.
+    halvings : int
+        At most so many of a panel, for functions with corners.
+
+    Examples
+    --------
+    >>> (bow,) = resolved(lambda x: np.abs(x - 0.3)[None, :], np.array([0.0, 1.0]), (1e-3,), 8)
+    >>> float(bow.at(np.array([0.75]))[0].round(12)), len(bow.ends) > 4
+    (0.45, True)
+    """
+    wanted = list(pairwise(np.asarray(ends).tolist()))
+    parents: dict[tuple[float, float], list[FloatArray]] = {}
+    done: dict[tuple[float, float], list[FloatArray]] = {}
+    largest = np.zeros(len(close))
+    for left in range(halvings, -1, -1):
+        places = np.unique(np.concatenate([nodes_of(panel) for panel in wanted]))
+        values = functions(places)
+        if parents and not np.isfinite(values).all():
+            done |= parents
+            break
+        largest = np.fmax(largest, np.nanmax(np.abs(values), axis=1, initial=0.0))
+        rough: dict[tuple[float, float], list[FloatArray]] = {}
+        for panel in wanted:
+            found = [coefficients(panel, places, row) for row in values]
+            tails = np.array([np.abs(one[-3:]).max() for one in found])
+            (rough if left and (tails > close * largest).any() else done)[panel] = found
+        if not rough:
+            break
+        middles = {panel: 0.5 * (panel[0] + panel[1]) for panel in rough}
+        parents = rough
+        wanted = [half for (low, high), at in middles.items() for half in ((low, at), (at, high))]
+    ordered = sorted(done)
+    borders = np.array([low for low, _ in ordered] + [ordered[-1][1]])
+    return tuple(Panels(borders, np.array([done[panel][k] for panel in ordered])) for k in range(len(close)))

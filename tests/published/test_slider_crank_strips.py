@@ -18,8 +18,8 @@ from cfmkit.families.slider_crank.flexures.chain import kink as offset
 from cfmkit.families.slider_crank.flexures.descent import descend
 from cfmkit.families.slider_crank.flexures.program import StripProgram
 from cfmkit.families.slider_crank.flexures.search import Found, Ranges, search, uniform_for_stroke, uniform_thickness
+from cfmkit.families.slider_crank.flexures.solution import first_at
 from cfmkit.families.slider_crank.flexures.task import Form, Task
-from cfmkit.families.slider_crank.flexures.values import first_at
 from cfmkit.numerics.sqp import Ending
 
 TASK = Task(corners(), np.pi, ABS, 1.5, 1 * MM, 20 * MM, 0.01, "stroke", 60 * MM)

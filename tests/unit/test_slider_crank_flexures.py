@@ -31,8 +31,8 @@ from cfmkit.families.slider_crank.flexures.findings import FINDINGS as OF_PARTS
 from cfmkit.families.slider_crank.flexures.pressing import Ending
 from cfmkit.families.slider_crank.flexures.program import StripProgram
 from cfmkit.families.slider_crank.flexures.sizing import Flexure, rotations, sized
+from cfmkit.families.slider_crank.flexures.solution import first_at
 from cfmkit.families.slider_crank.flexures.task import Form, Task
-from cfmkit.families.slider_crank.flexures.values import first_at
 from cfmkit.numerics import sqp
 from cfmkit.numerics.barycentric import differentiation, interpolation
 from cfmkit.results import Status
@@ -541,3 +541,50 @@ def test_two_links_with_pins_are_drawn_for_springs() -> None:
     apart = holes[1].edges[0].center[0] - holes[0].edges[0].center[0]  # type: ignore[union-attr]
     assert apart == pytest.approx(54 * MM)
     assert TABLE_2[0].length == pytest.approx(54 * MM / 5)
+
+
+# --- places ---------------------------------------------------------------------------------------------------
+
+PLACES = ("usable_stroke", "usable_start", "usable_end", "range_95", "band_range_05pct", "band_range_1pct")
+PLACES += ("band_range_5pct", "run_in_95", "run_in_98")
+
+
+@pytest.mark.parametrize(
+    ("name", "changes"),
+    [
+        ("lumped", ()),
+        ("strip", ()),
+        ("tapered", ()),
+        ("tapered", ("analysis.fidelity=lumped",)),
+        ("strip", ("mechanism.unloaded_angle=0.5404195002705842 rad",)),  # a corner, where the straight strip buckles
+        ("strip", ("analysis.side=beyond", "mechanism.material.yield_strength=30 MPa")),
+        ("strip", ("analysis.travel=[5 mm, 30 mm]", "analysis.window=[6 mm, 29 mm]")),
+    ],
+)
+def test_places_do_not_depend_on_the_number_of_points(name: str, changes: tuple[str, ...]) -> None:
+    found = []
+    for points in (21, 301):
+        one = spec(name, *changes, f"analysis.points={points}", "analysis.recheck=false")
+        metrics = api.evaluate(api.analyze(one))
+        found.append([metrics[each].value for each in PLACES])
+        found[-1].append(metrics["stress_stroke"].value or 0.0)
+    assert one.analysis.travel is not None
+    assert None not in found[0]
+    assert found[0] == pytest.approx(found[1], rel=0, abs=1e-7 * one.analysis.travel[1])
+
+
+def test_the_course_between_the_points_is_that_of_the_chain_pressed_there() -> None:
+    one = api.analyze(spec("tapered", "analysis.points=11", "analysis.recheck=false"))
+    travel = np.sort(np.random.default_rng(3).uniform(1e-7, 16 * MM, 40))
+    again = one.state.chain.press(travel)
+    np.testing.assert_allclose(one.closed.effort("load", travel), again.force, rtol=1e-8)
+    np.testing.assert_allclose(
+        one.closed.stress("load", travel), again.path.peak_stress().value[again.path.at_asked], 1e-6
+    )
+
+
+def test_the_stress_stroke_is_where_the_pressed_chain_has_the_allowable_stress() -> None:
+    one = api.analyze(spec("tapered", "analysis.fidelity=lumped", "analysis.points=11", "analysis.recheck=false"))
+    place = one.values["stress_stroke"].value
+    path = one.state.chain.press(np.array([place])).path
+    assert path.peak_stress().value[path.at_asked[0]] == pytest.approx(42.5e6, rel=1e-6)

@@ -10,7 +10,7 @@ from cfmkit.families.findings import mm, mpa, newton
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.flexures.chain import kink
 from cfmkit.families.slider_crank.flexures.findings import CLOSE, RUN_IN_SHARE, SIDE_SHARE, THINNEST_RATIO
-from cfmkit.families.slider_crank.flexures.values import first_at, stress_stroke
+from cfmkit.families.slider_crank.flexures.values import stress_stroke
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -73,7 +73,7 @@ def _kink(spec: SliderCrankSpec, solution: Printed) -> Iterator[Finding]:
             f"the kink of {mm(off)} that sends the chain to one side is smaller than what the process resolves "
             f"({mm(process.layer)}): the part may bend to the other side, with another force; 0.25 to 0.5 mm is safe",
         )
-    run_in = first_at(solution.travel, solution.force, 0.98 * solution.level)
+    run_in = solution.first_at(0.98 * solution.level)
     if run_in is not None and run_in > RUN_IN_SHARE * solution.travel[-1] and off > 1e-3 * solution.chain.length:
         yield finding(
             "long_run_in",

@@ -11,8 +11,7 @@ import numpy as np
 from cfmkit.families.findings import mm, mpa
 from cfmkit.families.slider_crank.flexures.assembly import strip_chain
 from cfmkit.families.slider_crank.flexures.pressing import Ending
-from cfmkit.families.slider_crank.flexures.solution import Printed, SecondOpinion
-from cfmkit.families.slider_crank.flexures.values import first_at
+from cfmkit.families.slider_crank.flexures.solution import Printed, SecondOpinion, first_at
 
 if TYPE_CHECKING:
     from cfmkit.curves import FloatArray

@@ -104,6 +104,8 @@ def analyze(spec: SliderCrankSpec, run: Run) -> Result:
         spec.mechanism.legs,
         window,
         spec.analysis.recheck,
+        side,
+        spec.analysis.accuracy,
     )
     return Result(
         spec=spec,
@@ -116,6 +118,7 @@ def analyze(spec: SliderCrankSpec, run: Run) -> Result:
         target=spec.design.force if spec.design else None,
         reference=spec.analysis.reference_travel,
         allowable_stress=solution.material.allowable_stress,
+        closed=solution.course,
         state=solution,
     )
 

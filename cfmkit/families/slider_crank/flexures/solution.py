@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -15,12 +15,13 @@ from cfmkit.families.slider_crank.flexures.pressing import Ending
 if TYPE_CHECKING:
     from cfmkit.curves import FloatArray
     from cfmkit.families.slider_crank.flexures.chain import Elasticity
+    from cfmkit.families.slider_crank.flexures.course import Course
     from cfmkit.families.slider_crank.flexures.pressing import Chain, Pressed
 
 Model = Literal["lumped", "beam"]
 
-NEAREST, RISING = 1e-5, 49
-"""Where the force is looked at while it comes up: from this share of the travel on, at so many places."""
+FOLLOWED = (Ending.COMPLETE, Ending.UNSTABLE)
+"""Endings of a path that has all points that were requested."""
 
 CHECKED = 6
 """Places at which the second opinion is asked for."""
@@ -56,6 +57,10 @@ class Printed:
         Where metrics are taken [m].
     checked : bool
         Whether a second opinion was asked for.
+    side : int
+        To which it was to bend, as `Chain.press` takes it.
+    accuracy : float
+        Of the path, relative.
     """
 
     model: Model
@@ -65,6 +70,8 @@ class Printed:
     legs: int
     window: tuple[float, float]
     checked: bool = False
+    side: int = 0
+    accuracy: float = 1e-7
 
     @cached_property
     def _at(self) -> Any:
@@ -135,25 +142,36 @@ class Printed:
         return energy
 
     @cached_property
+    def course(self) -> Course | None:
+        """Force and stress at every travel; None where the chain cannot be followed to places between its points."""
+        from cfmkit.families.slider_crank.flexures.course import course
+
+        low, high = float(self.travel[0]), float(self.travel[-1])
+        return course(self._at_travels, (low, high), (float(self.force[0]), float(self.stress[0])))
+
+    def _at_travels(self, travel: FloatArray) -> tuple[FloatArray, FloatArray] | None:
+        """Return force [N] and stress [Pa] at other travels than those of the points; None where one is not reached."""
+        found = self.chain.press(travel, self.side, self.accuracy)
+        if found.ending not in FOLLOWED or len(found.travel) < len(travel):
+            return None
+        other = replace(self, pressed=found)
+        return other.force, other.stress
+
+    @cached_property
     def level(self) -> float:
         """Mean force in the window [N]."""
-        low, high = self.window
+        low, high = max(self.window[0], float(self.travel[0])), min(self.window[1], float(self.travel[-1]))
+        if self.course is not None and low < high:
+            return self.course.mean((low, high))
         inside = (self.travel >= low) & (self.travel <= high)
         chosen = inside if inside.any() else np.ones(len(self.travel), dtype=bool)
         return float(self.force[chosen].mean())
 
-    @cached_property
-    def beginning(self) -> tuple[FloatArray, FloatArray]:
-        """Travel and force from rest on, at places that stand dense where the force comes up [m, N].
-
-        The points of the curve where the chain does not start from rest, or has no whole curve.
-        """
-        if self.travel[0] > 0.0 or self.pressed.ending is not Ending.COMPLETE:
-            return self.travel, self.force
-        found = self.chain.press(float(self.travel[-1]) * np.geomspace(NEAREST, 1.0, RISING), self.pressed.side)
-        if found.ending is not Ending.COMPLETE:
-            return self.travel, self.force
-        return found.travel, self.legs * found.force
+    def first_at(self, level: float, stress: bool = False) -> float | None:
+        """Return the travel at which the force [N], or the stress [Pa], first reaches a level; None if nowhere."""
+        if self.course is not None:
+            return self.course.first_at(level, int(stress))
+        return first_at(self.travel, self.stress if stress else self.force, level)
 
     @cached_property
     def width_ratio(self) -> float:
@@ -188,3 +206,15 @@ class Printed:
         stress = found.stress / self.stress[chosen] - 1.0
         worst = [float(part[np.abs(part).argmax()]) for part in (force, stress)]
         return SecondOpinion(worst[0], worst[1], bool(found.stable.all()), found.elements)
+
+
+def first_at(place: FloatArray, values: FloatArray, level: float) -> float | None:
+    """Return where values first reach a level from below, linear between points; None where they do not."""
+    above = np.flatnonzero(values >= level)
+    if not len(above):
+        return None
+    k = int(above[0])
+    if k == 0:
+        return float(place[0])
+    share = (level - values[k - 1]) / (values[k] - values[k - 1])
+    return float(place[k - 1] + share * (place[k] - place[k - 1]))

@@ -20,7 +20,7 @@ def numbers(solution: Printed) -> Iterator[tuple[str, float | None, str]]:
     yield "kink", kink(solution.chain.pins), ""
     level = solution.level
     for name, share in (("run_in_95", 0.95), ("run_in_98", 0.98)):
-        place = run_in(solution, share * level)
+        place = solution.first_at(share * level)
         yield name, place, "" if place is not None else "the force does not reach it"
     yield "side_force_max", _largest(solution.side_force), ""
     yield "guide_moment_max", _largest(solution.guide_moment), ""
@@ -36,42 +36,13 @@ def numbers(solution: Printed) -> Iterator[tuple[str, float | None, str]]:
     yield "recheck_stress", None if check is None else check.stress, why
 
 
-def run_in(solution: Printed, level: float) -> float | None:
-    """Return the travel at which the force first reaches a level [m], whatever the points of the curve.
-
-    The force comes up within a thousandth of the travel: it is looked at on a logarithmic scale of its own.
-    """
-    from scipy.interpolate import CubicSpline
-
-    from cfmkit.numerics.roots import bracketed_root
-
-    travel, force = solution.beginning
-    above = np.flatnonzero(force >= level)
-    if not len(above) or above[0] == 0 or travel[0] == 0.0:
-        return first_at(travel, force, level)
-    course, k = CubicSpline(np.log(travel), force - level), int(above[0])
-    return float(np.exp(bracketed_root(lambda at: float(course(at)), *np.log(travel[k - 1 : k + 1]).tolist())))
-
-
 def stress_stroke(solution: Printed) -> tuple[float | None, str]:
-    """Return the travel at which the allowable stress is reached [m], interpolated; None with the reason."""
+    """Return the travel at which the allowable stress is reached [m]; None with the reason."""
     limit = solution.material.allowable_stress
     if limit is None:
         return None, "the material has no 'yield_strength'"
-    place = first_at(solution.travel, solution.stress, limit)
+    place = solution.first_at(limit, stress=True)
     return place, "" if place is not None else "the stress stays below the allowable one"
-
-
-def first_at(place: FloatArray, values: FloatArray, level: float) -> float | None:
-    """Return where values first reach a level from below, linear between points; None where they do not."""
-    above = np.flatnonzero(values >= level)
-    if not len(above):
-        return None
-    k = int(above[0])
-    if k == 0:
-        return float(place[0])
-    share = (level - values[k - 1]) / (values[k] - values[k - 1])
-    return float(place[k - 1] + share * (place[k] - place[k - 1]))
 
 
 def _largest(values: FloatArray) -> float:
