@@ -16,6 +16,7 @@ import numpy as np
 from cfmkit.curves import Column, Curve
 from cfmkit.families.vcfm.checks import findings_of, spring_closed
 from cfmkit.families.vcfm.parts import parts, spring_room
+from cfmkit.families.vcfm.places import Places
 from cfmkit.families.vcfm.samples import LawSampler
 from cfmkit.families.vcfm.tables import adjustability, readings
 from cfmkit.families.vcfm.values import values_of
@@ -226,6 +227,7 @@ def result_of(solution: Solution) -> Result:
         target=spec.design.force if spec.design else None,
         allowable_stress=spec.mechanism.allowable_stress,
         load_cases=curves[1:],
+        closed=Places(solution),
         tables={"adjustability": partial(adjustability, solution), "readings": partial(readings, solution)},
         state=solution,
     )
