@@ -118,13 +118,18 @@ class Searched:
 class ClosedForm(Protocol):
     """A model that gives the effort at every place, not at the samples of the curve only.
 
-    Metrics that are places (``usable_stroke``, ``band_range_1pct``, ``range_95``) are solved on it, so that
-    they do not depend on the number of samples.
+    Metrics that are places (``usable_stroke``, ``band_range_1pct``, ``range_95``) are solved on it, ends of a window
+    between two samples are asked of it, and extremes are looked for between the samples next to them.
     """
 
     @property
     def places(self) -> FloatArray:
         """Increasing places over the motion, (n,), so dense that the effort hides nothing between two [m or rad]."""
+        ...
+
+    @property
+    def peaks(self) -> FloatArray:
+        """Places next to which an extreme of the effort may stand that the samples of a curve miss, (m,) [m or rad]."""
         ...
 
     def effort(self, branch: str, places: FloatArray, /) -> FloatArray:

@@ -1,7 +1,8 @@
-"""Means and extremes over a window of a model that is known at every place, whatever the samples of its curve.
+"""Means and extremes over a window of a model that is known at every place: for one curve, or for many at once.
 
-A model's places stand so dense that it hides nothing between two of them: an extreme lies next to the
-largest or smallest value there, and a few more places around that sharpen it.
+An extreme lies between the neighbours of the largest or smallest sample. There the model is asked at the vertex of the
+parabola through these three and on either side of it, and again between the neighbours of the best; the largest value
+that was seen counts.
 """
 
 from __future__ import annotations
@@ -17,6 +18,16 @@ if TYPE_CHECKING:
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(4)
 """Of each step between two places: polynomials of degree seven are integrated exactly."""
+
+
+FEW = 100
+"""Samples below which a parabola through three of them is no more than a first guess."""
+
+ROUNDS, BESIDE = 3, np.array([-0.08, 0.0, 0.08])
+"""Parabolas for few samples, and where the model is asked next to the vertex, as shares of the way between the outer
+points. Vertices alone draw nearer from one side only, slowly where a curve is skew; with a place on either side the
+way is a sixth as long after each round: of a cam at 31 points the last extreme is right to 2e-8 of the force.
+"""
 
 
 def inside(places: FloatArray, low: float, high: float) -> FloatArray:
@@ -37,3 +48,59 @@ def mean(function: Callable[[FloatArray], FloatArray], places: FloatArray, low: 
     middle, half = 0.5 * (ends[1:] + ends[:-1]), 0.5 * (ends[1:] - ends[:-1])
     values = function(middle[:, None] + half[:, None] * _NODES)
     return float((half * (values @ _WEIGHTS)).sum() / (high - low))
+
+
+def extremes(
+    function: Callable[[FloatArray], FloatArray], motion: FloatArray, effort: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return the largest and the smallest value of each row next to its samples, (d,) each.
+
+    Parameters
+    ----------
+    function : callable
+        Values at any places of each row, (d, m) -> (d, m); where it is not a number, it does not count.
+    motion, effort : (d, n) array
+        Samples, monotonic in the motion; their values.
+
+    Examples
+    --------
+    >>> x = np.linspace(0.0, 3.0, 7)[None, :]
+    >>> high, low = extremes(np.sin, x, np.sin(x))
+    >>> float(high[0].round(6)), float(low[0])
+    (1.0, 0.0)
+    """
+    last = effort.shape[1] - 1
+    sign = np.array([1.0, -1.0])
+    if last < 2:
+        return effort.max(axis=1), effort.min(axis=1)
+    middle = np.clip(np.stack([effort.argmax(axis=1), effort.argmin(axis=1)], axis=1), 1, last - 1)
+    near = middle[..., None] + np.arange(-1, 2)
+    rows = np.arange(len(effort))[:, None, None]
+    x, y = np.broadcast_to(motion, effort.shape)[rows, near], sign[:, None] * effort[rows, near]
+    best = np.stack([effort.max(axis=1), -effort.min(axis=1)], axis=1)
+    rounds, beside = (ROUNDS, BESIDE) if last < FEW else (1, np.zeros(1))
+    for _ in range(rounds):
+        places = _next(x, y, beside)
+        found = sign[:, None] * function(places.reshape(len(places), -1)).reshape(places.shape)
+        found = np.where(np.isfinite(found), found, -np.inf)
+        best = np.maximum(best, found.max(axis=-1))
+        x, y = _around(np.concatenate([x, places], axis=-1), np.concatenate([y, found], axis=-1))
+    return best[:, 0], -best[:, 1]
+
+
+def _next(x: FloatArray, y: FloatArray, beside: FloatArray) -> FloatArray:
+    """Return where the parabola through three points is largest, between the outer two, and places next to it."""
+    (a, b, c), (fa, fb, fc) = np.moveaxis(x, -1, 0), np.moveaxis(y, -1, 0)
+    with np.errstate(all="ignore"):
+        left, right = (b - a) * (fb - fc), (b - c) * (fb - fa)
+        place = b - 0.5 * ((b - a) * left - (b - c) * right) / (left - right)
+    places = np.where(np.isfinite(place), place, b)[..., None] + beside * (c - a)[..., None]
+    return np.asarray(np.clip(places, np.minimum(a, c)[..., None], np.maximum(a, c)[..., None]))
+
+
+def _around(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the three of all points that surround the largest."""
+    order = np.argsort(x, axis=-1)
+    x, y = np.take_along_axis(x, order, -1), np.take_along_axis(y, order, -1)
+    near = np.clip(y.argmax(axis=-1), 1, x.shape[-1] - 2)[..., None] + np.arange(-1, 2)
+    return np.take_along_axis(x, near, -1), np.take_along_axis(y, near, -1)

@@ -84,8 +84,10 @@ def rms_to_target(branch: Branch) -> float:
     branch.inside  # noqa: B018  (raises where the window is not covered)
     lo, hi = branch.ends
     places = lo + (hi - lo) * np.arange(1, UNIFORM_POINTS + 1) / UNIFORM_POINTS
-    function = branch.function
-    offset = np.interp(places, function.motion, function.effort) - target
+    function, model = branch.function, branch.frame.closed
+    sampled = np.interp(places, function.motion, function.effort)
+    effort = sampled if model is None else model.effort(branch.name, places)
+    offset = effort - target
     return sqrt(float(offset @ offset) / UNIFORM_POINTS)
 
 

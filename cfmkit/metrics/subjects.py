@@ -152,17 +152,23 @@ class Branch:
     def part(self, window: Window) -> Trace | str:
         """Return the part of the branch in some window, or why there is none."""
         if covers(self.extent, window):
-            return self._stressed(restrict(self.trace, window))
+            return self._asked(restrict(self.trace, window))
         return f"branch {self.name!r} covers {self.span(*self.extent)} only"
 
-    def _stressed(self, part: Trace) -> Trace:
-        """Return a part whose ends, between a sample with a stress and one without, have that of the model."""
-        model, found = self.frame.closed, part.stress
-        if model is None or found is None or not len(found) or np.isfinite(found[[0, -1]]).all():
+    def _asked(self, part: Trace) -> Trace:
+        """Return a part whose ends, where they lie between two samples, have effort and stress of the model."""
+        model, motion = self.frame.closed, self.trace.motion
+        if model is None or part is self.trace:
             return part
-        stress, ends = found.copy(), [end for end in (0, -1) if not isfinite(found[end])]
-        stress[ends] = model.stress(self.name, part.motion[ends])
-        return replace(part, stress=stress)
+        ends = [end for end in (0, -1) if not (motion == part.motion[end]).any()]
+        if not ends:
+            return part
+        effort, stress = part.effort.copy(), part.stress
+        effort[ends] = model.effort(self.name, part.motion[ends])
+        if stress is not None:
+            stress = stress.copy()
+            stress[ends] = model.stress(self.name, part.motion[ends])
+        return replace(part, effort=effort, stress=stress)
 
     @cached_property
     def beside(self) -> tuple[Trace, ...]:
@@ -177,11 +183,28 @@ class Branch:
         clipped = ((one, max(one.extent[0], self.window.lo), min(one.extent[1], self.window.hi)) for one in self.beside)
         return tuple(restrict(one, Window(low, high)) for one, low, high in clipped if low < high)
 
+    @property
+    def _extremes(self) -> tuple[float, float]:
+        """Largest and smallest effort in the window: of its points, or of the model next to them."""
+        model, part = self.frame.closed, self.inside
+        if model is None:
+            return float(part.effort.max()), float(part.effort.min())
+        motion, effort, (low, high) = part.motion, part.effort, self.ends
+        peaks = model.peaks[(model.peaks > low) & (model.peaks < high)]
+        if len(peaks):
+            motion, effort = (
+                np.concatenate(pair) for pair in ((motion, peaks), (effort, model.effort(self.name, peaks)))
+            )
+            motion, chosen = np.unique(motion, return_index=True)
+            motion, effort = motion[np.isfinite(effort[chosen])], effort[chosen][np.isfinite(effort[chosen])]
+        top, bottom = closed.extremes(partial(model.effort, self.name), motion[None, :], effort[None, :])
+        return float(top[0]), float(bottom[0])
+
     @cached_property
     def spread(self) -> Spread:
         """Mean and extremes in the window."""
         effort = self.inside.effort
-        mean, high, low = float(effort.sum()) / len(effort), float(effort.max()), float(effort.min())
+        mean, (high, low) = float(effort.sum()) / len(effort), self._extremes
         if mean < 0:
             return Spread(-mean, -low, -high, -1.0)
         return Spread(mean, high, low, 1.0)

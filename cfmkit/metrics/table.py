@@ -88,7 +88,7 @@ _FLATNESS = (
     Definition(
         "force_mean",
         "effort",
-        f"mean {{effort}} over the points in the window, interpolated ends included {_TABLE_3}",
+        f"mean {{effort}} over the points in the window, its ends included {_TABLE_3}",
         flatness.mean,
         "farthest-from-target",
     ),

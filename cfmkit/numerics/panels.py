@@ -98,7 +98,7 @@ def resolved(
 
     Examples
     --------
-    >>> (bow,) = resolved(lambda x: np.abs(x - 0.3)[None, :], np.array([0.0, 1.0]), (1e-3,), 8)
+    >>> (bow,) = resolved(lambda x: np.abs(x - 0.3)[None, :], np.array([0.0, 1.0]), (1e-6,), 12)
     >>> float(bow.at(np.array([0.75]))[0].round(12)), len(bow.ends) > 4
     (0.45, True)
     """
@@ -124,5 +124,5 @@ def resolved(
         parents = rough
         wanted = [half for (low, high), at in middles.items() for half in ((low, at), (at, high))]
     ordered = sorted(done)
-    borders = np.array([low for low, _ in ordered] + [ordered[-1][1]])
-    return tuple(Panels(borders, np.array([done[panel][k] for panel in ordered])) for k in range(len(close)))
+    borders, spans = np.array([low for low, _ in ordered] + [ordered[-1][1]]), np.array(ordered)
+    return tuple(Panels(borders, spans, np.array([done[panel][k] for panel in ordered])) for k in range(len(close)))

@@ -52,3 +52,16 @@ def test_a_force_that_leaves_its_band_between_two_samples_is_followed_there():
     coarse, fine = (evaluate(analyze(one), NAMES[:3]) for one in (spec, spec.replace({"analysis.points": 20001})))
     for name in NAMES[:3]:
         assert coarse[name].value == pytest.approx(fine[name].value, rel=1e-9)
+
+
+@pytest.mark.parametrize("name", SPECS)
+def test_ends_of_a_window_between_two_samples_are_those_of_the_cam(name):
+    """At 31 points the first sample beyond rest stands at 8 mm: a line to it says nothing of the force at 2 mm."""
+    names, found = ("force_max", "force_min", "force_ripple", "rms_to_target"), []
+    for points in (31, 3001):
+        result = analyze(SPECS[name].replace({"analysis.points": points}))
+        start = float(result.curve.displacement.min())
+        metrics = evaluate(result, names, Window(start + 0.0021, start + 0.2299))
+        found.append([metrics[one].value for one in names])
+    assert None not in found[0]
+    np.testing.assert_allclose(found[0], found[1], rtol=2e-6, atol=1e-9)

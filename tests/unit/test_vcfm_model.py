@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from vcfm_support import CONFIGS, MM, analyzed, leaf, table_i
@@ -18,6 +20,7 @@ from cfmkit.families.vcfm.springs import Diamond
 from cfmkit.families.vcfm.strip import Strip
 from cfmkit.families.vcfm.vbeam import VBeam
 from cfmkit.families.vcfm.windows import longest_window
+from cfmkit.metrics import Window, evaluate
 from cfmkit.results import Status
 from cfmkit.studies.columns import metrics_of
 from cfmkit.studies.engine import Work, run
@@ -359,6 +362,20 @@ def test_both_structures_can_be_written_for_cutting(kind, structure, loaded):
     inside = loaded == "whole" and structure != "straight"
     assert len(holes) == 2 + inside
     assert len(drawing.contours) == 4 + inside
+
+
+@pytest.mark.parametrize("change", ["0.4 mm", "0.2 mm", "0.6 mm"])
+def test_places_and_extremes_do_not_depend_on_the_number_of_points(change):
+    """Leaves of 0.2 mm (Q = 42) have the peak of their force before the second of 31 points."""
+    names = ("usable_start", "usable_end", "range_95", "band_range_1pct", "force_max", "force_min", "rms_to_target")
+    found = []
+    for points in (31, 1001):
+        spec = cfmkit.load(CONFIGS / "vcfm_ding2022.yaml", [f"mechanism.bistable.thickness={change}"])
+        result = api.analyze(spec.replace({"analysis.points": points}))
+        metrics = evaluate(replace(result, target=10.0), names, Window(0.03 * MM, 3.21 * MM))
+        found.append([metrics[name].value for name in names])
+    assert None not in found[0]
+    assert found[0] == pytest.approx(found[1], rel=1e-7)
 
 
 @pytest.mark.parametrize("stem", ["ding2022", "cosine", "straight", "hybrid", "u_shape"])

@@ -124,10 +124,14 @@ class BuiltSlab(Slab):
     @cached_property
     def _states(self) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
         """Return x and slope of the rollers, and where they run on the flank."""
-        cut, slider = self.cut, self.cut.start + self.travel
+        return self._states_at(self.travel)
+
+    def _states_at(self, travel: FloatArray) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
+        """Return x and slope of the rollers at travels, (d, m) each [m], and where they run on the flank."""
+        cut, slider = self.cut, self.cut.start + travel
         flank = (slider >= cut.corner_end) | (cut.profile.corner is None)
         law, low, high = cut.profile.path.law, cut.profile.start, cut.profile.end
-        guess = np.minimum(np.maximum(ideal_position(law, np.maximum(self.travel, 0.0)), low), high)
+        guess = np.minimum(np.maximum(ideal_position(law, np.maximum(travel, 0.0)), low), high)
         targets = np.where(flank, slider, cut.corner_end).ravel()
 
         def evaluate(u: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -140,6 +144,16 @@ class BuiltSlab(Slab):
         turn = np.where(slider <= cut.start, cut.pivot.low, turn)
         _, x_corner, slope_corner = cut.on_corner(turn)
         return np.where(flank, x, x_corner), np.where(flank, slope, slope_corner), flank
+
+    def exact(self, branch: str, travel: FloatArray) -> FloatArray:
+        """Return the force of a branch at travels of each mechanism, (d, m) [N]; NaN where friction holds a roller."""
+        x, slope, _ = self._states_at(travel)
+        mu, tangent = self.designs.friction[:, None], tangents(x, self.designs.brace[:, None])
+        mu = mu if branch == "load" else -mu
+        turn = 1.0 + mu * slope
+        lever = slope - mu - tangent * turn
+        spring = 2.0 * self.designs.stiffness[:, None] * np.maximum(x - self.designs.x0[:, None], 0.0)
+        return np.asarray(np.where(lever > 0, 2.0 * (spring * turn) / np.where(lever > 0, lever, 1.0), np.nan))
 
     @cached_property
     def half_width(self) -> FloatArray:

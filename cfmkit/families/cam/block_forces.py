@@ -7,7 +7,7 @@ formulas are those of `cam_profile`, `statics` and `cfmkit.metrics`, in the same
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -251,7 +251,7 @@ class Slab:
         """Return the forces of one branch inside a window."""
         if (branch, window) not in self.spreads:
             forces = self.up if branch == "load" else self.down
-            self.spreads[branch, window] = Spread(self.travel, forces.slider, window)
+            self.spreads[branch, window] = Spread(self.travel, forces.slider, window, partial(self.exact, branch))
         return self.spreads[branch, window]
 
 

@@ -42,11 +42,11 @@ def measured(cams: Slab, measure: Measure) -> Mapping[str, FloatArray]:
 
 
 def _branch(cams: Slab, branch: str, window: Window) -> ManyBranches:
-    effort = (cams.up if branch == "load" else cams.down).slider
+    effort, exact = (cams.up if branch == "load" else cams.down).slider, partial(cams.exact, branch)
     if window is None:
-        return ManyBranches(cams.travel, effort, cams.travel[:, 0], cams.travel[:, -1])
+        return ManyBranches(cams.travel, effort, cams.travel[:, 0], cams.travel[:, -1], exact)
     low, high = (np.full(len(cams.designs), end) for end in window)
-    return ManyBranches(cams.travel, effort, low, high)
+    return ManyBranches(cams.travel, effort, low, high, exact)
 
 
 def _everywhere(cams: Slab, branch: str, window: Window) -> ManyBranches:

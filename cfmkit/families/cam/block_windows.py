@@ -7,18 +7,29 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.metrics.closed import extremes
+
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from cfmkit.curves import FloatArray
+
+    Exact = Callable[[FloatArray], FloatArray]
 
 _SLACK = 1e-9
 
 
 class Spread:
-    """The forces of one branch inside a window."""
+    """The forces of one branch inside a window; `exact` gives them at any travels of each design."""
 
-    def __init__(self, travel: FloatArray, force: FloatArray, window: tuple[float, float] | None) -> None:
+    def __init__(self, travel: FloatArray, force: FloatArray, window: tuple[float, float] | None, exact: Exact) -> None:
         """Cut the window out."""
-        self.motion, self.force = (travel, force) if window is None else _inside(travel, force, window)
+        self.motion, self.force = (travel, force) if window is None else _inside(travel, force, window, exact)
+        self.exact = exact
+
+    @cached_property
+    def _extremes(self) -> tuple[FloatArray, FloatArray]:
+        return extremes(self.exact, self.motion, self.force)
 
     @cached_property
     def mean(self) -> FloatArray:
@@ -28,12 +39,12 @@ class Spread:
     @cached_property
     def max(self) -> FloatArray:
         """Largest force [N]."""
-        return np.asarray(self.force.max(axis=1))
+        return self._extremes[0]
 
     @cached_property
     def min(self) -> FloatArray:
         """Smallest force [N]."""
-        return np.asarray(self.force.min(axis=1))
+        return self._extremes[1]
 
     @cached_property
     def deviation(self) -> FloatArray:
@@ -48,21 +59,22 @@ class Spread:
         return np.asarray(np.einsum("ij,ij->i", steps, 0.5 * (self.force[:, 1:] + self.force[:, :-1])))
 
 
-def _inside(travel: FloatArray, force: FloatArray, window: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
-    """Return the samples in a window with its interpolated ends; all curves have the same travel."""
+def _inside(
+    travel: FloatArray, force: FloatArray, window: tuple[float, float], exact: Exact
+) -> tuple[FloatArray, FloatArray]:
+    """Return the samples in a window, its ends included; all curves have the same travel."""
     low, high = window
     slack, first = _SLACK * (high - low), travel[0]
     start, stop = int(np.searchsorted(first, low - slack)), int(np.searchsorted(first, high + slack, side="right"))
     parts = [(travel[:, start:stop], force[:, start:stop])]
     if start < stop and first[start] > low + slack:
-        parts.insert(0, _between(travel, force, start, low))
+        parts.insert(0, _at(low, len(travel), exact))
     if start < stop and first[stop - 1] < high - slack and stop < travel.shape[1]:
-        parts.append(_between(travel, force, stop, high))
+        parts.append(_at(high, len(travel), exact))
     return np.hstack([motion for motion, _ in parts]), np.hstack([effort for _, effort in parts])
 
 
-def _between(travel: FloatArray, force: FloatArray, after: int, place: float) -> tuple[FloatArray, FloatArray]:
-    left, right = travel[:, after - 1], travel[:, after]
-    share = (place - left) / (right - left)
-    effort = force[:, after - 1] + share * (force[:, after] - force[:, after - 1])
-    return np.full((len(travel), 1), place), effort[:, None]
+def _at(place: float, count: int, exact: Exact) -> tuple[FloatArray, FloatArray]:
+    """Return one travel and the forces of all curves there."""
+    places = np.full((count, 1), place)
+    return places, exact(places)

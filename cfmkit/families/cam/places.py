@@ -53,6 +53,11 @@ class Places:
         grid = nodes(solution.travel[-1:], np.array([solution.corner_travel]))[0]
         return np.asarray(grid + solution.origin)
 
+    @property
+    def peaks(self) -> FloatArray:
+        """None: between two samples of a usual curve no cam has a peak of its own."""
+        return np.empty(0)
+
     def effort(self, branch: str, places: FloatArray) -> FloatArray:
         """Return the force on the way up or down at displacements of any shape [N]."""
         return np.asarray(self._at(branch, places)[1].slider.reshape(np.shape(places)))

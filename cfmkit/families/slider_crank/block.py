@@ -28,6 +28,7 @@ from cfmkit.families.slider_crank.model import (
     target_of,
     window_of,
 )
+from cfmkit.metrics.closed import extremes
 from cfmkit.numerics.extrema import Monotone, sharpened
 
 if TYPE_CHECKING:
@@ -159,8 +160,8 @@ class Base:
         return known and (window is None or (self.low <= window[0] and window[1] <= self.high))
 
     def inside(self, window: tuple[float, float] | None) -> FloatArray:
-        """Return the unit efforts in a window, (4, k), with interpolated ends."""
-        return efforts_inside(self.motion, self.units, window)
+        """Return the unit efforts in a window, (4, k), its ends included."""
+        return efforts_inside(self.assembly, self.motion, self.units, window)
 
 
 def _fits(name: str, drive: str) -> bool:
@@ -258,8 +259,28 @@ class Slab:
         if name in BANDS:
             low, high = self.within(BANDS[name])
             return high - low
-        effort = self.effort if measure.window is None else self.rates @ self.base.inside(measure.window)
-        return of_curve(name, effort)
+        return of_curve(name, *self._inside(measure.window))
+
+    def _inside(self, window: tuple[float, float] | None) -> tuple[FloatArray, tuple[FloatArray, FloatArray]]:
+        """Return the efforts in a window, (m, k), and the largest and the smallest of each design, (m,) each."""
+        if window not in self.cut:
+            base = self.base
+            motion = base.motion
+            effort = self.effort if window is None else self.rates @ base.inside(window)
+            if window is not None:
+                motion = np.concatenate([window[:1], motion[(motion > window[0]) & (motion < window[1])], window[1:]])
+            self.cut[window] = effort, extremes(self._exact, motion[None, :], effort)
+        return self.cut[window]
+
+    @cached_property
+    def cut(self) -> dict[tuple[float, float] | None, tuple[FloatArray, tuple[FloatArray, FloatArray]]]:
+        """What is known of windows."""
+        return {}
+
+    def _exact(self, places: FloatArray) -> FloatArray:
+        """Return the efforts at places of each design, (m, k)."""
+        unit = self.base.assembly.forces(places.ravel()).reshape(4, *places.shape)
+        return np.asarray(np.einsum("dj,jdm->dm", self.rates, unit))
 
 
 BANDS = {"band_range_05pct": 0.005, "band_range_1pct": 0.01, "band_range_5pct": 0.05}

@@ -48,11 +48,14 @@ PLAIN: dict[str, Callable[[Spread], FloatArray]] = {
 }
 
 
-def of_curve(name: str, effort: FloatArray) -> FloatArray:
-    """Return a metric of each row of efforts in its window, by its name with ``force_`` or ``torque_``."""
+def of_curve(name: str, effort: FloatArray, ends: tuple[FloatArray, FloatArray]) -> FloatArray:
+    """Return a metric of each row of efforts in its window, by its name with ``force_`` or ``torque_``.
+
+    `ends` are the largest and the smallest effort of each row, (m,) each.
+    """
     mean = effort.mean(axis=1)
     sign = np.where(mean < 0.0, -1.0, 1.0)
-    top, bottom = effort.max(axis=1), effort.min(axis=1)
+    top, bottom = ends
     high, low = np.where(sign < 0.0, -bottom, top), np.where(sign < 0.0, -top, bottom)
     function = PLAIN[name] if name in PLAIN else CURVE[name.partition("_")[2]]
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -50,7 +50,7 @@ def gradient(spec: SliderCrankSpec, paths: Sequence[str]) -> dict[str, dict[str,
 def _slopes(spec: SliderCrankSpec, solution: Solution) -> Iterator[tuple[str, FloatArray]]:
     """Yield each metric with its derivatives by the four total rates."""
     drive, assembly = solution.assembly.drive, solution.assembly
-    unit = efforts_inside(solution.motion, solution.units, window_of(spec, assembly))
+    unit = efforts_inside(assembly, solution.motion, solution.units, window_of(spec, assembly))
     effort = assembly.rates @ unit
     sign = -1.0 if effort.mean() < 0 else 1.0
     high, low = unit[:, int(np.argmax(sign * effort))], unit[:, int(np.argmin(sign * effort))]

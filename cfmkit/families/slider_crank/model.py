@@ -133,6 +133,11 @@ class ClosedForm:
         places: FloatArray = self.character.curve.place[0]
         return places
 
+    @property
+    def peaks(self) -> FloatArray:
+        """None: springs bend the curve on the scale of the linkage only."""
+        return np.empty(0)
+
     def effort(self, _branch: str, places: FloatArray, /) -> FloatArray:
         """Return torque [N m] or force [N] at places of any shape."""
         return self.character.efforts(np.ravel(places)).reshape(np.shape(places))
@@ -230,13 +235,15 @@ def window_of(spec: SliderCrankSpec, assembly: Assembly) -> tuple[float, float] 
     return None if window is None else between(window, asked_motion(spec, assembly))
 
 
-def efforts_inside(motion: FloatArray, units: UnitCurves, window: tuple[float, float] | None) -> FloatArray:
-    """Return the unit efforts in a window with interpolated ends, (4, k); without a window all of them."""
+def efforts_inside(
+    assembly: Assembly, motion: FloatArray, units: UnitCurves, window: tuple[float, float] | None
+) -> FloatArray:
+    """Return the unit efforts in a window, (4, k), its ends included; without a window all of them."""
     if window is None:
         return units.effort
-    between = motion[(motion > window[0]) & (motion < window[1])]
-    places = np.concatenate([[window[0]], between, [window[1]]])
-    return np.stack([np.interp(places, motion, row) for row in units.effort])
+    between = (motion > window[0]) & (motion < window[1])
+    ends = assembly.forces(np.array(window))
+    return np.concatenate([ends[:, :1], units.effort[:, between], ends[:, 1:]], axis=1)
 
 
 def _shortfalls(assembly: Assembly, asked: Ends, run: Ends) -> Iterator[Finding]:

@@ -30,6 +30,7 @@ from cfmkit.families.vcfm.vbeam import (
     overrated,
 )
 from cfmkit.families.vcfm.windows import extremes, flat_window
+from cfmkit.metrics.closed import extremes as extremes_next_to
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -174,49 +175,65 @@ class Slab:
     def spread(self, window: tuple[float, float] | None) -> Spread:
         """Return the forces inside a window."""
         if window not in self._spreads:
-            self._spreads[window] = Spread(self._inside(window))
+            self._spreads[window] = Spread(*self._inside(window), self)
         return self._spreads[window]
 
-    def _inside(self, window: tuple[float, float] | None) -> FloatArray:
-        """Return the samples in a window with its interpolated ends, as the metrics of one curve take them."""
+    def _inside(self, window: tuple[float, float] | None) -> tuple[FloatArray, FloatArray]:
+        """Return the samples in a window, its ends included, as the metrics of one curve take them: travel, force."""
         if window is None:
-            return self.force
+            return self.grid, self.force
         (low, high), grid = window, self.grid
         slack = 1e-9 * (high - low)
         start, stop = int(np.searchsorted(grid, low - slack)), int(np.searchsorted(grid, high + slack, side="right"))
         head, tail = grid[start] > low + slack, grid[stop - 1] < high - slack
         first, last = start - int(head), stop + int(tail)
         force = self.force_at(grid[first:last]) if "force" not in self.__dict__ else self.force[:, first:last]
-        parts = [force[:, start - first : stop - first]]
+        parts, places = [force[:, start - first : stop - first]], [grid[start:stop]]
         if head:
-            parts.insert(0, _between(grid[first : first + 2], force[:, :2], low))
+            parts.insert(0, self.force_at(np.array([low])))
+            places.insert(0, np.array([low]))
         if tail:
-            parts.append(_between(grid[last - 2 : last], force[:, -2:], high))
-        return np.hstack(parts)
+            parts.append(self.force_at(np.array([high])))
+            places.append(np.array([high]))
+        return np.concatenate(places), np.hstack(parts)
+
+    def exact(self, places: FloatArray) -> FloatArray:
+        """Return the forces at places of each design, (k, m) [N]."""
+        return np.asarray(self.half_beams * self.leaf.force(places) + self.spring.force(places))
 
     @cached_property
     def window(self) -> tuple[FloatArray, FloatArray]:
         """Start and end of each longest flat stretch [m]."""
 
-        def force_at(places: FloatArray) -> FloatArray:
-            return np.asarray(self.half_beams * self.leaf.force(places) + self.spring.force(places))
-
-        return flat_window(self.grid, self.force, self.flatness, force_at)
-
-
-def _between(motion: FloatArray, force: FloatArray, place: float) -> FloatArray:
-    share = (place - motion[0]) / (motion[1] - motion[0])
-    found: FloatArray = force[:, :1] + share * (force[:, 1:] - force[:, :1])
-    return found
+        return flat_window(self.grid, self.force, self.flatness, self.exact)
 
 
 class Spread:
-    """Mean and extremes of forces, (k, n), in a window."""
+    """Mean and extremes of forces, (k, n), at travels in a window, (n,)."""
 
-    def __init__(self, force: FloatArray) -> None:
+    def __init__(self, travel: FloatArray, force: FloatArray, slab: Slab) -> None:
         """Keep the forces."""
-        self.force = force
-        self.mean, self.max, self.min = force.mean(axis=1), force.max(axis=1), force.min(axis=1)
+        self.travel, self.force, self.slab = travel, force, slab
+        self.mean = force.mean(axis=1)
+
+    @cached_property
+    def _extremes(self) -> tuple[FloatArray, FloatArray]:
+        """Largest and smallest force: next to the samples, or where the leaves buckle and straighten."""
+        ends = (np.broadcast_to(end, (len(self.force), 1)) for end in self.slab.leaf.linear)
+        knots = np.hstack([np.where(np.isfinite(end), end, self.travel[0]) for end in ends])
+        there = self.slab.exact(np.clip(knots, self.travel[0], self.travel[-1]))
+        high, low = extremes_next_to(self.slab.exact, self.travel[None, :], self.force)
+        return np.maximum(high, there.max(axis=1)), np.minimum(low, there.min(axis=1))
+
+    @property
+    def max(self) -> FloatArray:
+        """Largest force [N]."""
+        return self._extremes[0]
+
+    @property
+    def min(self) -> FloatArray:
+        """Smallest force [N]."""
+        return self._extremes[1]
 
     @property
     def deviation(self) -> FloatArray:

@@ -39,6 +39,11 @@ class Places:
         grid = np.unique(np.concatenate([np.linspace(low, high, EVEN), marks, *around]))
         return grid[(grid >= low) & (grid <= high)]
 
+    @property
+    def peaks(self) -> FloatArray:
+        """All places: thin leaves have their peak before the second point of a curve [m]."""
+        return self.places
+
     def effort(self, _branch: str, places: FloatArray, /) -> FloatArray:
         """Return the force at travels of any shape [N]."""
         sampler, travel = self.solution.sampler, np.ravel(places)

@@ -65,6 +65,11 @@ class Course:
         low, high = self.ends
         return np.concatenate([[low], own[(own > low) & (own < high)], [high]])
 
+    @property
+    def peaks(self) -> FloatArray:
+        """All places: a chain without a kink has its peak before the second point of a curve [m]."""
+        return self.places
+
     def effort(self, _branch: str, places: FloatArray, /) -> FloatArray:
         """Return the force of all legs at travels of any shape [N]."""
         return self._at(places, 0)
@@ -80,10 +85,10 @@ class Course:
     def _at(self, places: FloatArray, which: int) -> FloatArray:
         law, first = self.laws[which], self.first[which]
         nearest = float(np.exp(law.ends[0]))
-        size = np.clip(np.asarray(places, dtype=float), *self.ends)
+        size = np.clip(np.ravel(places), *self.ends)
         found = law.at(np.clip(np.log(np.maximum(size, nearest)), law.ends[0], law.ends[-1]))
         share = np.minimum(size / nearest, 1.0)
-        return np.asarray(np.where(size < nearest, first + (found - first) * share, found))
+        return np.asarray(np.where(size < nearest, first + (found - first) * share, found).reshape(np.shape(places)))
 
     def mean(self, window: tuple[float, float]) -> float:
         """Return the mean force in a window of the travel [N]."""
