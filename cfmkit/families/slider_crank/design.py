@@ -20,6 +20,7 @@ import numpy as np
 from cfmkit.bodies.slider_crank_springs import JOINTS
 from cfmkit.families.refusals import CannotBuild, Infeasible, no_design
 from cfmkit.families.slider_crank.build import TURN, default_motion, resolve
+from cfmkit.families.slider_crank.character import EDGE
 from cfmkit.families.slider_crank.family_of_optima import alternatives, chosen_rates, even_best
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.rates import least_squares, minimax
@@ -27,6 +28,7 @@ from cfmkit.families.slider_crank.solved import (
     Solved,
     about_springs,
     active_bounds,
+    audited,
     cannot_hold,
     check_reach,
     hopeless,
@@ -79,6 +81,7 @@ def design(spec: SliderCrankSpec, run: Run) -> Design:
         return design_part(spec, run)
     try:
         solved, search = _searched(spec, wanted, run)
+        solved = _kept(audited(solved, _written(solved)))
     except Infeasible as problem:
         return no_design(problem.finding, problem.nearest)
     except CannotBuild as problem:
@@ -94,6 +97,28 @@ def design(spec: SliderCrankSpec, run: Run) -> Design:
         warnings=warnings,
         search=search_of(solved),
     )
+
+
+def _kept(solved: Solved) -> Solved:
+    """Return a design that keeps its tolerance where it was audited.
+
+    A widest window whose springs are farther off between the places that the search looked at than its reserve allows
+    is looked for again, by as much stricter.
+
+    Raises
+    ------
+    Infeasible
+        If a given window does not allow it.
+    """
+    tolerance = solved.task.wanted.tolerance
+    if tolerance is None or not solved.exact or solved.deviation <= tolerance * EDGE:
+        return solved
+    if solved.task.wanted.window is None:
+        again = solve(solved.task, tolerance * tolerance / solved.deviation)
+        again = audited(again, _written(again))
+        if again.deviation <= tolerance * EDGE:
+            return again
+    raise Infeasible(*too_far(solved.task, solved.deviation))
 
 
 def _searched(spec: SliderCrankSpec, wanted: CrankDesign, run: Run) -> tuple[Solved, Lowest | None]:
@@ -150,8 +175,8 @@ def _height(spec: SliderCrankSpec, lengths: dict[str, float]) -> float:
     return goal.rms(rates) if least else goal.deviation(rates)
 
 
-def solve(task: Task) -> Solved:
-    """Return the best springs for given lengths.
+def solve(task: Task, tolerance: float | None = None) -> Solved:
+    """Return the best springs for given lengths, for the design's tolerance or another one.
 
     Raises
     ------
@@ -160,7 +185,7 @@ def solve(task: Task) -> Solved:
     """
     wanted, proven = task.wanted, True
     if wanted.window is None:
-        found, proven = widest_of_all(task, wanted.tolerance or 0.0)
+        found, proven = widest_of_all(task, tolerance or wanted.tolerance or 0.0)
         if found is None:
             raise Infeasible(nowhere(task))
         window = found.low, found.high

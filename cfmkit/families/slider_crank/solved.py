@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from cfmkit.bodies.slider_crank_springs import JOINTS
@@ -11,12 +11,13 @@ from cfmkit.families.refusals import Infeasible
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.targets import FREE
 from cfmkit.families.slider_crank.windows import widest
+from cfmkit.metrics import Window, evaluate
 from cfmkit.results import Quantity, Searched
 from cfmkit.units import format_short
 
 if TYPE_CHECKING:
     from cfmkit.curves import FloatArray
-    from cfmkit.families.slider_crank.spec import CrankDesign
+    from cfmkit.families.slider_crank.spec import CrankDesign, SliderCrankSpec
     from cfmkit.families.slider_crank.targets import Task
     from cfmkit.results import Finding
 
@@ -39,6 +40,8 @@ class Solved:
         Of a widest window: whether all others were ruled out.
     places : int
         At so many of the window the deviations were looked at.
+    exact : bool
+        Whether deviation and rms are those that the analysis of the design measures.
     """
 
     task: Task
@@ -48,6 +51,33 @@ class Solved:
     rms: float
     proven: bool = True
     places: int = 0
+    exact: bool = False
+
+    @property
+    def judged(self) -> tuple[float, float]:
+        """Where deviations are looked at [rad or m]: the window, its start left out where the force begins there."""
+        places = self.task.places(self.window, self.places or None)
+        return float(places[0]), float(places[-1])
+
+
+def audited(solved: Solved, spec: SliderCrankSpec) -> Solved:
+    """Return a design with the deviations that the analysis of its specification measures.
+
+    Those from a line that is not level are none of its metrics: they stay what the search found at its places.
+    """
+    from cfmkit.families.base import Run
+    from cfmkit.families.slider_crank.model import analyze
+
+    if solved.task.wanted.stiffness is not None:
+        return solved
+    result, target = analyze(spec, Run()), abs(solved.task.wanted.target)
+    if not result.curves or not result.target:
+        return solved
+    largest = evaluate(result, ["deviation_from_target"], Window(*solved.judged))["deviation_from_target"].value
+    rms = evaluate(result, ["rms_to_target"], Window(*solved.window))["rms_to_target"].value
+    if largest is None or rms is None:
+        return solved
+    return replace(solved, deviation=largest, rms=rms / target, exact=True)
 
 
 def check_reach(task: Task, window: tuple[float, float]) -> None:
@@ -169,13 +199,21 @@ def _place(solved: Solved, motion: float) -> str:
 
 def message(solved: Solved) -> str:
     """Return the outcome in one sentence."""
-    low, high = (_place(solved, end) for end in solved.window)
     rms = f"rms {percent(solved.rms)}"
+    if solved.exact:
+        low, high = (_place(solved, end) for end in solved.judged)
+        return f"off by at most {percent(solved.deviation)} ({rms}) over {low} to {high}"
+    low, high = (_place(solved, end) for end in solved.window)
     return f"off by at most {percent(solved.deviation)} ({rms}) at {solved.places} places of {low} to {high}"
 
 
 def search_of(solved: Solved) -> dict[str, Searched]:
-    """Return what only the search knows: how far the springs are off at the places that it looked at."""
+    """Return what only the search knows: how far the springs are off a line at the places that it looked at.
+
+    From a level line they are off by what the analysis measures, as ``deviation_from_target`` and ``rms_to_target``.
+    """
+    if solved.exact:
+        return {}
     about = {
         "largest_miss": (
             solved.deviation,
