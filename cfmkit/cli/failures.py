@@ -36,6 +36,10 @@ class Stopped(BaseException):
         """Add that what is finished is kept; a command that was to reuse nothing goes on without that option."""
         self.told += f"; what is finished is kept: {go_on(fresh)}"
 
+    def starts_over(self) -> None:
+        """Add that nothing was finished that could be kept: short searches and first points are computed again."""
+        self.told += "; nothing is finished that could be kept: the same command starts over"
+
 
 def go_on(fresh: bool) -> str:
     """Return how a run that keeps what it has finished goes on."""

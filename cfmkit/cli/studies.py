@@ -119,6 +119,8 @@ def noting(folder: RunFolder, fresh: bool = False) -> Iterator[Journal]:
         except Stopped as stop:
             if journal.held:
                 stop.goes_on(fresh)
+            else:
+                stop.starts_over()
             raise
 
 

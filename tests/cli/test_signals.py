@@ -77,7 +77,7 @@ def test_an_interrupted_run_is_a_json_document_too(cli, cam):
 
 @pytest.mark.parametrize("finished", [True, False])
 def test_a_search_that_is_ended_says_that_it_goes_on_if_it_does(tmp_path, finished):
-    """Only where a start is noted: a design that keeps nothing begins anew."""
+    """It does where a start is noted; a design that keeps nothing begins anew, and says so."""
     told = []
     with RunFolder(tmp_path / "out") as folder:
         try:
@@ -87,8 +87,9 @@ def test_a_search_that_is_ended_says_that_it_goes_on_if_it_does(tmp_path, finish
                 raise Stopped(signal.SIGTERM)
         except Stopped as stop:
             told.append(stop.told)
-    more = "; what is finished is kept: run the same command again to go on"
-    assert told == [f"terminated{more if finished else ''}"]
+    more = "what is finished is kept: run the same command again to go on"
+    anew = "nothing is finished that could be kept: the same command starts over"
+    assert told == [f"terminated; {more if finished else anew}"]
 
 
 LOST = """
