@@ -11,10 +11,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.beams.discretise import assemble_model
-from cfmkit.beams.solver import Solver, Spot
+from cfmkit.beams.solver import Points, Solver, Spot
 
 if TYPE_CHECKING:
+    from typing import Any
+
     from cfmkit.beams.kernels.model import Model
+    from cfmkit.beams.solver import MarchOptions
     from cfmkit.curves import FloatArray
 
 
@@ -106,3 +109,55 @@ def _turning(start: FloatArray, end: FloatArray, force: FloatArray) -> FloatArra
     reach = end - start
     turning: FloatArray = reach[:, 0] * force[:, 1] - reach[:, 1] * force[:, 0]
     return turning
+
+
+class UncondensedSolver(Solver):
+    """Equilibria in the unknowns of a plain solver, found with nothing eliminated."""
+
+    def __init__(self, plain: Solver) -> None:
+        """Take over the arrays of a plain solver."""
+        vars(self).update(vars(plain))
+        self.wide = ExpandedSolver(plain.layout, plain.mesh, plain.tolerance, plain.ramped)
+
+    def finer(self, tolerance: float) -> UncondensedSolver:
+        """Return a solver with twice as many steps in every segment."""
+        return UncondensedSolver(super().finer(tolerance))
+
+    def solve(
+        self,
+        y: FloatArray,
+        drive: float,
+        border: FloatArray | None = None,
+        target: float | None = None,
+        model: Model | None = None,
+    ) -> Spot | None:
+        """Return the equilibrium near (y, drive) where border . (z, drive) = target; at this drive by default."""
+        if model is not None:
+            return super().solve(y, drive, border, target, model)
+        across = None if border is None else self.wide.spread(border)
+        found = self.wide.solve(self.wide.expand(y), drive, across, target)
+        return None if found is None else self._reduced(found)
+
+    def march(
+        self, spot: Spot, targets: FloatArray, options: MarchOptions, room: int, model: Model | None = None
+    ) -> tuple[int, Points]:
+        """Follow the path from `spot`; return why the march ended and its points."""
+        if model is not None:
+            return super().march(spot, targets, options, room, model)
+        wide = Spot(self.wide.expand(spot.y), spot.drive, self.wide.spread(spot.tangent), spot.unstable)
+        code, points = self.wide.march(wide, targets, options, room)
+        ys = [self._reduced(Spot(y, 0.0, self.wide.unit)).y for y in points.y]
+        return code, Points(np.array(ys).reshape(len(points), self.size), points.drive, points.info)
+
+    def solve_each(self, ys: FloatArray, drives: FloatArray) -> tuple[FloatArray, Any]:
+        """Return the equilibria near ys (k, unknowns) at these drives (k,), and where there are any, (k,) bool."""
+        spots = [self.solve(y, drive) for y, drive in zip(ys, drives.tolist(), strict=True)]
+        new = np.array([y if spot is None else spot.y for y, spot in zip(ys, spots, strict=True)])
+        return new.reshape(ys.shape), np.array([spot is not None for spot in spots])
+
+    def _reduced(self, spot: Spot) -> Spot:
+        """Return an equilibrium with the unknowns and the tangent of a plain solver."""
+        plain, wide = self.wide.reduce(spot), self.wide
+        ends = spot.tangent[wide.n_free : wide.n].reshape(-1, 3)[wide.lasts]
+        tangent = np.concatenate([spot.tangent[: wide.plain_free], ends.ravel(), spot.tangent[-1:]])
+        return Spot(plain.y, spot.drive, tangent, spot.unstable, spot.shortness, spot.increment)

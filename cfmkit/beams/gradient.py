@@ -17,65 +17,19 @@ import numpy as np
 
 from cfmkit.beams import outputs
 from cfmkit.beams.drive import Loading
+from cfmkit.beams.slopes import Slopes
 from cfmkit.curves import read_only
-from cfmkit.errors import InputError
 
 if TYPE_CHECKING:
-    from cfmkit.beams.kernels.model import Tilt
     from cfmkit.beams.network import Network
     from cfmkit.beams.outputs import SectionSlopes
     from cfmkit.beams.path import Path
-    from cfmkit.beams.tilt import Tilts
     from cfmkit.curves import FloatArray
 
 
 @dataclass(frozen=True, eq=False)
-class Gradient:
-    """Derivatives at p chosen points of a path by k design variables; each output is computed when first asked for.
-
-    Attributes
-    ----------
-    path : Path
-        What was differentiated.
-    points : (p,) int array
-        Indices of the points.
-    tilts, tilt : Tilts, Tilt
-        How the network and its arrays change.
-    """
-
-    path: Path
-    points: Any
-    tilts: Tilts
-    tilt: Tilt
-
-    @property
-    def unknowns(self) -> FloatArray:
-        """Derivatives of everything that was solved for, (p, unknowns, k), dimensionless."""
-        return self._all[0]
-
-    @cached_property
-    def push(self) -> FloatArray:
-        """Derivatives of the force on what the drive moves, (p, k), dimensionless, where no force turns with its node.
-
-        They are ready with the unknowns; without them they take less time.
-        """
-        return self._all[1] if "_all" in vars(self) else self._slopes(0)[1]
-
-    @cached_property
-    def _all(self) -> tuple[FloatArray, FloatArray]:
-        return self._slopes(self.path.solver.size)
-
-    def _slopes(self, size: int) -> tuple[FloatArray, FloatArray]:
-        """Return derivatives of the unknowns, (p, size, k), none if the size is zero, and of the force, (p, k)."""
-        from cfmkit.beams.kernels import entry
-
-        s, count = self.path.solver, len(self.tilts)
-        unknowns = np.empty((len(self.points) if size else 0, size, count))
-        push = np.empty((len(self.points), count))
-        ys, drives = self.path.points.y[self.points], self.path.points.drive[self.points]
-        if not entry.slopes(s.model, self.tilt, s.n_free, ys, drives, (unknowns, push), s.scratch):
-            raise InputError("the tangent is singular at a point of the path: no derivative there")
-        return unknowns, push
+class Gradient(Slopes):
+    """Derivatives at p chosen points of a path by k design variables; each output is computed when first asked for."""
 
     @cached_property
     def effort(self) -> FloatArray:
@@ -88,17 +42,6 @@ class Gradient:
         if self.path.solver.model.load_follows.any():
             return read_only(-sense * unit * self.held[:, dof])
         return read_only(-unit * self.push)
-
-    @cached_property
-    def held(self) -> FloatArray:
-        """Derivatives of the forces on all degrees of freedom and of the springs' energy, (p, dofs + 1, k)."""
-        from cfmkit.beams.kernels import entry
-
-        s = self.path.solver
-        out = np.empty((len(self.points), s.n_dofs + 1, len(self.tilts)))
-        ys, drives = self.path.points.y[self.points], self.path.points.drive[self.points]
-        entry.held_slopes(s.model, self.tilt, s.n_free, ys, drives, self.unknowns, out)
-        return out
 
     @property
     def motion(self) -> Mapping[str, FloatArray]:
@@ -117,11 +60,6 @@ class Gradient:
         at = s.n_free + 3 * index if end == 1 else s.n + 6 * int(s.cut.beam_segment[index]) + 3
         units = np.array([scales.force, scales.force, scales.moment])
         return read_only(self.unknowns[:, at : at + 3] * units[:, None])
-
-    @cached_property
-    def rows(self) -> FloatArray:
-        """Derivatives of the states of `Path.sampler`, (p, rows, 7, k), dimensionless."""
-        return outputs.rows(self)
 
     @cached_property
     def energy(self) -> FloatArray:

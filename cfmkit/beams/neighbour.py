@@ -22,8 +22,6 @@ if TYPE_CHECKING:
     from cfmkit.beams.network import Network
     from cfmkit.curves import FloatArray
 
-_INFO = 6
-
 
 def neighbouring(path: Path, network: Network, drive: Drive, largest_turn: float = 0.5) -> Path:
     """Return the equilibria of `network` nearest to those of a path, one for each point of the drive.
@@ -55,19 +53,17 @@ def neighbouring(path: Path, network: Network, drive: Drive, largest_turn: float
     if solver.size != path.solver.size or len(known) != len(wanted):
         raise InputError("neighbouring equilibria need networks of the same kind and as many points as were reached")
     factors = _factors(path.solver, path.layout.scales, solver.layout.scales)
-    rows: list[tuple[FloatArray, float, FloatArray]] = []
+    rows: list[Points] = []
     missing: list[float] = []
     for number, (index, value) in enumerate(zip(known.tolist(), wanted.tolist(), strict=True)):
         guess = path.points.y[index] * factors
         spot = solver.solve(guess.copy(), value / solver.layout.scales.drive)
         near = spot is not None and solver.pose_change(spot.y, guess) <= largest_turn
         # a segment beyond its own critical length (shortness below zero) counts its unstable directions wrongly
-        if spot is None or not near or not spot.shortness > 0 or spot.unstable > int(path.points.info[index, 0]):
+        if spot is None or not near or not spot.shortness > 0 or spot.unstable > int(path.points.unstable[index]):
             missing.append(value)
             continue
-        info = np.zeros(_INFO)
-        info[[0, 1, 4, 5]] = spot.unstable, number, spot.tangent[-1], spot.shortness
-        rows.append((spot.y, spot.drive, info))
+        rows.append(Points.of(spot, number))
     return _path(solver, rows, missing, path)
 
 
@@ -134,16 +130,15 @@ def _factors(solver: Solver, old: Scales, new: Scales) -> FloatArray:
     return factors
 
 
-def _path(solver: Solver, rows: Any, missing: list[float], known: Path) -> Path:
+def _path(solver: Solver, rows: list[Points], missing: list[float], known: Path) -> Path:
     """Return the points as a path."""
-    y = np.array([row[0] for row in rows]).reshape(-1, solver.size)
-    drive, info = np.array([row[1] for row in rows]), np.array([row[2] for row in rows]).reshape(-1, _INFO)
+    points = Points.none(solver.size).joined(*rows)
     status, message = PathStatus.COMPLETE, PathStatus.COMPLETE.value
     if missing:
         status, message = PathStatus.LOST, f"no equilibrium near the known one at {missing[0]:.6g}"
     return Path(
         solver=solver,
-        points=Points(y, drive, info),
+        points=points,
         branch=np.array(["neighbour"] * len(rows), dtype=np.str_),
         status=status,
         message=message,

@@ -13,13 +13,13 @@ from cfmkit.beams.tilt import slope
 
 if TYPE_CHECKING:
     from cfmkit.beams.drive import Loading
-    from cfmkit.beams.gradient import Gradient
     from cfmkit.beams.network import LineLoad
     from cfmkit.beams.plain_tilt import PlainTilt
+    from cfmkit.beams.slopes import Slopes
     from cfmkit.curves import FloatArray
 
 
-def _values(g: Gradient, dof: int) -> tuple[FloatArray, FloatArray]:
+def _values(g: Slopes, dof: int) -> tuple[FloatArray, FloatArray]:
     """Return a degree of freedom (p,) and its derivatives (p, k), dimensionless."""
     slot, known = int(g.path.solver.model.slot[dof]), g.path.value(dof)[g.points]
     if slot >= 0:
@@ -35,7 +35,7 @@ def _turned(frame: float, by: FloatArray, a: Any, b: Any) -> tuple[FloatArray, F
     return dx, dy
 
 
-def _frame(g: Gradient, node: str) -> tuple[float, FloatArray]:
+def _frame(g: Slopes, node: str) -> tuple[float, FloatArray]:
     """Return the direction of a node's frame and its derivatives (k,)."""
     direction = float(np.real(g.path.layout.direction[node]))
     if g.tilts.plain is not None:
@@ -43,7 +43,7 @@ def _frame(g: Gradient, node: str) -> tuple[float, FloatArray]:
     return direction, np.array([slope(layout.direction[node]) for layout in g.tilts.tilted], dtype=float)
 
 
-def motion(g: Gradient, node: str) -> FloatArray:
+def motion(g: Slopes, node: str) -> FloatArray:
     """Return the derivatives of a node's displacement and rotation, (p, 3, k) [m, m, rad]."""
     layout = g.path.layout
     master, length = layout.network.master_of(node), layout.scales.length
@@ -59,7 +59,7 @@ def motion(g: Gradient, node: str) -> FloatArray:
     return np.stack([dx, dy, _values(g, layout.plan.turn[node])[1]], axis=1)
 
 
-def reaction(g: Gradient, node: str) -> FloatArray:
+def reaction(g: Slopes, node: str) -> FloatArray:
     """Return the derivatives of the force and moment that support and drive exert on a node, (p, 3, k)."""
     layout = g.path.layout
     first, scales = layout.supported(node), layout.scales
@@ -69,19 +69,7 @@ def reaction(g: Gradient, node: str) -> FloatArray:
     return np.stack([dx * scales.force, dy * scales.force, slopes[:, 2] * scales.moment], axis=1)
 
 
-def rows(g: Gradient) -> FloatArray:
-    """Return the derivatives of the sampled states, (p, rows, 7, k): x, y, turn, moment, h, v, energy."""
-    from cfmkit.beams.kernels import entry
-
-    sampler, solver = g.path.sampler, g.path.solver
-    tilt = g.tilts.arrays(sampler.model, sampler.cut, every=True)
-    out = np.empty((len(g.points), sampler.states.shape[1], 7 * len(g.tilts)))
-    ys, drives = g.path.points.y[g.points], g.path.points.drive[g.points]
-    entry.row_slopes(sampler.model, tilt, solver.n_free, ys, drives, g.unknowns, out)
-    return out.reshape(*out.shape[:2], 7, -1)[:, :, [2, 3, 0, 1, 5, 6, 4]]
-
-
-def energy(g: Gradient) -> FloatArray:
+def energy(g: Slopes) -> FloatArray:
     """Return the derivatives of the strain energy of beams and springs, (p, k) [J]."""
     cut = g.path.sampler.cut
     ends = cut.segment_step[1:] + np.arange(len(cut.segment_step) - 1)
@@ -89,7 +77,7 @@ def energy(g: Gradient) -> FloatArray:
     return total * g.path.layout.scales.moment
 
 
-def shape(g: Gradient, beam: str) -> FloatArray:
+def shape(g: Slopes, beam: str) -> FloatArray:
     """Return the derivatives of the centre line, (p, n, 2, k) [m]."""
     index = g.path.sampler.rows(list(g.path.layout.network.beams).index(beam)).index
     return g.rows[:, index][:, :, [X, Y]] * g.path.layout.scales.length
@@ -106,7 +94,7 @@ class SectionSlopes:
     axial_stress: FloatArray
 
 
-def sections(g: Gradient, beam: str) -> SectionSlopes:
+def sections(g: Slopes, beam: str) -> SectionSlopes:
     """Return the derivatives of section forces and stresses at the sampled places of a beam."""
     layout, sampler = g.path.layout, g.path.sampler
     number = list(layout.network.beams).index(beam)
@@ -128,7 +116,7 @@ def sections(g: Gradient, beam: str) -> SectionSlopes:
     return SectionSlopes(moment, dn, dq, bending, dn / area - known.axial_stress[g.points][..., None] * grows)
 
 
-def _geometry(g: Gradient, beam: str, at: Any) -> tuple[FloatArray, float, FloatArray, tuple[Any, Any, Any]]:
+def _geometry(g: Slopes, beam: str, at: Any) -> tuple[FloatArray, float, FloatArray, tuple[Any, Any, Any]]:
     """Return angle (n,), width and thickness (n,) at the rows of a beam, and their derivatives (n, k), (k,), (n, k)."""
     cut, count = g.path.sampler.cut, len(g.tilts)
     if g.tilts.plain is not None:
@@ -154,7 +142,7 @@ def _geometry(g: Gradient, beam: str, at: Any) -> tuple[FloatArray, float, Float
     return angles[0].real, float(np.real(widths[0])), thicks[0].real, by
 
 
-def _plain_geometry(g: Gradient, tilt: PlainTilt, beam: str, at: Any) -> tuple[Any, float, Any, tuple[Any, Any, Any]]:
+def _plain_geometry(g: Slopes, tilt: PlainTilt, beam: str, at: Any) -> tuple[Any, float, Any, tuple[Any, Any, Any]]:
     """Return the same for a network of plain beams."""
     fitted, section = g.path.layout.fits[beam], g.path.layout.network.beams[beam].section
     number, ones = list(g.path.layout.network.beams).index(beam), np.ones(len(at.t))
@@ -162,7 +150,7 @@ def _plain_geometry(g: Gradient, tilt: PlainTilt, beam: str, at: Any) -> tuple[A
     return fitted.angle(at.t, 0.5), float(section.width), section.thickness_at(at.t, 0.5), by
 
 
-def stress_extremes(g: Gradient, beam: str, axial: bool) -> FloatArray:
+def stress_extremes(g: Slopes, beam: str, axial: bool) -> FloatArray:
     """Return the derivatives of the highest and lowest stress on both sides of a beam, (p, 2, 2, k) [Pa]."""
     found = g.path.stress_extremes(beam, axial)
     slopes = sections(g, beam)
@@ -186,7 +174,7 @@ def _weights(nodes: FloatArray, place: FloatArray) -> FloatArray:
     return weights
 
 
-def load_displacement(g: Gradient, drive: Loading) -> FloatArray:
+def load_displacement(g: Slopes, drive: Loading) -> FloatArray:
     """Return the derivatives of the work-conjugate displacement of a load drive, (p, k) [J]."""
     from cfmkit.beams.network import PointLoad
 
@@ -197,7 +185,7 @@ def load_displacement(g: Gradient, drive: Loading) -> FloatArray:
     return total
 
 
-def _point_work(g: Gradient, load: Any, others: list[Any]) -> FloatArray:
+def _point_work(g: Slopes, load: Any, others: list[Any]) -> FloatArray:
     """Return the derivatives of a point load times the displacement of its node."""
     moved, slopes = g.path.motion(load.node)[g.points], motion(g, load.node)
     force = np.array([load.fx, load.fy, load.moment], dtype=float)
@@ -211,7 +199,7 @@ def _point_work(g: Gradient, load: Any, others: list[Any]) -> FloatArray:
     return np.asarray(work + force[2] * turn + moved[:, 2:] * change[2])
 
 
-def _line_work(g: Gradient, load: LineLoad, others: list[Any]) -> FloatArray:
+def _line_work(g: Slopes, load: LineLoad, others: list[Any]) -> FloatArray:
     """Return the derivatives of a line load's work-conjugate displacement."""
     path, sampler = g.path, g.path.sampler
     beam = list(path.layout.network.beams).index(load.beam)
@@ -225,7 +213,7 @@ def _line_work(g: Gradient, load: LineLoad, others: list[Any]) -> FloatArray:
     return np.asarray(np.einsum("n,pnk->pk", weights, density) + (moved @ force) @ grows)
 
 
-def _rest_slope(g: Gradient, k: int, index: Any) -> FloatArray:
+def _rest_slope(g: Slopes, k: int, index: Any) -> FloatArray:
     """Return the derivatives of the unloaded centre line by variable k at rows, (n, 2), dimensionless."""
     from cfmkit.beams.discretise import assemble_model, table
 
@@ -242,7 +230,6 @@ __all__ = [
     "load_displacement",
     "motion",
     "reaction",
-    "rows",
     "sections",
     "shape",
     "stress_extremes",

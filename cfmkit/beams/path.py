@@ -113,7 +113,7 @@ class Path:
         Under loads that follow they are those of the tangent's symmetric part, less one where its determinant, which
         decides on divergence, does not agree.
         """
-        return read_only(self.points.info[:, 0], np.int64)
+        return read_only(self.points.unstable, np.int64)
 
     @property
     def stable(self) -> Any:
@@ -123,7 +123,7 @@ class Path:
     @cached_property
     def asked(self) -> Any:
         """Index of the point asked for, -1 for points in between."""
-        return read_only(self.points.info[:, 1], np.int64)
+        return read_only(self.points.asked, np.int64)
 
     @cached_property
     def at_asked(self) -> Any:

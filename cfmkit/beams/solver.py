@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from cfmkit.beams.discretise import PRESTRESS, Mesh, assemble_model, grid, segment_turns, table
 from cfmkit.beams.kernels import entry
-from cfmkit.beams.kernels.codes import INFO, SOLVED
+from cfmkit.beams.kernels.codes import ASKED, DRIVE_RATE, REACHED, SHORTNESS, SOLVED, UNSTABLE
 from cfmkit.beams.kernels.workspace import work_space
 
 if TYPE_CHECKING:
@@ -19,27 +19,102 @@ if TYPE_CHECKING:
     from cfmkit.curves import FloatArray
 
 ITERATIONS = 16
-NATURAL, LONGEST, SENSE, TRIES = 2, 5, 12, 13  # numbers of a march's options: by the drive, longest step, sense, tries
+_STORED = SHORTNESS + 1  # values with a point
 _TIGHT = 1e-12  # prestress of springs, in lengths or radians, that counts
 _LARGEST_CHANGE, _SMALLEST_SHARE = 0.35, 1e-3  # of poses in one step; of the prestress
 FORCE_WEIGHT = 1e-3  # of a dimensionless force in the arc length
 
 
-@dataclass
+class MarchOptions(NamedTuple):
+    """How a march goes: the names of what `cfmkit.beams.kernels.march.march` takes.
+
+    Attributes
+    ----------
+    tolerance : float
+        Of Newton's method, in units of lengths and rotations [1].
+    step, smallest, longest : float
+        Lengths of the first, the shortest and the longest step.
+    largest_change : float
+        Largest change of a pose in a step [rad or mean beam lengths].
+    natural : bool
+        Whether steps go by the drive, or by the arc length.
+    lowest, highest : float
+        Range of the drive that is not left.
+    inertia : int or None
+        Number of unstable directions at the start, whose change ends the march; None to go on.
+    sense : float
+        1 or -1 where the start is only near an equilibrium: the sense in which the drive goes; else 0.
+    landings : float
+        How often a step to a value of the drive may be refused.
+    """
+
+    tolerance: float
+    step: float
+    largest_change: float
+    natural: bool = True
+    smallest: float = 1e-7
+    longest: float = np.inf
+    lowest: float = -np.inf
+    highest: float = np.inf
+    inertia: int | None = None
+    sense: float = 0.0
+    landings: float = np.inf
+
+    def array(self) -> FloatArray:
+        """Return them as the compiled code takes them, in its order."""
+        steps = (self.step, self.smallest, self.longest, self.largest_change)
+        ends = (self.lowest, self.highest, float(self.inertia is not None), float(self.inertia or 0))
+        given = (self.tolerance, ITERATIONS, float(self.natural), *steps, FORCE_WEIGHT, *ends)
+        return np.array([*given, self.sense, self.landings])
+
+
+@dataclass(frozen=True)
 class Points:
-    """Points of a path in dimensionless form."""
+    """Points of a path in dimensionless form: unknowns (n, size), drives (n,) and what a march stores with them."""
 
     y: FloatArray
     drive: FloatArray
     info: FloatArray
 
+    @classmethod
+    def none(cls, size: int) -> Points:
+        """Return no points, of so many unknowns."""
+        return cls(np.empty((0, size)), np.empty(0), np.empty((0, _STORED)))
+
+    @classmethod
+    def of(cls, spot: Spot, asked: int) -> Points:
+        """Return one equilibrium; `asked` is the number of the point asked for that it is, or -1."""
+        info = np.zeros((1, _STORED))
+        info[0, [UNSTABLE, ASKED, DRIVE_RATE, SHORTNESS]] = spot.unstable, asked, spot.tangent[-1], spot.shortness
+        return cls(spot.y[None], np.array([spot.drive]), info)
+
+    @property
+    def unstable(self) -> FloatArray:
+        """Numbers of unstable directions."""
+        return self.info[:, UNSTABLE]
+
+    @property
+    def asked(self) -> FloatArray:
+        """Numbers of the points asked for; -1 for those in between."""
+        return self.info[:, ASKED]
+
+    @property
+    def reached(self) -> FloatArray:
+        """The drive, or the arc length since the march began, -1 between two of its steps."""
+        return self.info[:, REACHED]
+
+    @property
+    def drive_rate(self) -> FloatArray:
+        """Change of the drive along the path."""
+        return self.info[:, DRIVE_RATE]
+
     def __len__(self) -> int:
         """Return the number of points."""
         return len(self.drive)
 
-    def joined(self, other: Points) -> Points:
+    def joined(self, *others: Points) -> Points:
         """Return these points followed by others."""
-        return Points(*(np.concatenate(pair) for pair in zip(self.parts, other.parts, strict=True)))
+        return Points(*map(np.concatenate, zip(self.parts, *(other.parts for other in others), strict=True)))
 
     def copied(self) -> Points:
         """Return the points in arrays of their own."""
@@ -157,13 +232,13 @@ class Solver:
         return h[:, : self.n].copy(), h[:, self.n].copy()
 
     def march(
-        self, spot: Spot, targets: FloatArray, options: FloatArray, room: int, model: Model | None = None
+        self, spot: Spot, targets: FloatArray, options: MarchOptions, room: int, model: Model | None = None
     ) -> tuple[int, Points]:
         """Follow the path from `spot`; return why the march ended and its points.
 
         `model`: other values than the network's own.
         """
-        y, drive, info = np.empty((room, self.size)), np.empty(room), np.empty((room, INFO))
+        y, drive, info = np.empty((room, self.size)), np.empty(room), np.empty((room, _STORED))
         code, stored = entry.march(
             self.model if model is None else model,
             self.n_free,
@@ -171,7 +246,7 @@ class Solver:
             spot.drive,
             spot.tangent.copy(),
             np.array(targets),
-            options,
+            options.array(),
             (y, drive, info),
             self.scratch,
         )
@@ -213,38 +288,3 @@ class Solver:
         new, solved = ys.copy(), np.empty(len(drives))
         entry.solve_each(self.model, self.n_free, new, drives, self.limits, solved, self.scratch)
         return new, solved > 0
-
-
-def march_options(
-    tolerance: float,
-    step: float,
-    turn: float,
-    natural: bool = True,
-    smallest: float = 1e-7,
-    greatest: float = np.inf,
-    bounds: tuple[float, float] = (-np.inf, np.inf),
-    watch: int | None = None,
-    sense: float = 0.0,
-) -> FloatArray:
-    """Return the options of a march; see `cfmkit.beams.kernels.march.march`.
-
-    `watch` is the inertia at the start, whose change ends the march; None to go on.
-    """
-    return np.array(
-        [
-            tolerance,
-            ITERATIONS,
-            float(natural),
-            step,
-            smallest,
-            greatest,
-            turn,
-            FORCE_WEIGHT,
-            bounds[0],
-            bounds[1],
-            float(watch is not None),
-            float(watch or 0),
-            sense,
-            np.inf,
-        ]
-    )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from math import ceil
 from typing import TYPE_CHECKING
 
@@ -14,9 +14,10 @@ from cfmkit.beams.layout import Layout
 from cfmkit.curves import read_only
 
 if TYPE_CHECKING:
+    from cfmkit.beams.continuation.singular import Singular
+    from cfmkit.beams.continuation.state import Problem, Trail
     from cfmkit.beams.network import Network
     from cfmkit.beams.path import Path
-    from cfmkit.beams.run import Run
 
 _EARLY = 0.1  # share of the drive's range: segments that are too long before it are cut in four, later in two
 _ROUNDS = 8  # meshes tried before giving up on the tolerance
@@ -48,60 +49,99 @@ def trace(network: Network, drive: Drive, control: Control | None = None) -> Pat
     control = control or Control()
     if control.imperfection == 0.0:
         return _solved(network, drive, control).path()
-    from cfmkit.beams.imperfection import imperfect
+    from cfmkit.beams.continuation.imperfection import imperfect
 
     perfect = replace(control, imperfection=0.0)
-    bent, name = imperfect(_solved(network, drive, replace(perfect, branch="primary"), True), control.imperfection)
+    primary = _solved(network, drive, replace(perfect, branch="primary"), True)
+    bent, name = imperfect(network, primary.first, control.imperfection)
     path = _solved(bent, drive, perfect).path()
     branch = path.branch if bent is network else np.where(path.branch == "primary", "imperfect", path.branch)
     return replace(path, imperfection=name, branch=read_only(branch, np.str_))
 
 
-def _solved(network: Network, drive: Drive, control: Control, to_first: bool = False) -> Run:
-    """Return the run on the first mesh that reaches the tolerance, or on the last that is tried.
+@dataclass(frozen=True, eq=False)
+class Attempt:
+    """A path on one mesh, with its estimated error; `first`: see `cfmkit.beams.continuation.loop.Followed`."""
 
-    to_first: only as far as the first bifurcation.
+    problem: Problem
+    trail: Trail
+    error: float
+    first: tuple[Problem, Singular] | None
+
+    def path(self) -> Path:
+        """Return the outcome; where the tolerance is not reached, every point is judged by itself."""
+        from cfmkit.beams.continuation.accuracy import errors, largest_force
+        from cfmkit.beams.continuation.ending import inaccurate
+        from cfmkit.beams.path import Path
+
+        problem, trail, tolerance = self.problem, self.trail, self.problem.control.tolerance
+        accurate = np.ones(len(trail.points), dtype=bool)
+        if not self.error <= tolerance:
+            largest = float(largest_force(trail).max())
+            accurate = errors(problem, trail, range(len(trail.points)), largest) <= tolerance
+            trail = inaccurate(problem, trail, self.error, int((~accurate).sum()))
+        accurate.setflags(write=False)
+        return Path(
+            solver=trail.solver,
+            points=trail.points,
+            branch=np.array(trail.branches, dtype=np.str_),
+            status=trail.ending.status,
+            message=trail.ending.message or trail.ending.status.value,
+            events=trail.events,
+            error=self.error,
+            accurate=accurate,
+        )
+
+
+def _solved(network: Network, drive: Drive, control: Control, first_only: bool = False) -> Attempt:
+    """Return the path on the first mesh that reaches the tolerance, or on the last that is tried.
+
+    first_only: only as far as the first bifurcation.
     """
-    from cfmkit.beams import endings
-    from cfmkit.beams.accuracy import estimate  # loads the compiler, as do the next two
+    from cfmkit.beams.continuation import ending  # loads the compiler, as do the next ones
+    from cfmkit.beams.continuation.accuracy import estimate
+    from cfmkit.beams.continuation.loop import follow
+    from cfmkit.beams.continuation.state import Problem
     from cfmkit.beams.kernels.codes import STALLED
     from cfmkit.beams.path import PathStatus
-    from cfmkit.beams.run import Run
 
     layout = Layout(network, drive)
-    mesh, before, borne = first_mesh(layout, control.tolerance), None, -1.0
+    mesh, borne = first_mesh(layout, control.tolerance), -1.0
+    before: Trail | None = None
     for round_ in range(_ROUNDS):
-        run = Run(layout, mesh, control, to_first)
-        run.follow()
-        if run.too_long and before is not None and not _further(run, before):
-            endings.stop(run, STALLED)
-        elif run.too_long and round_ < _ROUNDS - 1:
-            before = run
-            mesh = mesh.shorter(4 if _early(run) else 2)
+        problem = Problem(layout, mesh, control, first_only)
+        followed = follow(problem)
+        trail, last = followed.trail, round_ == _ROUNDS - 1
+        if trail.ending.too_long and before is not None and not _further(problem, trail, before):
+            trail = ending.stop(problem, trail, STALLED).trail
+        elif trail.ending.too_long and not last:
+            before = trail
+            mesh = mesh.shorter(4 if _early(problem, trail) else 2)
             continue
-        if run.status is PathStatus.NO_START and round_ < _STARTS and run.share > borne + _GAIN:
-            mesh, borne = mesh.shorter(), run.share
+        status = trail.ending.status
+        if status is PathStatus.NO_START and round_ < _STARTS and followed.share > borne + _GAIN:
+            mesh, borne = mesh.shorter(), followed.share
             continue
-        run.error = estimate(run)
-        limit = control.tolerance if run.status is PathStatus.COMPLETE else min(control.tolerance, _SURE)
-        if run.error <= limit or round_ == _ROUNDS - 1:
+        error = estimate(problem, trail)
+        limit = control.tolerance if status is PathStatus.COMPLETE else min(control.tolerance, _SURE)
+        if error <= limit or last:
             break
         mesh = mesh.finer()
-    return run
+    return Attempt(problem, trail, error, followed.first)
 
 
-def _early(run: Run) -> bool:
-    """Tell whether a run ended in the first part of the drive's range."""
-    return not len(run.points) or abs(float(run.points.drive[-1])) < _EARLY * run.span
+def _early(problem: Problem, trail: Trail) -> bool:
+    """Tell whether a path ended in the first part of the drive's range."""
+    return not len(trail.points) or abs(trail.drive) < _EARLY * problem.span
 
 
-def _further(run: Run, before: Run) -> bool:
-    """Tell whether shorter segments lead any further: a path drawn taut is followed by them just nearer to its end."""
-    from cfmkit.beams.steady import taut
+def _further(problem: Problem, trail: Trail, before: Trail) -> bool:
+    """Tell whether shorter segments lead any further: a path pulled straight is only followed nearer to its end."""
+    from cfmkit.beams.continuation.uncondensed import pulled_straight
 
-    if not taut(run) or not len(before.points) or run.asked() != before.asked():
+    if not pulled_straight(trail) or not len(before.points) or trail.asked != before.asked:
         return True
-    return abs(float(run.points.drive[-1] - before.points.drive[-1])) > _GAIN * run.span
+    return abs(trail.drive - before.drive) > _GAIN * problem.span
 
 
 def first_mesh(layout: Layout, tolerance: float) -> Mesh:

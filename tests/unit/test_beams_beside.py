@@ -10,9 +10,9 @@ from beam_networks import drives, network
 
 from cfmkit.beams import CLAMPED, Beam, Control, Displacement, Network, Node, Path, PathStatus, Section, guided, trace
 from cfmkit.beams.discretise import Mesh
+from cfmkit.beams.expanded import UncondensedSolver
 from cfmkit.beams.layout import Layout
-from cfmkit.beams.solver import Solver, march_options
-from cfmkit.beams.steady import SteadySolver
+from cfmkit.beams.solver import MarchOptions, Solver
 from cfmkit.errors import InputError
 
 LENGTH, ANGLE = 35e-3, np.radians(8)
@@ -137,7 +137,7 @@ def test_nothing_eliminated_leads_to_the_same_equilibria(seed: int) -> None:
     """Solutions, tangents, borders, marches and finer meshes, in the unknowns of the plain solver."""
     net = network(seed, follower=False)
     plain = Solver(Layout(net, drives(net, seed)[0]), Mesh(2, 2), 1e-12)
-    steady = SteadySolver(plain)
+    steady = UncondensedSolver(plain)
     start = plain.tightened()
     assert start is not None
     one, other = (solver.solve(start.y, 0.02) for solver in (plain, steady))
@@ -151,7 +151,7 @@ def test_nothing_eliminated_leads_to_the_same_equilibria(seed: int) -> None:
     across = steady.solve(one.y, 0.021, border, level)
     assert across is not None
     assert across.drive == pytest.approx(one.drive, abs=1e-7)
-    options = march_options(1e-12, 0.01, 0.35, sense=1.0)
+    options = MarchOptions(1e-12, 0.01, 0.35, sense=1.0)
     paths = [solver.march(start, np.array([0.02, 0.04]), options, 200)[1] for solver in (plain, steady)]
     np.testing.assert_allclose(paths[1].y[-1], paths[0].y[-1], rtol=0, atol=1e-9 * np.abs(one.y).max())
     fine, solved = steady.finer(1e-12).solve_each(one.y[None], np.array([0.02]))

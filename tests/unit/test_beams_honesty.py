@@ -15,12 +15,11 @@ from cfmkit.beams import (
     Path,
     PathStatus,
     Section,
-    branch_ends,
-    branches,
     guided,
     trace,
     tracing,
 )
+from cfmkit.beams.continuation import bifurcation, branch_end
 from cfmkit.beams.discretise import Mesh
 
 DOWN = -np.pi / 2
@@ -76,7 +75,7 @@ def test_a_branch_s_end_that_was_stepped_over_is_noticed(
     monkeypatch: pytest.MonkeyPatch, travel: tuple[float, ...], on_branch: int
 ) -> None:
     """Without a search for the end, long steps pass from the branch to the path that it joins; it is found behind."""
-    monkeypatch.setattr(branches, "end_of_branch", lambda *given: None)
+    monkeypatch.setattr(bifurcation, "predicted_end", lambda *given: (None, False))
     path = trace(v_beam(), Displacement("d", DOWN, np.array(travel) * 1e-3))
     names = path.branch[path.at_asked]
     assert all(name.startswith("bifurcated") for name in names[:on_branch])
@@ -87,8 +86,8 @@ def test_a_branch_s_end_that_was_stepped_over_is_noticed(
 
 def test_an_end_that_is_not_found_behind_either_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     """From 4.71 mm one step passes it; from 4.7 mm the steps become short there, and rounding decides what is found."""
-    monkeypatch.setattr(branches, "end_of_branch", lambda *given: None)
-    monkeypatch.setattr(branch_ends, "close_behind", lambda run: False)
+    monkeypatch.setattr(bifurcation, "predicted_end", lambda *given: (None, False))
+    monkeypatch.setattr(branch_end, "closed_behind", lambda *given: None)
     path = trace(v_beam(), Displacement("d", DOWN, np.array([4.0, 4.71, 5.0, 6.0]) * 1e-3))
     assert path.branch[path.at_asked][2:].tolist() == ["primary", "primary"]
     assert path.events[-1].kind == "unresolved"

@@ -23,8 +23,8 @@ from cfmkit.beams import (
     guided,
     trace,
 )
-from cfmkit.beams.curvature import Curvature, eigenvalues
-from cfmkit.beams.descent import descend
+from cfmkit.beams.continuation.modes import Curvature, eigenvalues
+from cfmkit.beams.continuation.switching import descend
 from cfmkit.beams.discretise import Mesh
 from cfmkit.beams.expanded import ExpandedSolver
 from cfmkit.beams.layout import Layout

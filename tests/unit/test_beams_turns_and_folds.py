@@ -22,7 +22,7 @@ from cfmkit.beams import (
     guided,
     trace,
 )
-from cfmkit.beams.folds import stretch
+from cfmkit.beams.continuation.limit_point import one_way
 
 DOWN = -np.pi / 2
 RISE = 35e-3 * np.sin(np.radians(8.0))
@@ -80,7 +80,7 @@ def places(path: Path) -> list[float]:
     [([1, 2, 3], [3]), ([0, 1, 0, 1], [2, 3, 4]), ([-1], [1]), ([1, -1, -2, 0], [1, 3, 4]), ([0, -1, 1], [2, 3])],
 )
 def test_a_drive_is_taken_in_stretches_that_go_one_way(points: list[float], ends: list[int]) -> None:
-    found = [stretch(points, asked) for asked in range(len(points))]
+    found = [one_way(points, asked) for asked in range(len(points))]
     starts = [0, *ends[:-1]]
     assert found == [
         next((start, end) for start, end in zip(starts, ends, strict=True) if asked < end)

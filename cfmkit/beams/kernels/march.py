@@ -5,18 +5,38 @@ from __future__ import annotations
 import numpy as np
 
 from cfmkit.beams.kernels.codes import (
+    ASKED,
+    BY_DRIVE,
+    CHANGE,
     DENIED,
     DONE,
+    DRIVE_RATE,
     FULL,
+    HIGHEST,
     INERTIA,
+    INERTIA_BEFORE,
+    ITERATIONS,
     KEPT,
     KEPT_WITH_SLOPES,
+    LANDINGS,
     LONG,
+    LONGEST,
+    LOWEST,
     NO_START,
     OUTSIDE,
+    REACHED,
+    SENSE,
     SHORT,
+    SHORTNESS,
+    SMALLEST,
     SOLVED,
+    SPENT,
     STALLED,
+    STEP,
+    TOLERANCE,
+    UNSTABLE,
+    WATCHED,
+    WEIGHT,
 )
 from cfmkit.beams.kernels.compiler import kernel
 from cfmkit.beams.kernels.dense import copy
@@ -40,8 +60,8 @@ def _store(k, y, state, asked, t, iterations, along, outs):
     out_y, out_drive, out_info = outs
     copy(out_y[k], y)
     out_drive[k] = state[0]
-    out_info[k, 0], out_info[k, 1], out_info[k, 2] = state[1], asked, t
-    out_info[k, 3], out_info[k, 4], out_info[k, 5] = iterations, along, state[2]
+    out_info[k, UNSTABLE], out_info[k, ASKED], out_info[k, REACHED] = state[1], asked, t
+    out_info[k, SPENT], out_info[k, DRIVE_RATE], out_info[k, SHORTNESS] = iterations, along, state[2]
 
 
 @kernel
@@ -73,19 +93,21 @@ def _begin(m, n_free, y, drive, natural, spaces, options, outs, scratch):
     the path's sense.
     """
     state, unit, new, tangent, slope = spaces
-    n, fresh = unit.shape[0] - 1, options[12] != 0.0
+    n, fresh = unit.shape[0] - 1, options[SENSE] != 0.0
     if not (natural or fresh):
         return 0, False
     copy(new, y)
     state[0] = drive
-    code, iterations = solve(m, n_free, new, state, unit, drive, (options[0], options[1]), tangent, scratch)
+    code, iterations = solve(
+        m, n_free, new, state, unit, drive, (options[TOLERANCE], options[ITERATIONS]), tangent, scratch
+    )
     if fresh:
         if code != SOLVED:
             return -1, False
         copy(y, new)
         _store(0, y, state, -1, 0.0, iterations, tangent[n], outs)
         for i in range(n + 1):
-            tangent[i] *= 1.0 if natural else options[12]
+            tangent[i] *= 1.0 if natural else options[SENSE]
     known = natural and code == SOLVED and changes(new, y, n_free, n) < AGAIN
     if known:
         all_slopes(m, n_free, tangent, slope, scratch)
@@ -102,7 +124,7 @@ def _longer(moved, missed, turn, count, landing, tolerance):
 @kernel
 def _creeps(slow, ahead, moved, new, old, options, n_free, n):
     """Count the short steps in a row, those tenfold in which only forces grow: a path drawn taut gets no further."""
-    if abs(ahead) >= CREEPING * (options[9] - options[8]):
+    if abs(ahead) >= CREEPING * (options[HIGHEST] - options[LOWEST]):
         return 0
     return slow + (10 if pulls(new, old, n_free, n) > TAUT * moved else 1)
 
@@ -145,14 +167,14 @@ def _strays(code, known, ahead, options, both, state, index, n_free, n):
     Or, from the slopes before and behind it, whether poses change in another direction: behind a sharp turn lie other
     paths.
     """
-    if code != SOLVED or options[2] > 0.5:
+    if code != SOLVED or options[BY_DRIVE] > 0.5:
         return False
     old, new = both
     changed, last = abs(state[1] - index), new.shape[0] - 1
     several = changed > 1.0 or (known and changed == 0.0 and old[last] * new[last] < 0.0)
-    if several and options[10] > 0.5 and ahead > LOOKED_INTO * options[5]:
+    if several and options[WATCHED] > 0.5 and ahead > LOOKED_INTO * options[LONGEST]:
         return True
-    if not known or ahead <= SHORTER * options[4]:
+    if not known or ahead <= SHORTER * options[SMALLEST]:
         return False
     along, one, other = 0.0, 0.0, 0.0
     for i in range(last):
@@ -167,14 +189,15 @@ def _strays(code, known, ahead, options, both, state, index, n_free, n):
 def march(m, n_free, y, drive, tangent, targets, options, outs, scratch, room):
     """Follow the path from (y, drive) through the targets.
 
-    options: tolerance, iterations, natural (1) or arc length (0), first, smallest and largest step, largest change of
-    a pose in a step, weight of forces in the arc length, lowest and highest drive, whether to stop where the
+    options: tolerance, iterations, by the drive (1) or the arc length (0), first, smallest and longest step, largest
+    change of a pose in a step, weight of forces in the arc length, lowest and highest drive, whether to stop where the
     inertia changes, inertia at the start, sense, how often a landing on a target may be refused. A sense of 1 or -1
     says that the start is only near an equilibrium, which is solved for and stored first. A step that lands on a
-    target may be longer than the largest by STRETCH. room: see `cfmkit.beams.kernels.workspace`.
+    target may be longer than the longest by STRETCH. room: see `cfmkit.beams.kernels.workspace`.
     Returns why the march ended and the number of points stored.
     """
-    natural, step, smallest, greatest, turn = options[2] > 0.5, options[3], options[4], options[5], options[6]
+    natural, step, smallest = options[BY_DRIVE] > 0.5, options[STEP], options[SMALLEST]
+    greatest, turn = options[LONGEST], options[CHANGE]
     n, size = tangent.shape[0] - 1, y.shape[0]
     kept, (new, guess, slope), state, (border, new_tangent, unit, unused), between = room
     times, past, slopes = kept
@@ -183,26 +206,28 @@ def march(m, n_free, y, drive, tangent, targets, options, outs, scratch, room):
     stored, known = _begin(m, n_free, y, drive, natural, (state, unit, new, tangent, slope), options, outs, scratch)
     if stored < 0:
         return NO_START, 0
-    t, asked, index = (drive if natural else 0.0), 0, (state[1] if stored == 1 else options[11])
+    t, asked, index = (drive if natural else 0.0), 0, (state[1] if stored == 1 else options[INERTIA_BEFORE])
     most = KEPT_WITH_SLOPES if natural else KEPT
     count, slow, denied = remember(kept, 0, t, y, drive, slope, most), 0, 0
     while asked < targets.shape[0]:
         if stored + targets.shape[0] - asked + 1 >= outs[0].shape[0]:
             return FULL, stored
         old = past[0]
-        set_border(natural, tangent, options[7], n_free, border)
+        set_border(natural, tangent, options[WEIGHT], n_free, border)
         ahead, landing, goal = _next_step(natural, step, old[size], targets, asked)
         goal = aim(new, state, border, tangent, (kept, count, t, guess), natural, goal, ahead)
-        code, iterations = solve(m, n_free, new, state, border, goal, (options[0], options[1]), new_tangent, scratch)
+        code, iterations = solve(
+            m, n_free, new, state, border, goal, (options[TOLERANCE], options[ITERATIONS]), new_tangent, scratch
+        )
         moved, missed = changes(new, old, n_free, n), changes(new, guess, n_free, n)
-        _slopes_behind(code, m, n_free, natural, options[7], new_tangent, slope, unused, scratch)
+        _slopes_behind(code, m, n_free, natural, options[WEIGHT], new_tangent, slope, unused, scratch)
         bent = misses(old, new, slopes[0], slope, ahead, n_free, n) if known else 0.0
         refused = _refused(code, moved, missed, bent, turn, count)
-        passed = _passed(state, index, count, natural, options[10] > 0.5, abs(ahead) / smallest)
+        passed = _passed(state, index, count, natural, options[WATCHED] > 0.5, abs(ahead) / smallest)
         passed = passed or _strays(code, known, ahead, options, (slopes[0], slope), state, index, n_free, n)
         if refused or passed or not (natural or _forward(border, new_tangent)):
             step, denied = (0.5 * ahead if natural else 0.5 * step), denied + (1 if landing else 0)
-            if abs(step) < smallest or denied >= options[13]:
+            if abs(step) < smallest or denied >= options[LANDINGS]:
                 return (STALLED if abs(step) < smallest else DENIED), stored
             if count > 1 and abs(step) < SECANT * abs(times[0] - times[1]):
                 count = 1
@@ -223,12 +248,12 @@ def march(m, n_free, y, drive, tangent, targets, options, outs, scratch, room):
         count = remember(kept, count if known or not natural else 0, t, new, state[0], slope, most)
         known = True
         copy(tangent, new_tangent)
-        if options[10] > 0.5 and state[1] != index:
+        if options[WATCHED] > 0.5 and state[1] != index:
             return INERTIA, stored
         index = state[1]
-        if state[0] < options[8] or state[0] > options[9]:
+        if state[0] < options[LOWEST] or state[0] > options[HIGHEST]:
             return OUTSIDE, stored
-        if _longer(moved, missed, turn, count, landing, options[0]):
+        if _longer(moved, missed, turn, count, landing, options[TOLERANCE]):
             step = np.sign(step) * min(greatest, 1.6 * abs(step))
     return DONE, stored
 
@@ -257,7 +282,9 @@ def _between(m, n_free, old, new, state, targets, asked, stored, options, outs, 
         for i in range(size):
             y[i] = old[i] + share * (new[i] - old[i])
         s[0] = value
-        code, iterations = solve(m, n_free, y, s, unit, value, (options[0], options[1]), tangent, scratch)
+        code, iterations = solve(
+            m, n_free, y, s, unit, value, (options[TOLERANCE], options[ITERATIONS]), tangent, scratch
+        )
         n = unit.shape[0] - 1
         if code == SOLVED and changes(y, new, n_free, n) <= 1.5 * changes(new, old, n_free, n) + 1e-7:
             _store(stored, y, s, k, -1.0, iterations, 1.0 if rising else -1.0, outs)

@@ -9,58 +9,58 @@ import numpy as np
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from cfmkit.beams.run import Run
+    from cfmkit.beams.continuation.state import Problem, Trail
     from cfmkit.beams.solver import Solver
     from cfmkit.curves import FloatArray
 
 
-def largest_force(run: Run) -> FloatArray:
+def largest_force(trail: Trail) -> FloatArray:
     """Return the largest dimensionless force or moment at the end of a beam at every point."""
-    forces: FloatArray = np.abs(run.points.y[:, run.solver.n_free : run.solver.n]).max(axis=1)
+    forces: FloatArray = np.abs(trail.points.y[:, trail.solver.n_free : trail.solver.n]).max(axis=1)
     return forces
 
 
-def estimate(run: Run) -> float:
+def estimate(problem: Problem, trail: Trail) -> float:
     """Return the largest of `errors` at up to three points: middle, last, and where the forces are largest."""
-    count = len(run.points)
+    count = len(trail.points)
     if not count:
         return 0.0
-    forces = largest_force(run)
+    forces = largest_force(trail)
     hardest = int(forces.argmax())
     chosen = {count // 2, count - 1, hardest}
-    if run.pinned:  # at a bifurcation no mesh is near another
-        chosen = {k for k in chosen if float(run.points.drive[k]) not in run.pinned} or {0}
-    return float(errors(run, chosen, float(forces[hardest])).max())
+    if trail.pinned:  # at a bifurcation no mesh is near another
+        chosen = {k for k in chosen if float(trail.points.drive[k]) not in trail.pinned} or {0}
+    return float(errors(problem, trail, chosen, float(forces[hardest])).max())
 
 
-def errors(run: Run, indices: Iterable[int], largest: float) -> FloatArray:
+def errors(problem: Problem, trail: Trail, indices: Iterable[int], largest: float) -> FloatArray:
     """Return the difference to a mesh of twice the steps at points: forces and positions, relative to the path.
 
     `largest` is the path's largest force. Infinite where the finer mesh has no equilibrium nearby.
     """
-    tolerance = max(run.solver.tolerance, 0.02 * run.control.tolerance)
-    fine = run.solver.finer(tolerance)
-    n, free = run.solver.n, run.solver.n_free
+    tolerance = max(trail.solver.tolerance, 0.02 * problem.control.tolerance)
+    fine = trail.solver.finer(tolerance)
+    n, free = trail.solver.n, trail.solver.n_free
     scale = max(1e-12, largest)
     chosen = np.array(sorted(indices))
-    ys, drives = run.points.y[chosen], run.points.drive[chosen]
+    ys, drives = trail.points.y[chosen], trail.points.drive[chosen]
     near, solved = fine.solve_each(ys, drives)
     change, far = np.abs(near - ys), 0.1 * max(1.0, scale)
     moved: Any = 0.0
     if not (solved.all() and change.max() <= far):
         moved = np.zeros(len(drives))
-        _across(run, fine, chosen, ~solved | (change.max(axis=1) > far), (ys, drives, change, moved, far))
+        _across(trail, fine, chosen, ~solved | (change.max(axis=1) > far), (ys, drives, change, moved, far))
     change[:, free:n] /= scale
     found: FloatArray = np.maximum(change[:, :n].max(axis=1), moved)
     return found
 
 
-def _across(run: Run, fine: Solver, chosen: Any, lost: Any, arrays: tuple[Any, ...]) -> None:
+def _across(trail: Trail, fine: Solver, chosen: Any, lost: Any, arrays: tuple[Any, ...]) -> None:
     """Set the differences at points that have no equilibrium nearby at their own drive: where the path turns back."""
     ys, drives, change, moved, far = arrays
-    n = run.solver.n
+    n = trail.solver.n
     for k in np.flatnonzero(lost):
-        border = run.spot(int(chosen[k])).tangent
+        border = trail.spot(int(chosen[k])).tangent
         level = float(border[:-1] @ ys[k, :n] + border[-1] * drives[k])
         across = fine.solve(ys[k], float(drives[k]), border, level)
         there = across is not None and np.abs(across.y - ys[k]).max() <= far

@@ -18,8 +18,8 @@ from cfmkit.beams.network import Network
 from cfmkit.beams.shapes import Bent
 
 if TYPE_CHECKING:
-    from cfmkit.beams.events import Singular
-    from cfmkit.beams.run import Run
+    from cfmkit.beams.continuation.singular import Singular
+    from cfmkit.beams.continuation.state import Problem
     from cfmkit.curves import FloatArray
 
 _KICK = 1e-5  # of the mode, to difference its states
@@ -27,18 +27,19 @@ _DEGREE = 14  # of the polynomials that the rotations are given as,
 _PLACES = 32  # from so many places of a beam
 
 
-def imperfect(run: Run, size: float) -> tuple[Network, str]:
+def imperfect(network: Network, first: tuple[Problem, Singular] | None, size: float) -> tuple[Network, str]:
     """Return the network with a mode of this size [m] in its shapes, and the sentence that names it.
 
-    `run` has followed the primary path of the perfect network.
+    `first` is the first bifurcation of the primary path of the perfect network, and the problem that it is one of.
     """
-    network, run = run.layout.network, run.ramp or run
-    if run.first is None:
+    if first is None:
         return network, "none: the perfect path has no bifurcation"
-    sampled = Mesh(run.mesh.segments, max(run.mesh.steps, -(-_PLACES // run.mesh.segments)))
-    solver = ExpandedSolver(run.layout, sampled, ramped=run.ramped)  # the same unknowns, states at more places
-    rotation, reach = _mode(solver, run.first)
-    share = size / (reach * run.layout.scales.length)
+    problem, singular = first
+    mesh = problem.mesh
+    sampled = Mesh(mesh.segments, max(mesh.steps, -(-_PLACES // mesh.segments)))
+    solver = ExpandedSolver(problem.layout, sampled, ramped=problem.ramp)  # the same unknowns, states at more places
+    rotation, reach = _mode(solver, singular)
+    share = size / (reach * problem.layout.scales.length)
     cut, beams, row = solver.cut, dict(network.beams), 0
     for number, (name, beam) in enumerate(network.beams.items()):
         t: list[float] = []
@@ -48,8 +49,8 @@ def imperfect(run: Run, size: float) -> tuple[Network, str]:
         turn = np.polynomial.Chebyshev.fit(t, share * rotation[row : row + len(t)], _DEGREE, domain=[0.0, 1.0])
         beams[name] = replace(beam, shape=Bent(beam.shape, tuple(turn.coef.tolist())))
         row += len(t)
-    place = run.first.spot.drive * run.unit
-    where = f"under {100 * place:.4g} % of the {run.ramped}" if run.ramped else f"at {place:.6g}"
+    place = singular.spot.drive * problem.unit
+    where = f"under {100 * place:.4g} % of the {problem.ramp}" if problem.ramp else f"at {place:.6g}"
     bent = Network(network.nodes, beams, network.links, network.springs, network.loads)
     return bent, f"{size:.6g} m of the buckling mode {where}"
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.beams.curvature import Curvature, eigenvalues
+from cfmkit.beams.continuation.modes import Curvature, eigenvalues
 from cfmkit.beams.solver import FORCE_WEIGHT, Spot
 
 if TYPE_CHECKING:
