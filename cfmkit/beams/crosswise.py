@@ -44,7 +44,7 @@ def cross_stiffness(path: Path, node: str, direction: float, points: Any = None)
     Returns
     -------
     (p,) array
-        Negative where the node would leave sideways; infinite where nothing gives way.
+        Negative where the node would leave sideways; nan where nothing gives way.
     """
     chosen = np.arange(len(path)) if points is None else np.asarray(points, dtype=np.int64)
     layout, solver = path.layout, path.solver
@@ -53,10 +53,10 @@ def cross_stiffness(path: Path, node: str, direction: float, points: Any = None)
     along, across = (int(slots[loose.layout.first[node] + k]) for k in range(2))
     ys = np.concatenate([_unknowns(path, loose.layout, node), path.points.y[:, solver.n_free :]], axis=1)
     kept = np.array([k for k in range(loose.n) if k not in (along, across)])
-    found = np.empty(len(chosen))
+    stiffness = np.empty((len(chosen), loose.n, loose.n))
     for place, k in enumerate(chosen.tolist()):
-        tangent, _ = loose.tangent_at(ys[k], float(path.points.drive[k]))
-        found[place] = _condensed(-tangent, across, kept)
+        stiffness[place], _ = loose.tangent_at(ys[k], float(path.points.drive[k]))
+    found = _condensed(-stiffness, across, kept)
     scales = layout.scales
     return read_only(found * scales.force / scales.length)
 
@@ -88,16 +88,23 @@ def _unknowns(path: Path, loose: Layout, node: str) -> FloatArray:
     return found
 
 
-def _condensed(stiffness: FloatArray, across: int, kept: Any) -> float:
-    """Return the stiffness of one unknown while the ones that are kept follow it."""
-    row, column, block = stiffness[across, kept], stiffness[kept, across], stiffness[np.ix_(kept, kept)]
+def _condensed(stiffness: FloatArray, across: int, kept: Any) -> FloatArray:
+    """Return the stiffness (p,) of one unknown while the ones that are kept follow it, from matrices (p, n, n)."""
+    row, column = stiffness[:, across, kept], stiffness[:, kept, across]
+    blocks = stiffness[:, kept[:, None], kept]
     try:
-        follow = np.linalg.solve(block, column)
-    except np.linalg.LinAlgError:  # a straight beam that does not stretch, held along itself: its force is open
-        follow, _, _, _ = np.linalg.lstsq(block, column)
-        if not np.allclose(block @ follow, column, rtol=0.0, atol=_OPEN * max(1.0, float(np.abs(column).max()))):
-            return float("inf")
-    return float(stiffness[across, across] - row @ follow)
+        follow = np.linalg.solve(blocks, column[..., None])[..., 0]
+    except np.linalg.LinAlgError:
+        follow = np.array([_followed(*each) for each in zip(blocks, column, strict=True)])
+    return np.asarray(stiffness[:, across, across] - (row * follow).sum(axis=1))
+
+
+def _followed(block: FloatArray, column: FloatArray) -> FloatArray:
+    """Return how the others follow one, where a force may be open: of a straight beam that cannot stretch, held."""
+    follow, _, _, _ = np.linalg.lstsq(block, column)
+    left = np.abs(block @ follow - column).max(initial=0.0)
+    open_force = left > _OPEN * max(1.0, float(np.abs(column).max(initial=0.0)))
+    return np.full(len(column), np.nan) if open_force else np.asarray(follow)
 
 
 __all__ = ["cross_stiffness"]

@@ -79,3 +79,12 @@ def test_it_does_not_depend_on_whether_a_displacement_or_a_force_drives() -> Non
     pushed = trace(straight(), Loading((PointLoad("tip", fy=1.0),), moved.effort[-1:]))
     one, other = (cross_stiffness(path, "tip", np.pi / 2, [len(path) - 1]) for path in (moved, pushed))
     assert one == pytest.approx(other, rel=1e-6)
+
+
+def test_there_is_none_where_nothing_gives_way() -> None:
+    """A straight beam that does not stretch, pushed sideways by nothing yet: along itself it is rigid."""
+    path = trace(straight(axial=False), Loading((PointLoad("tip", fy=1e-3),), np.array([0.0, 1.0])))
+    found = cross_stiffness(path, "tip", np.pi / 2)
+    assert path.drive[0] == 0.0
+    assert np.isnan(found[0])
+    assert found[-1] > 1e6 * RIGIDITY / LENGTH**3

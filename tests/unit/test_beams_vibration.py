@@ -260,6 +260,20 @@ def test_becks_column_flutters_at_its_load() -> None:
     assert found.free[2, 1] / found.free[2, 0] == pytest.approx(1.0, abs=0.02)
 
 
+@pytest.mark.parametrize("share", [0.2, 0.45])
+def test_a_column_under_a_load_that_turns_in_part_diverges_where_bolotin_says(share: float) -> None:
+    """A share stays tangential: divergence at cos(q L) = -share/(1 - share), with q^2 = P/EI; none beyond a half."""
+    critical = np.arccos(-share / (1 - share)) ** 2 * RIGIDITY / LENGTH**2
+    loads = (PointLoad("tip", fx=-share, follows=True), PointLoad("tip", fx=share - 1.0))
+    drive = Loading(loads, np.array([0.5, 0.999, 1.001, 1.05]) * critical)
+    path = trace(beam(), drive, Control(branch="primary"))
+    found = frequencies(path, WHOLE, 2, points=path.at_asked)
+    assert found.diverges.tolist() == [False, False, True, True]
+    assert not found.flutters.any()
+    assert np.isnan(found.free[2:]).all()
+    assert found.free[1, 0] < 0.1 * found.free[0, 0]
+
+
 def test_masses_must_be_known_and_positive() -> None:
     path = under(1e-9, beam())
     with pytest.raises(InputError, match="no density is given of the beams x"):

@@ -42,15 +42,17 @@ class Frequencies:
     held, free : (p, n) arrays
         The lowest ones with the drive held, and with it free, ascending [Hz]. Zero where a motion has no stiffness;
         nan where the pose is unstable, and where a network has fewer.
-    flutters : (p,) bool array
-        Whether loads that turn with their node make motions grow that swing, at the loads as they are: while the drive
-        is held if it is a motion, and free if it is a load.
+    flutters, diverges : (p,) bool arrays
+        Whether loads that turn with their node make motions grow that swing, or that do not: two squares of
+        frequencies are complex, or one is negative. As the drive has it: held if it is a motion, free if it is a load.
+        Other networks do not flutter, and whether they diverge is told by the path.
     """
 
     points: Any
     held: FloatArray
     free: FloatArray
     flutters: Any
+    diverges: Any
 
 
 def frequencies(
@@ -87,16 +89,17 @@ def frequencies(
     system = Linearisation(path, masses, count, hold)
     unit = float(np.sqrt(path.layout.scales.rigidity) / path.layout.scales.length**2 / (2 * np.pi))
     held, free = (np.full((len(chosen), count), np.nan) for _ in range(2))
-    flutters = np.zeros(len(chosen), dtype=bool)
+    grows = np.zeros((2, len(chosen)), dtype=bool)
     for first in range(0, len(chosen), _AT_ONCE):
         own = chosen[first : first + _AT_ONCE]
         matrices = system.at(own)
         for k in range(len(own)):
             one, other = _reduced(matrices, k, True), _reduced(matrices, k, False)
-            (squares, first_flutters), (others, then_flutters) = _squares(one, count), _squares(other, count)
+            (squares, *still), (others, *loose) = _squares(one, count), _squares(other, count)
             held[first + k], free[first + k] = unit * np.sqrt(squares), unit * np.sqrt(others)
-            flutters[first + k] = first_flutters if len(matrices.driven) else then_flutters
-    return Frequencies(read_only(chosen, np.int64), read_only(held), read_only(free), read_only(flutters, np.bool_))
+            grows[:, first + k] = still if len(matrices.driven) else loose
+    flutters, diverges = (read_only(row, np.bool_) for row in grows)
+    return Frequencies(read_only(chosen, np.int64), read_only(held), read_only(free), flutters, diverges)
 
 
 @dataclass(frozen=True)
@@ -133,11 +136,11 @@ def _basis(rows: FloatArray) -> FloatArray:
     return np.asarray(q[:, rank:])
 
 
-def _squares(system: _Reduced, count: int) -> tuple[FloatArray, bool]:
-    """Return the lowest squares of the frequencies, nan where it is unstable, and whether it flutters."""
+def _squares(system: _Reduced, count: int) -> tuple[FloatArray, bool, bool]:
+    """Return the lowest squares of the frequencies, nan where it is unstable; whether it flutters, and diverges."""
     if system.turning is not None:
         return _with_turning(system, count)
-    return _symmetric(system.stiffness, system.mass, count), False
+    return _symmetric(system.stiffness, system.mass, count), False, False
 
 
 def _symmetric(stiffness: FloatArray, mass: FloatArray, count: int) -> FloatArray:
@@ -183,8 +186,8 @@ def _evened(stiffness: FloatArray, *others: FloatArray) -> tuple[FloatArray, ...
     return tuple(matrix / np.outer(size, size) for matrix in (stiffness, *others))
 
 
-def _with_turning(system: _Reduced, count: int) -> tuple[FloatArray, bool]:
-    """Return the same under loads that turn with their node, and whether two frequencies have met: it flutters.
+def _with_turning(system: _Reduced, count: int) -> tuple[FloatArray, bool, bool]:
+    """Return the same under loads that turn with their node.
 
     The lowest ones are told from the inverse: M v = K v / omega^2.
     """
@@ -193,14 +196,15 @@ def _with_turning(system: _Reduced, count: int) -> tuple[FloatArray, bool]:
     try:
         inverse = np.linalg.eigvals(np.linalg.solve(stiffness + turning, mass))
     except np.linalg.LinAlgError:
-        return found, False
+        return found, False, True
     lowest = inverse[np.argsort(-np.abs(inverse))][: _RESOLVED * count + _RESOLVED]
     squares = 1.0 / lowest[np.abs(lowest) > np.finfo(float).eps * np.abs(lowest[0])]
-    swings = bool((np.abs(squares.imag) > _REAL * np.abs(squares)).any())
-    if not swings and (squares.real > 0.0).all():
+    complex_ones = np.abs(squares.imag) > _REAL * np.abs(squares)
+    swings, falls = bool(complex_ones.any()), bool((squares.real[~complex_ones] <= 0.0).any())
+    if not (swings or falls):
         real = np.sort(squares.real)[:count]
         found[: len(real)] = real
-    return found, swings
+    return found, swings, falls
 
 
 __all__ = ["Frequencies", "frequencies"]

@@ -123,10 +123,13 @@ class Solution:
 
     @cached_property
     def stable(self) -> Any:
-        """Whether each point is a stable equilibrium that reaches the tolerance; one that flutters is not."""
-        stable = self.path.stable[self.keep] & self.accurate
-        found = self.frequencies
-        return read_only(stable if found is None else stable & ~found.flutters, np.bool_)
+        """Whether each point is a stable equilibrium that reaches the tolerance.
+
+        Under loads that turn with their node all motions decide where masses are known, else the path's count.
+        """
+        found = self.frequencies if self.follows else None
+        stable = self.path.stable[self.keep] if found is None else ~(found.flutters | found.diverges)
+        return read_only(stable & self.accurate, np.bool_)
 
     @cached_property
     def follows(self) -> bool:
