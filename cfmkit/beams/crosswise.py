@@ -101,7 +101,10 @@ def _condensed(stiffness: FloatArray, across: int, kept: Any) -> FloatArray:
 
 def _followed(block: FloatArray, column: FloatArray) -> FloatArray:
     """Return how the others follow one, where a force may be open: of a straight beam that cannot stretch, held."""
-    follow, _, _, _ = np.linalg.lstsq(block, column)
+    try:
+        return np.asarray(np.linalg.solve(block, column))
+    except np.linalg.LinAlgError:
+        follow, _, _, _ = np.linalg.lstsq(block, column)
     left = np.abs(block @ follow - column).max(initial=0.0)
     open_force = left > _OPEN * max(1.0, float(np.abs(column).max(initial=0.0)))
     return np.full(len(column), np.nan) if open_force else np.asarray(follow)
