@@ -75,7 +75,8 @@ _METALS = (
     Material(
         "steel-1.4310", 179e9, 0.29, 965e6, 7900.0,
         "E: EN 10151 strip 1.4310, cold rolled to Rm 1300 MPa, along the grain (189 GPa after tempering, 195 GPa at "
-        "Rm 1800 MPa). Yield: ASTM A666 type 301 full hard, minimum; upper end typical of strip +C1300.",
+        "Rm 1800 MPa). Density: EN 10088-1. Yield: ASTM A666 type 301 full hard, minimum; upper end typical of strip "
+        "+C1300.",
         Scatter((175e9, 195e9), (930e6, 1300e6)), ("spring-steel", "aisi-301", "stainless-spring-steel", "301"),
     ),
     Material(
@@ -86,7 +87,8 @@ _METALS = (
     ),
     Material(
         "steel-s235", 210e9, 0.30, 235e6, 7850.0,
-        "EN 1993-1-1, sec. 3.2.6, and EN 10025-2, S235 up to 16 mm, minimum; upper end typical of mill certificates.",
+        "EN 1993-1-1, sec. 3.2.6, and EN 10025-2, S235 up to 16 mm, minimum; upper end typical of mill certificates. "
+        "Density: EN 1991-1-1, Table A.4 (78.5 kN/m^3).",
         Scatter((200e9, 212e9), (235e6, 340e6)), ("structural-steel", "mild-steel", "steel"),
     ),
     Material(
