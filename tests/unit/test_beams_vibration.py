@@ -274,6 +274,22 @@ def test_a_column_under_a_load_that_turns_in_part_diverges_where_bolotin_says(sh
     assert found.free[1, 0] < 0.1 * found.free[0, 0]
 
 
+@pytest.mark.parametrize("slenderness", [1000, 10000])
+def test_a_strip_pulled_taut_swings_as_a_stiff_string(slenderness: float) -> None:
+    """n/2l sqrt(T/m) (1 + 2 e + (4 + n^2 pi^2/2) e^2) with e = sqrt(EI/T)/l, of its stretched length [Morse 1948]."""
+    thick, strain = LENGTH / slenderness, 1e-3
+    nodes = {"root": Node(0, 0, CLAMPED), "tip": Node(LENGTH, 0, guided(0.0))}
+    net = Network(nodes, {"x": Beam("root", "tip", Section(MODULUS, WIDTH, thick))})
+    path = trace(net, Displacement("tip", 0.0, np.array([strain * LENGTH])))
+    found = frequencies(path, WHOLE, 3, [len(path) - 1]).held[0]
+    length, pull = LENGTH * (1 + strain), float(path.effort[-1])
+    mass = DENSITY * WIDTH * thick / (1 + strain)
+    e, n = np.sqrt(MODULUS * WIDTH * thick**3 / 12 / pull) / length, np.arange(1, 4)
+    wanted = n / (2 * length) * np.sqrt(pull / mass) * (1 + 2 * e + (4 + n**2 * np.pi**2 / 2) * e**2)
+    # what the series leaves out is of third order, some n^2 pi^2 times e^3; the stretch of the section adds 1e-6
+    assert found == pytest.approx(wanted, rel=200 * e**3 + 2e-6)
+
+
 def test_masses_must_be_known_and_positive() -> None:
     path = under(1e-9, beam())
     with pytest.raises(InputError, match="no density is given of the beams x"):
@@ -286,3 +302,9 @@ def test_masses_must_be_known_and_positive() -> None:
         Masses({"x": 1.0}, {"tip": (-1.0, 0.0)})
     with pytest.raises(InputError, match="at least one frequency"):
         frequencies(path, WHOLE, 0)
+
+
+def test_what_would_take_too_many_unknowns_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("cfmkit.beams.vibration.linearised._MOST", 20)
+    with pytest.raises(InputError, match="unknowns, more than 20: beams wind or are taut"):
+        frequencies(under(1e-9, beam()), WHOLE, 3)

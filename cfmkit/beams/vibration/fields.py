@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 ENDS = 8  # degrees of freedom at the attachments of the two ends
 _FIRST, _LAST = 3, 7  # rotations of the two ends among them
 _DEGREES = ((2, 10), (4, 8), (np.inf, 6))  # of the polynomials, by the number of panels: about as many unknowns
+_MANY = 16  # panels of one length; more of them are graded where the beam is flat
+_FLAT = 0.5  # [rad]: over such an angle one panel follows an arc to rounding
 _MORE = 4  # places of the quadrature beyond the degree: the pose bends, and the thickness may vary, within a panel
 
 
@@ -121,14 +123,37 @@ def _cuts(path: Path, beam: int, modes: int) -> list[tuple[float, float, float, 
     own = np.flatnonzero(cut.beam_of_step == beam)
     segments = int(cut.beam_segment[beam + 1] - cut.beam_segment[beam])
     wanted = max(segments, modes // 2 + 1)
-    found = []
+    found, flat = [], _is_flat(path, beam)
     for piece in np.unique(cut.piece[own]):
         steps = own[cut.piece[own] == piece]
         left, right = float(cut.edges[steps[0], 0]), float(cut.edges[steps[-1], 1])
-        edges = np.linspace(left, right, int(np.ceil(wanted * len(steps) / len(own))) + 1).tolist()
+        shares = _shares(int(np.ceil(wanted * len(steps) / len(own))), flat, modes)
+        edges = (left + (right - left) * shares).tolist()
         where = float(cut.middle[steps[0]]), float(cut.inside[steps[0]])
         found += [(a, b, *where) for a, b in itertools.pairwise(edges)]
     return found
+
+
+def _is_flat(path: Path, beam: int) -> bool:
+    """Tell whether a beam is bent by little, before any load and at all points of the path."""
+    rows, fitted = path.sampler.rows(beam), path.layout.fits[list(path.layout.network.beams)[beam]]
+    middles = path.sampler.cut.middle[rows.step].tolist()
+    angles = [float(np.real(fitted.angle(t, middle))) for t, middle in zip(rows.t.tolist(), middles, strict=True)]
+    turns = path.sampler.states[:, rows.index, TURN]
+    return bool(np.ptp(angles) < _FLAT and np.ptp(turns, axis=1).max(initial=0.0) < _FLAT)
+
+
+def _shares(count: int, flat: bool, modes: int) -> FloatArray:
+    """Return where a piece is cut into panels of 1/count, from 0 to 1; between the ends longer ones will do if flat.
+
+    So many are needed where a beam is pulled taut: it then bends near its ends only, and each panel may be twice as
+    long as the one before it, up to a quarter of the piece.
+    """
+    if count <= _MANY or not flat:
+        return np.linspace(0.0, 1.0, count + 1)
+    near = (2.0 ** np.arange(int(np.log2(0.25 * count + 1)) + 1) - 1.0) / count
+    middle = np.linspace(near[-1], 1.0 - near[-1], modes // 2 + 3)
+    return np.concatenate([near[:-1], middle, 1.0 - near[-2::-1]])
 
 
 def panels(path: Path, name: str, modes: int) -> Panels:

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from cfmkit.beams.vibration.masses import Masses
     from cfmkit.curves import FloatArray
 
+_MOST = 4000  # unknowns: dense matrices of this size take 130 MB each, and half a minute a pose
+
 
 @dataclass(frozen=True)
 class Linearised:
@@ -80,6 +82,10 @@ class Linearisation:
         inner = [one.unknowns - ENDS for one in self.panels]
         self.firsts = (self.layout.dof_count + np.cumsum([0, *inner])).tolist()
         self.size = int(self.firsts[-1])
+        if self.size > _MOST:
+            raise InputError(
+                f"natural frequencies need {self.size} unknowns, more than {_MOST}: beams wind or are taut"
+            )
 
     @cached_property
     def _values(self) -> FloatArray:
