@@ -265,6 +265,25 @@ def test_a_motion_that_leaves_the_profile_is_partial():
     assert len(result.curve) < 201
 
 
+def test_the_nine_coordinates_go_as_far_as_the_profile_does():
+    high = {"analysis__dynamics__slider_position": "360 mm"}
+    one, other = (analyze(moving(**high, analysis__dynamics__method=name)) for name in ("inverse", "multibody"))
+    assert other.status is Status.PARTIAL
+    assert names(other)[0] == "outside_profile"
+    np.testing.assert_array_equal(other.curve.displacement, one.curve.displacement)
+    # next to the profile's end they differ by what Runge-Kutta's method leaves
+    np.testing.assert_allclose(other.curve.force, one.curve.force, rtol=1e-6)
+
+
+@pytest.mark.parametrize("method", ["inverse", "multibody"])
+def test_a_motion_that_starts_outside_the_profile_has_no_first_pose(method):
+    """Where it would come in the force has no bound: the curve began with what was left of a division by nothing."""
+    down = {"slider_position": "480 mm", "stroke": "-150 mm", "method": method}
+    result = analyze(moving(**{f"analysis__dynamics__{name}": value for name, value in down.items()}))
+    assert result.status is Status.NO_EQUILIBRIUM
+    assert "from 330 mm to 480 mm" in result.message
+
+
 def test_a_motion_outside_the_profile_has_no_equilibrium():
     result = analyze(moving(analysis__dynamics__slider_position="500 mm"))
     assert result.status is Status.NO_EQUILIBRIUM

@@ -5,13 +5,12 @@ Sides are rows: right, left, with x outwards.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cfmkit.families.cam.dynamics.inverse import respond
-from cfmkit.families.cam.dynamics.motion import Moment
 from cfmkit.families.cam.dynamics.multibody import NineCoordinates
 from cfmkit.families.cam.dynamics.reactions import reactions
 
@@ -20,7 +19,7 @@ if TYPE_CHECKING:
 
     from cfmkit.curves import FloatArray
     from cfmkit.families.cam.dynamics.machine import Machine
-    from cfmkit.families.cam.dynamics.motion import Cycloid
+    from cfmkit.families.cam.dynamics.motion import Cycloid, Moment
     from cfmkit.families.cam.dynamics.multibody import Scheme
 
 
@@ -64,14 +63,6 @@ class History:
     center: NDArray[np.complex128]
     on_corner: NDArray[np.bool_]
 
-    def first(self, count: int) -> History:
-        """Return the history of the first points."""
-        if count >= len(self.times):
-            return self
-        rows = {item.name: getattr(self, item.name) for item in fields(self) if item.name != "moment"}
-        cut = {name: values[..., :count] for name, values in rows.items()}
-        return History(moment=Moment(*(values[:count] for values in self.moment)), **cut)
-
 
 def inverse_history(machine: Machine, motion: Cycloid, times: FloatArray) -> History:
     """Return the history by inverse dynamics."""
@@ -91,8 +82,12 @@ def inverse_history(machine: Machine, motion: Cycloid, times: FloatArray) -> His
     )
 
 
-def multibody_history(machine: Machine, motion: Cycloid, points: int, scheme: Scheme | None = None) -> History:
+def multibody_history(
+    machine: Machine, motion: Cycloid, points: int, scheme: Scheme | None = None, first: int | None = None
+) -> History:
     """Return the history by the nine-coordinate formulation, without rolling resistance.
+
+    Of `points` equally spaced times over the motion, it is known at the `first` ones where the motion ends early.
 
     Raises
     ------
@@ -100,7 +95,7 @@ def multibody_history(machine: Machine, motion: Cycloid, points: int, scheme: Sc
         If a roller runs on the corner of its cam.
     """
     model = NineCoordinates(machine)
-    found = model.run(motion, points, scheme)
+    found = model.run(motion, points, scheme, first)
     right, left = reactions(model, found)
     center = np.array([right.center, left.center])
     return History(
@@ -114,5 +109,5 @@ def multibody_history(machine: Machine, motion: Cycloid, points: int, scheme: Sc
         pin=np.abs([right.slider_pin, left.slider_pin]),
         elongation=np.abs(center[0] + center[1].conj()) - machine.rest_length,
         center=center,
-        on_corner=np.zeros(points, dtype=bool),
+        on_corner=np.zeros(len(found.times), dtype=bool),
     )

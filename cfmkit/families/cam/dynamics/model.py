@@ -93,9 +93,9 @@ def _inside(parts: Build, spec: CamSpec) -> tuple[FloatArray, tuple[Finding, ...
     if inside.all():
         return times, ()
     found = outside(parts, (low, high))
-    if inside.sum() < 2 or dynamics.method == "multibody":
+    if inside[:2].sum() < 2:
         raise CannotBuild(found)
-    return times[inside], (found,)
+    return times[: int(np.argmin(inside))], (found,)
 
 
 def _until(end: float, times: FloatArray, spec: CamSpec) -> FloatArray:
@@ -129,8 +129,7 @@ def _history(spec: CamSpec, parts: Build, times: FloatArray) -> History:
     if stated_motion(spec).closed:
         return inverse_history(parts.machine, parts.motion, times)
     try:
-        whole = multibody_history(parts.machine, parts.motion, stated_motion(spec).points)
-        return whole.first(len(times))
+        return multibody_history(parts.machine, parts.motion, stated_motion(spec).points, first=len(times))
     except CornerContact:
         found = runs_on_corner(parts)
         raise CannotBuild(found) from None

@@ -100,8 +100,8 @@ class NineCoordinates:
         self.machine = machine
         self.chains = (_chain(machine.right, 1.0), _chain(machine.left, -1.0))
 
-    def run(self, motion: Cycloid, points: int, scheme: Scheme | None = None) -> Trajectory:
-        """Return the motion and its multipliers at equally spaced times.
+    def run(self, motion: Cycloid, points: int, scheme: Scheme | None = None, first: int | None = None) -> Trajectory:
+        """Return the motion and its multipliers at equally spaced times, or at the `first` of them only.
 
         Raises
         ------
@@ -109,8 +109,9 @@ class NineCoordinates:
             If a roller begins or ends on the corner of its cam.
         """
         scheme = scheme or Scheme()
-        times = motion.times(points)
-        start, contacts = self._start(motion)
+        times = motion.times(points)[:first]
+        points = len(times)
+        start, contacts = self._start(motion, times)
         coordinates, contacts = self._integrate(motion, times, (start, contacts), scheme)
         postures = self.postures(coordinates, contacts)
         jacobian = self.jacobian(postures, (points,))
@@ -194,9 +195,9 @@ class NineCoordinates:
         """The right and the left side."""
         return self.machine.right, self.machine.left
 
-    def _start(self, motion: Cycloid) -> tuple[FloatArray, FloatArray]:
+    def _start(self, motion: Cycloid, times: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return coordinates that meet the constraints at the beginning [SS, eq. 18], and the path coordinates."""
-        ends = np.array([motion.start, motion.start + motion.stroke])
+        ends = motion.at(times[[0, -1]]).position
         stances = self.machine.stances(ends)
         if any(stance.on_corner.any() for stance in stances):
             raise CornerContact
@@ -221,7 +222,7 @@ class NineCoordinates:
     ) -> tuple[FloatArray, FloatArray]:
         """Return coordinates (n, 9) and path coordinates at contact (2, n) at the times, by Runge-Kutta's method."""
         rate = self._rate(motion, scheme, start[1])
-        step = motion.time / ((len(times) - 1) * scheme.steps)
+        step = float(times[1]) / scheme.steps
         x: Any = start[0]
         found, touched = [x], [start[1]]
         for index in range((len(times) - 1) * scheme.steps):
