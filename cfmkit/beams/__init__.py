@@ -12,11 +12,11 @@ References
 
 from __future__ import annotations
 
-from cfmkit.beams.batch import Outcome, trace_many
-from cfmkit.beams.beam import Beam
-from cfmkit.beams.drive import Control, Displacement, Loading, Rotation
-from cfmkit.beams.gradient import Gradient, gradient
-from cfmkit.beams.network import (
+from cfmkit.beams.continuation.batch import Outcome, trace_many
+from cfmkit.beams.continuation.tracing import trace
+from cfmkit.beams.model.beam import Beam
+from cfmkit.beams.model.drive import Control, Displacement, Loading, Rotation
+from cfmkit.beams.model.network import (
     CLAMPED,
     FREE,
     PINNED,
@@ -31,10 +31,10 @@ from cfmkit.beams.network import (
     TorsionSpring,
     guided,
 )
-from cfmkit.beams.path import Event, Path, PathStatus
-from cfmkit.beams.section import Section, Taper
-from cfmkit.beams.shapes import STRAIGHT, CosineArch, Polyline, Polynomial, Spline, arc
-from cfmkit.beams.tracing import trace
+from cfmkit.beams.model.section import Section, Taper
+from cfmkit.beams.model.shapes import STRAIGHT, CosineArch, Polyline, Polynomial, Spline, arc
+from cfmkit.beams.outcome.path import Event, Path, PathStatus
+from cfmkit.beams.sensitivity.gradient import Gradient, gradient
 
 __all__ = [
     "CLAMPED",

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.beams.beam import Beam
-from cfmkit.beams.drive import Displacement
-from cfmkit.beams.gradient import gradient
-from cfmkit.beams.network import CLAMPED, Network, Node
-from cfmkit.beams.section import Section
-from cfmkit.beams.tracing import trace
+from cfmkit.beams.continuation.tracing import trace
+from cfmkit.beams.model.beam import Beam
+from cfmkit.beams.model.drive import Displacement
+from cfmkit.beams.model.network import CLAMPED, Network, Node
+from cfmkit.beams.model.section import Section
+from cfmkit.beams.sensitivity.gradient import gradient
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -11,7 +11,7 @@ import pytest
 
 from cfmkit import analyze, dumps, evaluate, load, loads
 from cfmkit.beams import Polynomial, trace
-from cfmkit.beams.beam import fit
+from cfmkit.beams.model.beam import fit
 from cfmkit.families.base import Run
 from cfmkit.families.beam.shaping.audit import Spread, audited, half_band, lines_cross, strict_share, tolerated
 from cfmkit.families.beam.shaping.closer import looked_at

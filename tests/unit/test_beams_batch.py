@@ -16,7 +16,7 @@ from cfmkit.beams import (
     PathStatus,
     trace,
 )
-from cfmkit.beams.batch import trace_many
+from cfmkit.beams.continuation.batch import trace_many
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

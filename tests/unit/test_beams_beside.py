@@ -9,10 +9,10 @@ import pytest
 from beam_networks import drives, network
 
 from cfmkit.beams import CLAMPED, Beam, Control, Displacement, Network, Node, Path, PathStatus, Section, guided, trace
-from cfmkit.beams.discretise import Mesh
-from cfmkit.beams.expanded import UncondensedSolver
-from cfmkit.beams.layout import Layout
-from cfmkit.beams.solver import MarchOptions, Solver
+from cfmkit.beams.equilibrium.expanded import UncondensedSolver
+from cfmkit.beams.equilibrium.mesh import Mesh
+from cfmkit.beams.equilibrium.solver import MarchOptions, Solver
+from cfmkit.beams.model.layout import Layout
 from cfmkit.errors import InputError
 
 LENGTH, ANGLE = 35e-3, np.radians(8)

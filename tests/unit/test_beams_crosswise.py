@@ -23,7 +23,7 @@ from cfmkit.beams import (
     guided,
     trace,
 )
-from cfmkit.beams.crosswise import cross_stiffness
+from cfmkit.beams.outcome.crosswise import cross_stiffness
 
 MODULUS, WIDTH, THICKNESS, LENGTH = 200e9, 10e-3, 1e-3, 0.1
 RIGIDITY = MODULUS * WIDTH * THICKNESS**3 / 12

@@ -12,10 +12,10 @@ from cfmkit.beams import CLAMPED, Beam, Control, Displacement, Event, Network, N
 from cfmkit.beams.continuation import at_bifurcation, bifurcation, branch_end, ending, limit_point
 from cfmkit.beams.continuation.loop import decided
 from cfmkit.beams.continuation.state import BranchEnd, Leg, Problem, Resume, Stop, Stretch, Trail
-from cfmkit.beams.discretise import Mesh
+from cfmkit.beams.equilibrium.mesh import Mesh
+from cfmkit.beams.equilibrium.solver import Spot
 from cfmkit.beams.kernels.codes import DONE, FULL, INERTIA, LONG, OUTSIDE, STALLED
-from cfmkit.beams.layout import Layout
-from cfmkit.beams.solver import Spot
+from cfmkit.beams.model.layout import Layout
 
 ASKED = (1e-3, 2e-3, 3e-3)  # [m]; the mean beam length is 0.1 m
 

@@ -37,9 +37,9 @@ from cfmkit.beams import (
     guided,
     trace,
 )
-from cfmkit.beams.discretise import Mesh
-from cfmkit.beams.layout import Layout
-from cfmkit.beams.solver import Solver
+from cfmkit.beams.equilibrium.mesh import Mesh
+from cfmkit.beams.equilibrium.solver import Solver
+from cfmkit.beams.model.layout import Layout
 from cfmkit.errors import InputError
 
 TIGHT = Control(tolerance=1e-10)

@@ -24,10 +24,10 @@ from cfmkit.beams import (
     guided,
     trace,
 )
-from cfmkit.beams.discretise import Mesh, grid, table
-from cfmkit.beams.layout import Layout
-from cfmkit.beams.shapes import Bent
-from cfmkit.beams.tilt import Tilts, slope
+from cfmkit.beams.equilibrium.mesh import Mesh, grid, table
+from cfmkit.beams.model.layout import Layout
+from cfmkit.beams.model.shapes import Bent
+from cfmkit.beams.sensitivity.tilt import Tilts, slope
 from cfmkit.errors import InputError
 
 if TYPE_CHECKING:

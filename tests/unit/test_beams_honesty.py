@@ -5,22 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cfmkit.beams import (
-    CLAMPED,
-    Beam,
-    Control,
-    Displacement,
-    Network,
-    Node,
-    Path,
-    PathStatus,
-    Section,
-    guided,
-    trace,
-    tracing,
-)
-from cfmkit.beams.continuation import bifurcation, branch_end
-from cfmkit.beams.discretise import Mesh
+from cfmkit.beams import CLAMPED, Beam, Control, Displacement, Network, Node, Path, PathStatus, Section, guided, trace
+from cfmkit.beams.continuation import bifurcation, branch_end, tracing
+from cfmkit.beams.equilibrium.mesh import Mesh
 
 DOWN = -np.pi / 2
 BENDING = Displacement("d", DOWN, np.array([1e-3, 10e-3, 20e-3, 30e-3]))

@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 from beam_networks import drives, network
 
-from cfmkit.beams.discretise import LOADS, PRESTRESS, Mesh
+from cfmkit.beams.equilibrium.mesh import LOADS, PRESTRESS, Mesh
+from cfmkit.beams.equilibrium.solver import Solver
 from cfmkit.beams.kernels import entry
-from cfmkit.beams.layout import Layout
-from cfmkit.beams.solver import Solver
+from cfmkit.beams.model.layout import Layout
 
 WEIGHTS = np.array([1, -8, 8, -1]) / 12.0
 STEPS = np.array([-2, -1, 1, 2])

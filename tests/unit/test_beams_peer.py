@@ -3,8 +3,8 @@
 The other program: straight two-node elements, corotational and linear inside, their energy's gradient by hand and its
 derivative by complex steps. Curved beams become polygons with rigid joints: second order in the element length, which
 two meshes and Richardson's extrapolation take out. It shares no code with the engine but the fit of the shapes, and
-follows its own way from the unloaded pose. `cfmkit.beams.corotational`, the second opinion that users get, cannot stand
-in for it: it begins at the engine's pose and takes supports, links and the drive from the engine's layout.
+follows its own way from the unloaded pose. `cfmkit.beams.verification.corotational`, the second opinion that users get,
+cannot stand in for it: it begins at the engine's pose and takes supports, links and the drive from the engine's layout.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ import numpy as np
 from lan_2010 import half
 
 from cfmkit.beams import CLAMPED, Beam, Control, Displacement, Network, Node, Polynomial, Section, guided, trace
-from cfmkit.beams.corotational import recheck
-from cfmkit.beams.layout import Layout
+from cfmkit.beams.model.layout import Layout
+from cfmkit.beams.verification.corotational import recheck
 
 
 @dataclass

@@ -22,8 +22,8 @@ from cfmkit.beams import (
     guided,
     trace,
 )
-from cfmkit.beams.corotational import recheck
-from cfmkit.beams.neighbour import drive_slope, neighbouring
+from cfmkit.beams.sensitivity.neighbour import drive_slope, neighbouring
+from cfmkit.beams.verification.corotational import recheck
 from cfmkit.errors import InputError
 
 DOWN = Displacement("d", -np.pi / 2, np.array([1e-3, 4e-3, 9e-3]))

@@ -25,9 +25,9 @@ from cfmkit.beams import (
 )
 from cfmkit.beams.continuation.modes import Curvature, eigenvalues
 from cfmkit.beams.continuation.switching import descend
-from cfmkit.beams.discretise import Mesh
-from cfmkit.beams.expanded import ExpandedSolver
-from cfmkit.beams.layout import Layout
+from cfmkit.beams.equilibrium.expanded import ExpandedSolver
+from cfmkit.beams.equilibrium.mesh import Mesh
+from cfmkit.beams.model.layout import Layout
 
 LENGTH, SHUTTLE = 35e-3, guided(np.pi / 2)
 

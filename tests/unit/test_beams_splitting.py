@@ -28,8 +28,8 @@ from cfmkit.beams import (
     guided,
     trace,
 )
-from cfmkit.beams.beam import GAUSS
-from cfmkit.beams.layout import Layout
+from cfmkit.beams.model.beam import GAUSS
+from cfmkit.beams.model.layout import Layout
 
 DRIVE = Displacement("d", -np.pi / 2, np.array([2e-3, 6e-3]))
 FINE = Control(tolerance=1e-10)

@@ -29,7 +29,7 @@ from cfmkit.beams import (
     guided,
     trace,
 )
-from cfmkit.beams.solver import Solver, Spot
+from cfmkit.beams.equilibrium.solver import Solver, Spot
 
 UP = np.pi / 2
 SECTION = Section(2e9, 8e-3, 1e-3)

@@ -33,12 +33,12 @@ from cfmkit.beams import (
     guided,
     trace,
 )
-from cfmkit.beams.discretise import Mesh
-from cfmkit.beams.expanded import ExpandedSolver
+from cfmkit.beams.equilibrium.expanded import ExpandedSolver
+from cfmkit.beams.equilibrium.mesh import Mesh
+from cfmkit.beams.equilibrium.solver import Solver
 from cfmkit.beams.kernels import entry
 from cfmkit.beams.kernels.splitting import DRIFTS, KICKS, NODES
-from cfmkit.beams.layout import Layout
-from cfmkit.beams.solver import Solver
+from cfmkit.beams.model.layout import Layout
 
 RNG = np.random.default_rng(0)
 

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cfmkit.beams import CLAMPED, Beam, Displacement, Network, Node, Polynomial, Section, gradient, guided, tilt, trace
+from cfmkit.beams import CLAMPED, Beam, Displacement, Network, Node, Polynomial, Section, gradient, guided, trace
+from cfmkit.beams.sensitivity import tilt
 
 LAN = np.array([1.877, 3.05, 1.244, 2.40, 1.3092, -1.5707, -0.7560, 1.5707, 0.3013, 1.5707, 0.226, -1.148, 1.0, 2.0])
 

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from cfmkit.beams.continuation.state import Problem, Trail
-    from cfmkit.beams.solver import Solver
+    from cfmkit.beams.equilibrium.solver import Solver
     from cfmkit.curves import FloatArray
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from cfmkit.beams.continuation.singular import locate
 from cfmkit.beams.continuation.state import fine_spot
-from cfmkit.beams.solver import Spot
+from cfmkit.beams.equilibrium.solver import Spot
 
 if TYPE_CHECKING:
     from cfmkit.beams.continuation.singular import Singular

@@ -13,13 +13,13 @@ from cfmkit.beams.continuation.branch_end import end_at, predicted_end
 from cfmkit.beams.continuation.state import Resume, Stop, fine_spot
 from cfmkit.beams.continuation.switching import first_of_several, switched, well_before
 from cfmkit.beams.continuation.uncondensed import uncondensed
-from cfmkit.beams.path import Event, PathStatus
-from cfmkit.beams.solver import FORCE_WEIGHT
+from cfmkit.beams.equilibrium.solver import FORCE_WEIGHT
+from cfmkit.beams.outcome.path import Event, PathStatus
 
 if TYPE_CHECKING:
     from cfmkit.beams.continuation.singular import Singular
     from cfmkit.beams.continuation.state import Move, Problem, Trail
-    from cfmkit.beams.solver import Spot
+    from cfmkit.beams.equilibrium.solver import Spot
 
 _CLEAR = 0.01  # share of the drive's range from a bifurcation at which the paths there are told apart
 _SAME_PLACE = 1e-4  # share of the drive's range within which two searches found one bifurcation

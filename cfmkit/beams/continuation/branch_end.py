@@ -9,14 +9,14 @@ import numpy as np
 
 from cfmkit.beams.continuation import at_bifurcation
 from cfmkit.beams.continuation.state import PRIMARY, BranchEnd, Resume, Stop
+from cfmkit.beams.equilibrium.solver import Points
 from cfmkit.beams.kernels.codes import DONE, INERTIA
-from cfmkit.beams.path import Event, PathStatus
-from cfmkit.beams.solver import Points
+from cfmkit.beams.outcome.path import Event, PathStatus
 
 if TYPE_CHECKING:
     from cfmkit.beams.continuation.singular import Singular
     from cfmkit.beams.continuation.state import Move, Problem, Trail
-    from cfmkit.beams.solver import Spot
+    from cfmkit.beams.equilibrium.solver import Spot
     from cfmkit.curves import FloatArray
 
 BEFORE_END = 1e-4  # share of the drive's range by which the end of a branch is passed over

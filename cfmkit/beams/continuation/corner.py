@@ -13,7 +13,7 @@ from cfmkit.beams.continuation.state import Resume, fine_spot
 
 if TYPE_CHECKING:
     from cfmkit.beams.continuation.state import Move, Problem, Trail
-    from cfmkit.beams.solver import Spot
+    from cfmkit.beams.equilibrium.solver import Spot
 
 _WELL = 3e-3  # share of the drive's range that is well before a corner
 _BACK = 30  # points looked at before the place where a march stalled

@@ -15,9 +15,9 @@ import numpy as np
 from cfmkit.beams.continuation.modes import Curvature
 from cfmkit.beams.continuation.singular import Singular, entered
 from cfmkit.beams.continuation.state import PRIMARY, Resume
-from cfmkit.beams.discretise import LOADS
-from cfmkit.beams.path import Event
-from cfmkit.beams.solver import Spot
+from cfmkit.beams.equilibrium.mesh import LOADS
+from cfmkit.beams.equilibrium.solver import Spot
+from cfmkit.beams.outcome.path import Event
 
 if TYPE_CHECKING:
     from cfmkit.beams.continuation.state import Problem, Trail

@@ -9,7 +9,7 @@ import numpy as np
 
 from cfmkit.beams.continuation.state import Stop
 from cfmkit.beams.kernels.codes import FULL, LONG, OUTSIDE
-from cfmkit.beams.path import PathStatus
+from cfmkit.beams.outcome.path import PathStatus
 
 if TYPE_CHECKING:
     from cfmkit.beams.continuation.state import Problem, Trail

@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.beams.discretise import Mesh
-from cfmkit.beams.expanded import ExpandedSolver
-from cfmkit.beams.network import Network
-from cfmkit.beams.shapes import Bent
+from cfmkit.beams.equilibrium.expanded import ExpandedSolver
+from cfmkit.beams.equilibrium.mesh import Mesh
+from cfmkit.beams.model.network import Network
+from cfmkit.beams.model.shapes import Bent
 
 if TYPE_CHECKING:
     from cfmkit.beams.continuation.singular import Singular

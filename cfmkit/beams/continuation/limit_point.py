@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.beams.continuation.state import Resume, Stretch
+from cfmkit.beams.equilibrium.solver import FORCE_WEIGHT
 from cfmkit.beams.kernels.codes import INERTIA
-from cfmkit.beams.solver import FORCE_WEIGHT
 
 if TYPE_CHECKING:
     from cfmkit.beams.continuation.state import Move, Problem, Trail
-    from cfmkit.beams.solver import Spot
+    from cfmkit.beams.equilibrium.solver import Spot
 
 _WELL = 1e-3  # share of the drive's range before a limit point at which the arc length takes over
 _ROOM = 60  # points in which a limit point is found

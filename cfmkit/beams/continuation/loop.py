@@ -20,12 +20,12 @@ from cfmkit.beams.continuation import (
 from cfmkit.beams.continuation.state import PRIMARY, Leg, Resume, Stop, Trail
 from cfmkit.beams.continuation.uncondensed import uncondensed
 from cfmkit.beams.kernels.codes import DENIED, DONE, INERTIA, LONG, NO_START, STALLED
-from cfmkit.beams.path import PathStatus
+from cfmkit.beams.outcome.path import PathStatus
 
 if TYPE_CHECKING:
     from cfmkit.beams.continuation.singular import Singular
     from cfmkit.beams.continuation.state import Move, Problem
-    from cfmkit.beams.solver import Spot
+    from cfmkit.beams.equilibrium.solver import Spot
 
 _HOPS = 60  # decisions on one path
 _LANDINGS = 6  # tries to land on a point asked for before a bifurcation is looked for there

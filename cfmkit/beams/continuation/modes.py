@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from cfmkit.beams.expanded import ExpandedSolver
+    from cfmkit.beams.equilibrium.expanded import ExpandedSolver
     from cfmkit.curves import FloatArray
 
 _RIGID = 1e-14  # share of the largest compliance that is none

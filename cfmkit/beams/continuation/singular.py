@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.beams.continuation.modes import Curvature, eigenvalues
-from cfmkit.beams.solver import FORCE_WEIGHT, Spot
+from cfmkit.beams.equilibrium.solver import FORCE_WEIGHT, Spot
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from cfmkit.beams.expanded import ExpandedSolver
+    from cfmkit.beams.equilibrium.expanded import ExpandedSolver
     from cfmkit.curves import FloatArray
 
 _SEARCHES = 40

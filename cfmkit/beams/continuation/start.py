@@ -15,13 +15,13 @@ import numpy as np
 
 from cfmkit.beams.continuation import branch_end
 from cfmkit.beams.continuation.state import PRIMARY, Problem, Trail
-from cfmkit.beams.discretise import LOADS, PRESTRESS, assemble_model
+from cfmkit.beams.equilibrium.mesh import LOADS, PRESTRESS, assemble_model
+from cfmkit.beams.equilibrium.solver import MarchOptions, Solver, Spot
 from cfmkit.beams.kernels.codes import DONE, LONG, SHORT, STALLED
-from cfmkit.beams.layout import Layout
-from cfmkit.beams.network import Network
-from cfmkit.beams.path import Event, PathStatus
-from cfmkit.beams.section import Taper
-from cfmkit.beams.solver import MarchOptions, Solver, Spot
+from cfmkit.beams.model.layout import Layout
+from cfmkit.beams.model.network import Network
+from cfmkit.beams.model.section import Taper
+from cfmkit.beams.outcome.path import Event, PathStatus
 
 if TYPE_CHECKING:
     from cfmkit.beams.continuation.singular import Singular

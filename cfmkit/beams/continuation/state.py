@@ -12,17 +12,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.beams.discretise import Mesh
-from cfmkit.beams.expanded import ExpandedSolver
-from cfmkit.beams.path import Event, PathStatus
-from cfmkit.beams.solver import MarchOptions, Points, Solver, Spot
+from cfmkit.beams.equilibrium.expanded import ExpandedSolver
+from cfmkit.beams.equilibrium.mesh import Mesh
+from cfmkit.beams.equilibrium.solver import MarchOptions, Points, Solver, Spot
+from cfmkit.beams.outcome.path import Event, PathStatus
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from cfmkit.beams.continuation.singular import Singular
-    from cfmkit.beams.drive import Control
-    from cfmkit.beams.layout import Layout
+    from cfmkit.beams.model.drive import Control
+    from cfmkit.beams.model.layout import Layout
     from cfmkit.curves import FloatArray
 
 PRIMARY = "primary"  # name of the branch that a path from rest is on until it leaves it
@@ -42,7 +42,7 @@ class Problem:
     first_only : bool
         Whether the path ends with the first bifurcation.
     ramp : str
-        What a share of takes the place of the drive: see `cfmkit.beams.discretise.assemble_model`.
+        What a share of takes the place of the drive: see `cfmkit.beams.equilibrium.mesh.assemble_model`.
     begin : Spot or None
         Near the equilibrium where it starts, if that is known.
     """

@@ -20,8 +20,8 @@ from cfmkit.beams.continuation.state import fine_spot
 if TYPE_CHECKING:
     from cfmkit.beams.continuation.singular import Singular
     from cfmkit.beams.continuation.state import Problem, Trail
-    from cfmkit.beams.expanded import ExpandedSolver
-    from cfmkit.beams.solver import Spot
+    from cfmkit.beams.equilibrium.expanded import ExpandedSolver
+    from cfmkit.beams.equilibrium.solver import Spot
 
 _STEPS = 100
 _KICK, _LONGEST = 1e-3, 0.05  # first and longest step along one mode [rad]

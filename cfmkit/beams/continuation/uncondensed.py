@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.beams.continuation.state import Resume
-from cfmkit.beams.expanded import UncondensedSolver
+from cfmkit.beams.equilibrium.expanded import UncondensedSolver
 
 if TYPE_CHECKING:
     from cfmkit.beams.continuation.state import Problem, Trail

@@ -1,7 +1,7 @@
 """Linear vibration of networks about the equilibria of a path: frequencies, and flutter under loads that turn.
 
-`frequencies` takes a `cfmkit.beams.path.Path` and the `Masses` of its parts. Assumes: small motions, no damping, what
-is held does not move.
+`frequencies` takes a `cfmkit.beams.outcome.path.Path` and the `Masses` of its parts. Assumes: small motions, no
+damping, what is held does not move.
 
 References
 ----------

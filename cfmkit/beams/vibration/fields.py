@@ -18,10 +18,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.beams.recover import TURN, H, V
+from cfmkit.beams.outcome.sections import TURN, H, V
 
 if TYPE_CHECKING:
-    from cfmkit.beams.path import Path
+    from cfmkit.beams.outcome.path import Path
     from cfmkit.curves import FloatArray
 
 ENDS = 8  # degrees of freedom at the attachments of the two ends

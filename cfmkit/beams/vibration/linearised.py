@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.beams.drive import Loading
-from cfmkit.beams.numbering import SLIDE, TURN
+from cfmkit.beams.model.drive import Loading
+from cfmkit.beams.model.numbering import SLIDE, TURN
 from cfmkit.beams.vibration.fields import ENDS, panels, quadratic, states_at
 from cfmkit.errors import InputError
 
 if TYPE_CHECKING:
-    from cfmkit.beams.path import Path
+    from cfmkit.beams.outcome.path import Path
     from cfmkit.beams.vibration.masses import Masses
     from cfmkit.curves import FloatArray
 

@@ -18,7 +18,7 @@ from cfmkit.curves import read_only
 from cfmkit.errors import InputError
 
 if TYPE_CHECKING:
-    from cfmkit.beams.path import Path
+    from cfmkit.beams.outcome.path import Path
     from cfmkit.beams.vibration.linearised import Linearised
     from cfmkit.beams.vibration.masses import Masses
     from cfmkit.curves import FloatArray

@@ -15,8 +15,8 @@ from cfmkit.families.beam.layers import stacked
 from cfmkit.families.beam.parts.faults import HELD
 
 if TYPE_CHECKING:
-    from cfmkit.beams.network import LoadOn, Spring
-    from cfmkit.beams.shapes import Shape
+    from cfmkit.beams.model.network import LoadOn, Spring
+    from cfmkit.beams.model.shapes import Shape
     from cfmkit.families.beam.parts.spec import (
         LoadSpec,
         MemberSpec,

@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.beams.beam import fit
-from cfmkit.beams.network import Network
+from cfmkit.beams.model.beam import fit
+from cfmkit.beams.model.network import Network
 
 if TYPE_CHECKING:
-    from cfmkit.beams.beam import Beam
+    from cfmkit.beams.model.beam import Beam
 
 
 def chained(network: Network) -> Network:

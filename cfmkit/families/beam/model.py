@@ -18,10 +18,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.beams import Path, PathStatus, trace
-from cfmkit.beams.bundle import coils
-from cfmkit.beams.crosswise import cross_stiffness
-from cfmkit.beams.layout import Layout
-from cfmkit.beams.path import most_stressed
+from cfmkit.beams.model.bundle import coils
+from cfmkit.beams.model.layout import Layout
+from cfmkit.beams.outcome.crosswise import cross_stiffness
+from cfmkit.beams.outcome.path import most_stressed
 from cfmkit.beams.vibration import Frequencies, frequencies
 from cfmkit.curves import Column, Curve, read_only
 from cfmkit.errors import InputError

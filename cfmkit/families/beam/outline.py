@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.beams.layout import Layout
+from cfmkit.beams.model.layout import Layout
 from cfmkit.export.union import quarter_pieces
 from cfmkit.families.beam.build import assemble, mirror_axis, thickest
 from cfmkit.families.beam.parts.spec import PartSpec
@@ -20,7 +20,7 @@ from cfmkit.families.beam.strips import Strip, mirrored, strips
 from cfmkit.geometry import TOLERANCE, Contour, Curve2D, Drawing, Smooth
 
 if TYPE_CHECKING:
-    from cfmkit.beams.network import Network
+    from cfmkit.beams.model.network import Network
     from cfmkit.curves import FloatArray
     from cfmkit.families.beam.build import Assembly
     from cfmkit.families.beam.spec import BeamSpec

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.beams.network import LineSpring
-from cfmkit.beams.recover import TURN
+from cfmkit.beams.model.network import LineSpring
+from cfmkit.beams.outcome.sections import TURN
 
 if TYPE_CHECKING:
     from cfmkit.beams import Path

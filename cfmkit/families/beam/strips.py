@@ -13,8 +13,8 @@ from cfmkit.curves import read_only
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
 
-    from cfmkit.beams.beam import Beam, Fit
-    from cfmkit.beams.network import Network
+    from cfmkit.beams.model.beam import Beam, Fit
+    from cfmkit.beams.model.network import Network
     from cfmkit.curves import FloatArray
 
 STEPS, MOST_STEPS = 160, 20_000

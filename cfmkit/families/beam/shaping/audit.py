@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.beams import Control, Displacement, PathStatus, trace
-from cfmkit.beams.batch import trace_many
+from cfmkit.beams.continuation.batch import trace_many
 from cfmkit.families.beam.build import thickest_of
 from cfmkit.families.beam.shaping.separation import pairs
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.beams.beam import fit
+from cfmkit.beams.model.beam import fit
 
 if TYPE_CHECKING:
     from cfmkit.beams import Network

@@ -118,7 +118,7 @@ class Response:
 
     def _lines(self, states: FloatArray, axial: dict[str, FloatArray]) -> dict[str, Line]:
         """Return the beams from dimensionless states (7, p, rows, ...) and axial stresses (p, rows, ...)."""
-        from cfmkit.beams.recover import MOMENT, X, Y
+        from cfmkit.beams.outcome.sections import MOMENT, X, Y
 
         sampler, scales = self.path.sampler, self.path.layout.scales
         lines = {}

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.beams import Control, Displacement, Path, PathStatus, trace
-from cfmkit.beams.neighbour import neighbouring
+from cfmkit.beams.sensitivity.neighbour import neighbouring
 from cfmkit.families.slider_crank.flexures.chain import SLIDER, kink, mirrored
 
 if TYPE_CHECKING:

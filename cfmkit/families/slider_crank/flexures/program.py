@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.beams import Control, Displacement, PathStatus, gradient, trace
-from cfmkit.beams.neighbour import drive_slope, neighbouring
+from cfmkit.beams.sensitivity.neighbour import drive_slope, neighbouring
 from cfmkit.errors import InputError
 from cfmkit.families.slider_crank.flexures.chain import SLIDER, STRIP
 from cfmkit.families.slider_crank.flexures.pressing import FIRST_STEP

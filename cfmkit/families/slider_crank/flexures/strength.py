@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.beams.stress import STENCIL
+from cfmkit.beams.outcome.stress import STENCIL
 from cfmkit.families.slider_crank.flexures.chain import STRIP
 from cfmkit.numerics.barycentric import differentiation, interpolation
 

@@ -1,9 +1,9 @@
 """Exact derivatives of a path's outputs by design variables: implicit differentiation, complex steps of the geometry.
 
 At an equilibrium R(z, x) = 0, so dz/dx = -(dR/dz)^-1 dR/dx, in compiled code (`cfmkit.beams.kernels.columns`); how the
-network changes with x comes from complex steps of the function that builds it (`cfmkit.beams.tilt`). Variables may
-change positions, shapes, sections, materials, offsets, links' arms, springs, loads, support displacements and
-directions; not the number of anything. The drive keeps its values; a support that turns takes its drive with it.
+network changes with x comes from complex steps of the function that builds it (`cfmkit.beams.sensitivity.tilt`).
+Variables may change positions, shapes, sections, materials, offsets, links' arms, springs, loads, support displacements
+and directions; not the number of anything. The drive keeps its values; a support that turns takes its drive with it.
 """
 
 from __future__ import annotations
@@ -15,15 +15,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.beams import outputs
-from cfmkit.beams.drive import Loading
-from cfmkit.beams.slopes import Slopes
+from cfmkit.beams.model.drive import Loading
+from cfmkit.beams.sensitivity import outputs
+from cfmkit.beams.sensitivity.slopes import Slopes
 from cfmkit.curves import read_only
 
 if TYPE_CHECKING:
-    from cfmkit.beams.network import Network
-    from cfmkit.beams.outputs import SectionSlopes
-    from cfmkit.beams.path import Path
+    from cfmkit.beams.model.network import Network
+    from cfmkit.beams.outcome.path import Path
+    from cfmkit.beams.sensitivity.outputs import SectionSlopes
     from cfmkit.curves import FloatArray
 
 
@@ -120,7 +120,7 @@ def gradient(path: Path, build: Callable[[Any], Network], variables: Any, points
         If a variable changes how the network is made up, moves a corner of a beam and a step of its thickness past
         each other, or moves one side of a step only. Outputs raise it where the tangent is singular at a point.
     """
-    from cfmkit.beams.tilt import Tilts
+    from cfmkit.beams.sensitivity.tilt import Tilts
 
     solver = path.solver
     tilts = Tilts(path.layout, build, variables)

@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.beams.discretise import assemble_model
-from cfmkit.beams.solver import Points, Solver, Spot
+from cfmkit.beams.equilibrium.mesh import assemble_model
+from cfmkit.beams.equilibrium.solver import Points, Solver, Spot
 
 if TYPE_CHECKING:
     from typing import Any
 
+    from cfmkit.beams.equilibrium.solver import MarchOptions
     from cfmkit.beams.kernels.model import Model
-    from cfmkit.beams.solver import MarchOptions
     from cfmkit.curves import FloatArray
 
 

@@ -12,8 +12,8 @@ from cfmkit.errors import InputError
 
 if TYPE_CHECKING:
     from cfmkit.beams.kernels.model import Tilt
-    from cfmkit.beams.path import Path
-    from cfmkit.beams.tilt import Tilts
+    from cfmkit.beams.outcome.path import Path
+    from cfmkit.beams.sensitivity.tilt import Tilts
     from cfmkit.curves import FloatArray
 
 

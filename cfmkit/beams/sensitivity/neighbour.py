@@ -10,16 +10,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.beams.layout import Layout
-from cfmkit.beams.path import Path, PathStatus
-from cfmkit.beams.solver import Points, Solver
+from cfmkit.beams.equilibrium.solver import Points, Solver
+from cfmkit.beams.model.layout import Layout
+from cfmkit.beams.outcome.path import Path, PathStatus
 from cfmkit.curves import read_only
 from cfmkit.errors import InputError
 
 if TYPE_CHECKING:
-    from cfmkit.beams.drive import Drive
-    from cfmkit.beams.layout import Scales
-    from cfmkit.beams.network import Network
+    from cfmkit.beams.model.drive import Drive
+    from cfmkit.beams.model.layout import Scales
+    from cfmkit.beams.model.network import Network
     from cfmkit.curves import FloatArray
 
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from cfmkit.beams.network import LineLoad, LoadOn, PointLoad
+from cfmkit.beams.model.network import LineLoad, LoadOn, PointLoad
 from cfmkit.curves import read_only
 from cfmkit.errors import InputError
 

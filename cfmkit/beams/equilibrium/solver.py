@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from cfmkit.beams.discretise import PRESTRESS, Mesh, assemble_model, grid, segment_turns, table
+from cfmkit.beams.equilibrium.mesh import PRESTRESS, Mesh, assemble_model, grid, segment_turns, table
 from cfmkit.beams.kernels import entry
 from cfmkit.beams.kernels.codes import ASKED, DRIVE_RATE, REACHED, SHORTNESS, SOLVED, UNSTABLE
 from cfmkit.beams.kernels.workspace import work_space
@@ -15,7 +15,7 @@ from cfmkit.beams.kernels.workspace import work_space
 if TYPE_CHECKING:
     from cfmkit.beams.kernels.model import Model
     from cfmkit.beams.kernels.workspace import WorkSpace
-    from cfmkit.beams.layout import Layout
+    from cfmkit.beams.model.layout import Layout
     from cfmkit.curves import FloatArray
 
 ITERATIONS = 16
@@ -149,7 +149,7 @@ class Spot:
 class Solver:
     """Equilibria of a layout on a mesh. Holds work space: not for two threads at once.
 
-    `ramped`: what a share of takes the place of the drive; see `cfmkit.beams.discretise.assemble_model`.
+    `ramped`: what a share of takes the place of the drive; see `cfmkit.beams.equilibrium.mesh.assemble_model`.
     """
 
     def __init__(self, layout: Layout, mesh: Mesh, tolerance: float = 1e-11, ramped: str = "") -> None:

@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.beams.drive import Drive, Loading, Rotation
-from cfmkit.beams.network import LineLoad, Network, SlideSpring, TorsionSpring, same_direction
-from cfmkit.beams.numbering import LINE, SLIDE, TURN, Builder, Plan, apart, nonzero
+from cfmkit.beams.model.drive import Drive, Loading, Rotation
+from cfmkit.beams.model.network import LineLoad, Network, SlideSpring, TorsionSpring, same_direction
+from cfmkit.beams.model.numbering import LINE, SLIDE, TURN, Builder, Plan, apart, nonzero
 from cfmkit.errors import InputError
 
 if TYPE_CHECKING:
-    from cfmkit.beams.network import LoadOn, Spring
+    from cfmkit.beams.model.network import LoadOn, Spring
 
 _KEPT = 64
 _plans: OrderedDict[Any, Plan] = OrderedDict()

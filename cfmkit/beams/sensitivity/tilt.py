@@ -11,16 +11,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.beams.discretise import assemble_model, table
+from cfmkit.beams.equilibrium.mesh import assemble_model, table
 from cfmkit.beams.kernels.model import Tilt, in_order
-from cfmkit.beams.layout import Layout
-from cfmkit.beams.plain_tilt import plain_tilt
+from cfmkit.beams.model.layout import Layout
+from cfmkit.beams.sensitivity.plain_tilt import plain_tilt
 from cfmkit.errors import InputError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from cfmkit.beams.discretise import Grid
+    from cfmkit.beams.equilibrium.mesh import Grid
     from cfmkit.beams.kernels.model import Model
     from cfmkit.curves import FloatArray
 

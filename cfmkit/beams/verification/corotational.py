@@ -22,7 +22,7 @@ from cfmkit.curves import read_only
 from cfmkit.errors import InputError
 
 if TYPE_CHECKING:
-    from cfmkit.beams.path import Path
+    from cfmkit.beams.outcome.path import Path
     from cfmkit.curves import FloatArray
 
 _STEP = 1e-30

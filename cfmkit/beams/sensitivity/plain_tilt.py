@@ -1,7 +1,8 @@
 """How the arrays of a network of plain beams change with design variables: all variables at once.
 
-A plain beam has a polynomial angle and one thickness (`cfmkit.beams.bundle`). Where variables move nodes and offsets,
-and change such shapes and sections, and nothing else, the changes of the fits are written out and computed as arrays.
+A plain beam has a polynomial angle and one thickness (`cfmkit.beams.model.bundle`). Where variables move nodes and
+offsets, and change such shapes and sections, and nothing else, the changes of the fits are written out and computed as
+arrays.
 """
 
 from __future__ import annotations
@@ -12,17 +13,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.beams.beam import GAUSS
-from cfmkit.beams.bundle import is_plain, powers
 from cfmkit.beams.kernels.model import TABLE_COLUMNS, Tilt
-from cfmkit.beams.numbering import NOWHERE
+from cfmkit.beams.model.beam import GAUSS
+from cfmkit.beams.model.bundle import is_plain, powers
+from cfmkit.beams.model.numbering import NOWHERE
 
 if TYPE_CHECKING:
-    from cfmkit.beams.beam import Beam
-    from cfmkit.beams.discretise import Grid
-    from cfmkit.beams.drive import Drive
-    from cfmkit.beams.layout import Layout
-    from cfmkit.beams.network import Network
+    from cfmkit.beams.equilibrium.mesh import Grid
+    from cfmkit.beams.model.beam import Beam
+    from cfmkit.beams.model.drive import Drive
+    from cfmkit.beams.model.layout import Layout
+    from cfmkit.beams.model.network import Network
     from cfmkit.curves import FloatArray
 
 NO_OFFSET = (0.0, 0.0)  # an end without offset

@@ -9,16 +9,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.beams.beam import Fit, fit, same_value
-from cfmkit.beams.bundle import Bundle, coils
-from cfmkit.beams.drive import Displacement, Drive, Rotation
-from cfmkit.beams.network import LineSpring, Network, PointLoad, SlideSpring, Spring, TorsionSpring
-from cfmkit.beams.numbering import NOWHERE
-from cfmkit.beams.plan import driven, plan_of
+from cfmkit.beams.model.beam import Fit, fit, same_value
+from cfmkit.beams.model.bundle import Bundle, coils
+from cfmkit.beams.model.drive import Displacement, Drive, Rotation
+from cfmkit.beams.model.network import LineSpring, Network, PointLoad, SlideSpring, Spring, TorsionSpring
+from cfmkit.beams.model.numbering import NOWHERE
+from cfmkit.beams.model.plan import driven, plan_of
 from cfmkit.errors import InputError
 
 if TYPE_CHECKING:
-    from cfmkit.beams.network import LoadOn
+    from cfmkit.beams.model.network import LoadOn
 
 
 @dataclass(frozen=True)

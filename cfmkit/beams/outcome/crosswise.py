@@ -12,16 +12,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.beams.drive import Displacement
-from cfmkit.beams.layout import Layout
-from cfmkit.beams.network import Network, Support
-from cfmkit.beams.solver import Solver
+from cfmkit.beams.equilibrium.solver import Solver
+from cfmkit.beams.model.drive import Displacement
+from cfmkit.beams.model.layout import Layout
+from cfmkit.beams.model.network import Network, Support
 from cfmkit.curves import read_only
 
 if TYPE_CHECKING:
     from typing import Any
 
-    from cfmkit.beams.path import Path
+    from cfmkit.beams.outcome.path import Path
     from cfmkit.curves import FloatArray
 
 _OPEN = 1e-9  # dimensionless force that may be left where a force is open: rounding leaves 1e-14

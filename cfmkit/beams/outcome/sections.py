@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.beams.discretise import Mesh, assemble_model, grid, si_rows, table
+from cfmkit.beams.equilibrium.mesh import Mesh, assemble_model, grid, si_rows, table
 from cfmkit.beams.kernels.model import TABLE_COLUMNS
 from cfmkit.beams.kernels.splitting import ROWS
 
 if TYPE_CHECKING:
-    from cfmkit.beams.layout import Layout
-    from cfmkit.beams.solver import Points, Solver
+    from cfmkit.beams.equilibrium.solver import Points, Solver
+    from cfmkit.beams.model.layout import Layout
     from cfmkit.curves import FloatArray
 
 _ROWS = 8  # samples of a segment,

@@ -10,16 +10,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.beams.tracing import trace
+from cfmkit.beams.continuation.tracing import trace
 from cfmkit.errors import CfmError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
     from concurrent.futures import Future
 
-    from cfmkit.beams.drive import Control, Drive
-    from cfmkit.beams.network import Network
-    from cfmkit.beams.path import Path
+    from cfmkit.beams.model.drive import Control, Drive
+    from cfmkit.beams.model.network import Network
+    from cfmkit.beams.outcome.path import Path
     from cfmkit.curves import FloatArray
 
 _CHUNK, _AHEAD = 64, 2  # networks sent at once; chunks for each process that are on their way

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.beams.network import PointLoad, SlideSpring, TorsionSpring
+from cfmkit.beams.model.network import PointLoad, SlideSpring, TorsionSpring
 from cfmkit.errors import InputError
 
 if TYPE_CHECKING:
-    from cfmkit.beams.drive import Drive
     from cfmkit.beams.kernels.model import IntArray
-    from cfmkit.beams.network import Network, Spring
+    from cfmkit.beams.model.drive import Drive
+    from cfmkit.beams.model.network import Network, Spring
 
 LINE, TURN, SLIDE = 0, 1, 2  # as in cfmkit.beams.kernels.springs
 GROUND, NOWHERE = -1, -1

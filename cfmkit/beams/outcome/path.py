@@ -10,16 +10,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.beams.drive import Loading
-from cfmkit.beams.network import LineLoad
-from cfmkit.beams.recover import Sampler, Sections, along_beam
-from cfmkit.beams.stress import StressExtremes, extremes, signed_extremes
+from cfmkit.beams.model.drive import Loading
+from cfmkit.beams.model.network import LineLoad
+from cfmkit.beams.outcome.sections import Sampler, Sections, along_beam
+from cfmkit.beams.outcome.stress import StressExtremes, extremes, signed_extremes
 from cfmkit.curves import read_only
 
 if TYPE_CHECKING:
-    from cfmkit.beams.beam import Fit
-    from cfmkit.beams.layout import Layout
-    from cfmkit.beams.solver import Points, Solver
+    from cfmkit.beams.equilibrium.solver import Points, Solver
+    from cfmkit.beams.model.beam import Fit
+    from cfmkit.beams.model.layout import Layout
     from cfmkit.curves import FloatArray
 
 _TIE = 1e-9  # share by which stresses of two beams differ that are one but for rounding

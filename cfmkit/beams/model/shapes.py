@@ -1,6 +1,6 @@
 """Reference shapes: how the angle of a beam runs along it before any load, in a frame of the shape's own.
 
-A shape is made for a given chord and then turned and scaled into place (see `cfmkit.beams.beam`). It is described
+A shape is made for a given chord and then turned and scaled into place (see `cfmkit.beams.model.beam`). It is described
 by its angle over a parameter t in [0, 1] and its speed ds/dt; both may be complex, for derivatives by complex steps.
 """
 

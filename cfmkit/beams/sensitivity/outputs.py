@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.beams.recover import ENERGY, MOMENT, TURN, H, V, X, Y
-from cfmkit.beams.stress import STENCIL
-from cfmkit.beams.tilt import slope
+from cfmkit.beams.outcome.sections import ENERGY, MOMENT, TURN, H, V, X, Y
+from cfmkit.beams.outcome.stress import STENCIL
+from cfmkit.beams.sensitivity.tilt import slope
 
 if TYPE_CHECKING:
-    from cfmkit.beams.drive import Loading
-    from cfmkit.beams.network import LineLoad
-    from cfmkit.beams.plain_tilt import PlainTilt
-    from cfmkit.beams.slopes import Slopes
+    from cfmkit.beams.model.drive import Loading
+    from cfmkit.beams.model.network import LineLoad
+    from cfmkit.beams.sensitivity.plain_tilt import PlainTilt
+    from cfmkit.beams.sensitivity.slopes import Slopes
     from cfmkit.curves import FloatArray
 
 
@@ -85,7 +85,7 @@ def shape(g: Slopes, beam: str) -> FloatArray:
 
 @dataclass(frozen=True)
 class SectionSlopes:
-    """Derivatives of `cfmkit.beams.recover.Sections` along a beam: (p, n, k)."""
+    """Derivatives of `cfmkit.beams.outcome.sections.Sections` along a beam: (p, n, k)."""
 
     moment: FloatArray
     normal: FloatArray
@@ -176,7 +176,7 @@ def _weights(nodes: FloatArray, place: FloatArray) -> FloatArray:
 
 def load_displacement(g: Slopes, drive: Loading) -> FloatArray:
     """Return the derivatives of the work-conjugate displacement of a load drive, (p, k) [J]."""
-    from cfmkit.beams.network import PointLoad
+    from cfmkit.beams.model.network import PointLoad
 
     total = np.zeros((len(g.points), len(g.tilts)))
     for number, load in enumerate(drive.loads):
@@ -215,7 +215,7 @@ def _line_work(g: Slopes, load: LineLoad, others: list[Any]) -> FloatArray:
 
 def _rest_slope(g: Slopes, k: int, index: Any) -> FloatArray:
     """Return the derivatives of the unloaded centre line by variable k at rows, (n, 2), dimensionless."""
-    from cfmkit.beams.discretise import assemble_model, table
+    from cfmkit.beams.equilibrium.mesh import assemble_model, table
 
     sampler = g.path.sampler
     layout = g.tilts.tilted[k]

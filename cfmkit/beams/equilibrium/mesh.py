@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.beams.beam import SAME
 from cfmkit.beams.kernels.model import TABLE_COLUMNS, Model
 from cfmkit.beams.kernels.splitting import DRIFTS, KICKS, NODES, ROWS
-from cfmkit.beams.numbering import LINE, SLIDE, TURN
-from cfmkit.beams.section import Taper
+from cfmkit.beams.model.beam import SAME
+from cfmkit.beams.model.numbering import LINE, SLIDE, TURN
+from cfmkit.beams.model.section import Taper
 
 if TYPE_CHECKING:
-    from cfmkit.beams.layout import Layout
+    from cfmkit.beams.model.layout import Layout
     from cfmkit.curves import FloatArray
 
 _GAUSS = np.polynomial.legendre.leggauss(5)

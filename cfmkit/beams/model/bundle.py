@@ -1,7 +1,7 @@
 """All beams of a network at once: shapes fitted between their ends, tables of the compiled code.
 
 Most beams have a polynomial angle and one thickness: those are computed together, as arrays over the beams. The
-others are fitted and tabulated one by one (`cfmkit.beams.beam`, `cfmkit.beams.discretise`).
+others are fitted and tabulated one by one (`cfmkit.beams.model.beam`, `cfmkit.beams.equilibrium.mesh`).
 """
 
 from __future__ import annotations
@@ -11,15 +11,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.beams.beam import GAUSS, Fit
-from cfmkit.beams.section import Taper
-from cfmkit.beams.shapes import Polynomial, direction
+from cfmkit.beams.model.beam import GAUSS, Fit
+from cfmkit.beams.model.section import Taper
+from cfmkit.beams.model.shapes import Polynomial, direction
 from cfmkit.errors import InputError
 
 if TYPE_CHECKING:
-    from cfmkit.beams.beam import Beam
-    from cfmkit.beams.network import Network
-    from cfmkit.beams.section import Section
+    from cfmkit.beams.model.beam import Beam
+    from cfmkit.beams.model.network import Network
+    from cfmkit.beams.model.section import Section
     from cfmkit.curves import FloatArray
 
 
@@ -146,8 +146,8 @@ class Bundle:
     def table(self, powers: Any, shares: Any, units: FloatArray) -> Any:
         """Return the table of the plain beams at n rows of their steps, (plain, n, 6), in units (5,) of all but angles.
 
-        powers (m, n), shares (n, 5): see `cfmkit.beams.discretise.Grid.rows`; `cfmkit.beams.kernels.model.Model` says
-        what the table holds.
+        powers (m, n), shares (n, 5): see `cfmkit.beams.equilibrium.mesh.Grid.rows`; what the table holds:
+        `cfmkit.beams.kernels.model.Model`.
         """
         if self._compliances is None:
             g = self.length

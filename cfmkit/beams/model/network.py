@@ -1,6 +1,7 @@
 """What a planar network of slender beams is: nodes with their supports, beams, rigid links, springs, constant loads.
 
-Values only, in SI; what is done to a network is a `cfmkit.beams.drive`, what comes out a `cfmkit.beams.path.Path`.
+Values only, in SI; what is done to a network is a `cfmkit.beams.model.drive`, what comes out a
+`cfmkit.beams.outcome.path.Path`.
 
 Assumes: plane bending, linear elastic material, rigid joints and links, conservative springs.
 """
@@ -17,7 +18,7 @@ from cfmkit.errors import InputError
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from cfmkit.beams.beam import Beam
+    from cfmkit.beams.model.beam import Beam
 
 
 _NONE = (0.0, 0.0, 0.0)  # not displaced

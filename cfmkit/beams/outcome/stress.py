@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.beams.recover import along_beam, sections, stress_slopes
+from cfmkit.beams.outcome.sections import along_beam, sections, stress_slopes
 
 if TYPE_CHECKING:
-    from cfmkit.beams.recover import Rows, Sampler, Sections
+    from cfmkit.beams.outcome.sections import Rows, Sampler, Sections
     from cfmkit.curves import FloatArray
 
 STENCIL = 9

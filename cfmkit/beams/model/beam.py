@@ -15,12 +15,12 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from cfmkit.beams.section import Taper
-from cfmkit.beams.shapes import STRAIGHT, Course, Shape, direction
+from cfmkit.beams.model.section import Taper
+from cfmkit.beams.model.shapes import STRAIGHT, Course, Shape, direction
 from cfmkit.errors import InputError
 
 if TYPE_CHECKING:
-    from cfmkit.beams.section import Section
+    from cfmkit.beams.model.section import Section
 
 Joint = Literal["rigid", "pin"]
 Closure = Literal["rotscale", "raw"]
@@ -215,8 +215,9 @@ def same_value(one: Any, other: Any) -> bool:
 def _in_place(fitted: Fit, beam: Beam, known: Fit | None) -> Fit:
     """Return a fit over a parameter in which complex steps move neither the shape's breaks nor the section's stations.
 
-    A grid has its edges there (`cfmkit.beams.discretise`). A station keeps its fraction u of the arc length: where the
-    arc length changes along the shape's own parameter t, or u does, it moves there by dt = (du - d(arc)) / (d(arc)/dt).
+    A grid has its edges there (`cfmkit.beams.equilibrium.mesh`). A station keeps its fraction u of the arc length:
+    where the arc length changes along the shape's own parameter t, or u does, it moves there by
+    dt = (du - d(arc)) / (d(arc)/dt).
     """
     thickness = beam.section.thickness
     if not (np.iscomplexobj(fitted.length) or (isinstance(thickness, Taper) and np.iscomplexobj(thickness.stations))):

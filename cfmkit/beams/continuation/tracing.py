@@ -8,16 +8,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.beams.discretise import Mesh
-from cfmkit.beams.drive import Control, Drive
-from cfmkit.beams.layout import Layout
+from cfmkit.beams.equilibrium.mesh import Mesh
+from cfmkit.beams.model.drive import Control, Drive
+from cfmkit.beams.model.layout import Layout
 from cfmkit.curves import read_only
 
 if TYPE_CHECKING:
     from cfmkit.beams.continuation.singular import Singular
     from cfmkit.beams.continuation.state import Problem, Trail
-    from cfmkit.beams.network import Network
-    from cfmkit.beams.path import Path
+    from cfmkit.beams.model.network import Network
+    from cfmkit.beams.outcome.path import Path
 
 _EARLY = 0.1  # share of the drive's range: segments that are too long before it are cut in four, later in two
 _ROUNDS = 8  # meshes tried before giving up on the tolerance
@@ -72,7 +72,7 @@ class Attempt:
         """Return the outcome; where the tolerance is not reached, every point is judged by itself."""
         from cfmkit.beams.continuation.accuracy import errors, largest_force
         from cfmkit.beams.continuation.ending import inaccurate
-        from cfmkit.beams.path import Path
+        from cfmkit.beams.outcome.path import Path
 
         problem, trail, tolerance = self.problem, self.trail, self.problem.control.tolerance
         accurate = np.ones(len(trail.points), dtype=bool)
@@ -103,7 +103,7 @@ def _solved(network: Network, drive: Drive, control: Control, first_only: bool =
     from cfmkit.beams.continuation.loop import follow
     from cfmkit.beams.continuation.state import Problem
     from cfmkit.beams.kernels.codes import STALLED
-    from cfmkit.beams.path import PathStatus
+    from cfmkit.beams.outcome.path import PathStatus
 
     layout = Layout(network, drive)
     mesh, borne = first_mesh(layout, control.tolerance), -1.0

@@ -1,0 +1,1 @@
+"""Equilibrium on a mesh: segments and steps, unknowns, single solutions and marches."""

@@ -1,0 +1,1 @@
+"""What is known of a path of equilibria: motions, reactions, section forces, stresses."""
