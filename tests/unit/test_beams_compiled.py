@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import ctypes
+import io
 import logging
 import os
 import pickle
@@ -18,8 +19,9 @@ import numpy as np
 import pytest
 
 from cfmkit.beams import CLAMPED, Beam, Control, Displacement, Network, Node, Section, trace
-from cfmkit.beams.kernels import dense, entry, kept, machine, predictor
-from cfmkit.beams.kernels.packing import addresses, floats
+from cfmkit.beams.kernels import dense, entry, kept, machine, packing, predictor
+from cfmkit.beams.kernels.packing import HEAD, objects
+from cfmkit.beams.kernels.progress import told
 from cfmkit.beams.kernels.signatures import DOORS
 from cfmkit.beams.warming import warm
 from cfmkit.store.private import trusted
@@ -180,8 +182,8 @@ def _states_with(call: Any) -> Any:
     network, drive = _pulled_beam()
     path = trace(network, drive, Control(tolerance=1e-4))
     out = np.zeros((len(path), len(path.solver.cut.edges) + path.solver.n_segments, 7))
-    given = addresses((path.points.y, path.points.drive, out), (floats(2), floats(1), floats(3)))
-    block = entry._whole(path.solver.n_free) + path.solver.model.block + given
+    given = objects((path.points.y, path.points.drive, out))
+    block = HEAD + entry._whole(path.solver.n_free) + path.solver.model.block + given
     assert call(block, (ctypes.c_int64 * 2)()) == 0
     assert out.any()
     return out
@@ -284,20 +286,74 @@ def _curve_and_gradient() -> list[Any]:
     return [path.points.y, path.effort, slopes.effort, slopes.held, slopes.stress_extremes("y")]
 
 
-def test_arrays_of_another_kind_are_refused() -> None:
-    """The compiled code cannot tell: it would read other memory."""
-    array = np.zeros((3, 4))
-    assert len(addresses([array], [floats(2)])) == 3 * 8
-    for other in (array.T, array[0], array.astype(np.float32), array[:, ::2], array.astype(int)):
-        with pytest.raises(TypeError, match="float64, 2 axes, C order: not"):
-            addresses([other], [floats(2)])
+@pytest.mark.parametrize(
+    ("other", "number"),
+    [
+        (lambda y: y.T, 19),
+        (lambda y: y[0], 19),
+        (lambda y: y.astype(np.float32), 19),
+        (lambda y: np.repeat(y, 2, axis=1)[:, ::2], 19),
+        (lambda y: y.astype(int), 19),
+        (lambda y: y.tolist(), 19),
+        (lambda y: y.astype(y.dtype.newbyteorder()), 19),
+        (lambda y: y.view(np.matrix), 19),
+    ],
+)
+def test_what_is_no_array_of_the_right_kind_is_refused(other: Any, number: int) -> None:
+    """The compiled code looks into the arrays' own fields, and checks them before it reads any memory."""
+    path = trace(*_pulled_beam())
+    solver, y = path.solver, np.ascontiguousarray(path.points.y)
+    out = np.zeros((len(path), len(solver.cut.edges) + solver.n_segments, 7))
+    door = entry._doors["states"]
+    with pytest.raises(TypeError, match=rf"array {number} of 'states': float64, 2 axes, in C order"):
+        door(entry._whole(solver.n_free), solver.model.block, objects((other(y), path.points.drive, out)))
+    assert not out.any()
 
 
-def test_copies_of_a_model_have_addresses_of_their_own() -> None:
+def test_every_field_of_an_array_is_where_the_compiled_code_reads_it() -> None:
+    array = np.arange(6.0).reshape(2, 3)
+
+    def word(offset: int, kind: Any = ctypes.c_int64) -> int:
+        return int(kind.from_address(id(array) + offset).value)
+
+    assert word(packing.TYPE) == id(np.ndarray)
+    assert word(packing.DATA) == array.__array_interface__["data"][0]
+    assert word(packing.AXES, ctypes.c_int) == 2
+    assert tuple((ctypes.c_int64 * 2).from_address(word(packing.SHAPE))) == (2, 3)
+    assert word(packing.DTYPE) == id(array.dtype)
+    assert word(packing.FLAGS, ctypes.c_int) & packing.READY == packing.READY
+
+
+def test_arrays_from_another_process_are_taken() -> None:
+    """They bring a dtype of their own, equal to NumPy's but not the same object."""
+    network, drive = _pulled_beam()
+    here = trace(network, drive)
+    sent = trace(*pickle.loads(pickle.dumps((network, drive))))
+    array = pickle.loads(pickle.dumps(here.points.y))
+    assert array.dtype is not here.points.y.dtype
+    np.testing.assert_array_equal(sent.points.y, here.points.y)
+
+
+def test_copies_of_a_model_have_places_of_their_own() -> None:
     model = trace(*_pulled_beam()).solver.model
-    assert model.block == addresses(model, model.kinds)
+    assert model.block == objects(model)
     for other in (pickle.loads(pickle.dumps(model)), copy.deepcopy(model), model._replace(table=model.table.copy())):
-        assert other.block == addresses(other, other.kinds) != model.block
+        assert other.block == objects(other) != model.block
+
+
+def test_who_watches_a_compilation_sees_how_far_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Watched(io.StringIO):
+        def isatty(self) -> bool:
+            return True
+
+    screen = Watched()
+    monkeypatch.setattr(sys, "stderr", screen)
+    with told("solver") as report:
+        report(0.5)
+    shown = screen.getvalue().split("\r")
+    assert shown[1].endswith("equilibria and paths, about 12 s: 0 %")
+    assert shown[2].endswith("50 %")
+    assert shown[3].strip() == "" == shown[4]
 
 
 _ALONE = """

@@ -13,17 +13,17 @@ from typing import TYPE_CHECKING, Any
 import numba
 from llvmlite import ir
 from numba import types
-from numba.core import cgutils, codegen, compiler_lock
+from numba.core import cgutils, codegen, compiler_lock, event
 from numba.core.registry import cpu_target
 
 from cfmkit.beams.kernels import doors
 from cfmkit.beams.kernels.compiler import OPTIONS
 from cfmkit.beams.kernels.machine import SYMBOL, Code
-from cfmkit.beams.kernels.packing import Kind
+from cfmkit.beams.kernels.packing import AXES, DATA, DTYPE, DTYPES, ENTRIES, FLAGS, READY, REFUSED, SHAPE, TYPE, Kind
 from cfmkit.beams.kernels.signatures import DOORS, REAL, WHOLE
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
 _INTRINSIC = {"cos", "sin", "log", "floor", "memcpy", "memmove", "memset"}
 """What LLVM may call for operations of its own that are no instructions of the processor."""
@@ -101,16 +101,28 @@ def _type(what: Any) -> Any:
 
 
 class _Reader:
-    """Writes code that reads values from a block of words."""
+    """Writes code that reads values from a block of words, and looks into NumPy's arrays; see `packing`."""
 
     def __init__(self, context: Any, builder: Any, block: Any) -> None:
-        self.context, self.builder, self.block, self.at = context, builder, block, 0
+        self.context, self.builder, self.block, self.at, self.arrays = context, builder, block, 0, 0
+        self.type = self.word()
+        self.entries = {numba.from_dtype(dtype): self.word() for dtype in DTYPES}
 
     def word(self) -> Any:
         """Return the next word."""
         place = self.builder.gep(self.block, [ir.Constant(_WORD, self.at)])
         self.at += 1
         return self.builder.load(place)
+
+    def field(self, place: Any, offset: int, kind: Any = _WORD) -> Any:
+        """Return what stands so many bytes after a place."""
+        where = self.builder.add(place, ir.Constant(_WORD, offset))
+        return self.builder.load(self.builder.inttoptr(where, kind.as_pointer()))
+
+    def demand(self, found: Any, wanted: Any) -> None:
+        """Return from the function unless two numbers are equal."""
+        with self.builder.if_then(self.builder.icmp_unsigned("!=", found, wanted), likely=False):
+            self.builder.ret(ir.Constant(_STATUS, REFUSED + self.arrays))
 
     def value(self, kind: Any) -> Any:
         """Return the next value."""
@@ -124,11 +136,19 @@ class _Reader:
 
     def array(self, kind: Any) -> Any:
         """Return an array that nobody owns."""
+        given = self.word()
+        self.demand(self.field(given, TYPE), self.type)
+        self.demand(self.field(self.field(given, DTYPE), ENTRIES), self.entries[kind.dtype])
+        self.demand(self.field(given, AXES, _STATUS), ir.Constant(_STATUS, kind.ndim))
+        flags = self.builder.and_(self.field(given, FLAGS, _STATUS), ir.Constant(_STATUS, READY))
+        self.demand(flags, ir.Constant(_STATUS, READY))
+        self.arrays += 1
         array = self.context.make_array(kind)(self.context, self.builder)
         item = self.context.get_data_type(kind.dtype)
         size = ir.Constant(_WORD, self.context.get_abi_sizeof(item))
-        data = self.builder.inttoptr(self.word(), item.as_pointer())
-        shape = [self.word() for _ in range(kind.ndim)]
+        data = self.builder.inttoptr(self.field(given, DATA), item.as_pointer())
+        lengths = self.field(given, SHAPE)
+        shape = [self.field(lengths, 8 * axis) for axis in range(kind.ndim)]
         strides: list[Any] = []
         count: Any = ir.Constant(_WORD, 1)
         for length in reversed(shape):
@@ -158,10 +178,46 @@ def _way_in(context: Any, done: Any) -> Any:
     return module
 
 
-def compiled(name: str) -> Code:
-    """Return the machine code of a door."""
-    with compiler_lock.global_compiler_lock, _drafting() as drafting:
-        done = _typed(name)
+@contextlib.contextmanager
+def _optimising(name: str) -> Iterator[None]:
+    """Compile with the optimisations that make a door quickest, whatever the process has set otherwise.
+
+    Loops over the variables are what derivatives spend their time in; the solver's loops are too short for that, but
+    the four components of its states go side by side: a tenth of its time.
+    """
+    settings: Any = numba.config
+    before = settings.LOOP_VECTORIZE, settings.SLP_VECTORIZE
+    settings.LOOP_VECTORIZE, settings.SLP_VECTORIZE = (1, 0) if "slopes" in name else (0, 1)
+    try:
+        yield
+    finally:
+        settings.LOOP_VECTORIZE, settings.SLP_VECTORIZE = before
+
+
+class _Listener(event.Listener):
+    """Tells the share of a compilation that is done, by the functions that are typed."""
+
+    def __init__(self, name: str, report: Callable[[float], None]) -> None:
+        self.all, self.done, self.report = _FUNCTIONS.get(name, 20), 0, report
+
+    def on_start(self, _event: Any) -> None:
+        pass
+
+    def on_end(self, _event: Any) -> None:
+        self.done += 1
+        self.report(_TYPED * min(1.0, self.done / self.all))
+
+
+_FUNCTIONS = {"solver": 95, "slopes": 70}  # compiled for each, about
+_TYPED = 0.65  # share of the time until all functions are typed; then they are optimised and translated as a whole
+_OPTIMISED = 0.9
+
+
+def compiled(name: str, report: Callable[[float], None] = lambda _share: None) -> Code:
+    """Return the machine code of a door; `report` is told the share that is done."""
+    with compiler_lock.global_compiler_lock, _optimising(name), _drafting() as drafting:
+        with event.install_listener("numba:compile", _Listener(name, report)):
+            done = _typed(name)
         library = done.library
         library.add_ir_module(_way_in(cpu_target.target_context, done))
         module = link(library)
@@ -170,7 +226,9 @@ def compiled(name: str) -> Code:
                 own.linkage = "internal"
         module.verify()
         passes, builder = drafting._module_pass_manager()
+        report(_TYPED)
         passes.run(module, builder)
+        report(_OPTIMISED)
         calls = {each.name for each in module.functions if each.is_declaration and not each.name.startswith("llvm.")}
         return Code((*sorted(calls | _INTRINSIC),), drafting._tm.emit_object(module))
 
@@ -180,7 +238,7 @@ def called(name: str) -> int:
 
     It takes several times as long; for versions of numba that the short way does not know, and for tests of it.
     """
-    with compiler_lock.global_compiler_lock:
+    with compiler_lock.global_compiler_lock, _optimising(name):
         context, done = cpu_target.target_context, _typed(name)
         library = context.codegen().create_library(name)
         library.add_linking_library(done.library)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.beams.kernels.codes import KEPT
-from cfmkit.beams.kernels.packing import Packed, addresses, complexes, flat, floats
+from cfmkit.beams.kernels.packing import Packed, complexes, floats, objects
 
 if TYPE_CHECKING:
     from cfmkit.beams.kernels.model import Model, Tilt
@@ -50,12 +50,14 @@ HELD_SLOPES = ((floats(1), floats(1), floats(1)), floats(2), floats(2), floats(2
 class WorkSpace(Packed, tuple[Any, ...]):
     """Room for single solutions, in the order of `SOLVING`, and for marches. Not for two threads at once."""
 
-    kinds = SOLVING
+    def _all(self) -> tuple[Any, ...]:
+        return (*self[:8], *self[8], self[9])
 
     @cached_property
     def marching(self) -> bytes:
-        """Addresses of the room for marches."""
-        return addresses(flat(self._marching), tuple(flat(MARCHING)))
+        """Places of the arrays for marches."""
+        kept, new, state, vectors, between = self._marching
+        return objects((*kept, *new, state, *vectors, *between))
 
     @cached_property
     def _marching(self) -> Any:
