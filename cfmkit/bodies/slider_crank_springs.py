@@ -79,29 +79,48 @@ def along_crank(linkage: Linkage, unloaded: float, angle: FloatArray, bend: bool
     bend : bool
         Whether the second derivative of the effort is wanted, too.
     """
-    r1, r2, way = linkage.crank, linkage.coupler, linkage.branch
+    r1, r2 = linkage.crank, linkage.coupler
     angle = np.asarray(angle, dtype=np.float64)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         turn, position = _turns(linkage, unloaded, angle)
         sine, cosine = np.sin(angle), np.cos(angle)
-        rise = (linkage.offset - r1 * sine) / r2  # sin beta
-        level = (position - r1 * cosine) / r2  # cos beta, with the sign of the branch
-        level = way * np.abs(level)
-        b1 = -r1 * cosine / (r2 * level)
+        first, rise, level = _first(linkage, position, sine, cosine)
+        _, _, b1, _ = first
         b2 = (r1 * sine / r2 + rise * b1**2) / level
-        x1 = -r1 * sine - r2 * rise * b1
         x2 = -r1 * cosine - r2 * (level * b1**2 + rise * b2)
-        one, zero = np.ones_like(angle), np.zeros_like(angle)
-        first = np.stack([one, b1 - 1.0, b1, x1])
-        second = np.stack([zero, b2, b2, x2])
+        second = np.stack([np.zeros_like(angle), b2, b2, x2])
         effort = turn * first
         stiffness = first**2 + turn * second
         if not bend:
             return UnitCurves(angle, position, turn, effort, stiffness)
         b3 = (r1 * cosine / r2 + level * b1**3 + 3.0 * rise * b1 * b2) / level
         x3 = r1 * sine + r2 * (rise * b1**3 - 3.0 * level * b1 * b2 - rise * b3)
-        third = np.stack([zero, b3, b3, x3])
+        third = np.stack([np.zeros_like(angle), b3, b3, x3])
         return UnitCurves(angle, position, turn, effort, stiffness, 3.0 * first * second + turn * third)
+
+
+def crank_efforts(linkage: Linkage, unloaded: float, angle: FloatArray) -> FloatArray:
+    """Return the efforts of `along_crank`, (4, n), to the last bit, without anything else."""
+    angle = np.asarray(angle, dtype=np.float64)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        turn, position = _turns(linkage, unloaded, angle)
+        first, _, _ = _first(linkage, position, np.sin(angle), np.cos(angle))
+        turn *= first
+    return turn
+
+
+def _first(
+    linkage: Linkage, position: FloatArray, sine: FloatArray, cosine: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the derivatives of q by the crank angle, (4, n), and sine and cosine of the coupler's angle."""
+    r1, r2 = linkage.crank, linkage.coupler
+    rise = (linkage.offset - r1 * sine) / r2  # sin beta
+    level = linkage.branch * np.abs((position - r1 * cosine) / r2)  # cos beta, with the sign of the branch
+    first = np.empty((4, *np.shape(sine)))
+    first[0], first[2] = 1.0, -r1 * cosine / (r2 * level)
+    first[1] = first[2] - 1.0
+    first[3] = -r1 * sine - r2 * rise * first[2]
+    return first, rise, level
 
 
 CHUNK = 8192

@@ -182,9 +182,16 @@ def kind_of(result: Result) -> Kind | None:
     return result.curves[0].kind if result.curves else None
 
 
-def survey_of(result: Result, window: Window | None) -> Survey | None:
+Surveys = dict[Window | None, Survey | None]
+"""What is known of the nominal curve of one result: whoever asks again, asks the same."""
+
+
+def survey_of(result: Result, window: Window | None, surveys: Surveys | None = None) -> Survey | None:
     """Return the metrics of the nominal curve over a window; None without a curve."""
-    return survey(result.curves[0], frame_of(result), window) if result.curves else None
+    known: Surveys = {} if surveys is None else surveys
+    if window not in known:
+        known[window] = survey(result.curves[0], frame_of(result), window) if result.curves else None
+    return known[window]
 
 
 def left_of(window: Window | None, result: Result) -> Window | None:
@@ -201,6 +208,7 @@ def evaluate(
     names: Iterable[str] | None = None,
     window: Window | None = None,
     extra_definitions: Iterable[Definition] = (),
+    surveys: Surveys | None = None,
 ) -> dict[str, Quantity]:
     """Return the metrics of the nominal curve and the family's own values, by name.
 
@@ -215,6 +223,8 @@ def evaluate(
         inside it, what is left of it (requirements over it are missed all the same).
     extra_definitions : iterable of Definition
         A family's metrics beside those of the contract.
+    surveys : dict, optional
+        What is known of this result already, and where to note what is found out.
 
     Returns
     -------
@@ -226,7 +236,7 @@ def evaluate(
     cfmkit.errors.UsageError
         If one of `names` exists neither as a metric nor as a value of the family.
     """
-    view = survey_of(result, left_of(window or window_of(result), result))
+    view = survey_of(result, left_of(window or window_of(result), result), surveys)
     kind, extra = kind_of(result), tuple(extra_definitions)
     if names is not None:
         known = metrics_by_name(kind, extra)

@@ -7,10 +7,12 @@ The formulas are those for one curve, in the same order.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.metrics.ends import last_places
 from cfmkit.metrics.flatness import UNIFORM_POINTS
 from cfmkit.metrics.traces import ROUNDING
 
@@ -21,52 +23,8 @@ if TYPE_CHECKING:
 
     from cfmkit.curves import FloatArray
 
-
-_PARTS = 48
-
-
-def boundary(
-    holds: Callable[[FloatArray], NDArray[np.bool_]], inside: FloatArray, outside: FloatArray, rounds: int = 7
-) -> FloatArray:
-    """Return how far a condition holds from places inside towards places outside, one by one.
-
-    Each round cuts the way into parts and keeps the first in which the condition is lost, so
-    that it ends at the loss nearest to `inside`, and where the condition is not a number as well.
-
-    Parameters
-    ----------
-    holds : callable
-        ``holds(places)``, (d, k m) -> (d, k m) of bool: m places for each of the k, one after the other.
-    inside, outside : (d, k) array
-        Where it holds, and where it does not; equal where there is nothing to look for. What is looked for
-        together costs hardly more than the first of it: calls of the model are what takes the time.
-    rounds : int
-        Each makes the way 48 times as short: seven make a millimetre as short as rounding.
-
-    Returns
-    -------
-    (d, k) array
-        The last places at which it still holds.
-
-    Examples
-    --------
-    >>> boundary(lambda x: x * x <= 2.0, np.array([[0.0]]), np.array([[2.0]])).round(12)
-    array([[1.41421356]])
-    """
-    share = np.arange(1, _PARTS) / _PARTS
-    near, far = np.array(inside), np.array(outside)
-    for _ in range(rounds):
-        if (near == far).all():
-            break
-        places = near[..., None] + (far - near)[..., None] * share
-        lost = ~holds(places.reshape(len(places), -1)).reshape(places.shape)
-        first = np.where(lost.any(axis=-1), lost.argmax(axis=-1), _PARTS - 1)
-        last, next_ = np.maximum(first - 1, 0), np.minimum(first, _PARTS - 2)
-        near, far = (
-            np.where(first > 0, np.take_along_axis(places, last[..., None], axis=-1)[..., 0], near),
-            np.where(first < _PARTS - 1, np.take_along_axis(places, next_[..., None], axis=-1)[..., 0], far),
-        )
-    return near
+    Exact = Callable[[FloatArray, NDArray[np.intp]], FloatArray]
+    Pair = tuple[FloatArray, FloatArray]
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,23 +37,37 @@ class ManyBranches:
         Increasing along each row [m or rad], and finite [N or N m].
     low, high : (d,) array
         Ends of the window, or of the travel where there is no window.
+    pose : (d,) array, optional
+        Where bands are taken; default: the middle of the window.
     exact : callable, optional
-        The effort at any places of each row, (d, m) -> (d, m): then places are solved for, not interpolated.
+        ``exact(places, rows)``, the effort at any places of some rows, (r, m) -> (r, m): then places are solved for,
+        not interpolated.
     excess : callable, optional
-        By how much the stress exceeds what is allowed, at any places of each row [Pa].
+        By what share the stress there exceeds what is allowed, likewise.
     """
 
     motion: FloatArray
     effort: FloatArray
     low: FloatArray
     high: FloatArray
-    exact: Callable[[FloatArray], FloatArray] | None = None
-    excess: Callable[[FloatArray], FloatArray] | None = None
+    exact: Exact | None = None
+    excess: Exact | None = None
+    pose: FloatArray | None = None
+
+    @property
+    def reference(self) -> FloatArray:
+        """Where bands are taken, (d,)."""
+        return (self.low + self.high) / 2 if self.pose is None else self.pose
+
+    @cached_property
+    def solved(self) -> tuple[FloatArray, FloatArray]:
+        """Where 95 % is first reached, (d,), and the widths of `BAND_RANGES`, (d, 3), of branches that are known."""
+        return _solved(self)
 
     def at(self, places: FloatArray) -> FloatArray:
         """Return the effort at places of each row, (d, m), by linear interpolation."""
         if self.exact is not None:
-            return self.exact(places)
+            return self.exact(places, np.arange(len(places)))
         last = self.motion.shape[1] - 1
         rows = np.arange(len(self.motion))[:, None]
         left = np.stack([row.searchsorted(at, "right") for row, at in zip(self.motion, places, strict=True)]) - 1
@@ -127,6 +99,15 @@ def range_95_fraction(many: ManyBranches) -> FloatArray:
 
 
 def _first_95(many: ManyBranches) -> FloatArray:
+    if many.exact is not None:
+        return many.solved[0]
+    nominal, first, step, (earlier, later) = _rise(many)
+    crossed = _crossing(step, (earlier - 0.95 * nominal, later - 0.95 * nominal))
+    return np.where(nominal == 0, np.nan, np.where(first == 0, many.motion[:, 0], crossed))
+
+
+def _rise(many: ManyBranches) -> tuple[FloatArray, NDArray[np.intp], Pair, Pair]:
+    """Return efforts at the ends of windows, the first samples with 95 % of it, and those steps: places, efforts."""
     motion, effort, rows = many.motion, many.effort, np.arange(len(many.motion))
     nominal = many.at(many.high[:, None])[:, 0]
     before = (motion < many.high[:, None]).sum(axis=1)
@@ -135,14 +116,7 @@ def _first_95(many: ManyBranches) -> FloatArray:
     sample, earlier = np.minimum(first, motion.shape[1] - 1), np.maximum(first - 1, 0)
     place = np.where(first < before, motion[rows, sample], many.high)
     level = np.where(first < before, effort[rows, sample], nominal)
-    if many.exact is not None:
-        solve, wanted = many.exact, nominal[:, None]
-        ends = motion[rows, earlier][:, None], place[:, None]
-        crossed = boundary(lambda at: ~(solve(at) / wanted >= 0.95 - ROUNDING), *ends)[:, 0]
-    else:
-        heights = effort[rows, earlier] - 0.95 * nominal, level - 0.95 * nominal
-        crossed = _crossing((motion[rows, earlier], place), heights)
-    return np.where(nominal == 0, np.nan, np.where(first == 0, motion[:, 0], crossed))
+    return nominal, first, (motion[rows, earlier], place), (effort[rows, earlier], level)
 
 
 def _crossing(motion: tuple[FloatArray, FloatArray], height: tuple[FloatArray, FloatArray]) -> FloatArray:
@@ -151,10 +125,10 @@ def _crossing(motion: tuple[FloatArray, FloatArray], height: tuple[FloatArray, F
 
 
 def band_range(many: ManyBranches, tolerance: float) -> FloatArray:
-    """Return `ranges.band_range` of each row about the middle of its window, (d,)."""
+    """Return `ranges.band_range` of each row about its reference pose, (d,); one of `BAND_RANGES`."""
     if many.exact is not None:
-        return band_ranges(many, (tolerance,))[:, 0]
-    motion, place = many.motion, (many.low + many.high) / 2
+        return many.solved[1][:, list(BAND_RANGES.values()).index(tolerance)]
+    motion, place = many.motion, many.reference
     here = many.at(place[:, None])[:, 0]
     offset = many.effort / here[:, None] - 1
     outside = ~(np.abs(offset) <= tolerance * (1 + ROUNDING))
@@ -188,14 +162,38 @@ def _edge(
     return _crossing((many.motion[rows, worst], good), (offset[rows, worst] - level, height - level))
 
 
-def band_ranges(many: ManyBranches, tolerances: Sequence[float]) -> FloatArray:
-    """Return `band_range` of each row for each tolerance, (d, k), of branches that are known at every place."""
-    motion, place = many.motion, (many.low + many.high) / 2
+def _solved(many: ManyBranches) -> tuple[FloatArray, FloatArray]:
+    """Return `ManyBranches.solved`: all ends are looked for together, as calls of the model are what takes the time."""
+    nominal, first, (start, stop), _ = _rise(many)
+    start, some = np.where(first == 0, many.motion[:, 0], start), np.isfinite(nominal) & (nominal != 0)
+    stop = np.where(some & (first > 0), stop, start)
+    here, inside, outside, ends = _bands(many)
+    widths, effort = np.repeat(list(BAND_RANGES.values()), 2) * (1 + ROUNDING), many.exact
+    if effort is None:
+        raise ValueError("the branches are not known at every place")
+
+    def excess(at: FloatArray, ends: NDArray[np.intp]) -> FloatArray:
+        rows, which = np.divmod(ends, 1 + len(widths))
+        found, of_band = effort(at, rows), which > 0
+        risen = found / nominal[rows, None] - (0.95 - ROUNDING)
+        away = np.abs(found / here[rows] - 1) - widths[which - 1][:, None]
+        # Where there is no effort, 95 % are not reached, and it is outside every band.
+        return np.where(of_band[:, None], away, np.where(np.isnan(risen), -np.inf, risen))
+
+    places = last_places(excess, np.column_stack([start, inside]), np.column_stack([stop, outside]))
+    found = np.where(np.isnan(ends), places[:, 1:], ends)
+    bands = np.where(here == 0, np.nan, found[:, 1::2] - found[:, ::2])
+    return np.where(some, places[:, 0], np.nan), bands
+
+
+def _bands(many: ManyBranches) -> tuple[FloatArray, ...]:
+    """Return efforts at the poses, (d, 1), and of both ends of `BAND_RANGES` places inside, outside, and known ends."""
+    motion, place = many.motion, many.reference
     here = many.at(place[:, None])
     offset, last = np.abs(many.effort / here - 1), motion.shape[1] - 1
     index, samples = (motion < place[:, None]).sum(axis=1)[:, None], np.arange(motion.shape[1])
     inside, outside, ends = [], [], []
-    for tolerance in tolerances:
+    for tolerance in BAND_RANGES.values():
         bad = ~(offset <= tolerance * (1 + ROUNDING))
         for there, inward in ((bad & (samples < index), 1), (bad & (samples >= index), -1)):
             worst = last - there[:, ::-1].argmax(axis=1) if inward > 0 else there.argmax(axis=1)
@@ -207,14 +205,7 @@ def band_ranges(many: ManyBranches, tolerances: Sequence[float]) -> FloatArray:
             ends.append(np.where(some, np.nan, motion[:, :1] if inward > 0 else motion[:, -1:]))
             inside.append(good)
             outside.append(np.where(some, np.take_along_axis(motion, worst, axis=1), good))
-    widths = np.repeat(np.asarray(tolerances) * (1 + ROUNDING), 2)
-
-    def holds(at: FloatArray) -> NDArray[np.bool_]:
-        return np.asarray(np.abs(many.at(at) / here - 1) <= np.repeat(widths, at.shape[1] // len(widths)))
-
-    solved = boundary(holds, np.hstack(inside), np.hstack(outside))
-    found = np.where(np.isnan(np.hstack(ends)), solved, np.hstack(ends))
-    return np.where(here == 0, np.nan, found[:, 1::2] - found[:, ::2])
+    return here, np.hstack(inside), np.hstack(outside), np.hstack(ends)
 
 
 def usable_interval(
@@ -256,19 +247,22 @@ def _solved_interval(
     branches: Sequence[ManyBranches], target: FloatArray, width: float, valid: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return `usable_interval` of branches that are known at every place: its ends are solved for."""
-    motion, wanted = branches[0].motion, target[:, None]
-    rows, count = np.arange(len(motion)), motion.shape[1]
+    motion, every = branches[0].motion, np.arange(len(branches[0].motion))
+    rows, count = every, motion.shape[1]
+    reach = motion[:, -1] - motion[:, 0]
 
-    def holds(at: FloatArray) -> NDArray[np.bool_]:
-        kept = at >= valid[:, None]
+    def excess(at: FloatArray, rows: NDArray[np.intp], known: bool = False) -> FloatArray:
+        """Return by what share that exceeds its limit which does so most; NaN where one is no number."""
+        worst = (valid[rows, None] - at) / reach[rows, None]
         for branch in branches:
             if branch.exact is not None:
-                kept &= np.abs(branch.exact(at) / wanted - 1) <= width
+                effort = branch.effort if known else branch.exact(at, rows)
+                worst = np.maximum(worst, np.abs(effort / target[rows, None] - 1) - width)
             if branch.excess is not None:
-                kept &= branch.excess(at) <= 0
-        return kept
+                worst = np.maximum(worst, branch.excess(at, rows))
+        return worst
 
-    good = holds(motion)
+    good = excess(motion, every, known=True) <= 0
     begins, ends = good.copy(), good.copy()
     begins[:, 1:] &= ~good[:, :-1]
     ends[:, :-1] &= ~good[:, 1:]
@@ -280,7 +274,7 @@ def _solved_interval(
     first, some = since[rows, last], good.any(axis=1)
     before, after = np.maximum(first - 1, 0), np.minimum(last + 1, count - 1)
     inside, outside = (np.stack([motion[rows, k] for k in pair], axis=1) for pair in ((first, last), (before, after)))
-    start, end = boundary(holds, inside, outside).T
+    start, end = last_places(lambda at, ends: excess(at, ends // 2), inside, outside).T
     some &= end > start
     return np.where(some, start, np.nan), np.where(some, end, np.nan)
 

@@ -47,7 +47,7 @@ def _first_95(branch: Branch) -> float:
     if nominal == 0:
         raise Undefined(f"the {branch.kind} at the end is zero")
     if branch.closed is not None:
-        return _known(end - branch.solved_range_95)
+        return _known(float(branch.closed.solved[0][0]))
     motion, effort = branch.function
     before = int(motion.searchsorted(end))
     reached = effort[:before] / nominal >= 0.95 - ROUNDING
@@ -68,7 +68,7 @@ def band_range(branch: Branch, tolerance: float) -> float:
     """Return the widest interval around the reference pose in which ``|F / F_ref - 1|`` is within the tolerance."""
     motion, offset, here = branch.around
     if branch.closed is not None:
-        return _known(branch.solved_bands[list(many.BAND_RANGES.values()).index(tolerance)])
+        return _known(float(many.band_range(branch.closed, tolerance)[0]))
     outside = ~(np.abs(offset) <= tolerance * (1 + ROUNDING))
     left, right = outside[:here].nonzero()[0], outside[here:].nonzero()[0]
     low = _edge(motion, offset, int(left[-1]), 1, tolerance) if len(left) else float(motion[0])

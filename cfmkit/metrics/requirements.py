@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.errors import Problem, QuantityError, SpecError
-from cfmkit.metrics.evaluation import Survey, Value, kind_of, survey_of, window_of
+from cfmkit.metrics.evaluation import Survey, Surveys, Value, kind_of, survey_of, window_of
 from cfmkit.metrics.known import branch_fault, known_metrics
 from cfmkit.metrics.limits import Limits, bound
 from cfmkit.metrics.report import finite_border
@@ -166,12 +166,16 @@ def _window_faults(over: tuple[float, float], meant: Definition, kind: Kind | No
 
 
 def check(
-    requirements: Sequence[Requirement], result: Result, extra_definitions: Iterable[Definition] = ()
+    requirements: Sequence[Requirement],
+    result: Result,
+    extra_definitions: Iterable[Definition] = (),
+    surveys: Surveys | None = None,
 ) -> tuple[Outcome, ...]:
     """Return the outcome of every requirement on a result, in their order.
 
     Where no branch is named, all branches must meet it. A metric that has no
     value (the curve ends before the window does, there is no target) is missed.
+    `surveys` has what is known of this result already, and is where more is noted.
 
     Raises
     ------
@@ -184,7 +188,7 @@ def check(
     if problems:
         raise SpecError(problems)
     table = _by_name(known)
-    surveys: dict[Window | None, Survey | None] = {}
+    surveys = {} if surveys is None else surveys
     return tuple(_outcome(requirement, result, table, surveys) for requirement in requirements)
 
 
@@ -198,13 +202,11 @@ def _outcome(
     requirement: Requirement,
     result: Result,
     table: Mapping[str, Sequence[Definition]],
-    surveys: dict[Window | None, Survey | None],
+    surveys: Surveys,
 ) -> Outcome:
     definition = _meant(requirement, table[split_name(requirement.metric)[0]])
     window = _window(requirement, result)
-    if window not in surveys:
-        surveys[window] = survey_of(result, window)
-    values = _values(requirement.metric, definition, surveys[window], result)
+    values = _values(requirement.metric, definition, survey_of(result, window, surveys), result)
     limits = Limits.of(requirement, definition.dimension)
     value = min(values, key=limits.margin)
     kind = kind_of(result) or "force"

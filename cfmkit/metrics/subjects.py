@@ -7,13 +7,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
-from math import isfinite, nan
+from math import isfinite
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from cfmkit.metrics import closed
-from cfmkit.metrics.many import BAND_RANGES, ManyBranches, band_ranges, range_95
+from cfmkit.metrics.many import ManyBranches
 from cfmkit.metrics.traces import ROUNDING, Trace, Undefined, Window, covers, restrict, traces
 
 if TYPE_CHECKING:
@@ -256,27 +256,18 @@ class Branch:
         if model is None:
             return None
         places, (low, high) = model.places[None, :], self.ends
-        exact = partial(model.effort, self.name)
+
+        def exact(at: FloatArray, _rows: object = None) -> FloatArray:
+            return model.effort(self.name, at)
+
         excess = None
         if (allowed := self.frame.allowable_stress) is not None:
 
-            def excess(at: FloatArray) -> FloatArray:
-                return np.asarray(model.stress(self.name, at) - allowed * (1 + ROUNDING))
+            def excess(at: FloatArray, _rows: object) -> FloatArray:
+                return np.asarray(model.stress(self.name, at) / allowed - (1 + ROUNDING))
 
-        return ManyBranches(places, exact(places), np.array([low]), np.array([high]), exact, excess)
-
-    @cached_property
-    def solved_range_95(self) -> float:
-        """`cfmkit.metrics.many.range_95` of `closed`; NaN where there is none."""
-        return nan if self.closed is None else float(range_95(self.closed)[0])
-
-    @cached_property
-    def solved_bands(self) -> tuple[float, ...]:
-        """`cfmkit.metrics.many.band_ranges` of `closed` about the reference pose, all together; NaN where none."""
-        widths, pose = tuple(BAND_RANGES.values()), np.array([self.reference])
-        if self.closed is None:
-            return (nan,) * len(widths)
-        return tuple(band_ranges(replace(self.closed, low=pose, high=pose), widths)[0].tolist())
+        ends, pose = (np.array([low]), np.array([high])), np.array([self.reference])
+        return ManyBranches(places, exact(places), *ends, exact, excess, pose)
 
     @property
     def reference(self) -> float:

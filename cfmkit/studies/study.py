@@ -29,6 +29,7 @@ from cfmkit.units import to_border
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from cfmkit.metrics.evaluation import Surveys
     from cfmkit.results import Quantity
     from cfmkit.spec import Spec
     from cfmkit.units import Ends
@@ -201,20 +202,25 @@ class Study:
         if not result.status.usable:
             return Row(result.status, message=result.message, warnings=warnings)
         extra = values_of_family(family(result.spec.family).values)
-        values = tuple(_finite(item.value) for item in self.quantities(result))
-        met = tuple(outcome.ok for outcome in check(result.spec.requirements, result, extra))
+        surveys: Surveys = {}
+        values = tuple(_finite(item.value) for item in self.quantities(result, surveys))
+        met = tuple(outcome.ok for outcome in check(result.spec.requirements, result, extra, surveys))
         message = _gaps(result) if result.status is Status.COMPLETE else result.message
         curve = _curve(result) if self.curves else b""
         return Row(result.status, values, met, message, curve, warnings=warnings)
 
-    def quantities(self, result: Result) -> tuple[Quantity, ...]:
-        """Return what each metric of the study is on a result, with the reason where it has no value."""
+    def quantities(self, result: Result, surveys: Surveys | None = None) -> tuple[Quantity, ...]:
+        """Return what each metric of the study is on a result, with the reason where it has no value.
+
+        `surveys` is where what is found out of the curve is noted for later.
+        """
+        surveys = {} if surveys is None else surveys
         extra = values_of_family(family(result.spec.family).values)
         found: dict[tuple[str, Ends | None], Quantity] = {}
         for over in dict.fromkeys(one.over for one in self.metrics):
             names = [one.name for one in self.metrics if one.over == over]
             window = None if over is None else window_of(result, over)
-            found |= {(name, over): item for name, item in evaluate(result, names, window, extra).items()}
+            found |= {(name, over): item for name, item in evaluate(result, names, window, extra, surveys).items()}
         return tuple(found[one.name, one.over] for one in self.metrics)
 
 

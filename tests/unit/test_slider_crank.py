@@ -11,7 +11,7 @@ from slider_crank import DEG, LI, START, config
 
 import cfmkit
 from cfmkit.bodies.slider_crank import Linkage
-from cfmkit.bodies.slider_crank_springs import along_crank, along_slider, crank_torques
+from cfmkit.bodies.slider_crank_springs import along_crank, along_slider, crank_efforts, crank_torques
 from cfmkit.families.slider_crank.build import assemble
 from cfmkit.families.slider_crank.rates import Goal, minimax, preferred, ranges
 from cfmkit.families.slider_crank.reactions import reactions
@@ -50,6 +50,7 @@ def test_effort_stiffness_and_bend_are_derivatives_of_the_energy(link, start, pl
     for difference, exact in pairs:
         np.testing.assert_allclose(difference / scale, exact / scale, rtol=2e-4, atol=2e-4)
     np.testing.assert_allclose(crank_torques(link, start, np.array([place])), here.effort, rtol=1e-11, atol=1e-13)
+    np.testing.assert_array_equal(crank_efforts(link, start, np.array([place])), here.effort)
 
 
 @pytest.mark.parametrize(("link", "start", "place"), list(mechanisms(40)))

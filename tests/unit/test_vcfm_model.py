@@ -13,6 +13,8 @@ from cfmkit import api
 from cfmkit.export import files
 from cfmkit.families.base import Block, Measure
 from cfmkit.families.vcfm.block import METRICS, SCALARS, VARIED, analyze_block
+from cfmkit.families.vcfm.checks import extreme_sums
+from cfmkit.families.vcfm.model import force_of, rest_of, rests_of
 from cfmkit.families.vcfm.parts import parts
 from cfmkit.families.vcfm.sbranch import POLE, axial_root, compliance, end_curvature, pose
 from cfmkit.families.vcfm.shapes import centre_line
@@ -27,6 +29,35 @@ from cfmkit.studies.engine import Work, run
 from cfmkit.studies.plan import Draw, sampled
 from cfmkit.studies.study import Study
 from cfmkit.studies.variation import axes, wishes
+
+# --- preloads together, and lines together ---------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["vcfm_ding2022", "vcfm_cosine", "vcfm_hybrid"])
+def test_what_all_preloads_share_is_what_each_has_alone(name):
+    spec = cfmkit.load(CONFIGS / f"{name}.yaml").replace({"analysis.preloads": ["0 mm", "1 mm", "3 mm", "-0.5 mm"]})
+    solution = cfmkit.analyze(spec).state
+    grid = np.linspace(0.0, spec.travel, spec.analysis.points)
+    preloads = tuple(spec.analysis.preloads)
+    alone = [rest_of(solution.sampler, one, grid) for one in preloads]
+    for found, wanted in zip(rests_of(solution.sampler, preloads, grid), alone, strict=True):
+        assert found == (None if wanted is None else pytest.approx(wanted, rel=1e-13))
+    for push, window in zip(solution.pushes, solution.windows, strict=True):
+        wanted = solution.flat_part(push, spec.analysis.flatness)
+        assert window == (None if wanted is None else pytest.approx(wanted, rel=1e-12))
+        if push.rest:
+            left = force_of(solution.sampler, np.array([push.rest]), push.preload)[0]
+            assert abs(left) < 1e-12 * np.abs(push.force).max()
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 500])
+def test_extremes_of_many_lines_are_those_of_the_few_that_matter(count):
+    rng, factors = np.random.default_rng(count), np.geomspace(0.2, 5.0, 41)
+    slopes, offsets = rng.normal(size=count).round(1), rng.normal(size=count)
+    sums = factors[:, None] * slopes + offsets
+    for way, wanted in ((1.0, sums.max(axis=1)), (-1.0, sums.min(axis=1))):
+        np.testing.assert_allclose(extreme_sums(factors, slopes, offsets, way), wanted, rtol=1e-13, atol=1e-13)
+
 
 # --- the S form ------------------------------------------------------------------------------------------------
 

@@ -149,18 +149,19 @@ class CornerSlab(Slab):
         """Travel at the start over which friction lets no force move the slider up [m]."""
         return np.array([next((high for low, high in each if low <= 0), 0.0) for each in self.jams])
 
-    def exact(self, branch: str, travel: FloatArray) -> FloatArray:
-        """Return the force of a branch at travels of each design, on the corner or the flank, (designs, m) [N]."""
-        force, corner = super().exact(branch, travel), travel < self.corner_travel[:, None]
-        rows = np.flatnonzero(corner.any(axis=1))
-        if not rows.size:
+    def somewhere(self, way: float | FloatArray, travel: FloatArray, rows: NDArray[np.intp]) -> FloatArray:
+        """Return the force at travels of some designs, on the corner or the flank, (r, m) [N]."""
+        force, corner = super().somewhere(way, travel, rows), travel < self.corner_travel[rows, None]
+        few = np.flatnonzero(corner.any(axis=1))
+        if not few.size:
             return force
-        cams, pivot = self.designs.take(rows), Pivot(*(part[rows, None] for part in self.pivots))
-        angle = pivot_angle(self.starts[rows, None] + np.maximum(travel[rows], 0.0), pivot)
-        angle = np.where(travel[rows] <= 0.0, pivot.low, angle)
+        chosen = rows[few]
+        cams, pivot = self.designs.take(chosen), Pivot(*(part[chosen, None] for part in self.pivots))
+        angle = pivot_angle(self.starts[chosen, None] + np.maximum(travel[few], 0.0), pivot)
+        angle = np.where(travel[few] <= 0.0, pivot.low, angle)
         stretch = pivot.x + pivot.radius * np.sin(angle) - cams.x0[:, None]
-        moved = force_at(cams, stretch, np.tan(angle), 1.0 if branch == "load" else -1.0)
-        force[rows] = np.where(corner[rows], moved, force[rows])
+        moved = force_at(cams, stretch, np.tan(angle), way if np.ndim(way) == 0 else np.asarray(way)[few])
+        force[few] = np.where(corner[few], moved, force[few])
         return force
 
     @cached_property

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cfmkit.curves import FloatArray
+    from cfmkit.metrics.many import ManyBranches
 
 
 def tangents(x: FloatArray, brace: FloatArray) -> FloatArray:
@@ -112,8 +113,8 @@ class Slab:
         """Remember what is asked."""
         self.designs, self.points, self.contacts, self.band = designs, points, contacts, band
         self.usable: tuple[FloatArray, FloatArray] | None = None
-        self._known: dict[str, FloatArray] = {}
         self.spreads: dict[tuple[str, Any], Spread] = {}
+        self.known: dict[Any, ManyBranches] = {}
 
     @cached_property
     def travel(self) -> FloatArray:
@@ -179,24 +180,31 @@ class Slab:
         """Travels at which metrics that are places look at the force, (designs, n) [m]."""
         return nodes(self.travel[:, -1], self.corner_travel)
 
-    def everywhere(self, branch: str) -> FloatArray:
-        """Return the force of a branch at `places` [N]."""
-        if branch not in self._known:
-            self._known[branch] = self.exact(branch, self.places)
-        return self._known[branch]
+    @cached_property
+    def everywhere(self) -> tuple[FloatArray, FloatArray]:
+        """Force at `places` on the way up, and on the way down [N]."""
+        rows = np.arange(len(self.designs))
+        return self.somewhere(1.0, self.places, rows), self.somewhere(-1.0, self.places, rows)
 
     def exact(self, branch: str, travel: FloatArray) -> FloatArray:
-        """Return the force of a branch at travels of each design, (designs, m) [N]; NaN where friction holds a roller.
+        """Return the force of a branch at travels of each design, (designs, m) [N]; NaN where there is none."""
+        return self.somewhere(1.0 if branch == "load" else -1.0, travel, np.arange(len(self.designs)))
+
+    def somewhere(self, way: float | FloatArray, travel: FloatArray, rows: NDArray[np.intp]) -> FloatArray:
+        """Return the force at travels of some designs, (r, m) [N]; NaN where friction holds a roller.
 
         Parameters
         ----------
-        branch : {"load", "unload"}
-            On the way up, or down.
-        travel : (designs, m) array
+        way : float or (r, 1) array
+            1 on the way up, -1 on the way down.
+        travel : (r, m) array
             On the flank [m].
+        rows : (r,) array of int
+            Which designs.
         """
-        stretch, slope = _on_flank(self.designs, np.minimum(np.maximum(travel, 0.0), self.travel[:, -1:]))
-        return force_at(self.designs, stretch, slope, 1.0 if branch == "load" else -1.0)
+        cams = self.designs.take(rows)
+        stretch, slope = _on_flank(cams, np.minimum(np.maximum(travel, 0.0), self.travel[rows, -1:]))
+        return force_at(cams, stretch, slope, way)
 
     @cached_property
     def flank(self) -> NDArray[np.bool_]:
@@ -261,7 +269,7 @@ def _on_flank(cams: Designs, travel: FloatArray) -> tuple[FloatArray, FloatArray
     return stretch, stretch / cams.constant[:, None] + tangents(cams.x0[:, None] + stretch, cams.brace[:, None])
 
 
-def force_at(cams: Designs, stretch: FloatArray, slope: FloatArray, way: float) -> FloatArray:
+def force_at(cams: Designs, stretch: FloatArray, slope: FloatArray, way: float | FloatArray) -> FloatArray:
     """Return the force on the slider on the way up (1) or down (-1) [N]; NaN where friction holds a roller."""
     mu, tangent = way * cams.friction[:, None], tangents(cams.x0[:, None] + stretch, cams.brace[:, None])
     turn = 1.0 + mu * slope

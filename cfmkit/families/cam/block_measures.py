@@ -14,6 +14,8 @@ from cfmkit.metrics.many import RANGES, ManyBranches, rms_to_target, usable_inte
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
+    from numpy.typing import NDArray
+
     from cfmkit.curves import FloatArray
     from cfmkit.families.base import Measure
     from cfmkit.families.cam.block_forces import Designs, Slab
@@ -38,23 +40,31 @@ def measured(cams: Slab, measure: Measure) -> Mapping[str, FloatArray]:
     if measure.name == RMS:
         sampled = {branch: _branch(cams, branch, measure.window) for branch in BRANCHES}
         return {branch: rms_to_target(many, cams.designs.target) for branch, many in sampled.items()}
-    return {branch: RANGES[measure.name](_everywhere(cams, branch, measure.window)) for branch in BRANCHES}
+    both = RANGES[measure.name](_everywhere(cams, measure.window))
+    return dict(zip(BRANCHES, np.split(both, 2), strict=True))
 
 
 def _branch(cams: Slab, branch: str, window: Window) -> ManyBranches:
-    effort, exact = (cams.up if branch == "load" else cams.down).slider, partial(cams.exact, branch)
+    effort, exact = (cams.up if branch == "load" else cams.down).slider, lambda at, _rows: cams.exact(branch, at)
     if window is None:
         return ManyBranches(cams.travel, effort, cams.travel[:, 0], cams.travel[:, -1], exact)
     low, high = (np.full(len(cams.designs), end) for end in window)
     return ManyBranches(cams.travel, effort, low, high, exact)
 
 
-def _everywhere(cams: Slab, branch: str, window: Window) -> ManyBranches:
-    """Return a branch that is known at every place: metrics that are places do not depend on the samples."""
-    ends = window if window is not None else (0.0, np.inf)
-    low = np.full(len(cams.designs), ends[0])
-    high = np.minimum(np.full(len(cams.designs), ends[1]), cams.travel[:, -1])
-    return ManyBranches(cams.places, cams.everywhere(branch), low, high, partial(cams.exact, branch))
+def _everywhere(cams: Slab, window: Window) -> ManyBranches:
+    """Return both branches, one below the other, at every place: metrics that are places do not depend on samples."""
+    if window not in cams.known:
+        count, places = len(cams.designs), np.concatenate([cams.places, cams.places])
+        ends = window if window is not None else (0.0, np.inf)
+        low = np.full(2 * count, ends[0])
+        high = np.minimum(np.full(2 * count, ends[1]), places[:, -1])
+
+        def exact(travel: FloatArray, rows: NDArray[np.intp]) -> FloatArray:
+            return cams.somewhere(np.where(rows < count, 1.0, -1.0)[:, None], travel, rows % count)
+
+        cams.known[window] = ManyBranches(places, np.concatenate([*cams.everywhere]), low, high, exact)
+    return cams.known[window]
 
 
 def _ripple(one: Spread, _cams: Designs) -> FloatArray:
@@ -94,7 +104,11 @@ def _hysteresis(cams: Slab, window: Window) -> FloatArray:
 
 def _usable(cams: Slab) -> tuple[FloatArray, FloatArray]:
     if cams.usable is None:
-        branches = [_everywhere(cams, branch, None) for branch in BRANCHES]
+        ends = cams.travel[:, 0], cams.travel[:, -1]
+        branches = [
+            ManyBranches(cams.places, force, *ends, partial(cams.somewhere, way))
+            for force, way in zip(cams.everywhere, (1.0, -1.0), strict=True)
+        ]
         cams.usable = usable_interval(branches, cams.designs.target, cams.band, cams.corner_travel)
     return cams.usable
 

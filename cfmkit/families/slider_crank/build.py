@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from cfmkit.bodies.slider_crank import Linkage
-from cfmkit.bodies.slider_crank_springs import UnitCurves, along_crank, along_slider, slider_forces
+from cfmkit.bodies.slider_crank_springs import UnitCurves, along_crank, along_slider, crank_efforts, slider_forces
 from cfmkit.families.findings import deg, mm
 from cfmkit.families.refusals import CannotBuild
 from cfmkit.families.slider_crank.findings import finding
@@ -60,7 +60,7 @@ class Assembly:
     def forces(self, motion: FloatArray) -> FloatArray:
         """Return the efforts of `units` alone, (4, n)."""
         if self.drive == "torque":
-            return along_crank(self.linkage, self.unloaded, motion).effort
+            return crank_efforts(self.linkage, self.unloaded, motion)
         return slider_forces(self.linkage, self.unloaded, self.side, motion)
 
     @property

@@ -21,11 +21,16 @@ from cfmkit.families.vcfm.samples import LawSampler
 from cfmkit.families.vcfm.tables import adjustability, readings
 from cfmkit.families.vcfm.values import values_of
 from cfmkit.families.vcfm.windows import extreme, flat_window
+from cfmkit.metrics.ends import last_places
 from cfmkit.numerics.roots import bracketed_root
 from cfmkit.results import Result, Status
 from cfmkit.units import between
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from numpy.typing import NDArray
+
     from cfmkit.curves import FloatArray
     from cfmkit.families.base import Run
     from cfmkit.families.vcfm.parts import Parts
@@ -112,16 +117,27 @@ class Solution:
     @cached_property
     def windows(self) -> tuple[tuple[float, float] | None, ...]:
         """Constant-force window of each curve [m]; None where the force is nowhere positive."""
-        return tuple(self.flat_part(push, self.spec.analysis.flatness) for push in self.pushes)
+        return self._flat(self.pushes, self.spec.analysis.flatness)
 
     def flat_part(self, push: Push, flatness: float) -> tuple[float, float] | None:
         """Return the longest stretch of a curve on which (max - min)/max of the force is within `flatness` [m]."""
+        return self._flat((push,), flatness)[0]
+
+    def _flat(self, pushes: tuple[Push, ...], flatness: float) -> tuple[tuple[float, float] | None, ...]:
+        """Return `flat_part` of some curves: all together, because calls of the model are what takes the time."""
+        most, preload = max(len(push.travel) for push in pushes), np.array([[push.preload] for push in pushes])
+        travel = np.stack([np.pad(push.travel, (0, most - len(push.travel)), "edge") for push in pushes])
+        force = np.full(travel.shape, np.nan)
+        for row, push in zip(force, pushes, strict=True):
+            row[: len(push.force)] = push.force
 
         def force_at(places: FloatArray) -> FloatArray:
-            return force_of(self.sampler, places[0], push.preload)[None, :]
+            shuttle = self.sampler.leaf_force(places.ravel())
+            spring = self.sampler.spring((places + preload).ravel())[0]
+            return np.asarray((shuttle + spring).reshape(places.shape))
 
-        start, end = flat_window(push.travel, push.force[None, :], flatness, force_at)
-        return (float(start[0]), float(end[0])) if np.isfinite(start[0]) else None
+        ends = zip(*flat_window(travel, force, flatness, force_at), strict=True)
+        return tuple((float(low), float(high)) if np.isfinite(low) else None for low, high in ends)
 
     @cached_property
     def least(self) -> tuple[float, float] | None:
@@ -248,8 +264,9 @@ def travel_grid(spec: VcfmSpec) -> FloatArray:
 def solve(spec: VcfmSpec, made: Parts, sampler: Sampler) -> Solution:
     """Return the curves at all preloads by a model of leaves and spring."""
     grid = travel_grid(spec)
-    room = spring_room(spec)
-    nominal, *others = (_push(sampler, preload, grid, room) for preload in spec.analysis.preloads)
+    room, rests = spring_room(spec), rests_of(sampler, spec.analysis.preloads, grid)
+    poses = zip(spec.analysis.preloads, rests, strict=True)
+    nominal, *others = (_push(sampler, pose, grid, room) for pose in poses)
     # a preload at which the spring cannot be followed, or is closed, has no curve; a message says so
     pushes = (nominal, *(push for push in others if len(push.travel) >= LEAST))
     return Solution(spec, made, sampler, sampler.character, pushes)
@@ -260,20 +277,47 @@ def force_of(sampler: Sampler, travel: FloatArray, preload: float) -> FloatArray
     return np.asarray(sampler.leaf_force(travel) + sampler.spring(travel + preload)[0])
 
 
-def rest_of(sampler: Sampler, preload: float, grid: FloatArray) -> float | None:
-    """Return where the shuttle rests at a preload [m]: the first place without force, from the as-made pose on.
+def rests_of(sampler: Sampler, preloads: Sequence[float], grid: FloatArray) -> tuple[float | None, ...]:
+    """Return where the shuttle rests at each preload [m]: the first place without force, from the as-made pose on.
 
     None where there is none, or where the spring could not be followed so far.
     """
-    if preload == 0:
-        return 0.0
-    if preload > 0:
-        # no number where leaves too thin for the engine could not be moved at all
-        there = force_of(sampler, np.array([0.0]), preload)[0]
-        return _balanced(sampler, preload, -preload, 0.0) if there > 0 else None
-    force = sampler.leaf_force(grid) + sampler.spring(grid + preload)[0]
-    beyond = np.flatnonzero(force >= 0)
-    return _balanced(sampler, preload, grid[beyond[0] - 1], grid[beyond[0]]) if len(beyond) and beyond[0] else None
+    found: dict[float, float | None] = {preload: 0.0 if preload == 0 else None for preload in preloads}
+    for preload in (one for one in preloads if one < 0):
+        force = sampler.leaf_force(grid) + sampler.spring(grid + preload)[0]
+        beyond = np.flatnonzero(force >= 0)
+        if len(beyond) and beyond[0]:
+            found[preload] = _balanced(sampler, preload, grid[beyond[0] - 1], grid[beyond[0]])
+    pressed = np.array([one for one in preloads if one > 0])
+    if len(pressed):
+        found |= dict(zip(pressed.tolist(), _pushed_back(sampler, pressed), strict=True))
+    return tuple(found[preload] for preload in preloads)
+
+
+def _pushed_back(sampler: Sampler, preloads: FloatArray) -> Iterator[float | None]:
+    """Yield where the shuttle rests at positive preloads [m]: all are solved for together."""
+
+    def force(travel: FloatArray, compression: FloatArray) -> FloatArray:
+        return np.asarray(
+            (sampler.leaf_force(travel.ravel()) + sampler.spring(compression.ravel())[0]).reshape(travel.shape)
+        )
+
+    there, behind = force(0.0 * preloads, preloads), force(-preloads, 0.0 * preloads)
+    # No number as made: leaves too thin for the engine could not be moved at all. No number farther back: than they
+    # were followed, where they pull still harder. The closed form of arches pulls the wrong way far out of its range.
+    rests = (there > 0) & ~(behind > 0)
+
+    def excess(travel: FloatArray, ends: NDArray[np.intp]) -> FloatArray:
+        return -force(travel, travel + preloads[ends][:, None]) / there[ends][:, None]
+
+    places = last_places(excess, 0.0 * preloads[:, None], np.where(rests, -preloads, 0.0)[:, None])[:, 0]
+    # One secant more over what is left of the brackets: rests are known to rounding.
+    step = 1e-9 * preloads
+    here, ahead = (force(at, at + preloads) for at in (places, places + step))
+    with np.errstate(all="ignore"):
+        change = here * step / (ahead - here)
+    places = places - np.where(np.abs(change) < step, change, 0.0)
+    yield from (place if some else None for place, some in zip(places.tolist(), rests.tolist(), strict=True))
 
 
 def _balanced(sampler: Sampler, preload: float, low: float, high: float) -> float | None:
@@ -290,8 +334,13 @@ def _balanced(sampler: Sampler, preload: float, low: float, high: float) -> floa
     return bracketed_root(force, float(low), float(high))
 
 
-def _push(sampler: Sampler, preload: float, grid: FloatArray, room: float) -> Push:
-    rest = rest_of(sampler, preload, grid)
+def rest_of(sampler: Sampler, preload: float, grid: FloatArray) -> float | None:
+    """Return `rests_of` for one preload [m]."""
+    return rests_of(sampler, (preload,), grid)[0]
+
+
+def _push(sampler: Sampler, pose: tuple[float, float | None], grid: FloatArray, room: float) -> Push:
+    preload, rest = pose
     start = rest or 0.0
     if start < 0:
         step = grid[1]

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
+from cfmkit.families.vcfm.vbeam import VBeam
+
 if TYPE_CHECKING:
     from cfmkit.curves import FloatArray
     from cfmkit.families.vcfm.parts import Parts
@@ -68,9 +70,10 @@ class LawSampler:
     def leaves(self, travel: FloatArray) -> Samples:
         """Return what all leaves do at some travels [m]."""
         leaf = self.parts.leaf
-        force = self.parts.half_beams * np.asarray(leaf.force(travel), dtype=float)
+        force, stress = leaf.state(travel) if isinstance(leaf, VBeam) else (leaf.force(travel), leaf.stress(travel))
+        force = self.parts.half_beams * np.asarray(force, dtype=float)
         buckled = np.asarray(leaf.buckled(travel))
-        return Samples(force, np.asarray(leaf.stress(travel), dtype=float), np.ones(travel.shape, dtype=bool), buckled)
+        return Samples(force, np.asarray(stress, dtype=float), np.ones(travel.shape, dtype=bool), buckled)
 
     def leaf_force(self, travel: FloatArray) -> FloatArray:
         """Return the force of all leaves alone [N]."""

@@ -90,7 +90,7 @@ def compliance(z: FloatArray) -> tuple[FloatArray, FloatArray]:
         e[pulled], slope[pulled] = _pulled(z[pulled])
     near = np.abs(z) <= SERIES
     if near.any():
-        e[near], slope[near] = (np.polynomial.polynomial.polyval(z[near], k) for k in (_E, _SLOPE))
+        e[near], slope[near] = _series(z[near], _E), _series(z[near], _SLOPE)
     return e, slope
 
 
@@ -120,7 +120,18 @@ def end_curvature(z: FloatArray) -> FloatArray:
         t = np.tanh(q) / q
     w = np.where(z < -SERIES, -2.0 * z * t / (1.0 - t), w)
     near = np.abs(z) <= SERIES
-    return np.where(near, np.polynomial.polynomial.polyval(np.where(near, z, 0.0), _W), w)
+    if near.any():
+        w[near] = _series(z[near], _W)
+    return w
+
+
+def _series(z: FloatArray, terms: FloatArray) -> FloatArray:
+    """Return the power series with these terms, lowest first: `polyval` without its checks, to the last bit."""
+    found: FloatArray = terms[-1] + 0.0 * z
+    for term in terms[-2::-1].tolist():
+        found *= z
+        found += term
+    return found
 
 
 def largest_curvature(z: FloatArray) -> FloatArray:

@@ -148,7 +148,8 @@ class VBeam:
         """Where the leaf is buckled, from and to [m]: where the two laws cross; NaN where it never is."""
         first, last = onset_and_exit(self.strip)
         span = last - first
-        return self._crossing(first, -0.1 * span), self._crossing(last, 0.1 * span)
+        start, end = self._crossing(np.stack([first, last]), np.stack([-0.1 * span, 0.1 * span]))
+        return start, end
 
     def _crossing(self, guess: Any, outward: Any) -> Any:
         """Return where both laws give one force, by secants; where there is no such place near, the closed form."""
@@ -176,22 +177,24 @@ class VBeam:
         travel : array
             Of the shuttle from the as-made pose, positive towards the flat pose [m].
         """
-        return self._joined(travel, 0)
+        return self.state(travel)[0]
 
     def stress(self, travel: Any) -> FloatArray:
         """Return the largest stress of the leaf, bending and axial [Pa]."""
-        return self._joined(travel, 1)
+        return self.state(travel)[1]
 
-    def _joined(self, travel: Any, what: int) -> FloatArray:
+    def state(self, travel: Any) -> tuple[FloatArray, FloatArray]:
+        """Return `force` and `stress` at once: both come of one root."""
         buckled = self.buckled(travel)
         fields = (self.strip.length, self.strip.angle, self.strip.thickness, self.strip.width,
                   self.strip.youngs_modulus, self.strip.poisson_ratio, travel)  # fmt: skip
         wide = [np.broadcast_to(np.asarray(item, dtype=float), buckled.shape) for item in fields]
-        out = np.empty(buckled.shape)
+        force, stress = np.empty(buckled.shape), np.empty(buckled.shape)
         for chosen, law in ((buckled, _buckled), (~buckled, _bent)):
             *about, here = (item[chosen] for item in wide)
-            out[chosen] = law(type(self.strip)(*about), here)[what]
-        return out
+            if chosen.any():
+                force[chosen], stress[chosen] = law(type(self.strip)(*about), here)
+        return force, stress
 
 
 def _buckled(strip: Strip, travel: FloatArray) -> tuple[Any, Any]:

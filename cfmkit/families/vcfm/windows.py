@@ -18,8 +18,13 @@ if TYPE_CHECKING:
 
     from cfmkit.curves import FloatArray
 
+    Levels = list[tuple[FloatArray, FloatArray]]
+
 ZOOMS, CLOSER, AROUND = 6, 4.0, np.linspace(-2.0, 2.0, 17)
 """How often it is looked more closely, how much more each time, and where around a place, in steps."""
+
+FINE, FINER = np.linspace(-2.0, 2.0, 65), 16.0
+"""The same where a call of the model is what takes the time: more places in half as many calls."""
 
 
 def extremes(
@@ -39,9 +44,9 @@ def extremes(
         Within which it is looked for.
     """
     (low, high), rows = span, np.arange(len(place))
-    for _ in range(2 * ZOOMS):
-        near = np.clip(place[:, None] + AROUND * step, low[:, None], high[:, None])
-        place, step = near[rows, function(near).argmax(axis=1)], step / CLOSER
+    for _ in range(ZOOMS):
+        near = np.clip(place[:, None] + FINE * step, low[:, None], high[:, None])
+        place, step = near[rows, function(near).argmax(axis=1)], step / FINER
     return place
 
 
@@ -66,8 +71,8 @@ def flat_window(
 
     Parameters
     ----------
-    travel : (n,) array
-        Increasing [m].
+    travel : (n,) or (k, n) array
+        Increasing [m]; the last place may be repeated, without forces.
     force : (k, n) array
         Forces there [N]; a window holds positive ones only.
     flatness : float
@@ -90,8 +95,8 @@ def flat_window(
     """
     places = np.broadcast_to(travel, force.shape)
     force = np.where(np.isfinite(force), force, -1.0)
-    step = np.full(len(force), np.diff(travel).max())
-    low, high = travel[0], travel[-1]
+    step = np.diff(places, axis=1).max(axis=1)
+    low, high = places[:, :1].copy(), places[:, -1:].copy()
     for zoom in range(ZOOMS + 1):
         start, end, top, bottom = _longest(places, force, flatness)
         if zoom == ZOOMS:
@@ -112,11 +117,12 @@ def _longest(places: FloatArray, force: FloatArray, flatness: float) -> tuple[Fl
 
     Between two samples the force is linear.
     """
-    reach = _reach(force, flatness)
+    levels = _levels(force)
+    reach = _reach(levels, flatness)
     rows, n = np.arange(len(force)), force.shape[1]
     last = np.arange(n) + reach
     after = np.minimum(last + 1, n - 1)
-    high, low = _extremes(force, last)
+    high, low = _extremes(levels, last)
     here, there = np.take_along_axis(force, last, 1), np.take_along_axis(force, after, 1)
     # it leaves the band over its upper end, or over its lower one
     level = np.where(there > high, low / (1.0 - flatness), (1.0 - flatness) * high)
@@ -134,13 +140,13 @@ def _longest(places: FloatArray, force: FloatArray, flatness: float) -> tuple[Fl
     return tuple(np.where(none, np.nan, one) for one in found)
 
 
-def _extremes(force: FloatArray, last: NDArray[np.intp]) -> tuple[FloatArray, FloatArray]:
+def _extremes(levels: Levels, last: NDArray[np.intp]) -> tuple[FloatArray, FloatArray]:
     """Return the largest and smallest force from each sample to another behind it."""
-    levels, start = _levels(force), np.arange(force.shape[1])
+    start = np.arange(last.shape[1])
     size = last - start + 1
     level = np.frexp(size.astype(float))[1] - 1  # the largest power of two within
     highs, lows = (np.stack([pair[k] for pair in levels]) for k in (0, 1))
-    rows = np.arange(len(force))[:, None]
+    rows = np.arange(len(last))[:, None]
     tail = last + 1 - (1 << level)
     high = np.maximum(highs[level, rows, start], highs[level, rows, tail])
     return high, np.minimum(lows[level, rows, start], lows[level, rows, tail])
@@ -167,15 +173,15 @@ def longest_window(force: FloatArray, flatness: float) -> tuple[NDArray[np.intp]
     >>> int(first[0]), int(last[0])
     (2, 4)
     """
-    reach = _reach(np.where(np.isfinite(force), force, -1.0), flatness)
+    force = np.where(np.isfinite(force), force, -1.0)
+    reach = _reach(_levels(force), flatness)
     first = reach.argmax(axis=1)
     return first, first + reach[np.arange(len(force)), first]
 
 
-def _reach(force: FloatArray, flatness: float) -> NDArray[np.intp]:
+def _reach(levels: Levels, flatness: float) -> NDArray[np.intp]:
     """Return how many samples behind each one are still within the band that begins there."""
-    curves, n = force.shape
-    levels = _levels(force)
+    curves, n = levels[0][0].shape
     reach = np.zeros((curves, n), dtype=np.intp)
     high, low = levels[0][0].copy(), levels[0][1].copy()
     rows, start = np.arange(curves)[:, None], np.arange(n)[None, :]
@@ -191,7 +197,7 @@ def _reach(force: FloatArray, flatness: float) -> NDArray[np.intp]:
     return reach
 
 
-def _levels(force: FloatArray) -> list[tuple[FloatArray, FloatArray]]:
+def _levels(force: FloatArray) -> Levels:
     """Return largest and smallest of 1, 2, 4, ... samples from each on; beyond the end, of what is there."""
     found, size = [(force, force)], 1
     while 2 * size <= force.shape[1]:

@@ -1,0 +1,92 @@
+"""Sweeps with all default metrics: run ``python benchmarks/sweeps_all_metrics.py`` on a quiet machine.
+
+For each family, rows a second of processor time with the family's block model (where it applies) and point by
+point. ``--against PYTHON`` runs the same sweeps with the interpreter of another checkout, in turn with this one, and
+prints how many times as long a sweep takes here; ``--configs DIR`` has specifications that both know.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+HERE = Path(__file__).resolve()
+
+SWEEPS = {
+    "cam": ("cam.yaml", "mechanism.roller_radius=6 mm:10 mm:20", "mechanism.springs.stiffness=0.4 N/mm:1 N/mm:20"),
+    "cam, many": (
+        "cam.yaml", "mechanism.roller_radius=6 mm:10 mm:60",
+        "mechanism.springs.stiffness=0.4 N/mm:1 N/mm:60",
+    ),
+    "vcfm": (
+        "vcfm_ding2022.yaml", "mechanism.bistable.thickness=0.4 mm:0.6 mm:10",
+        "mechanism.positive.thickness=0.8 mm:1 mm:10",
+    ),
+    "slider-crank, torque": (
+        "slider_crank_li2019.yaml", "mechanism.springs.slider_pin=0.3 N*cm/deg:0.9 N*cm/deg:10",
+        "mechanism.springs.slider=0.5 N/cm:2 N/cm:10",
+    ),
+    "slider-crank, force": (
+        "slider_crank_bilancia2019.yaml", "mechanism.springs.crank_pin=0.3 N*cm/deg:0.9 N*cm/deg:10",
+        "mechanism.springs.slider_pin=0.01 N*cm/deg:0.02 N*cm/deg:10",
+    ),
+}  # fmt: skip
+ROUNDS = 3
+
+
+def measured(name: str, configs: Path, singly: bool) -> tuple[float, int, bool]:
+    """Return processor time of a sweep [s], its rows, and whether blocks were used."""
+    import cfmkit
+    from cfmkit.studies import engine
+    from cfmkit.studies.sweep import Request, outputs, prepare, summary_of
+    from cfmkit.studies.variation import wish
+
+    file, *vary = SWEEPS[name]
+    work = prepare(cfmkit.load(configs / file), Request(vary=tuple(wish(one) for one in vary)))
+    if singly:
+        engine.vectorised = lambda *_: False
+    start = time.process_time()
+    records = engine.run(work)
+    b"".join(dict(outputs(records, summary_of(records)))["results.csv"])
+    return time.process_time() - start, len(work.plan), work.vectorised
+
+
+def child(python: str, name: str, configs: Path, singly: bool) -> tuple[float, int, bool]:
+    """Return `measured` by a process of its own: the shorter of two runs, the first of which also imports."""
+    request = json.dumps([name, str(configs), singly])
+    told = subprocess.run([python, HERE, "--one", request], capture_output=True, text=True, check=True).stdout
+    seconds, rows, blocks = json.loads(told)
+    return seconds, rows, blocks
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__.partition(":")[0])
+    parser.add_argument("--against", metavar="PYTHON", help="interpreter of another checkout")
+    parser.add_argument("--configs", type=Path, default=HERE.parents[1] / "configs")
+    parser.add_argument("--one", help=argparse.SUPPRESS)
+    given = parser.parse_args()
+    if given.one:
+        name, configs, singly = json.loads(given.one)
+        print(json.dumps(min(measured(name, Path(configs), singly) for _ in range(2))))
+        return
+    print(f"{'sweep':<24}{'rows':>6}{'block':>14}{'singly':>14}{'against':>10}")
+    for name in SWEEPS:
+        here, there = [], []
+        for _ in range(ROUNDS):
+            here.append(child(sys.executable, name, given.configs, False))
+            if given.against:
+                there.append(child(given.against, name, given.configs, False))
+        alone = child(sys.executable, name, given.configs, True)
+        seconds, rows, blocks = min(here)
+        block = f"{rows / seconds:.0f} rows/s" if blocks else "none"
+        ratio = f"{seconds / min(there)[0]:.2f}" if there else ""
+        print(f"{name:<24}{rows:>6}{block:>14}{rows / alone[0]:>7.0f} rows/s{ratio:>10}", flush=True)
+
+
+if __name__ == "__main__":
+    main()
