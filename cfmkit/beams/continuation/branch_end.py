@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from cfmkit.curves import FloatArray
 
 BEFORE_END = 1e-4  # share of the drive's range by which the end of a branch is passed over
-_LEGS = 60
+_LEGS = 60  # changes of stability ahead that are looked through, as many as decisions on a path
 _MARKS = 25  # places at most where the path that was left is looked at
 _BACK = 0.01  # share of the range in one step where the end of a branch is looked for backwards
 _CLEAR = 0.01  # share of the drive's range behind the end of a branch where nothing leads back onto it

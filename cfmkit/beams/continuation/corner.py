@@ -1,4 +1,8 @@
-"""Corners of a path at its bifurcations: the error of integration rounds them off, too sharply to be followed."""
+"""Corners of a path at a bifurcation that two meshes put on different sides of a point: too sharp to be followed.
+
+A column of pieces with a point asked for at its critical load is led past it, unstable, and stalls: the path is taken
+back to well before, where both meshes agree, and led across.
+"""
 
 from __future__ import annotations
 

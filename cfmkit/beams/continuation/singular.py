@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from cfmkit.beams.equilibrium.expanded import ExpandedSolver
     from cfmkit.curves import FloatArray
 
-_SEARCHES = 40
+_SEARCHES = 40  # solutions in which a bracket is closed at most: halving alone would take forty to 1e-12 of it
 _CLOSE = 1e-4  # share of the determinant at the ends that is near enough to interpolate the rest: the smallest,
 _LOOSE = 10.0  # and in units of the tolerance
 _HUGE = 700.0  # logarithm of a number that is not too large

@@ -62,7 +62,11 @@ class Problem:
 
     @cached_property
     def fine(self) -> ExpandedSolver:
-        """The same segments with more steps and nothing condensed: singular points are seen in full, and exactly."""
+        """The same segments with more steps and nothing condensed: singular points are seen in full, and exactly.
+
+        Points may be asked for exactly at a bifurcation. Its place on the mesh that is marched on is only as exact as
+        the tolerance: located there, ten of a thousand paths through such points come to lie on the wrong side.
+        """
         tolerance = 0.0 if self.first_only else self.control.tolerance
         whole = next(steps for limit, steps in _FINE_STEPS if tolerance >= limit)
         steps = max(-(-whole // self.mesh.segments), 2 * self.mesh.steps)

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from cfmkit.beams.equilibrium.expanded import ExpandedSolver
     from cfmkit.beams.equilibrium.solver import Spot
 
-_STEPS = 100
+_STEPS = 100  # on the way down at most: ten of the longest go as far as is near, the first ones are short
 _KICK, _LONGEST = 1e-3, 0.05  # first and longest step along one mode [rad]
 _FAR = 0.5  # change of a pose behind which an equilibrium is no more nearby [rad]
 _STILL = 1e-6  # step to an equilibrium from where Newton's method gets there [rad]
