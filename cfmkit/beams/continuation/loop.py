@@ -98,7 +98,7 @@ def _complete(problem: Problem, move: Resume) -> bool:
 
 def _named(problem: Problem, trail: Trail) -> Trail:
     """Return a path with the end of its last branch, where it was stepped over or is known from behind only."""
-    if trail.ending.too_long or trail.closed or not trail.stretch.natural or set(trail.branches) <= {PRIMARY}:
+    if trail.closed or trail.ending.too_long or not trail.stretch.natural or set(trail.branches) <= {PRIMARY}:
         return trail
     closed = branch_end.closed_behind(problem, trail)
     if closed is not None:

@@ -219,7 +219,7 @@ class Trail:
         none = Points.none(problem.solver.size)
         return cls(problem.solver, Stretch(problem.values), none, branch=branch, closed=branch == PRIMARY)
 
-    @property
+    @cached_property
     def asked(self) -> int:
         """Number of points asked for that are done."""
         done = self.points.asked[self.stretch.begun :]

@@ -153,4 +153,6 @@ def first_mesh(layout: Layout, tolerance: float) -> Mesh:
         mesh = Mesh(3 if tolerance < 2e-5 and layout.bundle.curved else 2, 1)
     else:
         mesh = Mesh(2, 2 if tolerance >= 1e-7 else 4)
+    if not layout.bundle.others:  # coils are none of the plain beams
+        return mesh
     return replace(mesh, steps=max(mesh.steps, ceil(layout.turn / (mesh.segments * _COILED))))
