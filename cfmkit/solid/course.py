@@ -24,8 +24,13 @@ SMALLEST = 2.0**-12
 """Smallest step, in parts of the whole travel: a bifurcation's place is then known to 2.5e-4 of the travel."""
 STRAY = 0.5
 """Largest correction, in parts of the step: on one branch it shrinks with the step's square."""
+SOFTLY = 1e-3
+"""Corrections below this part of the part's size count as small: next to a bifurcation rounding is amplified along the
+soft mode beyond any short step."""
 GROWTH = 2.0
 """Of the step after one that was easy."""
+CORNER = 0.3
+"""Change of the stiffness, in parts of the larger one, that no smooth curve makes within a few smallest steps."""
 PUSHES = np.geomspace(1e-4, 0.1, 13)
 """Amplitudes along the softest mode, in parts of the part's size: a branch leaves its bifurcation like a root."""
 BEYOND = (2.0, 8.0, 32.0)
@@ -53,7 +58,7 @@ class Course:
     Attributes
     ----------
     poses : tuple of Balance
-        The requested ones as far as they were reached, those at bifurcations and the last one.
+        The requested ones as far as they were reached, and those on the way where steps were cut; without factors.
     ending : Ending
     bifurcations : tuple of float
         Travels at which another branch was taken [m or rad].
@@ -92,27 +97,33 @@ def follow(problem: Problem, stops: Sequence[float], report: Callable[[float], N
     if start is None:
         return Course((), Ending.NO_START)
     span = stops[-1] - stops[0]
-    course, state, step = Course((start,), Ending.COMPLETE), start, stops[1] - stops[0]
+    course, state, step = Course((start.kept(),), Ending.COMPLETE), start, stops[1] - stops[0]
     for stop in stops[1:]:
         while state.travel != stop:
             ahead = stop if abs(stop - state.travel) <= abs(step) * (1 + 1e-9) else state.travel + step
             found = advanced(problem, state, ahead)
             if found is not None and found.unstable <= state.unstable:
                 step = GROWTH * (ahead - state.travel)
-                state = found
             elif abs(ahead - state.travel) > SMALLEST * abs(span):
                 step = 0.5 * (ahead - state.travel)
+                continue
             else:
-                branch = None if found is None else switched(problem, state, SMALLEST * span, stop)
-                if branch is None:
-                    return replace(course, poses=(*course.poses, state), ending=_ending(start, state, found))
-                course = replace(
-                    course, poses=(*course.poses, state, branch), bifurcations=(*course.bifurcations, state.travel)
-                )
-                state, step = branch, SMALLEST * span
+                beyond = found
+                found = None if beyond is None else switched(problem, state, SMALLEST * span, stop)
+                step = SMALLEST * span
+                if found is None:
+                    return replace(course, ending=_ending(start, state, beyond))
+            if bends(state, found, 8 * SMALLEST * abs(span)):
+                course = replace(course, bifurcations=(*course.bifurcations, state.travel))
+            course, state = replace(course, poses=(*course.poses, found.kept())), found
             report((state.travel - stops[0]) / span)
-        course = replace(course, poses=(*course.poses, state))
-    return replace(course, poses=_distinct(course.poses))
+    return course
+
+
+def bends(state: Balance, found: Balance, short: float) -> bool:
+    """Tell whether the curve has a corner between two poses: another stiffness within a short way [m or rad]."""
+    largest = max(abs(state.stiffness), abs(found.stiffness))
+    return abs(found.travel - state.travel) <= short and abs(found.stiffness - state.stiffness) > CORNER * largest
 
 
 def advanced(problem: Problem, state: Balance, travel: float) -> Balance | None:
@@ -121,12 +132,14 @@ def advanced(problem: Problem, state: Balance, travel: float) -> Balance | None:
     found = problem.solve(state.unknowns + predicted, travel)
     if found is None:
         return None
-    correction = float(np.linalg.norm(found.unknowns - state.unknowns - predicted))
-    return found if correction <= STRAY * float(np.linalg.norm(predicted)) else None
+    size = float(np.ptp(problem.elements.mesh.nodes, axis=0).max())
+    correction = float(np.abs(found.unknowns - state.unknowns - predicted).max())
+    return found if correction <= STRAY * float(np.abs(predicted).max()) + SOFTLY * size else None
 
 
 def softest(problem: Problem, state: Balance) -> FloatArray:
     """Return the softest mode (q,), by inverse iteration; its largest displacement is 1 m."""
+    assert state.factors is not None  # poses on the way have theirs
     mode = np.random.default_rng(0).standard_normal(problem.supports.size)
     for _ in range(MODE_ROUNDS):
         mode = state.factors.solve(mode / np.linalg.norm(mode))
@@ -167,8 +180,3 @@ def _ending(start: Balance, state: Balance, beyond: Balance | None) -> Ending:
         return Ending.UNSTABLE
     grown = float(np.linalg.norm(state.slope) / np.linalg.norm(start.slope))
     return Ending.LIMIT_POINT if grown > SOFT else Ending.LOST
-
-
-def _distinct(poses: tuple[Balance, ...]) -> tuple[Balance, ...]:
-    """Return the poses without those that stand at one travel twice."""
-    return tuple(pose for i, pose in enumerate(poses) if i == 0 or pose.travel != poses[i - 1].travel)

@@ -190,6 +190,36 @@ class Elements:
         np.maximum.at(spread, nodes, equivalent(each - mean[:, nodes]))
         return mean, spread
 
+    def along_edges(self, moved: FloatArray, held: NDArray[np.bool_]) -> tuple[FloatArray, FloatArray]:
+        """Return Cauchy's stress along the free edges.
+
+        On a free edge nothing acts across, so the stress along it is all there is.
+
+        Parameters
+        ----------
+        moved : (n, 2) array
+            Displacements [m].
+        held : (n,) array of bool
+            Nodes that are no free edge.
+
+        Returns
+        -------
+        stress : (k,) array
+            Along the edge at the nodes of the boundary, positive in tension [Pa].
+        nodes : (k,) array of int
+        """
+        mean, _ = self.stress(moved)
+        edges = self.mesh.edges[~held[self.mesh.edges].any(axis=1)]
+        a, b, m = (self.mesh.nodes + moved)[edges].swapaxes(0, 1)
+        found, nodes = [], []
+        # slopes of the parabola through the three nodes, at its first, last and middle one
+        for column, along in ((0, 4 * m - 3 * a - b), (1, 3 * b + a - 4 * m), (2, b - a)):
+            c, s = (along / np.hypot(*along.T)[:, None]).T
+            xx, yy, xy = mean[:, edges[:, column]]
+            found.append(c * c * xx + s * s * yy + 2 * c * s * xy)
+            nodes.append(edges[:, column])
+        return np.concatenate(found), np.concatenate(nodes)
+
 
 def equivalent(stress: FloatArray) -> FloatArray:
     """Return von Mises' equivalent (k,) [Pa] of plane stresses (3, k); on a free edge it is the stress along it."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -43,7 +43,7 @@ class Balance:
         Number of directions in which the part moves on by itself, the drive held.
     slope : (q,) array
         Of the unknowns along the path, per unit of travel.
-    factors : object
+    factors : Factors or None
         Of the tangent.
     """
 
@@ -53,7 +53,11 @@ class Balance:
     stiffness: float
     unstable: int
     slope: FloatArray
-    factors: Factors
+    factors: Factors | None
+
+    def kept(self) -> Balance:
+        """Return the same without the factors, which take a hundred times the room of all the rest."""
+        return replace(self, factors=None)
 
 
 @dataclass(frozen=True)

@@ -111,5 +111,8 @@ class NeoHookean:
         return stress, tangent, np.sqrt(c33)
 
 
-LAWS = {"st-venant-kirchhoff": SaintVenantKirchhoff, "neo-hookean": NeoHookean}
+LAWS: dict[str, type[SaintVenantKirchhoff | NeoHookean]] = {
+    "st-venant-kirchhoff": SaintVenantKirchhoff,
+    "neo-hookean": NeoHookean,
+}
 """By the words of `material.law`."""

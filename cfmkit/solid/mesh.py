@@ -19,7 +19,7 @@ from scipy.spatial import Delaunay, cKDTree
 
 from cfmkit.curves import read_only
 from cfmkit.errors import GeometryError
-from cfmkit.solid.boundary import Ring, Sizes, sizes
+from cfmkit.solid.boundary import GRADING, Ring, Sizes, sizes
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -117,7 +117,7 @@ def mesh(
     kept_from = Room(field, sewn)
     inside = kept_from(_thrown(region, field, np.random.default_rng(seed)))
     if 4 * (len(inside) + len(fixed)) > MOST_NODES:  # a node in the middle of each side: three to a corner
-        raise GeometryError(f"the mesh would have {4 * (len(inside) + len(fixed)):.1g} nodes: allow larger elements")
+        raise _too_many(4 * (len(inside) + len(fixed)))
     inside = _relaxed(region, kept_from, np.concatenate([fixed, sewn]), inside)
     for _ in range(HALVINGS):
         fixed = np.concatenate([ring.at(arc) for ring, arc in zip(rings, laid, strict=True)])
@@ -173,18 +173,42 @@ def _thrown(region: Any, field: Sizes, random: np.random.Generator) -> FloatArra
     from shapely import contains_xy
 
     least = float(field.sizes.min())
-    x0, y0, x1, y1 = region.bounds
-    found = []
+    found = [np.zeros((0, 2))]
     for size in least * 2.0 ** np.arange(int(np.ceil(np.log2(field.largest / least))) + 1):
         # one lattice for each octave of sizes, so that nothing is thinned to less than a quarter
-        x, y = np.meshgrid(np.arange(x0, x1 + size, size), np.arange(y0, y1 + size, size * np.sqrt(0.75)))
-        x[1::2] += 0.5 * size
-        points = np.column_stack([x.ravel(), y.ravel()])
+        points = _lattice(region.bounds, field, size)
         points = points[contains_xy(region, points)]
         wanted = field(points)
         kept = (wanted >= size) & (wanted < 2 * size) & (random.random(len(points)) < (size / wanted) ** 2)
         found.append(points[kept])
+        if 4 * sum(map(len, found)) > MOST_NODES:
+            raise _too_many(4 * sum(map(len, found)))
     return np.concatenate(found)
+
+
+CELL = 16
+"""Side of the cells in which lattices are laid, in sizes: cells where no such size is wanted have none."""
+
+
+def _lattice(bounds: tuple[float, float, float, float], field: Sizes, size: float) -> FloatArray:
+    """Return a lattice of some size (k, 2) [m], wherever sizes below twice that may be wanted."""
+    x0, y0, x1, y1 = bounds
+    side = CELL * size
+    if (x1 - x0) * (y1 - y0) / side**2 > MOST_NODES:
+        raise _too_many(int(CELL**2 * (x1 - x0) * (y1 - y0) / side**2))
+    corner = np.stack(np.meshgrid(np.arange(x0, x1, side), np.arange(y0, y1, side)), -1).reshape(-1, 2)
+    near = field(corner + 0.5 * side) - GRADING * side  # sizes change by that within half a diagonal
+    corner = corner[near < 2 * size]
+    if CELL**2 * len(corner) > 20 * MOST_NODES:  # of them a few lie in the part
+        raise _too_many(CELL**2 * len(corner))
+    rows = round(CELL / np.sqrt(0.75))
+    column, row = np.meshgrid(np.arange(CELL), np.arange(rows))
+    inner = np.column_stack([(column + 0.5 * (row % 2)).ravel() * size, row.ravel() * side / rows])
+    return np.asarray((corner[:, None] + inner).reshape(-1, 2))
+
+
+def _too_many(nodes: int) -> GeometryError:
+    return GeometryError(f"the mesh would have more than {MOST_NODES} nodes ({nodes:.2g}): allow larger elements")
 
 
 def _sewn(region: Any, field: Sizes, seam: FloatArray) -> FloatArray:

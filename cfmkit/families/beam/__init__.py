@@ -15,7 +15,10 @@ FAMILY = Family(
     name="beam",
     summary="a planar network of slender beams in large deflection",
     spec_type=BeamSpec,
-    models=dict.fromkeys(("inextensible", "extensible", "reissner"), analyze),
+    models={
+        **dict.fromkeys(("inextensible", "extensible", "reissner"), analyze),
+        "solid": "cfmkit.families.beam.solid:analyze",
+    },
     design=design,
     search=Search(tables=("starts.csv",)),
     values=DEFINITIONS | SURFACE,

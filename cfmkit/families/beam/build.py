@@ -197,7 +197,7 @@ def _beam(spec: BeamSpec, beam: MemberSpec) -> engine.Beam:
         beam.width or mechanism.width,
         _thickness(beam.thickness or mechanism.thickness),
         axial=spec.fidelity != "inextensible",
-        shear=spec.fidelity == "reissner",
+        shear=spec.fidelity in ("reissner", "solid"),
         poisson_ratio=of.poisson,
     )
     return engine.Beam(
@@ -255,6 +255,6 @@ def _load(load: LoadSpec, share: float = 1.0) -> LoadOn:
 def resolve(spec: BeamSpec) -> BeamSpec:
     """Return the specification with everything derived written out: the model and what counts as stress."""
     fidelity = spec.fidelity
-    switches = {"axial": fidelity != "inextensible", "shear": fidelity == "reissner"}
+    switches = {"axial": fidelity != "inextensible", "shear": fidelity in ("reissner", "solid")}
     analysis = spec.analysis.model_copy(update={"fidelity": fidelity, "stress": spec.stress})
     return spec.model_copy(update={"mechanism": spec.mechanism.model_copy(update=switches), "analysis": analysis})

@@ -32,6 +32,8 @@ FINDINGS = {
     "thick_beam": "a beam is short for its thickness: beam theory is rough",
     "beams_touch": "two beams touch, or cross: contact is not modelled",
     "gap_small": "two beams are closer than can be cut",
+    "sharp_corners": "without fillets the stress in inside corners has no value: it grows as the mesh gets finer",
+    "mesh_coarse": "two meshes of the part differ by more than is wanted",
     "feature_small": "a beam is thinner than can be made",
 }
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -40,6 +41,86 @@ _ON_AXIS = 0.5
 
 SHARE = 0.2
 """Part of the tolerance that each step from the exact edges to the lines of the contour may take; there are four."""
+
+
+@dataclass(frozen=True)
+class Region:
+    """A place of the part that is held or driven and moves as one rigid piece.
+
+    Attributes
+    ----------
+    name : str
+        Of its node; of the mirrored half with a prime.
+    node : str
+    at : (2,) array
+        Where the node is [m].
+    shapes : tuple of (n, 2) arrays
+        Polygons that it covers [m]; a line (2, 2) across a beam where the node is neither a pad nor an eye.
+    seams : tuple of (2, 2) arrays
+        Lines at which it begins [m].
+    """
+
+    name: str
+    node: str
+    at: FloatArray
+    shapes: tuple[FloatArray, ...]
+    seams: tuple[FloatArray, ...] = ()
+
+
+def regions(spec: BeamSpec, tolerance: float = TOLERANCE) -> tuple[Region, ...]:
+    """Return where the part of `drawing` is held and driven: pads from the root plane on, the holes of eyes.
+
+    Parameters
+    ----------
+    spec : BeamSpec
+        Whose part is drawn.
+    tolerance : float
+        As for `drawing` [m].
+    """
+    assembly = assemble(spec)
+    network = assembly.network
+    fits = Layout(network, assembly.drive()).fits
+    beams = {name: strips(network, fits, name, SHARE * tolerance) for name in network.beams}
+    axis = mirror_axis(assembly)
+    moving = {assembly.driven, spec.mechanism.drive.node}
+    bars = _bars(assembly, beams, *axis) if axis is not None else []
+    found = []
+    for node, about in network.nodes.items():
+        ends = _ends(assembly, beams, node)
+        held = about.support.along or about.support.across or about.support.rotation
+        if not ends or not (held or node in moving):
+            continue
+        region = _region(assembly, node, ends, SHARE * tolerance)
+        joined = tuple(bars) if node in moving else ()
+        found.append(replace(region, shapes=(*region.shapes, *joined)))
+        if axis is not None and not _on_axis(assembly, node):
+            found.append(
+                Region(
+                    f"{node}'",
+                    node,
+                    mirrored(region.at[None], *axis)[0],
+                    tuple(mirrored(shape, *axis) for shape in region.shapes),
+                    tuple(mirrored(seam, *axis) for seam in region.seams),
+                )
+            )
+    return tuple(found)
+
+
+def _region(assembly: Assembly, node: str, ends: list[tuple[Strip, bool]], bulge: float) -> Region:
+    """Return the place of the described half at which a node is held or driven."""
+    about = assembly.network.nodes[node]
+    at = np.array([about.x, about.y])
+    if _padded(assembly, node):
+        pads = [_pad(strip, last) for strip, last in ends]
+        return Region(node, node, at, tuple(pads), tuple(pad[:2] for pad in pads))
+    strip, last = ends[0]
+    index = -1 if last else 0
+    size = float(strip.thickness[index])
+    if about.support.across and not about.support.rotation and not _on_axis(assembly, node):
+        return Region(node, node, at, (_disc(strip.points[index], HOLE * size, bulge),))
+    across = np.array([-math.sin(strip.angle[index]), math.cos(strip.angle[index])])
+    line = strip.points[index] + 0.5 * size * np.array([across, -across])
+    return Region(node, node, at, (line,), (line,))
 
 
 def drawing(spec: BeamSpec, tolerance: float = TOLERANCE) -> Drawing:

@@ -28,7 +28,7 @@ from cfmkit.materials.spec import SafetyFactor
 from cfmkit.spec import Analysis, Displacement, Model, Spec, refuse
 from cfmkit.units import DIMENSIONS, Factor, Force, Length, Ratio, Torque
 
-Fidelity = Literal["inextensible", "extensible", "reissner"]
+Fidelity = Literal["inextensible", "extensible", "reissner", "solid"]
 _EXTENT = {"displacement": "travel", "rotation": "travel", "force": "force", "moment": "moment", "loads": "factor"}
 
 
@@ -115,6 +115,18 @@ class Outputs(Model):
     cross_stiffness: bool = Field(False, description="the stiffness of the driven node across the drive, along the way")
 
 
+class SolidAnalysis(Model):
+    """How the part is solved as a planar solid."""
+
+    poses: int = Field(21, ge=3, le=2000, description="poses that are solved, rest included; cubics lead between them")
+    mesh: PositiveLength | None = Field(
+        None, description="side of an element; default: half the thickness of the thinnest beam"
+    )
+    law: Literal["st-venant-kirchhoff", "neo-hookean"] = Field(
+        "st-venant-kirchhoff", description="how the material answers to large strain"
+    )
+
+
 class BeamAnalysis(Analysis):
     """How a beam mechanism is run."""
 
@@ -125,8 +137,11 @@ class BeamAnalysis(Analysis):
     factor: Factor | None = Field(None, description="to go to, for a drive by loads: so many times what is given")
     reference: Displacement | None = Field(None, description="pose of the band ranges; default: centre of the window")
     fidelity: Fidelity | None = Field(
-        None, description="model: bending only, with stretching, or with shear, too; default: as in the mechanism"
+        None,
+        description="model: bending only, with stretching, with shear, too, or the part as a planar solid; default: as "
+        "in the mechanism",
     )
+    solid: SolidAnalysis = Field(SolidAnalysis(), description="of fidelity 'solid'")
     stress: Literal["bending", "total"] | None = Field(
         None, description="what counts as stress; default: bending where beams do not stretch, else with the axial part"
     )
@@ -195,6 +210,12 @@ class BeamSpec(Spec):
         refuse("BeamSpec", dict.fromkeys([("analysis", "modes")], text) if (text := _no_density(self)) else {})
         return self
 
+    @model_validator(mode="after")
+    def _is_a_part_where_it_is_solid(self) -> Self:
+        found = list(_solid_faults(self)) if self.analysis.fidelity == "solid" else []
+        refuse("BeamSpec", {("analysis", "fidelity"): f"'solid' {'; '.join(found)}"} if found else {})
+        return self
+
     @property
     def fidelity(self) -> Fidelity:
         """The model that the analysis uses."""
@@ -259,6 +280,32 @@ def _output_faults(spec: BeamSpec) -> Iterator[tuple[tuple[str | int, ...], str]
         for beam in mechanism.beams:
             if name == f"{beam}_force":
                 yield ("nodes",), f"the columns of {name!r} would have the names of those of the beam {beam!r}"
+
+
+def _solid_faults(spec: BeamSpec) -> Iterator[str]:
+    """Yield what the model of the part as a solid cannot do."""
+    mechanism, analysis = spec.mechanism, spec.analysis
+    if mechanism.drive.kind not in ("displacement", "rotation"):
+        yield "needs a drive of kind 'displacement' or 'rotation'"
+    things: dict[str, object] = {"springs": mechanism.springs, "loads": mechanism.loads}
+    things["nodes that are moved"] = [name for name, node in mechanism.nodes.items() if node.moved is not None]
+    things["pins between beams"] = [
+        name for name, beam in mechanism.beams.items() if "pin" in (beam.start_joint, beam.end_joint)
+    ]
+    things["analysis.modes"], things["analysis.surface"] = analysis.modes, analysis.surface
+    things["analysis.outputs"] = analysis.outputs.nodes or analysis.outputs.reactions
+    things["analysis.imperfection"] = analysis.imperfection
+    things["analysis.through_folds"] = analysis.through_folds
+    things["copies.layers"] = mechanism.copies is not None and mechanism.copies.layers > 1
+    unknown = [name for name, thing in things.items() if thing]
+    if unknown:
+        yield f"does not know {', '.join(unknown)}"
+    if mechanism.closure == "raw":
+        yield "needs beams that end at their nodes: closure 'rotscale' or 'chain'"
+    if len({beam.material or mechanism.material for beam in mechanism.beams.values()}) > 1:
+        yield "needs one material for all beams"
+    if len({beam.width or mechanism.width for beam in mechanism.beams.values()}) > 1:
+        yield "needs one width for all beams"
 
 
 def _no_density(spec: BeamSpec) -> str:

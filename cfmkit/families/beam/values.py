@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -15,9 +15,44 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from cfmkit.curves import FloatArray
+    from cfmkit.families.beam.build import Assembly
     from cfmkit.families.beam.model import Solution
+    from cfmkit.families.beam.spec import BeamSpec
 
 BAND = 0.05
+
+
+class OnCurve(Protocol):
+    """What a solved mechanism of any model knows at the points of its curve."""
+
+    @property
+    def spec(self) -> BeamSpec:
+        """The specification."""
+
+    @property
+    def assembly(self) -> Assembly:
+        """The network and what is done to it."""
+
+    @property
+    def motion(self) -> FloatArray:
+        """Displacement or rotation along the drive (n,) [m or rad]."""
+
+    @property
+    def effort(self) -> FloatArray:
+        """Force or torque of all copies (n,) [N or N m]."""
+
+    @property
+    def stress(self) -> FloatArray:
+        """The largest stress (n,) [Pa]."""
+
+    @property
+    def stresses(self) -> Mapping[str, tuple[FloatArray, FloatArray]]:
+        """Of each beam, or of the part, the largest stress (n,) [Pa] and its place."""
+
+    @property
+    def accurate(self) -> Any:
+        """Whether each point reaches the tolerance, (n,)."""
+
 
 DEFINITIONS = {
     "nominal_force": ("force", "F_d: force at d, the end of the window or of the travel [Lan, sec. 2]"),
@@ -56,6 +91,10 @@ DEFINITIONS = {
     ),
     "frequency_held_min": ("frequency", "lowest natural frequency in the window while the drive is held"),
     "frequency_free_min": ("frequency", "lowest natural frequency in the window under the force that the drive has"),
+    "peak_stress_x": ("length", "of the largest stress in the window, in the part before any load, as drawn"),
+    "peak_stress_y": ("length", "of the same"),
+    "mesh_force_difference": ("ratio", "largest difference of the force between two meshes, of the largest force"),
+    "mesh_stress_difference": ("ratio", "difference of the largest stress between two meshes, of the finer one's"),
     "strain_energy_max": ("energy", "largest strain energy on the path, of all copies"),
 }
 
@@ -75,13 +114,13 @@ def values_of(solution: Solution) -> Mapping[str, Quantity]:
     }
     if solution.spec.mechanism.drive.kind in ("displacement", "force", "loads"):
         numbers["travel_end"] = float(solution.motion[-1])
-        numbers |= _extremes(solution) | _events(solution)
+        numbers |= extremes(solution) | _events(solution)
     if solution.spec.mechanism.drive.kind == "displacement":
         numbers |= ranges(solution)
     return {name: Quantity(value, *DEFINITIONS[name]) for name, value in numbers.items()}
 
 
-def window_of(solution: Solution) -> tuple[float, float]:
+def window_of(solution: OnCurve) -> tuple[float, float]:
     """Return the window of the analysis in places, or the whole travel."""
     window = solution.spec.analysis.window
     if window is not None:
@@ -89,20 +128,20 @@ def window_of(solution: Solution) -> tuple[float, float]:
     return float(solution.motion.min()), float(solution.motion.max())
 
 
-def travel_of(solution: Solution) -> tuple[float, float]:
+def travel_of(solution: OnCurve) -> tuple[float, float]:
     """Return where the motion was to start and to end; of a drive by a load, where it did [m or rad]."""
     start, end = float(solution.motion[0]), float(solution.motion[-1])
     return start, solution.spec.extent if solution.spec.analysis.travel is not None else end
 
 
-def within(solution: Solution, low: float, high: float) -> Any:
+def within(solution: OnCurve, low: float, high: float) -> Any:
     """Tell which accurate points of the curve are in a window."""
     x = solution.motion
     slack = 1e-12 * float(np.abs(x).max())
     return (x >= low - slack) & (x <= high + slack) & solution.accurate
 
 
-def ranges(solution: Solution) -> dict[str, float | None]:
+def ranges(solution: OnCurve) -> dict[str, float | None]:
     """Return what Lan says about the range that ends at d; nothing on a curve that turns back."""
     x, force, stress = solution.motion, solution.effort, solution.stress
     end = window_of(solution)[1]
@@ -218,7 +257,7 @@ def _significant(values: FloatArray, error: float) -> float:
     return 0.0 if abs(first) <= 10 * error * float(np.nanmax(np.abs(values))) else first
 
 
-def _extremes(solution: Solution) -> dict[str, float | None]:
+def extremes(solution: OnCurve) -> dict[str, float | None]:
     """Return the first local maximum of the force and the minimum after it, on a curve that does not turn back."""
     names = ("peak_displacement", "peak_force", "valley_displacement", "valley_force")
     x, force = solution.motion, solution.effort

@@ -1,0 +1,360 @@
+"""The part as it is drawn, as a planar solid: what nodes, fillets and pads change against beams.
+
+Assumes: plane stress; pads and what joins the moving pads of two halves are rigid from the root plane on, as in the
+model of beams; an eye turns about its hole as one piece. No contact, no plasticity.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.curves import Column, Curve, read_only
+from cfmkit.errors import GeometryError
+from cfmkit.families.beam.build import assemble, mirror_axis, resolve, thinnest_of
+from cfmkit.families.beam.findings import finding
+from cfmkit.families.beam.outline import drawing, regions
+from cfmkit.families.beam.parts.spec import PartSpec
+from cfmkit.families.beam.values import DEFINITIONS, extremes, ranges
+from cfmkit.results import Quantity, Result, Status
+from cfmkit.units import between, format_short
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Mapping
+
+    from numpy.typing import NDArray
+
+    from cfmkit.curves import FloatArray, Kind
+    from cfmkit.families.base import Run
+    from cfmkit.families.beam.build import Assembly
+    from cfmkit.families.beam.outline import Region
+    from cfmkit.families.beam.spec import BeamSpec
+    from cfmkit.geometry import Contour
+    from cfmkit.results import Finding
+    from cfmkit.solid.course import Course
+    from cfmkit.solid.equilibrium import Problem
+    from cfmkit.solid.supports import Group
+
+ACROSS, SHARE = 2.5, 0.2
+"""Elements across the thinnest beam, and side of an element on a fillet in radii, of the finer mesh: the force of Lan's
+part at 2 mm is then within 3e-4 of that of elements of 0.6 times the size (4.94735 N)."""
+COARSER = 1.5
+"""Sides of the coarser mesh in those of the finer one: half as many nodes, so that the check costs a third more."""
+ON = 5e-6
+"""Nodes nearer to a pad or a hole than this belong to it [m]: outlines are drawn within that."""
+FORCE_APART, STRESS_APART = 2e-3, 0.05
+"""Differences of two meshes from which on they are called coarse: a tenth of what parts differ from beams by."""
+
+
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """One mesh of the part, followed over the travel.
+
+    Attributes
+    ----------
+    problem : Problem
+    course : Course
+    held : (n,) array of bool
+        Nodes of pads and holes.
+    """
+
+    problem: Problem
+    course: Course
+    held: NDArray[np.bool_]
+
+    @cached_property
+    def peaks(self) -> tuple[FloatArray, FloatArray]:
+        """Largest stress along a free edge at each pose (k,) [Pa], and where in the unloaded part (k, 2) [m]."""
+        stresses, places = [], []
+        for pose in self.course.poses:
+            stress, nodes = self.problem.elements.along_edges(self.moved(pose), self.held)
+            worst = int(np.abs(stress).argmax())
+            stresses.append(abs(float(stress[worst])))
+            places.append(self.problem.elements.mesh.nodes[nodes[worst]])
+        return read_only(stresses), read_only(places)
+
+    def moved(self, pose: Any) -> FloatArray:
+        """Return the displacements of all nodes at a pose (n, 2) [m]."""
+        return self.problem.supports.displaced(pose.unknowns, pose.travel)
+
+
+@dataclass(frozen=True, eq=False)
+class SolidSolution:
+    """A part that was solved on two meshes.
+
+    Attributes
+    ----------
+    assembly : Assembly
+        The network that the part is drawn from.
+    fine, coarse : Solved
+        The finer mesh, whose values are reported, and the one that it is compared with.
+    motion : (n,) array
+        Travel of the points of the curve [m or rad].
+    """
+
+    assembly: Assembly
+    fine: Solved
+    coarse: Solved
+    motion: FloatArray = field(default_factory=lambda: np.zeros(0))
+
+    @property
+    def spec(self) -> BeamSpec:
+        """The specification."""
+        return self.assembly.spec
+
+    @property
+    def copies(self) -> int:
+        """How many of the drawn part act side by side."""
+        copies = self.spec.mechanism.copies
+        return copies.legs if copies is not None else 1
+
+    @cached_property
+    def effort(self) -> FloatArray:
+        """Force [N] or torque [N m] at the points of the curve, of all parts: cubics between the poses."""
+        return read_only(self.copies * self.fine.course.effort(self.motion))
+
+    @cached_property
+    def accurate(self) -> NDArray[np.bool_]:
+        """Every point of the curve: no pose is kept that did not converge."""
+        return np.ones(len(self.motion), bool)
+
+    @cached_property
+    def stress(self) -> FloatArray:
+        """Largest stress along a free edge [Pa]; between poses by cubics that stay between their values."""
+        from scipy.interpolate import PchipInterpolator
+
+        return read_only(PchipInterpolator(self.fine.course.travel, self.fine.peaks[0])(self.motion))
+
+    @property
+    def stresses(self) -> Mapping[str, tuple[FloatArray, FloatArray]]:
+        """The same, by part."""
+        return {"part": (self.stress, np.zeros_like(self.stress))}
+
+    @cached_property
+    def differences(self) -> tuple[float, float]:
+        """Of force and of largest stress, between the meshes, in parts of the finer one's largest."""
+        last = min(self.fine.course.travel[-1], self.coarse.course.travel[-1])
+        poses = self.fine.course.travel[self.fine.course.travel <= last]
+        force, other = (one.course.effort(poses) for one in (self.fine, self.coarse))
+        peaks = [float(one.peaks[0][one.course.travel <= last].max()) for one in (self.fine, self.coarse)]
+        largest = float(np.abs(force).max())
+        apart = float(np.abs(force - other).max()) / largest if largest else 0.0
+        return apart, abs(peaks[1] / peaks[0] - 1) if peaks[0] else 0.0
+
+
+def analyze(spec: BeamSpec, run: Run) -> Result:
+    """Return the force-displacement curve of the part as drawn, with everything that is wrong with it.
+
+    Parameters
+    ----------
+    spec : BeamSpec
+        The mechanism; of drives, a displacement or a rotation.
+    run : Run
+        Its progress is reported.
+
+    Returns
+    -------
+    Result
+        PARTIAL if the path ends before the travel, NO_EQUILIBRIUM if there is no first pose.
+    """
+    from cfmkit.solid.course import Ending
+
+    assembly = assemble(spec)
+    size = spec.analysis.solid.mesh or _thinnest(assembly) / ACROSS
+    try:
+        coarse = _solved(spec, assembly, COARSER * size, lambda share: run.progress(0.35 * share, "coarser mesh"))
+        fine = _solved(spec, assembly, size, lambda share: run.progress(0.35 + 0.65 * share, "finer mesh"))
+    except GeometryError as error:
+        message = f"the part cannot be meshed: {error}; look at analysis.solid.mesh and mechanism.part"
+        return Result(resolve(spec), Status.NO_EQUILIBRIUM, message)
+    if min(len(one.course.poses) for one in (fine, coarse)) < 2:
+        return Result(resolve(spec), Status.NO_EQUILIBRIUM, f"no curve: {fine.course.ending.value}")
+    asked = np.linspace(0.0, spec.extent, spec.analysis.points)
+    forwards = np.sign(spec.extent)
+    reached = forwards * asked <= forwards * fine.course.travel[-1] * (1 + 1e-12)
+    solution = SolidSolution(assembly, fine, coarse, read_only(asked[reached]))
+    complete = fine.course.ending is Ending.COMPLETE
+    return Result(
+        spec=resolve(spec),
+        status=Status.COMPLETE if complete else Status.PARTIAL,
+        message="" if complete else _ended(solution),
+        curves=(_curve(solution),),
+        values=_values(solution),
+        warnings=tuple(_findings(solution)),
+        travel=(0.0, spec.extent),
+        reference=None if spec.analysis.reference is None else float(spec.analysis.reference),
+        allowable_stress=assembly.allowable_stress,
+        state=solution,
+    )
+
+
+def _solved(spec: BeamSpec, assembly: Assembly, size: float, report: Callable[[float], None]) -> Solved:
+    """Return the part meshed with elements of a size [m] and followed over the travel."""
+    from cfmkit.solid.boundary import Ring
+    from cfmkit.solid.course import follow
+    from cfmkit.solid.elements import Elements
+    from cfmkit.solid.equilibrium import Problem
+    from cfmkit.solid.law import LAWS
+    from cfmkit.solid.mesh import mesh
+    from cfmkit.solid.supports import Supports
+
+    part = [contour for contour in drawing(spec).contours if contour.layer == "cut"]
+    rings = tuple(Ring.of(_vertices(one), one.hole) for one in part)
+    places = regions(spec)
+    share = SHARE * size / (_thinnest(assembly) / ACROSS)
+    grid = mesh(rings, size, share, seams=[seam for place in places for seam in place.seams])
+    groups, held = _groups(assembly, grid.nodes, places)
+    beam = next(iter(spec.mechanism.beams.values()))
+    material, width = beam.material or spec.mechanism.material, beam.width or spec.mechanism.width
+    law = LAWS[spec.analysis.solid.law](material.modulus, material.poisson)
+    elements = Elements(grid, law, np.full(len(grid.triangles), width)).without(held)
+    problem = Problem(elements, Supports(grid.nodes, groups))
+    return Solved(problem, follow(problem, _stops(spec), report), held)
+
+
+def _vertices(contour: Contour) -> FloatArray:
+    """Return the points (n, 2) [m] of a contour of straight edges."""
+    starts = np.array([edge.ends[0] for edge in contour.edges])
+    return np.column_stack([starts.real, starts.imag])
+
+
+def _thinnest(assembly: Assembly) -> float:
+    return min(thinnest_of(beam.section) for beam in assembly.network.beams.values())
+
+
+def _stops(spec: BeamSpec) -> list[float]:
+    """Return the travels to solve for [m or rad]: even ones, and the ends of every window."""
+    end = spec.extent
+    windows = [spec.analysis.window, *(one.over for one in spec.requirements)]
+    ends = [place for window in windows if window is not None for place in between(window, (0.0, end))]
+    inside = [place for place in ends if 0.0 < place / end < 1.0]
+    even = np.linspace(0.0, end, spec.analysis.solid.poses)
+    found = np.unique(np.concatenate([even, inside]))
+    # ends of windows that are an even pose but for rounding are that pose
+    near = np.abs(np.diff(found)) < 1e-9 * abs(end)
+    return [float(place) for place in np.delete(found, np.flatnonzero(near) + 1)[:: 1 if end > 0 else -1]]
+
+
+def _groups(
+    assembly: Assembly, nodes: FloatArray, places: tuple[Region, ...]
+) -> tuple[tuple[Group, ...], NDArray[np.bool_]]:
+    """Return the groups of nodes that are held or driven, and which nodes are in one."""
+    from shapely import LineString, Polygon, distance, points, union_all
+
+    from cfmkit.solid.supports import Group
+
+    taken, at = np.zeros(len(nodes), bool), points(nodes)
+    found: list[Group] = []
+    for place in places:
+        covered = union_all([Polygon(one) if len(one) > 2 else LineString(one) for one in place.shapes])
+        inside = np.flatnonzero((distance(covered, at) <= ON) & ~taken)
+        if len(inside):
+            found.append(Group(place.name, inside, place.at, *_motions(assembly, place)))
+            taken[inside] = True
+        elif not any(one.name == place.node for one in found):
+            raise GeometryError(f"no node of the mesh lies where {place.name} is held")
+    return tuple(found), taken
+
+
+def _motions(assembly: Assembly, place: Region) -> tuple[FloatArray, FloatArray]:
+    """Return how a region is driven, (3,), and which motions it is free in, (3, f)."""
+    about = assembly.network.nodes[place.node].support
+    flip = place.name != place.node
+    direction = about.direction
+    if flip and (axis := mirror_axis(assembly)) is not None:
+        direction = 2 * axis[1] - direction
+    driven = np.zeros(3)
+    along, across, turn = about.along, about.across, about.rotation
+    if place.node == assembly.driven:
+        if assembly.spec.mechanism.drive.kind == "rotation":
+            driven[2], turn = (-1.0 if flip else 1.0), True
+        else:
+            direction, along = assembly.direction, True
+            driven[:2] = np.cos(direction), np.sin(direction)
+    c, s = np.cos(direction), np.sin(direction)
+    ways = ((along, (c, s, 0.0)), (across, (-s, c, 0.0)), (turn, (0.0, 0.0, 1.0)))
+    return driven, np.array([way for held, way in ways if not held]).reshape(-1, 3).T
+
+
+def _ended(solution: SolidSolution) -> str:
+    course = solution.fine.course
+    where = format_short(float(course.travel[-1]), "angle" if _turns(solution.spec) else "length")
+    return f"{course.ending.value}, at {where}"
+
+
+def _turns(spec: BeamSpec) -> bool:
+    return spec.mechanism.drive.kind == "rotation"
+
+
+def _curve(solution: SolidSolution) -> Curve:
+    course, motion = solution.fine.course, solution.motion
+    solved = np.isclose(motion[:, None], course.travel, rtol=0, atol=1e-9 * abs(solution.spec.extent)).any(axis=1)
+    stable = np.array([pose.unstable == 0 for pose in course.poses])
+    before = np.clip(np.searchsorted(np.abs(course.travel), np.abs(motion) * (1 + 1e-12)) - 1, 0, None)
+    extra = {
+        "max_stress": Column(solution.stress, "stress"),
+        "solved": Column(read_only(np.where(solved, "yes", "between"), np.str_), "text"),
+    }
+    kind: Kind = "torque" if _turns(solution.spec) else "force"
+    return Curve(motion, solution.effort, np.repeat(["load"], len(motion)), stable[before], extra, kind)
+
+
+def _values(solution: SolidSolution) -> Mapping[str, Quantity]:
+    """Return the scalar results by name; None where the model does not know a value."""
+    numbers: dict[str, float | None] = dict.fromkeys(DEFINITIONS) | {
+        "allowable_stress": solution.assembly.allowable_stress,
+        "mesh_force_difference": solution.differences[0],
+        "mesh_stress_difference": solution.differences[1],
+        "gap_min": None,
+    }
+    window = solution.spec.analysis.window
+    course = solution.fine.course
+    low, high = (-np.inf, np.inf) if window is None else between(window, (0.0, solution.spec.extent))
+    slack = 1e-9 * abs(solution.spec.extent)
+    inside = np.flatnonzero((course.travel >= low - slack) & (course.travel <= high + slack))
+    if len(inside):
+        worst = inside[solution.fine.peaks[0][inside].argmax()]
+        numbers["peak_stress_x"], numbers["peak_stress_y"] = solution.fine.peaks[1][worst].tolist()
+    if not _turns(solution.spec):
+        numbers |= {"travel_end": float(solution.motion[-1])} | extremes(solution) | ranges(solution)
+    return {name: Quantity(value, *DEFINITIONS[name]) for name, value in numbers.items()}
+
+
+def _findings(solution: SolidSolution) -> Iterator[Finding]:
+    spec, course = solution.spec, solution.fine.course
+    if course.ending.value:
+        yield finding("ends_early", _ended(solution))
+    for place in course.bifurcations:
+        at = format_short(place, "angle" if _turns(spec) else "length")
+        yield finding("bifurcation", f"the part leaves its path at {at} for a stable branch")
+    if (spec.mechanism.part or PartSpec()).fillet == 0:
+        yield finding(
+            "sharp_corners", "without fillets the stress in inside corners has no value", "mechanism.part.fillet=0.5 mm"
+        )
+    force, stress = solution.differences
+    if force > FORCE_APART or stress > STRESS_APART:
+        yield finding(
+            "mesh_coarse",
+            f"two meshes of the part differ by {100 * force:.2g} % in force and {100 * stress:.2g} % in stress: give a "
+            "smaller analysis.solid.mesh",
+        )
+    allowable = solution.assembly.allowable_stress
+    largest = _largest_stress(solution)
+    if allowable is not None and largest > allowable:
+        at = ", ".join(format_short(_values(solution)[f"peak_stress_{axis}"].value or 0.0, "length") for axis in "xy")
+        yield finding(
+            "overstressed",
+            f"the stress reaches {format_short(largest, 'stress')} at ({at}), allowed are "
+            f"{format_short(allowable, 'stress')}",
+        )
+
+
+def _largest_stress(solution: SolidSolution) -> float:
+    """Return the largest stress of the poses in the window [Pa]."""
+    window, course = solution.spec.analysis.window, solution.fine.course
+    low, high = (-np.inf, np.inf) if window is None else between(window, (0.0, solution.spec.extent))
+    inside = (course.travel >= low) & (course.travel <= high)
+    return float(solution.fine.peaks[0][inside].max(initial=0.0))

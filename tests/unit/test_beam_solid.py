@@ -1,0 +1,111 @@
+"""The part of a beam mechanism as a planar solid: numbers of an independent solver, limits, and what is refused."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import cfmkit
+from cfmkit.errors import SpecError
+from cfmkit.results import Result, Status
+
+CONFIGS = Path(__file__).parents[2] / "configs"
+LAN = CONFIGS / "beam_lan2010.yaml"
+
+
+@cache
+def lan(**changes: object) -> Result:
+    """Return Lan's part as a solid: some five seconds, shared by the tests of its numbers."""
+    keys = {f"analysis.solid.{key}": value for key, value in changes.items()}
+    return cfmkit.analyze(cfmkit.load(LAN).replace({"analysis.fidelity": "solid", **keys}))
+
+
+def test_lans_part_has_the_force_and_the_peak_stress_of_a_much_finer_mesh():
+    """47 334 degrees of freedom, another mesher, another program: force within 5e-4, peak stress within 2 %."""
+    result = lan()
+    force = {0.002: 4.94597, 0.006: 9.20436, 0.010: 10.10955, 0.0136: 10.08839, 0.018: 10.80585}
+    for place, value in force.items():
+        assert np.interp(place, result.curve.motion, result.curve.effort) == pytest.approx(value, rel=5e-4)
+    metrics = cfmkit.evaluate(result)
+    assert metrics["stress_max"].value == pytest.approx(60.65e6, rel=0.02)
+    assert abs(result.values["peak_stress_x"].value) == pytest.approx(12.12e-3, abs=0.1e-3)
+    assert result.values["peak_stress_y"].value == pytest.approx(25.00e-3, abs=0.1e-3)
+    assert {found.name for found in result.warnings} == {"overstressed"}
+
+
+def test_rubber_like_material_carries_a_little_more():
+    """Neo-Hookean against Hooke's law in Green's strain: +0.3 % of force and +5.6 % of peak stress; a coarse mesh."""
+    one, other = (lan(mesh="0.8 mm", poses=9, law=law) for law in ("st-venant-kirchhoff", "neo-hookean"))
+    at = int(np.abs(one.curve.motion - 0.0135).argmin())
+    assert other.curve.effort[at] / one.curve.effort[at] - 1 == pytest.approx(0.003, abs=0.0015)
+    stress = [result.curve.extra["max_stress"].values[at] for result in (one, other)]
+    assert stress[1] / stress[0] - 1 == pytest.approx(0.056, abs=0.015)
+
+
+VEE = """
+cfmkit: 1
+family: beam
+name: vee
+mechanism:
+  material: {youngs_modulus: 2 GPa, poisson_ratio: 0.35}
+  thickness: 0.5 mm
+  width: 10 mm
+  nodes:
+    root: {at: [0 mm, 0 mm], support: clamped}
+    shuttle: {at: [24.6 mm, 3.3 mm], support: guided, direction: 90 deg}
+  beams:
+    leaf: {start: root, end: shuttle}
+  drive: {kind: displacement, node: shuttle, direction: -90 deg}
+  part: {fillet: 0.05 mm}
+analysis: {travel: 5 mm, points: 51, fidelity: solid, solid: {poses: 11, mesh: 0.25 mm}}
+"""
+
+
+@pytest.fixture(scope="module")
+def snapping(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Result]:
+    """A leaf that buckles on its way, as beams and as a solid."""
+    path = tmp_path_factory.mktemp("vee") / "vee.yaml"
+    path.write_text(VEE, encoding="utf-8")
+    spec = cfmkit.load(path)
+    return {name: cfmkit.analyze(spec.replace({"analysis.fidelity": name})) for name in ("solid", "reissner")}
+
+
+def test_a_leaf_that_buckles_follows_its_stable_branch(snapping):
+    solid, beams = (snapping[name].curve for name in ("solid", "reissner"))
+    assert snapping["solid"].status is Status.COMPLETE
+    assert solid.stable.all()
+    assert solid.effort.max() == pytest.approx(beams.effort.max(), rel=0.01)
+    assert solid.effort.min() == pytest.approx(beams.effort.min(), rel=0.02)
+    assert solid.effort == pytest.approx(beams.effort, abs=0.02 * beams.effort.max())
+
+
+@pytest.mark.parametrize(
+    ("config", "said"),
+    [
+        ("beam_cantilever", "needs a drive of kind 'displacement' or 'rotation'"),
+        ("beam_end_effector", "does not know analysis.surface"),
+        ("beam_two_layers", "does not know copies.layers"),
+    ],
+)
+def test_what_a_solid_cannot_be_is_refused_in_one_line(config, said):
+    with pytest.raises(SpecError, match=said) as caught:
+        cfmkit.load(CONFIGS / f"{config}.yaml").replace({"analysis.fidelity": "solid"})
+    assert len(caught.value.problems) == 1
+
+
+def test_a_part_without_fillets_is_solved_and_warns_that_stress_has_no_value(tmp_path):
+    path = tmp_path / "vee.yaml"
+    path.write_text(VEE.replace("0.05 mm", "0 mm"), encoding="utf-8")
+    result = cfmkit.analyze(cfmkit.load(path).replace({"analysis.travel": "1 mm", "analysis.solid.mesh": "0.5 mm"}))
+    assert "sharp_corners" in {found.name for found in result.warnings}
+
+
+def test_a_mesh_that_would_be_endless_is_no_result_but_a_sentence(tmp_path):
+    path = tmp_path / "vee.yaml"
+    path.write_text(VEE.replace("mesh: 0.25 mm", "mesh: 0.001 mm"), encoding="utf-8")
+    result = cfmkit.analyze(cfmkit.load(path))
+    assert result.status is Status.NO_EQUILIBRIUM
+    assert "analysis.solid.mesh" in result.message
