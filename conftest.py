@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 
+import blas_threads  # noqa: F401 before numpy
 import plugin_support
 from hypothesis import settings
 

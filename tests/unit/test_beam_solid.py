@@ -18,7 +18,7 @@ LAN = CONFIGS / "beam_lan2010.yaml"
 
 @cache
 def lan(**changes: object) -> Result:
-    """Return Lan's part as a solid: some five seconds, shared by the tests of its numbers."""
+    """Return Lan's part as a solid: some five seconds, the least in which its numbers can be had."""
     keys = {f"analysis.solid.{key}": value for key, value in changes.items()}
     return cfmkit.analyze(cfmkit.load(LAN).replace({"analysis.fidelity": "solid", **keys}))
 
@@ -36,6 +36,7 @@ def test_lans_part_has_the_force_and_the_peak_stress_of_a_much_finer_mesh():
     assert {found.name for found in result.warnings} == {"overstressed"}
 
 
+@pytest.mark.slow
 def test_rubber_like_material_carries_a_little_more():
     """Neo-Hookean against Hooke's law in Green's strain: +0.3 % of force and +5.6 % of peak stress; a coarse mesh."""
     one, other = (lan(mesh="0.8 mm", poses=9, law=law) for law in ("st-venant-kirchhoff", "neo-hookean"))
