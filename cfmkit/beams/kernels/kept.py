@@ -25,18 +25,27 @@ _HEAD = b"cfmkit code 1\n"
 
 
 def digest() -> str:
-    """Return a digest of the sources of all kernels."""
+    """Return a digest of the sources of all kernels, and of what compiles them."""
     whole = hashlib.sha256()
     for path in sorted(Path(__file__).parent.glob("*.py")):
-        whole.update(path.read_bytes())
+        if path.name not in _NOT_COMPILED:
+            whole.update(path.read_bytes())
     return whole.hexdigest()
+
+
+_NOT_COMPILED = ("entry.py", "kept.py", "progress.py")
+"""What calls the code, keeps it and tells of it: the code does not follow from them."""
+
+_SETTINGS = ("NUMBA_BOUNDSCHECK", "NUMBA_CPU_FEATURES", "NUMBA_CPU_NAME", "NUMBA_ENABLE_AVX", "NUMBA_OPT")
+"""Variables of the environment that the machine code follows from; those of threads, which differ between the processes
+of one study, are none."""
 
 
 @lru_cache(maxsize=1)
 def origin() -> dict[str, str]:
     """Return all that the machine code follows from: sources, compiler, its settings, processor."""
     libraries = {name: str(installed(name)) for name in ("llvmlite", "numba", "numpy")}
-    settings = {name: value for name, value in os.environ.items() if name.startswith("NUMBA_") and name != _ELSEWHERE}
+    settings = {name: os.environ[name] for name in _SETTINGS if name in os.environ}
     return {
         "sources": digest(),
         "python": sys.version,
