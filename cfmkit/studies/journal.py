@@ -8,6 +8,9 @@ to the disk once a second and at the end, so that a failing power supply costs a
 The journal of a finished study is written anew, in little room: hundreds of records stand in one line, which is
 ``{"c":"<crc32>","k":"<key of the first>","r":{"keys":"<key><key>...",...}}``.
 
+JSON has no infinity: a record that holds one, or a number that is none, has ``{"float":"inf"}`` in its place and comes
+back as it was. A start of a search is infinitely far from its limits where its network cannot be followed.
+
 A line that is cut off at the end of the file (the process died while it was written) is
 dropped. A line in the middle whose checksum does not fit is passed over and counted: its
 point is computed again. There is one writer, which holds the lock of the folder; should
@@ -18,6 +21,7 @@ reads its own: a record is found by its place and believed by its key.
 from __future__ import annotations
 
 import json
+import math
 import os
 import time
 from typing import TYPE_CHECKING, Any, Self
@@ -52,6 +56,10 @@ MOST_TOGETHER = 256
 
 _CHUNK = 1 << 20
 _ENCODE = json.JSONEncoder(separators=(",", ":"), allow_nan=False).encode
+
+_FLOAT = "float"
+_MARK = b'{"float":"'
+"""How a number that JSON lacks begins; lines without it, which are nearly all, are read at full speed."""
 
 
 class Journal:
@@ -239,12 +247,31 @@ def is_journal(path: Path) -> bool:
 
 def line_of(key: str, record: Any) -> bytes:
     """Return a record as a line of a journal."""
-    body = f'"k":"{key}","r":{_ENCODE(record)}}}'.encode()
+    try:
+        text = _ENCODE(record)
+    except ValueError:  # infinite, or not a number
+        text = _ENCODE(_marked(record))
+    body = f'"k":"{key}","r":{text}}}'.encode()
     return b'%b%08x",%b\n' % (_HEAD, crc32(body), body)
 
 
 def _record(line: bytes) -> Any:
-    return json.loads(line)["r"]
+    return json.loads(line, object_hook=_unmarked if _MARK in line else None)["r"]
+
+
+def _marked(value: Any) -> Any:
+    """Return a record with a word in place of each number that JSON lacks."""
+    if isinstance(value, float) and not math.isfinite(value):
+        return {_FLOAT: str(value)}
+    if isinstance(value, dict):
+        return {name: _marked(one) for name, one in value.items()}
+    return [_marked(one) for one in value] if isinstance(value, list | tuple) else value
+
+
+def _unmarked(found: dict[str, Any]) -> Any:
+    """Return the number that an object stands for, or the object."""
+    word = found.get(_FLOAT)
+    return float(word) if len(found) == 1 and word in ("inf", "-inf", "nan") else found
 
 
 def _keys_in(line: bytes) -> Iterator[tuple[int, bytes]]:

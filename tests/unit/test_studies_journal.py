@@ -1,9 +1,11 @@
 """The journal: what was acknowledged stays, what is damaged is told and done again."""
 
+import json
 import os
 import subprocess
 import sys
 
+import numpy as np
 import pytest
 
 from cfmkit.errors import OutputError
@@ -41,6 +43,21 @@ def test_a_long_record_comes_back_too(path):
     with Journal(path) as journal:
         place = journal.add(key(1), {"v": "x" * 3_000_000})
         assert len(journal.read(place, key(1))["v"]) == 3_000_000
+
+
+def test_numbers_that_json_lacks_come_back_as_they_were_from_lines_that_are_json(path):
+    record = {"found": {"x": [0.1, np.nan], "violation": np.inf, "float": "inf"}, "pair": (-np.inf, np.float64("inf"))}
+    expected = {"found": {"x": [0.1, np.nan], "violation": np.inf, "float": "inf"}, "pair": [-np.inf, np.inf]}
+    with Journal(path) as journal:
+        journal.add(key(1), record)
+    with Journal(path) as journal:
+        np.testing.assert_equal(recalled(journal, key(1)), expected)
+        assert journal.damaged == 0
+
+    def refused(word):
+        raise AssertionError(word)
+
+    json.loads(path.read_bytes(), parse_constant=refused)
 
 
 def test_keys_that_begin_alike_are_told_apart(path):
