@@ -2,7 +2,7 @@
 
 A file is a run's if the manifest beside it lists it and its content is what was written; one that was edited since is
 somebody's work and stays, as does whatever no manifest lists. A journal proves itself: its lines carry
-their checksums. Links are neither followed nor removed.
+their checksums; one to which somebody else wrote a line stays. Links are neither followed nor removed.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from cfmkit.errors import OutputError
 from cfmkit.store import Manifest, RunFolder, disk
 from cfmkit.store.disk import reporting
 from cfmkit.store.names import JOURNAL, MANIFEST, hash_in, mode_of
-from cfmkit.studies.journal import is_journal
+from cfmkit.studies.journal import has_foreign_lines, is_journal
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -37,7 +37,8 @@ class Remains:
     size : int
         Bytes in them.
     edited : tuple of str
-        Names that a manifest lists, but whose content is another one now: they stay.
+        Names that a manifest lists, but whose content is another one now, and a journal with lines of somebody
+        else: they stay.
     """
 
     folder: Path
@@ -72,12 +73,13 @@ def remains_in(folder: Path) -> Remains:
     with reporting(folder, "look at"):
         hashes = {name: hash_in(folder, name) for name in listed if mode_of(folder / name) is not None}
         files = [name for name, digest in hashes.items() if digest == listed[name].sha256]
+        edited = [name for name in hashes if name not in files]
         if is_journal(folder / JOURNAL):
-            files.append(JOURNAL)
+            (edited if has_foreign_lines(folder / JOURNAL) else files).append(JOURNAL)
         if manifest is not None:
             files.append(MANIFEST)
         size = sum((folder / name).stat().st_size for name in files)
-    return Remains(folder, tuple(files), size, tuple(name for name in hashes if name not in files))
+    return Remains(folder, tuple(files), size, tuple(edited))
 
 
 def _manifest(folder: Path) -> Manifest | None:

@@ -245,6 +245,15 @@ def is_journal(path: Path) -> bool:
         return any(_sound(line) for line in file)
 
 
+def has_foreign_lines(path: Path) -> bool:
+    """Return whether somebody else wrote to a journal: a line in it that does not begin as a record does.
+
+    A record that was damaged or cut off still begins so, and a power failure leaves zeros.
+    """
+    with path.open("rb") as file:
+        return any(not _HEAD.startswith(begun) for line in file if (begun := line.strip(b"\0")[: len(_HEAD)]))
+
+
 def line_of(key: str, record: Any) -> bytes:
     """Return a record as a line of a journal."""
     try:

@@ -85,6 +85,25 @@ def test_the_journal_of_a_killed_run_goes(tmp_path):
     assert left(tmp_path) == []
 
 
+@pytest.mark.parametrize("line", [b"my own notes\n", b"{}\n", b"\n", b"no end"])
+def test_a_journal_to_which_somebody_else_wrote_stays(tmp_path, line):
+    a_run(tmp_path)
+    with (tmp_path / JOURNAL).open("ab") as file:
+        file.write(line)
+    found = remove(remains_in(tmp_path), tmp_path)
+    assert (JOURNAL in found.files, found.edited) == (False, (JOURNAL,))
+    assert (tmp_path / JOURNAL).read_bytes().endswith(line)
+
+
+@pytest.mark.parametrize("damage", [lambda text: text[:40] + b"?" + text[41:], lambda text: text + bytes(64)])
+def test_a_damaged_journal_goes_all_the_same(tmp_path, damage):
+    with Journal(tmp_path / JOURNAL) as journal:
+        journal.add("0" * 32, 1)
+        journal.add("1" * 32, 2)
+    (tmp_path / JOURNAL).write_bytes(damage((tmp_path / JOURNAL).read_bytes()))
+    assert remains_in(tmp_path).files == (JOURNAL,)
+
+
 def test_where_a_run_is_at_work_nothing_is_removed(tmp_path):
     a_run(tmp_path)
     found = remains_in(tmp_path)
