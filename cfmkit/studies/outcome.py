@@ -11,6 +11,7 @@ import numpy as np
 from cfmkit.errors import QuantityError, UsageError
 from cfmkit.studies.executors import serial
 from cfmkit.studies.leaves import CannotVary, leaf
+from cfmkit.studies.plan import MOST_POINTS
 from cfmkit.tables import read_csv
 from cfmkit.units import format_quantity
 
@@ -92,13 +93,17 @@ def examined(spec: Spec, jobs: int, block: Mapping[str, Any]) -> StudyResult:
 def in_words(values: Any, spec: Spec, path: str) -> Any:
     """Return what a file would say for values from NumPy: numbers of a dimension are in SI units, as in results.
 
-    What is not from NumPy stays as it is: a bare number in a list has no unit, as in a file.
+    A range is the list of its numbers. What is not from NumPy has no unit where it is a bare number, as in a file.
 
     Raises
     ------
     cfmkit.errors.UsageError
-        If an array has more than one dimension, or a value is not finite.
+        If an array has more than one dimension, a value is not finite, or a range has more values than a study points.
     """
+    if isinstance(values, range):
+        if values[MOST_POINTS:]:
+            raise UsageError(f"{path}: a range of more than {MOST_POINTS} values; take fewer")
+        return list(values)
     if isinstance(values, Mapping):
         return {key: in_words(value, spec, path) for key, value in values.items()}
     if isinstance(values, list | tuple) and any(isinstance(value, np.generic | np.ndarray) for value in values):

@@ -41,6 +41,7 @@ DEEPEST = 32
 MOST_NODES = 100_000
 MOST_FAULTS = 1000
 _WHOLE, _DIGITS = re.compile("[-+]?[0-9]+"), re.compile("[0-9]")
+_ZERO, _WITH_UNIT = re.compile("[-+]?0+"), re.compile("(?>[0-9]+(?:[eE][-+]?[0-9]+)?) *[^-+0-9., ].*")
 
 
 @dataclass
@@ -145,8 +146,21 @@ class _Builder:
 
     def _sequence(self, path: Path) -> tuple[Any, ...]:
         items: list[Any] = []
+        last, zeros, spaced = None, [], False  # the item before, and what may be a zero or the start of 0,5 mm
         while not isinstance(event := next(self.events), SequenceEndEvent):
+            if last is not None and _split_at_comma(last, event):
+                if _ZERO.fullmatch(getattr(last, "value", "")):
+                    zeros.append((last, event))
+                else:
+                    self._decimal_comma(last, event, (*path, len(items) - 1))
+                    last = None
+                    continue
+            elif last is not None:
+                spaced = spaced or not _adjacent(last, event)
             items.append(self._node(event, (*path, len(items))))
+            last = event
+        if zeros and spaced:  # [0,240 mm] alone is two values, as zero needs no unit
+            self._decimal_comma(*zeros[0], path)
         return tuple(items)
 
     def _mapping(self, path: Path, flow: bool) -> dict[str, Any]:
@@ -169,7 +183,7 @@ class _Builder:
         return block
 
     def _decimal_comma(self, whole: Event, rest: Event, path: Path) -> None:
-        """Complain about a number that YAML ended at its decimal comma: ``{pivot: 28,303 N*mm/rad}``."""
+        """Complain about a number that YAML ended at its decimal comma, as in ``{pivot: 28,303 N*mm/rad}``."""
         before, after = getattr(whole, "value", ""), getattr(rest, "value", "")
         told = f"{shown(f'{before},{after}')} has a decimal comma; write {before}.{after}"
         if not any(fault.path == path for fault in self.reading.faults):  # thousands have more than one
@@ -200,6 +214,18 @@ def _goes_on(value: Event, key: Event) -> bool:
     if not isinstance(value, ScalarEvent) or not isinstance(key, ScalarEvent) or value.style or key.style:
         return False
     return bool(_WHOLE.fullmatch(value.value) and _DIGITS.match(key.value))
+
+
+def _split_at_comma(value: Event, item: Event) -> bool:
+    """Tell whether two items of a list are the halves of one quantity: 2 and 5 mm, with no space after the comma."""
+    return _goes_on(value, item) and _adjacent(value, item) and bool(_WITH_UNIT.fullmatch(getattr(item, "value", "")))
+
+
+def _adjacent(value: Event, item: Event) -> bool:
+    """Tell whether nothing but a comma is between two items."""
+    end: Any = value.end_mark
+    start: Any = item.start_mark
+    return bool((end.line, end.column + 1) == (start.line, start.column))
 
 
 def _is_empty(event: Event) -> bool:

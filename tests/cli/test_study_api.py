@@ -32,6 +32,8 @@ def test_a_sweep_gives_the_rows_of_results_csv(cli, tmp_path, jobs):
         (RADIUS, list(np.array([8e-3, 16e-3])), ["8 mm", "16 mm"]),
         ("mechanism.rolling_friction", np.array([0.001, 0.003]), [0.001, 0.003]),
         ("mechanism.springs.count", np.arange(1, 3), [1, 2]),
+        ("mechanism.springs.count", range(2, 5), [2, 3, 4]),
+        ("analysis.points", range(41, 20, -20), [41, 21]),
         ("mechanism.springs.stiffness", np.array(["0.5 N/mm", "1 N/mm"]), ["0.5 N/mm", "1 N/mm"]),
         ("analysis.gravity", np.array([True, False]), [True, False]),
     ],
@@ -56,6 +58,7 @@ def test_arrays_are_taken_by_a_sensitivity_study():
     ("values", "words"),
     [
         (np.ones((2, 2)), "an array of 2 dimensions is no list of values; flatten it"),
+        (range(10**30), "mechanism.roller_radius: a range of more than 1000000 values; take fewer"),
         (np.array([0.01, np.nan]), "mechanism.roller_radius: nan cannot be written"),
     ],
 )

@@ -373,6 +373,29 @@ def test_a_decimal_comma_in_a_flow_block_is_called_one(flow, told):
 
 
 @pytest.mark.parametrize(
+    ("flow", "column", "path", "told"),
+    [
+        ("[2,5 mm, 4 mm]", 10, "window.0", "'2,5 mm' has a decimal comma; write 2.5 mm"),
+        ("[2 mm, 4,5 mm]", 16, "window.1", "'4,5 mm' has a decimal comma; write 4.5 mm"),
+        ("[-1,25 %,3 %]", 10, "window.0", "'-1,25 %' has a decimal comma; write -1.25 %"),
+        ("[0,5 mm, 4 mm]", 10, "window", "'0,5 mm' has a decimal comma; write 0.5 mm"),
+    ],
+)
+def test_a_decimal_comma_in_a_flow_list_is_called_one_at_its_place(flow, column, path, told):
+    found = read_document(f"cfmkit: 1\nwindow: {flow}\n", "a.yaml").problems
+    assert [(problem.line, problem.column, problem.path, problem.message) for problem in found] == [
+        (2, column, path, told)
+    ]
+
+
+@pytest.mark.parametrize(
+    "flow", ["[1,2,4]", "[0,240 mm]", "[0, 5 mm, 6 mm]", "[0,0.5 mm, 2 mm]", "[2 mm,4 mm]", "['2',5 mm]", "[1,2e3, 4]"]
+)
+def test_commas_between_the_values_of_a_list_are_no_decimal_commas(flow):
+    assert not read_document(f"cfmkit: 1\nwindow: {flow}\n", "a.yaml").problems
+
+
+@pytest.mark.parametrize(
     "text", ["a: 5\n1: 6\n", "a: {b: 5, c: 1}\n", "a: {b: '5', 1 mm: 2}\n", "a: {b: x, 1 mm: 2}\n"]
 )
 def test_digits_where_a_key_should_be_are_no_decimal_comma_elsewhere(text):
