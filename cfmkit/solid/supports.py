@@ -15,6 +15,8 @@ import numpy as np
 from scipy.sparse import csc_array, hstack
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
     from cfmkit.curves import FloatArray
@@ -42,6 +44,14 @@ class Group:
     center: FloatArray
     driven: FloatArray = field(default_factory=lambda: np.zeros(3))
     free: FloatArray = field(default_factory=lambda: np.zeros((3, 0)))
+
+
+def within(nodes: FloatArray, shapes: Sequence[FloatArray], near: float) -> NDArray[np.bool_]:
+    """Tell which nodes (n, 2) [m] lie in polygons, or on lines of two points, or within `near` [m] of them."""
+    from shapely import LineString, Polygon, distance, points, union_all
+
+    covered = union_all([Polygon(one) if len(one) > 2 else LineString(one) for one in shapes])
+    return np.asarray(distance(covered, points(nodes)) <= near)
 
 
 def turned(angle: float, derivative: int = 0) -> FloatArray:

@@ -242,15 +242,12 @@ def _groups(
     assembly: Assembly, nodes: FloatArray, places: tuple[Region, ...]
 ) -> tuple[tuple[Group, ...], NDArray[np.bool_]]:
     """Return the groups of nodes that are held or driven, and which nodes are in one."""
-    from shapely import LineString, Polygon, distance, points, union_all
+    from cfmkit.solid.supports import Group, within
 
-    from cfmkit.solid.supports import Group
-
-    taken, at = np.zeros(len(nodes), bool), points(nodes)
+    taken = np.zeros(len(nodes), bool)
     found: list[Group] = []
     for place in places:
-        covered = union_all([Polygon(one) if len(one) > 2 else LineString(one) for one in place.shapes])
-        inside = np.flatnonzero((distance(covered, at) <= ON) & ~taken)
+        inside = np.flatnonzero(within(nodes, place.shapes, ON) & ~taken)
         if len(inside):
             found.append(Group(place.name, inside, place.at, *_motions(assembly, place)))
             taken[inside] = True
