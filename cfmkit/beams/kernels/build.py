@@ -2,7 +2,7 @@
 
 Numba types the functions and writes LLVM's code for each. On its way a library of its own is made, optimised and
 translated for every function, of which the code of all that it calls is a part; here that is done once, for the
-door, when all the code is there: a third of the time.
+door, when all the code is there: half of the time.
 """
 
 from __future__ import annotations
