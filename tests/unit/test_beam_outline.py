@@ -128,6 +128,11 @@ def test_two_halves_whose_moving_ends_have_no_pad_are_one_piece_too():
     assert sum(not one.hole for one in cuts(spec)) == 1
 
 
+def test_beams_shorter_than_they_are_thick_that_meet_at_both_ends_have_no_gap():
+    line = np.column_stack([np.linspace(0.0, 1.0, 11), np.zeros(11)])
+    assert smallest_gap({"a": line, "b": line + np.array([0.0, 1e-9])}, {"a": 20.0, "b": 20.0}) is None
+
+
 def test_the_smallest_gap_is_found_without_looking_at_beams_far_away(monkeypatch):
     rng = np.random.default_rng(5)
     lines = {f"b{k}": rng.normal(size=(1, 2)) * 9 + np.cumsum(rng.normal(size=(40, 2)), axis=0) for k in range(12)}

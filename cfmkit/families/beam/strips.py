@@ -148,7 +148,9 @@ def _gap(lines: Mapping[str, FloatArray], halves: Mapping[str, float], one: str,
 
 
 def _away(line: FloatArray, end: int, length: float) -> FloatArray:
-    """Return a line without some length at one end."""
+    """Return a line without some length at one end; of a short one nothing may be left, and nothing is taken then."""
+    if not len(line):
+        return line
     ordered = line if end == 0 else line[::-1]
     way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(ordered, axis=0).T))])
     kept = ordered[way >= length]

@@ -111,7 +111,8 @@ def _said(name: str, known: Mapping[str, FloatArray], machine: Machine, when: st
         "lift_off": lambda: finding(
             "lift_off",
             f"a roller leaves the cam {when}: it would have to be pulled with up to {newton(-worst)} from there on; "
-            "use stiffer springs, lighter parts or a slower motion ('analysis.dynamics.time')",
+            "use stiffer springs ('mechanism.springs.stiffness'), lighter parts ('mechanism.masses') or a slower "
+            "motion ('analysis.dynamics.time')",
         ),
         "spring_slack": lambda: finding(
             "spring_slack",
