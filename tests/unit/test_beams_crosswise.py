@@ -23,6 +23,7 @@ from cfmkit.beams import (
     guided,
     trace,
 )
+from cfmkit.beams.outcome import crosswise
 from cfmkit.beams.outcome.crosswise import cross_stiffness
 
 MODULUS, WIDTH, THICKNESS, LENGTH = 200e9, 10e-3, 1e-3, 0.1
@@ -81,8 +82,26 @@ def test_it_does_not_depend_on_whether_a_displacement_or_a_force_drives() -> Non
     assert one == pytest.approx(other, rel=1e-6)
 
 
-def test_there_is_none_where_nothing_gives_way() -> None:
+def test_large_networks_are_condensed_by_sparse_factors(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Eighty beams in a row are one: 3 EI/L^3; dense factors would take the cube of their number."""
+    places = np.linspace(0.0, LENGTH, 81)
+    nodes = {f"n{k}": Node(float(x), 0, FREE if k else CLAMPED) for k, x in enumerate(places)}
+    beams = {f"b{k}": Beam(f"n{k}", f"n{k + 1}", Section(MODULUS, WIDTH, THICKNESS)) for k in range(80)}
+    path = trace(Network(nodes, beams), Loading((PointLoad("n80", fx=1e-6),), np.array([1.0])))
+    dense = np.linalg.solve
+
+    def small(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
+        assert matrix.shape[-1] < crosswise._MANY
+        return dense(matrix, right)
+
+    monkeypatch.setattr(np.linalg, "solve", small)
+    assert cross_stiffness(path, "n80", 0.0)[-1] == pytest.approx(3.0 * RIGIDITY / LENGTH**3, rel=1e-6)
+
+
+@pytest.mark.parametrize("many", [0, 150], ids=["sparse", "dense"])
+def test_there_is_none_where_nothing_gives_way(monkeypatch: pytest.MonkeyPatch, many: int) -> None:
     """A straight beam that does not stretch, pushed sideways by nothing yet: along itself it is rigid."""
+    monkeypatch.setattr(crosswise, "_MANY", many)
     path = trace(straight(axial=False), Loading((PointLoad("tip", fy=1e-3),), np.array([0.0, 1.0])))
     found = cross_stiffness(path, "tip", np.pi / 2)
     assert path.drive[0] == 0.0

@@ -6,7 +6,7 @@ import re
 
 import numpy as np
 import pytest
-from vcfm_support import MM, analyzed, message, names, table_i
+from vcfm_support import CONFIGS, MM, analyzed, message, names, table_i
 
 import cfmkit
 from cfmkit import api
@@ -425,3 +425,11 @@ def test_every_finding_is_explained_and_no_other_can_be_made():
 def test_what_makes_no_sense_is_refused(changes, words):
     with pytest.raises(SpecError, match=words):
         table_i(*changes)
+
+
+def test_a_spring_so_slender_that_rounding_roughens_its_path_is_not_traced_ever_finer():
+    spec = cfmkit.load(CONFIGS / "vcfm_hybrid.yaml", ["mechanism.positive.length=2.5e10 mm"])
+    sampler = ExactSampler(spec, spec.travel, MM)
+    assert not sampler.problem
+    for side in sampler.sides:
+        assert len(side.points.places) < 1000  # 197; with 3e-8 of the force asked of a path good to 1e-5, thousands

@@ -37,7 +37,8 @@ TOLERANCES = (1e-9, 1e-7, 1e-6, 1e-5)
 leaves that are pulled straight there do not reach the first: the next is taken."""
 
 RESOLVED = 3e-8
-"""Size of a panel's last coefficients, relative to the largest force so far, at which it has converged."""
+"""Size of a panel's last coefficients, relative to the largest force so far, at which it has converged; where only a
+looser tolerance of the path was reached, that one: halving does not take away what the path is off by."""
 
 WIDE, CORNERED = (4, 3, 5), 16
 """Panels of a piece at first, the next number where a path left its branch; and of one that may have corners."""
@@ -227,7 +228,14 @@ class Route:
             if path.status is not PathStatus.INACCURATE:
                 self.tolerances = self.tolerances[number:]
                 break
+        else:  # nor do other places reach the stricter ones
+            self.tolerances = self.tolerances[-1:]
         return path, places
+
+    @property
+    def resolved(self) -> float:
+        """Size of the last coefficients, relative to the largest force so far, at which a panel has converged."""
+        return max(RESOLVED, self.tolerances[0])
 
 
 def _begun(route: Route, end: float, count: int) -> First:
@@ -305,7 +313,7 @@ def _resolved(route: Route, first: First, number: int) -> tuple[Panels, Points, 
         for panel in wanted:
             found = coefficients(inside(panel), size, points.force)
             scale = largest[np.searchsorted(size, max(panel[1], early), side="right") - 1]
-            if left and np.abs(found[-3:]).max() > RESOLVED * scale:  # false where a node is missing
+            if left and np.abs(found[-3:]).max() > route.resolved * scale:  # false where a node is missing
                 middle = 0.5 * (panel[0] + panel[1])
                 halves += [(panel[0], middle), (middle, panel[1])]
             else:
