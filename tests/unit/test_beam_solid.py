@@ -104,6 +104,15 @@ def test_a_part_without_fillets_is_solved_and_warns_that_stress_has_no_value(tmp
     assert "sharp_corners" in {found.name for found in result.warnings}
 
 
+def test_a_drive_that_nothing_follows_has_no_curve_and_names_the_keys(monkeypatch, tmp_path):
+    path = tmp_path / "vee.yaml"
+    path.write_text(VEE, encoding="utf-8")
+    monkeypatch.setattr("cfmkit.solid.course.advanced", lambda *_: None)  # no pose beside the first is ever found
+    result = cfmkit.analyze(cfmkit.load(path))
+    assert result.status is Status.NO_EQUILIBRIUM
+    assert "mechanism.nodes.shuttle.support" in result.message
+
+
 def test_a_mesh_that_would_be_endless_is_no_result_but_a_sentence(tmp_path):
     path = tmp_path / "vee.yaml"
     path.write_text(VEE.replace("mesh: 0.25 mm", "mesh: 0.001 mm"), encoding="utf-8")

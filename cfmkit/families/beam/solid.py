@@ -171,7 +171,10 @@ def analyze(spec: BeamSpec, run: Run) -> Result:
         message = f"the part cannot be meshed: {error}; look at analysis.solid.mesh and mechanism.part"
         return Result(resolve(spec), Status.NO_EQUILIBRIUM, message)
     if min(len(one.course.poses) for one in (fine, coarse)) < 2:
-        return Result(resolve(spec), Status.NO_EQUILIBRIUM, f"no curve: {fine.course.ending.value}")
+        why = next(one.course.ending.value for one in (coarse, fine) if len(one.course.poses) < 2)
+        keys = ", ".join(f"mechanism.nodes.{name}.support" for name in spec.mechanism.nodes)
+        message = f"no curve: {why}; look at mechanism.drive, {keys}, analysis.solid.mesh"
+        return Result(resolve(spec), Status.NO_EQUILIBRIUM, message)
     asked = np.linspace(0.0, spec.extent, spec.analysis.points)
     forwards = np.sign(spec.extent)
     reached = forwards * asked <= forwards * fine.course.travel[-1] * (1 + 1e-12)
