@@ -398,7 +398,8 @@ sys.exit(any(name.split(".")[0] in ("numba", "scipy") for name in sys.modules))
 
 def test_code_that_is_kept_runs_without_numba() -> None:
     list(warm())
-    assert subprocess.run([sys.executable, "-c", _ALONE], check=False).returncode == 0
+    # -P: the package that is tested, not one in the current folder
+    assert subprocess.run([sys.executable, "-P", "-c", _ALONE], check=False).returncode == 0
 
 
 _NOWHERE = """

@@ -6,6 +6,7 @@ import dataclasses
 from pathlib import Path
 
 import numpy as np
+import plugin_support
 import pytest
 
 import cfmkit
@@ -198,7 +199,7 @@ def test_three_springs_cannot_all_oppose_each_other():
 
 def test_every_family_takes_a_study_of_its_own_values():
     for name in families.names():
-        for path in sorted(CONFIG.parent.parent.glob("*.yaml")):
+        for path in [*sorted(CONFIG.parent.parent.glob("*.yaml")), *plugin_support.CONFIGS]:
             one = cfmkit.load(path)
             values = {leaf: value for leaf, value in one.leaves() if leaf.startswith("mechanism.")}
             if one.family != name or not values:

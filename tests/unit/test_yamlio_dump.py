@@ -54,6 +54,7 @@ PLACES = st.builds(Place, NUMBERS, st.just("length")) | st.builds(Place, ANGLES,
 LOADS = st.builds(Spring, force=NUMBERS) | st.builds(Weight, height=NUMBERS) | st.just(Weight())
 SHEETS = st.builds(
     Sheet,
+    family=st.just("sheet"),
     name=TEXTS.filter(bool),
     description=TEXTS,
     width=NUMBERS,
