@@ -77,8 +77,9 @@ class Course:
         """Return the effort at travels (m,) [N or N m]: cubics with the efforts and stiffnesses of the poses."""
         from scipy.interpolate import CubicHermiteSpline
 
-        efforts, slopes = np.array([(pose.effort, pose.stiffness) for pose in self.poses]).T
-        return np.asarray(CubicHermiteSpline(self.travel, efforts, slopes)(travel))
+        rising = sorted(self.poses, key=lambda pose: pose.travel)  # a travel may go to the negative side
+        places, efforts, slopes = np.array([(pose.travel, pose.effort, pose.stiffness) for pose in rising]).T
+        return np.asarray(CubicHermiteSpline(places, efforts, slopes)(travel))
 
 
 def follow(problem: Problem, stops: Sequence[float], report: Callable[[float], None] = lambda _share: None) -> Course:

@@ -104,6 +104,23 @@ def test_a_part_without_fillets_is_solved_and_warns_that_stress_has_no_value(tmp
     assert "sharp_corners" in {found.name for found in result.warnings}
 
 
+def test_a_part_is_pulled_as_well_as_pressed(tmp_path):
+    path = tmp_path / "vee.yaml"
+    path.write_text(VEE, encoding="utf-8")
+    spec = cfmkit.load(path).replace({"analysis.solid.poses": 3, "analysis.points": 5})
+    pulled, turned = (
+        cfmkit.analyze(spec.replace(change))
+        for change in (
+            {"analysis.travel": "-0.5 mm"},
+            {"analysis.travel": "0.5 mm", "mechanism.drive.direction": "90 deg"},
+        )
+    )
+    assert pulled.status is turned.status is Status.COMPLETE
+    assert pulled.curve.motion == pytest.approx(-turned.curve.motion)
+    assert pulled.curve.effort == pytest.approx(-turned.curve.effort, rel=1e-6, abs=1e-9)
+    assert pulled.curve.extra["max_stress"].values == pytest.approx(turned.curve.extra["max_stress"].values, rel=1e-6)
+
+
 def test_a_drive_that_nothing_follows_has_no_curve_and_names_the_keys(monkeypatch, tmp_path):
     path = tmp_path / "vee.yaml"
     path.write_text(VEE, encoding="utf-8")

@@ -126,7 +126,9 @@ class SolidSolution:
         """Largest stress along a free edge [Pa]; between poses by cubics that stay between their values."""
         from scipy.interpolate import PchipInterpolator
 
-        return read_only(PchipInterpolator(self.fine.course.travel, self.fine.peaks[0])(self.motion))
+        rising = np.argsort(self.fine.course.travel)
+        between = PchipInterpolator(self.fine.course.travel[rising], self.fine.peaks[0][rising])
+        return read_only(np.maximum(between(self.motion), 0.0))  # at rest rounding may be below
 
     @property
     def stresses(self) -> Mapping[str, tuple[FloatArray, FloatArray]]:
@@ -136,10 +138,10 @@ class SolidSolution:
     @cached_property
     def differences(self) -> tuple[float, float]:
         """Of force and of largest stress, between the meshes, in parts of the finer one's largest."""
-        last = min(self.fine.course.travel[-1], self.coarse.course.travel[-1])
-        poses = self.fine.course.travel[self.fine.course.travel <= last]
+        last = min(abs(one.course.travel[-1]) for one in (self.fine, self.coarse))
+        poses = self.fine.course.travel[np.abs(self.fine.course.travel) <= last]
         force, other = (one.course.effort(poses) for one in (self.fine, self.coarse))
-        peaks = [float(one.peaks[0][one.course.travel <= last].max()) for one in (self.fine, self.coarse)]
+        peaks = [float(one.peaks[0][np.abs(one.course.travel) <= last].max()) for one in (self.fine, self.coarse)]
         largest = float(np.abs(force).max())
         apart = float(np.abs(force - other).max()) / largest if largest else 0.0
         return apart, abs(peaks[1] / peaks[0] - 1) if peaks[0] else 0.0
