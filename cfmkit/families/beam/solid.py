@@ -127,8 +127,8 @@ class SolidSolution:
         from scipy.interpolate import PchipInterpolator
 
         rising = np.argsort(self.fine.course.travel)
-        between = PchipInterpolator(self.fine.course.travel[rising], self.fine.peaks[0][rising])
-        return read_only(np.maximum(between(self.motion), 0.0))  # at rest rounding may be below
+        cubics = PchipInterpolator(self.fine.course.travel[rising], self.fine.peaks[0][rising])
+        return read_only(np.maximum(cubics(self.motion), 0.0))  # at rest rounding may be below
 
     @property
     def stresses(self) -> Mapping[str, tuple[FloatArray, FloatArray]]:
