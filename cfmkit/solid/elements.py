@@ -103,15 +103,16 @@ class Elements:
         times = gradient.shape[-1] // len(self.mesh.triangles)
         u = np.tile(moved[self.mesh.triangles].transpose(1, 2, 0), times)  # (6, 2, k)
         f = np.einsum("aik,ajk->ijk", u, gradient)
-        f[0, 0] += 1.0
-        f[1, 1] += 1.0
+        # from the displacements' slopes, before 1 is added: tiny strains keep their digits
         strain = np.stack(
             [
-                0.5 * (f[0, 0] ** 2 + f[1, 0] ** 2 - 1),
-                0.5 * (f[0, 1] ** 2 + f[1, 1] ** 2 - 1),
-                f[0, 0] * f[0, 1] + f[1, 0] * f[1, 1],
+                f[0, 0] + 0.5 * (f[0, 0] ** 2 + f[1, 0] ** 2),
+                f[1, 1] + 0.5 * (f[0, 1] ** 2 + f[1, 1] ** 2),
+                f[0, 1] + f[1, 0] + f[0, 0] * f[0, 1] + f[1, 0] * f[1, 1],
             ]
         )
+        f[0, 0] += 1.0
+        f[1, 1] += 1.0
         return f, strain
 
     def forces(self, moved: FloatArray) -> FloatArray:

@@ -84,19 +84,23 @@ class NeoHookean:
         mu = 0.5 * self.youngs_modulus / (1 + self.poisson_ratio)
         lam = self.youngs_modulus * self.poisson_ratio / ((1 + self.poisson_ratio) * (1 - 2 * self.poisson_ratio))
         c11, c22, c12 = 1 + 2 * strain[0], 1 + 2 * strain[1], strain[2]
-        det = c11 * c22 - c12**2
+        # small strains keep their digits where 1 is never added and taken away again
+        more = 2 * (strain[0] + strain[1]) + 4 * strain[0] * strain[1] - c12**2
+        det = 1 + more
         with np.errstate(invalid="ignore", divide="ignore"):
-            log = np.log(det)  # NaN where the material is turned inside out: no such state is accepted
-            c33 = np.ones_like(det)
+            log = np.log1p(more)  # NaN where the material is turned inside out: no such state is accepted
+            x = np.zeros_like(det)  # logarithm of the squared stretch across
             for _ in range(ROUNDS):
-                # stress across, times c33: mu (c33 - 1) + lambda/2 ln(det c33) = 0, solved for ln c33
-                step = (mu * (c33 - 1) + 0.5 * lam * (log + np.log(c33))) / (mu * c33 + 0.5 * lam)
-                c33 = c33 * np.exp(-np.clip(step, -1.0, 1.0))
+                # stress across, times the squared stretch: mu (c33 - 1) + lambda/2 ln(det c33) = 0
+                step = (mu * np.expm1(x) + 0.5 * lam * (log + x)) / (mu * np.exp(x) + 0.5 * lam)
+                x = x - np.clip(step, -1.0, 1.0)
                 if not np.any(np.abs(step) > 1e-15):
                     break
-            half = 0.5 * lam * (log + np.log(c33))  # lambda ln J
+            half = 0.5 * lam * (log + x)  # lambda ln J
             inverse = np.stack([c22 / det, c11 / det, -c12 / det])
-        stress = (half - mu) * inverse + np.array([mu, mu, 0.0]).reshape(3, *[1] * det.ndim)
+            # 1 - C^-1
+            missing = np.stack([2 * strain[0] * c22 - c12**2, 2 * strain[1] * c11 - c12**2, c12]) / det
+        stress = half * inverse + mu * missing
         # dS/dE = lambda C^-1 x C^-1 + 2 (mu - lambda ln J) I(C^-1), less what the strain across takes back
         outer = inverse[:, None] * inverse[None]
         i11, i22, i12 = inverse
@@ -108,7 +112,7 @@ class NeoHookean:
             ]
         )
         tangent = lam * outer + 2 * (mu - half) * mixed - lam**2 / (lam + 2 * (mu - half)) * outer
-        return stress, tangent, np.sqrt(c33)
+        return stress, tangent, np.exp(0.5 * x)
 
 
 LAWS: dict[str, type[SaintVenantKirchhoff | NeoHookean]] = {

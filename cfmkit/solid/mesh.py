@@ -110,6 +110,8 @@ def mesh(
         If the boundary crosses itself, or the mesh would have more than `MOST_NODES`.
     """
     region = _region(rings)
+    if (around := sum(float(ring.places[-1]) for ring in rings)) > size * MOST_NODES:
+        raise _too_many(int(around / size))
     field = sizes(rings, size, share, across)
     laid = [_laid(ring, field) for ring in rings]
     fixed = np.concatenate([ring.at(arc) for ring, arc in zip(rings, laid, strict=True)])

@@ -130,9 +130,17 @@ def test_a_drive_that_nothing_follows_has_no_curve_and_names_the_keys(monkeypatc
     assert "mechanism.nodes.shuttle.support" in result.message
 
 
-def test_a_mesh_that_would_be_endless_is_no_result_but_a_sentence(tmp_path):
+def test_an_incompressible_material_is_refused_where_the_law_has_no_value_for_it(tmp_path):
     path = tmp_path / "vee.yaml"
-    path.write_text(VEE.replace("mesh: 0.25 mm", "mesh: 0.001 mm"), encoding="utf-8")
+    path.write_text(VEE.replace("0.35", "0.5"), encoding="utf-8")
+    with pytest.raises(SpecError, match=r"poisson_ratio below 0\.5"):
+        cfmkit.load(path).replace({"analysis.solid.law": "neo-hookean"})
+
+
+@pytest.mark.parametrize("size", ["0.001 mm", "1e-9 mm"])
+def test_a_mesh_that_would_be_endless_is_no_result_but_a_sentence(tmp_path, size):
+    path = tmp_path / "vee.yaml"
+    path.write_text(VEE.replace("mesh: 0.25 mm", f"mesh: {size}"), encoding="utf-8")
     result = cfmkit.analyze(cfmkit.load(path))
     assert result.status is Status.NO_EQUILIBRIUM
     assert "analysis.solid.mesh" in result.message

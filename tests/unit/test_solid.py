@@ -129,6 +129,17 @@ def test_the_tangent_of_elements_is_the_derivative_of_their_forces_and_symmetric
     assert abs(matrix - matrix.T).max() < 1e-12 * abs(matrix).max()
 
 
+@pytest.mark.parametrize("law", [HOOKE, NeoHookean(E, NU)])
+def test_tiny_travels_converge_as_large_ones_do(law):
+    length, height = 20e-3, 1e-3
+    grid = bar(length, height, 0.5e-3)
+    root = Group("root", at(grid, 0, 0.0), np.zeros(2))
+    tip = Group("tip", at(grid, 0, length), np.array([length, height / 2]), np.array([0.0, -1.0, 0.0]))
+    course = follow(problem(grid, [root, tip], law), [0.0, 1e-12, 1e-9])
+    assert course.ending is Ending.COMPLETE
+    assert course.poses[1].effort / 1e-12 == pytest.approx(course.poses[0].stiffness, rel=1e-6)
+
+
 def test_a_rigid_turn_needs_no_force_and_a_stretch_the_exact_one():
     grid = bar(3e-3, 1e-3, 0.6e-3)
     elements = Elements(grid, HOOKE, np.full(len(grid.triangles), 1e-3))

@@ -300,6 +300,9 @@ def _solid_faults(spec: BeamSpec) -> Iterator[str]:
     unknown = [name for name, thing in things.items() if thing]
     if unknown:
         yield f"does not know {', '.join(unknown)}"
+    poisson = next((beam.material or mechanism.material).poisson for beam in mechanism.beams.values())
+    if analysis.solid.law == "neo-hookean" and poisson >= 0.5:
+        yield "needs a poisson_ratio below 0.5 with the law 'neo-hookean'"
     if mechanism.closure == "raw":
         yield "needs beams that end at their nodes: closure 'rotscale' or 'chain'"
     if len({beam.material or mechanism.material for beam in mechanism.beams.values()}) > 1:
