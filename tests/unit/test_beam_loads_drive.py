@@ -4,26 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from beam_support import CANTILEVER
 from scipy.integrate import solve_bvp
 
 import cfmkit
 from cfmkit.errors import SpecError
 
 RIGIDITY, LENGTH = 0.02, 0.4  # [N m2], [m]
-TEXT = """
-cfmkit: 1
-family: beam
-mechanism:
-  material: {youngs_modulus: 2.4 GPa, yield_strength: 50 MPa}
-  thickness: 1 mm
-  width: 100 mm
-  nodes:
-    root: {at: [0 mm, 0 mm], support: clamped}
-    tip: {at: [400 mm, 0 mm]}
-  beams: {beam: {start: root, end: tip}}
-  drive: {kind: loads, node: tip, direction: -90 deg, loads: [LOADS]}
-analysis: {factor: FACTOR, points: 5}
-"""
+DRIVE = "{kind: loads, node: tip, direction: -90 deg, loads: [LOADS]}"
+TEXT = CANTILEVER.replace("{kind: displacement, node: tip, direction: -90 deg}", DRIVE).replace(
+    "  travel: 100 mm\n  points: 21", "  factor: FACTOR\n  points: 5"
+)
 FORCE = "{kind: point, node: tip, fx: -0.1 N, fy: -0.3 N}"
 MOMENT = "{kind: point, node: tip, moment: 40 N*mm}"
 LINE = "{kind: line, beam: beam, wy: -0.002 N/mm}"
@@ -130,7 +121,7 @@ def test_where_it_snaps_is_told_as_a_factor_and_as_a_force(rise):
     ("old", "new", "told"),
     [
         ("factor: 1", "force: 1 N", "give 'factor'"),
-        ("factor: 1, ", "", "the key 'factor' is missing"),
+        ("  factor: 1\n", "", "the key 'factor' is missing"),
         ("factor: 1", "factor: 0", "must not be 0"),
         ("fx: -0.1 N, fy: -0.3 N", "", "every load is zero"),
         ("kind: point, node: tip", "kind: point, node: top", "there is no node 'top'"),
