@@ -136,6 +136,22 @@ class SolidSolution:
         return {"part": (self.stress, np.zeros_like(self.stress))}
 
     @cached_property
+    def worst(self) -> tuple[float, FloatArray] | None:
+        """Largest stress of the poses in the window [Pa] and its place in the unloaded part (2,) [m]; None without any.
+
+        Without a window over the whole travel.
+        """
+        end, window, travel = self.spec.extent, self.spec.analysis.window, self.fine.course.travel
+        low, high = sorted((0.0, end)) if window is None else between(window, (0.0, end))
+        slack = 1e-9 * abs(end)  # an end of the window is a pose, but for rounding
+        inside = np.flatnonzero((travel >= low - slack) & (travel <= high + slack))
+        if not len(inside):
+            return None
+        stresses, places = self.fine.peaks
+        pose = inside[stresses[inside].argmax()]
+        return float(stresses[pose]), places[pose]
+
+    @cached_property
     def differences(self) -> tuple[float, float]:
         """Of force and of largest stress, between the meshes, in parts of the finer one's largest."""
         last = min(abs(one.course.travel[-1]) for one in (self.fine, self.coarse))
@@ -310,16 +326,9 @@ def _values(solution: SolidSolution) -> Mapping[str, Quantity]:
         "allowable_stress": solution.assembly.allowable_stress,
         "mesh_force_difference": solution.differences[0],
         "mesh_stress_difference": solution.differences[1],
-        "gap_min": None,
     }
-    window = solution.spec.analysis.window
-    course = solution.fine.course
-    low, high = (-np.inf, np.inf) if window is None else between(window, (0.0, solution.spec.extent))
-    slack = 1e-9 * abs(solution.spec.extent)
-    inside = np.flatnonzero((course.travel >= low - slack) & (course.travel <= high + slack))
-    if len(inside):
-        worst = inside[solution.fine.peaks[0][inside].argmax()]
-        numbers["peak_stress_x"], numbers["peak_stress_y"] = solution.fine.peaks[1][worst].tolist()
+    if solution.worst is not None:
+        numbers["peak_stress_x"], numbers["peak_stress_y"] = solution.worst[1].tolist()
     if not _turns(solution.spec):
         numbers |= {"travel_end": float(solution.motion[-1])} | extremes(solution) | ranges(solution)
     return {name: Quantity(value, *DEFINITIONS[name]) for name, value in numbers.items()}
@@ -344,19 +353,11 @@ def _findings(solution: SolidSolution) -> Iterator[Finding]:
             "smaller analysis.solid.mesh",
         )
     allowable = solution.assembly.allowable_stress
-    largest = _largest_stress(solution)
-    if allowable is not None and largest > allowable:
-        at = ", ".join(format_short(_values(solution)[f"peak_stress_{axis}"].value or 0.0, "length") for axis in "xy")
+    if allowable is not None and solution.worst is not None and solution.worst[0] > allowable:
+        largest, spot = solution.worst
+        at = ", ".join(format_short(one, "length") for one in spot.tolist())
         yield finding(
             "overstressed",
             f"the stress reaches {format_short(largest, 'stress')} at ({at}), allowed are "
             f"{format_short(allowable, 'stress')}",
         )
-
-
-def _largest_stress(solution: SolidSolution) -> float:
-    """Return the largest stress of the poses in the window [Pa]."""
-    window, course = solution.spec.analysis.window, solution.fine.course
-    low, high = (-np.inf, np.inf) if window is None else between(window, (0.0, solution.spec.extent))
-    inside = (course.travel >= low) & (course.travel <= high)
-    return float(solution.fine.peaks[0][inside].max(initial=0.0))
