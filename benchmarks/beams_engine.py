@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.beams import (
+from cfmkit.elastica import (
     CLAMPED,
     Beam,
     Control,

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from beams_engine import best, cantilever
 
-from cfmkit.beams import Control, Loading, PointLoad, trace
+from cfmkit.elastica import Control, Loading, PointLoad, trace
 
 if TYPE_CHECKING:
     from cfmkit.curves import FloatArray

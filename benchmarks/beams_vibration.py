@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from cfmkit.beams import (
+from cfmkit.elastica import (
     CLAMPED,
     Beam,
     Control,
@@ -24,7 +24,7 @@ from cfmkit.beams import (
     guided,
     trace,
 )
-from cfmkit.beams.vibration import Masses, frequencies
+from cfmkit.elastica.vibration import Masses, frequencies
 
 MM, DENSITY, COUNT = 1e-3, 1410.0, 3
 SECTION = Section(2e9, 10 * MM, 1 * MM)

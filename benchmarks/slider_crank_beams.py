@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 import cfmkit
-from cfmkit.beams.verification.corotational import recheck
+from cfmkit.elastica.verification.corotational import recheck
 from cfmkit.families.slider_crank.build import linkage_of, resolve, unloaded_angle
 from cfmkit.families.slider_crank.flexures.design import form_of, task_of
 from cfmkit.families.slider_crank.flexures.model import chain_of

@@ -16,7 +16,7 @@ from timing import best
 
 import cfmkit
 from cfmkit import api
-from cfmkit.beams import Displacement, trace
+from cfmkit.elastica import Displacement, trace
 from cfmkit.families.vcfm.exact import DOWN, leaf_network
 from cfmkit.families.vcfm.springs import Diamond
 from cfmkit.families.vcfm.strip import Strip

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cfmkit.beams import CLAMPED, Beam, Displacement, Network, Node, Section, gradient, trace
 from cfmkit.cli.main import main
+from cfmkit.elastica import CLAMPED, Beam, Displacement, Network, Node, Section, gradient, trace
 from cfmkit.store.names import JOURNAL
 
 CONFIGS = sorted((Path(__file__).parents[2] / "configs").glob("*.yaml"))

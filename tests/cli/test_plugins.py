@@ -166,7 +166,7 @@ def test_the_doctor_knows_versions_folders_and_the_solver(site, capsys):
 
 
 def test_the_doctor_sees_whether_the_solver_is_compiled(tmp_path, monkeypatch):
-    from cfmkit.beams.kernels import kept, machine
+    from cfmkit.elastica.kernels import kept, machine
 
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
     assert kept.kept_in() is None

@@ -36,7 +36,7 @@ def test_forces_of_each_beam_as_in_figure_8(lan, beam, v, h):
     np.testing.assert_allclose(at(lan, TRAVEL, f"{beam}_force_x"), -VALUES[:, h], atol=6e-7)
 
 
-def test_beams_1_and_2_take_turns_as_positive_and_negative_stiffness(lan):
+def test_elastica_1_and_2_take_turns_as_positive_and_negative_stiffness(lan):
     """The extremes were read off a table in steps of half a millimetre."""
     travel = np.linspace(0, 18, 181)
     one, two = (lan.curve.extra[f"{beam}_force_y"].values for beam in ("b1", "b2"))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cfmkit.beams import Section
+from cfmkit.elastica import Section
 from cfmkit.families.slider_crank.flexures.leaves import (
     parallelogram_force,
     parallelogram_rate,

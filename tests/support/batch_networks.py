@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.beams import CLAMPED, Beam, Network, Node, Section, arc, guided
+from cfmkit.elastica import CLAMPED, Beam, Network, Node, Section, arc, guided
 
 if TYPE_CHECKING:
-    from cfmkit.beams import Path
+    from cfmkit.elastica import Path
 
 
 def bent(sweep: float, height: float = 0.03) -> Network:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from cfmkit.beams import LineSpring, Loading, Path, PointLoad, SlideSpring, TorsionSpring
+from cfmkit.elastica import LineSpring, Loading, Path, PointLoad, SlideSpring, TorsionSpring
 
 
 class Judge:

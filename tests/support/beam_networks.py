@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from cfmkit.beams import (
+from cfmkit.elastica import (
     CLAMPED,
     PINNED,
     STRAIGHT,

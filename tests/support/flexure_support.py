@@ -23,7 +23,7 @@ from cfmkit.families.slider_crank.flexures.sizing import Flexure
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from cfmkit.beams import Path
+    from cfmkit.elastica import Path
 
 MM = 1e-3
 LINKAGE = Linkage(54 * MM, (np.hypot(100, 60) - 54) * MM, 60 * MM)

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.beams import CLAMPED, Beam, Network, Node, Polynomial, guided
+from cfmkit.elastica import CLAMPED, Beam, Network, Node, Polynomial, guided
 
 if TYPE_CHECKING:
-    from cfmkit.beams import Section
+    from cfmkit.elastica import Section
 
 CM = 1e-2
 NODES = {"n3": (3.05 * CM, 1.877 * CM), "n4": (1.244 * CM, 2.40 * CM)}

@@ -17,7 +17,7 @@ LAYERS = (
     ("api", "recordings", "specfile", "keys"),
     ("plots", "export", "studies", "experiment"),
     ("families",),
-    ("beams", "bodies", "solid"),
+    ("elastica", "bodies", "solid"),
     ("numerics", "decimals"),
     ("yamlio",),
     ("spec", "metrics", "tables", "geometry", "store", "materials", "jsontext"),

@@ -9,7 +9,7 @@ import pytest
 from beam_support import MM, at, cantilever, config, solved, value
 
 import cfmkit
-from cfmkit.beams import Section, Taper
+from cfmkit.elastica import Section, Taper
 from cfmkit.errors import DataError, SpecError
 from cfmkit.families.beam.build import thickest_of, thinnest_of
 from cfmkit.families.beam.surface.ride import DEFINITIONS as SURFACE
@@ -591,7 +591,7 @@ analysis:
 
 
 @pytest.mark.parametrize("support", ["pinned", "clamped"])
-def test_beams_that_are_pulled_taut_have_no_limit_point(support):
+def test_elastica_that_are_pulled_taut_have_no_limit_point(support):
     result = cfmkit.analyze(cfmkit.loads(TAUT.replace("support: pinned", f"support: {support}")))
     assert result.status is Status.PARTIAL
     assert "the beams are taut at 2." in result.message

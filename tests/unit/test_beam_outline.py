@@ -100,7 +100,7 @@ def cuts(spec):
     return [one for one in cfmkit.drawing(spec).contours if one.layer == "cut"]
 
 
-def test_beams_that_meet_on_the_mirror_axis_are_one_strip_without_a_hole():
+def test_elastica_that_meet_on_the_mirror_axis_are_one_strip_without_a_hole():
     """Williams' toggle: nothing but two pads and 2 x 12.949 in of a beam 0.243 in thick."""
     found = cuts(config("beam_williams_toggle", "mechanism.part.fillet=0 mm"))
     assert [one.hole for one in found] == [False]
@@ -128,7 +128,7 @@ def test_two_halves_whose_moving_ends_have_no_pad_are_one_piece_too():
     assert sum(not one.hole for one in cuts(spec)) == 1
 
 
-def test_beams_shorter_than_they_are_thick_that_meet_at_both_ends_have_no_gap():
+def test_elastica_shorter_than_they_are_thick_that_meet_at_both_ends_have_no_gap():
     line = np.column_stack([np.linspace(0.0, 1.0, 11), np.zeros(11)])
     assert smallest_gap({"a": line, "b": line + np.array([0.0, 1e-9])}, {"a": 20.0, "b": 20.0}) is None
 

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from cfmkit import analyze, dumps, evaluate, load, loads
-from cfmkit.beams import Polynomial, trace
-from cfmkit.beams.model.beam import fit
+from cfmkit.elastica import Polynomial, trace
+from cfmkit.elastica.model.beam import fit
 from cfmkit.families.base import Run
 from cfmkit.families.beam.shaping.audit import Spread, audited, half_band, lines_cross, strict_share, tolerated
 from cfmkit.families.beam.shaping.closer import looked_at

@@ -311,7 +311,7 @@ def test_exact_forces_do_not_depend_on_the_number_of_points():
 @pytest.mark.parametrize(("slenderness", "top"), [(3.4, 3.0), (10.66, 1.4), (14.2, 2.1), (40, 1.4)])
 def test_exact_leaves_are_those_of_a_path_through_the_very_points(structure, slenderness, top):
     """Before thin leaves buckle, too: 1/500 of the rise at Q = 40. To 1e-6 of the peak, up to three times the rise."""
-    from cfmkit.beams import Control, Displacement, trace
+    from cfmkit.elastica import Control, Displacement, trace
     from cfmkit.families.vcfm.exact import DOWN, leaf_network
     from cfmkit.families.vcfm.traced import traced
 
@@ -364,7 +364,7 @@ def test_exact_leaves_have_their_force_where_a_coarse_sampling_cut_the_peak_off(
 @pytest.mark.parametrize(("stem", "error"), [("ding2022", 0.035), ("cosine", 0.05), ("hybrid", 0.16)])
 @pytest.mark.parametrize("travel", [-1.0, 0.5, 2.0, 4.0])
 def test_drawn_leaves_have_the_shape_of_exact_ones(stem, error, travel):
-    from cfmkit.beams import Control, Displacement, trace
+    from cfmkit.elastica import Control, Displacement, trace
     from cfmkit.families.vcfm.exact import DOWN, leaf_network
 
     spec = cfmkit.load(CONFIGS / f"vcfm_{stem}.yaml")

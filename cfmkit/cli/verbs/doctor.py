@@ -82,7 +82,7 @@ _EXTRAS = ("cluster",)
 
 
 def _folders() -> Mapping[str, Path]:
-    from cfmkit.beams.kernels.kept import folders
+    from cfmkit.elastica.kernels.kept import folders
 
     return {
         "output (the current folder)": Path.cwd(),
@@ -103,7 +103,7 @@ def _writable(path: Path) -> bool:
 
 
 def _solver() -> Record:
-    from cfmkit.beams.kernels.kept import kept_in
+    from cfmkit.elastica.kernels.kept import kept_in
 
     folder = kept_in()
     return {"compiled": folder is not None, "folder": None if folder is None else str(folder)}

@@ -27,7 +27,7 @@ def run(options: Options, terminal: Terminal) -> Answer:
 
     For images of containers and caches of pipelines. Code that is there already is only loaded.
     """
-    from cfmkit.beams.warming import warm
+    from cfmkit.elastica.warming import warm
 
     parts = []
     for part in warm():

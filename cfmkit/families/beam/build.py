@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, assert_never
 
 import numpy as np
 
-from cfmkit import beams as engine
-from cfmkit.beams.vibration import Masses
+from cfmkit import elastica as engine
+from cfmkit.elastica.vibration import Masses
 from cfmkit.families.beam.chain import chained
 from cfmkit.families.beam.layers import stacked
 from cfmkit.families.beam.parts.faults import HELD
 
 if TYPE_CHECKING:
-    from cfmkit.beams.model.network import LoadOn, Spring
-    from cfmkit.beams.model.shapes import Shape
+    from cfmkit.elastica.model.network import LoadOn, Spring
+    from cfmkit.elastica.model.shapes import Shape
     from cfmkit.families.beam.parts.spec import (
         LoadSpec,
         MemberSpec,

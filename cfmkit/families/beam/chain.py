@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.beams.model.beam import fit
-from cfmkit.beams.model.network import Network
+from cfmkit.elastica.model.beam import fit
+from cfmkit.elastica.model.network import Network
 
 if TYPE_CHECKING:
-    from cfmkit.beams.model.beam import Beam
+    from cfmkit.elastica.model.beam import Beam
 
 
 def chained(network: Network) -> Network:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.beams import PathStatus
+from cfmkit.elastica import PathStatus
 from cfmkit.families.beam.build import thickest_of, thinnest_of
 from cfmkit.families.beam.endings import ending_of
 from cfmkit.families.beam.findings import finding

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.beams import PathStatus
+from cfmkit.elastica import PathStatus
 from cfmkit.families.beam.words import in_units
 from cfmkit.units import format_short
 

@@ -14,10 +14,10 @@ import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from cfmkit.beams.model.network import FREE, Link, Network, Node
+from cfmkit.elastica.model.network import FREE, Link, Network, Node
 
 if TYPE_CHECKING:
-    from cfmkit.beams.model.beam import Beam
+    from cfmkit.elastica.model.beam import Beam
 
 _ROOM = 1.15  # of the pitch that is chosen, for what joins the stages
 

@@ -17,13 +17,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.beams import Path, PathStatus, trace
-from cfmkit.beams.model.bundle import coils
-from cfmkit.beams.model.layout import Layout
-from cfmkit.beams.outcome.crosswise import cross_stiffness
-from cfmkit.beams.outcome.path import most_stressed
-from cfmkit.beams.vibration import Frequencies, frequencies
 from cfmkit.curves import Column, Curve, read_only
+from cfmkit.elastica import Path, PathStatus, trace
+from cfmkit.elastica.model.bundle import coils
+from cfmkit.elastica.model.layout import Layout
+from cfmkit.elastica.outcome.crosswise import cross_stiffness
+from cfmkit.elastica.outcome.path import most_stressed
+from cfmkit.elastica.vibration import Frequencies, frequencies
 from cfmkit.errors import InputError
 from cfmkit.families.beam.build import Assembly, assemble, mirror_axis, resolve, thickest_of
 from cfmkit.families.beam.checks import findings_of

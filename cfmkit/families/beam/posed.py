@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.beams.model.network import LineSpring
-from cfmkit.beams.outcome.sections import TURN
+from cfmkit.elastica.model.network import LineSpring
+from cfmkit.elastica.outcome.sections import TURN
 
 if TYPE_CHECKING:
-    from cfmkit.beams import Path
     from cfmkit.curves import FloatArray
+    from cfmkit.elastica import Path
 
 _BETWEEN = 4  # points of the picture for a step of the sampling
 _NEAR = 1e-9  # of the size: parts shorter than this are not there

@@ -13,9 +13,9 @@ from cfmkit.curves import read_only
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
 
-    from cfmkit.beams.model.beam import Beam, Fit
-    from cfmkit.beams.model.network import Network
     from cfmkit.curves import FloatArray
+    from cfmkit.elastica.model.beam import Beam, Fit
+    from cfmkit.elastica.model.network import Network
 
 STEPS, MOST_STEPS = 160, 20_000
 _GAUSS, _WEIGHTS = np.polynomial.legendre.leggauss(4)

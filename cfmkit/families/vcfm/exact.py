@@ -21,8 +21,8 @@ from cfmkit.families.vcfm.traced import traced
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from cfmkit.beams import Network
     from cfmkit.curves import FloatArray
+    from cfmkit.elastica import Network
     from cfmkit.families.base import Run
     from cfmkit.families.vcfm.spec import VcfmSpec
     from cfmkit.families.vcfm.strip import Strip
@@ -34,7 +34,7 @@ DOWN = -0.5 * np.pi
 
 def section(strip: Strip, thickness: Any = None) -> Any:
     """Return the engine's section of a leaf."""
-    from cfmkit.beams import Section
+    from cfmkit.elastica import Section
 
     return Section(
         strip.youngs_modulus,
@@ -47,7 +47,7 @@ def section(strip: Strip, thickness: Any = None) -> Any:
 
 def leaf_network(spec: VcfmSpec) -> Network:
     """Return one leaf between wall and shuttle, or both leaves of a V whose shuttle can turn."""
-    from cfmkit.beams import CLAMPED, STRAIGHT, Beam, CosineArch, Network, Node, Taper, guided
+    from cfmkit.elastica import CLAMPED, STRAIGHT, Beam, CosineArch, Network, Node, Taper, guided
 
     about = spec.mechanism.bistable
     strip = strip_of(about, spec.mechanism.material)
@@ -80,7 +80,7 @@ class Chain:
 
 def spring_chain(spec: VcfmSpec) -> Chain:
     """Return what is traced of the spring."""
-    from cfmkit.beams import CLAMPED, Beam, Network, Node, Support, arc, guided
+    from cfmkit.elastica import CLAMPED, Beam, Network, Node, Support, arc, guided
 
     about = spec.mechanism.positive
     strip, share = strip_of(about, spec.mechanism.material), share_of(about)

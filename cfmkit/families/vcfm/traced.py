@@ -21,8 +21,8 @@ from cfmkit.numerics.panels import Panels, coefficients, nodes_of
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from cfmkit.beams import Network, Path
     from cfmkit.curves import FloatArray
+    from cfmkit.elastica import Network, Path
 
 DOWN = -0.5 * np.pi
 
@@ -220,7 +220,7 @@ class Route:
 
     def through(self, places: FloatArray) -> tuple[Path, FloatArray]:
         """Return the path through some places, by the strictest tolerance that it reaches, and the places."""
-        from cfmkit.beams import Control, Displacement, PathStatus, trace
+        from cfmkit.elastica import Control, Displacement, PathStatus, trace
 
         drive = Displacement(self.node, DOWN, places)
         for number, tolerance in enumerate(self.tolerances):
@@ -240,7 +240,7 @@ class Route:
 
 def _begun(route: Route, end: float, count: int) -> First:
     """Return a first path through so many places at equal distances up to `end` [m]."""
-    from cfmkit.beams import PathStatus
+    from cfmkit.elastica import PathStatus
 
     places = end * np.arange(1, count + 1) / count
     path, _ = route.through(places)

@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.beams import Control, Displacement, PathStatus, trace
-from cfmkit.beams.continuation.batch import trace_many
+from cfmkit.elastica import Control, Displacement, PathStatus, trace
+from cfmkit.elastica.continuation.batch import trace_many
 from cfmkit.families.beam.build import thickest_of
 from cfmkit.families.beam.shaping.separation import pairs
 
 if TYPE_CHECKING:
-    from cfmkit.beams import Path
     from cfmkit.curves import FloatArray
+    from cfmkit.elastica import Path
     from cfmkit.families.beam.shaping.search import Found
     from cfmkit.families.beam.shaping.separation import Pair
     from cfmkit.families.beam.shaping.task import Task

@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.beams import Control, Displacement, PathStatus, trace
+from cfmkit.elastica import Control, Displacement, PathStatus, trace
 from cfmkit.errors import CfmError
 
 if TYPE_CHECKING:
-    from cfmkit.beams import Network
     from cfmkit.curves import FloatArray
+    from cfmkit.elastica import Network
     from cfmkit.families.beam.shaping.task import Task
 
 POSES = 241

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.beams.model.beam import fit
+from cfmkit.elastica.model.beam import fit
 
 if TYPE_CHECKING:
-    from cfmkit.beams import Network
     from cfmkit.curves import FloatArray
+    from cfmkit.elastica import Network
     from cfmkit.families.beam.shaping.variables import Variables
 
 _U, _W = np.polynomial.legendre.leggauss(24)

@@ -14,8 +14,8 @@ from cfmkit.numerics.sampled import largest
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from cfmkit.beams import Section
     from cfmkit.curves import FloatArray
+    from cfmkit.elastica import Section
     from cfmkit.families.beam.shaping.lengths import Length
     from cfmkit.families.beam.shaping.poses import Poses
     from cfmkit.families.beam.shaping.response import Response

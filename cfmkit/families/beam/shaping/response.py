@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.beams import Control, Displacement, PathStatus, Taper, gradient, trace
+from cfmkit.elastica import Control, Displacement, PathStatus, Taper, gradient, trace
 from cfmkit.errors import CfmError
 from cfmkit.families.beam.shaping.lengths import Length, lengths
 
 if TYPE_CHECKING:
-    from cfmkit.beams import Path, Section
     from cfmkit.curves import FloatArray
+    from cfmkit.elastica import Path, Section
     from cfmkit.families.beam.shaping.variables import Variables
 
 # A design that loses stability in the window is no answer; the audit looks at branches.
@@ -118,7 +118,7 @@ class Response:
 
     def _lines(self, states: FloatArray, axial: dict[str, FloatArray]) -> dict[str, Line]:
         """Return the beams from dimensionless states (7, p, rows, ...) and axial stresses (p, rows, ...)."""
-        from cfmkit.beams.outcome.sections import MOMENT, X, Y
+        from cfmkit.elastica.outcome.sections import MOMENT, X, Y
 
         sampler, scales = self.path.sampler, self.path.layout.scales
         lines = {}

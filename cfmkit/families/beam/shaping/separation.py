@@ -19,8 +19,8 @@ from cfmkit.numerics.sampled import soft_least
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from cfmkit.beams import Network
     from cfmkit.curves import FloatArray
+    from cfmkit.elastica import Network
     from cfmkit.families.beam.shaping.limits import View
 
 SHARPNESS = 25.0

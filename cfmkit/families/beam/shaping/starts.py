@@ -12,8 +12,8 @@ from cfmkit.families.beam.build import thickest_of
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from cfmkit.beams import Network
     from cfmkit.curves import FloatArray
+    from cfmkit.elastica import Network
     from cfmkit.families.beam.shaping.variables import Variables
 
 _MOST = 2000

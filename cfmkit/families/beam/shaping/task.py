@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 if TYPE_CHECKING:
-    from cfmkit.beams import Network
+    from cfmkit.elastica import Network
 
 Objective = Literal["ripple", "range", "paper"]
 

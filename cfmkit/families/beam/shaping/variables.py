@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.beams import Network, Polynomial
+from cfmkit.elastica import Network, Polynomial
 
 if TYPE_CHECKING:
     from cfmkit.curves import FloatArray

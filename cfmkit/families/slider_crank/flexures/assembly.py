@@ -23,9 +23,9 @@ from cfmkit.families.slider_crank.flexures.sizing import Flexure
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from cfmkit.beams import Network, Path
     from cfmkit.bodies.slider_crank import Linkage
     from cfmkit.curves import FloatArray
+    from cfmkit.elastica import Network, Path
     from cfmkit.families.slider_crank.flexures.spec import Printed, StripSpec
 
 FLEXURE_SHARE = 0.2

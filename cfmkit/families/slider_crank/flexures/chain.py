@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.beams import CLAMPED, FREE, Beam, Link, Network, Node, Polyline, Section, Support, Taper, guided
 from cfmkit.curves import read_only
+from cfmkit.elastica import CLAMPED, FREE, Beam, Link, Network, Node, Polyline, Section, Support, Taper, guided
 from cfmkit.errors import InputError
 
 if TYPE_CHECKING:

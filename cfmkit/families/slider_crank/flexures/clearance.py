@@ -15,8 +15,8 @@ from cfmkit.families.slider_crank.flexures.pressing import Ending, Pressed, part
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from cfmkit.beams import Path
     from cfmkit.curves import FloatArray
+    from cfmkit.elastica import Path
 
 COARSE = 60
 """Straight pieces of the line that are looked at for crossings."""

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.beams import (
+from cfmkit.elastica import (
     CLAMPED,
     Beam,
     Control,

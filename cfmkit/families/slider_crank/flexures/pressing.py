@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.beams import Control, Displacement, Path, PathStatus, trace
-from cfmkit.beams.sensitivity.neighbour import neighbouring
+from cfmkit.elastica import Control, Displacement, Path, PathStatus, trace
+from cfmkit.elastica.sensitivity.neighbour import neighbouring
 from cfmkit.families.slider_crank.flexures.chain import SLIDER, kink, mirrored
 
 if TYPE_CHECKING:
@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from cfmkit.beams import Network
     from cfmkit.curves import FloatArray
+    from cfmkit.elastica import Network
 
 FIRST_STEP = 1e-5
 """Of the travel."""
@@ -146,7 +146,7 @@ class Chain:
         side : int
             1, -1, or 0 for the side of the kink (left where there is none).
         tolerance : float
-            As in `cfmkit.beams.Control`.
+            As in `cfmkit.elastica.Control`.
         """
         taut = np.flatnonzero(self._reach(travel) > (1.0 + 1e-9) * self.reach)
         if len(taut):

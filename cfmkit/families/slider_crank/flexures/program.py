@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.beams import Control, Displacement, PathStatus, gradient, trace
-from cfmkit.beams.sensitivity.neighbour import drive_slope, neighbouring
+from cfmkit.elastica import Control, Displacement, PathStatus, gradient, trace
+from cfmkit.elastica.sensitivity.neighbour import drive_slope, neighbouring
 from cfmkit.errors import InputError
 from cfmkit.families.slider_crank.flexures.chain import SLIDER, STRIP
 from cfmkit.families.slider_crank.flexures.pressing import FIRST_STEP
@@ -25,8 +25,8 @@ from cfmkit.families.slider_crank.flexures.strength import LAST, Watched, watche
 from cfmkit.numerics.barycentric import differentiation, interpolation
 
 if TYPE_CHECKING:
-    from cfmkit.beams import Network, Path
     from cfmkit.curves import FloatArray
+    from cfmkit.elastica import Network, Path
     from cfmkit.families.slider_crank.flexures.task import Form, Task
 
 POINTS, DENSE = 12, 81

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from cfmkit.beams.verification.corotational import recheck as by_elements
+from cfmkit.elastica.verification.corotational import recheck as by_elements
 from cfmkit.families.slider_crank.flexures.chain import SLIDER, STRIP
 from cfmkit.families.slider_crank.flexures.pressing import Ending
 

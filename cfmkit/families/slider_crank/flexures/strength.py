@@ -14,13 +14,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.beams.outcome.stress import STENCIL
+from cfmkit.elastica.outcome.stress import STENCIL
 from cfmkit.families.slider_crank.flexures.chain import STRIP
 from cfmkit.numerics.barycentric import differentiation, interpolation
 
 if TYPE_CHECKING:
-    from cfmkit.beams import Path
     from cfmkit.curves import FloatArray
+    from cfmkit.elastica import Path
 
 LAST, BETWEEN = 4, 13
 """Points at which the stress is computed, the last ones, and places from the first to the last of them."""

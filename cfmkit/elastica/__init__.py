@@ -1,0 +1,74 @@
+"""Planar networks of slender beams in large deflection: one engine for all families that bend.
+
+`Network` says what it is, a `Displacement`, `Rotation` or `Loading` what is done to it, `trace` follows the
+equilibria, `Path` answers questions about them. Compiled code is loaded, and compiled once, when something is solved.
+
+References
+----------
+[LL] C.-C. Lan, K.-M. Lee, ASME J. Mech. Des. 128 (2006) 765: the generalised (multiple) shooting method.
+[R] E. Reissner, Z. angew. Math. Phys. 23 (1972) 795: the beam theory.
+[D] M. Redheffer's star product, used to chain segments: J. Math. Phys. 41 (1962) 1.
+"""
+
+from __future__ import annotations
+
+from cfmkit.elastica.continuation.batch import Outcome, trace_many
+from cfmkit.elastica.continuation.tracing import trace
+from cfmkit.elastica.model.beam import Beam
+from cfmkit.elastica.model.drive import Control, Displacement, Loading, Rotation
+from cfmkit.elastica.model.network import (
+    CLAMPED,
+    FREE,
+    PINNED,
+    LineLoad,
+    LineSpring,
+    Link,
+    Network,
+    Node,
+    PointLoad,
+    SlideSpring,
+    Support,
+    TorsionSpring,
+    guided,
+)
+from cfmkit.elastica.model.section import Section, Taper
+from cfmkit.elastica.model.shapes import STRAIGHT, CosineArch, Polyline, Polynomial, Spline, arc
+from cfmkit.elastica.outcome.path import Event, Path, PathStatus
+from cfmkit.elastica.sensitivity.gradient import Gradient, gradient
+
+__all__ = [
+    "CLAMPED",
+    "FREE",
+    "PINNED",
+    "STRAIGHT",
+    "Beam",
+    "Control",
+    "CosineArch",
+    "Displacement",
+    "Event",
+    "Gradient",
+    "LineLoad",
+    "LineSpring",
+    "Link",
+    "Loading",
+    "Network",
+    "Node",
+    "Outcome",
+    "Path",
+    "PathStatus",
+    "PointLoad",
+    "Polyline",
+    "Polynomial",
+    "Rotation",
+    "Section",
+    "SlideSpring",
+    "Spline",
+    "Support",
+    "Taper",
+    "TorsionSpring",
+    "arc",
+    "gradient",
+    "guided",
+    "trace",
+    "trace_many",
+]

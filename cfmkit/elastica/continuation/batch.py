@@ -1,0 +1,145 @@
+"""Many networks under one drive: in this process or over several, one outcome each, failures kept as such."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+from functools import partial
+from itertools import islice
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.elastica.continuation.tracing import trace
+from cfmkit.errors import CfmError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Iterator
+    from concurrent.futures import Future
+
+    from cfmkit.curves import FloatArray
+    from cfmkit.elastica.model.drive import Control, Drive
+    from cfmkit.elastica.model.network import Network
+    from cfmkit.elastica.outcome.path import Path
+
+_CHUNK, _AHEAD = 64, 2  # networks sent at once; chunks for each process that are on their way
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What came of one network.
+
+    Attributes
+    ----------
+    status, message : str
+        Name and sentence of the path's status; ``INVALID`` and the reason where the network cannot exist.
+    value : Any
+        What was collected from the path; None where there is no path.
+    """
+
+    status: str
+    message: str
+    value: Any
+
+
+@dataclass(frozen=True)
+class Asked:
+    """Drive, effort and stability at the points asked for that were reached."""
+
+    drive: FloatArray
+    effort: FloatArray
+    stable: Any
+
+
+def asked(path: Path) -> Asked:
+    """Return a path's values at the points asked for: the default of what `trace_many` collects."""
+    keep = path.at_asked
+    return Asked(path.drive[keep], path.effort[keep], path.stable[keep])
+
+
+def trace_many(
+    networks: Iterable[Network | Callable[[], Network]],
+    drive: Drive,
+    control: Control | None = None,
+    collect: Callable[[Path], Any] = asked,
+    workers: int = 1,
+) -> Iterator[Outcome]:
+    """Yield one outcome for each network, in their order; nothing but the collected values is kept.
+
+    Parameters
+    ----------
+    networks : iterable of Network, or of functions that return one
+        Taken one by one, or as they are needed by several processes: however many there are, few are kept. Functions
+        (a `functools.partial` of what builds the network, importable for several workers) are called where the network
+        is traced, which leaves less to do for the process that gives out the work.
+    drive : Displacement, Rotation or Loading
+        What is done to each.
+    control : Control, optional
+        As in `trace`.
+    collect : callable
+        From a path to what is wanted of it; must be importable for several workers.
+    workers : int
+        Processes to use.
+    """
+    one = partial(_outcome, drive=drive, control=control, collect=collect)
+    if workers <= 1:
+        yield from map(one, networks)
+        return
+    from concurrent.futures import ProcessPoolExecutor
+    from multiprocessing import get_context
+
+    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+        waiting: deque[Future[_Packed]] = deque()
+        for chunk in _chunks(networks):
+            waiting.append(pool.submit(_outcomes, chunk, one))
+            if len(waiting) > _AHEAD * workers:
+                yield from waiting.popleft().result().outcomes()
+        while waiting:
+            yield from waiting.popleft().result().outcomes()
+
+
+def _chunks(networks: Iterable[Network | Callable[[], Network]]) -> Iterator[list[Network | Callable[[], Network]]]:
+    """Yield the networks in lists of at most `_CHUNK`."""
+    source = iter(networks)
+    while chunk := list(islice(source, _CHUNK)):
+        yield chunk
+
+
+@dataclass(frozen=True)
+class _Packed:
+    """Outcomes on their way from a process: `Asked` as rows of three arrays for all, which are quicker to send."""
+
+    said: list[tuple[str, str]]
+    values: list[Any]
+    arrays: tuple[FloatArray, FloatArray, Any] | None
+
+    def outcomes(self) -> Iterator[Outcome]:
+        """Yield the outcomes."""
+        end = 0
+        for (status, message), value in zip(self.said, self.values, strict=True):
+            if self.arrays is not None and value is not None:
+                begin, end = end, end + value
+                value = Asked(*(array[begin:end] for array in self.arrays))
+            yield Outcome(status, message, value)
+
+
+def _outcomes(networks: list[Any], one: Callable[[Any], Outcome]) -> _Packed:
+    found = [one(network) for network in networks]
+    said, values = [(each.status, each.message) for each in found], [each.value for each in found]
+    rows = [value for value in values if value is not None]
+    if not rows or not all(type(row) is Asked for row in rows):
+        return _Packed(said, values, None)
+    all_rows = zip(*((row.drive, row.effort, row.stable) for row in rows), strict=True)
+    drive, effort, stable = (np.concatenate(same) for same in all_rows)
+    lengths = [None if value is None else len(value.drive) for value in values]
+    return _Packed(said, lengths, (drive, effort, stable))
+
+
+def _outcome(
+    network: Network | Callable[[], Network], drive: Drive, control: Control | None, collect: Callable[[Path], Any]
+) -> Outcome:
+    try:
+        path = trace(network() if callable(network) else network, drive, control)
+    except CfmError as error:
+        return Outcome("INVALID", str(error), None)
+    return Outcome(path.status.name, path.message, collect(path))

@@ -1,0 +1,255 @@
+"""Decisions where stability changes: stay on the path, or leave it for a stable branch."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.elastica.continuation import at_bifurcation, limit_point
+from cfmkit.elastica.continuation.at_bifurcation import BESIDE
+from cfmkit.elastica.continuation.branch_end import end_at, predicted_end
+from cfmkit.elastica.continuation.state import Resume, Stop, fine_spot
+from cfmkit.elastica.continuation.switching import first_of_several, switched, well_before
+from cfmkit.elastica.continuation.uncondensed import uncondensed
+from cfmkit.elastica.equilibrium.solver import FORCE_WEIGHT
+from cfmkit.elastica.outcome.path import Event, PathStatus
+
+if TYPE_CHECKING:
+    from cfmkit.elastica.continuation.singular import Singular
+    from cfmkit.elastica.continuation.state import Move, Problem, Trail
+    from cfmkit.elastica.equilibrium.solver import Spot
+
+_CLEAR = 0.01  # share of the drive's range from a bifurcation at which the paths there are told apart
+_SAME_PLACE = 1e-4  # share of the drive's range within which two searches found one bifurcation
+_TIMES = 12  # that one point may be taken back
+_SLIGHT = 1e-3  # share of a determinant that is hardly any
+_ASIDE = 1e-3  # share of the ways to the points on both sides of a bifurcation at which the path is looked at,
+_STRAIGHT, _ROUNDING = 10.0, 1e-7  # largest change of a pose between, in that share of the whole one; what is rounding
+_FINEST = 1e-8  # share of the range below which a change of stability is not looked into with shorter steps
+_SHORTER = 0.25  # of a step that passed what was not resolved, for the next
+
+
+def crossed(problem: Problem, trail: Trail) -> Move:
+    """Handle a change of inertia between the last two points."""
+    natural = trail.stretch.natural
+    begun = -2 if natural else _last_step_before(trail)
+    if natural:
+        one, beyond = fine_spot(problem, trail, -2), fine_spot(problem, trail, -1)
+    else:
+        one, beyond = limit_point.fine_spots(problem, trail, begun)
+    if natural and len(trail.points) > 2 and _at_it(problem, trail, -2, one, beyond):
+        back = _without_last_but_one(trail)
+        if back is not None:
+            trail, one = back, fine_spot(problem, back, -2)
+    if natural and _at_it(problem, trail, -1, beyond, one):
+        behind = at_bifurcation.passed(problem, trail.up_to(-1), trail.drive)
+        trail, beyond = (trail, None) if behind is None else (behind, fine_spot(problem, behind, -1))
+        again = None if beyond is not None else uncondensed(problem, trail, 1)
+        if again is not None:
+            return again
+    other = _along(trail, trail.spot(-1))
+    senses = np.sign(trail.points.drive_rate[[begun, -1]])
+    fold = not natural and bool(senses[0] != senses[1])
+    found = None
+    if one is not None and beyond is not None:
+        found = at_bifurcation.located(problem, trail, one, beyond, fold)
+        if found is not None and natural and _may_be_shorter(problem, trail):
+            found = found if _on_one_path(problem, found, one, beyond) else None
+    if found is None or one is None:
+        return _unresolved(problem, trail, other)
+    if natural and found.after - found.before > 1:
+        trail, found = first_of_several(problem, trail, found, one)
+        other = trail.spot(-1)
+    kind = "limit point" if found.fold else "bifurcation"
+    untold = trail
+    trail = trail.telling(Event(kind, found.spot.drive * problem.unit, found.before, found.after))
+    if trail.first is None and not found.fold and found.after > found.before:
+        trail = replace(trail, first=found)
+    return _parted(problem, trail, found, one, other, untold) if natural else Resume(trail, other)
+
+
+def _unresolved(problem: Problem, trail: Trail, other: Spot) -> Move:
+    """Look again with a shorter step at what changed the inertia, or tell that it is not known."""
+    before, after = trail.unstable(-2), trail.unstable(-1)
+    if after > before and _may_be_shorter(problem, trail) and not trail.stuck(problem):
+        return _again(trail)
+    event = Event("unresolved", other.drive * problem.unit, before, after)
+    told = before == after or event in trail.events
+    if min(before, after) >= 0 and not told:  # a count below zero is that of rounding
+        trail = trail.telling(event)
+    return Resume(trail, other)
+
+
+def _on_one_path(problem: Problem, found: Singular, one: Spot, beyond: Spot) -> bool:
+    """Tell whether a path goes straight on through a singular point that was found between two of its points.
+
+    A slightly imperfect part has a sharp corner there instead, and behind it a path of its own that is unstable.
+    """
+    fine = problem.fine
+    whole = fine.pose_change(one.y, beyond.y)
+    ends = []
+    for end in (one, beyond):
+        share = _ASIDE * (end.drive - found.spot.drive)
+        ends.append(fine.solve(found.spot.y + _ASIDE * (end.y - found.spot.y), found.spot.drive + share))
+    near, far = ends
+    if near is None or far is None or near.unstable > one.unstable:
+        return False
+    return fine.pose_change(near.y, far.y) <= _STRAIGHT * _ASIDE * whole + _ROUNDING
+
+
+def _last_step_before(trail: Trail) -> int:
+    """Return the index of the point that the last step began at: along the arc there are points asked for between."""
+    index = -2
+    while -index < len(trail.points) and trail.points.reached[index] == -1.0:
+        index -= 1
+    return index
+
+
+def _at_it(problem: Problem, trail: Trail, index: int, spot: Spot | None, other: Spot | None) -> bool:
+    """Tell whether one of the last two points lies at the bifurcation between them, for the fine mesh.
+
+    It has another inertia there than on this mesh, or hardly any determinant compared with the other one.
+    """
+    if spot is None or spot.unstable != trail.unstable(index):
+        return True
+    if other is None:
+        return False
+    share = min(0.5 * BESIDE * problem.span / abs(other.drive - spot.drive), _SLIGHT)
+    return not spot.log_size - other.log_size > np.log(share)
+
+
+def _without_last_but_one(trail: Trail) -> Trail | None:
+    """Take back a point beside a bifurcation, where meshes differ in what is stable.
+
+    None where that was done several times before, or where anything happened before it.
+    """
+    if trail.points.unstable[-3] != trail.points.unstable[-2]:
+        return None
+    place = (float(trail.points.drive[-2]), np.inf)
+    times = trail.visited.get(place, 0) + 1
+    if times > _TIMES:
+        return None
+    last, name, back = trail.points.take([-1]), trail.branches[-1], trail.up_to(-2)
+    if last.asked[0] > back.asked:
+        last.asked[0] = -1.0  # the point taken back is to be done first
+    return replace(back.with_last(last, name), visited={**trail.visited, place: times})
+
+
+def _parted(problem: Problem, trail: Trail, found: Singular, one: Spot, other: Spot, untold: Trail) -> Move:
+    """Go on behind a bifurcation between `one` and the last point `other`, where the control says.
+
+    `untold` is the path without the word of it, for where it is to be looked at again.
+    """
+    control = problem.control
+    unstable_anyway = control.through_folds and found.before > 0
+    if found.after <= found.before or control.branch == "primary" or unstable_anyway:
+        return _past(problem, trail, found, one, _clear_of(problem, trail, found, one, other))
+    forward, onto = float(np.sign(other.drive - one.drive)), trail.branch
+    found, wide = switched(problem, trail, found, one, forward)
+    left = None if wide is None else trail.settled(problem.fine.reduce(wide))
+    if left is None and _may_be_shorter(problem, trail) and not _sure(problem, trail, one, other, found):
+        return _again(replace(untold, without_branch=found))
+    if left is None:
+        if control.through_folds:
+            return _past(problem, trail, found, one, _clear_of(problem, trail, found, one, other))
+        return _no_branch(problem, trail, found)
+    clear = _clear_of(problem, trail, found, one, other)
+    trail = trail.up_to(-1)
+    trail = replace(trail, events=(*trail.events[:-1], replace(trail.events[-1], after=found.after)))
+    name = f"bifurcated at {found.spot.drive * problem.unit:.6g}, sign {control.sign:+d}"
+    trail = at_bifurcation.opening(problem, trail, found, one, wide, name)
+    left = _not_beyond(problem, trail, found, left, forward)
+    trail = replace(trail, branch=name, closed=False).with_spot(left, -1)
+    ending, closed = predicted_end(problem, trail, clear, found.before, forward, onto)
+    begin = end_at(problem, replace(found, before=found.after, after=found.before), one, onto)
+    trail = replace(trail, ends=(begin, *([ending] if ending else [])), closed=closed)
+    return Resume(trail, left, 0.5 * abs(left.drive - found.spot.drive))
+
+
+def _past(problem: Problem, trail: Trail, found: Singular, one: Spot, clear: Spot) -> Resume:
+    """Stay on the path behind a bifurcation between `one` and the last point; go on from `clear`, there or beyond."""
+    last = trail.points.take([-1])
+    trail = at_bifurcation.opening(problem, trail.up_to(-1), found, one, None, trail.branch)
+    if last.asked[0] < trail.asked:
+        last.asked[0] = -1.0  # it has just been added
+    trail = trail.with_points(last)
+    if clear.drive != last.drive[0]:
+        trail = trail.with_spot(clear, -1)
+    return Resume(trail, clear)
+
+
+def _clear_of(problem: Problem, trail: Trail, found: Singular, one: Spot, other: Spot) -> Spot:
+    """Return a point behind a bifurcation from which the path can be followed on: `other` if it is far enough.
+
+    Beside a bifurcation the error of integration may lead to the path that crosses; on the fine mesh it does not.
+    """
+    place = found.spot.drive
+    room = min(_CLEAR * problem.span, 0.5 * problem.nearest_target(trail.ahead, other.drive))
+    if abs(other.drive - place) >= room:
+        return other
+    early = well_before(problem, trail, found, 0.1 * room) or one  # from nearer the prediction would be bad
+    before = place - early.drive
+    if before == 0.0:
+        return other
+    there = other.drive + float(np.sign(other.drive - one.drive)) * room
+    guess = found.spot.y + (found.spot.y - early.y) * ((there - place) / before)
+    wide = problem.fine.solve(guess, there)
+    near = None if wide is None or wide.unstable != found.after else trail.settled(problem.fine.reduce(wide))
+    return other if near is None else near
+
+
+def _sure(problem: Problem, trail: Trail, one: Spot, other: Spot, found: Singular) -> bool:
+    """Tell whether a bifurcation was found before and now between points so near that its branch would be found too.
+
+    Or as near as steps lead.
+    """
+    known, near = trail.without_branch, _SAME_PLACE * problem.span
+    close = trail.stuck(problem) or abs(other.drive - one.drive) <= near
+    return close and known is not None and abs(known.spot.drive - found.spot.drive) <= near
+
+
+def _not_beyond(problem: Problem, trail: Trail, found: Singular, left: Spot, forward: float) -> Spot:
+    """Return the entry of a branch, moved back before the next point asked for where it lies beyond that.
+
+    Away from a bifurcation a branch opens like the square root of the distance.
+    """
+    place, solver = found.spot.drive, trail.solver
+    ahead = (trail.ahead[:1] - place) * forward
+    reach, nearest = (left.drive - place) * forward, 0.5 * ahead[ahead > 0].min(initial=np.inf)
+    if not 2.0 * nearest < reach:
+        return left
+    start = problem.fine.reduce(found.spot).y
+    guess = start + np.sqrt(nearest / reach) * (left.y - start)
+    near = solver.solve(guess, place + forward * nearest)
+    if near is None or near.unstable > left.unstable:
+        return left
+    return near if solver.pose_change(near.y, start) > 0.3 * solver.pose_change(guess, start) else left
+
+
+def _may_be_shorter(problem: Problem, trail: Trail) -> bool:
+    """Tell whether the last step may have passed a sharp corner, and ended on another path."""
+    return trail.stretch.natural and trail.last_step > _FINEST * problem.span
+
+
+def _again(trail: Trail) -> Resume:
+    """Take the last point back, and go on from the one before in shorter steps."""
+    before, last = trail.points.drive[-2:].tolist()
+    back = trail.come_by(before, last).up_to(-1)
+    return Resume(back, back.spot(-1), _SHORTER * trail.last_step)
+
+
+def _no_branch(problem: Problem, trail: Trail, found: Singular) -> Stop:
+    """End at a bifurcation without a stable branch nearby: the mechanism jumps there."""
+    place = found.spot.drive * problem.unit
+    message = f"no stable equilibrium near {place:.6g}: it jumps to a distant one there"
+    return Stop(trail.up_to(-1).stopped(PathStatus.JUMPS, message))
+
+
+def _along(trail: Trail, spot: Spot) -> Spot:
+    """Return the last point with its tangent the way the path came: after a limit point the drive goes back."""
+    n, points = trail.solver.n, trail.points
+    came = np.append(points.y[-1, :n] - points.y[-2, :n], points.drive[-1] - points.drive[-2])
+    weights = np.append(np.where(np.arange(n) < trail.solver.n_free, 1.0, FORCE_WEIGHT), 1.0)
+    return replace(spot, tangent=-spot.tangent) if float((weights * came) @ spot.tangent) < 0 else spot

@@ -1,0 +1,158 @@
+"""Tracing: from a network and a drive to the path of its equilibria."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import ceil
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.curves import read_only
+from cfmkit.elastica.equilibrium.mesh import Mesh
+from cfmkit.elastica.model.drive import Control, Drive
+from cfmkit.elastica.model.layout import Layout
+
+if TYPE_CHECKING:
+    from cfmkit.elastica.continuation.singular import Singular
+    from cfmkit.elastica.continuation.state import Problem, Trail
+    from cfmkit.elastica.model.network import Network
+    from cfmkit.elastica.outcome.path import Path
+
+_EARLY = 0.1  # share of the drive's range: segments that are too long before it are cut in four, later in two
+_ROUNDS = 8  # meshes tried before giving up on the tolerance
+_GAIN = 0.005  # share of the drive's range, or of the constant loads, that is some
+_SURE = 1e-3  # error of a path that ends early from which on that may be the mesh's fault
+_COILED = (
+    4.0  # turn of an unloaded shape in one step [rad] up to which the step sees it: 14 kicks for two thirds of a turn
+)
+_STARTS = 4  # of them where nothing bears the constant loads, if each bears more of them than the one before
+
+
+def trace(network: Network, drive: Drive, control: Control | None = None) -> Path:
+    """Return the path of equilibria of a network under a drive, from rest through all points asked for.
+
+    Parameters
+    ----------
+    network : Network
+        What it is.
+    drive : Displacement, Rotation or Loading
+        What is done to it.
+    control : Control, optional
+        Accuracy, folds, branches.
+
+    Returns
+    -------
+    Path
+        Converged points only. `Path.status` says whether the path reaches all points asked for, and if not, why.
+    """
+    control = control or Control()
+    if control.imperfection == 0.0:
+        return _solved(network, drive, control).path()
+    from cfmkit.elastica.continuation.imperfection import imperfect
+
+    perfect = replace(control, imperfection=0.0)
+    primary = _solved(network, drive, replace(perfect, branch="primary"), True)
+    bent, name = imperfect(network, primary.first, control.imperfection)
+    path = _solved(bent, drive, perfect).path()
+    branch = path.branch if bent is network else np.where(path.branch == "primary", "imperfect", path.branch)
+    return replace(path, imperfection=name, branch=read_only(branch, np.str_))
+
+
+@dataclass(frozen=True, eq=False)
+class Attempt:
+    """A path on one mesh, with its estimated error; `first`: see `cfmkit.elastica.continuation.loop.Followed`."""
+
+    problem: Problem
+    trail: Trail
+    error: float
+    first: tuple[Problem, Singular] | None
+
+    def path(self) -> Path:
+        """Return the outcome; where the tolerance is not reached, every point is judged by itself."""
+        from cfmkit.elastica.continuation.accuracy import errors, largest_force
+        from cfmkit.elastica.continuation.ending import inaccurate
+        from cfmkit.elastica.outcome.path import Path
+
+        problem, trail, tolerance = self.problem, self.trail, self.problem.control.tolerance
+        accurate = np.ones(len(trail.points), dtype=bool)
+        if not self.error <= tolerance:
+            largest = float(largest_force(trail).max())
+            accurate = errors(problem, trail, range(len(trail.points)), largest) <= tolerance
+            trail = inaccurate(problem, trail, self.error, int((~accurate).sum()))
+        accurate.setflags(write=False)
+        return Path(
+            solver=trail.solver,
+            points=trail.points,
+            branch=np.array(trail.branches, dtype=np.str_),
+            status=trail.ending.status,
+            message=trail.ending.message or trail.ending.status.value,
+            events=trail.events,
+            error=self.error,
+            accurate=accurate,
+        )
+
+
+def _solved(network: Network, drive: Drive, control: Control, first_only: bool = False) -> Attempt:
+    """Return the path on the first mesh that reaches the tolerance, or on the last that is tried.
+
+    first_only: only as far as the first bifurcation.
+    """
+    from cfmkit.elastica.continuation import ending  # loads the compiler, as do the next ones
+    from cfmkit.elastica.continuation.accuracy import estimate
+    from cfmkit.elastica.continuation.loop import follow
+    from cfmkit.elastica.continuation.state import Problem
+    from cfmkit.elastica.kernels.codes import STALLED
+    from cfmkit.elastica.outcome.path import PathStatus
+
+    layout = Layout(network, drive)
+    mesh, borne = first_mesh(layout, control.tolerance), -1.0
+    before: Trail | None = None
+    for round_ in range(_ROUNDS):
+        problem = Problem(layout, mesh, control, first_only)
+        followed = follow(problem)
+        trail, last = followed.trail, round_ == _ROUNDS - 1
+        if trail.ending.too_long and before is not None and not _further(problem, trail, before):
+            trail = ending.stop(problem, trail, STALLED).trail
+        elif trail.ending.too_long and not last:
+            before = trail
+            mesh = mesh.shorter(4 if _early(problem, trail) else 2)
+            continue
+        status = trail.ending.status
+        if status is PathStatus.NO_START and round_ < _STARTS and followed.share > borne + _GAIN:
+            mesh, borne = mesh.shorter(), followed.share
+            continue
+        error = estimate(problem, trail)
+        limit = control.tolerance if status is PathStatus.COMPLETE else min(control.tolerance, _SURE)
+        if error <= limit or last:
+            break
+        mesh = mesh.finer()
+    return Attempt(problem, trail, error, followed.first)
+
+
+def _early(problem: Problem, trail: Trail) -> bool:
+    """Tell whether a path ended in the first part of the drive's range."""
+    return not len(trail.points) or abs(trail.drive) < _EARLY * problem.span
+
+
+def _further(problem: Problem, trail: Trail, before: Trail) -> bool:
+    """Tell whether shorter segments lead any further: a path pulled straight is only followed nearer to its end."""
+    from cfmkit.elastica.continuation.uncondensed import pulled_straight
+
+    if not pulled_straight(trail) or not len(before.points) or trail.asked != before.asked:
+        return True
+    return abs(trail.drive - before.drive) > _GAIN * problem.span
+
+
+def first_mesh(layout: Layout, tolerance: float) -> Mesh:
+    """Return the mesh that is tried first for a tolerance: straight beams need fewer segments than curved ones.
+
+    Coils need more steps than their loads do.
+    """
+    if tolerance >= 4e-6:
+        mesh = Mesh(3 if tolerance < 2e-5 and layout.bundle.curved else 2, 1)
+    else:
+        mesh = Mesh(2, 2 if tolerance >= 1e-7 else 4)
+    if not layout.bundle.others:  # coils are none of the plain beams
+        return mesh
+    return replace(mesh, steps=max(mesh.steps, ceil(layout.turn / (mesh.segments * _COILED))))

@@ -1,0 +1,1 @@
+"""Compiled code of the beam engine. Importing `cfmkit.elastica.kernels.entry` loads compiled code: only to solve."""

@@ -1,0 +1,170 @@
+"""Doors to the compiled code, see `cfmkit.elastica.kernels.doors`: compiled once, kept on disk, loaded when used."""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import logging
+import struct
+import threading
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.elastica.kernels import kept, machine
+from cfmkit.elastica.kernels.packing import HEAD, REFUSED, Kind, flat, objects
+from cfmkit.elastica.kernels.progress import told
+from cfmkit.elastica.kernels.signatures import DOORS, EACH, FORCES, MARCH, SOLVE, TANGENT
+from cfmkit.elastica.kernels.workspace import held_slope_space, slope_space
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from cfmkit.elastica.kernels.model import Model, Tilt
+    from cfmkit.elastica.kernels.workspace import WorkSpace
+
+_Pair = ctypes.c_int64 * 2
+_compiling = threading.Lock()
+
+
+class Door:
+    """A compiled function of one block of words, which returns two integers."""
+
+    def __init__(self, name: str) -> None:
+        """Be ready to load it."""
+        self.name = name
+        self._call: Callable[[bytes, Any], int] | None = None
+
+    def __call__(self, *parts: bytes) -> tuple[int, int]:
+        """Call it with numbers and places of arrays, which the caller holds.
+
+        Raises
+        ------
+        TypeError
+            If an array is not of the kind that it must be.
+        """
+        found = _Pair()
+        if status := (self._call or self._ready())(HEAD + b"".join(parts), found):
+            raise self._error(status)
+        return found[0], found[1]
+
+    def _error(self, status: int) -> Exception:
+        kinds = [each for each in flat(DOORS[self.name]) if isinstance(each, Kind)]
+        if not 0 <= status - REFUSED < len(kinds):
+            return RuntimeError(f"the compiled function '{self.name}' failed")  # none of its operations can
+        kind, number = kinds[status - REFUSED], status - REFUSED
+        return TypeError(f"array {number} of '{self.name}': {kind.dtype}, {kind.ndim} axes, in C order")
+
+    def _ready(self) -> Callable[[bytes, Any], int]:
+        with _compiling:
+            if self._call is None:
+                self._call = _got(self.name)
+            return self._call
+
+
+def _got(name: str) -> Callable[[bytes, Any], int]:
+    """Return a door's code: what is kept, else what numba makes of the sources now."""
+    with contextlib.suppress(machine.Strange):
+        if path := kept.library(name):
+            return machine.in_library(path)
+    with contextlib.suppress(machine.Strange):
+        if found := kept.read(name):
+            return machine.loaded(found)
+    with told(name) as report:
+        from cfmkit.elastica.kernels import build
+
+        try:
+            code = build.compiled(name, report)
+            run = machine.loaded(code)
+        except (AttributeError, TypeError, machine.Strange) as error:  # another version of numba or of LLVM
+            _LOG.info("compiled code of '%s' cannot be kept (%s): it is compiled in every process", name, error)
+            return machine.callable_at(build.called(name))
+        kept.write(name, code)
+    return run
+
+
+_LOG = logging.getLogger("cfmkit.elastica")
+
+_doors = {name: Door(name) for name in DOORS}
+_solver = _doors["solver"]
+_numbers = struct.Struct("qqd").pack
+_whole = struct.Struct("q").pack
+
+
+def solve(
+    m: Model,
+    n_free: int,
+    y: Any,
+    state: Any,
+    border: Any,
+    target: float,
+    limits: Any,
+    tangent: Any,
+    scratch: WorkSpace,
+) -> tuple[int, int]:
+    """Solve for one equilibrium; see `cfmkit.elastica.kernels.newton.solve`."""
+    arrays = (limits, y[None], border, tangent, state, _NONE, y)
+    return _solver(_numbers(SOLVE, n_free, target), m.block, objects(arrays), scratch.block, scratch.marching)
+
+
+def solve_each(m: Model, n_free: int, ys: Any, drives: Any, limits: Any, solved: Any, scratch: WorkSpace) -> None:
+    """Solve at several drives; see `cfmkit.elastica.kernels.newton.solve_each`."""
+    arrays = (limits, ys, solved, drives, drives, _NONE, drives)
+    _solver(_numbers(EACH, n_free, 0.0), m.block, objects(arrays), scratch.block, scratch.marching)
+
+
+def march(
+    m: Model,
+    n_free: int,
+    y: Any,
+    drive: float,
+    tangent: Any,
+    targets: Any,
+    options: Any,
+    outs: Any,
+    scratch: WorkSpace,
+) -> tuple[int, int]:
+    """Follow a path; see `cfmkit.elastica.kernels.march.march`; outs: unknowns, drives, info."""
+    arrays = (options, outs[0], targets, tangent, outs[1], outs[2], y)
+    return _solver(_numbers(MARCH, n_free, drive), m.block, objects(arrays), scratch.block, scratch.marching)
+
+
+def forces(m: Model, n_free: int, ys: Any, drives: Any, out: Any, scratch: WorkSpace) -> None:
+    """Set residual forces and spring energy at points; see `cfmkit.elastica.kernels.observe.forces`."""
+    arrays = (drives, ys, drives, drives, drives, out, drives)
+    _solver(_numbers(FORCES, n_free, 0.0), m.block, objects(arrays), scratch.block, scratch.marching)
+
+
+def tangent(m: Model, n_free: int, y: Any, drive: float, scratch: WorkSpace) -> None:
+    """Set the first matrix of the work space to the Jacobian; see `cfmkit.elastica.kernels.observe.tangent`."""
+    arrays = (y, y[None], y, y, y, _NONE, y)
+    _solver(_numbers(TANGENT, n_free, drive), m.block, objects(arrays), scratch.block, scratch.marching)
+
+
+def states(m: Model, n_free: int, ys: Any, drives: Any, out: Any) -> None:
+    """Set the states along all beams at points, real or complex; see `cfmkit.elastica.kernels.observe.states`."""
+    door = _doors["complex_states" if ys.dtype.kind == "c" else "states"]
+    door(_whole(n_free), m.block, objects((ys, drives, out)))
+
+
+def slopes(m: Model, tilt: Tilt, n_free: int, ys: Any, drives: Any, outs: tuple[Any, Any], scratch: WorkSpace) -> bool:
+    """Set the derivatives of solutions; see `cfmkit.elastica.kernels.columns.slopes`."""
+    room = slope_space(m, tilt, len(scratch[0]) - 1)
+    given = objects((ys, drives, *outs))
+    return _doors["slopes"](_whole(n_free), m.block, tilt.block, given, scratch.block, objects(flat(room)))[0] == 1
+
+
+def row_slopes(m: Model, tilt: Tilt, n_free: int, ys: Any, drives: Any, dys: Any, out: Any) -> None:
+    """Set the derivatives of states along beams; see `cfmkit.elastica.kernels.output_slopes.row_slopes`."""
+    room = np.zeros(9 * dys.shape[2])
+    _doors["row_slopes"](_whole(n_free), m.block, tilt.block, objects((ys, drives, dys, out, room)))
+
+
+def held_slopes(m: Model, tilt: Tilt, n_free: int, ys: Any, drives: Any, dys: Any, out: Any) -> None:
+    """Set the derivatives of forces; see `cfmkit.elastica.kernels.output_slopes.held_slopes`."""
+    room = held_slope_space(m)
+    given = objects((ys, drives, dys, out, *flat(room)))
+    _doors["held_slopes"](_whole(n_free), m.block, tilt.block, given)
+
+
+_NONE = np.zeros((0, 0))

@@ -1,0 +1,297 @@
+"""Following a path of equilibria: extrapolation from the last points, Newton, steps by the change of rotation."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cfmkit.elastica.kernels.codes import (
+    ASKED,
+    BY_DRIVE,
+    CHANGE,
+    DENIED,
+    DONE,
+    DRIVE_RATE,
+    FULL,
+    HIGHEST,
+    INERTIA,
+    INERTIA_BEFORE,
+    ITERATIONS,
+    KEPT,
+    KEPT_WITH_SLOPES,
+    LANDINGS,
+    LONG,
+    LONGEST,
+    LOWEST,
+    NO_START,
+    OUTSIDE,
+    REACHED,
+    SENSE,
+    SHORT,
+    SHORTNESS,
+    SMALLEST,
+    SOLVED,
+    SPENT,
+    STALLED,
+    STEP,
+    TOLERANCE,
+    UNSTABLE,
+    WATCHED,
+    WEIGHT,
+)
+from cfmkit.elastica.kernels.compiler import kernel
+from cfmkit.elastica.kernels.dense import copy
+from cfmkit.elastica.kernels.newton import all_slopes, solve
+from cfmkit.elastica.kernels.predictor import MISSED, aim, changes, misses, pulls, remember, set_border
+
+VEER = 0.5  # cosine of the largest angle between the changes of poses at both ends of a step along the arc
+LOOKED_INTO = 0.01  # share of the longest step along the arc that is short enough to meet several things in
+SECANT = 0.25  # of the last step: shorter ones go along the tangent, from which the secants of long ones differ
+STRETCH = 1.3  # factor on a step that lands on an asked value: rather than a short one after it
+CREEPING = 5e-5  # share of the drive's bounds that is a short step
+CREEPS, TAUT = 400, 100.0  # short steps in a row that are enough; change of forces for one of poses that counts for ten
+NOISE = 30.0  # how far off a guess may be where points are solved to a tolerance of one
+AGAIN = 1e-5  # change of a pose between two solutions of one point
+SHORTER, APART = 4.0, 1e4  # lengths of steps that may yet be shorter; between bifurcations that are met one by one
+
+
+@kernel
+def _store(k, y, state, asked, t, iterations, along, outs):
+    """Store point k; asked: index of its value, -1 for none; t: parameter; along: d(drive)/ds."""
+    out_y, out_drive, out_info = outs
+    copy(out_y[k], y)
+    out_drive[k] = state[0]
+    out_info[k, UNSTABLE], out_info[k, ASKED], out_info[k, REACHED] = state[1], asked, t
+    out_info[k, SPENT], out_info[k, DRIVE_RATE], out_info[k, SHORTNESS] = iterations, along, state[2]
+
+
+@kernel
+def _next_step(natural, step, old, targets, asked):
+    """Return the advance to the next point, whether it lands on an asked value, and that value of the drive."""
+    if not natural:
+        return abs(step), False, 0.0
+    left = targets[asked] - old
+    if abs(left) <= STRETCH * abs(step):
+        return left, True, targets[asked]
+    ahead = step if left * step > 0.0 else -step
+    return ahead, False, old + ahead
+
+
+@kernel
+def _forward(border, tangent):
+    """Tell whether a tangent exists and goes the way of the bordering row."""
+    along = 0.0
+    for i in range(border.shape[0]):
+        along += border[i] * tangent[i]
+    return along > 0.0
+
+
+@kernel
+def _begin(m, n_free, y, drive, natural, spaces, options, outs, scratch):
+    """Solve for the start where it is only near an equilibrium, and store it; in natural steps set the slopes there.
+
+    Returns how many points are stored, -1 where there is no start, and whether the slopes are known. The tangent gets
+    the path's sense.
+    """
+    state, unit, new, tangent, slope = spaces
+    n, fresh = unit.shape[0] - 1, options[SENSE] != 0.0
+    if not (natural or fresh):
+        return 0, False
+    copy(new, y)
+    state[0] = drive
+    code, iterations = solve(
+        m, n_free, new, state, unit, drive, (options[TOLERANCE], options[ITERATIONS]), tangent, scratch
+    )
+    if fresh:
+        if code != SOLVED:
+            return -1, False
+        copy(y, new)
+        _store(0, y, state, -1, 0.0, iterations, tangent[n], outs)
+        for i in range(n + 1):
+            tangent[i] *= 1.0 if natural else options[SENSE]
+    known = natural and code == SOLVED and changes(new, y, n_free, n) < AGAIN
+    if known:
+        all_slopes(m, n_free, tangent, slope, scratch)
+    return (1 if fresh else 0), known
+
+
+@kernel
+def _longer(moved, missed, turn, count, landing, tolerance):
+    """Tell whether the next step may be longer; the guess has the errors of the points that it comes from, enlarged."""
+    well = missed < 0.1 * moved + NOISE * tolerance
+    return well and (landing or (count > 2 and moved < 0.5 * turn))
+
+
+@kernel
+def _creeps(slow, ahead, moved, new, old, options, n_free, n):
+    """Count the short steps in a row, those tenfold in which only forces grow: a path drawn taut gets no further."""
+    if abs(ahead) >= CREEPING * (options[HIGHEST] - options[LOWEST]):
+        return 0
+    return slow + (10 if pulls(new, old, n_free, n) > TAUT * moved else 1)
+
+
+@kernel
+def _refused(code, moved, missed, bent, turn, count):
+    """Tell whether a step led to no equilibrium, too far, or off what the points before it or its slopes foretell."""
+    off = max(bent, missed if count > 1 else 0.0)
+    return code != SOLVED or not (moved <= turn and off <= MISSED * moved + 1e-7)
+
+
+@kernel
+def _passed(state, index, count, natural, watched, length):
+    """Tell whether a step has gone past more than one loss of stability, or into loads that its segments do not bear.
+
+    Behind one bifurcation the next ones are near: the first one is to be met first, by shorter steps. Those that are
+    nearer than APART are met together: very short steps would follow the corner that errors of integration round off.
+    length: of the step, in units of the smallest one.
+    """
+    if length <= SHORTER:
+        return False
+    lost = state[1] - index if watched and natural else 0.0
+    unborne = state[2] < SHORT and (lost > 0.0 or (natural and count == 1))
+    return (lost > 1.0 and length > APART) or state[1] < min(index, 0.0) or unborne
+
+
+@kernel
+def _slopes_behind(code, m, n_free, natural, weight, tangent, slope, room, scratch):
+    """Set the slopes behind a step; along the arc those per unit of its length. room (n + 1): for `set_border`."""
+    if code == SOLVED:
+        if not natural:
+            set_border(natural, tangent, weight, n_free, room)
+        all_slopes(m, n_free, tangent, slope, scratch)
+
+
+@kernel
+def _strays(code, known, ahead, options, both, state, index, n_free, n):
+    """Tell whether in a step along the arc that led somewhere more happened than one limit point or one bifurcation.
+
+    Or, from the slopes before and behind it, whether poses change in another direction: behind a sharp turn lie other
+    paths.
+    """
+    if code != SOLVED or options[BY_DRIVE] > 0.5:
+        return False
+    old, new = both
+    changed, last = abs(state[1] - index), new.shape[0] - 1
+    several = changed > 1.0 or (known and changed == 0.0 and old[last] * new[last] < 0.0)
+    if several and options[WATCHED] > 0.5 and ahead > LOOKED_INTO * options[LONGEST]:
+        return True
+    if not known or ahead <= SHORTER * options[SMALLEST]:
+        return False
+    along, one, other = 0.0, 0.0, 0.0
+    for i in range(last):
+        if i < n_free or (i >= n and (i - n) % 6 < 3):
+            along += old[i] * new[i]
+            one += old[i] * old[i]
+            other += new[i] * new[i]
+    return along < VEER * np.sqrt(one * other)
+
+
+@kernel
+def march(m, n_free, y, drive, tangent, targets, options, outs, scratch, room):
+    """Follow the path from (y, drive) through the targets.
+
+    options: tolerance, iterations, by the drive (1) or the arc length (0), first, smallest and longest step, largest
+    change of a pose in a step, weight of forces in the arc length, lowest and highest drive, whether to stop where the
+    inertia changes, inertia at the start, sense, how often a landing on a target may be refused. A sense of 1 or -1
+    says that the start is only near an equilibrium, which is solved for and stored first. A step that lands on a
+    target may be longer than the longest by STRETCH. room: see `cfmkit.elastica.kernels.workspace`.
+    Returns why the march ended and the number of points stored.
+    """
+    natural, step, smallest = options[BY_DRIVE] > 0.5, options[STEP], options[SMALLEST]
+    greatest, turn = options[LONGEST], options[CHANGE]
+    n, size = tangent.shape[0] - 1, y.shape[0]
+    kept, (new, guess, slope), state, (border, new_tangent, unit, unused), between = room
+    times, past, slopes = kept
+    for i in range(state.shape[0]):
+        state[i] = 0.0
+    stored, known = _begin(m, n_free, y, drive, natural, (state, unit, new, tangent, slope), options, outs, scratch)
+    if stored < 0:
+        return NO_START, 0
+    t, asked, index = (drive if natural else 0.0), 0, (state[1] if stored == 1 else options[INERTIA_BEFORE])
+    most = KEPT_WITH_SLOPES if natural else KEPT
+    count, slow, denied = remember(kept, 0, t, y, drive, slope, most), 0, 0
+    while asked < targets.shape[0]:
+        if stored + targets.shape[0] - asked + 1 >= outs[0].shape[0]:
+            return FULL, stored
+        old = past[0]
+        set_border(natural, tangent, options[WEIGHT], n_free, border)
+        ahead, landing, goal = _next_step(natural, step, old[size], targets, asked)
+        goal = aim(new, state, border, tangent, (kept, count, t, guess), natural, goal, ahead)
+        code, iterations = solve(
+            m, n_free, new, state, border, goal, (options[TOLERANCE], options[ITERATIONS]), new_tangent, scratch
+        )
+        moved, missed = changes(new, old, n_free, n), changes(new, guess, n_free, n)
+        _slopes_behind(code, m, n_free, natural, options[WEIGHT], new_tangent, slope, unused, scratch)
+        bent = misses(old, new, slopes[0], slope, ahead, n_free, n) if known else 0.0
+        refused = _refused(code, moved, missed, bent, turn, count)
+        passed = _passed(state, index, count, natural, options[WATCHED] > 0.5, abs(ahead) / smallest)
+        passed = passed or _strays(code, known, ahead, options, (slopes[0], slope), state, index, n_free, n)
+        if refused or passed or not (natural or _forward(border, new_tangent)):
+            step, denied = (0.5 * ahead if natural else 0.5 * step), denied + (1 if landing else 0)
+            if abs(step) < smallest or denied >= options[LANDINGS]:
+                return (STALLED if abs(step) < smallest else DENIED), stored
+            if count > 1 and abs(step) < SECANT * abs(times[0] - times[1]):
+                count = 1
+            continue
+        if state[2] < SHORT:
+            return LONG, stored
+        slow = _creeps(slow, ahead, moved, new, old, options, n_free, n) if natural and not landing else 0
+        if slow > CREEPS:
+            return STALLED, stored
+        if not natural:
+            spaces = (scratch, between)
+            asked, stored = _between(m, n_free, old, new, state, targets, asked, stored, options, outs, unit, spaces)
+            if asked >= targets.shape[0]:
+                return DONE, stored
+        t += ahead
+        _store(stored, new, state, asked if landing else -1, t, iterations, new_tangent[n], outs)
+        stored, asked, denied = stored + 1, asked + (1 if landing else 0), (0 if landing else denied)
+        count = remember(kept, count if known or not natural else 0, t, new, state[0], slope, most)
+        known = True
+        copy(tangent, new_tangent)
+        if options[WATCHED] > 0.5 and state[1] != index:
+            return INERTIA, stored
+        index = state[1]
+        if state[0] < options[LOWEST] or state[0] > options[HIGHEST]:
+            return OUTSIDE, stored
+        if _longer(moved, missed, turn, count, landing, options[TOLERANCE]):
+            step = np.sign(step) * min(greatest, 1.6 * abs(step))
+    return DONE, stored
+
+
+@kernel
+def _between(m, n_free, old, new, state, targets, asked, stored, options, outs, unit, spaces):
+    """Solve at the asked values of the drive that a step of arc length has passed; return (asked, stored).
+
+    Values in the direction of the first target count as asked once each; a value passed again on the way back
+    after a fold is stored again.
+    """
+    size = new.shape[0]
+    n_all = targets.shape[0]
+    scratch, (y, s, tangent) = spaces
+    s[4] = s[5] = 0.0
+    before, after = old[size], state[0]
+    rising = after > before
+    first = 0 if (rising == (targets[n_all - 1] > targets[0]) or n_all == 1) else n_all - 1
+    for i in range(n_all):
+        k = i if first == 0 else n_all - 1 - i
+        value = targets[k]
+        inside = (before < value <= after) if rising else (after <= value < before)
+        if not inside or stored >= outs[0].shape[0] - 2:
+            continue
+        share = (value - before) / (after - before)
+        for i in range(size):
+            y[i] = old[i] + share * (new[i] - old[i])
+        s[0] = value
+        code, iterations = solve(
+            m, n_free, y, s, unit, value, (options[TOLERANCE], options[ITERATIONS]), tangent, scratch
+        )
+        n = unit.shape[0] - 1
+        if code == SOLVED and changes(y, new, n_free, n) <= 1.5 * changes(new, old, n_free, n) + 1e-7:
+            _store(stored, y, s, k, -1.0, iterations, 1.0 if rising else -1.0, outs)
+            stored += 1
+            if k == n_all - 1:
+                return n_all, stored
+            asked = max(asked, k + 1) if asked < n_all - 1 else asked
+        elif k == n_all - 1:
+            return n_all, stored
+    return asked, stored

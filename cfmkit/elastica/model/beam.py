@@ -1,0 +1,309 @@
+"""A beam between two nodes: its shape, its section, how it closes the gap between the nodes, how its ends are joined.
+
+Closure: nodes and shapes that are given rounded do not fit exactly. "rotscale" turns each shape and scales it so
+that it does, and reports by how much; "raw" keeps shape and length and forces the beam into place, prestressed.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass, fields, is_dataclass, replace
+from functools import cached_property
+from math import ceil
+from numbers import Number
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from cfmkit.elastica.model.section import Taper
+from cfmkit.elastica.model.shapes import STRAIGHT, Course, Shape, direction
+from cfmkit.errors import InputError
+
+if TYPE_CHECKING:
+    from cfmkit.elastica.model.section import Section
+
+Joint = Literal["rigid", "pin"]
+Closure = Literal["rotscale", "raw"]
+
+SAME = 1e-12
+"""Parameters of a shape that differ by less count as one place."""
+
+_SLIGHT = 1e-9  # [rad] an angle that is no corner; [1] a share of the complex step that is rounding
+_PANELS = 8  # of a smooth piece at least
+_COILED = 2.0  # mean turn of a panel [rad] up to which twelve nodes integrate its sine and cosine to about 1e-12
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(12)
+GAUSS = (
+    ((np.arange(_PANELS)[:, None] + 0.5 * (1 + _NODES)) / _PANELS).ravel(),
+    np.tile(0.5 * _WEIGHTS / _PANELS, _PANELS),
+)
+"""Places and weights of the quadrature over a whole smooth beam, parameter from 0 to 1."""
+
+
+_JOINTS = ("rigid", "pin")
+
+
+@dataclass(frozen=True)
+class Beam:
+    """A beam from node `start` to node `end`.
+
+    Parameters
+    ----------
+    start, end : str
+        Names of the nodes.
+    section : Section
+        Cross-section and material.
+    shape : Shape
+        Reference shape; straight unless given.
+    closure : {"rotscale", "raw"}
+        How the shape is fitted between its ends.
+    start_joint, end_joint : {"rigid", "pin"}
+        Whether the end turns with the node.
+    start_offset, end_offset : (float, float)
+        Rigid arms from the node to the beam's end [m], as they lie before any load; they turn with the node.
+    """
+
+    start: str
+    end: str
+    section: Section
+    shape: Shape = STRAIGHT
+    closure: Closure = "rotscale"
+    start_joint: Joint = "rigid"
+    end_joint: Joint = "rigid"
+    start_offset: tuple[float, float] = (0.0, 0.0)
+    end_offset: tuple[float, float] = (0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        """Check the choices."""
+        if self.closure not in ("rotscale", "raw"):
+            raise InputError(f"closure must be 'rotscale' or 'raw', got {self.closure!r}")
+        if self.start_joint not in _JOINTS or self.end_joint not in _JOINTS:
+            wrong = self.end_joint if self.start_joint in _JOINTS else self.start_joint
+            raise InputError(f"a joint is 'rigid' or 'pin', got {wrong!r}")
+        if self.start == self.end:
+            raise InputError(f"a beam needs two different nodes, got {self.start!r} twice")
+
+
+@dataclass(frozen=True)
+class Fit:
+    """How a shape was fitted between its ends.
+
+    Attributes
+    ----------
+    rotation : float
+        Turn of the shape [rad]; as given plus this is as used.
+    scale : float
+        Factor on the shape's size [1].
+    gap : float
+        Distance between the far end of the shape as given and its node [m].
+    length : float
+        Arc length as used [m].
+    """
+
+    rotation: Any
+    scale: Any
+    gap: float
+    length: Any
+    course: Course
+
+    def angle(self, t: Any, inside: float) -> Any:
+        """Return the reference angle [rad] as used."""
+        return self.course.angle(t, inside) + self.rotation
+
+    def speed(self, t: Any, inside: float) -> Any:
+        """Return ds/dt [m] as used."""
+        return self.course.speed(t, inside) * self.scale
+
+    def arc(self, t: Any) -> Any:
+        """Return the fractions of the arc length at parameters of any shape."""
+        if self.course.uniform:
+            return t
+        edges, lengths = self._arcs
+        values = np.atleast_1d(np.asarray(t, dtype=float))
+        panel = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, len(edges) - 2)
+        half = 0.5 * (values - edges[panel])
+        places = edges[panel][..., None] + half[..., None] * (1 + _NODES)
+        piece = np.searchsorted(self.course.breaks, edges[panel], side="right") - 1
+        middles = 0.5 * (self.course.breaks[1:] + self.course.breaks[:-1])
+        found = lengths[panel]
+        for one in np.unique(piece):
+            own = piece == one
+            found[own] += (self.course.speed(places[own], middles[one]) * _WEIGHTS).sum(axis=-1) * half[own]
+        return (found / lengths[-1]).reshape(np.shape(t))[()]
+
+    @cached_property
+    def _arcs(self) -> tuple[Any, Any]:
+        """Edges of panels over the parameter, and the arc lengths there before scaling."""
+        edges, steps = [np.zeros(1)], [np.zeros(1)]
+        for left, right in itertools.pairwise(self.course.breaks.tolist()):
+            marks = np.linspace(left, right, _PANELS + 1)
+            half = 0.5 * (marks[1] - marks[0])
+            t = (marks[:-1] + half)[:, None] + half * _NODES
+            edges.append(marks[1:])
+            steps.append((self.course.speed(t, 0.5 * (left + right)) * _WEIGHTS).sum(axis=1) * half)
+        return np.concatenate(edges), np.cumsum(np.concatenate(steps))
+
+    def parameter(self, fraction: float) -> float:
+        """Return t at a fraction of the arc length."""
+        if self.course.uniform or fraction in (0.0, 1.0):
+            return fraction
+        if fraction not in self._parameters:
+            from cfmkit.numerics.roots import bracketed_root
+
+            self._parameters[fraction] = bracketed_root(lambda t: float(np.real(self.arc(t))) - fraction, 0.0, 1.0)
+        return self._parameters[fraction]
+
+    @property
+    def turn(self) -> float:
+        """By how much the angle turns along the unloaded shape, to and fro added up, corners left out [rad]."""
+        return sum(_turn_of(self.course, left, right) for left, right in itertools.pairwise(self.course.breaks))
+
+    @cached_property
+    def _parameters(self) -> dict[float, float]:
+        """Parameters that were asked for, by the fraction."""
+        return {}
+
+
+def fit(beam: Beam, reach: Any, known: Fit | None = None) -> Fit:
+    """Return the beam's shape fitted to the vector `reach` between its ends, (dx, dy) [m].
+
+    Parameters
+    ----------
+    beam : Beam
+        May hold complex steps.
+    reach : (float, float)
+        May hold them too.
+    known : Fit, optional
+        The same fit without complex steps: it may know the parameters of the stations.
+
+    Raises
+    ------
+    cfmkit.errors.InputError
+        If the ends coincide, or the shape closes on itself.
+    """
+    dx, dy = reach
+    distance = (dx * dx + dy * dy) ** 0.5
+    if not np.real(distance) > 0:
+        raise InputError(f"the ends of the beam {beam.start}-{beam.end} coincide")
+    course = beam.shape.course(distance)
+    (cx, cy), length = _integral(course)
+    own = (cx * cx + cy * cy) ** 0.5
+    if not np.real(own) > 1e-9 * np.real(length):
+        raise InputError(f"the shape of the beam {beam.start}-{beam.end} returns to its start: it cannot be fitted")
+    gap = float(np.hypot(np.real(dx - cx), np.real(dy - cy)))
+    if beam.closure == "raw":
+        return _in_place(Fit(0.0, 1.0, gap, length, course), beam, known)
+    rotation = direction(dx * cx + dy * cy, dy * cx - dx * cy)
+    scale = distance / own
+    return _in_place(Fit(rotation, scale, gap, length * scale, course), beam, known)
+
+
+def same_value(one: Any, other: Any) -> bool:
+    """Tell whether two values are equal to the last bit; records by their fields, arrays by their entries."""
+    if one is other:
+        return True
+    if isinstance(one, Number) and isinstance(other, Number):
+        return bool(one == other)
+    if type(one) is not type(other):
+        return False
+    if is_dataclass(one):
+        return all(same_value(getattr(one, f.name), getattr(other, f.name)) for f in fields(one))
+    if isinstance(one, tuple):
+        return len(one) == len(other) and all(map(same_value, one, other))
+    return bool(np.array_equal(one, other)) if isinstance(one, np.ndarray) else bool(one == other)
+
+
+def _in_place(fitted: Fit, beam: Beam, known: Fit | None) -> Fit:
+    """Return a fit over a parameter in which complex steps move neither the shape's breaks nor the section's stations.
+
+    A grid has its edges there (`cfmkit.elastica.equilibrium.mesh`). A station keeps its fraction u of the arc length:
+    where the arc length changes along the shape's own parameter t, or u does, it moves there by
+    dt = (du - d(arc)) / (d(arc)/dt).
+    """
+    thickness = beam.section.thickness
+    if not (np.iscomplexobj(fitted.length) or (isinstance(thickness, Taper) and np.iscomplexobj(thickness.stations))):
+        return fitted
+    breaks = np.real(fitted.course.breaks)
+    if np.iscomplexobj(fitted.course.breaks):
+        fitted = replace(fitted, course=fitted.course.over(breaks, fitted.course.breaks))
+    stations = beam.section.stations[1:-1]
+    if not len(stations) or (fitted.course.uniform and not np.iscomplexobj(thickness.stations)):  # type: ignore[union-attr]
+        return fitted
+    marks, steps = breaks, np.zeros(len(breaks))
+    for station in stations.tolist():
+        t = (known or fitted).parameter(station)
+        ahead = _station_step(beam, station) - np.imag(fitted.arc(t))
+        step = float(ahead * np.real(fitted.length) / np.real(fitted.speed(t, t)))
+        k = int(np.searchsorted(marks, t - SAME))
+        if marks[k] > t + SAME:
+            marks, steps = np.insert(marks, k, t), np.insert(steps, k, step)
+        elif not _has_corner(fitted.course, t):
+            steps[k] = step
+        elif _has_step(beam.section, station) and abs(step) > _SLIGHT * _change(fitted.course):
+            raise InputError(
+                f"a corner of the beam {beam.start}-{beam.end} and a step of its thickness move past each other: "
+                "no derivative there"
+            )
+    return replace(fitted, course=fitted.course.over(marks, marks + 1j * steps))
+
+
+def _has_corner(course: Course, t: float) -> bool:
+    """Tell whether the angle jumps at the break at t; the ends count as corners."""
+    k = int(np.abs(course.breaks - t).argmin())
+    if k in (0, len(course.breaks) - 1):
+        return True
+    before, after = 0.5 * (course.breaks[k - 1 : k + 1] + course.breaks[k : k + 2])
+    return bool(abs(np.real(course.angle(t, after) - course.angle(t, before))) > _SLIGHT)
+
+
+def _has_step(section: Section, station: float) -> bool:
+    """Tell whether the thickness jumps at a station."""
+    given = section.thickness
+    return isinstance(given, Taper) and bool(np.ptp(given.values[given.stations.real == station].real) > 0)
+
+
+def _station_step(beam: Beam, station: float) -> float:
+    """Return the imaginary step of a station of a taper."""
+    given: Any = beam.section.thickness
+    steps = np.imag(given.stations[np.real(given.stations) == station])
+    if np.ptp(steps) > 0:
+        raise InputError(
+            f"both stations of a step in the thickness of the beam {beam.start}-{beam.end} must move alike: "
+            "no derivative there"
+        )
+    return float(steps[0])
+
+
+def _change(course: Course) -> float:
+    """Return by how much complex steps change angle and, relatively, speed at the middles of a course's pieces."""
+    middles = (0.5 * (course.breaks[1:] + course.breaks[:-1])).tolist()
+    angles = [abs(np.imag(course.angle(t, t))) for t in middles]
+    return float(max(*angles, *(abs(np.imag(course.speed(t, t)) / np.real(course.speed(t, t))) for t in middles)))
+
+
+def _turn_of(course: Course, left: Any, right: Any) -> float:
+    """Return by how much the angle turns between two neighbouring breaks, to and fro added up [rad].
+
+    The angle itself, unlike its sine, shows at a few places how far it runs.
+    """
+    places = np.linspace(np.real(left), np.real(right), _PANELS * len(_NODES))
+    angles = np.broadcast_to(np.real(course.angle(places, float(np.real(0.5 * (left + right))))), places.shape)
+    return float(np.abs(np.diff(angles)).sum())
+
+
+def _integral(course: Course) -> tuple[tuple[Any, Any], Any]:
+    """Return the integrals of (cos, sin) of the angle and of the speed over a whole course."""
+    x: Any = 0.0
+    y: Any = 0.0
+    length: Any = 0.0
+    for left, right in itertools.pairwise(course.breaks):
+        inside = float(np.real(0.5 * (left + right)))
+        count = max(_PANELS, ceil(_turn_of(course, left, right) / _COILED))
+        panels = np.linspace(left, right, count + 1)
+        half = 0.5 * (panels[1] - panels[0])
+        t = ((panels[:-1] + half)[:, None] + half * _NODES).ravel()
+        weights = np.tile(half * _WEIGHTS, count)
+        speed, angle = course.speed(t, inside) * weights, course.angle(t, inside)
+        x = x + (speed * np.cos(angle)).sum()
+        y = y + (speed * np.sin(angle)).sum()
+        length = length + speed.sum()
+    return (x, y), length

@@ -1,0 +1,140 @@
+"""What is done to a network: one quantity that is taken through given values.
+
+Every drive has `points`, the values at which results are wanted, in the order in which they are passed, starting
+from rest (zero, which need not be among them). The values may turn round (up, and down again): what was passed is then
+met once more, from the other side. `Control` says how the path is followed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import isfinite
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from cfmkit.curves import read_only
+from cfmkit.elastica.model.network import LineLoad, LoadOn, PointLoad
+from cfmkit.errors import InputError
+
+if TYPE_CHECKING:
+    from cfmkit.curves import FloatArray
+
+
+@dataclass(frozen=True)
+class Displacement:
+    """A node is moved along a direction [rad] by `points` [m]; the effort is the force along it [N].
+
+    `loads` grow with it, by so much for one metre.
+    """
+
+    node: str
+    direction: float
+    points: FloatArray
+    loads: tuple[LoadOn, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Freeze and check the points."""
+        object.__setattr__(self, "points", _points(self.points))
+
+
+@dataclass(frozen=True)
+class Rotation:
+    """A node is turned by `points` [rad]; the effort is the moment [N m].
+
+    `loads` grow with it, by so much for one radian.
+    """
+
+    node: str
+    points: FloatArray
+    loads: tuple[LoadOn, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Freeze and check the points."""
+        object.__setattr__(self, "points", _points(self.points))
+
+
+@dataclass(frozen=True)
+class Loading:
+    """Loads are applied times a factor that goes through `points` [1].
+
+    The effort is the work-conjugate displacement: the sum of load times displacement per unit of the factor [J];
+    for one unit force it is the displacement along it.
+    """
+
+    loads: tuple[LoadOn, ...]
+    points: FloatArray
+
+    def __post_init__(self) -> None:
+        """Freeze and check the points and the loads."""
+        object.__setattr__(self, "points", _points(self.points))
+        if not self.loads or not all(isinstance(load, PointLoad | LineLoad) for load in self.loads):
+            raise InputError("a load drive needs at least one load")
+
+
+Drive = Displacement | Rotation | Loading
+
+
+@dataclass(frozen=True)
+class Control:
+    """How a path is followed and how accurate it must be.
+
+    Parameters
+    ----------
+    tolerance : float
+        Error of forces and positions allowed, relative to the largest of the path [1].
+    through_folds : bool
+        Follow the path through limit points of the drive, where it would end otherwise: from there on by its arc
+        length, until the drive leads on again. Until then it is unstable and stays on its curve, whatever `branch`
+        says; its bifurcations are told. Values asked for that are passed several times are delivered every time. It
+        ends where the last of them (the last before the points turn round) is passed first.
+    branch : {"stable", "primary", "stop"}
+        Where stability is lost leave for a stable branch, stay on the path and say so, or end the path there: the
+        quickest way to know that a design is no good. With `through_folds` the path stays on its curve also where no
+        stable branch begins.
+    sign : {1, -1}
+        Which of two mirror-image branches is taken, at every bifurcation anew: also where the points turn round and a
+        bifurcation is passed again.
+    largest_turn : float
+        Largest change of a rotation, or of a position in units of the mean beam length, in one step [rad].
+    first_step : float or None
+        First step as a fraction of the drive's range; found from the points unless given.
+    most_points : int
+        At most so many points besides those asked for.
+    imperfection : float
+        Bend the unloaded beams by so much [m] in the form of the buckling mode at the first bifurcation of the
+        perfect path, to either side by its sign; 0: perfect. `Path.imperfection` names what was done.
+    """
+
+    tolerance: float = 1e-7
+    through_folds: bool = False
+    branch: Literal["stable", "primary", "stop"] = "stable"
+    sign: Literal[1, -1] = 1
+    largest_turn: float = 0.35
+    first_step: float | None = None
+    most_points: int = 2000
+    imperfection: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Check the values."""
+        if not 1e-12 <= self.tolerance <= 0.1:
+            raise InputError(f"the tolerance must be between 1e-12 and 0.1, got {self.tolerance}")
+        if self.branch not in ("stable", "primary", "stop") or self.sign not in (1, -1):
+            raise InputError("branch is 'stable', 'primary' or 'stop', sign 1 or -1")
+        if not (self.largest_turn > 0 and self.most_points >= 2):
+            raise InputError("largest_turn must be positive and most_points at least 2")
+        if not isfinite(self.imperfection):
+            raise InputError(f"the imperfection must be a finite length, got {self.imperfection}")
+        if self.first_step is not None and not 0 < self.first_step <= 1:
+            raise InputError(f"first_step must be above 0 and at most 1, got {self.first_step}")
+
+
+def _points(points: FloatArray) -> FloatArray:
+    array = read_only(np.atleast_1d(np.asarray(points, dtype=float)))
+    if array.ndim != 1 or len(array) == 0 or not np.isfinite(array).all():
+        raise InputError("a drive needs a list of finite points")
+    if (np.diff(array) == 0).any():
+        raise InputError("the points of a drive must differ from one to the next")
+    if not array.any():
+        raise InputError("a drive needs a point other than zero")
+    return array

@@ -1,0 +1,256 @@
+"""What a planar network of slender beams is: nodes with their supports, beams, rigid links, springs, constant loads.
+
+Values only, in SI; what is done to a network is a `cfmkit.elastica.model.drive`, what comes out a
+`cfmkit.elastica.outcome.path.Path`.
+
+Assumes: plane bending, linear elastic material, rigid joints and links, conservative springs.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+from cfmkit.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from cfmkit.elastica.model.beam import Beam
+
+
+_NONE = (0.0, 0.0, 0.0)  # not displaced
+
+
+@dataclass(frozen=True)
+class Support:
+    """Which motions of a node are held, in a frame turned by `direction`.
+
+    Parameters
+    ----------
+    along, across, rotation : bool
+        Whether the motion along the direction, across it (90 deg to its left) and the rotation are held.
+    direction : float
+        Angle of the frame [rad].
+    displacement : (float, float, float)
+        Where held motions are held: along [m], across [m], rotation [rad]; applied before anything else is.
+    """
+
+    along: bool = False
+    across: bool = False
+    rotation: bool = False
+    direction: float = 0.0
+    displacement: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        """Refuse displacements of motions that are free."""
+        if tuple(self.displacement) == _NONE:
+            return
+        for held, value, name in zip(
+            (self.along, self.across, self.rotation), self.displacement, ("along", "across", "rotation"), strict=True
+        ):
+            if value != 0 and not held:
+                raise InputError(f"a displacement {name} is given but that motion is not held")
+
+
+FREE = Support()
+CLAMPED = Support(True, True, True)
+PINNED = Support(True, True, False)
+
+
+def guided(direction: float, rotates: bool = False) -> Support:
+    """Return the support of a node that slides along `direction` [rad] and, if asked, rotates."""
+    return Support(along=False, across=True, rotation=not rotates, direction=direction)
+
+
+@dataclass(frozen=True)
+class Node:
+    """A place in the plane [m] and its support."""
+
+    x: float
+    y: float
+    support: Support = FREE
+
+
+@dataclass(frozen=True)
+class Link:
+    """A rigid link: `node` moves and turns with `master` as one body; a pin where it does not turn with it.
+
+    A pin lets beams, links and springs at `node` turn against those at `master` without a moment; a torsion spring
+    between the two makes it a sprung hinge.
+    """
+
+    master: str
+    node: str
+    turns: bool = True
+
+
+@dataclass(frozen=True)
+class LineSpring:
+    """A spring along the line between two nodes; `free_length` [m] is the present one unless given.
+
+    `stiffness` in N/m. A second node that is None is `ground`, a place [m].
+    """
+
+    start: str
+    end: str | None
+    stiffness: float
+    free_length: float | None = None
+    ground: tuple[float, float] = (0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class TorsionSpring:
+    """A spring between the rotations of two nodes, or one node and the ground.
+
+    `stiffness` in N m/rad; the moment vanishes where the rotation of `end` less that of `start` is `free_angle` [rad].
+    """
+
+    start: str | None
+    end: str
+    stiffness: float
+    free_angle: float = 0.0
+
+
+@dataclass(frozen=True)
+class SlideSpring:
+    """A spring that resists the motion of a node along a fixed `direction` [rad]; `stiffness` in N/m."""
+
+    node: str
+    direction: float
+    stiffness: float
+    free_displacement: float = 0.0
+
+
+Spring = LineSpring | TorsionSpring | SlideSpring
+
+
+@dataclass(frozen=True)
+class PointLoad:
+    """A force [N] and moment [N m] at a node. One that `follows` turns with the node; else it keeps its direction.
+
+    Under loads that follow a path is called unstable where it diverges. Whether it flutters, which depends on masses,
+    is not judged.
+    """
+
+    node: str
+    fx: float = 0.0
+    fy: float = 0.0
+    moment: float = 0.0
+    follows: bool = False
+
+
+@dataclass(frozen=True)
+class LineLoad:
+    """A uniform dead load on a beam per reference length [N/m]."""
+
+    beam: str
+    wx: float = 0.0
+    wy: float = 0.0
+
+
+LoadOn = PointLoad | LineLoad
+
+
+@dataclass(frozen=True)
+class Network:
+    """A network: everything about it, by name, and nothing about what is done to it.
+
+    Raises
+    ------
+    cfmkit.errors.InputError
+        If names do not match, or a linked node has a support of its own.
+    """
+
+    nodes: Mapping[str, Node]
+    beams: Mapping[str, Beam]
+    links: tuple[Link, ...] = ()
+    springs: tuple[Spring, ...] = ()
+    loads: tuple[LoadOn, ...] = field(default=())
+
+    def __post_init__(self) -> None:
+        """Freeze the mappings and check that names match."""
+        nodes, beams = dict(self.nodes), dict(self.beams)
+        object.__setattr__(self, "nodes", MappingProxyType(nodes))
+        object.__setattr__(self, "beams", MappingProxyType(beams))
+        if not beams:
+            raise InputError("a network needs at least one beam")
+        for name, beam in beams.items():
+            if beam.start not in nodes or beam.end not in nodes:
+                self._known(beam.start, f"beam {name!r}")
+                self._known(beam.end, f"beam {name!r}")
+        for spring in self.springs:
+            for end in _ends(spring):
+                self._known(end, "a spring")
+        for load in self.loads:
+            self.check_load(load)
+        if self.links:
+            self._check_links()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Return what pickling needs (mapping proxies do not pickle)."""
+        return type(self), (dict(self.nodes), dict(self.beams), self.links, self.springs, self.loads)
+
+    def check_load(self, load: LoadOn) -> None:
+        """Raise an error if what the load acts on is not there."""
+        if isinstance(load, PointLoad):
+            self._known(load.node, "a load")
+        elif load.beam not in self.beams:
+            raise InputError(f"a line load acts on {load.beam!r}, which is not a beam; beams: {', '.join(self.beams)}")
+
+    def master_of(self, node: str) -> str:
+        """Return the node that moves `node`: its link's master, or itself."""
+        for link in self.links:
+            if link.node == node:
+                return self.master_of(link.master)
+        return node
+
+    def moved(self, node: str) -> bool:
+        """Tell whether a link moves a node."""
+        return any(link.node == node for link in self.links)
+
+    def body_of(self, node: str) -> str:
+        """Return the node whose rotation is that of `node`: up the links as far as the first pin."""
+        for link in self.links:
+            if link.node == node and link.turns:
+                return self.body_of(link.master)
+        return node
+
+    def _known(self, node: str, what: str) -> None:
+        if node not in self.nodes:
+            raise InputError(f"{what} refers to {node!r}, which is not a node; nodes: {', '.join(self.nodes)}")
+
+    def _check_links(self) -> None:
+        moved = [link.node for link in self.links]
+        for link in self.links:
+            self._known(link.master, "a link")
+            self._known(link.node, "a link")
+            seen = {link.node}
+            at = link.master
+            while at in moved:
+                if at in seen:
+                    raise InputError(f"the links through {link.node!r} form a loop")
+                seen.add(at)
+                at = self.links[moved.index(at)].master
+            if at == link.node:
+                raise InputError(f"the links through {link.node!r} form a loop")
+            support = self.nodes[link.node].support
+            if support.along or support.across or support.rotation:
+                raise InputError(f"node {link.node!r} is moved by a link and cannot have a support of its own")
+        if len(set(moved)) != len(moved):
+            raise InputError("a node can be moved by one link only")
+
+
+def _ends(spring: Spring) -> list[str]:
+    """Return the names of the nodes at a spring."""
+    if isinstance(spring, SlideSpring):
+        return [spring.node]
+    return [end for end in (spring.start, spring.end) if end is not None]
+
+
+def same_direction(one: float, other: float) -> bool:
+    """Tell whether two directions [rad] are parallel, in either sense."""
+    between = one.real - other.real
+    return math.isfinite(between) and abs(math.sin(between)) < 1e-12

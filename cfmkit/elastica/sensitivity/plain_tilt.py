@@ -1,0 +1,198 @@
+"""How the arrays of a network of plain beams change with design variables: all variables at once.
+
+A plain beam has a polynomial angle and one thickness (`cfmkit.elastica.model.bundle`). Where variables move nodes and
+offsets, and change such shapes and sections, and nothing else, the changes of the fits are written out and computed as
+arrays.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from operator import attrgetter
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.elastica.kernels.model import TABLE_COLUMNS, Tilt
+from cfmkit.elastica.model.beam import GAUSS
+from cfmkit.elastica.model.bundle import is_plain, powers
+from cfmkit.elastica.model.numbering import NOWHERE
+
+if TYPE_CHECKING:
+    from cfmkit.curves import FloatArray
+    from cfmkit.elastica.equilibrium.mesh import Grid
+    from cfmkit.elastica.model.beam import Beam
+    from cfmkit.elastica.model.drive import Drive
+    from cfmkit.elastica.model.layout import Layout
+    from cfmkit.elastica.model.network import Network
+
+NO_OFFSET = (0.0, 0.0)  # an end without offset
+_SAME = attrgetter("start", "end", "start_joint", "end_joint", "closure", "section.axial", "section.shear")
+
+
+@dataclass(frozen=True, eq=False)
+class PlainTilt:
+    """Derivatives by k variables for b plain beams.
+
+    Attributes
+    ----------
+    layout : Layout
+    origin, arm : (k, places, 2) arrays
+        Of the attachments [m].
+    coefficients : (k, b, m) array
+        Of the angle as given, without the fit's rotation.
+    sections : (k, b, 7) array
+        Young's modulus, width, thickness, axial, shear, Poisson's ratio, shear factor.
+    rotation, length : (k, b) arrays
+        Of the fits.
+    """
+
+    layout: Layout
+    origin: FloatArray
+    arm: FloatArray
+    coefficients: FloatArray
+    sections: FloatArray
+    rotation: FloatArray
+    length: FloatArray
+
+    def angle(self, beam: int, t: FloatArray) -> FloatArray:
+        """Return the derivatives of a beam's angle at places, (n, k)."""
+        slopes: FloatArray = np.vander(t, self.coefficients.shape[2], increasing=True) @ self.coefficients[:, beam].T
+        return slopes + self.rotation[:, beam]
+
+    def arrays(self, cut: Grid, every: bool) -> Tilt:
+        """Return the derivatives of the model's arrays; with `every` each beam is paired with every variable."""
+        layout, count = self.layout, len(self.origin)
+        beams = self.coefficients.shape[1]
+        touched = self.coefficients.any(axis=2) | self.sections.any(axis=2) | (self.rotation != 0) | (self.length != 0)
+        powers, shares = cut.rows(self.coefficients.shape[2], 0)
+        places, rest = powers.T, self._compliances()
+        own = [np.arange(count) if every else np.flatnonzero(touched[:, e]) for e in range(beams)]
+        blocks = []
+        for e, variables in enumerate(own):
+            block = np.empty((len(places), TABLE_COLUMNS, len(variables)))
+            block[:, 0] = places @ self.coefficients[variables, e].T + self.rotation[variables, e]
+            block[:, 1:] = shares[:, :, None] * rest[variables, e].T
+            blocks.append(block.ravel())
+        first = np.cumsum([0, *map(len, own)])
+        shifts: Any = self.origin.any(axis=2) | self.arm.any(axis=2)
+        model, length = layout.plan, layout.scales.length
+        dofs, loads, springs = layout.dof_count, len(model.load_place), len(model.spring_kind)
+        none = np.zeros((count, dofs))
+        return Tilt(
+            variable=np.concatenate(own),
+            first=first,
+            table=np.concatenate(blocks),
+            begin=first[:-1] * (len(places) * TABLE_COLUMNS),
+            moves=shifts.any(axis=1),
+            shifts=shifts,
+            touches=(touched | shifts[:, layout.beam_end].any(axis=2)).T,
+            origin=self.origin / length,
+            arm=self.arm / length,
+            frame=np.zeros(self.origin.shape),
+            base=none,
+            rate=none,
+            spring=np.zeros((count, springs, 5)),
+            load=np.zeros((count, loads, 2, 3)),
+            line=np.zeros((count, beams, 2, 2)),
+        )
+
+    def _compliances(self) -> FloatArray:
+        """Return the derivatives of the length, of it times the three compliances, and of it again, (k, b, 5)."""
+        bundle, scales = self.layout.bundle, self.layout.scales
+        young, width, thickness, _, _, poisson, factor = bundle.sections
+        by = self.sections
+        stiff = by[..., 0] / young + by[..., 1] / width + by[..., 2] / thickness
+        longer = self.length / bundle.length
+        pull = longer - stiff
+        slide = pull + by[..., 5] / (1 + poisson) - by[..., 6] / factor
+        g, force = bundle.length / scales.length, scales.force
+        out = np.empty((*longer.shape, 5))
+        out[..., 0] = out[..., 4] = g * longer
+        out[..., 1] = g * scales.rigidity / bundle.bending * (pull - 2 * by[..., 2] / thickness)
+        out[..., 2] = g * force * bundle.stretch * pull
+        out[..., 3] = g * force * bundle.slip * slide
+        return out
+
+
+def plain_tilt(layout: Layout, built: list[tuple[Network, Drive]], step: float) -> PlainTilt | None:
+    """Return the derivatives for networks with one variable each moved by an imaginary step; None if not that plain."""
+    if layout.bundle.others or layout.network.springs or not built:
+        return None
+    usual = [_make_up(beam) for beam in layout.network.beams.values()]
+    fitted = all(beam.closure == "rotscale" for beam in layout.network.beams.values())
+    if not fitted or not all(_alike(layout, usual, network, drive) for network, drive in built):
+        return None
+    networks = [network for network, _ in built]
+    where = np.array([[(node.x, node.y) for node in network.nodes.values()] for network in networks]).imag / step
+    plan, bundle = layout.plan, layout.bundle
+    origin = where[:, plan.place_master]
+    arm = where[:, plan.place_node] - origin
+    if plan.offsets:
+        for place in np.flatnonzero(plan.place_offset != NOWHERE).tolist():
+            arm[:, place] += _offsets(networks, *divmod(int(plan.place_offset[place]), 2)) / step
+    most = bundle.coefficients.shape[1]
+    shapes: list[list[Any]] = [[beam.shape for beam in network.beams.values()] for network in networks]
+    given = [[shape.coefficients for shape in row] for row in shapes]
+    coefficients = np.array([[(*c, *(0.0,) * (most - len(c))) for c in row] for row in given]).imag / step
+    sections = np.array([_sections(network) for network in networks])
+    ends = origin + arm
+    reach = ends[:, plan.beam_end[:, 1]] - ends[:, plan.beam_end[:, 0]]
+    rotation, length = _fits(layout, coefficients, reach)
+    return PlainTilt(layout, origin, arm, coefficients, sections.imag / step, rotation, length)
+
+
+def _sections(network: Network) -> list[tuple[Any, ...]]:
+    """Return what `PlainTilt.sections` has, of one network."""
+    given = [beam.section for beam in network.beams.values()]
+    known = {id(s): (s.youngs_modulus, s.width, s.thickness, 0.0, 0.0, s.poisson_ratio, s.shear_factor) for s in given}
+    return [known[id(s)] for s in given]
+
+
+def _alike(layout: Layout, usual: list[Any], network: Network, drive: Drive) -> bool:
+    """Tell whether a network differs in places, coefficients and sections of rotscaled plain beams only.
+
+    usual: `_make_up` of the layout's own beams.
+    """
+    base = layout.network
+    if drive is not layout.drive or network.springs or network.links != base.links or network.loads != base.loads:
+        return False
+    if list(network.nodes) != list(base.nodes) or list(network.beams) != list(base.beams):
+        return False
+    supports = zip(network.nodes.values(), base.nodes.values(), strict=True)
+    if not all(one.support is other.support or one.support == other.support for one, other in supports):
+        return False
+    beams = network.beams.values()
+    return list(map(_make_up, beams)) == usual
+
+
+def _make_up(beam: Beam) -> tuple[Any, ...]:
+    """Return what no variable may change of a beam."""
+    return (*_SAME(beam), is_plain(beam), beam.start_offset != NO_OFFSET, beam.end_offset != NO_OFFSET)
+
+
+def _offsets(networks: list[Network], beam: int, side: int) -> FloatArray:
+    """Return the imaginary parts of one offset in all networks, (k, 2)."""
+    found = [(b.start_offset, b.end_offset)[side] for b in (list(n.beams.values())[beam] for n in networks)]
+    return np.array(found).imag
+
+
+def _fits(layout: Layout, coefficients: FloatArray, reach: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the derivatives of the fits' rotations and lengths, (k, b) each; reach (k, b, 2): those of the chords.
+
+    With the fitted angle the shape of unit length ends at (distance / length) times the direction of the chord.
+    """
+    bundle = layout.bundle
+    ends = layout.places.origin + layout.places.arm
+    d = ends[layout.beam_end[:, 1]] - ends[layout.beam_end[:, 0]]
+    distance = np.hypot(d[:, 0], d[:, 1])
+    along = d / distance[:, None]
+    v = powers(coefficients.shape[2])
+    angle = bundle.coefficients @ v
+    turned = np.array([-np.sin(angle), np.cos(angle)]) * GAUSS[1] @ v.T
+    cx, cy = np.einsum("kbm,sbm->skb", coefficients, turned)
+    longer = (reach * along).sum(axis=2)
+    aside = (reach[..., 1] * along[:, 0] - reach[..., 0] * along[:, 1]) / distance
+    own = distance / bundle.length
+    stretch, swing = cx * along[:, 0] + cy * along[:, 1], (cy * along[:, 0] - cx * along[:, 1]) / own
+    return aside - swing, bundle.length * (longer / distance - stretch / own)

@@ -1,0 +1,246 @@
+"""Points asked for at bifurcations, on both ends of a branch; the solver with nothing eliminated."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from beam_networks import drives, network
+
+from cfmkit.elastica import (
+    CLAMPED,
+    Beam,
+    Control,
+    Displacement,
+    Network,
+    Node,
+    Path,
+    PathStatus,
+    Section,
+    guided,
+    trace,
+)
+from cfmkit.elastica.equilibrium.expanded import UncondensedSolver
+from cfmkit.elastica.equilibrium.mesh import Mesh
+from cfmkit.elastica.equilibrium.solver import MarchOptions, Solver
+from cfmkit.elastica.model.layout import Layout
+from cfmkit.errors import InputError
+
+LENGTH, ANGLE = 35e-3, np.radians(8)
+RISE = LENGTH * np.sin(ANGLE)
+REGULAR = np.linspace(0.05, 2.1, 15) * RISE
+
+
+LEAF = Section(1477e6, 6e-3, 7e-4)
+
+
+def pressed(points: Any, tolerance: float, branch: Any = "stable", section: Section = LEAF) -> Path:
+    """Return the path of half a V-beam as slender as it needs to be to buckle on its way."""
+    return turned(np.sort(points), tolerance, branch, section)
+
+
+def turned(points: Any, tolerance: float, branch: Any = "stable", section: Section = LEAF) -> Path:
+    """Return the path of the same half, pressed and released."""
+    nodes = {"wall": Node(0, 0, CLAMPED), "d": Node(LENGTH * np.cos(ANGLE), RISE, guided(np.pi / 2))}
+    leaf = Network(nodes, {"v": Beam("wall", "d", section)})
+    return trace(leaf, Displacement("d", -np.pi / 2, points), Control(tolerance=tolerance, branch=branch))
+
+
+@pytest.fixture(scope="module")
+def exact() -> Path:
+    path = pressed(REGULAR, 1e-10)
+    assert [event.kind for event in path.events] == ["bifurcation", "bifurcation"]
+    return path
+
+
+@pytest.mark.parametrize("which", [0, 1])
+@pytest.mark.parametrize("tolerance", [1e-4, 1e-6, 1e-8])
+@pytest.mark.parametrize("off", [0.0, 1e-12, -1e-10, 1e-9, -1e-8, 1e-7, -1e-6, 3e-6, -1e-5, 1e-4, -1e-3])
+def test_a_point_at_the_begin_or_the_end_of_a_branch(exact: Path, which: int, tolerance: float, off: float) -> None:
+    """It is there, the path goes on as without it, and both bifurcations are found where they are."""
+    place = exact.events[which].drive
+    path = pressed(np.append(REGULAR, place + off * RISE), tolerance)
+    assert path.status is PathStatus.COMPLETE, path.message
+    assert path.stable.all()
+    assert path.asked[path.at_asked].tolist() == list(range(16))
+    assert path.drive[path.at_asked] == pytest.approx(np.sort(np.append(REGULAR, place + off * RISE)), rel=1e-12)
+    assert [(e.kind, e.before, e.after) for e in path.events] == [("bifurcation", 0, 1), ("bifurcation", 1, 0)]
+    assert [e.drive for e in path.events] == pytest.approx([e.drive for e in exact.events], abs=tolerance * RISE)
+    usual = np.isin(path.drive[path.at_asked].round(12), REGULAR.round(12))
+    found, expected = path.effort[path.at_asked], exact.effort[exact.at_asked]
+    np.testing.assert_allclose(found[usual], expected, rtol=0, atol=10 * tolerance * np.abs(expected).max())
+    aside = place + (1e-3 if which else -1e-3) * RISE  # on the path without a branch
+    near = pressed([aside, RISE] if which == 0 else [*REGULAR[:9], aside], 1e-8)
+    here = float(near.effort[np.abs(near.drive - aside).argmin()])
+    assert found[~usual] == pytest.approx([here], abs=0.03 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("off", [0.0, -1e-9, 1e-9, 1e-6])
+def test_a_point_at_a_bifurcation_of_a_path_that_goes_straight_on(exact: Path, off: float) -> None:
+    path = pressed(np.append(REGULAR, exact.events[0].drive + off * RISE), 1e-6, "primary")
+    assert path.status is PathStatus.COMPLETE, path.message
+    assert path.asked[path.at_asked].tolist() == list(range(16))
+    assert [(e.kind, e.before, e.after) for e in path.events] == [("bifurcation", 0, 1), ("bifurcation", 1, 0)]
+
+
+@pytest.mark.parametrize("which", [0, 1])
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-5, 1e-7, 1e-9])
+def test_the_last_point_may_lie_at_an_end_of_a_branch(exact: Path, which: int, tolerance: float) -> None:
+    """The path ends with it, although its end is found only from a little further on."""
+    places = [event.drive for event in exact.events]
+    path = pressed([0.5 * places[0], *([RISE] * which), places[which]], tolerance)
+    assert path.status is PathStatus.COMPLETE, path.message
+    assert path.error <= tolerance
+    assert path.stable.all()
+    assert path.drive[-1] == places[which]
+    assert [e.drive for e in path.events] == pytest.approx(places[: which + 1], abs=tolerance * RISE)
+
+
+@pytest.mark.parametrize("tolerance", [1e-4, 1e-7, 1e-9])
+@pytest.mark.parametrize(
+    ("points", "changes"),
+    [
+        ((1, 0.06, 1), "+-+"),
+        ((1, "begin", 1), "+"),
+        ((1, "end", 1), "+"),
+        ((1, "just before", 0.5), "+-+"),
+        ((1, 2.1, 1, 0.03), "+-+-"),
+        ((1, 2.1, 1, 2.1), "+-+-"),
+    ],
+)
+def test_a_drive_that_turns_back_leaves_a_branch_by_either_end(
+    exact: Path, points: Any, changes: str, tolerance: float
+) -> None:
+    """Where it turns at an end it stays on the branch. What is met is the same both ways."""
+    begin, end = (event.drive / RISE for event in exact.events)
+    named = {"begin": begin, "end": end, "just before": begin - 1e-6}
+    places = [named.get(point, point) for point in points]
+    path = turned(np.array(places) * RISE, tolerance)
+    assert path.status is PathStatus.COMPLETE, path.message
+    assert path.asked[path.at_asked].tolist() == list(range(len(places)))
+    assert path.stable.all()
+    assert "".join("+" if event.after else "-" for event in path.events) == changes
+    nearest = [min(abs(event.drive - place * RISE) for place in (begin, end)) for event in path.events]
+    assert max(nearest) < tolerance * 2.1 * RISE
+    for p, name in zip(places, path.branch[path.at_asked], strict=True):
+        assert p in (begin, end) or (name == "primary") == (not begin < p < end)
+    alike = [path.effort[path.at_asked[k]] for k, p in enumerate(places) if p == 1]
+    zero = 1e-11 * np.abs(path.effort).max()  # there the force vanishes
+    assert alike == pytest.approx([alike[0]] * len(alike), rel=100 * tolerance, abs=zero)
+
+
+@pytest.mark.parametrize("tolerance", [1e-4, 1e-7, 1e-9])
+@pytest.mark.parametrize("offs", [(-1e-7, 0.0), (0.0, 1e-7), (-1e-7, 1e-7), (-1e-6, -1e-7, 0.0, 1e-7, 1e-6)])
+@pytest.mark.parametrize("behind", [(), (2.1,)])
+def test_points_next_to_each_other_at_the_end_of_a_branch(
+    exact: Path, offs: Any, behind: Any, tolerance: float
+) -> None:
+    end = exact.events[1].drive / RISE
+    path = pressed(np.array([1.0, *(end + off for off in offs), *behind]) * RISE, tolerance)
+    assert path.status is PathStatus.COMPLETE, path.message
+    assert path.asked[path.at_asked].tolist() == list(range(1 + len(offs) + len(behind)))
+    assert path.stable.all()
+    assert [(event.kind, event.after) for event in path.events] == [("bifurcation", 1), ("bifurcation", 0)]
+
+
+@pytest.mark.parametrize("seed", [1, 3, 4, 5, 6, 8, 10])
+def test_nothing_eliminated_leads_to_the_same_equilibria(seed: int) -> None:
+    """Solutions, tangents, borders, marches and finer meshes, in the unknowns of the plain solver."""
+    net = network(seed, follower=False)
+    plain = Solver(Layout(net, drives(net, seed)[0]), Mesh(2, 2), 1e-12)
+    steady = UncondensedSolver(plain)
+    start = plain.tightened()
+    assert start is not None
+    one, other = (solver.solve(start.y, 0.02) for solver in (plain, steady))
+    assert one is not None
+    assert other is not None
+    np.testing.assert_allclose(other.y, one.y, rtol=0, atol=1e-9 * np.abs(one.y).max())
+    np.testing.assert_allclose(other.tangent, one.tangent, rtol=0, atol=1e-7 * np.abs(one.tangent).max())
+    assert (other.unstable, other.shortness) == (one.unstable, pytest.approx(one.shortness))
+    border = np.random.default_rng(seed).standard_normal(plain.n + 1)
+    level = float(border[:-1] @ one.y[: plain.n] + border[-1] * one.drive)
+    across = steady.solve(one.y, 0.021, border, level)
+    assert across is not None
+    assert across.drive == pytest.approx(one.drive, abs=1e-7)
+    options = MarchOptions(1e-12, 0.01, 0.35, sense=1.0)
+    paths = [solver.march(start, np.array([0.02, 0.04]), options, 200)[1] for solver in (plain, steady)]
+    np.testing.assert_allclose(paths[1].y[-1], paths[0].y[-1], rtol=0, atol=1e-9 * np.abs(one.y).max())
+    fine, solved = steady.finer(1e-12).solve_each(one.y[None], np.array([0.02]))
+    again, _ = plain.finer(1e-12).solve_each(one.y[None], np.array([0.02]))
+    assert solved.all()
+    np.testing.assert_allclose(fine, again, rtol=0, atol=1e-9 * np.abs(one.y).max())
+
+
+def whole(points: Any, sections: Any = (LEAF, LEAF), **control: Any) -> Path:
+    """Return the path of both halves with a shuttle that neither turns nor moves aside."""
+    across = LENGTH * np.cos(ANGLE)
+    nodes = {
+        "left": Node(-across, 0, CLAMPED),
+        "d": Node(0, RISE, guided(np.pi / 2)),
+        "right": Node(across, 0, CLAMPED),
+    }
+    beams = {"one": Beam("left", "d", sections[0]), "two": Beam("right", "d", sections[1])}
+    return trace(Network(nodes, beams), Displacement("d", -np.pi / 2, points), Control(**control))
+
+
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-5, 1e-7])
+@pytest.mark.parametrize("sign", [1, -1])
+def test_where_two_modes_are_critical_at_once_both_leaves_buckle(exact: Path, sign: int, tolerance: float) -> None:
+    """Two equal leaves on one shuttle: with one of them straight the equilibrium is not stable."""
+    path = whole(REGULAR, tolerance=tolerance, sign=sign)
+    assert path.status is PathStatus.COMPLETE
+    assert path.stable.all()
+    assert [(e.kind, e.before, e.after) for e in path.events] == [("bifurcation", 0, 2), ("bifurcation", 2, 0)]
+    found, half = path.effort[path.at_asked], exact.effort[exact.at_asked]
+    np.testing.assert_allclose(found, 2 * half, rtol=0, atol=10 * tolerance * np.abs(half).max())
+
+
+def test_the_sign_mirrors_the_forms_of_both_leaves() -> None:
+    one, other = (whole(REGULAR[:6], tolerance=1e-6, sign=sign) for sign in (1, -1))
+    for leaf in ("one", "two"):
+        moments = [path.end_force(leaf, 1)[path.at_asked[-1], 2] for path in (one, other)]
+        middle = 0.5 * (moments[0] + moments[1])
+        assert abs(moments[0] - moments[1]) > 10 * abs(middle)
+
+
+@pytest.mark.parametrize("off", [3e-6, 6e-6, 1e-5, 1.5e-5, 2e-5])
+@pytest.mark.parametrize("which", [0, 1])
+@pytest.mark.parametrize("branch", ["stable", "primary"])
+def test_every_point_asked_for_has_its_number_once(exact: Path, branch: Any, which: int, off: float) -> None:
+    path = pressed(np.append(REGULAR, exact.events[which].drive + off * RISE), 1e-6, branch)
+    assert path.status is PathStatus.COMPLETE, path.message
+    assert path.asked[path.at_asked].tolist() == list(range(16))
+
+
+@pytest.mark.parametrize("tolerance", [1e-5, 1e-7])
+@pytest.mark.parametrize("factor", [1 + 1e-4, 1 + 3e-4, 1 + 1e-3, 1.01])
+def test_leaves_that_are_nearly_equal_buckle_one_after_the_other(factor: float, tolerance: float) -> None:
+    """As the sum of two half beams, which do not act on each other."""
+    sections = [Section(1477e6, 6e-3, 7e-4 * one) for one in (1.0, factor)]
+    path = whole(REGULAR, sections, tolerance=tolerance)
+    assert path.status is PathStatus.COMPLETE, path.message
+    assert path.stable.all()
+    halves = [pressed(REGULAR, 1e-9, section=section) for section in sections]
+    expected = sum(half.effort[half.at_asked] for half in halves)
+    np.testing.assert_allclose(path.effort[path.at_asked], expected, rtol=0, atol=10 * tolerance * expected.max())
+
+
+def test_a_given_first_step_does_not_keep_a_bifurcation_from_being_found() -> None:
+    nodes = {"wall": Node(0, 0, CLAMPED), "d": Node(LENGTH * np.cos(ANGLE), RISE, guided(np.pi / 2))}
+    leaf = Network(nodes, {"v": Beam("wall", "d", LEAF)})
+    for step in (0.3, 0.1, 0.01):
+        path = trace(leaf, Displacement("d", -np.pi / 2, REGULAR), Control(tolerance=1e-6, first_step=step))
+        assert path.status is PathStatus.COMPLETE
+        assert path.stable.all()
+        assert len(path.events) == 2
+
+
+def test_a_drive_that_stands_still_is_refused() -> None:
+    with pytest.raises(InputError, match="must differ from one to the next"):
+        Displacement("d", 0.0, np.array([1e-3, 1e-3, 2e-3]))
+
+
+def test_as_many_points_as_asked_for_are_always_allowed() -> None:
+    path = pressed(np.linspace(0.05, 2.1, 2500) * RISE, 1e-5)
+    assert path.status is PathStatus.COMPLETE, path.message

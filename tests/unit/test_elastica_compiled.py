@@ -1,0 +1,464 @@
+"""The compiled code: what it is kept as, what is checked before it is used, and that it is what numba makes of it."""
+
+from __future__ import annotations
+
+import copy
+import ctypes
+import io
+import logging
+import os
+import pickle
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numba
+import numpy as np
+import pytest
+
+from cfmkit.elastica import CLAMPED, Beam, Control, Displacement, Network, Node, Section, trace
+from cfmkit.elastica.kernels import dense, entry, kept, machine, packing, predictor
+from cfmkit.elastica.kernels.packing import HEAD, objects
+from cfmkit.elastica.kernels.progress import told
+from cfmkit.elastica.kernels.signatures import DOORS
+from cfmkit.elastica.warming import warm
+from cfmkit.store.private import trusted
+
+_count, _solve, _predict = dense.positive_count, dense.lu_solve, predictor._predict
+
+
+@numba.njit
+def count_of(a):  # type: ignore[no-untyped-def]
+    return _count(a)
+
+
+@numba.njit
+def solve_with(a, b):  # type: ignore[no-untyped-def]
+    return _solve(a, b)
+
+
+@numba.njit
+def foretell(times, past, slopes, natural, t, y):  # type: ignore[no-untyped-def]
+    _predict(times, past, slopes, times.shape[0], natural, t, y)
+
+
+@pytest.mark.parametrize(("natural", "degree"), [(True, 5), (False, 2)])
+def test_the_next_point_is_foretold_exactly_where_the_path_is_a_polynomial(natural: bool, degree: int) -> None:
+    """Three points with their slopes hold a polynomial of degree 5, without them one of degree 2."""
+    course = np.polynomial.Polynomial(np.random.default_rng(0).standard_normal(degree + 1))
+    times, found = np.array([1.0, 0.7, 0.2]), np.empty(1)
+    foretell(times, course(times)[:, None], course.deriv()(times)[:, None], natural, 1.3, found)
+    assert found[0] == pytest.approx(course(1.3), rel=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_inertia_and_solution_of_random_symmetric_matrices(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    n = int(rng.integers(1, 14))
+    a = rng.standard_normal((n, n))
+    a = a + a.T
+    a[rng.random((n, n)) < 0.3] = 0.0
+    a = np.triu(a) + np.triu(a, 1).T
+    if seed % 2:
+        np.fill_diagonal(a, 0.0)
+    a += 1e-9 * np.eye(n)
+    expected = int((np.linalg.eigvalsh(a) > 0).sum())
+    assert count_of(a.copy()) == expected
+    b = rng.standard_normal((n, 2))
+    if np.linalg.cond(a) < 1e8:
+        x = b.copy()
+        assert solve_with(a.copy(), x)
+        np.testing.assert_allclose(a @ x, b, atol=1e-6)
+
+
+def _pulled_beam() -> tuple[Network, Displacement]:
+    beam = Beam("a", "b", Section(2e9, 1e-2, 1e-3))
+    nodes = {"a": Node(0.0, 0.0, CLAMPED), "b": Node(0.1, 0.0)}
+    return Network(nodes, {"x": beam}), Displacement("b", 0.0, np.array([1e-4]))
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Where alone code is kept in a test; what the test itself needs is loaded before."""
+    trace(*_pulled_beam())
+    monkeypatch.setattr(kept, "_lasting", lambda: iter([tmp_path]))
+    return tmp_path
+
+
+CODE = machine.Code(("cos",), b"machine\ncode")
+
+
+def test_code_is_kept_whole_and_for_this_user_alone(folder: Path) -> None:
+    assert kept.write("door", CODE) == folder
+    assert kept.read("door") == CODE
+    (file,) = folder.iterdir()
+    assert file.stat().st_mode & 0o022 == 0
+    assert kept.stamp()[:24] in file.name
+
+
+def test_a_changed_kernel_file_changes_the_digest(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for path in Path(kept.__file__).parent.glob("*.py"):
+        (tmp_path / path.name).write_bytes(path.read_bytes())
+    monkeypatch.setattr(kept, "__file__", str(tmp_path / "kept.py"))
+    before = kept.digest()
+    for name, same in (("entry.py", True), ("chain.py", False)):  # the code does not follow from who calls it
+        with (tmp_path / name).open("a") as file:
+            file.write("# changed\n")
+        assert (kept.digest() == before) is same
+
+
+@pytest.mark.parametrize("changed", ["sources", "python", "numba", "llvmlite", "numpy", "settings", "processor"])
+def test_code_of_another_origin_is_not_used(folder: Path, monkeypatch: pytest.MonkeyPatch, changed: str) -> None:
+    """Neither under the name that it would have, nor if it were renamed."""
+    kept.write("door", CODE)
+    (file,) = folder.iterdir()
+    origin = kept.origin() | {changed: "another"}
+    kept.stamp.cache_clear()
+    monkeypatch.setattr(kept, "origin", lambda: origin)
+    try:
+        assert kept.read("door") is None
+        file.rename(folder / f"door-{kept.stamp()[:24]}.code")
+        assert kept.read("door") is None
+    finally:
+        monkeypatch.undo()
+        kept.stamp.cache_clear()
+
+
+@pytest.mark.parametrize(("name", "same"), [("NUMBA_NUM_THREADS", True), ("NUMBA_OPT", False)])
+def test_settings_that_change_the_code_count_and_no_others(
+    monkeypatch: pytest.MonkeyPatch, name: str, same: bool
+) -> None:
+    """Processes of one study may have different numbers of threads: they share their code."""
+    before = kept.origin()
+    monkeypatch.setenv(name, "1")
+    kept.origin.cache_clear()
+    try:
+        assert (kept.origin() == before) is same
+    finally:
+        monkeypatch.undo()
+        kept.origin.cache_clear()
+
+
+@pytest.mark.parametrize("damage", [lambda data: data[:-1], lambda data: data[:-1] + b"?", lambda _data: b""])
+def test_damaged_code_is_not_used(folder: Path, damage: Any) -> None:
+    kept.write("door", CODE)
+    (file,) = folder.iterdir()
+    file.write_bytes(damage(file.read_bytes()))
+    assert kept.read("door") is None
+
+
+@pytest.mark.parametrize("others", ["the folder", "the file", "a folder above"])
+def test_code_is_never_used_where_others_could_have_put_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, others: str
+) -> None:
+    place = tmp_path / "above" / "folder"
+    place.mkdir(parents=True)
+    monkeypatch.setattr(kept, "_lasting", lambda: iter([place]))
+    monkeypatch.setattr(kept, "private_folder", lambda _name, make=True: None)
+    kept.write("door", CODE)
+    (file,) = place.iterdir()
+    assert kept.read("door") == CODE
+    {"the folder": place, "the file": file, "a folder above": place.parent}[others].chmod(0o777)
+    assert kept.read("door") is None
+    if others != "the file":
+        assert kept.write("door", CODE) is None
+
+
+def test_a_file_of_another_user_is_not_trusted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "file").touch()
+    assert trusted(tmp_path / "file")
+    owner = os.getuid()
+    monkeypatch.setattr(os, "getuid", lambda: owner + 1)
+    assert trusted(tmp_path / "file") == (owner == 0)  # the system's owner may write everywhere anyhow
+    assert not trusted(tmp_path / "no such file")
+
+
+def test_what_the_linker_would_not_find_is_told_before_it_ends_the_process() -> None:
+    with pytest.raises(machine.Strange, match="no function no_such_function"):
+        machine.loaded(machine.Code(("no_such_function",), b""))
+
+
+def test_code_that_cannot_be_loaded_is_compiled_anew(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """Two seconds: the smallest door is compiled, once; its first compilation is announced."""
+    kept.write("states", machine.Code(("no_such_function",), b""))
+    with caplog.at_level(logging.WARNING):
+        _states_with(entry._got("states"))
+        _states_with(entry._got("states"))
+    said = [record.message for record in caplog.records]
+    assert said == ["compiling the beam engine, once: states along beams, a moment"]
+    assert len(list(folder.glob("*.code"))) == 1
+
+
+def _states_with(call: Any) -> Any:
+    """Return the states along a bent beam by a loaded function."""
+    network, drive = _pulled_beam()
+    path = trace(network, drive, Control(tolerance=1e-4))
+    out = np.zeros((len(path), len(path.solver.cut.edges) + path.solver.n_segments, 7))
+    given = objects((path.points.y, path.points.drive, out))
+    block = HEAD + entry._whole(path.solver.n_free) + path.solver.model.block + given
+    assert call(block, (ctypes.c_int64 * 2)()) == 0
+    assert out.any()
+    return out
+
+
+def test_kept_code_gives_to_the_last_bit_what_numba_gives() -> None:
+    """Two seconds: numba compiles the smallest door in its usual way. All doors: see the next test."""
+    from cfmkit.elastica.kernels import build
+
+    usual = _states_with(machine.callable_at(build.called("states")))
+    _states_with(entry._got("states"))
+    code, path = kept.read("states"), kept.library("states")
+    assert code is not None
+    assert _states_with(machine.loaded(code)).tobytes() == usual.tobytes()
+    if path is not None:  # there is a C compiler
+        assert _states_with(machine.in_library(path)).tobytes() == usual.tobytes()
+
+
+_WAY_IN = "int cfmkit_door(const long long *block, long long *out) { out[0] = 2 * block[0]; return 0; }"
+
+
+@pytest.fixture
+def small(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A kept library of two machine instructions."""
+    linker = shutil.which("cc")
+    if linker is None:
+        pytest.skip("there is no C compiler")
+    room = tmp_path_factory.mktemp("source")
+    (room / "code.c").write_text(_WAY_IN)
+    subprocess.run([linker, "-fPIC", "-c", "code.c"], cwd=room, check=True)
+    kept.write("door", machine.Code((), (room / "code.o").read_bytes()))
+    path = kept.library("door")
+    assert path is not None
+    return path
+
+
+def _doubled(call: Any) -> int:
+    out = (ctypes.c_int64 * 2)()
+    assert call(np.array([21]).tobytes(), out) == 0
+    return int(out[0])
+
+
+def test_code_is_linked_where_there_is_a_compiler_and_runs_alike_where_there_is_none(
+    small: Path, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert _doubled(machine.in_library(small)) == 42
+    code = kept.read("door")
+    assert code is not None
+    assert _doubled(machine.loaded(code)) == 42
+    monkeypatch.setattr(shutil, "which", lambda _name: None)
+    kept.write("other", code)
+    assert kept.library("other") is None
+    assert kept.read("other") == code
+
+
+@pytest.mark.parametrize("damage", ["half of it", "of another origin", "others can write to it"])
+def test_a_damaged_or_strange_library_is_not_loaded(small: Path, damage: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    if damage == "half of it":
+        small.write_bytes(small.read_bytes()[: small.stat().st_size // 2])
+    elif damage == "of another origin":
+        kept.origin()
+        monkeypatch.setattr(kept, "stamp", lambda: "0" * 64)
+        for file in (small, small.with_suffix(".sha256")):
+            file.rename(small.with_name(f"door-{'0' * 24}{file.suffix}"))
+    else:
+        small.chmod(0o666)
+    assert kept.library("door") is None
+
+
+def test_what_is_no_library_is_said_to_be_strange(tmp_path: Path) -> None:
+    (tmp_path / "door.so").write_bytes(b"no library")
+    with pytest.raises(machine.Strange):
+        machine.in_library(tmp_path / "door.so")
+
+
+def test_curves_and_gradients_are_the_same_to_the_last_bit_however_the_code_is_loaded(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """As it was compiled, by LLVM; and as it is kept, by the system where there is a C compiler."""
+    list(warm())
+    ours = [part.tobytes() for part in _curve_and_gradient()]
+    for name, door in entry._doors.items():
+        code = kept.read(name)
+        if code is not None:
+            monkeypatch.setattr(door, "_call", machine.loaded(code))
+    assert [part.tobytes() for part in _curve_and_gradient()] == ours
+
+
+@pytest.mark.slow  # compiles everything in numba's usual way
+def test_curves_and_gradients_are_those_of_numba_to_rounding(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Optimised function by function, products and sums are fused in other places: the last bits differ."""
+    from cfmkit.elastica.kernels import build
+
+    ours = _curve_and_gradient()
+    for name, door in entry._doors.items():
+        monkeypatch.setattr(door, "_call", machine.callable_at(build.called(name)))
+    for theirs, own in zip(_curve_and_gradient(), ours, strict=True):
+        np.testing.assert_allclose(theirs, own, rtol=0.0, atol=1e-9 * np.abs(own).max())
+
+
+def _curve_and_gradient() -> list[Any]:
+    from cfmkit.elastica import gradient
+
+    def bent(x: Any) -> Network:
+        nodes = {"a": Node(0.0, 0.0, CLAMPED), "b": Node(x[0], 0.0), "c": Node(2 * x[0], x[2])}
+        section = Section(2e9, 1e-2, x[1])
+        return Network(nodes, {"x": Beam("a", "b", section), "y": Beam("b", "c", section)})
+
+    x = np.array([0.1, 2e-3, 0.01])
+    path = trace(bent(x), Displacement("c", 1.0, np.linspace(0, 2e-2, 9)[1:]))
+    slopes = gradient(path, bent, x)
+    return [path.points.y, path.effort, slopes.effort, slopes.held, slopes.stress_extremes("y")]
+
+
+@pytest.mark.parametrize(
+    ("other", "number"),
+    [
+        (lambda y: y.T, 19),
+        (lambda y: y[0], 19),
+        (lambda y: y.astype(np.float32), 19),
+        (lambda y: np.repeat(y, 2, axis=1)[:, ::2], 19),
+        (lambda y: y.astype(int), 19),
+        (lambda y: y.tolist(), 19),
+        (lambda y: y.astype(y.dtype.newbyteorder()), 19),
+        (lambda y: y.view(np.matrix), 19),
+    ],
+)
+def test_what_is_no_array_of_the_right_kind_is_refused(other: Any, number: int) -> None:
+    """The compiled code looks into the arrays' own fields, and checks them before it reads any memory."""
+    path = trace(*_pulled_beam())
+    solver, y = path.solver, np.ascontiguousarray(path.points.y)
+    out = np.zeros((len(path), len(solver.cut.edges) + solver.n_segments, 7))
+    door = entry._doors["states"]
+    with pytest.raises(TypeError, match=rf"array {number} of 'states': float64, 2 axes, in C order"):
+        door(entry._whole(solver.n_free), solver.model.block, objects((other(y), path.points.drive, out)))
+    assert not out.any()
+
+
+def test_every_field_of_an_array_is_where_the_compiled_code_reads_it() -> None:
+    array = np.arange(6.0).reshape(2, 3)
+
+    def word(offset: int, kind: Any = ctypes.c_int64) -> int:
+        return int(kind.from_address(id(array) + offset).value)
+
+    assert word(packing.TYPE) == id(np.ndarray)
+    assert word(packing.DATA) == array.__array_interface__["data"][0]
+    assert word(packing.AXES, ctypes.c_int) == 2
+    assert tuple((ctypes.c_int64 * 2).from_address(word(packing.SHAPE))) == (2, 3)
+    assert word(packing.DTYPE) == id(array.dtype)
+    assert word(packing.FLAGS, ctypes.c_int) & packing.READY == packing.READY
+
+
+def test_arrays_from_another_process_are_taken() -> None:
+    """They bring a dtype of their own, equal to NumPy's but not the same object."""
+    network, drive = _pulled_beam()
+    here = trace(network, drive)
+    sent = trace(*pickle.loads(pickle.dumps((network, drive))))
+    array = pickle.loads(pickle.dumps(here.points.y))
+    assert array.dtype is not here.points.y.dtype
+    np.testing.assert_array_equal(sent.points.y, here.points.y)
+
+
+def test_copies_of_a_model_have_places_of_their_own() -> None:
+    model = trace(*_pulled_beam()).solver.model
+    assert model.block == objects(model)
+    for other in (pickle.loads(pickle.dumps(model)), copy.deepcopy(model), model._replace(table=model.table.copy())):
+        assert other.block == objects(other) != model.block
+
+
+def test_who_watches_a_compilation_sees_how_far_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Watched(io.StringIO):
+        def isatty(self) -> bool:
+            return True
+
+    screen = Watched()
+    monkeypatch.setattr(sys, "stderr", screen)
+    with told("solver") as report:
+        report(0.5)
+    shown = screen.getvalue().split("\r")
+    assert shown[1].endswith("equilibria and paths, about 12 s: 0 %")
+    assert shown[2].endswith("50 %")
+    assert shown[3].strip() == "" == shown[4]
+
+
+_ALONE = """
+import sys
+import numpy as np
+from cfmkit.elastica import CLAMPED, Beam, Displacement, Network, Node, Section, gradient, trace
+def pulled(x):
+    return Network({"a": Node(0.0, 0.0, CLAMPED), "b": Node(0.1, 0.0)}, {"x": Beam("a", "b", Section(2e9, 1e-2, x[0]))})
+path = trace(pulled([1e-3]), Displacement("b", 0.0, np.array([1e-4])))
+path.peak_stress(), gradient(path, pulled, np.array([1e-3])).held
+sys.exit(any(name.split(".")[0] in ("numba", "scipy") for name in sys.modules))
+"""
+
+
+def test_code_that_is_kept_runs_without_numba() -> None:
+    list(warm())
+    # -P: the package that is tested, not one in the current folder
+    assert subprocess.run([sys.executable, "-P", "-c", _ALONE], check=False).returncode == 0
+
+
+_NOWHERE = """
+import logging, sys
+from pathlib import Path
+from cfmkit.elastica.kernels import kept, machine
+logging.basicConfig(level=logging.INFO, format="%(message)s")
+kept._lasting = lambda: iter([Path("/proc/none")])  # neither package nor home is writable
+code = machine.Code((), b"code")
+before = kept.read("door") == code
+print(kept.write("door", code), before, kept.read("door") == code)
+"""
+
+
+def _without_folders(folder: Path) -> tuple[Path, bool, bool, str]:
+    environment = {key: value for key, value in os.environ.items() if key != "NUMBA_CACHE_DIR"}
+    command = [sys.executable, "-c", _NOWHERE]
+    done = subprocess.run(
+        command, env=environment | {"TMPDIR": str(folder)}, capture_output=True, text=True, check=True
+    )
+    place, before, after = done.stdout.split()
+    return Path(place), before == "True", after == "True", done.stderr
+
+
+def test_compiled_code_is_kept_in_a_private_folder_where_nothing_else_is_writable(tmp_path: Path) -> None:
+    place, before, after, told = _without_folders(tmp_path)
+    assert place == tmp_path / f"cfmkit-compiled-{os.getuid()}"
+    assert place.stat().st_mode & 0o777 == 0o700
+    assert (before, after) == (False, True)
+    assert told.count("compiled code is kept in") == 1
+    assert _without_folders(tmp_path)[:3] == (place, True, True)
+
+
+@pytest.mark.parametrize("trap", ["writable by others", "a link", "a file"])
+def test_code_is_never_loaded_from_a_folder_that_others_could_have_prepared(tmp_path: Path, trap: str) -> None:
+    private = tmp_path / f"cfmkit-compiled-{os.getuid()}"
+    if trap == "writable by others":
+        private.mkdir()
+        private.chmod(0o777)
+    elif trap == "a link":
+        (tmp_path / "elsewhere").mkdir(mode=0o700)
+        private.symlink_to(tmp_path / "elsewhere")
+    else:
+        private.touch()
+    place, before, after, _ = _without_folders(tmp_path)
+    assert place.parent == tmp_path
+    assert place != private
+    assert place.stat().st_mode & 0o777 == 0o700
+    assert (before, after) == (False, False)
+
+
+def test_without_any_folder_code_is_compiled_and_not_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(kept, "_lasting", lambda: iter(()))
+    monkeypatch.setattr(kept, "private_folder", lambda _name, make=True: None)
+    assert kept.write("door", CODE) is None
+    assert kept.read("door") is None
+
+
+def test_warming_loads_every_part_of_the_compiled_code() -> None:
+    parts = list(warm())
+    assert len({part.name for part in parts}) == len(parts) == 5
+    assert all(entry._doors[name]._call is not None for name in DOORS if name != "complex_states")

@@ -1,0 +1,165 @@
+"""V-beams asked for points next to their bifurcations, loosely and tightly, and starts on coarse meshes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from beam_networks import drives, network
+
+from cfmkit.elastica import (
+    CLAMPED,
+    Beam,
+    Control,
+    CosineArch,
+    Displacement,
+    Loading,
+    Network,
+    Node,
+    Path,
+    PathStatus,
+    PointLoad,
+    Section,
+    guided,
+    trace,
+)
+
+LENGTH = 35e-3
+
+
+def pressed(angle: float, thickness: float, points: Any, **control: Any) -> Path:
+    nodes = {
+        "wall": Node(0, 0, CLAMPED),
+        "d": Node(LENGTH * np.cos(angle), LENGTH * np.sin(angle), guided(np.pi / 2)),
+    }
+    leaf = Network(nodes, {"v": Beam("wall", "d", Section(1477e6, 6e-3, thickness))})
+    return trace(leaf, Displacement("d", -np.pi / 2, np.asarray(points)), Control(**control))
+
+
+@pytest.mark.parametrize(
+    ("angle", "thickness", "off", "tolerance"),
+    [
+        (0.16564239, 6.755719e-4, -3e-7, 9e-7),
+        (0.32094386, 1.2854059e-3, 9e-7, 4.3e-5),
+        (0.242028, 2.0692e-3, -4e-6, 3e-4),
+    ],
+)
+def test_a_point_beside_a_bifurcation_does_not_end_the_path(
+    angle: float, thickness: float, off: float, tolerance: float
+) -> None:
+    rise = LENGTH * np.sin(angle)
+    end = 1.9 * rise
+    place = pressed(angle, thickness, np.linspace(0, end, 21)[1:]).events[0].drive + off * rise
+    path = pressed(angle, thickness, [place, end], tolerance=tolerance)
+    assert path.status is PathStatus.COMPLETE
+    assert path.stable.all()
+    assert path.drive[path.at_asked] == pytest.approx([place, end], rel=1e-12)
+
+
+def test_a_path_returns_to_its_primary_path_in_one_step_to_its_only_point() -> None:
+    """A leaf of a twelfth of its rise: the end of its branch is passed over."""
+    angle = 0.0796134409080207
+    path = pressed(angle, 2.3904131510924884e-4, [5.051286820682658e-3], tolerance=1.0623860005428965e-6, sign=-1)
+    assert path.status is PathStatus.COMPLETE
+    assert path.stable.all()
+    assert path.branch[-1] == "primary"
+
+
+@pytest.mark.parametrize("tolerance", [1e-6, 1e-8])
+@pytest.mark.parametrize("slenderness", [3.4, 5.0, 9.0])
+def test_bifurcations_are_placed_as_tightly_as_the_tolerance_asks(slenderness: float, tolerance: float) -> None:
+    angle = np.radians(7)
+    rise = LENGTH * np.sin(angle)
+    thickness = rise / slenderness
+    some, many = (np.linspace(0, 1.9 * rise, count + 1)[1:] for count in (20, 60))
+    path = pressed(angle, thickness, some, tolerance=tolerance)
+    exact = pressed(angle, thickness, many, tolerance=1e-11, largest_turn=0.1)
+    places, truth = ([event.drive / rise for event in one.events] for one in (path, exact))
+    assert len(truth) == 2
+    assert places == pytest.approx(truth, rel=0, abs=tolerance)
+
+
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-4, 4.65e-5, 1e-5])
+def test_a_stated_imperfection_does_not_depend_on_the_tolerance(tolerance: float) -> None:
+    """Away from the bifurcation no direction is singular: beside it the mode was that of another shape."""
+    angle, points = 0.043669063665053666, [6.1176e-4, 1.22353e-3, 1.83529e-3]
+    loose, tight = (
+        pressed(angle, 1.718747248202898e-4, points, tolerance=limit, imperfection=8.164652e-5)
+        for limit in (tolerance, 1e-9)
+    )
+    assert loose.imperfection == tight.imperfection
+    forces = [path.effort[path.at_asked] for path in (loose, tight)]
+    np.testing.assert_allclose(forces[0], forces[1], rtol=0, atol=3 * tolerance * np.abs(forces[1]).max())
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-4, 1.7e-5, 1e-6])
+def test_the_mode_of_an_arch_is_sampled_finely_at_any_tolerance(tolerance: float) -> None:
+    half, rise = 0.06, 0.012
+    nodes = {"a": Node(0, 0, CLAMPED), "t": Node(half, rise), "b": Node(2 * half, 0, CLAMPED)}
+    section = Section(2e9, 8e-3, rise / 12)
+    beams = {
+        "x": Beam("a", "t", section, CosineArch(rise, 0.5)),
+        "y": Beam("t", "b", section, CosineArch(-rise, 0.5)),
+    }
+    drive = Displacement("t", -np.pi / 2, np.linspace(0, 1.2 * rise, 7)[1:])
+    loose, tight = (
+        trace(Network(nodes, beams), drive, Control(limit, imperfection=3e-5)) for limit in (tolerance, 1e-9)
+    )
+    assert "buckling mode" in loose.imperfection
+    turns = [np.abs(path.motion("t")[path.at_asked, 2]) for path in (loose, tight)]
+    np.testing.assert_allclose(turns[0], turns[1], rtol=0, atol=tolerance)
+
+
+@pytest.mark.parametrize("tolerance", [1e-3, 4.9e-6, 1e-6])
+def test_a_mesh_too_coarse_for_the_constant_loads_is_refined(tolerance: float) -> None:
+    held = network(102, True)
+    path = trace(held, Displacement("d", drives(held, 102)[0].direction, np.array([5e-4, 1e-3])), Control(tolerance))
+    assert path.status is PathStatus.COMPLETE
+    assert path.error <= tolerance
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_the_side_of_a_branch_does_not_depend_on_the_mesh(sign: Any) -> None:
+    """Where no node moves in the mode, by the moment at the clamp; else by the node's rotation."""
+    angle, rise, half = np.radians(7), 0.006, 0.03
+    nodes = {"a": Node(0, 0, CLAMPED), "t": Node(half, rise), "b": Node(2 * half, 0, CLAMPED)}
+    section = Section(2e9, 8e-3, rise / 10)
+    beams = {
+        "x": Beam("a", "t", section, CosineArch(rise, 0.5)),
+        "y": Beam("t", "b", section, CosineArch(-rise, 0.5)),
+    }
+    down = Displacement("t", -np.pi / 2, np.linspace(0, 1.0 * rise, 7)[1:])
+    moments, turns = [], []
+    for tolerance in (1e-3, 1e-5, 5e-6, 1e-6, 1e-8):
+        leaf = pressed(angle, 1e-3, [1e-3, 2e-3], tolerance=tolerance, sign=sign)
+        moments.append(leaf.end_force("v", 1)[leaf.at_asked[-1], 2])
+        arch = trace(Network(nodes, beams), down, Control(tolerance=tolerance, sign=sign))
+        turns.append(arch.motion("t")[arch.at_asked[-1], 2])
+    assert moments == pytest.approx([-0.01141 * sign] * 5, rel=1e-2)
+    assert abs(turns[0]) > 0.05
+    assert turns == pytest.approx([turns[-1]] * 5, rel=1e-2)
+
+
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8])
+@pytest.mark.parametrize("steps", [3, 4, 10, 17])
+def test_a_truss_of_stiff_beams_jumps_where_they_buckle_whatever_the_tolerance(tolerance: float, steps: int) -> None:
+    """Two beams that do not stretch hold the apex; they buckle as columns clamped at one end and pinned at the other.
+
+    N = 20.1907 EI / L^2 (tan u = u); there is no stable equilibrium near.
+    """
+    angle, length, stiff = np.radians(8), 0.05, Section(2e9, 8e-3, 1e-3, axial=False)
+    across, up = length * np.cos(angle), length * np.sin(angle)
+    nodes = {"left": Node(-across, 0, CLAMPED), "apex": Node(0, up), "right": Node(across, 0, CLAMPED)}
+    beams = {"one": Beam("left", "apex", stiff), "two": Beam("right", "apex", stiff)}
+    root = 4.493409457909064
+    force = 2 * np.sin(angle) * root**2 * 2e9 * 8e-3 * 1e-9 / 12 / length**2
+    drive = Loading((PointLoad("apex", fy=-force),), np.linspace(0.0, 1.5, steps + 1)[1:])
+    path = trace(Network(nodes, beams), drive, Control(tolerance=tolerance))
+    assert path.status is PathStatus.JUMPS
+    assert path.stable.all()
+    assert [(event.kind, event.before, event.after) for event in path.events] == [("bifurcation", 0, 1)]
+    assert path.events[0].drive == pytest.approx(1.0, rel=10 * tolerance)
+    assert path.drive[-1] <= 1.0 + 10 * tolerance
+    assert len(path.at_asked) in (int((drive.points < 1.0).sum()), int((drive.points <= 1.0).sum()))

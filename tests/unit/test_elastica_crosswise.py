@@ -1,0 +1,109 @@
+"""Stiffness of the driven node across its drive, from the tangent along a path."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from cfmkit.elastica import (
+    CLAMPED,
+    FREE,
+    Beam,
+    Displacement,
+    Link,
+    Loading,
+    Network,
+    Node,
+    PathStatus,
+    PointLoad,
+    Section,
+    SlideSpring,
+    Support,
+    arc,
+    guided,
+    trace,
+)
+from cfmkit.elastica.outcome import crosswise
+from cfmkit.elastica.outcome.crosswise import cross_stiffness
+
+MODULUS, WIDTH, THICKNESS, LENGTH = 200e9, 10e-3, 1e-3, 0.1
+RIGIDITY = MODULUS * WIDTH * THICKNESS**3 / 12
+
+
+def straight(end: Support = FREE, axial: bool = True) -> Network:
+    beam = Beam("root", "tip", Section(MODULUS, WIDTH, THICKNESS, axial=axial))
+    return Network({"root": Node(0, 0, CLAMPED), "tip": Node(LENGTH, 0, end)}, {"x": beam})
+
+
+@pytest.mark.parametrize(("end", "factor"), [(FREE, 3.0), (guided(0.0), 12.0)], ids=["free", "guided"])
+@pytest.mark.parametrize("axial", [True, False])
+def test_a_straight_beam_resists_across_as_the_closed_form_says(end: Support, factor: float, axial: bool) -> None:
+    """3 or 12 EI/L^3, as the support leaves the rotation; what guides the node across is taken away."""
+    path = trace(straight(end, axial), Loading((PointLoad("tip", fx=1e-6),), np.array([1.0])))
+    assert cross_stiffness(path, "tip", 0.0)[-1] == pytest.approx(factor * RIGIDITY / LENGTH**3, rel=1e-6)
+
+
+def test_thrust_takes_it_away_and_a_pull_adds_to_it() -> None:
+    """EI q^3 / (2 tan(qL/2) - qL) of a beam between clamp and guide under a thrust P, with q^2 = P/EI."""
+    euler = np.pi**2 * RIGIDITY / LENGTH**2
+    thrust = np.array([0.5, 0.9]) * euler
+    path = trace(straight(guided(0.0), axial=False), Loading((PointLoad("tip", fx=-1.0),), thrust))
+    q = np.sqrt(thrust / RIGIDITY)
+    wanted = RIGIDITY * q**3 / (2 * np.tan(q * LENGTH / 2) - q * LENGTH)
+    assert cross_stiffness(path, "tip", 0.0)[path.at_asked] == pytest.approx(wanted, rel=1e-6)
+
+
+def test_it_is_what_a_small_push_across_meets_in_any_pose() -> None:
+    """An arch with a link and a spring, far from rest: the force of the guide by its place, as differences."""
+
+    def path(shift: float) -> tuple[float, np.ndarray]:
+        top = Support(across=True, direction=np.pi / 2, displacement=(0.0, shift, 0.0))
+        nodes = {
+            "a": Node(0, 0, CLAMPED),
+            "top": Node(0.05, 0.02, top),
+            "eye": Node(0.055, 0.03),
+        }
+        beams = {"x": Beam("a", "eye", Section(2e9, WIDTH, THICKNESS), arc(-0.8))}
+        net = Network(nodes, beams, (Link("top", "eye"),), (SlideSpring("eye", 0.3, 20.0),))
+        found = trace(net, Displacement("top", -np.pi / 2, np.array([0.004, 0.008])))
+        assert found.status is PathStatus.COMPLETE
+        return float(found.reaction("top")[-1, 0]), cross_stiffness(found, "top", -np.pi / 2)
+
+    small = 1e-7
+    (more, _), (less, _), (_, here) = path(small), path(-small), path(0.0)
+    # across is to the left of the support's direction: against x; the reaction is what the guide exerts
+    assert here[-1] == pytest.approx((less - more) / (2 * small), rel=1e-5)
+
+
+def test_it_does_not_depend_on_whether_a_displacement_or_a_force_drives() -> None:
+    moved = trace(straight(), Displacement("tip", np.pi / 2, np.array([0.02])))
+    pushed = trace(straight(), Loading((PointLoad("tip", fy=1.0),), moved.effort[-1:]))
+    one, other = (cross_stiffness(path, "tip", np.pi / 2, [len(path) - 1]) for path in (moved, pushed))
+    assert one == pytest.approx(other, rel=1e-6)
+
+
+def test_large_networks_are_condensed_by_sparse_factors(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Eighty beams in a row are one: 3 EI/L^3; dense factors would take the cube of their number."""
+    places = np.linspace(0.0, LENGTH, 81)
+    nodes = {f"n{k}": Node(float(x), 0, FREE if k else CLAMPED) for k, x in enumerate(places)}
+    beams = {f"b{k}": Beam(f"n{k}", f"n{k + 1}", Section(MODULUS, WIDTH, THICKNESS)) for k in range(80)}
+    path = trace(Network(nodes, beams), Loading((PointLoad("n80", fx=1e-6),), np.array([1.0])))
+    dense = np.linalg.solve
+
+    def small(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
+        assert matrix.shape[-1] < crosswise._MANY
+        return dense(matrix, right)
+
+    monkeypatch.setattr(np.linalg, "solve", small)
+    assert cross_stiffness(path, "n80", 0.0)[-1] == pytest.approx(3.0 * RIGIDITY / LENGTH**3, rel=1e-6)
+
+
+@pytest.mark.parametrize("many", [0, 150], ids=["sparse", "dense"])
+def test_there_is_none_where_nothing_gives_way(monkeypatch: pytest.MonkeyPatch, many: int) -> None:
+    """A straight beam that does not stretch, pushed sideways by nothing yet: along itself it is rigid."""
+    monkeypatch.setattr(crosswise, "_MANY", many)
+    path = trace(straight(axial=False), Loading((PointLoad("tip", fy=1e-3),), np.array([0.0, 1.0])))
+    found = cross_stiffness(path, "tip", np.pi / 2)
+    assert path.drive[0] == 0.0
+    assert np.isnan(found[0])
+    assert found[-1] > 1e6 * RIGIDITY / LENGTH**3

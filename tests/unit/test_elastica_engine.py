@@ -1,0 +1,404 @@
+"""Identities and invariants of the beam engine."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from cfmkit.elastica import (
+    CLAMPED,
+    FREE,
+    PINNED,
+    Beam,
+    Control,
+    CosineArch,
+    Displacement,
+    LineLoad,
+    LineSpring,
+    Link,
+    Loading,
+    Network,
+    Node,
+    Path,
+    PathStatus,
+    PointLoad,
+    Polyline,
+    Polynomial,
+    Rotation,
+    Section,
+    SlideSpring,
+    Spline,
+    Support,
+    Taper,
+    TorsionSpring,
+    arc,
+    guided,
+    trace,
+)
+from cfmkit.elastica.equilibrium.mesh import Mesh
+from cfmkit.elastica.equilibrium.solver import Solver
+from cfmkit.elastica.model.layout import Layout
+from cfmkit.errors import InputError
+
+TIGHT = Control(tolerance=1e-10)
+UP = np.pi / 2
+TAPER = Taper(np.array([0, 0.4, 1]), np.array([1.0e-3, 1.6e-3, 0.8e-3]))
+
+
+def frame(section: Section | None = None, turn: float = 0.0, size: float = 1.0, mirrored: bool = False) -> Network:
+    """Return a network with curved and straight beams, a pin, a spring, an offset and a linked node."""
+    section = section or Section(2e9, 8e-3 * size, _scaled(TAPER, size), shear=True)
+    sign = -1.0 if mirrored else 1.0
+
+    def at(x: float, y: float, support: Support = FREE) -> Node:
+        c, s = np.cos(turn), np.sin(turn)
+        support = dataclasses.replace(support, direction=sign * support.direction + turn)
+        y *= sign
+        return Node(size * (c * x - s * y), size * (s * x + c * y), support)
+
+    def arm(x: float, y: float) -> tuple[float, float]:
+        c, s = np.cos(turn), np.sin(turn)
+        y *= sign
+        return size * (c * x - s * y), size * (s * x + c * y)
+
+    nodes = {
+        "a": at(0, 0, CLAMPED),
+        "b": at(0.05, 0.03),
+        "bb": at(0.055, 0.03),
+        "c": at(0.09, 0.0, PINNED),
+        "d": at(0.06, 0.07, guided(UP)),
+    }
+    beams = {
+        "ab": Beam("a", "b", section, Polynomial((0.0, sign * 0.8, -sign * 0.5))),
+        "bc": Beam("bb", "c", section, arc(-sign * 0.7), end_joint="pin"),
+        "bd": Beam("b", "d", section, start_offset=arm(0.0, 0.004)),
+    }
+    springs = (TorsionSpring(None, "b", 0.02 * size**3), LineSpring("b", None, 30.0 * size, ground=arm(0.0, 0.06)))
+    return Network(nodes, beams, links=(Link("b", "bb"),), springs=springs)
+
+
+def _scaled(taper: Taper, size: float) -> Taper:
+    return Taper(taper.stations, np.array(taper.values) * size)
+
+
+def driven(network: Network, travel: np.ndarray, turn: float = 0.0, control: Control = TIGHT) -> Path:
+    path = trace(network, Displacement("d", -UP + turn, travel), control)
+    assert path.status is PathStatus.COMPLETE, path.message
+    return path
+
+
+TRAVEL = np.array([2e-3, 5e-3, 9e-3])
+
+
+@pytest.fixture(scope="module")
+def reference() -> Path:
+    return driven(frame(), TRAVEL)
+
+
+def test_the_tangent_by_the_drive_is_the_derivative_of_the_solution() -> None:
+    """With dead, follower and line loads, springs, links and pins; central differences of order 4."""
+    network = frame()
+    loads = (PointLoad("bb", 1.0, -2.0, 0.01), PointLoad("b", 0.5, 1.0, follows=True), LineLoad("ab", 3.0, -5.0))
+    drive = Loading(loads, np.array([1.0]))
+    layout = Layout(dataclasses.replace(network, loads=(LineLoad("bd", 1.0, 2.0),)), drive)
+    solver = Solver(layout, Mesh(1, 2))
+    n, start = solver.n, 0.3
+    near = solver.solve(solver.unstressed(), start)
+    assert near is not None
+    h = 1e-4
+    points = [solver.solve(near.y, start + k * h) for k in (-2, -1, 1, 2)]
+    values = [p.y[:n] for p in points if p is not None]
+    assert len(values) == 4
+    slope = (values[0] - 8 * values[1] + 8 * values[2] - values[3]) / (12 * h)
+    np.testing.assert_allclose(near.tangent[:n], slope, rtol=1e-7, atol=1e-9)
+
+
+def test_flow_derivatives_are_those_of_complex_steps() -> None:
+    """The variational columns of a segment at random start values against complex steps of the plain integration."""
+    from cfmkit.elastica.kernels import entry
+
+    nodes = {"a": Node(0, 0, CLAMPED), "d": Node(0.08, 0.05)}
+    section = Section(2e9, 8e-3, TAPER, shear=True)
+    network = Network(
+        nodes, {"x": Beam("a", "d", section, Polynomial((0.2, 1.1, -0.8)))}, loads=(LineLoad("x", 3.0, -9.0),)
+    )
+    solver = Solver(Layout(network, Displacement("d", UP, [1e-3])), Mesh(1, 3))
+    rng = np.random.default_rng(5)
+    rows = len(solver.cut.edges) + solver.n_segments
+    for _ in range(20):
+        y = solver.unstressed() + rng.standard_normal(solver.size)
+        y[solver.n : solver.n + 3] = solver.unstressed()[solver.n : solver.n + 3]
+        solver.tangent_at(y, 0.0)
+        relation = solver.scratch[6][0]  # E by the start's pose and F by the end force, of the whole chain
+        steps = np.eye(solver.size)[solver.n + 2 : solver.n + 6]  # start rotation, h, v, m of the first segment
+        ends = []
+        for step in steps:
+            out = np.empty((1, rows, 7), dtype=complex)
+            first = solver.model.segment_step[1]
+            tilted = y + 1e-30j * step
+            entry.states(solver.model, solver.n_free, tilted[None], np.zeros(1, dtype=complex), out)
+            ends.append(out[0, first].imag / 1e-30)
+        ends = np.array(ends)  # rows: by rotation, h, v, m; columns: x, y, rotation, moment
+        # after one segment: dq = A dq_a + B dp, dp_b = C dq_a + D dp with D the identity but for its last row
+        last = np.eye(3)
+        last[2] = ends[1:, 3]
+        kept = solver.scratch[7]
+        e, f = (kept[1][k] for k in (0, 1)) if solver.n_segments > 1 else (relation[0], relation[1])
+        compliance = ends[1:, :3].T @ np.linalg.inv(last)
+        np.testing.assert_allclose(f, compliance, rtol=1e-9, atol=1e-9 * np.abs(compliance).max())
+        turned = ends[0, :3] - compliance[:, 2] * ends[0, 3]
+        np.testing.assert_allclose(e[:, 2], turned, rtol=1e-9, atol=1e-9 * np.abs(turned).max())
+
+
+def test_newton_s_method_converges_quadratically_from_random_states() -> None:
+    """The error after each iteration is bounded by the square of the one before, down to rounding."""
+    from cfmkit.elastica.kernels import entry
+
+    solver = Solver(Layout(frame(), Displacement("d", -UP, TRAVEL)), Mesh(2, 3), 1e-13)
+    rng = np.random.default_rng(1)
+    exact = solver.solve(solver.unstressed(), 0.05)
+    assert exact is not None
+    for _ in range(10):
+        y = exact.y + 1e-3 * rng.standard_normal(solver.size)
+        errors = []
+        for _ in range(4):
+            state, once = np.array([0.05, 0, 0, 0, 0]), np.array([0.0, 1.0])
+            entry.solve(
+                solver.model, solver.n_free, y, state, solver.unit, 0.05, once, solver.unit.copy(), solver.scratch
+            )
+            errors.append(float(np.abs(y - exact.y).max()))
+        assert errors[0] > 1e-10, "the first iteration is not meant to be exact"
+        assert errors[1] < 50 * errors[0] ** 2 + 1e-12
+        assert errors[2] < 50 * errors[1] ** 2 + 1e-12
+        assert errors[3] < 1e-12 * max(1.0, float(np.abs(exact.y).max()))
+
+
+def test_the_tangent_is_symmetric_where_forces_are_conservative(reference: Path) -> None:
+    solver = Solver(Layout(frame(), Displacement("d", -UP, TRAVEL)), Mesh(2, 8))
+    near = solver.solve(solver.unstressed(), 0.05)
+    assert near is not None
+    solver.tangent_at(near.y, near.drive)
+    h = solver.scratch[0][: solver.n, : solver.n]
+    np.testing.assert_allclose(h, h.T, atol=1e-10 * np.abs(h).max())
+
+
+def test_energy_is_the_work_of_the_drive() -> None:
+    nodes, weights = np.polynomial.legendre.leggauss(16)
+    travel = np.append(0.5 * 9e-3 * (nodes + 1), 9e-3)
+    p = driven(frame(), np.sort(travel))
+    work = 0.5 * 9e-3 * weights @ p.effort[p.at_asked][:16]
+    assert p.energy[-1] == pytest.approx(work, rel=1e-9)
+
+
+def test_work_of_a_force_drive_is_its_energy_too() -> None:
+    loads = (PointLoad("d", fy=-1.0), LineLoad("ab", 2.0, -3.0))
+    nodes, weights = np.polynomial.legendre.leggauss(24)
+    factor = 0.5 * 0.6 * (nodes + 1)
+    p = trace(frame(), Loading(loads, np.append(factor, 0.6)), TIGHT)
+    shift = p.effort[p.at_asked]
+    # integral of u dP by parts: P u - W
+    assert p.energy[-1] == pytest.approx(0.6 * shift[-1] - 0.3 * weights @ shift[:-1], rel=1e-9)
+
+
+@pytest.mark.parametrize("turn", [0.3, 2.0, -1.1])
+def test_a_turned_network_has_the_same_forces(reference: Path, turn: float) -> None:
+    p = driven(frame(turn=turn), TRAVEL, turn)
+    np.testing.assert_allclose(p.effort[p.at_asked], reference.effort[reference.at_asked], rtol=1e-8)
+    c, s = np.cos(turn), np.sin(turn)
+    moved, was = p.motion("bb")[-1], reference.motion("bb")[-1]
+    np.testing.assert_allclose(moved, [c * was[0] - s * was[1], s * was[0] + c * was[1], was[2]], atol=1e-10)
+
+
+def test_a_mirrored_network_has_mirrored_motions(reference: Path) -> None:
+    p = trace(frame(mirrored=True), Displacement("d", UP, TRAVEL), TIGHT)
+    np.testing.assert_allclose(p.effort[p.at_asked], reference.effort[reference.at_asked], rtol=1e-8)
+    np.testing.assert_allclose(p.motion("b")[-1], reference.motion("b")[-1] * [1, -1, -1], atol=1e-10)
+
+
+@pytest.mark.parametrize("size", [0.1, 25.0])
+def test_a_scaled_network_has_scaled_forces(reference: Path, size: float) -> None:
+    """All lengths times k (width too): forces times k^2, torsion springs times k^3, line springs times k."""
+    p = driven(frame(size=size), TRAVEL * size)
+    np.testing.assert_allclose(p.effort[p.at_asked], reference.effort[reference.at_asked] * size**2, rtol=1e-8)
+
+
+def test_the_modulus_scales_the_force() -> None:
+    soft, hard = (
+        trace(
+            Network({"a": Node(0, 0, CLAMPED), "d": Node(0.1, 0)}, {"x": Beam("a", "d", Section(e, 1e-2, 1e-3))}),
+            Displacement("d", UP, [0.03]),
+            TIGHT,
+        ).effort[-1]
+        for e in (1e9, 3e9)
+    )
+    assert hard == pytest.approx(3 * soft, rel=1e-10)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_splitting_a_beam_at_a_random_place_changes_nothing(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    u = float(rng.uniform(0.1, 0.9))
+    c0, c1, c2 = 0.2, 1.1, -0.8
+    section = Section(2e9, 8e-3, 1e-3, shear=True)
+    one = Network(
+        {"a": Node(0, 0, CLAMPED), "d": Node(0.08, 0.05, guided(UP))},
+        {"all": Beam("a", "d", section, Polynomial((c0, c1, c2)))},
+    )
+    fitted = Layout(one, Displacement("d", -UP, [1e-3])).fits["all"]
+    s = np.linspace(0, u, 4001)
+    angle = fitted.angle(s, 0.5)
+    from scipy.integrate import simpson
+
+    x, y = (float(simpson(f(angle), x=s)) * fitted.length for f in (np.cos, np.sin))
+    first = Polynomial((c0, c1 * u, c2 * u * u))
+    rest = Polynomial((c0 + c1 * u + c2 * u * u, (c1 + 2 * c2 * u) * (1 - u), c2 * (1 - u) ** 2))
+    two = Network(
+        {"a": one.nodes["a"], "m": Node(x, y), "d": one.nodes["d"]},
+        {"first": Beam("a", "m", section, first), "rest": Beam("m", "d", section, rest)},
+    )
+    travel = np.array([2e-3, 1e-2, 2e-2])
+    forces = [driven(network, travel) for network in (one, two)]
+    np.testing.assert_allclose(forces[1].effort[forces[1].at_asked], forces[0].effort[forces[0].at_asked], rtol=2e-9)
+
+
+def test_the_error_falls_with_the_sixth_power_of_the_step() -> None:
+    layout = Layout(frame(Section(2e9, 8e-3, 1e-3)), Displacement("d", -UP, TRAVEL))
+    tips = []
+    for steps in (3, 6, 12, 48):
+        solver = Solver(layout, Mesh(1, steps), 1e-13)
+        near = solver.solve(solver.unstressed(), 0.04)
+        assert near is not None
+        tips.append(near.y[: solver.n])
+    errors = [np.abs(tip - tips[-1]).max() for tip in tips[:-1]]
+    assert errors[0] / errors[1] > 2**5.5
+    assert errors[1] / errors[2] > 2**5.5
+
+
+def test_the_reported_error_bounds_the_true_one() -> None:
+    exact = driven(frame(), TRAVEL, control=Control(tolerance=1e-11))
+    for tolerance in (1e-3, 1e-5, 1e-7):
+        p = driven(frame(), TRAVEL, control=Control(tolerance=tolerance))
+        true = np.abs(p.effort[p.at_asked] - exact.effort[exact.at_asked]).max() / np.abs(exact.effort).max()
+        assert p.error <= tolerance
+        assert true <= 3 * tolerance
+
+
+def test_forces_on_the_whole_network_balance(reference: Path) -> None:
+    """Reactions at all supports sum to zero force; the line spring's ground takes its share."""
+    total = sum(reference.reaction(node)[:, :2] for node in ("a", "c", "d", "b"))
+    moved = reference.motion("b")[:, :2]
+    spring = np.array([0.0, 0.06]) - (np.array([0.05, 0.03]) + moved)
+    length = np.hypot(*spring.T)
+    pull = 30.0 * (length - np.hypot(0.05, 0.03)) / length
+    np.testing.assert_allclose(total, -pull[:, None] * spring, atol=1e-8)
+
+
+def test_a_pin_carries_no_moment_and_a_guide_no_force_along_itself(reference: Path) -> None:
+    np.testing.assert_allclose(reference.end_force("bc", 1)[:, 2], 0, atol=1e-11)
+    p = trace(frame(), Rotation("b", np.array([0.1, 0.3])), TIGHT)
+    np.testing.assert_allclose(p.reaction("d")[:, 1], 0, atol=1e-9)
+    assert p.motion("b")[-1, 2] == pytest.approx(0.3)
+
+
+def test_linked_nodes_move_as_one_body(reference: Path) -> None:
+    b, bb = reference.motion("b"), reference.motion("bb")
+    np.testing.assert_allclose(b[:, 2], bb[:, 2])
+    gap = np.array([0.005, 0.0]) + (bb - b)[:, :2]
+    np.testing.assert_allclose(np.hypot(*gap.T), 0.005, rtol=1e-12)
+
+
+def test_force_control_and_displacement_control_agree(reference: Path) -> None:
+    force = float(reference.effort[-1])
+    if not (np.diff(reference.effort) > 0).all():
+        pytest.fail("the reference is meant to stiffen monotonically")
+    p = trace(frame(), Loading((PointLoad("d", fy=-force),), np.array([1.0])), TIGHT)
+    assert -p.motion("d")[-1, 1] == pytest.approx(9e-3, rel=1e-7)
+
+
+def test_arc_length_passes_the_same_points(reference: Path) -> None:
+    p = trace(frame(), Displacement("d", -UP, TRAVEL), Control(tolerance=1e-10, through_folds=True))
+    np.testing.assert_allclose(p.effort[p.at_asked], reference.effort[reference.at_asked], rtol=1e-8)
+
+
+def test_a_path_repeats_bit_by_bit(reference: Path) -> None:
+    np.testing.assert_array_equal(driven(frame(), TRAVEL).effort, reference.effort)
+
+
+def test_results_cannot_be_written_to(reference: Path) -> None:
+    for array in (reference.effort, reference.drive, reference.motion("b"), reference.stable):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 1
+
+
+def test_shapes_by_points_approach_the_exact_arc() -> None:
+    angles = np.linspace(-0.6, 0.6, 41)
+    circle = np.column_stack([0.1 * np.sin(angles), 0.1 - 0.1 * np.cos(angles)])
+    section = Section(2e9, 8e-3, 1e-3)
+
+    def force(shape: object) -> float:
+        nodes = {"a": Node(*circle[0], CLAMPED), "d": Node(*circle[-1], guided(0.0))}
+        network = Network(nodes, {"x": Beam("a", "d", section, shape)})  # type: ignore[arg-type]
+        return float(trace(network, Displacement("d", np.pi, [5e-3]), TIGHT).effort[-1])
+
+    exact = force(arc(1.2))
+    assert force(Spline(circle)) == pytest.approx(exact, rel=1e-5)
+    assert force(Polyline(circle)) == pytest.approx(exact, rel=2e-3)
+    assert force(Polyline(circle)) != pytest.approx(exact, rel=1e-6)
+
+
+def test_a_cosine_arch_fits_its_span_exactly() -> None:
+    nodes = {"a": Node(0, 0, CLAMPED), "d": Node(0.1, 0.0, CLAMPED), "e": Node(0.1, 0.05)}
+    beams = {
+        "x": Beam("a", "d", Section(1e9, 1e-2, 1e-3), CosineArch(0.004)),
+        "y": Beam("d", "e", Section(1e9, 1e-2, 1e-3)),
+    }
+    layout = Layout(Network(nodes, beams), Displacement("e", 0.0, [1e-3]))
+    fitted = layout.fits["x"]
+    assert (fitted.rotation, fitted.scale) == (pytest.approx(0, abs=1e-12), pytest.approx(1, rel=1e-12))
+    assert fitted.length == pytest.approx(0.1 * (1 + (np.pi * 0.004 / 0.1) ** 2 / 4), rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: Network({"a": Node(0, 0)}, {}), "at least one beam"),
+        (lambda: Network({"a": Node(0, 0)}, {"x": Beam("a", "z", Section(1, 1, 1))}), "not a node"),
+        (lambda: Beam("a", "a", Section(1, 1, 1)), "two different nodes"),
+        (lambda: Section(1.0, 1.0, -1.0), "thickness must be positive"),
+        (lambda: Section(float("nan"), 1.0, 1.0), "youngs_modulus"),
+        (lambda: Taper(np.array([0, 0.5]), np.array([1, 1])), "from 0 to 1"),
+        (lambda: Displacement("a", 0.0, [0.0]), "other than zero"),
+        (lambda: Control(tolerance=0.0), "tolerance"),
+        (lambda: Support(displacement=(1.0, 0, 0)), "not held"),
+        (lambda: trace(frame(), Displacement("a", 0.0, [1.0])), "it is held"),
+        (lambda: trace(frame(), Displacement("bb", 0.0, [1.0])), "cannot be driven"),
+        (lambda: trace(frame(), Displacement("d", 0.3, [1.0])), "it is held"),
+        (lambda: trace(frame(), Displacement("d", np.inf, [1.0])), "cannot be moved along inf deg"),
+        (lambda: Network({"z": Node(0, 0)}, {"x": Beam("a", "z", Section(1, 1, 1))}), "'a', which is not a node"),
+        (lambda: Beam("a", "b", Section(1, 1, 1), start_joint="hinge"), "got 'hinge'"),
+        (lambda: Beam("a", "b", Section(1, 1, 1), end_joint="hinge"), "got 'hinge'"),
+        (lambda: Support(True, True, displacement=np.array([0.0, 0.0, 1.0])), "rotation is given"),
+    ],
+)
+def test_what_cannot_be_is_refused_with_a_reason(make: object, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        make()  # type: ignore[operator]
+
+
+def test_importing_the_beams_does_not_load_the_compiler() -> None:
+    import subprocess
+    import sys
+
+    code = (
+        "import cfmkit.elastica, sys; sys.exit(any(name.split('.')[0] in ('numba', 'scipy') for name in sys.modules))"
+    )
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_a_slide_spring_pulls_along_its_direction_only() -> None:
+    network = frame()
+    sprung = dataclasses.replace(network, springs=(*network.springs, SlideSpring("d", UP, 50.0)))
+    more, less = (driven(net, TRAVEL).effort[-1] for net in (sprung, network))
+    assert more - less == pytest.approx(50.0 * 9e-3, rel=1e-9)

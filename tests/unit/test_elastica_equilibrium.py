@@ -1,0 +1,82 @@
+"""Answers for random networks against mechanics stated anew: Reissner's equations, balances, energy and work."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+import pytest
+from beam_equilibrium import Judge
+from beam_networks import drives, network
+
+from cfmkit.elastica import Control, LineLoad, Loading, Path, PathStatus, PointLoad, trace
+
+FINE = Control(tolerance=1e-9)
+
+
+def solved(net: Any, drive: Any, points: Any = None) -> Path:
+    if points is not None:
+        drive = dataclasses.replace(drive, points=points)
+    path = trace(net, drive, FINE)
+    assert path.status is PathStatus.COMPLETE, path.message
+    return path
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("kind", range(4))
+def test_every_beam_and_every_body_is_in_equilibrium(seed: int, kind: int) -> None:
+    net = network(seed)
+    path = solved(net, drives(net, seed)[kind])
+    scales = path.layout.scales
+    forces = np.array([scales.force, scales.force, scales.moment])
+    judge = Judge(path, int(path.at_asked[-1]))
+    largest = max(1.0, *(np.abs(path.end_force(beam, 0)[-1] / forces).max() for beam in net.beams))
+    for beam in net.beams:
+        gap, jump = judge.gaps(beam)
+        np.testing.assert_allclose(gap / [scales.length, scales.length, 1.0], 0.0, atol=2e-8)
+        np.testing.assert_allclose(jump / forces, 0.0, atol=2e-8 * largest)
+    for total in judge.imbalance().values():
+        np.testing.assert_allclose(total / forces, 0.0, atol=1e-9 * largest)
+
+
+def dead_work(path: Path, point: int) -> float:
+    """Return the work of the constant dead loads up to a point, from the first."""
+    total = 0.0
+    for load in path.layout.network.loads:
+        if isinstance(load, PointLoad):
+            moved = path.motion(load.node)[point] - path.motion(load.node)[0]
+            total += float(np.dot([load.fx, load.fy, load.moment], moved))
+        elif isinstance(load, LineLoad):
+            moved = path.line_motion(load.beam)[point] - path.line_motion(load.beam)[0]
+            index = list(path.layout.network.beams).index(load.beam)
+            total += float((moved @ [load.wx, load.wy]) @ path.sampler.weights(path.layout, index))
+    return total
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("kind", range(3))
+def test_energy_grows_by_the_work_of_the_drive_and_of_dead_loads(seed: int, kind: int) -> None:
+    """With prestressed springs and moved supports, which do no work while the drive goes on."""
+    net = network(seed, follower=False)
+    drive = drives(net, seed)[kind]
+    nodes, weights = np.polynomial.legendre.leggauss(20)
+    end = float(drive.points[-1])
+    path = solved(net, drive, np.array([0.0, *(0.5 * end * (nodes + 1)), end]))
+    at = path.at_asked
+    work = 0.5 * end * weights @ path.effort[at[1:-1]]
+    grown = path.energy[at[-1]] - path.energy[0]
+    size = 0.5 * abs(end) * weights @ np.abs(path.effort[at[1:-1]])
+    assert grown == pytest.approx(work + dead_work(path, int(at[-1])), abs=1e-7 * size)
+
+
+def test_energy_grows_by_the_work_of_dead_loads_that_are_driven() -> None:
+    """The factor's work: its effort is the loads' displacement by unit factor, less that at the start."""
+    net = network(2, follower=False)
+    loads = (PointLoad("bb", 0.1, -0.15, 2e-3), PointLoad("d", 0.05, 0.1), LineLoad("cd", 3.0, 5.0))
+    nodes, weights = np.polynomial.legendre.leggauss(12)
+    path = solved(net, Loading(loads, np.array([0.0, *(0.5 * (nodes + 1)), 1.0])))
+    at = path.at_asked
+    shift = path.effort[at] - path.effort[0]
+    work = shift[-1] - 0.5 * weights @ shift[1:-1]
+    assert path.energy[at[-1]] - path.energy[0] == pytest.approx(work + dead_work(path, int(at[-1])), rel=1e-7)

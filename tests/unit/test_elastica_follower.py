@@ -1,0 +1,64 @@
+"""Loads that turn with their node: what diverges is told, where it does; whether it flutters depends on masses.
+
+A column, clamped at its foot, under a load P at its top of which a share a stays tangential, and a small dead force F
+across. With q^2 = P/(EI), c = cos(qL) its top turns by F/P (1 - c)/(c + a (1 - c)): it diverges where c = -a/(1 - a),
+and not at all if a is more than a half; M. Beck, Z. angew. Math. Phys. 3 (1952) 225, and V. V. Bolotin, Nonconservative
+Problems of the Theory of Elastic Stability, 1963.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cfmkit.elastica import CLAMPED, Beam, Control, Loading, Network, Node, PathStatus, PointLoad, Section, trace
+
+LENGTH, RIGIDITY = 0.1, 2e9 * 8e-3 * 1e-9 / 12
+EULER = np.pi**2 * RIGIDITY / (4 * LENGTH**2)  # of a column clamped at its foot, free at its top
+NODES = {"foot": Node(0, 0, CLAMPED), "top": Node(LENGTH, 0)}
+
+
+def column(loads: Any = ()) -> Network:
+    beam = Beam("foot", "top", Section(2e9, 8e-3, 1e-3, axial=False))
+    return Network(NODES, {"column": beam}, loads=loads)
+
+
+@pytest.mark.parametrize("ratio", [3.9, 4.1, 6.0, 8.0])
+def test_a_column_under_a_tangential_load_never_diverges(ratio: float) -> None:
+    """From 4 times Euler's load on the symmetric part of the tangent is indefinite: that is no loss of stability."""
+    tangential = PointLoad("top", fx=-ratio * EULER, follows=True)
+    push = Loading((PointLoad("top", fy=1e-6 * EULER),), np.array([0.5, 1.0]))
+    path = trace(column((tangential,)), push)
+    assert path.status is PathStatus.COMPLETE, path.message
+    assert path.events == ()
+    assert path.stable.all()
+    angle = np.pi / 2 * np.sqrt(ratio)
+    assert path.motion("top")[-1, 2] == pytest.approx(1e-6 / ratio * (1 - np.cos(angle)), rel=1e-6)
+
+
+@pytest.mark.parametrize("tolerance", [1e-4, 1e-8])
+@pytest.mark.parametrize("share", [0.0, 0.25, 0.4, 0.45])
+def test_a_column_under_a_partly_tangential_load_diverges_where_its_tangent_is_singular(
+    share: float, tolerance: float
+) -> None:
+    loads = (PointLoad("top", fx=-(1 - share) * EULER), PointLoad("top", fx=-share * EULER, follows=True))
+    press = Loading(loads, np.array([1.0, 2.0, 3.5]))
+    path = trace(column(), press, Control(tolerance=tolerance, branch="primary"))
+    expected = (np.arccos(-share / (1 - share)) / (np.pi / 2)) ** 2
+    assert [(event.kind, event.before, event.after) for event in path.events] == [("bifurcation", 0, 1)]
+    assert path.events[0].drive == pytest.approx(expected, rel=10 * tolerance)
+    assert (path.stable == (path.drive < expected)).all()
+
+
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-6, 1e-9])
+def test_a_limit_point_under_a_load_that_follows_is_told_as_one(tolerance: float) -> None:
+    """The symmetric part of the tangent is singular before: no bifurcation is there."""
+    network = column((PointLoad("top", fx=-1.3 * EULER),))
+    drive = Loading((PointLoad("top", fy=0.1 * EULER, follows=True),), np.array([0.5, 1.0, 2.0]))
+    ends, passed = (trace(network, drive, Control(tolerance=tolerance, through_folds=folds)) for folds in (False, True))
+    assert ends.status is PathStatus.LIMIT_POINT
+    assert [event.kind for event in ends.events] == ["bifurcation under constant loads"]
+    assert [event.kind for event in passed.events] == ["bifurcation under constant loads", "limit point"]
+    assert passed.events[1].drive == pytest.approx(ends.drive[-1], rel=max(10 * tolerance, 2e-6))

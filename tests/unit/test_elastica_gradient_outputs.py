@@ -1,0 +1,204 @@
+"""Derivatives of every output by every kind of design variable, against differences along random directions."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cfmkit.elastica import (
+    CLAMPED,
+    Beam,
+    Control,
+    CosineArch,
+    Displacement,
+    LineLoad,
+    LineSpring,
+    Link,
+    Loading,
+    Network,
+    Node,
+    PointLoad,
+    Polyline,
+    Polynomial,
+    Rotation,
+    Section,
+    SlideSpring,
+    Spline,
+    Support,
+    Taper,
+    TorsionSpring,
+    gradient,
+    guided,
+    trace,
+)
+from cfmkit.errors import InputError
+
+FINE = Control(tolerance=1e-11)
+VALUES = {
+    "node x": 0.05,
+    "node y": 0.02,
+    "thickness": 1.1,
+    "linked node": 4e-3,
+    "offset x": 3e-3,
+    "offset y": 2e-3,
+    "line spring": 150.0,
+    "its free length": 0.045,
+    "torsion spring": 0.2,
+    "its angle": 0.05,
+    "slide spring": 60.0,
+    "its direction": 0.4,
+    "its place": 1e-3,
+    "dead load": -0.2,
+    "follower": 0.1,
+    "line load": -5.0,
+    "support displacement": 4e-4,
+    "support direction": 1.5,
+    "rise": 6e-3,
+    "corner": 0.012,
+    "spline point": 0.011,
+    "modulus": 1.0,
+    "Poisson's ratio": 0.3,
+    "coefficient": 0.7,
+    "width": 8.0,
+}
+X, KINDS = np.array(list(VALUES.values())), list(VALUES)
+
+
+def zoo(x: Any) -> Network:
+    """A network in which everything varies."""
+    section = Section(x[21] * 2e9, x[24] * 1e-3, Taper(np.array([0, 0.5, 1]), np.array([1.0, x[2], 1.2]) * 1e-3), True)
+    plain = Section(x[21] * 2e9, 8e-3, 1e-3, axial=True, shear=True, poisson_ratio=x[22])
+    steps = Taper(np.array([0, 0.3, 0.3, 0.8, 1]), np.array([1.2, 1.1, 0.8, 0.9, 1.0]) * 1e-3)
+    stepped = Section(x[21] * 2e9, 8e-3, steps, axial=True, shear=True, poisson_ratio=x[22])
+    nodes = {
+        "a": Node(0, 0, Support(True, True, True, displacement=(0.0, x[16], 0.0))),
+        "b": Node(x[0], x[1]),
+        "bb": Node(0.05 + x[3], 0.022),
+        "c": Node(0.1, 0.0, CLAMPED),
+        "d": Node(0.06, 0.08, guided(np.pi / 2)),
+        "e": Node(0.12, 0.05, guided(x[17], rotates=True)),
+        "f": Node(-0.02, 0.06, CLAMPED),
+    }
+    beams = {
+        "ab": Beam("a", "b", section, Polynomial((0.0, x[23])), end_offset=(x[4], x[5])),
+        "bc": Beam("bb", "c", stepped, CosineArch(x[18]), end_joint="pin"),
+        "bd": Beam("b", "d", section),
+        "be": Beam("b", "e", plain, Polyline(np.array([[0.0, 0.0], [0.03, x[19]], [0.07, 0.03]]))),
+        "bf": Beam("bb", "f", stepped, Spline(np.array([[0.0, 0.0], [0.03, x[20]], [0.05, 0.012], [0.085, 0.0]]))),
+    }
+    springs = (
+        LineSpring("b", "d", x[6], x[7]),
+        LineSpring("bb", None, 40.0, ground=(0.0, 0.05)),
+        TorsionSpring("b", "e", x[8], x[9]),
+        SlideSpring("e", x[11], x[10], x[12]),
+    )
+    loads = (PointLoad("b", fy=x[13], moment=1e-3), PointLoad("bb", fx=x[14], follows=True), LineLoad("ab", 2.0, x[15]))
+    return Network(nodes, beams, (Link("b", "bb"),), springs, loads)
+
+
+def outputs(path: Any, at: Any = slice(None)) -> dict[str, Any]:
+    """Everything that can be asked for at the points asked for."""
+    keep = path.at_asked[at]
+    found = {"effort": path.effort[keep], "energy": path.energy[keep]}
+    for node in path.layout.network.nodes:
+        found[f"motion {node}"] = path.motion(node)[keep]
+    for node in path.layout.masters:
+        found[f"reaction {node}"] = path.reaction(node)[keep]
+    for beam in path.layout.network.beams:
+        found[f"start force {beam}"] = path.end_force(beam, 0)[keep]
+        found[f"end force {beam}"] = path.end_force(beam, 1)[keep]
+        found[f"shape {beam}"] = np.array([path.shape(beam, int(k)) for k in keep])
+        sections = path.sections(beam)
+        for name in ("moment", "normal", "shear", "bending_stress", "axial_stress"):
+            found[f"{name} {beam}"] = getattr(sections, name)[keep]
+        for axial in (True, False):
+            extremes = path.stress_extremes(beam, axial)
+            found[f"extremes {beam} {axial}"] = extremes.value[keep]
+            found[f"places {beam} {axial}"] = extremes.place[keep]
+    return found
+
+
+def slopes(g: Any) -> dict[str, Any]:
+    """The derivatives of the same."""
+    found = {"effort": g.effort, "energy": g.energy}
+    for node in g.path.layout.network.nodes:
+        found[f"motion {node}"] = g.motion[node]
+    for node in g.path.layout.masters:
+        found[f"reaction {node}"] = g.reaction[node]
+    for beam in g.path.layout.network.beams:
+        found[f"start force {beam}"] = g.end_force(beam, 0)
+        found[f"end force {beam}"] = g.end_force(beam, 1)
+        found[f"shape {beam}"] = g.shape(beam)
+        sections = g.sections(beam)
+        for name in ("moment", "normal", "shear", "bending_stress", "axial_stress"):
+            found[f"{name} {beam}"] = getattr(sections, name)
+        for axial in (True, False):
+            found[f"extremes {beam} {axial}"] = g.stress_extremes(beam, axial)
+    return found
+
+
+def pushed(x: Any) -> Any:
+    return zoo(x), Displacement("d", -np.pi / 2, np.array([1e-3, 3e-3]))
+
+
+def turned(x: Any) -> Any:
+    return zoo(x), Rotation("e", np.array([-0.1, -0.2]))
+
+
+def loaded(x: Any) -> Any:
+    loads = (
+        PointLoad("b", 0.2, 3 * x[13], 1e-3 * x[2]),
+        PointLoad("d", 0, x[13], follows=True),
+        LineLoad("bf", 1.0, x[15]),
+    )
+    return zoo(x), Loading(loads, np.array([0.5, 1.0]))
+
+
+@pytest.mark.parametrize("build", [pushed, turned, loaded])
+def test_derivatives_of_all_outputs_are_those_of_differences(build: Any) -> None:
+    exact = slopes(gradient(trace(*build(X), FINE), build, X))
+    rng = np.random.default_rng(5)
+    for _ in range(2):
+        way = X * rng.uniform(0.5, 1.0, len(X)) * rng.choice([-1.0, 1.0], len(X))
+        values = [outputs(trace(*build(X + step * 1e-3 * way), FINE)) for step in (-2, -1, 1, 2)]
+        for name, slope in exact.items():
+            a, b, c, d = (one[name] for one in values)
+            want = (a - 8 * b + 8 * c - d) / 12e-3
+            same = np.ones(want.shape, dtype=bool)
+            if name.startswith("extremes"):  # where two peaks are equally high the highest has no derivative
+                same = np.ptp([one[name.replace("extremes", "places")] for one in values], axis=0) < 0.02
+            off = np.abs(slope @ way - want)[same]
+            limit = 1e-5 if name.startswith("extremes") else 2e-6  # those are interpolated between sampled places
+            assert (off <= limit * np.abs(want).max() + 1e-10).all(), (name, off.max(), np.abs(want).max())
+
+
+@pytest.mark.parametrize(
+    "name", ["line spring", "its direction", "follower", "support direction", "corner", "spline point"]
+)
+def test_each_of_the_rarer_variables_has_its_own_derivative(name: str) -> None:
+    """Effort and reactions by springs, loads, supports, corners: one by one, so that no error hides in a sum."""
+    kind = KINDS.index(name)
+    found = gradient(trace(*pushed(X), FINE), pushed, X)
+    way = np.zeros(len(X))
+    way[kind] = 1e-3 * X[kind]
+    values = [trace(*pushed(X + step * way), FINE) for step in (-2, -1, 1, 2)]
+    for slope, output in (
+        (found.effort[:, kind], lambda p: p.effort[p.at_asked]),
+        (found.reaction["c"][:, :, kind], lambda p: p.reaction("c")[p.at_asked]),
+    ):
+        a, b, c, d = (output(p) for p in values)
+        want = (a - 8 * b + 8 * c - d) / (12 * way[kind])
+        np.testing.assert_allclose(slope, want, rtol=1e-6, atol=1e-6 * np.abs(want).max())
+
+
+def test_a_variable_that_changes_the_make_up_is_refused() -> None:
+    def build(x: Any) -> Network:
+        joint = "pin" if np.iscomplexobj(x) else "rigid"
+        beam = Beam("a", "b", Section(2e9, 8e-3, 1e-3), Polynomial((0.0, x[0])), end_joint=joint)  # type: ignore[arg-type]
+        return Network({"a": Node(0, 0, CLAMPED), "b": Node(0.1, 0.0, guided(np.pi / 2))}, {"ab": beam})
+
+    path = trace(build(np.array([0.3])), Displacement("b", np.pi / 2, np.array([1e-3])))
+    with pytest.raises(InputError, match="how the network is made up"):
+        gradient(path, build, np.array([0.3]))

@@ -1,0 +1,188 @@
+"""Derivatives where the thickness has stations and the arc length changes along the parameter of the shape."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+from cfmkit.elastica import (
+    CLAMPED,
+    Beam,
+    Control,
+    CosineArch,
+    Displacement,
+    Network,
+    Node,
+    Polyline,
+    Polynomial,
+    Section,
+    Spline,
+    Taper,
+    gradient,
+    guided,
+    trace,
+)
+from cfmkit.elastica.equilibrium.mesh import Mesh, grid, table
+from cfmkit.elastica.model.layout import Layout
+from cfmkit.elastica.model.shapes import Bent
+from cfmkit.elastica.sensitivity.tilt import Tilts, slope
+from cfmkit.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+FINE = Control(tolerance=1e-11)
+DOWN = Displacement("d", -np.pi / 2, np.array([3e-3]))
+STATIONS = np.array([0, 0.3, 0.3, 0.75, 1])
+THICKNESS = {
+    "constant": 1e-3,
+    "steps": Taper(STATIONS, np.array([1.2, 1.1, 0.8, 0.9, 1.0]) * 1e-3),
+    "kink": Taper(np.array([0, 0.3, 1]), np.array([1.2, 0.8, 1.1]) * 1e-3),
+}
+BENDING = (0.05, 0.2, -0.1)
+
+
+def corner(r: Any) -> Polyline:
+    return Polyline(np.array([[0, 0], [0.03, 0], [0.1, 0]]) + np.array([[0, 0], [0.001, 0.01], [0, 0]]) * r)
+
+
+def curve(r: Any) -> Spline:
+    points = np.array([[0, 0], [0.03, 0], [0.07, 0], [0.1, 0]])
+    return Spline(points + np.array([[0, 0], [0.002, 0.01], [0, 0], [0, 0]]) * r)
+
+
+SHAPES: dict[str, Callable[[Any], Any]] = {
+    "polynomial": lambda r: Polynomial((0.0, 0.8 * r, 0.3)),
+    "cosine arch": lambda r: CosineArch(0.01 * r),
+    "half arch": lambda r: CosineArch(0.01 * r, 0.5),
+    "spline": curve,
+    "short spline": lambda r: Spline(
+        np.array([[0, 0], [0.03, 0], [0.1, 0]]) + np.array([[0, 0], [0, 0.01], [0, 0]]) * r
+    ),
+    "polyline": corner,
+    "bent arch": lambda r: Bent(CosineArch(0.01 * r), BENDING),
+    "bent spline": lambda r: Bent(curve(r), BENDING),
+    "bent polyline": lambda r: Bent(corner(r), BENDING),
+}
+
+
+def one_beam(shape: Callable[[Any], Any], thickness: Any, closure: Any = "rotscale") -> Callable[[Any], Network]:
+    """A beam by factors: on the size of its shape, the place of its end, its thickness, its first station."""
+
+    def build(x: Any) -> Network:
+        given = thickness
+        if isinstance(given, Taper):
+            stations = given.stations * np.where(given.stations == given.stations[1], x[3], 1)
+            given = Taper(stations, given.values * x[2])
+        else:
+            given = given * x[2]
+        nodes = {"a": Node(0, 0, CLAMPED), "d": Node(0.1 * x[1], 0.02, guided(np.pi / 2))}
+        return Network(nodes, {"ad": Beam("a", "d", Section(2e9, 8e-3, given, shear=True), shape(x[0]), closure)})
+
+    return build
+
+
+def difference(output: Callable[[Any], Any], x: Any, which: int, step: float = 1e-3) -> Any:
+    """Return a central difference of fourth order."""
+    a, b, c, d = (output(x + k * step * np.eye(len(x))[which]) for k in (-2, -1, 1, 2))
+    return (a - 8 * b + 8 * c - d) / (12 * step)
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize("thickness", THICKNESS)
+@pytest.mark.parametrize("closure", ["rotscale", "raw"])
+def test_derivatives_of_tables_are_those_of_tables_on_grids_that_move(shape: str, thickness: str, closure: Any) -> None:
+    """A complex step leaves the grid where it is: angles, lengths and compliances of all drifts and kicks count."""
+    build, x = one_beam(SHAPES[shape], THICKNESS[thickness], closure), np.array([1.0, 1.05, 1.0, 1.0])
+    known = Layout(build(x), DOWN)
+    cut = grid(known, Mesh())
+
+    def moved(values: Any) -> Any:
+        layout = Layout(build(values), DOWN)
+        layout.scales = known.scales
+        return table(layout, grid(layout, Mesh()))
+
+    sizes = np.abs(table(known, cut)).max(axis=(0, 1))
+    for which, tilted in enumerate(Tilts(known, build, x).tilted):
+        want, found = difference(moved, x, which), slope(table(tilted, cut))
+        off = np.abs(found - want).max(axis=(0, 1))
+        assert (off <= 1e-9 * sizes).all(), (which, off, sizes)
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_derivatives_of_a_stepped_beam_are_those_of_differences(shape: str) -> None:
+    build, x = one_beam(SHAPES[shape], THICKNESS["steps"]), np.ones(4)
+    found = gradient(trace(build(x), DOWN, FINE), build, x)
+    asked = {
+        "effort": (found.effort[0], lambda p: p.effort[-1]),
+        "energy": (found.energy[0], lambda p: p.energy[-1]),
+        "shape": (found.shape("ad")[0], lambda p: p.shape("ad", -1)),
+        "moment": (found.sections("ad").moment[0], lambda p: p.sections("ad").moment[-1]),
+        "stress": (found.sections("ad").bending_stress[0], lambda p: p.sections("ad").bending_stress[-1]),
+        "extremes": (found.stress_extremes("ad")[0], lambda p: p.stress_extremes("ad").value[-1]),
+    }
+
+    def outputs(values: Any) -> Any:
+        path = trace(build(values), DOWN, FINE)
+        return np.concatenate([np.ravel(output(path)) for _, output in asked.values()])
+
+    sizes = np.cumsum([slopes[..., 0].size for slopes, _ in asked.values()])
+    for which in (0, 1, 3):
+        wanted = np.split(difference(outputs, x, which), sizes[:-1])
+        for (name, (slopes, _)), want in zip(asked.items(), wanted, strict=True):
+            off = np.abs(slopes[..., which].ravel() - want).max()
+            assert off <= 1e-6 * np.abs(want).max(), (name, which, off, np.abs(want).max())
+
+
+def knot_of_the_curve() -> float:
+    """The fraction of the arc length at the first inner knot of a spline."""
+    fitted = Layout(one_beam(curve, 1e-3)(np.ones(4)), DOWN).fits["ad"]
+    return float(fitted.arc(fitted.course.breaks[1]))
+
+
+def corner_of_the_polyline() -> float:
+    return float(corner(1.0).course(1.0).breaks[1])
+
+
+@pytest.mark.parametrize(
+    ("shape", "station", "after"),
+    [(curve, knot_of_the_curve, 0.8), (curve, knot_of_the_curve, 1.2), (corner, corner_of_the_polyline, 1.2)],
+)
+def test_a_station_may_lie_where_smooth_pieces_of_the_shape_meet(shape: Any, station: Any, after: float) -> None:
+    """A step of the thickness at a knot of a spline, or its kink at either: each moves as it does alone."""
+    u = station()
+    build = one_beam(shape, Taper(np.array([0, u, u, 1]), np.array([1.0, 1.2, after, 1.0]) * 1e-3))
+    x = np.ones(4)
+    found = gradient(trace(build(x), DOWN, FINE), build, x).effort[0]
+    for which in range(3):
+        want = difference(lambda values: trace(build(values), DOWN, FINE).effort[-1], x, which)
+        assert found[which] == pytest.approx(want, rel=1e-6)
+
+
+def test_a_corner_that_moves_past_a_step_is_refused_and_one_that_stays_with_it_is_not() -> None:
+    def built(way: Any) -> tuple[Callable[[Any], Network], Any]:
+        def shape(r: Any) -> Polyline:
+            return Polyline(np.array([[0, 0], [0.05, 0.01], [0.1, 0]]) + np.array([[0, 0], way, [0, 0]]) * (r - 1))
+
+        build = one_beam(shape, Taper(np.array([0, 0.5, 0.5, 1]), np.array([1, 1, 0.8, 0.8]) * 1e-3))
+        return lambda x: build([x[0], 1.0, 1.0, 1.0]), np.ones(1)
+
+    build, x = built([0.01, 0.0])
+    with pytest.raises(InputError, match="past each other"):
+        gradient(trace(build(x), DOWN), build, x)
+    build, x = built([0.0, 0.01])
+    found = gradient(trace(build(x), DOWN, FINE), build, x).effort[0, 0]
+    want = difference(lambda values: trace(build(values), DOWN, FINE).effort[-1], x, 0)
+    assert found == pytest.approx(want, rel=1e-6)
+
+
+def test_a_step_of_the_thickness_is_moved_as_a_whole() -> None:
+    def build(x: Any) -> Network:
+        steps = Taper(np.array([0, 0.5, x[0], 1]), np.array([1, 1, 0.8, 0.8]) * 1e-3)
+        return one_beam(corner, steps)(np.ones(4))
+
+    x = np.array([0.5])
+    with pytest.raises(InputError, match="must move alike"):
+        gradient(trace(build(x), DOWN), build, x)

@@ -1,0 +1,114 @@
+"""Pins between beams and rigid bodies, sprung or not, against the same mechanism built otherwise."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cfmkit.elastica import (
+    CLAMPED,
+    Beam,
+    Control,
+    Displacement,
+    Link,
+    Network,
+    Node,
+    Polynomial,
+    Section,
+    TorsionSpring,
+    gradient,
+    guided,
+    trace,
+)
+from cfmkit.errors import InputError
+
+FINE = Control(tolerance=1e-10)
+SECTION = Section(2e9, 8e-3, 1e-3)
+PUSH = Displacement("c", -np.pi / 2, np.array([2e-3, 6e-3]))
+NODES = {
+    "a": Node(0.0, 0.0, CLAMPED),
+    "b": Node(0.05, 0.03),
+    "p": Node(0.05, 0.03),
+    "c": Node(0.1, 0.05, guided(np.pi / 2)),
+}
+
+
+def pinned(stiffness: Any = 0.0, x: Any = 0.05) -> Network:
+    """Two beams that meet at a pin with a torsion spring."""
+    nodes = {**NODES, "b": Node(x, 0.03), "p": Node(x, 0.03)}
+    beams = {"ab": Beam("a", "b", SECTION, Polynomial((0.0, 0.4))), "pc": Beam("p", "c", SECTION)}
+    return Network(nodes, beams, (Link("b", "p", turns=False),), (TorsionSpring("b", "p", stiffness),))
+
+
+def test_a_pin_between_nodes_is_a_pin_at_the_end_of_a_beam() -> None:
+    beams = {"ab": Beam("a", "b", SECTION, Polynomial((0.0, 0.4))), "bc": Beam("b", "c", SECTION, start_joint="pin")}
+    nodes = {name: node for name, node in NODES.items() if name != "p"}
+    same = trace(Network(nodes, beams), PUSH, FINE)
+    path = trace(pinned(), PUSH, FINE)
+    np.testing.assert_allclose(path.effort, same.effort, rtol=1e-9)
+    np.testing.assert_allclose(path.motion("p")[:, :2], path.motion("b")[:, :2])
+    np.testing.assert_allclose(path.end_force("pc", 0)[:, 2], 0.0, atol=1e-12)
+    assert abs(path.motion("p")[-1, 2] - path.motion("b")[-1, 2]) > 0.01
+
+
+def test_a_sprung_pin_transmits_the_moment_of_its_spring() -> None:
+    path = trace(pinned(0.3), PUSH, FINE)
+    turn = path.motion("p")[:, 2] - path.motion("b")[:, 2]
+    np.testing.assert_allclose(path.end_force("pc", 0)[:, 2], 0.3 * turn, rtol=1e-8)
+
+
+def test_a_stiff_pin_is_a_rigid_joint() -> None:
+    beams = {"ab": Beam("a", "b", SECTION, Polynomial((0.0, 0.4))), "bc": Beam("b", "c", SECTION)}
+    rigid = trace(Network({n: node for n, node in NODES.items() if n != "p"}, beams), PUSH, FINE)
+    np.testing.assert_allclose(trace(pinned(1e6), PUSH, FINE).effort, rigid.effort, rtol=1e-5)
+
+
+def test_a_pin_on_a_rigid_arm_moves_with_the_arm() -> None:
+    nodes = {**NODES, "p": Node(0.055, 0.036)}
+    beams = {"ab": Beam("a", "b", SECTION), "pc": Beam("p", "c", SECTION)}
+    path = trace(Network(nodes, beams, (Link("b", "p", turns=False),)), PUSH, FINE)
+    offset = {"ab": beams["ab"], "bc": Beam("b", "c", SECTION, start_offset=(0.005, 0.006), start_joint="pin")}
+    same = trace(Network({n: node for n, node in NODES.items() if n != "p"}, offset), PUSH, FINE)
+    np.testing.assert_allclose(path.effort, same.effort, rtol=1e-9)
+    with pytest.raises(InputError, match="pinned to a rigid arm"):
+        trace(
+            Network(nodes, {**beams, "pc": Beam("p", "c", SECTION, start_offset=(1e-3, 0))}, (Link("b", "p", False),)),
+            PUSH,
+        )
+
+
+def test_a_pinned_node_carries_offsets_that_turn_with_it() -> None:
+    beams = {"ab": Beam("a", "b", SECTION), "pc": Beam("p", "c", SECTION, start_offset=(2e-3, 4e-3))}
+    path = trace(Network(NODES, beams, (Link("b", "p", turns=False),)), PUSH, FINE)
+    force = path.end_force("pc", 0)
+    c, s = np.cos(path.motion("p")[:, 2]), np.sin(path.motion("p")[:, 2])
+    arm = np.stack([c * 2e-3 - s * 4e-3, s * 2e-3 + c * 4e-3])
+    moment = force[:, 2] + arm[0] * force[:, 1] - arm[1] * force[:, 0]
+    np.testing.assert_allclose(moment, 0.0, atol=1e-9)
+
+
+def test_gradients_go_through_pins() -> None:
+    def build(x: Any) -> Network:
+        return pinned(x[0], x[1])
+
+    x = np.array([0.3, 0.05])
+    path = trace(build(x), PUSH, FINE)
+    found = gradient(path, build, x)
+    for k in range(2):
+        h = 1e-4 * x[k]
+        one, other = (trace(build(x + s * h * np.eye(2)[k]), PUSH, FINE) for s in (1, -1))
+        np.testing.assert_allclose(found.effort[:, k], (one.effort - other.effort)[path.at_asked] / (2 * h), rtol=1e-6)
+        slope = (one.motion("p") - other.motion("p"))[path.at_asked] / (2 * h)
+        np.testing.assert_allclose(found.motion["p"][:, :, k], slope, rtol=1e-6, atol=1e-6 * np.abs(slope).max())
+
+
+def test_no_support_acts_on_a_node_that_a_link_moves() -> None:
+    path = trace(pinned(), PUSH)
+    with pytest.raises(InputError, match="'p' is moved by a link: what is held is its master, 'b'"):
+        path.reaction("p")
+    with pytest.raises(InputError, match="'q' is not a node; nodes: a, b, p, c"):
+        path.reaction("q")
+    with pytest.raises(InputError, match="moved by a link"):
+        gradient(path, lambda x: pinned(x=x[0]), np.array([0.05])).reaction["p"]

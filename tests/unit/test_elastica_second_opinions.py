@@ -1,0 +1,116 @@
+"""Corotational elements beside the engine, equilibria from neighbouring networks, the slope of the force."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from cfmkit.elastica import (
+    CLAMPED,
+    Beam,
+    Control,
+    Displacement,
+    Link,
+    Network,
+    Node,
+    Path,
+    PathStatus,
+    Polynomial,
+    Section,
+    Taper,
+    TorsionSpring,
+    guided,
+    trace,
+)
+from cfmkit.elastica.sensitivity.neighbour import drive_slope, neighbouring
+from cfmkit.elastica.verification.corotational import recheck
+from cfmkit.errors import InputError
+
+DOWN = Displacement("d", -np.pi / 2, np.array([1e-3, 4e-3, 9e-3]))
+
+
+def frame(thickness: float = 1.2e-3, bend: float = 0.7, springs: tuple[TorsionSpring, ...] = ()) -> Network:
+    """Return curved and tapered beams with a linked node, a turned frame and an offset."""
+    section = Section(2e9, 8e-3, Taper(np.array([0, 0.5, 1]), np.array([1e-3, thickness, 1.1e-3])), shear=True)
+    nodes = {
+        "a": Node(0, 0, CLAMPED),
+        "b": Node(0.05, 0.02),
+        "bb": Node(0.055, 0.025),
+        "c": Node(0.1, 0.0, CLAMPED),
+        "d": Node(0.06, 0.08, guided(np.pi / 2)),
+    }
+    beams = {
+        "ab": Beam("a", "b", section, Polynomial((0.0, bend)), end_offset=(0.003, 0.001)),
+        "bc": Beam("bb", "c", section),
+        "bd": Beam("b", "d", section),
+    }
+    return Network(nodes, beams, links=(Link("b", "bb"),), springs=springs)
+
+
+@pytest.fixture(scope="module")
+def path() -> Path:
+    return trace(frame(), DOWN, Control(tolerance=1e-9))
+
+
+def test_elements_agree_with_the_engine(path: Path) -> None:
+    found = recheck(path, elements=60)
+    at = path.at_asked
+    np.testing.assert_allclose(found.effort, path.effort[at], rtol=5e-6)
+    np.testing.assert_allclose(found.stress, path.peak_stress().value[at], rtol=3e-4)
+    assert found.stable.all()
+
+
+def test_the_error_of_the_elements_falls_until_only_the_theories_differ(path: Path) -> None:
+    """The two theories measure shear and stretch in frames that differ by the shear angle: about 1e-6 here."""
+    exact = path.effort[path.at_asked[-1]]
+    coarse, middle, fine = (abs(recheck(path, path.at_asked[-1:], n).effort[0] / exact - 1) for n in (12, 24, 48))
+    assert coarse / middle > 4
+    assert middle / fine > 4
+    assert fine < 5e-6
+
+
+def test_elements_find_an_unstable_equilibrium_unstable() -> None:
+    straight = Network(
+        {"a": Node(0, 0, CLAMPED), "d": Node(0.1, 0.0, guided(0.0))},
+        {"x": Beam("a", "d", Section(2e9, 8e-3, Taper(np.array([0, 1.0]), np.array([1e-3, 1.05e-3]))))},
+    )
+    pressed = Displacement("d", np.pi, np.array([1e-6, 2e-3]))
+    on, off = (trace(straight, pressed, Control(branch=branch)) for branch in ("primary", "stable"))  # type: ignore[arg-type]
+    assert recheck(on).stable.tolist() == [True, False]
+    assert recheck(off).stable.tolist() == [True, True]
+
+
+def test_elements_refuse_what_they_do_not_have() -> None:
+    with pytest.raises(InputError, match="beams, links and supports"):
+        recheck(trace(frame(springs=(TorsionSpring(None, "b", 0.01),)), DOWN))
+
+
+def test_neighbours_are_the_equilibria_of_the_other_network(path: Path) -> None:
+    other = frame(1.35e-3, 0.72)
+    again = trace(other, DOWN, Control(tolerance=1e-9))
+    found = neighbouring(path, other, DOWN)
+    assert found.status is PathStatus.COMPLETE
+    np.testing.assert_allclose(found.effort, again.effort[again.at_asked], rtol=1e-8)
+    np.testing.assert_allclose(found.motion("bb"), again.motion("bb")[again.at_asked], atol=1e-9)
+    np.testing.assert_allclose(found.peak_stress().value, again.peak_stress().value[again.at_asked], rtol=1e-7)
+
+
+def test_a_neighbour_too_far_away_is_lost_and_not_made_up(path: Path) -> None:
+    found = neighbouring(path, frame(), Displacement("d", -np.pi / 2, np.array([1e-3, 4e-3, 70e-3])))
+    assert found.status is PathStatus.LOST
+    assert "0.07" in found.message
+    assert len(found) == 2
+
+
+def test_neighbours_must_be_of_one_kind(path: Path) -> None:
+    with pytest.raises(InputError, match="same kind"):
+        neighbouring(path, frame(), Displacement("d", -np.pi / 2, np.array([1e-3])))
+
+
+def test_slope_of_the_force_is_that_of_differences(path: Path) -> None:
+    h = 1e-6
+    sides = [
+        trace(frame(), Displacement("d", -np.pi / 2, DOWN.points + step), Control(tolerance=1e-11)) for step in (-h, h)
+    ]
+    low, high = (side.effort[side.at_asked] for side in sides)
+    np.testing.assert_allclose(drive_slope(path), (high - low) / (2 * h), rtol=1e-5)

@@ -1,0 +1,218 @@
+"""Several modes critical at once, or nearly: leaves and columns in parallel, judged by one of them alone."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cfmkit.elastica import (
+    CLAMPED,
+    Beam,
+    Control,
+    Displacement,
+    Loading,
+    Network,
+    Node,
+    Path,
+    PathStatus,
+    PointLoad,
+    Section,
+    guided,
+    trace,
+)
+from cfmkit.elastica.continuation.modes import Curvature, eigenvalues
+from cfmkit.elastica.continuation.switching import descend
+from cfmkit.elastica.equilibrium.expanded import ExpandedSolver
+from cfmkit.elastica.equilibrium.mesh import Mesh
+from cfmkit.elastica.model.layout import Layout
+
+LENGTH, SHUTTLE = 35e-3, guided(np.pi / 2)
+
+
+def leaves(many: Any, count: int, thickness: float = 7e-4, angle: float = 8.0, support: Any = SHUTTLE) -> Any:
+    """Return leaves left and right of one shuttle, that many or with these factors on their thickness; the drive."""
+    factors = [1.0] * many if isinstance(many, int) else many
+    rise, across = LENGTH * np.sin(np.radians(angle)), LENGTH * np.cos(np.radians(angle))
+    nodes, beams = {"d": Node(0, rise, support)}, {}
+    for i, factor in enumerate(factors):
+        down = 5e-3 * (i // 2)
+        nodes[f"w{i}"] = Node((-1 if i % 2 == 0 else 1) * across, -down, CLAMPED)
+        beams[f"b{i}"] = Beam(f"w{i}", "d", Section(1477e6, 6e-3, thickness * factor), end_offset=(0.0, -down))
+    return Network(nodes, beams), Displacement("d", -np.pi / 2, np.linspace(0.05, 2.1, count) * rise)
+
+
+@cache
+def alone(count: int = 15, factor: float = 1.0, thickness: float = 7e-4, angle: float = 8.0) -> Path:
+    return trace(*leaves([factor], count, thickness, angle), Control(tolerance=1e-9))
+
+
+def moments(path: Path, point: int) -> Any:
+    """Return the moments at the shuttle."""
+    at = path.at_asked[point]
+    return np.array([path.end_force(name, 1)[at, 2] for name in path.layout.network.beams])
+
+
+def changes(path: Path) -> list[tuple[str, int, int]]:
+    return [(event.kind, event.before, event.after) for event in path.events]
+
+
+@pytest.mark.parametrize(("many", "tolerance"), [(2, 1e-9), (5, 1e-5), (8, 1e-3)])
+def test_equal_leaves_buckle_together_and_straighten_together(many: int, tolerance: float) -> None:
+    """They do not act on each other: everything is as for one of them, that many times."""
+    one, paths = alone(), [trace(*leaves(many, 15), Control(tolerance=tolerance, sign=sign)) for sign in (1, -1)]
+    for path, sense in zip(paths, (-1, 1), strict=True):
+        assert path.status is PathStatus.COMPLETE, path.message
+        assert path.stable.all()
+        assert changes(path) == [("bifurcation", 0, many), ("bifurcation", many, 0)]
+        assert [event.drive for event in path.events] == pytest.approx([event.drive for event in one.events], rel=1e-7)
+        expected = many * one.effort[one.at_asked]
+        allowed = 10 * tolerance * np.abs(expected).max()
+        np.testing.assert_allclose(path.effort[path.at_asked], expected, rtol=0, atol=allowed)
+        sides = moments(path, 4) * sense
+        assert sides == pytest.approx(np.full(many, abs(moments(one, 4)[0])), rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("factors", "tolerance"), [((1, 1 + 1e-7), 1e-5), ((1, 1 + 1e-6), 1e-3), ((1, 1 + 1e-5, 1 + 1e-4), 1e-6)]
+)
+def test_leaves_that_hardly_differ_buckle_together(factors: tuple[float, ...], tolerance: float) -> None:
+    path, many = trace(*leaves(factors, 15), Control(tolerance=tolerance)), len(factors)
+    assert path.status is PathStatus.COMPLETE, path.message
+    assert path.stable.all()
+    assert changes(path) == [("bifurcation", 0, many), ("bifurcation", many, 0)]
+    each = [alone(factor=factor) for factor in factors]
+    expected = sum(one.effort[one.at_asked] for one in each)
+    allowed = 10 * tolerance * np.abs(expected).max()
+    np.testing.assert_allclose(path.effort[path.at_asked], expected, rtol=0, atol=allowed)
+
+
+def test_leaves_that_differ_straighten_one_after_the_other() -> None:
+    """Where one of them is straight again the path is a branch still: there may be several such ends."""
+    factors = tuple(1 + 1e-3 * i for i in range(5))
+    path = trace(*leaves(factors, 15), Control(tolerance=1e-5))
+    assert path.status is PathStatus.COMPLETE, path.message
+    assert path.stable.all()
+    expected = sum(one.effort[one.at_asked] for one in (alone(factor=factor) for factor in factors))
+    allowed = 1e-4 * np.abs(expected).max()
+    np.testing.assert_allclose(path.effort[path.at_asked], expected, rtol=0, atol=allowed)
+
+
+@pytest.mark.parametrize(("thickness", "tolerance"), [(1e-4, 1e-3), (2e-4, 1e-5), (5e-4, 1e-9)])
+def test_two_very_slender_leaves(thickness: float, tolerance: float) -> None:
+    one = alone(11, 1.0, thickness, 9.4)
+    path = trace(*leaves(2, 11, thickness, 9.4), Control(tolerance=tolerance))
+    assert path.status is PathStatus.COMPLETE, path.message
+    expected = 2 * one.effort[one.at_asked]
+    allowed = 10 * tolerance * np.abs(expected).max()
+    np.testing.assert_allclose(path.effort[path.at_asked], expected, rtol=0, atol=allowed)
+
+
+@pytest.mark.parametrize(("many", "count"), [(2, 11), (2, 20), (4, 51)])
+def test_no_rounded_corner_hides_a_bifurcation_of_several_modes(many: int, count: int) -> None:
+    """Its branch has its name, the sign decides, and whoever wants to stop there is told."""
+    one, places = alone(count, 1.0, 5.66e-4, 4.6), []
+    for sign in (1, -1):
+        path = trace(*leaves(many, count, 5.66e-4, 4.6), Control(tolerance=1e-6, sign=sign))
+        assert changes(path) == [("bifurcation", 0, many), ("bifurcation", many, 0)]
+        assert (sign * moments(path, count // 3) < 0).all()
+        places.append([event.drive for event in path.events])
+    assert places[0] == pytest.approx([event.drive for event in one.events], rel=1e-6)
+    stopped = trace(*leaves(many, count, 5.66e-4, 4.6), Control(tolerance=1e-6, branch="stop"))
+    assert stopped.status is PathStatus.JUMPS
+
+
+def test_steps_do_not_shrink_until_they_follow_a_rounded_corner() -> None:
+    """As they did here, where every shorter step came a little nearer to the bifurcation and not past it."""
+    network, drive = leaves(5, 29, 0.0006034841487544531, 5.047877770936848)
+    points = np.linspace(0.03, 2.1, 29) * float(drive.points[-1]) / 2.1
+    path = trace(network, Displacement("d", -np.pi / 2, points), Control(tolerance=6.665797876563091e-08))
+    assert changes(path) == [("bifurcation", 0, 5), ("bifurcation", 5, 0)]
+
+
+@pytest.mark.parametrize(("sign", "tolerance"), [(1, 1e-3), (-1, 1e-6)])
+def test_leaves_on_a_shuttle_that_may_turn_fare_alike_with_any_points(sign: Any, tolerance: float) -> None:
+    """One mode turns the shuttle, three do not: they meet one after the other, and the forces must agree."""
+    paths = [
+        trace(*leaves(4, count, support=guided(np.pi / 2, True)), Control(tolerance=tolerance, sign=sign))
+        for count in (5, 43)
+    ]
+    for path in paths:
+        assert path.status is PathStatus.COMPLETE, path.message
+        assert path.stable.all()
+        assert changes(path) == changes(paths[0])
+        same = path.effort[path.at_asked][:: (len(path.at_asked) - 1) // 2]
+        assert same == pytest.approx(paths[0].effort[paths[0].at_asked][::2], abs=20 * tolerance)
+
+
+@pytest.mark.parametrize(("many", "factor"), [(2, 1.0), (5, 1 + 1e-6), (3, 1 + 1e-3)])
+def test_columns_under_one_platform_bear_its_load_together(many: int, factor: float) -> None:
+    """Under a load as under a displacement; were one to buckle alone the others would bear more than they can."""
+
+    def columns(count: int) -> Path:
+        nodes, beams = {"d": Node(0, 0.1, SHUTTLE)}, {}
+        for i in range(count):
+            x = 0.02 * (i - 0.5 * (count - 1))
+            nodes[f"w{i}"] = Node(x, 0, CLAMPED)
+            section = Section(2e9, 1e-2, 1e-3 * (factor if i else 1.0))
+            beams[f"b{i}"] = Beam(f"w{i}", "d", section, end_offset=(x, 0.0))
+        drive = Loading((PointLoad("d", fy=-count * critical),), np.linspace(0.1, 1.3, 13))
+        return trace(Network(nodes, beams), drive, Control(tolerance=1e-5))
+
+    critical = 4 * np.pi**2 * 2e9 * (1e-2 * 1e-9 / 12) / 0.1**2
+    one, path = columns(1), columns(many)
+    assert path.status is PathStatus.COMPLETE, path.message
+    assert path.stable.all()
+    assert changes(path) == [("bifurcation", 0, many)]
+    assert path.events[0].drive == pytest.approx(one.events[0].drive, rel=1e-6 + 3 * (factor - 1))
+    assert (moments(path, -1) < 0).all()
+    expected = many * one.effort[one.at_asked]
+    np.testing.assert_allclose(path.effort[path.at_asked][-2:], expected[-2:], rtol=1e-4 + 30 * (factor - 1))
+
+
+def test_a_mode_that_is_one_of_several_bends_all_leaves() -> None:
+    path = trace(*leaves(3, 15), Control(tolerance=1e-5, imperfection=1e-5))
+    assert path.status is PathStatus.COMPLETE
+    assert path.events == ()
+    found = moments(path, 4)
+    assert found == pytest.approx(np.full(3, found.mean()), rel=0.05)
+    assert found.mean() == pytest.approx(moments(alone(), 4)[0], rel=0.05)
+
+
+@pytest.mark.parametrize("axial", [True, False])
+def test_the_curvature_of_the_energy_counts_unstable_directions_and_leads_down(axial: bool) -> None:
+    """Beyond their critical load two columns are a saddle; beams that do not stretch have rigid directions."""
+    section = Section(2e9, 1e-2, 1e-3, axial=axial)
+    nodes = {name: Node(x, 0, CLAMPED) for name, x in (("a", 0.0), ("b", 0.02))}
+    nodes |= {name: Node(x, 0.1, SHUTTLE) for name, x in (("s", 0.0), ("t", 0.02))}
+    net = Network(nodes, {"x": Beam("a", "s", section), "y": Beam("b", "t", section)})
+    critical = 4 * np.pi**2 * 2e9 * (1e-2 * 1e-9 / 12) / 0.1**2
+    drive = Loading(tuple(PointLoad(name, fy=-critical) for name in "st"), np.array([0.9, 1.02]))
+    layout = Layout(net, drive)
+    solver = ExpandedSolver(layout, Mesh(8, 4), 1e-11)
+    spots = [solver.solve(solver.unstressed(), load / layout.scales.drive) for load in (0.9, 1.02)]
+    for spot, unstable in zip(spots, (0, 2), strict=True):
+        assert spot is not None
+        assert spot.unstable == unstable
+        curvature = Curvature(solver, spot.y, spot.drive)
+        assert (curvature.values < 0).sum() == unstable
+        found = eigenvalues(solver, spot.y, spot.drive)
+        assert found[:4] == pytest.approx(curvature.values[:4], rel=1e-6)
+        matrix, _ = solver.tangent_at(spot.y, spot.drive)
+        forces = matrix @ curvature.modes[:, :4]
+        free = solver.n_free
+        np.testing.assert_allclose(forces[free:], 0.0, atol=1e-6 * np.abs(matrix).max())
+        np.testing.assert_allclose(
+            forces[:free], -curvature.modes[:free, :4] * curvature.values[:4], atol=1e-6 * np.abs(matrix).max()
+        )
+    assert spots[1] is not None
+    ends = [descend(solver, spots[1], sign) for sign in (1, -1)]
+    turns = []
+    for end in ends:
+        assert end is not None
+        assert end.unstable == 0
+        turns.append(end.y[solver.plain_free : solver.n_free].reshape(-1, 3)[:, 2])
+        assert solver.pose_change(end.y, spots[1].y) > 0.05
+    np.testing.assert_allclose(turns[0], -turns[1], atol=1e-8)

@@ -1,0 +1,208 @@
+"""The splitting that beams are integrated by: of order six, symmetric, symplectic, on meshes as coarse as one step.
+
+References
+----------
+[TG] S. P. Timoshenko, J. M. Gere, Theory of Elastic Stability, 2nd ed., 1961.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq, root
+from scipy.special import ellipe, ellipk
+
+from cfmkit.elastica import (
+    CLAMPED,
+    PINNED,
+    Beam,
+    Control,
+    Displacement,
+    LineLoad,
+    Network,
+    Node,
+    PathStatus,
+    Polynomial,
+    Section,
+    Support,
+    Taper,
+    guided,
+    trace,
+)
+from cfmkit.elastica.equilibrium.expanded import ExpandedSolver
+from cfmkit.elastica.equilibrium.mesh import Mesh
+from cfmkit.elastica.equilibrium.solver import Solver
+from cfmkit.elastica.kernels import entry
+from cfmkit.elastica.kernels.splitting import DRIFTS, KICKS, NODES
+from cfmkit.elastica.model.layout import Layout
+
+RNG = np.random.default_rng(0)
+
+
+def random_solver(steps: int, load: bool, segments: int = 1) -> Solver:
+    """A curved, tapered beam that stretches and shears, its far end free to be anywhere."""
+    taper = Taper(np.array([0.0, 1.0]), np.array([1.2e-3, 0.8e-3]))
+    section = Section(2e9, 8e-3, taper, shear=True)
+    nodes = {"a": Node(0, 0, CLAMPED), "d": Node(0.08, 0.05)}
+    loads = (LineLoad("x", 3.0, -9.0),) if load else ()
+    network = Network(nodes, {"x": Beam("a", "d", section, Polynomial((0.2, 1.1, -0.8)))}, loads=loads)
+    return Solver(Layout(network, Displacement("d", 0.0, [1e-3])), Mesh(segments, steps))
+
+
+def end_state(solver: Solver, start: Any) -> Any:
+    """Return x, y, rotation, moment and force at the end of the first segment for those at its start."""
+    start = np.asarray(start)
+    y = np.zeros((1, solver.size), dtype=start.dtype)
+    y[0, solver.n : solver.n + 6] = start[[0, 1, 2, 4, 5, 3]]
+    out = np.empty((1, len(solver.cut.edges) + solver.n_segments, 7), dtype=start.dtype)
+    entry.states(solver.model, solver.n_free, y, np.zeros(1, dtype=start.dtype), out)
+    return out[0, solver.model.segment_step[1], :6]
+
+
+def test_drifts_and_kicks_are_symmetric_and_sum_to_the_step() -> None:
+    np.testing.assert_array_equal(DRIFTS, DRIFTS[::-1])
+    np.testing.assert_array_equal(KICKS[:-1], KICKS[-2::-1])
+    assert DRIFTS.sum() == pytest.approx(1.0, abs=1e-15)
+    assert KICKS.sum() == pytest.approx(1.0, abs=1e-15)
+    assert NODES[-1] == 1.0
+
+
+@pytest.mark.parametrize("power", range(6))
+def test_kicks_integrate_polynomials_up_to_the_order_of_the_method(power: int) -> None:
+    assert KICKS @ NODES**power == pytest.approx(1 / (power + 1), abs=1e-13)
+
+
+@pytest.mark.parametrize("load", [False, True])
+def test_errors_fall_with_the_sixth_power_of_the_step(load: bool) -> None:
+    start = np.array([0.0, 0.0, 0.3, 1.7, -2.0, -3.0])
+    ends = {steps: end_state(random_solver(steps, load), start) for steps in (4, 8, 64)}
+    coarse, fine = (float(np.abs(ends[steps] - ends[64]).max()) for steps in (4, 8))
+    assert fine < 1e-6
+    assert 5.0 < math.log2(coarse / fine) < 8.5
+
+
+@pytest.mark.parametrize("steps", [1, 3])
+@pytest.mark.parametrize("load", [False, True])
+@pytest.mark.parametrize("seed", range(3))
+def test_a_segment_is_a_canonical_map_to_rounding(steps: int, load: bool, seed: int) -> None:
+    """J' S J = S for the derivatives J of the end by the start: a stiffness is then symmetric; signs as (q, -p)."""
+    solver = random_solver(steps, load)
+    start = np.random.default_rng(seed).standard_normal(6)
+    h = 1e-30
+    jacobian = np.array([end_state(solver, start + 1j * h * np.eye(6)[k]).imag / h for k in range(6)]).T
+    # coordinates x, y, rotation; momenta h, v and the moment, in the order of the states: x, y, rotation, M, h, v
+    form = np.zeros((6, 6))
+    form[0, 4] = form[1, 5] = form[2, 3] = 1.0
+    form -= form.T
+    np.testing.assert_allclose(jacobian.T @ form @ jacobian, form, atol=1e-12 * np.abs(jacobian).max() ** 2)
+
+
+@pytest.mark.parametrize("mesh", [Mesh(1, 1), Mesh(2, 1), Mesh(3, 2)])
+def test_the_tangent_of_a_network_is_symmetric_on_any_mesh(mesh: Mesh) -> None:
+    section = Section(2e9, 8e-3, Taper(np.array([0.0, 1.0]), np.array([1.2e-3, 0.8e-3])), shear=True)
+    nodes = {"a": Node(0, 0, CLAMPED), "b": Node(0.05, 0.03), "c": Node(0.1, 0.0, PINNED)}
+    beams = {
+        "ab": Beam("a", "b", section, Polynomial((0.0, 0.8, -0.5))),
+        "bc": Beam("b", "c", section, Polynomial((0.0, -1.0))),
+    }
+    network = Network(nodes, beams, loads=(LineLoad("ab", 1.0, -2.0),))
+    solver = Solver(Layout(network, Displacement("b", 1.0, [1e-3])), mesh)
+    equilibrium = solver.solve(solver.unstressed(), 0.002)
+    assert equilibrium is not None
+    matrix, _ = solver.tangent_at(equilibrium.y, 0.002)
+    np.testing.assert_allclose(matrix, matrix.T, atol=1e-10 * np.abs(matrix).max())
+
+
+@pytest.mark.parametrize("mesh", [Mesh(1, 1), Mesh(2, 1)])
+def test_mirror_images_of_a_symmetric_network_stay_mirror_images(mesh: Mesh) -> None:
+    """A V-beam under its thrust keeps straight down to rounding, on one step a leg."""
+    section = Section(2e9, 8e-3, 1e-3)
+    nodes = {"a": Node(-0.05, 0, CLAMPED), "b": Node(0.0, 0.01), "c": Node(0.05, 0.0, CLAMPED)}
+    beams = {"ab": Beam("a", "b", section), "bc": Beam("b", "c", section)}
+    layout = Layout(Network(nodes, beams), Displacement("b", -np.pi / 2, [5e-3]))
+    solver = ExpandedSolver(layout, mesh)
+    spot = solver.solve(solver.unstressed(), 0.01)
+    assert spot is not None
+    assert abs(spot.y[solver.n_free - 1]) < 1.0
+    free = [spot.y[int(s)] for s in solver.model.slot[3:6] if s >= 0]
+    assert min(map(abs, free)) < 1e-13  # sideways motion and rotation of the apex
+
+
+def strip(slenderness: float, ends: str) -> tuple[Network, float]:
+    """A straight strip of 100 mm, and its bending rigidity; pinned, or clamped and guided."""
+    thickness = 0.1 * math.sqrt(12) / slenderness
+    start, end = (PINNED, Support(False, True, False)) if ends == "pinned" else (CLAMPED, guided(0.0))
+    section = Section(2e9, 10e-3, thickness)
+    nodes = {"a": Node(0, 0, start), "b": Node(0.1, 0, end)}
+    return Network(nodes, {"strip": Beam("a", "b", section)}), 2e9 * 10e-3 * thickness**3 / 12
+
+
+@pytest.mark.parametrize("slenderness", [100, 1000, 3000, 10000])
+@pytest.mark.parametrize("ends", ["pinned", "clamped"])
+def test_a_strip_in_pure_tension_is_stable(slenderness: float, ends: str) -> None:
+    network, _ = strip(slenderness, ends)
+    path = trace(network, Displacement("b", 0.0, np.linspace(0, 1e-3, 11)), Control(tolerance=1e-6))
+    assert path.status is PathStatus.COMPLETE
+    assert not path.unstable.any()
+    thickness = 0.1 * math.sqrt(12) / slenderness
+    assert path.effort[-1] == pytest.approx(2e9 * 10e-3 * thickness * 0.01, rel=1e-9)
+
+
+def elastica(shortening: float) -> tuple[float, float]:
+    """Return a pinned inextensible column's force over its critical one, and its end's angle [TG, sec. 2.7]."""
+    m = brentq(lambda m: 2 * ellipe(m) / ellipk(m) - 1 - (1 - shortening), 1e-12, 0.99)
+    return float((2 * ellipk(m) / np.pi) ** 2), 2 * math.asin(math.sqrt(m))
+
+
+def shot(slenderness: float, share: float, ends: str, shortening: float) -> float:
+    """Return the force [N] of a strip that is bent in its first mode, by shooting: solve_ivp knows nothing of the mesh.
+
+    share: of the thickness; shortening: of the distance between the ends, over its length.
+    """
+    _, rigidity = strip(slenderness, ends)
+    thickness, waves = 0.1 * math.sqrt(12) / slenderness, 1 if ends == "pinned" else 2
+    size = share * thickness if ends == "pinned" else 0.5 * share * thickness  # of the wave: 1 - cos is 2 at its top
+    s = np.linspace(0, 1, 4001)
+    sloped = size * waves * np.pi / 0.1 * (np.cos(np.pi * s) if waves == 1 else np.sin(2 * np.pi * s))
+    length = 0.1 / np.trapezoid(np.cos(sloped), s)
+    stretch = 1 / (2e9 * 10e-3 * thickness)
+
+    def slopes(place: float, state: Any, push: float) -> list[float]:
+        angle = size * waves * np.pi / 0.1 * (math.cos(np.pi * place) if waves == 1 else math.sin(2 * np.pi * place))
+        c, sine = math.cos(angle + state[0]), math.sin(angle + state[0])
+        longer = 1 - push * c * stretch
+        return [length * state[1] / rigidity, -push * length * longer * sine, length * longer * c]
+
+    def missed(unknown: Any) -> list[float]:
+        push = unknown[1] * rigidity / 0.01
+        start = [unknown[0], 0.0, 0.0] if waves == 1 else [0.0, unknown[0] * rigidity / 0.1, 0.0]
+        end = solve_ivp(slopes, (0, 1), start, method="DOP853", rtol=1e-10, atol=1e-13, args=(push,)).y[:, -1]
+        return [end[1] * 0.1 / rigidity if waves == 1 else end[0], end[2] / 0.1 - (1 - shortening)]
+
+    ratio, angle = elastica(shortening)
+    push = ratio * (waves * np.pi) ** 2
+    curve = 2 * math.sin(0.5 * angle) * math.sqrt(push)  # the largest curvature: M^2 = 2 P B (1 - cos angle)
+    found = root(missed, [angle if waves == 1 else curve, push], tol=1e-10)
+    assert found.success
+    return float(found.x[1] * rigidity / 0.01)
+
+
+@pytest.mark.parametrize("slenderness", [100, 300, 1000, 3000, 5000])
+@pytest.mark.parametrize("share", [0.001, 0.03, 0.3])
+@pytest.mark.parametrize("ends", ["pinned", "clamped"])
+def test_a_slender_column_keeps_to_its_first_mode(slenderness: float, share: float, ends: str) -> None:
+    """Slightly bent in its first mode and pressed to 60 % of its length: nothing happens on the way."""
+    network, _ = strip(slenderness, ends)
+    thickness = 0.1 * math.sqrt(12) / slenderness
+    pressed = Displacement("b", np.pi, np.linspace(0, 0.06, 41))
+    path = trace(network, pressed, Control(imperfection=share * thickness))
+    assert path.status is PathStatus.COMPLETE, path.message
+    assert not path.unstable.any()
+    assert path.events == ()
+    for point in (4, 16, 40):
+        expected = shot(slenderness, share, ends, pressed.points[point] / 0.1)
+        assert path.effort[path.at_asked[point]] == pytest.approx(expected, rel=5e-4)

@@ -1,0 +1,156 @@
+"""Drives whose points turn round, and paths through limit points: the same events and forces however they are asked."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from cfmkit.elastica import (
+    CLAMPED,
+    PINNED,
+    Beam,
+    Control,
+    CosineArch,
+    Displacement,
+    Loading,
+    Network,
+    Node,
+    Path,
+    PathStatus,
+    PointLoad,
+    Section,
+    guided,
+    trace,
+)
+from cfmkit.elastica.continuation.limit_point import one_way
+
+DOWN = -np.pi / 2
+RISE = 35e-3 * np.sin(np.radians(8.0))
+SECTION = Section(2e9, 8e-3, 1e-3)
+TOLERANCES = (1e-3, 1e-5, 1e-7)
+
+
+def leaves(count: int) -> Network:
+    """Return equal inclined leaves on a guided shuttle: pressed down they buckle, and straighten out beyond."""
+    across = 35e-3 * np.cos(np.radians(8.0))
+    nodes, beams = {"d": Node(0, RISE, guided(np.pi / 2))}, {}
+    for k in range(count):
+        nodes[f"w{k}"] = Node(across * (-1) ** k, 0, CLAMPED)
+        beams[f"b{k}"] = Beam(f"w{k}", "d", Section(1477e6, 6e-3, 7e-4))
+    return Network(nodes, beams)
+
+
+def pressed(points: object, tolerance: float, count: int = 1, **control: object) -> Path:
+    """Return the path of leaves pressed down by shares of their rise; it must be complete."""
+    drive = Displacement("d", DOWN, np.asarray(points, dtype=float) * RISE)
+    path = trace(leaves(count), drive, Control(tolerance=tolerance, **control))  # type: ignore[arg-type]
+    assert path.status is PathStatus.COMPLETE, path.message
+    return path
+
+
+def toggle(shift: float) -> Network:
+    """Return two clamped bars, one longer by a shift."""
+    nodes = {"a": Node(0, 0, CLAMPED), "t": Node(0.1, 0.012), "b": Node(0.2 + shift, 0, CLAMPED)}
+    return Network(nodes, {"x": Beam("a", "t", SECTION), "y": Beam("t", "b", SECTION)})
+
+
+def arch() -> Network:
+    nodes = {"a": Node(0, 0, PINNED), "t": Node(0.1, 0.02), "b": Node(0.2, 0, PINNED)}
+    beams = {"x": Beam("a", "t", SECTION, CosineArch(0.02, 0.5)), "y": Beam("t", "b", SECTION, CosineArch(-0.02, 0.5))}
+    return Network(nodes, beams)
+
+
+def loaded(network: Network, points: object, tolerance: float, **control: object) -> Path:
+    load = Loading((PointLoad("t", fy=-1.0),), np.asarray(points, dtype=float))
+    path = trace(network, load, Control(tolerance=tolerance, through_folds=True, **control))  # type: ignore[arg-type]
+    assert path.status is PathStatus.COMPLETE, path.message
+    return path
+
+
+def told(path: Path) -> list[tuple[str, int, int]]:
+    return [(event.kind, event.before, event.after) for event in path.events]
+
+
+def places(path: Path) -> list[float]:
+    return [event.drive for event in path.events]
+
+
+@pytest.mark.parametrize(
+    ("points", "ends"),
+    [([1, 2, 3], [3]), ([0, 1, 0, 1], [2, 3, 4]), ([-1], [1]), ([1, -1, -2, 0], [1, 3, 4]), ([0, -1, 1], [2, 3])],
+)
+def test_a_drive_is_taken_in_stretches_that_go_one_way(points: list[float], ends: list[int]) -> None:
+    found = [one_way(points, asked) for asked in range(len(points))]
+    starts = [0, *ends[:-1]]
+    assert found == [
+        next((start, end) for start, end in zip(starts, ends, strict=True) if asked < end)
+        for asked in range(len(points))
+    ]
+
+
+@pytest.mark.parametrize(("count", "tolerance"), [(1, 1e-5), (1, 1e-7), (2, 1e-7)])
+def test_down_and_up_again_passes_the_same_bifurcations(count: int, tolerance: float) -> None:
+    down = np.linspace(0.05, 2.1, 15)
+    path = pressed(np.concatenate([down, down[::-1][1:], [0]]), tolerance, count)
+    names = [("bifurcation", 0, count), ("bifurcation", count, 0)]
+    assert told(path) == names * 2
+    first, second, again, last = places(path)
+    alone = pressed(down, 1e-9)
+    np.testing.assert_allclose([first, last, second, again], np.repeat(places(alone), 2), atol=tolerance * 2.1 * RISE)
+    forces = path.effort[path.at_asked]
+    np.testing.assert_allclose(forces[:14], forces[15:29][::-1], rtol=0, atol=2 * tolerance * np.abs(forces).max())
+    assert path.stable.all()
+
+
+@pytest.mark.parametrize("tolerance", TOLERANCES)
+@pytest.mark.parametrize("sign", [1, -1])
+def test_on_a_branch_the_drive_may_turn_round_as_often_as_it_likes(tolerance: float, sign: int) -> None:
+    path = pressed([1, 0.05, 1, 1.5, 0.5, 2, 1, 0], tolerance, sign=sign)
+    opened, closed = ("bifurcation", 0, 1), ("bifurcation", 1, 0)
+    assert told(path) == [opened, closed] * 4
+    first, last = places(pressed([2.1], 1e-9))
+    np.testing.assert_allclose(places(path), [first] * 3 + [last] * 4 + [first], atol=2 * tolerance * RISE)
+    at = path.branch[path.at_asked]
+    assert [name == "primary" for name in at] == [False, True] * 4
+    assert all(name.endswith(f"sign {sign:+d}") for name in at if name != "primary")
+
+
+def test_a_path_that_ends_in_a_stretch_does_not_begin_the_next() -> None:
+    path = trace(arch(), Loading((PointLoad("t", fy=-1.0),), np.array([0.3, 2.0, 0.3])))
+    assert path.status is PathStatus.JUMPS
+    assert path.asked[path.at_asked].tolist() == [0]
+
+
+@pytest.mark.parametrize("tolerance", TOLERANCES)
+@pytest.mark.parametrize("points", [5, 51])
+def test_without_limit_points_through_folds_changes_nothing(points: int, tolerance: float) -> None:
+    asked = np.linspace(0, 2.05, points)
+    plain, arc = pressed(asked, tolerance), pressed(asked, tolerance, through_folds=True)
+    assert arc.events == plain.events
+    np.testing.assert_array_equal(arc.effort, plain.effort)
+    assert arc.branch.tolist() == plain.branch.tolist()
+
+
+@pytest.mark.parametrize("tolerance", TOLERANCES)
+def test_a_toggle_snaps_and_snaps_back_at_the_limit_points_of_its_force(tolerance: float) -> None:
+    """Bars of different length: driven by its travel the toggle has no bifurcation, only a force that falls."""
+    travel = Displacement("t", DOWN, np.linspace(0, 0.02, 801)[1:])
+    force = trace(toggle(1e-3), travel, Control(tolerance=1e-7)).effort
+    first = int((np.diff(force) < 0).argmax())
+    top, low = force[first], force[first:].min()
+    path = loaded(toggle(1e-3), [0.4, 0.8, 1.5, 0.8, 0.4, 0], tolerance)
+    assert told(path) == [("limit point", a, b) for a, b in ((0, 1), (1, 0), (0, 1), (1, 0))]
+    np.testing.assert_allclose(places(path), [top, low, low, top], atol=3e-5)  # of travel in steps
+    assert path.asked[path.at_asked].tolist() == [0, 0, 0, 1, 2, 3, 4, 4, 4, 5]
+    np.testing.assert_allclose(path.motion("t")[-1], 0, atol=1e-8)
+
+
+@pytest.mark.parametrize("branch", ["stable", "primary"])
+@pytest.mark.parametrize("points", [4, 30])
+def test_the_bifurcations_between_limit_points_are_the_same_at_every_tolerance(branch: str, points: int) -> None:
+    asked = np.linspace(0, 2, points + 1)[1:]
+    paths = [loaded(arch(), asked, tolerance, branch=branch) for tolerance in (*TOLERANCES, 1e-9)]
+    kinds = [("bifurcation", 0, 1), ("limit point", 1, 2), ("bifurcation", 2, 1), ("limit point", 1, 0)]
+    for path, tolerance in zip(paths, TOLERANCES, strict=False):
+        assert told(path) == kinds
+        np.testing.assert_allclose(places(path), places(paths[-1]), atol=2 * tolerance)
