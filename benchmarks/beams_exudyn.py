@@ -16,7 +16,7 @@ from beams_engine import best, cantilever
 from cfmkit.elastica import Control, Loading, PointLoad, trace
 
 if TYPE_CHECKING:
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
 
 LENGTH, RIGIDITY, STRETCH = 0.4, 0.02, 2.4e5  # [m], [N m2], [N]: the real one, softer joints of forces converge better
 STEPS, LARGEST = 10, 10.0  # steps, P L^2 / EI

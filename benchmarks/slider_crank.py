@@ -20,11 +20,11 @@ from scipy.optimize import minimize
 from timing import best
 
 import cfmkit
-from cfmkit.bodies.slider_crank import Linkage
-from cfmkit.bodies.slider_crank_springs import along_crank, crank_torques
 from cfmkit.families.base import Block, Measure
 from cfmkit.families.slider_crank.block import analyze_block
+from cfmkit.families.slider_crank.linkage import Linkage
 from cfmkit.families.slider_crank.rates import Goal, minimax
+from cfmkit.families.slider_crank.unit_springs import along_crank, crank_torques
 
 CONFIGS = Path(__file__).resolve().parent.parent / "configs"
 MILLION, DESIGNS = 1_000_000, 65_536
@@ -48,7 +48,7 @@ def eq_10(angle: np.ndarray, rates: np.ndarray) -> np.ndarray:
 def slsqp(seed: int) -> float:
     """Return the error of [B, eq. 8] that scipy's SLSQP ends with, from one random start."""
     travel = 0.35 * np.arange(1, 101)
-    from cfmkit.bodies.slider_crank_springs import along_slider
+    from cfmkit.families.slider_crank.unit_springs import along_slider
 
     def error(values: np.ndarray) -> float:
         r1, lead, *rates = values

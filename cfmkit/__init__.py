@@ -33,7 +33,6 @@ if TYPE_CHECKING:
         sensitivity,
         sweep,
     )
-    from cfmkit.batches import BatchResult, batch
     from cfmkit.curves import Curve
     from cfmkit.errors import (
         CfmError,
@@ -52,9 +51,10 @@ if TYPE_CHECKING:
     from cfmkit.experiment.reading import Recording
     from cfmkit.experiment.report import MeasureReport
     from cfmkit.families.base import Run
-    from cfmkit.recordings import calibrate, measure
     from cfmkit.results import Design, Finding, Quantity, Result, Status
-    from cfmkit.spec import Spec
+    from cfmkit.runs.batch import BatchResult, batch
+    from cfmkit.runs.recordings import calibrate, measure
+    from cfmkit.specs.spec import Spec
     from cfmkit.studies.outcome import StudyResult
 
 _HOMES = {
@@ -71,7 +71,7 @@ _HOMES = {
         "sensitivity",
         "sweep",
     ),
-    "cfmkit.batches": ("BatchResult", "batch"),
+    "cfmkit.runs.batch": ("BatchResult", "batch"),
     "cfmkit.curves": ("Curve",),
     "cfmkit.errors": (
         "CfmError",
@@ -90,9 +90,9 @@ _HOMES = {
     "cfmkit.experiment.reading": ("Recording",),
     "cfmkit.experiment.report": ("MeasureReport",),
     "cfmkit.families.base": ("Run",),
-    "cfmkit.recordings": ("calibrate", "measure"),
+    "cfmkit.runs.recordings": ("calibrate", "measure"),
     "cfmkit.results": ("Design", "Finding", "Quantity", "Result", "Status"),
-    "cfmkit.spec": ("Spec",),
+    "cfmkit.specs.spec": ("Spec",),
     "cfmkit.studies.outcome": ("StudyResult",),
 }
 _HOME = {name: module for module, names in _HOMES.items() for name in names}

@@ -19,10 +19,10 @@ if TYPE_CHECKING:
 
     from matplotlib.figure import Figure
 
-    from cfmkit.geometry import Drawing
+    from cfmkit.export.geometry import Drawing
     from cfmkit.metrics import Outcome, Window
     from cfmkit.results import Design, Quantity, Result
-    from cfmkit.spec import Spec
+    from cfmkit.specs.spec import Spec
     from cfmkit.studies.outcome import StudyResult
 
     AnySpec: TypeAlias = Spec | str | os.PathLike[str]
@@ -46,7 +46,7 @@ def load(path: str | os.PathLike[str], changes: Iterable[str] = ()) -> Spec:
     cfmkit.errors.SpecError
         With every problem in it.
     """
-    from cfmkit.specfile import bind, read_spec
+    from cfmkit.runs.specfile import bind, read_spec
 
     return bind(read_spec(os.fspath(path), changes))
 
@@ -66,8 +66,8 @@ def loads(text: str | bytes, source: str = "text") -> Spec:
     cfmkit.errors.SpecError
         With every problem in it.
     """
-    from cfmkit.specfile import bind
-    from cfmkit.yamlio import read_document
+    from cfmkit.runs.specfile import bind
+    from cfmkit.specs.yamlio import read_document
 
     return bind(read_document(text, source))
 
@@ -82,7 +82,7 @@ def dumps(spec: Spec, complete: bool = False) -> str:
     complete : bool
         Write every default too.
     """
-    from cfmkit.yamlio import dump
+    from cfmkit.specs.yamlio import dump
 
     return dump(spec, complete)
 
@@ -97,7 +97,7 @@ def spec_of(spec: AnySpec) -> Spec:
     cfmkit.errors.SpecError
         With every problem in the file.
     """
-    from cfmkit.spec import Spec
+    from cfmkit.specs.spec import Spec
 
     if isinstance(spec, Spec):
         return spec
@@ -311,7 +311,7 @@ def export(
 def _length(length: str | float | None, option: str) -> float | None:
     """Return a length above zero [m]; None for None."""
     from cfmkit.errors import QuantityError
-    from cfmkit.units import read_quantity
+    from cfmkit.specs.units import read_quantity
 
     if length is None:
         return None

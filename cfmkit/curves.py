@@ -11,27 +11,22 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
+
+from cfmkit.arrays import FloatArray, read_only
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
-FloatArray = NDArray[np.float64]
+    from numpy.typing import NDArray
+
 Kind = Literal["force", "torque"]
-
-
-def read_only(values: Any, dtype: Any = np.float64) -> NDArray[Any]:
-    """Return `values` as an array that cannot be written to (copied if it could be)."""
-    array = np.array(values, dtype=dtype)
-    array.setflags(write=False)
-    return array
 
 
 @dataclass(frozen=True)
 class Column:
     """One more column of a curve: values in SI and the dimension that names their unit.
 
-    `dimension` is a name of `cfmkit.units` ("force", "length", "ratio", ...), or
+    `dimension` is a name of `cfmkit.specs.units` ("force", "length", "ratio", ...), or
     "text" for labels.
     """
 

@@ -16,8 +16,9 @@ from cfmkit.errors import ExitCode
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-    from cfmkit.curves import Curve, FloatArray
-    from cfmkit.spec import Spec
+    from cfmkit.arrays import FloatArray
+    from cfmkit.curves import Curve
+    from cfmkit.specs.spec import Spec
     from cfmkit.tables import Table
 
 

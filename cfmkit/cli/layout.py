@@ -13,7 +13,7 @@ from rich.text import Text
 from cfmkit.cli.rows import rows, searched
 from cfmkit.cli.terminal import BAD, FAINT, GOOD, LABEL
 from cfmkit.errors import ExitCode, visible
-from cfmkit.specfile import STDIN
+from cfmkit.runs.specfile import STDIN
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from cfmkit.cli.rows import Row
     from cfmkit.cli.runs import Outcome
     from cfmkit.cli.terminal import Terminal
-    from cfmkit.spec import Spec
+    from cfmkit.specs.spec import Spec
 
 MARGIN = 9
 """Columns of the words that begin a paragraph: ``warning``, ``written``."""

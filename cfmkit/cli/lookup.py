@@ -59,8 +59,8 @@ def _keys(kind: str, name: str) -> list[str]:
 
 def _measured_in(unit: str) -> list[str]:
     """Return the dimensions that a unit such as ``N/mm`` measures; none if it is no unit."""
-    from cfmkit.units import DIMENSIONS
-    from cfmkit.units.registry import border_size, is_unit, unit_size
+    from cfmkit.specs.units import DIMENSIONS
+    from cfmkit.specs.units.registry import border_size, is_unit, unit_size
 
     if not is_unit(unit):
         return []
@@ -76,14 +76,14 @@ def _gathered(pairs: Iterator[tuple[str, dict[str, Any]]]) -> Records:
 
 
 def _materials() -> Records:
-    from cfmkit.materials import MATERIALS
+    from cfmkit.stock import MATERIALS
 
     return _gathered((name, asdict(one)) for one in MATERIALS.values() for name in (one.name, *one.aliases))
 
 
 def _metrics() -> Records:
     from cfmkit.metrics import definitions
-    from cfmkit.units import border_unit
+    from cfmkit.specs.units import border_unit
 
     return _gathered(
         (one.name, {"name": one.name, "unit": border_unit(one.dimension), "definition": one.definition})
@@ -92,7 +92,7 @@ def _metrics() -> Records:
 
 
 def _values() -> Records:
-    from cfmkit.units import border_unit
+    from cfmkit.specs.units import border_unit
 
     return _gathered(
         (key, {"name": key, "family": record.name, "unit": border_unit(dimension), "definition": definition})
@@ -110,7 +110,7 @@ def _findings() -> Records:
 
 
 def _units() -> Records:
-    from cfmkit.units import unit_table
+    from cfmkit.specs.units import unit_table
 
     keys = ("symbol", "name", "dimension", "si", "input_only")
     each = [dict(zip(keys, entry, strict=True)) for entry in unit_table()]
@@ -118,7 +118,7 @@ def _units() -> Records:
 
 
 def _dimensions() -> Records:
-    from cfmkit.units import DIMENSIONS
+    from cfmkit.specs.units import DIMENSIONS
 
     return _gathered(
         (one.name, {"name": one.name, "unit": one.unit, "meaning": one.description, "example": one.example})

@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING
 from cfmkit import api
 from cfmkit.families import family
 from cfmkit.metrics import Window, known_metrics, left_of, split_name, window_of
-from cfmkit.units import border_unit, format_short, to_border
+from cfmkit.specs.units import border_unit, format_short, to_border
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from cfmkit.metrics import Outcome
-    from cfmkit.report import Report
     from cfmkit.results import Quantity, Searched
-    from cfmkit.spec import Requirement, Spec
+    from cfmkit.runs.report import Report
+    from cfmkit.specs.spec import Requirement, Spec
 
 HEADLINE = (
     "force_mean",

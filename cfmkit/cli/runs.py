@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 
 from cfmkit.cli.answer import Answer
 from cfmkit.errors import UsageError
-from cfmkit.runs import Outcome, Request, Verb, carry_out, spec_of
-from cfmkit.specfile import STDIN
+from cfmkit.runs.run import Outcome, Request, Verb, carry_out, spec_of
+from cfmkit.runs.specfile import STDIN
 
 if TYPE_CHECKING:
     from cfmkit.cli.options import Computing, OneSpec
     from cfmkit.cli.terminal import Terminal
-    from cfmkit.report import Report
+    from cfmkit.runs.report import Report
 
 
 def execute(verb: Verb, options: Computing, terminal: Terminal) -> Answer:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from cfmkit.cli.progress import StudyProgress
     from cfmkit.cli.terminal import Terminal
-    from cfmkit.spec import Spec
+    from cfmkit.specs.spec import Spec
     from cfmkit.store import Manifest, RunFolder
     from cfmkit.studies.engine import Records, Work
     from cfmkit.studies.executors import Executor
@@ -88,7 +88,7 @@ class Made:
 
 def commit(place: Desk, made: Made, terminal: Terminal, code: ExitCode) -> Manifest:
     """Put the files in place with a manifest that says what was run."""
-    from cfmkit.runs import family_package
+    from cfmkit.runs.run import family_package
     from cfmkit.store import stable_hash
 
     about = {

@@ -14,7 +14,7 @@ from cfmkit.tables import Table, TableColumn, border_values, read_csv
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.studies.engine import Records
     from cfmkit.studies.plan import Plan, Variable
     from cfmkit.studies.study import Metric

@@ -32,7 +32,7 @@ def page(name: str | None) -> Page:
         return family_page(name)
     if (found := lookup.found(name)) is not None:
         return found
-    from cfmkit.yamlio import did_you_mean
+    from cfmkit.specs.yamlio import did_you_mean
 
     known = [*TOPICS, *families.names()]
     every = f"there are {', '.join(known)}, and materials, metrics, values, warnings, units and papers by their names"
@@ -57,7 +57,7 @@ def overview() -> Page:
 
 def units_page() -> Page:
     """Return the closed list of units, and the dimensions with the unit that files are written in."""
-    from cfmkit.units import DIMENSIONS, unit_table
+    from cfmkit.specs.units import DIMENSIONS, unit_table
 
     names = ("symbol", "name", "dimension", "si", "input_only")
     units = [dict(zip(names, entry, strict=True)) for entry in unit_table()]
@@ -87,7 +87,7 @@ def units_page() -> Page:
 def metrics_page() -> Page:
     """Return the metrics that every family has."""
     from cfmkit.metrics import definitions
-    from cfmkit.units import border_unit
+    from cfmkit.specs.units import border_unit
 
     records = [
         {
@@ -108,7 +108,7 @@ def metrics_page() -> Page:
 
 def materials_page() -> Page:
     """Return the material library."""
-    from cfmkit.materials import MATERIALS
+    from cfmkit.stock import MATERIALS
 
     records = [asdict(item) for item in MATERIALS.values()]
     columns = (
@@ -138,10 +138,11 @@ def references_page() -> Page:
 
 def family_page(name: str) -> Page:
     """Return what a spec of a family may say, what a run can report, and where it comes from."""
-    from cfmkit.keys import keys
-    from cfmkit.units import border_unit
+    from cfmkit.specs.keys import keys
+    from cfmkit.specs.units import border_unit
 
-    record, known = families.family(name), [asdict(key) for key in keys(name)]
+    record = families.family(name)
+    known = [asdict(key) for key in keys(record.spec_type)]
     values = [
         {"name": key, "unit": border_unit(dimension), "definition": definition, "per_branch": False}
         for key, (dimension, definition) in record.values.items()

@@ -20,16 +20,16 @@ from cfmkit.families.base import Run
 from cfmkit.metrics import Window
 from cfmkit.numerics.fit import Fit, LeastSquares, Loss, NotFinite, lack_of_fit, solve, unidentifiable
 from cfmkit.results import Finding
-from cfmkit.units import format_short
+from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.experiment.measured import Measured
     from cfmkit.experiment.parameters import Parameter
     from cfmkit.results import Result
-    from cfmkit.spec import Spec
+    from cfmkit.specs.spec import Spec
 
 POOR = 0.3
 """Parameters known to less than this part of their size are reported as badly known."""
@@ -254,7 +254,7 @@ def _misfit(parameters: Sequence[Parameter], fit: Fit, after: Comparison) -> lis
 
 def table(calibration: Calibration) -> list[dict[str, Any]]:
     """Return one record a parameter in border units: value, 95 % interval, standard deviation, start."""
-    from cfmkit.units import border_unit, to_border
+    from cfmkit.specs.units import border_unit, to_border
 
     half, spread = calibration.fit.half_widths(), calibration.fit.deviations
     records = []

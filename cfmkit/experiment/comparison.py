@@ -20,7 +20,8 @@ from cfmkit.metrics.subjects import span_text
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from cfmkit.curves import Curve, FloatArray
+    from cfmkit.arrays import FloatArray
+    from cfmkit.curves import Curve
     from cfmkit.experiment.measured import Measured
     from cfmkit.metrics.differences import Measure
     from cfmkit.results import Quantity, Result

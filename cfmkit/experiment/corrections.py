@@ -12,7 +12,7 @@ from cfmkit.errors import QuantityError, UsageError
 if TYPE_CHECKING:
     from collections.abc import Collection
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.experiment.reading import Recording
 
 START = "start"
@@ -74,7 +74,7 @@ def _resting(motion: FloatArray) -> int:
 
 
 def _shown(value: str | float | None, first: FloatArray, option: str, dimension: str) -> float:
-    from cfmkit.units import read_quantity
+    from cfmkit.specs.units import read_quantity
 
     if value is None:
         return 0.0
@@ -89,7 +89,7 @@ def _shown(value: str | float | None, first: FloatArray, option: str, dimension:
 
 
 def _notes(words: tuple[str, str], shown: list[float], kind: str) -> list[str]:
-    from cfmkit.units import format_short
+    from cfmkit.specs.units import format_short
 
     dimensions = (kind, "length" if kind == "force" else "angle")
     return [

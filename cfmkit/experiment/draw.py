@@ -13,7 +13,7 @@ from cfmkit.plots.curves import Look, plot_curve
 from cfmkit.plots.place import Label, place_labels
 from cfmkit.plots.style import GREY, LINES, axes_mm, new_figure, styled
 from cfmkit.plots.text import Heading, axis_label, write_heading
-from cfmkit.units import to_border
+from cfmkit.specs.units import to_border
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -22,7 +22,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-    from cfmkit.curves import Curve, FloatArray
+    from cfmkit.arrays import FloatArray
+    from cfmkit.curves import Curve
     from cfmkit.experiment.comparison import Comparison, Samples
     from cfmkit.experiment.report import MeasureReport
 
@@ -64,7 +65,7 @@ def loop(report: MeasureReport) -> Figure:
 
 
 def _from_border(value: float, dimension: str) -> float:
-    from cfmkit.units import from_border
+    from cfmkit.specs.units import from_border
 
     return float(from_border(value, dimension))
 

@@ -19,7 +19,7 @@ import numpy as np
 from cfmkit.errors import DataError, QuantityError, UsageError
 
 if TYPE_CHECKING:
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
 
 Per = Literal["time", "length", "angle"]
 
@@ -138,11 +138,11 @@ def read_filter(text: str) -> LowPass | None:
 
 
 def _read_cutoff(text: str) -> tuple[float, Per]:
-    from cfmkit.units import read_one_of
+    from cfmkit.specs.units import read_one_of
 
     match = re.fullmatch(r"\s*(\S+) +1/(deg|rad)\s*", text)
     if match:
-        from cfmkit.units import read_number
+        from cfmkit.specs.units import read_number
 
         return read_number(match[1]) * (180.0 / math.pi if match[2] == "deg" else 1.0), "angle"
     value, dimension = read_one_of(text, ("frequency", "curvature"))

@@ -11,7 +11,8 @@ from cfmkit.results import Quantity
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from cfmkit.curves import Curve, FloatArray
+    from cfmkit.arrays import FloatArray
+    from cfmkit.curves import Curve
     from cfmkit.metrics import Window
 
 PLACES = 513

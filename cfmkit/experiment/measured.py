@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.curves import Column, Curve, FloatArray
+from cfmkit.curves import Column, Curve
 from cfmkit.errors import DataError
 from cfmkit.experiment.branches import LOAD, UNLOAD, WHOLE, Stroke, Strokes, covered, split
 from cfmkit.experiment.corrections import corrected
@@ -30,7 +30,7 @@ from cfmkit.metrics import Frame, Window, measure
 from cfmkit.metrics.subjects import span_text
 from cfmkit.numerics.robust import spikes
 from cfmkit.results import Finding, Quantity
-from cfmkit.units import format_short
+from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
     import os
@@ -38,6 +38,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from cfmkit.arrays import FloatArray
     from cfmkit.experiment.reading import Recording
     from cfmkit.experiment.reversals import Settled
 

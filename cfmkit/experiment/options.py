@@ -19,7 +19,7 @@ def read_window(text: str | tuple[float, float] | None, kind: Kind) -> Window | 
     cfmkit.errors.UsageError
         If it is malformed.
     """
-    from cfmkit.units import read_quantity
+    from cfmkit.specs.units import read_quantity
 
     if text is None:
         return None
@@ -46,7 +46,7 @@ def read_target(text: str | float | None, kind: Kind) -> float | None:
     cfmkit.errors.UsageError
         If it is malformed.
     """
-    from cfmkit.units import read_quantity
+    from cfmkit.specs.units import read_quantity
 
     if text is None or not isinstance(text, str):
         return text

@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.errors import QuantityError, UsageError
+from cfmkit.specs.yamlio.shape import Slot
 from cfmkit.studies.leaves import CannotVary, leaf
-from cfmkit.yamlio.shape import Slot
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
     from cfmkit.experiment.reading import Recording
-    from cfmkit.spec import Spec
+    from cfmkit.specs.spec import Spec
 
 DATA = "data."
 """What begins so is no value of the specification, but of the recording."""
@@ -44,7 +44,7 @@ class Parameter:
     path : str
         Dotted.
     dimension : str
-        Of `cfmkit.units`.
+        Of `cfmkit.specs.units`.
     start, low, high : float
         SI.
     size : float
@@ -181,7 +181,7 @@ def _open(spec_type: type[Spec], path: str, name: str) -> float:
 
 def _size(value: float, limits: tuple[float, float], dimension: str) -> float:
     """Return how large a typical change is: the value itself; from zero a hundredth of the range, else one unit."""
-    from cfmkit.units import from_border
+    from cfmkit.specs.units import from_border
 
     if value:
         return abs(value)
@@ -190,7 +190,7 @@ def _size(value: float, limits: tuple[float, float], dimension: str) -> float:
 
 
 def _told(value: float, dimension: str) -> str:
-    from cfmkit.units import format_short
+    from cfmkit.specs.units import format_short
 
     return format_short(value, dimension, 6)
 
@@ -244,7 +244,7 @@ def split_bounds(options: Iterable[str]) -> dict[str, str]:
 
 def _bound(text: str, path: str, spec: Spec, recording: Recording | None) -> float:
     """Return a bound of a value of the specification or of the recording, SI."""
-    from cfmkit.units import read_quantity
+    from cfmkit.specs.units import read_quantity
 
     if path.startswith(DATA):
         return read_quantity(text, _zero(path, "--bounds", recording))
@@ -253,7 +253,7 @@ def _bound(text: str, path: str, spec: Spec, recording: Recording | None) -> flo
 
 def _number(text: str) -> float | str:
     """Return a bare number as one, anything else as it is."""
-    from cfmkit.units import read_number
+    from cfmkit.specs.units import read_number
 
     try:
         return read_number(text.strip())

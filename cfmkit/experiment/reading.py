@@ -14,17 +14,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.curves import FloatArray, Kind, read_only
+from cfmkit.arrays import FloatArray, read_only
 from cfmkit.errors import DataError, UsageError
 from cfmkit.experiment.roles import columns_of, roles_of
+from cfmkit.specs.units.numbers import shown
 from cfmkit.tables.labheaders import read_units
 from cfmkit.tables.labtext import SEPARATORS, Block, block_of, decoded, refuse_group
-from cfmkit.units.numbers import shown
 
 if TYPE_CHECKING:
     import os
     from collections.abc import Sequence
 
+    from cfmkit.curves import Kind
     from cfmkit.tables.labheaders import ColumnInfo
 
 LARGEST = 500_000_000
@@ -211,8 +212,8 @@ def _comma_reader(cell: str) -> float:
 
 
 def _in_si(values: FloatArray, column: ColumnInfo) -> FloatArray:
-    from cfmkit.units import from_border
-    from cfmkit.units.table import COMMON, border_unit
+    from cfmkit.specs.units import from_border
+    from cfmkit.specs.units.table import COMMON, border_unit
 
     dimension, unit = column.dimension or "", column.unit or ""
     if unit == border_unit(dimension):
@@ -220,7 +221,7 @@ def _in_si(values: FloatArray, column: ColumnInfo) -> FloatArray:
         return converted
     if (dimension, unit) in COMMON:
         return values * float(COMMON[dimension, unit])
-    from cfmkit.units.registry import unit_size
+    from cfmkit.specs.units.registry import unit_size
 
     return values * float(unit_size(unit).factor)
 

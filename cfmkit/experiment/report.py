@@ -61,7 +61,7 @@ class MeasureReport:
 
 
 def _ends(report: MeasureReport) -> dict[str, Any]:
-    from cfmkit.units import border_unit, to_border
+    from cfmkit.specs.units import border_unit, to_border
 
     dimension = report.source.raw[0].motion_dimension
     low, high = (float(to_border(end, dimension)) for end in (report.numbers.window.lo, report.numbers.window.hi))
@@ -121,7 +121,7 @@ def files(report: MeasureReport, plots: bool = True) -> Iterator[tuple[str, byte
     plots : bool
         Whether to draw.
     """
-    from cfmkit.jsontext import json_bytes
+    from cfmkit.tables.jsontext import json_bytes
 
     yield "curve.csv", to_csv(curves_table(report.source))
     yield "cycles.csv", to_csv(cycles_table(report))

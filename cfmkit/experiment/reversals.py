@@ -30,7 +30,7 @@ from cfmkit.numerics.fit import correlation_time
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.experiment.reading import Recording
 
 REACH = 0.2

@@ -10,8 +10,8 @@ import numpy as np
 from cfmkit.experiment.calibration import table
 from cfmkit.experiment.report import curves_table
 from cfmkit.metrics.subjects import span_text
+from cfmkit.specs.units import format_short
 from cfmkit.tables import Table, TableColumn, border_column, to_csv
-from cfmkit.units import format_short
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 def comparison_data(comparison: Comparison, source: Measured) -> dict[str, Any]:
     """Return what metrics.json says about the data besides the errors, which are metrics."""
-    from cfmkit.units import border_unit, to_border
+    from cfmkit.specs.units import border_unit, to_border
 
     dimension, window = comparison.curve.motion_dimension, comparison.window
     low, high = (float(to_border(end, dimension)) for end in (window.lo, window.hi))
@@ -103,13 +103,13 @@ def _rms(comparison: Comparison) -> float:
 
 
 def _border(value: float, calibration: Calibration) -> float:
-    from cfmkit.units import to_border
+    from cfmkit.specs.units import to_border
 
     return float(to_border(value, calibration.after.curve.kind))
 
 
 def _unit(calibration: Calibration) -> str:
-    from cfmkit.units import border_unit
+    from cfmkit.specs.units import border_unit
 
     return border_unit(calibration.after.curve.kind)
 

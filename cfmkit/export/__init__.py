@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING
 
 from cfmkit.export.arcs import outlines
 from cfmkit.export.dxf import dxf_bytes, write_dxf
+from cfmkit.export.geometry import TOLERANCE
 from cfmkit.export.kerf import with_kerf
 from cfmkit.export.layers import check_name
 from cfmkit.export.points import write_points
 from cfmkit.export.svg import svg_bytes, write_svg
-from cfmkit.geometry import TOLERANCE
 
 if TYPE_CHECKING:
-    from cfmkit.geometry import Drawing
+    from cfmkit.export.geometry import Drawing
 
 __all__ = ["TOLERANCE", "files", "write_dxf", "write_points", "write_svg"]
 

@@ -14,10 +14,10 @@ import numpy as np
 
 from cfmkit.errors import GeometryError
 from cfmkit.export.checks import check_outlines, place
-from cfmkit.geometry import TOLERANCE, Arc, Contour, Drawing, Edge, Line
+from cfmkit.export.geometry import TOLERANCE, Arc, Contour, Drawing, Edge, Line
 from cfmkit.numerics.arcchain import ArcChain
 from cfmkit.numerics.biarcs import CoarseDataError, fit_arcs
-from cfmkit.units import format_short
+from cfmkit.specs.units import format_short
 
 _LEAN = 1e-3  # largest angle of the arcs to the exact curve [rad], as far as its points allow; see `outlines`
 _GAP = 1e-9  # two ends closer than this are one point [m]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.errors import GeometryError
-from cfmkit.units import to_border
+from cfmkit.specs.units import to_border
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -21,15 +21,15 @@ import numpy as np
 from cfmkit.errors import OutputError
 from cfmkit.export.arcs import Outline, outlines
 from cfmkit.export.checks import flat_points
+from cfmkit.export.geometry import TOLERANCE
 from cfmkit.export.layers import Look, looks
-from cfmkit.geometry import TOLERANCE
-from cfmkit.units import to_border
+from cfmkit.specs.units import to_border
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
     from types import ModuleType
 
-    from cfmkit.geometry import Drawing
+    from cfmkit.export.geometry import Drawing
 
 _MILLIMETRES, _METRIC = 4, 1
 _DIGITS = 9  # of coordinates [mm]: a picometre, the scale of rounding errors

@@ -17,7 +17,7 @@ from cfmkit.errors import GeometryError
 from cfmkit.export.checks import check_outlines, flat_points, place
 from cfmkit.numerics.arcchain import ArcChain
 from cfmkit.numerics.parallel import parallel
-from cfmkit.units import format_short
+from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

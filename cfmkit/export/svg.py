@@ -11,14 +11,14 @@ import numpy as np
 
 from cfmkit.export.arcs import Outline, outlines
 from cfmkit.export.checks import flat_points
+from cfmkit.export.geometry import TOLERANCE
 from cfmkit.export.layers import Look, check_name, looks
-from cfmkit.geometry import TOLERANCE
-from cfmkit.units import to_border
+from cfmkit.specs.units import to_border
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from cfmkit.geometry import Drawing
+    from cfmkit.export.geometry import Drawing
 
 _MARGIN = 5.0  # around the drawing [mm]
 _STROKE = 0.25  # width of every line [mm]

@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.errors import GeometryError
-from cfmkit.geometry import Contour, Line
+from cfmkit.export.geometry import Contour, Line
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
 
 ROUGH = 1e-6
 """By default contours are no farther from the true ones [m]."""

@@ -13,9 +13,10 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from cfmkit.curves import FloatArray, Kind
+    from cfmkit.arrays import FloatArray
+    from cfmkit.curves import Kind
     from cfmkit.results import Design, Result
-    from cfmkit.spec import Spec
+    from cfmkit.specs.spec import Spec
 
 
 def _silent(_fraction: float, _text: str) -> None:

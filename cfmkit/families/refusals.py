@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from cfmkit.results import Finding
-    from cfmkit.spec import Spec
+    from cfmkit.specs.spec import Spec
 
 
 class CannotBuild(SolutionError):

@@ -14,7 +14,7 @@ import numpy as np
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(4)
 """Of each step between two places: polynomials of degree seven are integrated exactly."""

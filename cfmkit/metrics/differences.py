@@ -17,7 +17,8 @@ from cfmkit.results import Quantity
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
 
-    from cfmkit.curves import Curve, FloatArray
+    from cfmkit.arrays import FloatArray
+    from cfmkit.curves import Curve
 
     Measure = tuple[Callable[[FloatArray], float], str]
 

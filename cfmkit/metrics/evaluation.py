@@ -14,14 +14,14 @@ from cfmkit.metrics.subjects import Cycle, Frame, cycle
 from cfmkit.metrics.table import Definition, definitions, split_name, unknown_metric
 from cfmkit.metrics.traces import Undefined, Window, traces
 from cfmkit.results import Quantity, Status
-from cfmkit.units import Share, between
+from cfmkit.specs.units import Share, between
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping
 
     from cfmkit.curves import Curve, Kind
     from cfmkit.results import Result
-    from cfmkit.units import Ends
+    from cfmkit.specs.units import Ends
 
 
 class Value(NamedTuple):

@@ -15,7 +15,7 @@ import numpy as np
 from cfmkit.metrics.traces import Trace, Undefined, Window
 
 if TYPE_CHECKING:
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.metrics.subjects import Branch, Cycle
 
 UNIFORM_POINTS = 100

@@ -7,11 +7,11 @@ from functools import lru_cache
 from typing import TYPE_CHECKING
 
 from cfmkit.metrics.table import split_name
-from cfmkit.units import format_short, read_one_of, to_border
+from cfmkit.specs.units import format_short, read_one_of, to_border
 
 if TYPE_CHECKING:
     from cfmkit.metrics.evaluation import Value
-    from cfmkit.spec import Requirement
+    from cfmkit.specs.spec import Requirement
 
 ROUNDING = 1e-9
 """A value on its bound is within it, whatever the conversion of units does to the last bits (relative)."""

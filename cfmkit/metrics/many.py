@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
 
     Exact = Callable[[FloatArray, NDArray[np.intp]], FloatArray]
     Pair = tuple[FloatArray, FloatArray]

@@ -20,7 +20,7 @@ from cfmkit.metrics.traces import ROUNDING, Undefined
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.metrics.subjects import Branch, Cycle
     from cfmkit.metrics.traces import Trace
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from cfmkit.units import border_unit, to_border
+from cfmkit.specs.units import border_unit, to_border
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -14,7 +14,7 @@ from cfmkit.metrics.limits import Limits, bound
 from cfmkit.metrics.report import finite_border
 from cfmkit.metrics.subjects import span_text
 from cfmkit.metrics.table import Definition, split_name, unknown_metric
-from cfmkit.units import DIMENSIONS, SHARE, border_unit
+from cfmkit.specs.units import DIMENSIONS, SHARE, border_unit
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from cfmkit.curves import Kind
     from cfmkit.metrics.traces import Window
     from cfmkit.results import Result
-    from cfmkit.spec import Requirement, Spec
+    from cfmkit.specs.spec import Requirement, Spec
 
 _MOTION = {"force": "length", "torque": "angle"}
 

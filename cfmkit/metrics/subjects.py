@@ -17,7 +17,8 @@ from cfmkit.metrics.many import ManyBranches
 from cfmkit.metrics.traces import ROUNDING, Trace, Undefined, Window, covers, restrict, traces
 
 if TYPE_CHECKING:
-    from cfmkit.curves import Curve, FloatArray, Kind
+    from cfmkit.arrays import FloatArray
+    from cfmkit.curves import Curve, Kind
     from cfmkit.results import ClosedForm
 
 
@@ -296,7 +297,7 @@ class Branch:
 
 def span_text(lo: float, hi: float, kind: Kind) -> str:
     """Return an interval of the motion as text in border units, rounded to six digits."""
-    from cfmkit.units import border_unit, to_border
+    from cfmkit.specs.units import border_unit, to_border
 
     dimension = "length" if kind == "force" else "angle"
     return f"{float(to_border(lo, dimension)):.6g} ... {float(to_border(hi, dimension)):.6g} {border_unit(dimension)}"

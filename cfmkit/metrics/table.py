@@ -46,7 +46,7 @@ class Definition:
     name : str
         As requirements and tables call it.
     dimension : str
-        A name of `cfmkit.units`, or "effort", "motion", "work": what that is depends on the curve.
+        A name of `cfmkit.specs.units`, or "effort", "motion", "work": what that is depends on the curve.
     definition : str
         One sentence with the source; ``{effort}`` and ``{motion}`` stand for the curve's words.
     function : callable or None

@@ -18,7 +18,8 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from cfmkit.curves import Curve, FloatArray
+    from cfmkit.arrays import FloatArray
+    from cfmkit.curves import Curve
 
 TOLERANCE = 1e-9
 """How far a sample may miss an end of the window and still count as on it, as a fraction of the window."""

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from cfmkit.curves import FloatArray, read_only
+from cfmkit.arrays import FloatArray, read_only
 
 ComplexArray = NDArray[np.complex128]
 

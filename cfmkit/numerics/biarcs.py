@@ -35,7 +35,7 @@ from cfmkit.numerics.hermite import CoarseDataError, checked, cubic, doubt, slop
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.numerics.arcchain import ComplexArray
 
 __all__ = ["Biarc", "CoarseDataError", "biarc", "fit_arcs"]

@@ -18,7 +18,7 @@ from cfmkit.numerics.robust import robust_scale
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
 
 Loss = Literal["linear", "soft_l1", "huber", "cauchy"]
 LOSSES: tuple[Loss, ...] = ("linear", "soft_l1", "huber", "cauchy")

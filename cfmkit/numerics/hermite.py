@@ -13,7 +13,7 @@ import numpy as np
 from cfmkit.errors import GeometryError
 
 if TYPE_CHECKING:
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.numerics.arcchain import ComplexArray
 
 _STEP_TURN = 0.8  # of a tangent against the chord to the next sample [rad]

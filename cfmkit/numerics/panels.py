@@ -20,7 +20,7 @@ from numpy.polynomial import chebyshev
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
 
 NODES = 16
 """Of a panel."""

@@ -12,7 +12,7 @@ from numpy.polynomial import legendre
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
 
 ORDER = 8
 FIRST_PANELS = 16

@@ -27,7 +27,7 @@ from cfmkit.numerics.robust import robust_scale, tukey
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
 
 _STEPS = 60
 _SAMPLES = 257

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
 
 TUKEY = 4.685
 """Where Tukey's weight falls to zero, in standard deviations: 95 % efficient for normal values."""

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from cfmkit.curves import FloatArray
+from cfmkit.arrays import FloatArray
 
 Evaluate = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
 EPS = float(np.finfo(float).eps)

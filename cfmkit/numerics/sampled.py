@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
 
 
 def largest(places: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -19,7 +19,7 @@ import numpy as np
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
 
 _FAR = 1e3  # what a point without an answer counts, in units of the objective and of the constraints
 

@@ -20,7 +20,7 @@ from cfmkit.plots.place import Label, place_labels
 from cfmkit.plots.style import BAND, LINES, TROUBLE, styled
 from cfmkit.plots.text import axis_label, finite_range, shown_range, value_text
 from cfmkit.results import Result
-from cfmkit.units import to_border
+from cfmkit.specs.units import to_border
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
 
 SAME = 2e-3
 """Branches closer than this fraction of the axes' height are one line, with one name."""

@@ -10,7 +10,7 @@ import numpy as np
 from cfmkit.plots.place import Label, place_labels
 from cfmkit.plots.style import GREY, TROUBLE, axes_mm, new_figure, styled
 from cfmkit.plots.text import Heading, axis_label, finite_range, plain_ticks, shown_range, write_heading
-from cfmkit.units import to_border
+from cfmkit.specs.units import to_border
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from cfmkit.plots.diagram import padded
 from cfmkit.plots.place import Label, place_labels
 from cfmkit.plots.style import GREY, LINES, axes_mm, new_figure, styled
 from cfmkit.plots.text import axis_label, remark, shown_range, write_heading
-from cfmkit.units import to_border
+from cfmkit.specs.units import to_border
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -20,7 +20,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from cfmkit.curves import Curve, FloatArray
+    from cfmkit.arrays import FloatArray
+    from cfmkit.curves import Curve
     from cfmkit.plots.text import Heading
 
 

@@ -16,7 +16,7 @@ from cfmkit.plots.bands import bands_of
 from cfmkit.plots.curves import Look, plot_curve
 from cfmkit.plots.style import GREY, axes_mm, new_figure, styled
 from cfmkit.plots.text import Heading, finite_range, write_heading
-from cfmkit.units import to_border
+from cfmkit.specs.units import to_border
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -69,7 +69,7 @@ def loop_figure(result: Result, look: Look | None = None, subject: str = "") -> 
 
 def _across(upper: Axes, curve: Curve) -> Interval:
     """Return the motion that the upper panel shows, in SI."""
-    from cfmkit.units import from_border
+    from cfmkit.specs.units import from_border
 
     low, high = upper.get_xlim()
     return float(from_border(low, curve.motion_dimension)), float(from_border(high, curve.motion_dimension))

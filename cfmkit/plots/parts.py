@@ -13,7 +13,7 @@ import numpy as np
 
 from cfmkit.plots.place import Label
 from cfmkit.plots.style import GREY, INK, OCHRE, SMALL, VERMILLION, axes_mm, styled
-from cfmkit.units import to_border
+from cfmkit.specs.units import to_border
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
 
 Point = tuple[float, float]
 Box = tuple[float, float, float, float]

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.transforms import Transform
     from numpy.typing import NDArray
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
 
 CELL = 1.5
 """Size of a cell [pt]."""

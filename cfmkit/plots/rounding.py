@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
 
 ROUNDING = 1e-9
 """Share of the size of values below which a difference of them, or one of them, is rounding."""

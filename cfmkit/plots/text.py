@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.plots.style import GREY, MM, NORMAL, SMALL, TROUBLE, styled
+from cfmkit.specs.units import border_unit, format_short
 from cfmkit.tables import border_values
-from cfmkit.units import border_unit, format_short
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.axis import Axis
     from matplotlib.figure import Figure
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.results import Result
 
 POLE = 3.0

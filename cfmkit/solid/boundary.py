@@ -15,14 +15,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial import cKDTree
 
-from cfmkit.curves import read_only
+from cfmkit.arrays import read_only
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from numpy.typing import NDArray
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
 
 CORNER = math.radians(25.0)
 """Turn of a true corner [rad]. An arc of 0.5 mm within 1 um of its lines turns by 7 degrees a vertex, one of 0.1 mm

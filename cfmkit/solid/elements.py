@@ -15,7 +15,7 @@ from scipy.sparse import csc_array
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.solid.law import Law
     from cfmkit.solid.mesh import Mesh
 

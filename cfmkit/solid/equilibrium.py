@@ -13,7 +13,7 @@ from scipy.sparse.linalg import splu
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.solid.elements import Elements
     from cfmkit.solid.supports import Supports
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 if TYPE_CHECKING:
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
 
 ROUNDS = 20
 """Of Newton's method for the stretch across the plane; from 1 it takes four to six."""

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.spatial import Delaunay, cKDTree
 
-from cfmkit.curves import read_only
+from cfmkit.arrays import read_only
 from cfmkit.errors import GeometryError
 from cfmkit.solid.boundary import GRADING, Ring, Sizes, sizes
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
 
     IntArray = NDArray[np.int64]
 

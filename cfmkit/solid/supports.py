@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
 
 
 @dataclass(frozen=True)

@@ -10,18 +10,18 @@ from cfmkit.families import family
 from cfmkit.families.base import Block, Measure
 from cfmkit.metrics import metrics_by_name, other_name, split_name, values_of_family
 from cfmkit.metrics.limits import ROUNDING, Limits
+from cfmkit.specs.units import Share
 from cfmkit.studies.rows import Rows, gathered
-from cfmkit.units import Share
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from numpy.typing import NDArray
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.families.base import BlockAnswer
     from cfmkit.metrics import Definition
-    from cfmkit.spec import Requirement
+    from cfmkit.specs.spec import Requirement
     from cfmkit.studies.plan import Plan
     from cfmkit.studies.study import Study
 

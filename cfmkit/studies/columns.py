@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
     from cfmkit.curves import Curve
-    from cfmkit.spec import Spec
+    from cfmkit.specs.spec import Spec
     from cfmkit.studies.plan import Plan
 
 NEED_STRESS = ("stress_max", "safety_factor")

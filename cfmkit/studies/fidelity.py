@@ -23,11 +23,12 @@ from cfmkit.results import Finding, Status
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
-    from cfmkit.curves import Curve, FloatArray, Kind
+    from cfmkit.arrays import FloatArray
+    from cfmkit.curves import Curve, Kind
     from cfmkit.families.base import Run
     from cfmkit.metrics.differences import Measure
     from cfmkit.results import Quantity, Result
-    from cfmkit.spec import Spec
+    from cfmkit.specs.spec import Spec
 
 PATH = "analysis.fidelity"
 
@@ -277,7 +278,7 @@ def lines_of(found: Comparison) -> tuple[tuple[str, str], ...]:
 
 
 def _lines(found: Comparison, item: Variant) -> Iterator[str]:
-    from cfmkit.units import format_short
+    from cfmkit.specs.units import format_short
 
     metrics, window, differences = found.metrics(), found.windows.get(item.name), found.differences(item)
     for branch in differences:

@@ -7,15 +7,15 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 from cfmkit.errors import QuantityError
-from cfmkit.units import BareFloat, Quantity, place_of
-from cfmkit.units.fields import described
-from cfmkit.yamlio.explain import not_among
-from cfmkit.yamlio.shape import Slot, expected, required
+from cfmkit.specs.units import BareFloat, Quantity, place_of
+from cfmkit.specs.units.fields import described
+from cfmkit.specs.yamlio.explain import not_among
+from cfmkit.specs.yamlio.shape import Slot, expected, required
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from cfmkit.spec import Spec
+    from cfmkit.specs.spec import Spec
 
 Value = float | int | str | bool
 Kind = Literal["quantity", "number", "whole", "word", "switch"]

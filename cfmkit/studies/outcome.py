@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.errors import QuantityError, UsageError
+from cfmkit.specs.units import format_quantity
 from cfmkit.studies.executors import serial
 from cfmkit.studies.leaves import CannotVary, leaf
 from cfmkit.studies.plan import MOST_POINTS
 from cfmkit.tables import read_csv
-from cfmkit.units import format_quantity
 
 if TYPE_CHECKING:
-    from cfmkit.spec import Spec
+    from cfmkit.specs.spec import Spec
     from cfmkit.studies.engine import Records, Work
     from cfmkit.studies.executors import Executor
     from cfmkit.tables import Table

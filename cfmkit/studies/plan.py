@@ -14,16 +14,16 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from cfmkit.decimals import even_grid, shift_decimal
 from cfmkit.errors import UsageError
+from cfmkit.specs.units import Place, format_quantity, from_border, place_of, to_border
+from cfmkit.specs.units.decimals import even_grid, shift_decimal
 from cfmkit.studies.variation import is_place
 from cfmkit.tables import border_values
-from cfmkit.units import Place, format_quantity, from_border, place_of, to_border
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.studies.variation import Axis
 
 Combine = Literal["grid", "zip", "lhs", "sobol"]
@@ -42,7 +42,7 @@ class Variable:
     path : str
         Dotted.
     dimension : str
-        Of `cfmkit.units`; "count" for whole numbers, "text" for words and switches.
+        Of `cfmkit.specs.units`; "count" for whole numbers, "text" for words and switches.
     values : sequence
         SI floats, whole numbers or words, as `Spec.replace` takes them.
     shown : sequence

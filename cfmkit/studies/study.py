@@ -22,17 +22,17 @@ from cfmkit.families import origin as family_origin
 from cfmkit.families.base import Run
 from cfmkit.metrics import check, evaluate, gaps, values_of_family, window_of, windows_judged
 from cfmkit.results import Result, Status
+from cfmkit.specs.units import to_border
 from cfmkit.store import file_hash, origin, stable_hash
 from cfmkit.tables.source import named_in
-from cfmkit.units import to_border
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from cfmkit.metrics.evaluation import Surveys
     from cfmkit.results import Quantity
-    from cfmkit.spec import Spec
-    from cfmkit.units import Ends
+    from cfmkit.specs.spec import Spec
+    from cfmkit.specs.units import Ends
 
 NOT_DECIDING = {"name", "description", "sweep", "sensitivity"}
 """Parts of a specification that change no result of a point."""
@@ -52,7 +52,7 @@ class Metric:
     name : str
         With ``[branch]`` where wanted.
     dimension : str
-        Of `cfmkit.units`.
+        Of `cfmkit.specs.units`.
     definition : str
         What it is.
     over : tuple of WindowEnd, optional

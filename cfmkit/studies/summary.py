@@ -17,13 +17,13 @@ import numpy as np
 from cfmkit.errors import ExitCode
 from cfmkit.metrics import other_name
 from cfmkit.results import WINDOW_OUTSIDE, Status
+from cfmkit.specs.units import border_unit, to_border
 from cfmkit.studies.variation import written
-from cfmkit.units import border_unit, to_border
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.studies.engine import Records
     from cfmkit.studies.rows import Rows
     from cfmkit.studies.study import Study

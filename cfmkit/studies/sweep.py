@@ -18,7 +18,7 @@ from cfmkit.studies.variation import Wish, axes, wishes
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from cfmkit.spec import Spec
+    from cfmkit.specs.spec import Spec
     from cfmkit.store.disk import Data
     from cfmkit.studies.engine import Records
     from cfmkit.studies.plan import Combine, Plan
@@ -128,8 +128,8 @@ def summary_of(records: Records) -> Summary:
 
 def outputs(records: Records, summary: Summary, curves: bool = False) -> Iterator[tuple[str, Data]]:
     """Yield every file of a sweep but the pictures as (name, content); the summary is filled on the way."""
-    from cfmkit.jsontext import json_bytes
-    from cfmkit.yamlio import dump
+    from cfmkit.specs.yamlio import dump
+    from cfmkit.tables.jsontext import json_bytes
 
     study = records.work.study
     yield "results.csv", results_csv(records, summary.add)

@@ -6,16 +6,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cfmkit.specs.units import border_unit
 from cfmkit.studies.rows import WARNINGS_JOINT
 from cfmkit.tables import Table, TableColumn, border_column, csv_chunks, read_csv
-from cfmkit.units import border_unit
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     from numpy.typing import NDArray
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.studies.engine import Records
     from cfmkit.studies.plan import Plan, Variable
     from cfmkit.studies.rows import Rows

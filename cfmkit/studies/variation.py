@@ -10,13 +10,13 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from cfmkit.errors import Problem, SpecError, UsageError
+from cfmkit.specs.units import Place, format_quantity
 from cfmkit.studies.leaves import CannotVary, Leaf, leaf
-from cfmkit.units import Place, format_quantity
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
 
-    from cfmkit.spec import Spec
+    from cfmkit.specs.spec import Spec
     from cfmkit.studies.leaves import Value
 
 EXAMPLE = "write e.g. --vary 'mechanism.roller_radius=8 mm:16 mm:5' or --vary 'a.b=[1 mm, 2 mm]'"
@@ -52,7 +52,7 @@ class Axis:
     leaf : Leaf
         What varies.
     dimension : str
-        Of `cfmkit.units`; "text" for words and switches.
+        Of `cfmkit.specs.units`; "text" for words and switches.
     listed : tuple
         Values as `Spec.replace` takes them; empty for a range.
     ends : tuple of (float, float), optional
@@ -78,8 +78,8 @@ def wish(option: str) -> Wish:
     cfmkit.errors.SpecError
         If its list holds what no specification may.
     """
-    from cfmkit.units.numbers import shown
-    from cfmkit.yamlio.reader import read
+    from cfmkit.specs.units.numbers import shown
+    from cfmkit.specs.yamlio.reader import read
 
     path, equals, content = (part.strip() for part in option.partition("="))
     if not equals or not content:
@@ -208,7 +208,7 @@ def _range(found: Leaf, text: str, drawn: bool) -> Axis:
 def _end(found: Leaf, text: str) -> tuple[Any, str]:
     """Return (SI value, dimension) of one end of a range."""
     from cfmkit.errors import QuantityError
-    from cfmkit.units import read_number
+    from cfmkit.specs.units import read_number
 
     if found.kind == "quantity":
         return found.read(text)

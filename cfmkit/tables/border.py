@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.curves import Column, Curve
-from cfmkit.decimals import shift_decimal
+from cfmkit.specs.units.decimals import shift_decimal
 from cfmkit.tables.table import Table, TableColumn
 
 if TYPE_CHECKING:
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
 
     Part = tuple[Mapping[str, Column], int]
 
@@ -48,11 +48,11 @@ def border_column(name: str, values: Any, dimension: str) -> TableColumn:
     values : (n,) array
         SI values, or texts if `dimension` is ``"text"``.
     dimension : str
-        A dimension of `cfmkit.units`, or ``"text"``.
+        A dimension of `cfmkit.specs.units`, or ``"text"``.
     """
     if dimension == "text":
         return TableColumn(name, values)
-    from cfmkit.units import border_unit
+    from cfmkit.specs.units import border_unit
 
     return TableColumn(name, border_values(values, dimension), border_unit(dimension))
 
@@ -65,7 +65,7 @@ def border_values(values: ArrayLike, dimension: str) -> FloatArray:
     values : array_like
         SI values.
     dimension : str
-        A dimension of `cfmkit.units`.
+        A dimension of `cfmkit.specs.units`.
 
     Examples
     --------
@@ -73,7 +73,7 @@ def border_values(values: ArrayLike, dimension: str) -> FloatArray:
     (4.1, 4.1000000000000005)
     """
     # Here and above, because reading and writing CSV needs no units.
-    from cfmkit.units import to_border
+    from cfmkit.specs.units import to_border
 
     power = _power_of_ten(float(to_border(1.0, dimension)))
     if power is not None:

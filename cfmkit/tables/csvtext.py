@@ -21,7 +21,7 @@ from cfmkit.tables.table import HEADER, Cell, Table, TableColumn, Values
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
 
 _CHUNK = 8192
 """Rows that are text at one time: large enough for speed, small beside the table itself."""

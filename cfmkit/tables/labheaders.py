@@ -14,7 +14,7 @@ from difflib import get_close_matches
 from typing import TYPE_CHECKING
 
 from cfmkit.errors import DataError, QuantityError, UsageError
-from cfmkit.units.numbers import shown
+from cfmkit.specs.units.numbers import shown
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -192,7 +192,7 @@ def _spelt(unit: str) -> str:
 
 def _size(unit: str) -> bool | None:
     """Return True for a unit that there is, None otherwise."""
-    from cfmkit.units.registry import is_unit
+    from cfmkit.specs.units.registry import is_unit
 
     spelt = _spelt(unit)
     return True if spelt == "1" or is_unit(spelt) else None
@@ -200,8 +200,8 @@ def _size(unit: str) -> bool | None:
 
 def _dimension(unit: str) -> str | None:
     """Return which of the dimensions of interest a unit has."""
-    from cfmkit.units.registry import border_size, is_unit, unit_size
-    from cfmkit.units.table import COMMON
+    from cfmkit.specs.units.registry import border_size, is_unit, unit_size
+    from cfmkit.specs.units.table import COMMON
 
     spelt = _spelt(unit)
     common = next((name for name in ROLES if (name, spelt) in COMMON), None)

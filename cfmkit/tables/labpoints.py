@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
 
 FEWEST = 20
 """Points on a side without which it cannot be told from noise."""
@@ -95,7 +95,7 @@ def _points(path: Path) -> tuple[FloatArray, dict[str, tuple[int, float]], list[
 
 def _columns(lines: list[str], block: Block, name: str) -> dict[str, tuple[int, float]]:
     """Return index and unit of x and y, and the index of the side."""
-    from cfmkit.units.registry import border_size, is_unit, unit_size
+    from cfmkit.specs.units.registry import border_size, is_unit, unit_size
 
     above = [index for index in range(block.first) if lines[index].strip()][-5:]
     cells = next(

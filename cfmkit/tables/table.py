@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cfmkit.curves import read_only
+from cfmkit.arrays import read_only
 from cfmkit.errors import CfmError
 
 if TYPE_CHECKING:

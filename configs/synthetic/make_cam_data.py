@@ -18,8 +18,8 @@ from pathlib import Path
 import numpy as np
 
 import cfmkit
-from cfmkit.bodies.cam_flank import DesignFlank, arc_lengths
 from cfmkit.families.cam.build import assemble
+from cfmkit.families.cam.geometry.flank import DesignFlank, arc_lengths
 from cfmkit.numerics.registration import turned
 
 HERE = Path(__file__).resolve().parent

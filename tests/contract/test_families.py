@@ -13,13 +13,14 @@ import pytest
 import spare_family
 
 import cfmkit
-from cfmkit import api, families, report
+from cfmkit import api, families
 from cfmkit.cli.main import main
 from cfmkit.cli.templates import template
-from cfmkit.geometry import Drawing
-from cfmkit.keys import keys
+from cfmkit.export.geometry import Drawing
 from cfmkit.results import Status
-from cfmkit.units import DIMENSIONS
+from cfmkit.runs import report
+from cfmkit.specs.keys import keys
+from cfmkit.specs.units import DIMENSIONS
 
 CONFIGS = [*sorted((Path(__file__).parents[2] / "configs").glob("*.yaml")), *plugin_support.CONFIGS]
 BY_NAME = {path.stem: path for path in CONFIGS}
@@ -78,7 +79,7 @@ def test_the_band_of_the_template_is_one_that_a_spec_takes(name):
 @every_family
 def test_the_template_mentions_every_key_of_the_mechanism_the_design_and_the_analysis(name):
     text = template(name)
-    paths = [key.path.split(".") for key in keys(name)]
+    paths = [key.path.split(".") for key in keys(families.family(name).spec_type)]
     named = {path[1] for path in paths if path[0] in ("mechanism", "design", "analysis") and len(path) == 2}
     assert {word for word in named if f"{word}:" not in text} == set()
 

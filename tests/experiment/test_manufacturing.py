@@ -8,10 +8,10 @@ from cam_support import analyze, cam
 from flanks import flanks
 
 import cfmkit
-from cfmkit.bodies.cam_flank import BuiltFlank, arc_lengths
 from cfmkit.families.base import Run
 from cfmkit.families.cam.build import assemble
 from cfmkit.families.cam.built import Sides
+from cfmkit.families.cam.geometry.flank import BuiltFlank, arc_lengths
 from cfmkit.families.cam.manufacturing.band import Drawn, _track, force_band
 from cfmkit.families.cam.manufacturing.spec import Manufacturing
 

@@ -13,7 +13,7 @@ from beam_support import MM, at, config, solved, value
 from lan_2010 import LEG, ROWS, TRAVEL, VALUES
 
 import cfmkit
-from cfmkit.units import read_quantity
+from cfmkit.specs.units import read_quantity
 
 CLOSURES = ("rotscale", "chain")
 KINDS = {"at": "length", "coefficients": "angle"}

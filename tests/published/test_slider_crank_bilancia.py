@@ -14,9 +14,9 @@ from slider_crank import ALPHA, BILANCIA, TABLE_1, config, force
 
 import cfmkit
 from cfmkit import api
-from cfmkit.bodies.slider_crank import Linkage
-from cfmkit.bodies.slider_crank_springs import along_slider
+from cfmkit.families.slider_crank.linkage import Linkage
 from cfmkit.families.slider_crank.rates import Goal, least_squares
+from cfmkit.families.slider_crank.unit_springs import along_slider
 from cfmkit.metrics import Window
 
 TABLE = {
@@ -195,7 +195,7 @@ def test_a_crank_of_12_mm_cannot_make_the_stroke():
 
 def test_both_papers_have_the_same_model():
     """The force is the torque over the slider's velocity ratio, -T/x'."""
-    from cfmkit.bodies.slider_crank_springs import along_crank
+    from cfmkit.families.slider_crank.unit_springs import along_crank
 
     units = along_slider(BILANCIA, 0.542, 1, np.array([1.0, 10.0, 35.0]))
     torque = along_crank(BILANCIA, 0.542, units.angle)

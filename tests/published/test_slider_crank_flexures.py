@@ -20,10 +20,10 @@ from flexure_support import (
     strip_chain,
 )
 
-from cfmkit.bodies.slider_crank_springs import along_slider
 from cfmkit.families.slider_crank.flexures.chain import Elasticity
 from cfmkit.families.slider_crank.flexures.pressing import Chain, Ending
 from cfmkit.families.slider_crank.flexures.sizing import Flexure, stroke_within
+from cfmkit.families.slider_crank.unit_springs import along_slider
 from cfmkit.numerics.roots import bracketed_root
 
 STRETCHED = LINKAGE.stretched_angle

@@ -13,10 +13,10 @@ import pytest
 from slider_crank import DEG, LI, START, config, li
 
 import cfmkit
-from cfmkit.bodies.slider_crank import Linkage
-from cfmkit.bodies.slider_crank_springs import along_crank
 from cfmkit.families.slider_crank.build import assemble
+from cfmkit.families.slider_crank.linkage import Linkage
 from cfmkit.families.slider_crank.thresholds import scale_factors, small_angle_number
+from cfmkit.families.slider_crank.unit_springs import along_crank
 
 T2 = LI.stretched_angle
 PER_DEG = 180 / math.pi

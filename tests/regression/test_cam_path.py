@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from cam_support import MM, at, cam
 
-from cfmkit.bodies.cam_cut import cut
-from cfmkit.bodies.cam_path import Path, reach
-from cfmkit.bodies.cam_profile import SlopeLaw
+from cfmkit.families.cam.geometry.cut import cut
+from cfmkit.families.cam.geometry.path import Path, reach
+from cfmkit.families.cam.geometry.profile import SlopeLaw
 
 X0, BRACE, A, ROLLER = 68 * MM, 200 * MM, 9.058 * MM, 16 * MM
 DIGITS = 0.51e-8 * MM

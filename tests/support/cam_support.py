@@ -12,7 +12,7 @@ from cfmkit.families.base import Run
 from cfmkit.families.cam.build import Assembly, assemble
 from cfmkit.families.cam.spec import CamSpec
 from cfmkit.families.cam.statics import forces
-from cfmkit.spec import frozen
+from cfmkit.specs.spec import frozen
 
 if TYPE_CHECKING:
     from cfmkit.results import Design, Result

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from cam_support import cam
 
-from cfmkit.bodies.cam_flank import DesignFlank
 from cfmkit.families.cam.build import assemble
+from cfmkit.families.cam.geometry.flank import DesignFlank
 from cfmkit.numerics.registration import turned
 
 if TYPE_CHECKING:
-    from cfmkit.bodies.cam_cut import CamProfile
+    from cfmkit.families.cam.geometry.cut import CamProfile
 
 MOVE = np.radians(0.3), np.array([1.5e-3, -0.8e-3])
 """The rigid motion of the reference note's case; its inverse is -0.3 deg, (-1.49579067, 0.80784298) mm."""

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.bodies.slider_crank import Linkage
 from cfmkit.families.slider_crank.flexures.chain import (
     FLEXURES,
     STRIP,
@@ -19,6 +18,7 @@ from cfmkit.families.slider_crank.flexures.chain import (
 )
 from cfmkit.families.slider_crank.flexures.pressing import Chain
 from cfmkit.families.slider_crank.flexures.sizing import Flexure
+from cfmkit.families.slider_crank.linkage import Linkage
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

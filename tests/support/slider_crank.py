@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 import cfmkit
-from cfmkit.bodies.slider_crank import Linkage
-from cfmkit.bodies.slider_crank_springs import along_crank, along_slider
+from cfmkit.families.slider_crank.linkage import Linkage
+from cfmkit.families.slider_crank.unit_springs import along_crank, along_slider
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 DEG = math.pi / 180

@@ -9,8 +9,8 @@ import numpy as np
 from cfmkit.curves import Curve
 from cfmkit.families.base import Family, Run
 from cfmkit.results import Result, Status
-from cfmkit.spec import Analysis, Model, Spec
-from cfmkit.units import Stiffness  # noqa: TC001  pydantic reads the annotation
+from cfmkit.specs.spec import Analysis, Model, Spec
+from cfmkit.specs.units import Stiffness  # noqa: TC001  pydantic reads the annotation
 
 TEXT = """
 cfmkit: 1

@@ -10,10 +10,12 @@ import numpy as np
 import pytest
 
 import cfmkit
-from cfmkit import families, keys, report, specfile
+from cfmkit import families
 from cfmkit.errors import ExitCode
 from cfmkit.results import Design, Finding, Result, Status
-from cfmkit.yamlio import read_document
+from cfmkit.runs import report, specfile
+from cfmkit.specs import keys
+from cfmkit.specs.yamlio import read_document
 
 CAM = Path(__file__).parents[2] / "configs" / "cam.yaml"
 
@@ -139,11 +141,10 @@ def test_not_a_number_never_reaches_a_file():
         report.json_bytes({"value": np.nan})
 
 
-def test_the_schema_of_several_families_keeps_their_blocks_apart(monkeypatch):
-    alone = keys.schema(["cam"])
-    cam = families.family("cam")
-    monkeypatch.setattr(keys, "family", lambda name: cam)
-    both = keys.schema(["cam", "other"])
+def test_the_schema_of_several_families_keeps_their_blocks_apart():
+    cam = families.family("cam").spec_type
+    alone = keys.schema({"cam": cam})
+    both = keys.schema({"cam": cam, "other": cam})
     assert [one["properties"]["mechanism"]["$ref"] for one in both["oneOf"]] == [
         "#/$defs/cam.Mechanism",
         "#/$defs/other.Mechanism",
@@ -165,7 +166,7 @@ def references(node):
 
 def test_every_reference_of_a_schema_leads_somewhere():
     for names in (["cam"], list(families.names())):
-        schema = keys.schema(names)
+        schema = keys.schema({name: families.family(name).spec_type for name in names})
         assert {name.removeprefix("#/$defs/") for name in references(schema)} <= set(schema["$defs"])
 
 

@@ -9,7 +9,8 @@ from beam_support import CANTILEVER, CONFIGS, cantilever, config
 
 import cfmkit
 from cfmkit.errors import SpecError
-from cfmkit.keys import keys
+from cfmkit.families import family
+from cfmkit.specs.keys import keys
 from cfmkit.studies.leaves import leaf, paths
 
 
@@ -168,7 +169,7 @@ def test_paths_below_names_can_be_varied_and_are_listed():
     assert leaf(kind, "mechanism.nodes.n3.at.1").kind == "quantity"
     assert leaf(kind, "mechanism.beams.b1.shape.length").kind == "quantity"
     assert "mechanism.nodes.NAME.at.0" in set(paths(kind))
-    listed = {key.path for key in keys("beam")}
+    listed = {key.path for key in keys(family("beam").spec_type)}
     assert {"mechanism.nodes.NAME.at", "mechanism.beams.NAME.shape.sweep", "mechanism.links[].master"} <= listed
 
 

@@ -8,8 +8,8 @@ from cam_motion import moving
 from cam_support import MM, analyze, at, cam, message, names
 
 import cfmkit
-from cfmkit.materials import material
 from cfmkit.metrics import Window, evaluate
+from cfmkit.stock import material
 
 WINDOW = Window(0.002, 0.24)
 PRESSED = {"roller_radius": "10 mm", "contact": {"width": "3 mm", "material": "pla"}}

@@ -10,8 +10,8 @@ from cam_support import MM, analyze, cam, design, message, names
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from cfmkit.bodies.cam_profile import SlopeLaw
 from cfmkit.families.cam.design import two_way_gap
+from cfmkit.families.cam.geometry.profile import SlopeLaw
 from cfmkit.results import Status
 
 NOMINAL = {"springs": {"stiffness": "0.69 N/mm", "count": 2}}

@@ -11,12 +11,12 @@ from cam_support import MM, cam, fixed
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from cfmkit.bodies.cam_cut import WholeCamUndercut, cut
-from cfmkit.bodies.cam_path import reach
-from cfmkit.bodies.cam_profile import SlopeLaw, brace_tangent
-from cfmkit.bodies.cam_track import Track
-from cfmkit.bodies.track_states import NoTrack
 from cfmkit.families.cam.build import assemble
+from cfmkit.families.cam.geometry.cut import WholeCamUndercut, cut
+from cfmkit.families.cam.geometry.path import reach
+from cfmkit.families.cam.geometry.profile import SlopeLaw, brace_tangent
+from cfmkit.families.cam.geometry.track import Track
+from cfmkit.families.cam.geometry.track_states import NoTrack
 from cfmkit.families.refusals import CannotBuild
 
 SLOW = settings(deadline=None, max_examples=25)

@@ -10,8 +10,8 @@ import pytest
 from cam_motion import moving
 from cam_support import analyze
 
-from cfmkit.bodies.cam_profile import SlopeLaw
 from cfmkit.families.cam.dynamics.build import build
+from cfmkit.families.cam.geometry.profile import SlopeLaw
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy.integrate import quad, solve_ivp
 
-from cfmkit.bodies.cam_path import Path, ideal_position, reach
-from cfmkit.bodies.cam_profile import SlopeLaw, brace_tangent, drop
+from cfmkit.families.cam.geometry.path import Path, ideal_position, reach
+from cfmkit.families.cam.geometry.profile import SlopeLaw, brace_tangent, drop
 
 SLOW = settings(deadline=None, max_examples=30)
 FAST = settings(deadline=None, max_examples=150)

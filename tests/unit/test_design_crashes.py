@@ -14,7 +14,7 @@ from cfmkit.families.base import Run
 from cfmkit.families.beam.shaping import multistart
 from cfmkit.families.slider_crank.flexures import search
 from cfmkit.results import Status
-from cfmkit.runs import designed as compute
+from cfmkit.runs.run import designed as compute
 from cfmkit.studies.executors import Lost, serial
 
 if TYPE_CHECKING:

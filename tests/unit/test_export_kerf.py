@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from cfmkit.errors import GeometryError
 from cfmkit.export import files
 from cfmkit.export.arcs import outlines
+from cfmkit.export.geometry import Arc, Contour, Drawing, Line, Smooth, circle, polygon
 from cfmkit.export.kerf import with_kerf
-from cfmkit.geometry import Arc, Contour, Drawing, Line, Smooth, circle, polygon
 from cfmkit.numerics.arcchain import ArcChain
 from cfmkit.numerics.parallel import parallel
 

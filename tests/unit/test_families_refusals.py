@@ -9,7 +9,7 @@ import pytest
 from cfmkit.families.findings import at_least, at_most, deg, finder, mm, mpa, newton, percent, rate
 from cfmkit.families.refusals import CannotBuild, no_design, no_result
 from cfmkit.results import Finding, Status
-from cfmkit.spec import Spec
+from cfmkit.specs.spec import Spec
 
 SHORT = Finding("brace_too_short", "the braces do not reach the rollers", ("mechanism.brace_length=200 mm",))
 

@@ -5,9 +5,9 @@ import pytest
 
 import cfmkit
 from cfmkit.errors import ExitCode, SpecError
-from cfmkit.materials import MATERIALS, Material, UnknownMaterial, library, material
-from cfmkit.specfile import bind
-from cfmkit.yamlio import dump, read_document
+from cfmkit.runs.specfile import bind
+from cfmkit.specs.yamlio import dump, read_document
+from cfmkit.stock import MATERIALS, Material, UnknownMaterial, material, materials
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 
@@ -15,7 +15,7 @@ EVERY = pytest.mark.parametrize("item", MATERIALS.values(), ids=lambda item: ite
 
 
 def test_no_two_entries_of_the_library_share_a_name():
-    entries = (*library._METALS, *library._PLASTICS, *library._PAPERS)
+    entries = (*materials._METALS, *materials._PLASTICS, *materials._PAPERS)
     assert len({item.name for item in entries}) == len(entries) == len(MATERIALS)
 
 

@@ -7,7 +7,7 @@ from cfmkit.curves import Curve
 from cfmkit.errors import SpecError
 from cfmkit.metrics import check, definitions, requirement_problems, validate_requirements, values_of_family
 from cfmkit.results import Quantity, Result, Status
-from cfmkit.spec import Requirement, Spec
+from cfmkit.specs.spec import Requirement, Spec
 
 OWN = values_of_family({"spring_elongation": ("length", "largest elongation of the springs")})
 

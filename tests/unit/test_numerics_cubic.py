@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cfmkit.numerics.cubic import bisect, crossing, first_extreme, value_at, values_at
-from cfmkit.numerics.formula import formula
+from cfmkit.specs.formula import formula
 
 X = np.array([0.0, 0.3, 1.0, 1.4, 2.0, 3.1])
 

@@ -25,7 +25,7 @@ from cfmkit.plots.render import render
 from cfmkit.plots.style import BAND, GREY, INK, LINES, OCHRE, TAN, TROUBLE, new_figure, png, style
 from cfmkit.plots.text import Heading, axis_label, top_axis, value_text, write_heading
 from cfmkit.results import Result, Status
-from cfmkit.spec import Spec
+from cfmkit.specs.spec import Spec
 
 ROOT = Path(__file__).parents[2]
 

@@ -10,11 +10,11 @@ import pytest
 from slider_crank import DEG, LI, START, config
 
 import cfmkit
-from cfmkit.bodies.slider_crank import Linkage
-from cfmkit.bodies.slider_crank_springs import along_crank, along_slider, crank_efforts, crank_torques
 from cfmkit.families.slider_crank.build import assemble
+from cfmkit.families.slider_crank.linkage import Linkage
 from cfmkit.families.slider_crank.rates import Goal, minimax, preferred, ranges
 from cfmkit.families.slider_crank.reactions import reactions
+from cfmkit.families.slider_crank.unit_springs import along_crank, along_slider, crank_efforts, crank_torques
 from cfmkit.numerics.boxes import Axis, lowest
 from cfmkit.numerics.extrema import monotone, sharpened
 
@@ -379,7 +379,7 @@ def test_gradients_are_those_of_differences(name):
 
 
 def test_a_mechanism_without_a_curve_misses_requirements_in_degrees():
-    from cfmkit import report
+    from cfmkit.runs.run import report
 
     found = report.report_on(cfmkit.analyze(config("li2019", mechanism__offset="700 mm")))
     assert found.exit_code == 4

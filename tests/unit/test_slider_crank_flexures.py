@@ -75,7 +75,7 @@ def test_flexures_at_the_crank_pin_grow_wide_with_the_stroke(stroke: float, thic
 
 def test_a_short_flexure_is_the_spring_it_stands_for() -> None:
     """The correction goes to one with the length."""
-    from cfmkit.bodies.slider_crank_springs import along_slider
+    from cfmkit.families.slider_crank.unit_springs import along_slider
 
     parts = []
     for rate in RATES:

@@ -10,13 +10,13 @@ import pytest
 from slider_crank import DEG, config, force_of_energy
 
 import cfmkit
-from cfmkit.bodies.slider_crank import Linkage
-from cfmkit.bodies.slider_crank_springs import JOINTS, along_slider
 from cfmkit.families.slider_crank.build import assemble
 from cfmkit.families.slider_crank.draw import figures
+from cfmkit.families.slider_crank.linkage import Linkage
 from cfmkit.families.slider_crank.reactions import reactions
 from cfmkit.families.slider_crank.spec import SliderCrankSpec
 from cfmkit.families.slider_crank.targets import task_of
+from cfmkit.families.slider_crank.unit_springs import JOINTS, along_slider
 
 EQUAL = {
     "mechanism": {

@@ -15,7 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cfmkit.errors import InputError, QuantityError
-from cfmkit.units import (
+from cfmkit.specs.units import (
     DIMENSIONS,
     border_factor,
     border_unit,
@@ -27,8 +27,8 @@ from cfmkit.units import (
     to_border,
     unit_table,
 )
-from cfmkit.units.registry import border_size, unit_size
-from cfmkit.units.table import COMMON
+from cfmkit.specs.units.registry import border_size, unit_size
+from cfmkit.specs.units.table import COMMON
 
 READABLE = [name for name in DIMENSIONS if name != "text"]
 JSON_NUMBER = re.compile(r"[-+]?(0|[1-9][0-9]*|(?=\.[0-9]))(\.[0-9]*)?([eE][-+]?[0-9]+)?")
@@ -321,7 +321,7 @@ def test_no_two_units_differ_in_case_only_within_a_dimension() -> None:
 @pytest.mark.parametrize("heavy", ["pint", "numpy", "yaml"])
 def test_common_units_are_read_and_written_without(heavy: str) -> None:
     code = (
-        "import sys, cfmkit.units as u; assert u.read_quantity('0.69 N/mm', 'stiffness') == 690;"
+        "import sys, cfmkit.specs.units as u; assert u.read_quantity('0.69 N/mm', 'stiffness') == 690;"
         "u.format_quantity(0.5, 'angle'); u.to_border(0.2, 'length');"
         f"assert {heavy!r} not in sys.modules"
     )

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from pydantic import BaseModel, Field, ValidationError
 
-from cfmkit import units
 from cfmkit.errors import QuantityError
-from cfmkit.units import DIMENSIONS, BareFloat, BareInt, Displacement, Length, MetricValue, Place, Ratio
+from cfmkit.specs import units
+from cfmkit.specs.units import DIMENSIONS, BareFloat, BareInt, Displacement, Length, MetricValue, Place, Ratio
 
 
 class Part(BaseModel):

@@ -9,7 +9,7 @@ import pytest
 import cfmkit
 from cfmkit.errors import InputError, SpecError
 from cfmkit.results import WINDOW_OUTSIDE
-from cfmkit.units import Place, Share, between
+from cfmkit.specs.units import Place, Share, between
 
 # (specification, travel, a metric): one of every family and kind of motion
 FAMILIES = {

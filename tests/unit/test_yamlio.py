@@ -9,9 +9,9 @@ import pytest
 from pydantic import Field, model_validator
 
 from cfmkit.errors import SpecError, UsageError
-from cfmkit.spec import Analysis, Model, Spec
-from cfmkit.units import Angle, Force, Length, Mass, Ratio, RotationalStiffness, Stiffness
-from cfmkit.yamlio import json_schema, read_document
+from cfmkit.specs.spec import Analysis, Model, Spec
+from cfmkit.specs.units import Angle, Force, Length, Mass, Ratio, RotationalStiffness, Stiffness
+from cfmkit.specs.yamlio import json_schema, read_document
 
 CORPUS = Path(__file__).parent / "bad_specs"
 
@@ -183,7 +183,7 @@ def test_a_problem_can_be_put_at_any_path() -> None:
 
 
 def test_the_two_parsers_see_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
-    from cfmkit.yamlio import reader
+    from cfmkit.specs.yamlio import reader
 
     fast = reader.read(GOOD)
     monkeypatch.setattr(reader, "_LOADERS", reader._LOADERS[-1:])
@@ -348,7 +348,7 @@ def test_the_json_schema_speaks_in_units() -> None:
 @pytest.mark.parametrize("heavy", ["pint", "numpy", "scipy", "matplotlib"])
 def test_reading_common_units_needs_no(heavy: str) -> None:
     code = (
-        "import sys; from cfmkit.spec import Spec; from cfmkit.yamlio import read_document;"
+        "import sys; from cfmkit.specs.spec import Spec; from cfmkit.specs.yamlio import read_document;"
         "text = 'cfmkit: 1\\nfamily: x\\nrequirements: [{metric: a, max: 5 %, over: [1 mm, 2 deg]}]';"
         "read_document(text, 'x').bind(Spec);"
         f"assert {heavy!r} not in sys.modules"

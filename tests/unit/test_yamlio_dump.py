@@ -8,9 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import Field
 
-from cfmkit.spec import Model, Spec
-from cfmkit.units import Angle, Displacement, Force, Length, MetricValue, Place, Ratio
-from cfmkit.yamlio import dump, read_document
+from cfmkit.specs.spec import Model, Spec
+from cfmkit.specs.units import Angle, Displacement, Force, Length, MetricValue, Place, Ratio
+from cfmkit.specs.yamlio import dump, read_document
 
 
 class Spring(Model):

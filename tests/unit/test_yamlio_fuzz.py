@@ -10,9 +10,9 @@ from pace import within
 from pydantic import Field
 
 from cfmkit.errors import SpecError, UsageError
-from cfmkit.spec import Analysis, Model, Spec
-from cfmkit.units import Angle, Force, Length, Ratio, Stiffness
-from cfmkit.yamlio import dump, read_document, reader
+from cfmkit.specs.spec import Analysis, Model, Spec
+from cfmkit.specs.units import Angle, Force, Length, Ratio, Stiffness
+from cfmkit.specs.yamlio import dump, read_document, reader
 
 GOOD = (Path(__file__).parent / "bad_specs" / "good.yaml").read_text()
 LINES = GOOD.splitlines(keepends=True)

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from cfmkit.cli.terminal import Terminal
     from cfmkit.experiment.measured import Measured
     from cfmkit.families.base import Run
-    from cfmkit.report import Report
-    from cfmkit.spec import Spec
+    from cfmkit.runs.report import Report
+    from cfmkit.specs.spec import Spec
     from cfmkit.studies.fidelity import Comparison
 
 PLACE = 20
@@ -46,7 +46,7 @@ class Options(Computing, Measuring, Common):
 def run(options: Options, terminal: Terminal) -> Answer:
     """Analyse a mechanism as it is: curve, metrics, requirements, figures; beside a measured curve if there is one."""
     from cfmkit.cli.runs import Verb, execute
-    from cfmkit.runs import analysed
+    from cfmkit.runs.run import analysed
 
     work, inputs = analysed, {}
     if options.data is not None:
@@ -67,8 +67,8 @@ def compute_beside(source: Measured, spec: Spec, run: Run) -> Report:
     """Return the report on a mechanism beside its measured curve."""
     from cfmkit.experiment.comparison import compare
     from cfmkit.experiment.supplements import causes_lines, comparison_data, comparison_files, comparison_lines
-    from cfmkit.report import Supplement
-    from cfmkit.runs import analysed
+    from cfmkit.runs.report import Supplement
+    from cfmkit.runs.run import analysed
 
     found = analysed(spec, run)
     if not found.result.curves:
@@ -88,7 +88,7 @@ def compute_beside(source: Measured, spec: Spec, run: Run) -> Report:
 
 def compute_each(work: Callable[[Spec, Run], Report], spec: Spec, run: Run) -> Report:
     """Return the report on a mechanism beside the curves of its other models."""
-    from cfmkit.report import Supplement
+    from cfmkit.runs.report import Supplement
     from cfmkit.studies.fidelity import choices_of, compare, data_of, lines_of
 
     choices = choices_of(spec)

@@ -14,8 +14,8 @@ from cfmkit.cli.studies import Fresh, Jobs, Timeout
 from cfmkit.errors import ExitCode
 
 if TYPE_CHECKING:
-    from cfmkit.batches import BatchResult
     from cfmkit.cli.terminal import Terminal
+    from cfmkit.runs.batch import BatchResult
 
 PLACE = 26
 
@@ -71,9 +71,9 @@ def run(options: Options, terminal: Terminal) -> Answer:
     A spec that an earlier batch has finished is reused as long as nothing has changed: neither spec nor options, nor
     cfmkit, nor a file that was written.
     """
-    from cfmkit.batches import batch, unreached
     from cfmkit.cli import studies
     from cfmkit.cli.progress import watching
+    from cfmkit.runs.batch import batch, unreached
 
     start = studies.now()
     with watching(terminal, "specs") as progress:
@@ -111,8 +111,8 @@ class Ending:
 
 
 def _answer(found: BatchResult, ending: Ending, terminal: Terminal) -> Answer:
-    from cfmkit.batches import complaints
     from cfmkit.cli.failures import go_on
+    from cfmkit.runs.batch import complaints
     from cfmkit.studies.batch import message
 
     entries, code = found.entries, found.exit_code

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from cfmkit.experiment.calibration import Calibration
     from cfmkit.experiment.measured import Measured
     from cfmkit.families.base import Run
-    from cfmkit.report import Report
-    from cfmkit.spec import Spec
+    from cfmkit.runs.report import Report
+    from cfmkit.specs.spec import Spec
 
 PLACE = 34
 
@@ -80,7 +80,7 @@ def compute(options: Options, source: Measured, spec: Spec, run: Run) -> Report:
     """Return the report on the fitted mechanism."""
     from cfmkit.experiment.parameters import split_bounds
     from cfmkit.numerics.fit import LOSSES
-    from cfmkit.recordings import calibrate
+    from cfmkit.runs.recordings import calibrate
 
     loss = next(name for name in LOSSES if name == options.loss)
     bounds = split_bounds(options.bounds or ())
@@ -93,7 +93,7 @@ def report(calibration: Calibration, source: Measured) -> Report:
 
     from cfmkit import api
     from cfmkit.experiment import supplements as add
-    from cfmkit.report import Supplement, report_on
+    from cfmkit.runs.report import Supplement, report_on
     from cfmkit.tables import to_csv
 
     found, after, name = report_on(calibration.result), calibration.after, calibration.spec.name

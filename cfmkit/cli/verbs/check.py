@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from rich.text import Text
 
     from cfmkit.cli.terminal import Terminal
-    from cfmkit.spec import Spec
+    from cfmkit.specs.spec import Spec
 
 PLACE = 40
 
@@ -82,7 +82,7 @@ def _files(named: list[str]) -> list[str]:
 
 
 def _checked(name: str, changes: tuple[str, ...], of_many: bool) -> Finding:
-    from cfmkit.specfile import bind, read_spec
+    from cfmkit.runs.specfile import bind, read_spec
 
     try:
         return Finding(name, bind(read_spec(name, changes, of_many)), Answer())

@@ -31,7 +31,7 @@ class Options(Computing, Common):
 def run(options: Options, terminal: Terminal) -> Answer:
     """Design a mechanism for the targets of its spec, analyse it, and draw what is to be cut."""
     from cfmkit.cli.runs import Verb, execute
-    from cfmkit.runs import designed
+    from cfmkit.runs.run import designed
     from cfmkit.studies.executors import cores
 
     running = partial(long_run, options.jobs or cores(), options.fresh)
@@ -40,7 +40,7 @@ def run(options: Options, terminal: Terminal) -> Answer:
 
 def long_run(jobs: int, fresh: bool, folder: RunFolder, plain: Run) -> AbstractContextManager[Run]:
     """Return a run in several processes that says on a signal whether the same command goes on."""
-    from cfmkit import runs
     from cfmkit.cli.studies import noting
+    from cfmkit.runs import run
 
-    return runs.long_run(jobs, fresh, folder, plain, noting)
+    return run.long_run(jobs, fresh, folder, plain, noting)

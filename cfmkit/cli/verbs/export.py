@@ -45,8 +45,8 @@ def run(options: Options, terminal: Terminal) -> Answer:
     """Write what is to be cut or printed, as it stands in a spec: DXF, SVG, CSV."""
     from cfmkit import api
     from cfmkit.cli.runs import folder_of
-    from cfmkit.runs import provenance
-    from cfmkit.specfile import bind, read_spec
+    from cfmkit.runs.run import provenance
+    from cfmkit.runs.specfile import bind, read_spec
     from cfmkit.store import RunFolder
 
     out = folder_of(options, "export")

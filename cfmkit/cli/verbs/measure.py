@@ -117,7 +117,7 @@ def _folder(options: Options) -> str:
 
 
 def _report(options: Options) -> MeasureReport:
-    from cfmkit.recordings import measure
+    from cfmkit.runs.recordings import measure
 
     return measure(
         options.data,
@@ -183,6 +183,6 @@ def _shown(report: MeasureReport) -> list[str]:
 
 
 def _short(quantity: Any) -> str:
-    from cfmkit.units import format_short
+    from cfmkit.specs.units import format_short
 
     return "no value" if quantity.value is None else format_short(quantity.value, quantity.dimension, 6)

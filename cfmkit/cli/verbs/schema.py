@@ -37,11 +37,11 @@ class Options(Common):
 def run(options: Options, terminal: Terminal) -> Answer:
     """Print the JSON schema of specs, for editors."""
     from cfmkit import families
-    from cfmkit.keys import schema
+    from cfmkit.specs.keys import schema
 
     if options.family is not None:
-        return _answer(schema([options.family]))
-    return told_of(families.skipped(), _answer(schema([one.name for one in families.records()])))
+        return _answer(schema({options.family: families.family(options.family).spec_type}))
+    return told_of(families.skipped(), _answer(schema({one.name: one.spec_type for one in families.records()})))
 
 
 def _answer(found: dict[str, Any]) -> Answer:

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from cfmkit.cli.answer import Answer
     from cfmkit.cli.terminal import Terminal
-    from cfmkit.spec import Spec
+    from cfmkit.specs.spec import Spec
     from cfmkit.store.disk import Data
     from cfmkit.studies.sensitivity.findings import Findings
 

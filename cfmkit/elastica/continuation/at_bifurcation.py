@@ -17,7 +17,7 @@ from cfmkit.elastica.continuation.state import fine_spot
 from cfmkit.elastica.equilibrium.solver import Spot
 
 if TYPE_CHECKING:
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.elastica.continuation.singular import Singular
     from cfmkit.elastica.continuation.state import BranchEnd, Problem, Trail
 

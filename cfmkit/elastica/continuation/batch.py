@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
     from concurrent.futures import Future
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.elastica.model.drive import Control, Drive
     from cfmkit.elastica.model.network import Network
     from cfmkit.elastica.outcome.path import Path

@@ -14,7 +14,7 @@ from cfmkit.elastica.kernels.codes import DONE, INERTIA
 from cfmkit.elastica.outcome.path import Event, PathStatus
 
 if TYPE_CHECKING:
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.elastica.continuation.singular import Singular
     from cfmkit.elastica.continuation.state import Move, Problem, Trail
     from cfmkit.elastica.equilibrium.solver import Spot

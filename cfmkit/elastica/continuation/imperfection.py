@@ -18,7 +18,7 @@ from cfmkit.elastica.model.network import Network
 from cfmkit.elastica.model.shapes import Bent
 
 if TYPE_CHECKING:
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.elastica.continuation.singular import Singular
     from cfmkit.elastica.continuation.state import Problem
 

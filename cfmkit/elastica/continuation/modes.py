@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.elastica.equilibrium.expanded import ExpandedSolver
 
 _RIGID = 1e-14  # share of the largest compliance that is none

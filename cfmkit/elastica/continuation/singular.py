@@ -18,7 +18,7 @@ from cfmkit.elastica.equilibrium.solver import FORCE_WEIGHT, Spot
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.elastica.equilibrium.expanded import ExpandedSolver
 
 _SEARCHES = 40  # solutions in which a bracket is closed at most: halving alone would take forty to 1e-12 of it

@@ -20,7 +20,7 @@ from cfmkit.elastica.outcome.path import Event, PathStatus
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.elastica.continuation.singular import Singular
     from cfmkit.elastica.model.drive import Control
     from cfmkit.elastica.model.layout import Layout

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.curves import read_only
+from cfmkit.arrays import read_only
 from cfmkit.elastica.equilibrium.mesh import Mesh
 from cfmkit.elastica.model.drive import Control, Drive
 from cfmkit.elastica.model.layout import Layout

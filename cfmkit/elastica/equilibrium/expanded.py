@@ -16,7 +16,7 @@ from cfmkit.elastica.equilibrium.solver import Points, Solver, Spot
 if TYPE_CHECKING:
     from typing import Any
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.elastica.equilibrium.solver import MarchOptions
     from cfmkit.elastica.kernels.model import Model
 

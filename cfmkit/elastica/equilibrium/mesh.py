@@ -16,7 +16,7 @@ from cfmkit.elastica.model.numbering import LINE, SLIDE, TURN
 from cfmkit.elastica.model.section import Taper
 
 if TYPE_CHECKING:
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.elastica.model.layout import Layout
 
 _GAUSS = np.polynomial.legendre.leggauss(5)

@@ -13,7 +13,7 @@ from cfmkit.elastica.kernels.codes import ASKED, DRIVE_RATE, REACHED, SHORTNESS,
 from cfmkit.elastica.kernels.workspace import work_space
 
 if TYPE_CHECKING:
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.elastica.kernels.model import Model
     from cfmkit.elastica.kernels.workspace import WorkSpace
     from cfmkit.elastica.model.layout import Layout

@@ -17,7 +17,7 @@ from cfmkit.elastica.model.shapes import Polynomial, direction
 from cfmkit.errors import InputError
 
 if TYPE_CHECKING:
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.elastica.model.beam import Beam
     from cfmkit.elastica.model.network import Network
     from cfmkit.elastica.model.section import Section

@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.curves import read_only
+from cfmkit.arrays import read_only
 from cfmkit.errors import InputError
 
 if TYPE_CHECKING:
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
 
 _NEAR = 1e-12  # of the parameter: counts as on a piece
 

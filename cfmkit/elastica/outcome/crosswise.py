@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.curves import read_only
+from cfmkit.arrays import read_only
 from cfmkit.elastica.equilibrium.solver import Solver
 from cfmkit.elastica.model.drive import Displacement
 from cfmkit.elastica.model.layout import Layout
@@ -21,7 +21,7 @@ from cfmkit.elastica.model.network import Network, Support
 if TYPE_CHECKING:
     from typing import Any
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.elastica.outcome.path import Path
 
 _MANY = 150  # unknowns from which sparse factors are faster; at 380 of them dense ones take 5 times as long

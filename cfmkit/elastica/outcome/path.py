@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.curves import read_only
+from cfmkit.arrays import read_only
 from cfmkit.elastica.model.drive import Loading
 from cfmkit.elastica.model.network import LineLoad
 from cfmkit.elastica.outcome.sections import Sampler, Sections, along_beam
 from cfmkit.elastica.outcome.stress import StressExtremes, extremes, signed_extremes
 
 if TYPE_CHECKING:
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.elastica.equilibrium.solver import Points, Solver
     from cfmkit.elastica.model.beam import Fit
     from cfmkit.elastica.model.layout import Layout

@@ -15,7 +15,7 @@ from cfmkit.elastica.kernels.model import TABLE_COLUMNS
 from cfmkit.elastica.kernels.splitting import ROWS
 
 if TYPE_CHECKING:
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.elastica.equilibrium.solver import Points, Solver
     from cfmkit.elastica.model.layout import Layout
 

@@ -15,7 +15,7 @@ import numpy as np
 from cfmkit.elastica.outcome.sections import along_beam, sections, stress_slopes
 
 if TYPE_CHECKING:
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.elastica.outcome.sections import Rows, Sampler, Sections
 
 STENCIL = 9

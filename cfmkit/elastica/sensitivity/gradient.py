@@ -15,13 +15,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.curves import read_only
+from cfmkit.arrays import read_only
 from cfmkit.elastica.model.drive import Loading
 from cfmkit.elastica.sensitivity import outputs
 from cfmkit.elastica.sensitivity.slopes import Slopes
 
 if TYPE_CHECKING:
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.elastica.model.network import Network
     from cfmkit.elastica.outcome.path import Path
     from cfmkit.elastica.sensitivity.outputs import SectionSlopes

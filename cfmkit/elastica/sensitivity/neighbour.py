@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.curves import read_only
+from cfmkit.arrays import read_only
 from cfmkit.elastica.equilibrium.solver import Points, Solver
 from cfmkit.elastica.model.layout import Layout
 from cfmkit.elastica.outcome.path import Path, PathStatus
 from cfmkit.errors import InputError
 
 if TYPE_CHECKING:
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.elastica.model.drive import Drive
     from cfmkit.elastica.model.layout import Scales
     from cfmkit.elastica.model.network import Network

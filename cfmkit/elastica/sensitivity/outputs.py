@@ -12,7 +12,7 @@ from cfmkit.elastica.outcome.stress import STENCIL
 from cfmkit.elastica.sensitivity.tilt import slope
 
 if TYPE_CHECKING:
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.elastica.model.drive import Loading
     from cfmkit.elastica.model.network import LineLoad
     from cfmkit.elastica.sensitivity.plain_tilt import PlainTilt

@@ -19,7 +19,7 @@ from cfmkit.elastica.model.bundle import is_plain, powers
 from cfmkit.elastica.model.numbering import NOWHERE
 
 if TYPE_CHECKING:
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.elastica.equilibrium.mesh import Grid
     from cfmkit.elastica.model.beam import Beam
     from cfmkit.elastica.model.drive import Drive

@@ -11,7 +11,7 @@ import numpy as np
 from cfmkit.errors import InputError
 
 if TYPE_CHECKING:
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.elastica.kernels.model import Tilt
     from cfmkit.elastica.outcome.path import Path
     from cfmkit.elastica.sensitivity.tilt import Tilts

@@ -20,7 +20,7 @@ from cfmkit.errors import InputError
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.elastica.equilibrium.mesh import Grid
     from cfmkit.elastica.kernels.model import Model
 

@@ -21,7 +21,7 @@ import numpy as np
 from cfmkit.elastica.outcome.sections import TURN, H, V
 
 if TYPE_CHECKING:
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.elastica.outcome.path import Path
 
 ENDS = 8  # degrees of freedom at the attachments of the two ends

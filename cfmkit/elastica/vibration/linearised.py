@@ -19,7 +19,7 @@ from cfmkit.elastica.vibration.fields import ENDS, panels, quadratic, states_at
 from cfmkit.errors import InputError
 
 if TYPE_CHECKING:
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.elastica.outcome.path import Path
     from cfmkit.elastica.vibration.masses import Masses
 

@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.curves import read_only
+from cfmkit.arrays import read_only
 from cfmkit.elastica.vibration.linearised import Linearisation
 from cfmkit.errors import InputError
 
 if TYPE_CHECKING:
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.elastica.outcome.path import Path
     from cfmkit.elastica.vibration.linearised import Linearised
     from cfmkit.elastica.vibration.masses import Masses

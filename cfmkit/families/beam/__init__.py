@@ -36,7 +36,7 @@ FAMILY = Family(
         "frequency_held_min",
         "frequency_free_min",
     ),
-    template="cfmkit/templates/beam.yaml",
+    template="cfmkit/families/beam/template.yaml",
     findings=FINDINGS,
     references=(
         "C.-C. Lan, J.-H. Wang, Y.-H. Chen, A compliant constant-force mechanism for adaptive robot end-effector "

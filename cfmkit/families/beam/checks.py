@@ -12,7 +12,7 @@ from cfmkit.families.beam.endings import ending_of
 from cfmkit.families.beam.findings import finding
 from cfmkit.families.beam.values import window_of, within
 from cfmkit.families.beam.words import drive_text, in_units, percent
-from cfmkit.units import format_short
+from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

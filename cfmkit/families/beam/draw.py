@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.families.beam.model import Solution
     from cfmkit.families.beam.solid import SolidSolution
     from cfmkit.plots.place import Label

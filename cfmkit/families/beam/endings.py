@@ -9,7 +9,7 @@ import numpy as np
 
 from cfmkit.elastica import PathStatus
 from cfmkit.families.beam.words import in_units
-from cfmkit.units import format_short
+from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

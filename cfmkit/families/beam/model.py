@@ -17,7 +17,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.curves import Column, Curve, read_only
+from cfmkit.arrays import read_only
+from cfmkit.curves import Column, Curve
 from cfmkit.elastica import Path, PathStatus, trace
 from cfmkit.elastica.model.bundle import coils
 from cfmkit.elastica.model.layout import Layout
@@ -33,12 +34,13 @@ from cfmkit.families.beam.surface.ride import curve_of, findings_along, ride, va
 from cfmkit.families.beam.values import natural, travel_of, values_of
 from cfmkit.families.beam.words import in_units
 from cfmkit.results import Result, Status
-from cfmkit.units import format_short
+from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from cfmkit.curves import FloatArray, Kind
+    from cfmkit.arrays import FloatArray
+    from cfmkit.curves import Kind
     from cfmkit.families.base import Run
     from cfmkit.families.beam.spec import BeamSpec
 

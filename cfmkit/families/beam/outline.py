@@ -14,14 +14,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.elastica.model.layout import Layout
+from cfmkit.export.geometry import TOLERANCE, Contour, Curve2D, Drawing, Smooth
 from cfmkit.export.union import quarter_pieces
 from cfmkit.families.beam.build import assemble, mirror_axis, thickest
 from cfmkit.families.beam.parts.spec import PartSpec
 from cfmkit.families.beam.strips import Strip, mirrored, strips
-from cfmkit.geometry import TOLERANCE, Contour, Curve2D, Drawing, Smooth
 
 if TYPE_CHECKING:
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.elastica.model.network import Network
     from cfmkit.families.beam.build import Assembly
     from cfmkit.families.beam.spec import BeamSpec

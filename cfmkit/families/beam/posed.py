@@ -10,7 +10,7 @@ from cfmkit.elastica.model.network import LineSpring
 from cfmkit.elastica.outcome.sections import TURN
 
 if TYPE_CHECKING:
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.elastica import Path
 
 _BETWEEN = 4  # points of the picture for a step of the sampling

@@ -22,7 +22,7 @@ from cfmkit.families.beam.model import solve
 from cfmkit.families.beam.values import ranges, window_of
 from cfmkit.numerics.cubic import value_at
 from cfmkit.results import Design, Status
-from cfmkit.units import Place, Share, format_short
+from cfmkit.specs.units import Place, Share, format_short
 
 if TYPE_CHECKING:
     from cfmkit.families.beam.parts.spec import Thickness

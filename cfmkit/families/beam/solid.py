@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.curves import Column, Curve, read_only
+from cfmkit.arrays import read_only
+from cfmkit.curves import Column, Curve
 from cfmkit.errors import GeometryError
 from cfmkit.families.beam.build import assemble, mirror_axis, resolve, thinnest_of
 from cfmkit.families.beam.findings import finding
@@ -20,19 +21,20 @@ from cfmkit.families.beam.outline import drawing, regions
 from cfmkit.families.beam.parts.spec import PartSpec
 from cfmkit.families.beam.values import DEFINITIONS, extremes, ranges
 from cfmkit.results import Quantity, Result, Status
-from cfmkit.units import between, format_short
+from cfmkit.specs.units import between, format_short
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
 
     from numpy.typing import NDArray
 
-    from cfmkit.curves import FloatArray, Kind
+    from cfmkit.arrays import FloatArray
+    from cfmkit.curves import Kind
+    from cfmkit.export.geometry import Contour
     from cfmkit.families.base import Run
     from cfmkit.families.beam.build import Assembly
     from cfmkit.families.beam.outline import Region
     from cfmkit.families.beam.spec import BeamSpec
-    from cfmkit.geometry import Contour
     from cfmkit.results import Finding
     from cfmkit.solid.course import Course
     from cfmkit.solid.equilibrium import Problem

@@ -24,9 +24,9 @@ from cfmkit.families.beam.parts.spec import (
 )
 from cfmkit.families.beam.shaping.spec import Optimise, optimise_faults
 from cfmkit.families.beam.surface.spec import Surface
-from cfmkit.materials.spec import SafetyFactor
-from cfmkit.spec import Analysis, Displacement, Model, Spec, refuse
-from cfmkit.units import DIMENSIONS, Factor, Force, Length, Ratio, Torque
+from cfmkit.specs.spec import Analysis, Displacement, Model, Spec, refuse
+from cfmkit.specs.units import DIMENSIONS, Factor, Force, Length, Ratio, Torque
+from cfmkit.stock.spec import SafetyFactor
 
 Fidelity = Literal["inextensible", "extensible", "reissner", "solid"]
 _EXTENT = {"displacement": "travel", "rotation": "travel", "force": "force", "moment": "moment", "loads": "factor"}

@@ -9,12 +9,12 @@ import numpy as np
 from cfmkit.families.beam.build import thickest_of
 from cfmkit.numerics.cubic import bisect, crossing, first_extreme, value_at
 from cfmkit.results import Quantity
-from cfmkit.units import between
+from cfmkit.specs.units import between
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.families.beam.build import Assembly
     from cfmkit.families.beam.model import Solution
     from cfmkit.families.beam.spec import BeamSpec

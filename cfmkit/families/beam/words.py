@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING
 
-from cfmkit.units import format_short
+from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
     from cfmkit.families.beam.build import Assembly

@@ -33,7 +33,7 @@ FAMILY = Family(
         "contact_force_max",
     ),
     branches=("load", "unload"),
-    template="cfmkit/templates/cam.yaml",
+    template="cfmkit/families/cam/template.yaml",
     findings=FINDINGS,
     references=(
         "S. Sanchez-Salinas, A. Garcia-Agundez, J. Lopez-Martinez, D. Garcia-Vallejo, "

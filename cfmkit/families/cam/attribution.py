@@ -26,7 +26,7 @@ from cfmkit.results import Quantity
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.families.base import MeasuredLoop
     from cfmkit.families.cam.statics import Loads
     from cfmkit.results import Result

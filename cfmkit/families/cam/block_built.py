@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.bodies.cam_path import ideal_position
-from cfmkit.bodies.cam_track import Pivot, pivot_angle
 from cfmkit.families.cam.block_forces import Forces, Slab, tangents
+from cfmkit.families.cam.geometry.path import ideal_position
+from cfmkit.families.cam.geometry.track import Pivot, pivot_angle
 from cfmkit.numerics.roots import invert_increasing
 
 if TYPE_CHECKING:
@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from cfmkit.bodies.cam_cut import CamProfile
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
+    from cfmkit.families.cam.geometry.cut import CamProfile
 
 _LOOKED_AT = 65
 """Places on the corner and on the flank at which the slider must rise and friction must not hold the roller."""

@@ -12,22 +12,22 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.bodies.cam_cut import WholeCamUndercut, cut
-from cfmkit.bodies.cam_path import reach
-from cfmkit.bodies.cam_profile import SlopeLaw
-from cfmkit.bodies.cam_track import Pivot, Track, pivot_angle
-from cfmkit.bodies.track_states import NoTrack
 from cfmkit.families.cam.block_forces import Forces, Slab, force_at, tangents
 from cfmkit.families.cam.build import CLOSE
+from cfmkit.families.cam.geometry.cut import WholeCamUndercut, cut
+from cfmkit.families.cam.geometry.path import reach
+from cfmkit.families.cam.geometry.profile import SlopeLaw
+from cfmkit.families.cam.geometry.track import Pivot, Track, pivot_angle
+from cfmkit.families.cam.geometry.track_states import NoTrack
 from cfmkit.families.cam.statics import jams
 from cfmkit.numerics import sampled
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from cfmkit.bodies.track_states import TrackStates
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.families.cam.block_forces import Designs
+    from cfmkit.families.cam.geometry.track_states import TrackStates
 
 PEAK = 129
 """Samples on the corner among which the largest force is looked for."""

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.families.base import Measure
     from cfmkit.families.cam.block_forces import Designs, Slab
     from cfmkit.families.cam.block_windows import Spread

@@ -12,7 +12,7 @@ from cfmkit.metrics.closed import extremes
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
 
     Exact = Callable[[FloatArray], FloatArray]
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from cfmkit.bodies.cam_cut import CamProfile, WholeCamUndercut, cut
-from cfmkit.bodies.cam_path import Path, reach
-from cfmkit.bodies.cam_profile import SlopeLaw
-from cfmkit.bodies.cam_track import Track
-from cfmkit.bodies.track_states import NoTrack
 from cfmkit.families.cam.findings import finding
+from cfmkit.families.cam.geometry.cut import CamProfile, WholeCamUndercut, cut
+from cfmkit.families.cam.geometry.path import Path, reach
+from cfmkit.families.cam.geometry.profile import SlopeLaw
+from cfmkit.families.cam.geometry.track import Track
+from cfmkit.families.cam.geometry.track_states import NoTrack
 from cfmkit.families.cam.statics import GRAVITY, Loads
 from cfmkit.families.findings import mm
 from cfmkit.families.refusals import CannotBuild

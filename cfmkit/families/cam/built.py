@@ -18,9 +18,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.bodies.cam_built import BuiltTrack, built_flank, built_track
-from cfmkit.bodies.cam_flank import DesignFlank
-from cfmkit.bodies.cam_profile import brace_tangent
 from cfmkit.curves import Column, Curve
 from cfmkit.errors import DataError
 from cfmkit.families.cam.build import Assembly, assemble, displacement_origin
@@ -29,6 +26,9 @@ from cfmkit.families.cam.checks import left_out
 from cfmkit.families.cam.contact import allowable_stress, stress
 from cfmkit.families.cam.existence import check_first_pose, check_springs, until_overlap
 from cfmkit.families.cam.findings import finding
+from cfmkit.families.cam.geometry.built_track import BuiltTrack, built_flank, built_track
+from cfmkit.families.cam.geometry.flank import DesignFlank
+from cfmkit.families.cam.geometry.profile import brace_tangent
 from cfmkit.families.cam.values import DEFINITIONS, design_values, largest
 from cfmkit.families.findings import mm
 from cfmkit.families.refusals import CannotBuild, no_result
@@ -40,7 +40,7 @@ from cfmkit.tables.source import DataSource
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.families.cam.spec import CamSpec
     from cfmkit.families.cam.statics import Loads
     from cfmkit.results import Finding

@@ -11,14 +11,14 @@ from cfmkit.families.cam.findings import finding
 from cfmkit.families.findings import mm
 from cfmkit.numerics.robust import neighbour_noise
 from cfmkit.results import Quantity
-from cfmkit.units import between
+from cfmkit.specs.units import between
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
     from numpy.typing import NDArray
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.families.cam.built import Built
     from cfmkit.results import Finding
 

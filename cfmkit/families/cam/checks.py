@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.families.cam.model import Solution
     from cfmkit.families.cam.spec import CamSpec
     from cfmkit.results import Finding

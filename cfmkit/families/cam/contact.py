@@ -20,9 +20,9 @@ from cfmkit.families.cam.findings import finding
 from cfmkit.families.findings import mm, mpa
 
 if TYPE_CHECKING:
-    from cfmkit.bodies.track_states import TrackStates
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.families.cam.build import Assembly
+    from cfmkit.families.cam.geometry.track_states import TrackStates
     from cfmkit.families.cam.spec import Contact, Mechanism
     from cfmkit.results import Finding
 

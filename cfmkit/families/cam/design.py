@@ -18,11 +18,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.bodies.cam_path import reach
-from cfmkit.bodies.cam_profile import SlopeLaw, brace_tangent
 from cfmkit.families.cam.build import CLOSE, assemble_sides, check_start, hanging_weights
 from cfmkit.families.cam.existence import rollers_overlap
 from cfmkit.families.cam.findings import finding
+from cfmkit.families.cam.geometry.path import reach
+from cfmkit.families.cam.geometry.profile import SlopeLaw, brace_tangent
 from cfmkit.families.cam.outline import plate_notes
 from cfmkit.families.findings import at_least, at_most, mm, newton, rate
 from cfmkit.families.refusals import CannotBuild, Infeasible, no_design

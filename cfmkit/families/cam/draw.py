@@ -19,7 +19,7 @@ from cfmkit.plots.loop import loop_figure
 from cfmkit.plots.place import place_labels
 from cfmkit.plots.style import BLUE, GREY, OCHRE, PURPLE, TROUBLE, VERMILLION, new_figure, styled
 from cfmkit.plots.text import Heading, finite_range, right_axis, top_axis, value_text, write_heading
-from cfmkit.units import to_border
+from cfmkit.specs.units import to_border
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.families.cam.model import Solution
     from cfmkit.families.cam.pose import Scene
     from cfmkit.plots.place import Label

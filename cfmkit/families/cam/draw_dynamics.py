@@ -15,7 +15,7 @@ from cfmkit.plots.loop import loop_figure
 from cfmkit.plots.place import Label, place_labels
 from cfmkit.plots.style import BLUE, GREY, PURPLE, VERMILLION, styled
 from cfmkit.plots.text import Heading, value_text
-from cfmkit.units import to_border
+from cfmkit.specs.units import to_border
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.families.cam.dynamics.solution import Moved
     from cfmkit.results import Result
 

@@ -17,9 +17,9 @@ from cfmkit.families.findings import mm
 from cfmkit.families.refusals import CannotBuild
 
 if TYPE_CHECKING:
-    from cfmkit.bodies.cam_cut import CamProfile
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.families.cam.build import Assembly
+    from cfmkit.families.cam.geometry.cut import CamProfile
     from cfmkit.families.cam.spec import Mechanism
     from cfmkit.results import Finding
 

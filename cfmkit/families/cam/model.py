@@ -19,13 +19,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.bodies.cam_profile import brace_tangent
-from cfmkit.curves import Column, Curve, FloatArray
+from cfmkit.curves import Column, Curve
 from cfmkit.families.cam.build import CLOSE, Assembly, assemble, displacement_origin
 from cfmkit.families.cam.checks import findings_of, left_out
 from cfmkit.families.cam.contact import allowable_stress, stress
 from cfmkit.families.cam.existence import check_first_pose, check_springs
 from cfmkit.families.cam.findings import finding
+from cfmkit.families.cam.geometry.profile import brace_tangent
 from cfmkit.families.cam.places import Places
 from cfmkit.families.cam.statics import Forces, forces, jams
 from cfmkit.families.cam.values import contact_pressure, theoretical_force, values_of
@@ -34,8 +34,9 @@ from cfmkit.families.refusals import CannotBuild, no_result
 from cfmkit.results import Result, Status
 
 if TYPE_CHECKING:
-    from cfmkit.bodies.track_states import TrackStates
+    from cfmkit.arrays import FloatArray
     from cfmkit.families.base import Run
+    from cfmkit.families.cam.geometry.track_states import TrackStates
     from cfmkit.families.cam.manufacturing.band import Band
     from cfmkit.families.cam.spec import CamSpec
     from cfmkit.results import Finding

@@ -12,17 +12,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.export.geometry import TOLERANCE, Arc, Contour, Curve2D, Drawing, Edge, Line, Smooth
 from cfmkit.families.cam.build import assemble_sides
 from cfmkit.families.cam.existence import flanks_crossing
 from cfmkit.families.findings import mm
 from cfmkit.families.refusals import CannotBuild
-from cfmkit.geometry import TOLERANCE, Arc, Contour, Curve2D, Drawing, Edge, Line, Smooth
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from cfmkit.bodies.cam_cut import CamProfile
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
+    from cfmkit.families.cam.geometry.cut import CamProfile
     from cfmkit.families.cam.spec import CamSpec, Plate
 
     Profiles = tuple[CamProfile, CamProfile]

@@ -17,8 +17,8 @@ from cfmkit.families.cam.contact import flank_pressure, stress
 from cfmkit.families.cam.statics import forces
 
 if TYPE_CHECKING:
-    from cfmkit.bodies.track_states import TrackStates
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
+    from cfmkit.families.cam.geometry.track_states import TrackStates
     from cfmkit.families.cam.model import Solution
     from cfmkit.families.cam.statics import Forces
 

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.curves import Curve
+from cfmkit.export.geometry import polygons
 from cfmkit.families.cam.outline import plate_contours
 from cfmkit.families.cam.statics import forces
-from cfmkit.geometry import polygons
-from cfmkit.units import format_short
+from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.families.cam.model import Solution
 
 Point = tuple[float, float]

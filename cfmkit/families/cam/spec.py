@@ -8,10 +8,10 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from cfmkit.families.cam.manufacturing.spec import Manufacturing
-from cfmkit.materials.spec import MaterialField, MaterialSpec, SafetyFactor
-from cfmkit.spec import Analysis, Model, OldWords, Spec, refuse
+from cfmkit.specs.spec import Analysis, Model, OldWords, Spec, refuse
+from cfmkit.specs.units import Angle, Force, Inertia, Length, Mass, Ratio, Stiffness, Time, format_short
+from cfmkit.stock.spec import MaterialField, MaterialSpec, SafetyFactor
 from cfmkit.tables.source import DataSource
-from cfmkit.units import Angle, Force, Inertia, Length, Mass, Ratio, Stiffness, Time, format_short
 
 Positive = Field(gt=0)
 PositiveLength = Annotated[Length, Field(gt=0)]

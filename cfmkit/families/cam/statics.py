@@ -26,14 +26,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.bodies.cam_profile import brace_tangent
+from cfmkit.families.cam.geometry.profile import brace_tangent
 from cfmkit.numerics.roots import bracketed_root
 
 if TYPE_CHECKING:
-    from cfmkit.bodies.cam_profile import Real
-    from cfmkit.bodies.cam_track import Track
-    from cfmkit.bodies.track_states import Stretch, TrackStates
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
+    from cfmkit.families.cam.geometry.profile import Real
+    from cfmkit.families.cam.geometry.track import Track
+    from cfmkit.families.cam.geometry.track_states import Stretch, TrackStates
 
 GRAVITY = 9.81
 """Standard acceleration used throughout [m/s^2]."""

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.families.cam.build import Assembly
     from cfmkit.families.cam.model import Solution
     from cfmkit.families.cam.statics import Forces

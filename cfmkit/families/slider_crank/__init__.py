@@ -31,7 +31,7 @@ FAMILY = Family(
     draw="cfmkit.families.slider_crank.draw",
     outline="cfmkit.families.slider_crank.outline",
     headline=("stiffness_class", "band_range_05pct", "half_band", "energy_max", "crank_pin_rotation_max"),
-    template="cfmkit/templates/slider-crank.yaml",
+    template="cfmkit/families/slider_crank/template.yaml",
     findings=FINDINGS,
     references=(
         "B. Li, G. Hao, Chin. J. Mech. Eng. 32 (2019), doi:10.1186/s10033-019-0369-z",

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.bodies.slider_crank_springs import JOINTS
 from cfmkit.families.base import BlockAnswer
 from cfmkit.families.refusals import CannotBuild
 from cfmkit.families.slider_crank.block_bands import edges
@@ -28,6 +27,7 @@ from cfmkit.families.slider_crank.model import (
     target_of,
     window_of,
 )
+from cfmkit.families.slider_crank.unit_springs import JOINTS
 from cfmkit.metrics.closed import extremes
 from cfmkit.numerics.extrema import Monotone, sharpened
 
@@ -36,11 +36,11 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from cfmkit.bodies.slider_crank_springs import UnitCurves
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.families.base import Block, Measure
     from cfmkit.families.slider_crank.build import Assembly
     from cfmkit.families.slider_crank.spec import SliderCrankSpec
+    from cfmkit.families.slider_crank.unit_springs import UnitCurves
 
 LEGS = "mechanism.legs"
 """What this model can vary besides `RATES`."""

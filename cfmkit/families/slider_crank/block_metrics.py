@@ -13,7 +13,7 @@ import numpy as np
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
 
 
 @dataclass(frozen=True)

@@ -8,14 +8,21 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from cfmkit.bodies.slider_crank import Linkage
-from cfmkit.bodies.slider_crank_springs import UnitCurves, along_crank, along_slider, crank_efforts, slider_forces
 from cfmkit.families.findings import deg, mm
 from cfmkit.families.refusals import CannotBuild
 from cfmkit.families.slider_crank.findings import finding
+from cfmkit.families.slider_crank.linkage import Linkage
+from cfmkit.families.slider_crank.unit_springs import (
+    UnitCurves,
+    along_crank,
+    along_slider,
+    crank_efforts,
+    slider_forces,
+)
 
 if TYPE_CHECKING:
-    from cfmkit.curves import FloatArray, Kind
+    from cfmkit.arrays import FloatArray
+    from cfmkit.curves import Kind
     from cfmkit.families.slider_crank.spec import Mechanism, SliderCrankSpec
 
 TURN = 2.0 * math.pi

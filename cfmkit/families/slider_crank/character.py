@@ -23,7 +23,7 @@ from cfmkit.numerics.roots import bracketed_root
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.families.slider_crank.build import Assembly
 
 GRID = 1025

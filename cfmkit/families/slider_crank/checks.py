@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.bodies.slider_crank_springs import JOINTS
 from cfmkit.families.findings import deg, mm, newton
 from cfmkit.families.slider_crank.build import TURN
 from cfmkit.families.slider_crank.classes import BISTABLE, BOUNDARY, SNAPS, TRISTABLE
 from cfmkit.families.slider_crank.findings import finding
-from cfmkit.units import format_short
+from cfmkit.families.slider_crank.unit_springs import JOINTS
+from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -19,7 +19,7 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.numerics.extrema import Monotone
 
 CLASSES = ("positive", "zero", "local negative", "snap-through", "bistable", "tristable")

@@ -17,7 +17,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.bodies.slider_crank_springs import JOINTS
 from cfmkit.families.refusals import CannotBuild, Infeasible, no_design
 from cfmkit.families.slider_crank.build import TURN, default_motion, resolve
 from cfmkit.families.slider_crank.character import EDGE
@@ -39,10 +38,11 @@ from cfmkit.families.slider_crank.solved import (
     too_far,
 )
 from cfmkit.families.slider_crank.targets import DENSE, FREE, task_of, with_lengths
+from cfmkit.families.slider_crank.unit_springs import JOINTS
 from cfmkit.families.slider_crank.windows import widest, widest_of_all
 from cfmkit.numerics.boxes import Axis, Lowest, lowest
 from cfmkit.results import Design, Status
-from cfmkit.units import Place
+from cfmkit.specs.units import Place
 
 if TYPE_CHECKING:
     from cfmkit.families.base import Run

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.bodies.slider_crank_springs import JOINTS
 from cfmkit.families.slider_crank.classes import NEGATIVE
 from cfmkit.families.slider_crank.flexures.solution import Printed
 from cfmkit.families.slider_crank.pose import KEY_ROOM, Scene, key_positions, scene, torsion_spring
+from cfmkit.families.slider_crank.unit_springs import JOINTS
 from cfmkit.plots import parts
 from cfmkit.plots.bands import limits_on
 from cfmkit.plots.curves import Look, plot_curve
@@ -19,7 +19,7 @@ from cfmkit.plots.loop import loop_figure
 from cfmkit.plots.place import Label, place_labels
 from cfmkit.plots.style import BLUE, BROWN, GREY, INK, OCHRE, PURPLE, VERMILLION, axes_mm, new_figure, styled
 from cfmkit.plots.text import Heading, value_text, write_heading
-from cfmkit.units import to_border
+from cfmkit.specs.units import to_border
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.bodies.slider_crank_springs import JOINTS
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.rates import preferred, ranges
 from cfmkit.families.slider_crank.targets import FREE, task_of, with_lengths
-from cfmkit.units import format_short
+from cfmkit.families.slider_crank.unit_springs import JOINTS
+from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.families.slider_crank.rates import Goal
     from cfmkit.families.slider_crank.solved import Solved
     from cfmkit.families.slider_crank.spec import CrankDesign, SliderCrankSpec

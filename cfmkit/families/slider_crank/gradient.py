@@ -17,7 +17,7 @@ from cfmkit.families.slider_crank.model import RATES, efforts_inside, reference_
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.families.slider_crank.model import Solution
     from cfmkit.families.slider_crank.spec import SliderCrankSpec
 

@@ -17,8 +17,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.bodies.slider_crank_springs import JOINTS
-from cfmkit.curves import Column, Curve, FloatArray
+from cfmkit.curves import Column, Curve
 from cfmkit.families.findings import deg, mm
 from cfmkit.families.refusals import CannotBuild, no_result
 from cfmkit.families.slider_crank.build import TURN, assemble, default_motion, resolve
@@ -26,17 +25,19 @@ from cfmkit.families.slider_crank.character import Character, Equilibrium
 from cfmkit.families.slider_crank.checks import findings_of
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.reactions import reactions
+from cfmkit.families.slider_crank.unit_springs import JOINTS
 from cfmkit.families.slider_crank.values import values_of
 from cfmkit.results import Result, Status
-from cfmkit.units import between
+from cfmkit.specs.units import between
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from cfmkit.bodies.slider_crank_springs import UnitCurves
+    from cfmkit.arrays import FloatArray
     from cfmkit.families.base import Run
     from cfmkit.families.slider_crank.build import Assembly
     from cfmkit.families.slider_crank.spec import SliderCrankSpec
+    from cfmkit.families.slider_crank.unit_springs import UnitCurves
     from cfmkit.results import Finding
 
 

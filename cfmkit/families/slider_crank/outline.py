@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.export.geometry import TOLERANCE, Arc, Contour, Curve2D, Drawing, Line, circle, polygon
 from cfmkit.families.slider_crank.build import linkage_of, resolve, unloaded_angle
 from cfmkit.families.slider_crank.flexures.assembly import corners, flexures_of, strip_of
-from cfmkit.geometry import TOLERANCE, Arc, Contour, Curve2D, Drawing, Line, circle, polygon
 
 if TYPE_CHECKING:
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.families.slider_crank.flexures.chain import Strip
     from cfmkit.families.slider_crank.spec import SliderCrankSpec
 

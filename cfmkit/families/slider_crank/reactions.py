@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from cfmkit.bodies.slider_crank import Linkage
-    from cfmkit.bodies.slider_crank_springs import UnitCurves
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.families.slider_crank.build import Assembly
+    from cfmkit.families.slider_crank.linkage import Linkage
+    from cfmkit.families.slider_crank.unit_springs import UnitCurves
 
 
 def reactions(assembly: Assembly, units: UnitCurves, drive: FloatArray) -> tuple[FloatArray, FloatArray]:

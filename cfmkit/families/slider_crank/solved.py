@@ -5,18 +5,18 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from cfmkit.bodies.slider_crank_springs import JOINTS
 from cfmkit.families.findings import percent
 from cfmkit.families.refusals import Infeasible
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.targets import FREE
+from cfmkit.families.slider_crank.unit_springs import JOINTS
 from cfmkit.families.slider_crank.windows import widest
 from cfmkit.metrics import Window, evaluate
 from cfmkit.results import Quantity, Searched
-from cfmkit.units import format_short
+from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.families.slider_crank.spec import CrankDesign, SliderCrankSpec
     from cfmkit.families.slider_crank.targets import Task
     from cfmkit.results import Finding

@@ -8,8 +8,8 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from cfmkit.families.slider_crank.flexures.spec import Printed, PrintedAnalysis, PrintedDesign
-from cfmkit.spec import Model, Spec, refuse
-from cfmkit.units import Angle, Force, Length, Ratio, RotationalStiffness, Stiffness, Torque
+from cfmkit.specs.spec import Model, Spec, refuse
+from cfmkit.specs.units import Angle, Force, Length, Ratio, RotationalStiffness, Stiffness, Torque
 
 PositiveLength = Annotated[Length, Field(gt=0)]
 PositiveAngle = Annotated[Angle, Field(gt=0)]

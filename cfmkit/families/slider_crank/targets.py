@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.bodies.slider_crank_springs import JOINTS
 from cfmkit.families.refusals import Infeasible
 from cfmkit.families.slider_crank.build import assemble
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.rates import Goal
+from cfmkit.families.slider_crank.unit_springs import JOINTS
 
 if TYPE_CHECKING:
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.families.slider_crank.build import Assembly
     from cfmkit.families.slider_crank.spec import CrankDesign, SliderCrankSpec
 

@@ -23,7 +23,7 @@ from cfmkit.families.slider_crank.rates import minimax
 from cfmkit.families.slider_crank.targets import DENSE
 
 if TYPE_CHECKING:
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.families.slider_crank.targets import Task
 
 COARSE = 48

@@ -33,7 +33,7 @@ FAMILY = Family(
         "travel_safety_factor",
     ),
     branches=("load",),
-    template="cfmkit/templates/vcfm.yaml",
+    template="cfmkit/families/vcfm/template.yaml",
     findings=FINDINGS,
     references=(
         "B. Ding, X. Li, Y. Li, Configuration design and experimental verification of a variable constant-force "

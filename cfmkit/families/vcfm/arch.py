@@ -21,7 +21,7 @@ import numpy as np
 from cfmkit.families.vcfm.sbranch import BUCKLED, POLE
 
 if TYPE_CHECKING:
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.families.vcfm.strip import Strip
 
 _LOOSE = 1e5  # tension down to z = -1e5: strains beyond anything that bends

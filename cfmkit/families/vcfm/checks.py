@@ -29,7 +29,7 @@ from cfmkit.families.vcfm.vbeam import (
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.families.vcfm.model import Push, Solution
     from cfmkit.results import Finding
 

@@ -27,8 +27,8 @@ from cfmkit.families.vcfm.springs import Diamond
 from cfmkit.families.vcfm.strip import Strip
 from cfmkit.families.vcfm.vbeam import critical_force, onset_and_exit, overrated
 from cfmkit.results import Design, Status
-from cfmkit.units import format_short
-from cfmkit.units.windows import Share
+from cfmkit.specs.units import format_short
+from cfmkit.specs.units.windows import Share
 
 if TYPE_CHECKING:
     from cfmkit.families.base import Run

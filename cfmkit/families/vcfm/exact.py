@@ -21,7 +21,7 @@ from cfmkit.families.vcfm.traced import traced
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.elastica import Network
     from cfmkit.families.base import Run
     from cfmkit.families.vcfm.spec import VcfmSpec

@@ -24,14 +24,14 @@ from cfmkit.families.vcfm.windows import extreme, flat_window
 from cfmkit.metrics.ends import last_places
 from cfmkit.numerics.roots import bracketed_root
 from cfmkit.results import Result, Status
-from cfmkit.units import between
+from cfmkit.specs.units import between
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from numpy.typing import NDArray
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.families.base import Run
     from cfmkit.families.vcfm.parts import Parts
     from cfmkit.families.vcfm.samples import Character, Sampler, Samples

@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.export.geometry import TOLERANCE, Arc, Contour, Curve2D, Drawing, Edge, Line, Smooth
 from cfmkit.families.vcfm.parts import RIM, strip_of
-from cfmkit.geometry import TOLERANCE, Arc, Contour, Curve2D, Drawing, Edge, Line, Smooth
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.families.vcfm.spec import VcfmSpec
 
 GAP = 0.01

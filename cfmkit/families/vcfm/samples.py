@@ -10,7 +10,7 @@ import numpy as np
 from cfmkit.families.vcfm.vbeam import VBeam
 
 if TYPE_CHECKING:
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.families.vcfm.parts import Parts
 
 

@@ -15,7 +15,7 @@ from cfmkit.families.vcfm.parts import RIM
 from cfmkit.families.vcfm.shapes import bent_leaf, centre_line, u_chain
 
 if TYPE_CHECKING:
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.families.vcfm.model import Solution
     from cfmkit.families.vcfm.spec import Bistable
 

@@ -18,7 +18,7 @@ from cfmkit.families.vcfm.truss import TrussLeaf
 from cfmkit.families.vcfm.vbeam import VBeam, critical_force
 
 if TYPE_CHECKING:
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.families.vcfm.strip import Strip
 
 POINTS = 81

@@ -8,9 +8,9 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
-from cfmkit.materials.spec import MaterialSpec, PositiveStress, SafetyFactor, material_input
-from cfmkit.spec import Analysis, Model, Spec, refuse
-from cfmkit.units import Angle, Force, Length, Ratio, Stiffness
+from cfmkit.specs.spec import Analysis, Model, Spec, refuse
+from cfmkit.specs.units import Angle, Force, Length, Ratio, Stiffness
+from cfmkit.stock.spec import MaterialSpec, PositiveStress, SafetyFactor, material_input
 
 PositiveLength = Annotated[Length, Field(gt=0)]
 NonNegativeLength = Annotated[Length, Field(ge=0)]

@@ -21,7 +21,7 @@ import numpy as np
 from cfmkit.families.vcfm.sbranch import s_force
 
 if TYPE_CHECKING:
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.families.vcfm.strip import Strip
 
 

@@ -15,7 +15,7 @@ from cfmkit.tables import Table, TableColumn, border_column
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.families.vcfm.model import Push, Solution
 
 PLACES = 201

@@ -21,7 +21,7 @@ from cfmkit.numerics.panels import Panels, coefficients, nodes_of
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.elastica import Network, Path
 
 DOWN = -0.5 * np.pi

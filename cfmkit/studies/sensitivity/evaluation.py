@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.studies.engine import Records
     from cfmkit.studies.rows import Rows
     from cfmkit.studies.sensitivity.parameters import Parameter

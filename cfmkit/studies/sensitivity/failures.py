@@ -21,7 +21,7 @@ import numpy as np
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
 
 Policy = Literal["fail", "resample", "bound"]
 POLICIES: tuple[Policy, ...] = ("fail", "resample", "bound")

@@ -7,13 +7,13 @@ from functools import cached_property
 from math import isfinite
 from typing import TYPE_CHECKING
 
+from cfmkit.specs.units import border_unit, to_border
 from cfmkit.studies.sensitivity.sobol import varies_not
-from cfmkit.units import border_unit, to_border
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.studies.sensitivity.evaluation import Evaluator
     from cfmkit.studies.sensitivity.failures import Analysis
     from cfmkit.studies.sensitivity.setup import Setup

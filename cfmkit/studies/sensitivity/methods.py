@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.families import family
+from cfmkit.specs.units import border_unit, to_border
 from cfmkit.studies.sensitivity import local, morris, oat, sobol, tolerance
 from cfmkit.studies.sensitivity.evaluation import Evaluator, Interrupted
 from cfmkit.studies.sensitivity.failures import evaluated, nothing, stated
@@ -15,14 +16,13 @@ from cfmkit.studies.sensitivity.findings import Findings, Line, lines_of
 from cfmkit.studies.sensitivity.findings import stated as told
 from cfmkit.studies.sensitivity.spreads import draw, values_across, values_at
 from cfmkit.studies.study import Metric
-from cfmkit.units import border_unit, to_border
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
 
     from numpy.typing import NDArray
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.studies.engine import Records, Work
     from cfmkit.studies.sensitivity.failures import Analysis
     from cfmkit.studies.sensitivity.parameters import Parameter

@@ -20,7 +20,7 @@ from cfmkit.studies.sensitivity.failures import Analysis, Index
 from cfmkit.studies.sensitivity.sobol import RESAMPLES, problem
 
 if TYPE_CHECKING:
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
 
 MU_STAR, MU, SIGMA = "mu_star", "mu", "sigma"
 NAMES = (MU_STAR, MU, SIGMA)

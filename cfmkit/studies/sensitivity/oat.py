@@ -14,7 +14,7 @@ import numpy as np
 from cfmkit.studies.sensitivity.failures import Analysis, Index
 
 if TYPE_CHECKING:
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.studies.sensitivity.failures import Policy
 
 LOW, HIGH, SWING, SLOPE = "at_low_end", "at_high_end", "swing", "normalised_slope"

@@ -33,8 +33,8 @@ POLICIES = {
 
 def outputs(found: Findings) -> Iterator[tuple[str, Data]]:
     """Yield every file of a study but the pictures as (name, content)."""
-    from cfmkit.jsontext import json_bytes
-    from cfmkit.yamlio import dump
+    from cfmkit.specs.yamlio import dump
+    from cfmkit.tables.jsontext import json_bytes
 
     spec = found.setup.study.spec
     yield "results.csv", results_csv(found)

@@ -8,16 +8,16 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from cfmkit.errors import Problem, QuantityError, SpecError
-from cfmkit.spec import Tolerance
+from cfmkit.specs.spec import Tolerance
+from cfmkit.specs.units import read_number, read_quantity
 from cfmkit.studies.leaves import CannotVary, Leaf, leaf
 from cfmkit.studies.sensitivity.spreads import Incompatible, Spread, correlation_matrix
-from cfmkit.units import read_number, read_quantity
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
-    from cfmkit.curves import FloatArray
-    from cfmkit.spec import Sensitivity, Spec
+    from cfmkit.arrays import FloatArray
+    from cfmkit.specs.spec import Sensitivity, Spec
 
 Place = tuple[str | int, ...]
 
@@ -34,7 +34,7 @@ class Parameter:
     path : str
         Dotted.
     dimension : str
-        Of `cfmkit.units`.
+        Of `cfmkit.specs.units`.
     spread : Spread
         How it is distributed [SI].
     place : bool

@@ -13,23 +13,24 @@ from cfmkit.families import family
 from cfmkit.metrics import check, values_of_family
 from cfmkit.metrics.limits import Limits
 from cfmkit.results import Finding
+from cfmkit.specs.units import Share, border_unit, format_short, to_border
 from cfmkit.studies.columns import metrics_of
 from cfmkit.studies.plan import MOST_POINTS, refuse_too_many
 from cfmkit.studies.sensitivity.parameters import correlations, parameters_of, together
 from cfmkit.studies.study import Study
-from cfmkit.units import Share, border_unit, format_short, to_border
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from cfmkit.curves import Curve, FloatArray
+    from cfmkit.arrays import FloatArray
+    from cfmkit.curves import Curve
     from cfmkit.metrics import Outcome
     from cfmkit.results import Quantity, Result
-    from cfmkit.spec import Requirement, Sensitivity, Spec
+    from cfmkit.specs.spec import Requirement, Sensitivity, Spec
+    from cfmkit.specs.units import Ends
     from cfmkit.studies.sensitivity.failures import Policy
     from cfmkit.studies.sensitivity.parameters import Parameter
     from cfmkit.studies.study import Metric
-    from cfmkit.units import Ends
 
 Method = Literal["oat", "local", "morris", "sobol", "tolerance"]
 SAMPLES = {"oat": 11, "local": 2, "morris": 20, "sobol": 256, "tolerance": 1000}

@@ -18,7 +18,7 @@ import numpy as np
 from cfmkit.studies.sensitivity.failures import Analysis, Index, nothing
 
 if TYPE_CHECKING:
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
 
 FIRST, TOTAL = "first_order", "total_order"
 NAMES = (FIRST, TOTAL)

@@ -15,7 +15,7 @@ import numpy as np
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
 
 COVERED = 3.0
 """Standard deviations on either side that stand for the range of a normal parameter."""

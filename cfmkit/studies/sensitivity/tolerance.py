@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.studies.sensitivity.failures import Policy
     from cfmkit.studies.sensitivity.intervals import Interval
     from cfmkit.studies.sensitivity.spreads import Spread

@@ -28,7 +28,7 @@ from cfmkit.results import Quantity, Result, Status
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.families.base import Run
     from cfmkit.results import Finding
     from cfmkit_oblique.spec import ObliqueSpec

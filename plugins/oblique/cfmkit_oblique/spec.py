@@ -6,8 +6,8 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from cfmkit.spec import Analysis, Model, Spec
-from cfmkit.units import Force, Length, Ratio, Stiffness
+from cfmkit.specs.spec import Analysis, Model, Spec
+from cfmkit.specs.units import Force, Length, Ratio, Stiffness
 
 PositiveLength = Annotated[Length, Field(gt=0)]
 

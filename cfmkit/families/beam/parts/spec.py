@@ -8,10 +8,8 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, field_validator, model_validator
 
 from cfmkit.families.beam.parts.faults import HELD
-from cfmkit.materials.library import material
-from cfmkit.materials.spec import MaterialSpec, material_input
-from cfmkit.spec import Model
-from cfmkit.units import (
+from cfmkit.specs.spec import Model
+from cfmkit.specs.units import (
     Angle,
     Density,
     Force,
@@ -24,6 +22,8 @@ from cfmkit.units import (
     Stiffness,
     Torque,
 )
+from cfmkit.stock.materials import material
+from cfmkit.stock.spec import MaterialSpec, material_input
 
 PositiveLength = Annotated[Length, Field(gt=0)]
 Point = tuple[Length, Length]

@@ -18,7 +18,7 @@ from cfmkit.families.beam.build import thickest_of
 from cfmkit.families.beam.shaping.separation import pairs
 
 if TYPE_CHECKING:
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.elastica import Path
     from cfmkit.families.beam.shaping.search import Found
     from cfmkit.families.beam.shaping.separation import Pair

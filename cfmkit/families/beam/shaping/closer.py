@@ -16,7 +16,7 @@ from cfmkit.elastica import Control, Displacement, PathStatus, trace
 from cfmkit.errors import CfmError
 
 if TYPE_CHECKING:
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.elastica import Network
     from cfmkit.families.beam.shaping.task import Task
 

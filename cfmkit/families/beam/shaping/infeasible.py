@@ -13,7 +13,7 @@ from cfmkit.families.beam.shaping.program import Shaping
 from cfmkit.families.beam.shaping.search import VIOLATION, Found, Plan, met
 from cfmkit.families.beam.shaping.variables import Variables
 from cfmkit.families.beam.words import percent
-from cfmkit.units import format_short
+from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping

@@ -19,7 +19,7 @@ from cfmkit.families.beam.shaping.search import PLACES, Found
 from cfmkit.families.beam.shaping.variables import Variables
 from cfmkit.families.beam.words import percent
 from cfmkit.metrics import Window, evaluate
-from cfmkit.units import format_short
+from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

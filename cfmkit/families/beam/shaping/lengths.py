@@ -10,7 +10,7 @@ import numpy as np
 from cfmkit.elastica.model.beam import fit
 
 if TYPE_CHECKING:
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.elastica import Network
     from cfmkit.families.beam.shaping.variables import Variables
 

@@ -14,7 +14,7 @@ from cfmkit.numerics.sampled import largest
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.elastica import Section
     from cfmkit.families.beam.shaping.lengths import Length
     from cfmkit.families.beam.shaping.poses import Poses

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.curves import read_only
+from cfmkit.arrays import read_only
 from cfmkit.numerics.quadrature import clenshaw_curtis
 
 if TYPE_CHECKING:
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.families.beam.shaping.task import Task
 
 _EACH = 8  # poses of the window for one before it

@@ -16,7 +16,7 @@ from cfmkit.families.beam.shaping.poses import Poses, poses_of
 from cfmkit.families.beam.shaping.response import NoAnswer, respond
 
 if TYPE_CHECKING:
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.families.beam.shaping.goals import Aim, Goal
     from cfmkit.families.beam.shaping.variables import Variables
 

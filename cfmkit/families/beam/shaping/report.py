@@ -10,7 +10,7 @@ from cfmkit.families.base import Run
 from cfmkit.families.beam.model import analyze
 from cfmkit.metrics import Window, evaluate
 from cfmkit.results import Quantity, Searched
-from cfmkit.units import format_short
+from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -13,7 +13,7 @@ from cfmkit.errors import CfmError
 from cfmkit.families.beam.shaping.lengths import Length, lengths
 
 if TYPE_CHECKING:
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.elastica import Path, Section
     from cfmkit.families.beam.shaping.variables import Variables
 

@@ -27,7 +27,7 @@ from cfmkit.numerics.sqp import Effort, Optimum, minimize
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.families.beam.shaping.task import Task
 
 VIOLATION = 1e-4

@@ -19,7 +19,7 @@ from cfmkit.numerics.sampled import soft_least
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.elastica import Network
     from cfmkit.families.beam.shaping.limits import View
 

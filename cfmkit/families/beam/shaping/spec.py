@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from cfmkit.spec import Model, refuse
-from cfmkit.units import Angle, Force, Length, Ratio, Time
+from cfmkit.specs.spec import Model, refuse
+from cfmkit.specs.units import Angle, Force, Length, Ratio, Time
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

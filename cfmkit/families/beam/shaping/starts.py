@@ -12,7 +12,7 @@ from cfmkit.families.beam.build import thickest_of
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.elastica import Network
     from cfmkit.families.beam.shaping.variables import Variables
 

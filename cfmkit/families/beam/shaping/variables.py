@@ -19,7 +19,7 @@ import numpy as np
 from cfmkit.elastica import Network, Polynomial
 
 if TYPE_CHECKING:
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.families.beam.shaping.task import Task
 
 

@@ -10,7 +10,7 @@ import numpy as np
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.families.beam.surface.spec import FileProfile, FormulaProfile, Surface
 
 LOOKED_AT = 4001
@@ -61,7 +61,7 @@ def course_of(surface: Surface) -> Course:
 
 
 def _of_formula(given: FormulaProfile) -> Course:
-    from cfmkit.numerics.formula import formula, slope
+    from cfmkit.specs.formula import formula, slope
 
     height, rise = formula(given.height), slope(given.height)
     rows = np.linspace(0.0, given.length, given.points)

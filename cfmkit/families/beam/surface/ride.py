@@ -25,12 +25,12 @@ from cfmkit.families.beam.findings import finding
 from cfmkit.families.beam.surface.course import LOOKED_AT, course_of, largest
 from cfmkit.numerics.cubic import bisect, values_at
 from cfmkit.results import Quantity
-from cfmkit.units import format_short
+from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.families.beam.model import Solution
     from cfmkit.families.beam.surface.course import Course
     from cfmkit.families.beam.surface.spec import Surface

@@ -8,11 +8,11 @@ import numpy as np
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from cfmkit.families.beam.parts.spec import PositiveLength
-from cfmkit.numerics.formula import formula
-from cfmkit.spec import Model, refuse
+from cfmkit.specs.formula import formula
+from cfmkit.specs.spec import Model, refuse
+from cfmkit.specs.units import Length, Ratio
+from cfmkit.specs.units.fields import LARGEST
 from cfmkit.tables.source import DataSource
-from cfmkit.units import Length, Ratio
-from cfmkit.units.fields import LARGEST
 
 
 class FileProfile(Model):

@@ -16,9 +16,9 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from cfmkit.bodies.cam_cut import CamProfile
-    from cfmkit.bodies.cam_track import Track
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
+    from cfmkit.families.cam.geometry.cut import CamProfile
+    from cfmkit.families.cam.geometry.track import Track
 
     ComplexArray = NDArray[np.complex128]
 

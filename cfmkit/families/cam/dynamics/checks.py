@@ -11,7 +11,7 @@ from cfmkit.families.cam.dynamics.build import slender_rod, solid_cylinder
 from cfmkit.families.cam.dynamics.values import contact_pressure
 from cfmkit.families.cam.findings import finding
 from cfmkit.families.findings import mm, newton
-from cfmkit.units import format_short
+from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -16,12 +16,12 @@ from cfmkit.families.cam.existence import flanks_cross, rollers_overlap
 from cfmkit.families.cam.findings import finding
 from cfmkit.families.findings import mm, newton
 from cfmkit.families.refusals import CannotBuild
-from cfmkit.units import format_short
+from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.families.cam.dynamics.build import Build
     from cfmkit.families.cam.dynamics.machine import Machine
     from cfmkit.results import Finding

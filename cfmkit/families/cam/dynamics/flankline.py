@@ -19,8 +19,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 if TYPE_CHECKING:
-    from cfmkit.bodies.cam_path import Path
-    from cfmkit.bodies.cam_profile import Real, SlopeLaw
+    from cfmkit.families.cam.geometry.path import Path
+    from cfmkit.families.cam.geometry.profile import Real, SlopeLaw
 
 KNOTS = 65
 NEWTON_STEPS = 30

@@ -17,7 +17,7 @@ from cfmkit.families.cam.dynamics.reactions import reactions
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.families.cam.dynamics.machine import Machine
     from cfmkit.families.cam.dynamics.motion import Cycloid, Moment
     from cfmkit.families.cam.dynamics.multibody import Scheme

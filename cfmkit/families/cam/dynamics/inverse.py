@@ -36,7 +36,7 @@ from cfmkit.families.cam.dynamics.motion import Moment
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.families.cam.dynamics.machine import Constants, Machine
     from cfmkit.families.cam.dynamics.side import Stance
 

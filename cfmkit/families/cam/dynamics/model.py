@@ -31,7 +31,7 @@ from cfmkit.families.refusals import CannotBuild, no_result
 from cfmkit.results import Result, Status
 
 if TYPE_CHECKING:
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.families.base import Run
     from cfmkit.families.cam.spec import CamSpec
     from cfmkit.results import Finding

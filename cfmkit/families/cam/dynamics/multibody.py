@@ -27,7 +27,7 @@ from cfmkit.families.cam.dynamics.flankline import FlankLine
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.families.cam.dynamics.constraints import Posture
     from cfmkit.families.cam.dynamics.machine import Machine
     from cfmkit.families.cam.dynamics.motion import Cycloid

@@ -14,7 +14,7 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.families.cam.dynamics.constraints import Chain, Posture
     from cfmkit.families.cam.dynamics.multibody import NineCoordinates, Trajectory
     from cfmkit.families.cam.dynamics.side import Parts

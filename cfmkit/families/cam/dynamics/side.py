@@ -28,7 +28,7 @@ from cfmkit.numerics.roots import EPS, bracketed_root, invert_increasing
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.families.cam.dynamics.center import Piece
 
     ComplexArray = NDArray[np.complex128]

@@ -16,7 +16,7 @@ from cfmkit.results import Quantity
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.families.cam.dynamics.machine import Machine
     from cfmkit.families.cam.dynamics.solution import Moved
 

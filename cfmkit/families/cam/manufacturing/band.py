@@ -16,11 +16,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.bodies.cam_flank import BuiltFlank, DesignFlank, arc_lengths
 from cfmkit.families.cam.built import Sides
+from cfmkit.families.cam.geometry.flank import BuiltFlank, DesignFlank, arc_lengths
 
 if TYPE_CHECKING:
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.families.cam.build import Assembly
     from cfmkit.families.cam.manufacturing.spec import Manufacturing
     from cfmkit.numerics.registration import Frame

@@ -6,8 +6,8 @@ from typing import Annotated
 
 from pydantic import Field
 
-from cfmkit.spec import Model
-from cfmkit.units import Angle, Length
+from cfmkit.specs.spec import Model
+from cfmkit.specs.units import Angle, Length
 
 
 class Manufacturing(Model):

@@ -23,10 +23,10 @@ from cfmkit.families.slider_crank.flexures.sizing import Flexure
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from cfmkit.bodies.slider_crank import Linkage
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.elastica import Network, Path
     from cfmkit.families.slider_crank.flexures.spec import Printed, StripSpec
+    from cfmkit.families.slider_crank.linkage import Linkage
 
 FLEXURE_SHARE = 0.2
 """Length of a flexure where none is given, in crank lengths: that of [B, Table 2]."""

@@ -16,16 +16,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.curves import read_only
+from cfmkit.arrays import read_only
 from cfmkit.elastica import CLAMPED, FREE, Beam, Link, Network, Node, Polyline, Section, Support, Taper, guided
 from cfmkit.errors import InputError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from cfmkit.bodies.slider_crank import Linkage
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.families.slider_crank.flexures.sizing import Flexure
+    from cfmkit.families.slider_crank.linkage import Linkage
 
 SLIDER = "slider"
 """Name of the node that moves along the way."""

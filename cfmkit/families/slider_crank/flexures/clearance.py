@@ -15,7 +15,7 @@ from cfmkit.families.slider_crank.flexures.pressing import Ending, Pressed, part
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.elastica import Path
 
 COARSE = 60

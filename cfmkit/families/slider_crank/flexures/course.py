@@ -21,7 +21,7 @@ from cfmkit.numerics.roots import bracketed_root
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.numerics.panels import Panels
 
 NEAREST = 1e-6

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from cfmkit.numerics.sqp import Effort, Optimum, minimize
 
 if TYPE_CHECKING:
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.families.slider_crank.flexures.program import StripProgram
 
 VIOLATION = 5e-3

@@ -33,10 +33,10 @@ from cfmkit.numerics.sqp import Ending
 from cfmkit.results import Design, Finding, Quantity, Searched, Status
 
 if TYPE_CHECKING:
-    from cfmkit.bodies.slider_crank import Linkage
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.families.base import Run
     from cfmkit.families.slider_crank.flexures.spec import StripDesign
+    from cfmkit.families.slider_crank.linkage import Linkage
     from cfmkit.families.slider_crank.spec import SliderCrankSpec
 
 RESERVES, RESERVE_STRESS = (4e-5, 2e-4), 5e-4

@@ -9,7 +9,7 @@ from cfmkit.families.refusals import no_design
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.flexures.descent import VIOLATION
 from cfmkit.numerics.sqp import Ending
-from cfmkit.units import format_short
+from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
     from cfmkit.families.slider_crank.flexures.search import Found

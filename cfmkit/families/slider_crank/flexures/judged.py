@@ -14,7 +14,7 @@ from cfmkit.families.slider_crank.flexures.pressing import Ending
 from cfmkit.families.slider_crank.flexures.solution import Printed, SecondOpinion, first_at
 
 if TYPE_CHECKING:
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.families.slider_crank.flexures.chain import Strip
     from cfmkit.families.slider_crank.flexures.search import Found
     from cfmkit.families.slider_crank.flexures.task import Form

@@ -31,7 +31,7 @@ from cfmkit.elastica import (
 )
 
 if TYPE_CHECKING:
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
 
 CHARACTERISTIC = 0.85
 """Where the pivot of a pinned beam is, as a share of its length from the pinned end [LH, sec. 7]."""

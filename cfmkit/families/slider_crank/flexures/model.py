@@ -32,15 +32,15 @@ from cfmkit.families.slider_crank.flexures.solution import Printed
 from cfmkit.families.slider_crank.flexures.values import numbers
 from cfmkit.families.slider_crank.values import DEFINITIONS as ALL
 from cfmkit.results import Quantity, Result, Status
-from cfmkit.units import between
+from cfmkit.specs.units import between
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from cfmkit.bodies.slider_crank import Linkage
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.families.base import Run
     from cfmkit.families.slider_crank.flexures.pressing import Chain
+    from cfmkit.families.slider_crank.linkage import Linkage
     from cfmkit.families.slider_crank.spec import SliderCrankSpec
 
 DEFAULT_SHARE = 0.35

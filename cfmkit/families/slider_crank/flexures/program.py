@@ -25,7 +25,7 @@ from cfmkit.families.slider_crank.flexures.strength import LAST, Watched, watche
 from cfmkit.numerics.barycentric import differentiation, interpolation
 
 if TYPE_CHECKING:
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.elastica import Network, Path
     from cfmkit.families.slider_crank.flexures.task import Form, Task
 

@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.bodies.slider_crank_springs import along_slider
 from cfmkit.errors import InputError
 from cfmkit.families.findings import mm
 from cfmkit.families.refusals import no_design
@@ -26,15 +25,16 @@ from cfmkit.families.slider_crank.flexures.assembly import FLEXURE_SHARE, chain_
 from cfmkit.families.slider_crank.flexures.pressing import Ending
 from cfmkit.families.slider_crank.flexures.sizing import PEAK_FACTOR, Flexure, rotations, sized
 from cfmkit.families.slider_crank.flexures.spec import Flexures, FlexureSpec
+from cfmkit.families.slider_crank.unit_springs import along_slider
 from cfmkit.results import Design, Quantity, Searched, Status
-from cfmkit.units import format_short
+from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from cfmkit.bodies.slider_crank import Linkage
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.families.slider_crank.flexures.chain import Elasticity
+    from cfmkit.families.slider_crank.linkage import Linkage
     from cfmkit.families.slider_crank.spec import SliderCrankSpec
 
 _ROUNDS = 8

@@ -15,7 +15,7 @@ from cfmkit.numerics.sqp import Ending, Optimum
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.families.slider_crank.flexures.task import Task
 
 COARSE = 5

@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from cfmkit.bodies.slider_crank import Linkage
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
+    from cfmkit.families.slider_crank.linkage import Linkage
 
 PEAK_FACTOR = 1.09
 """Largest stress of a flexure of finite length over that of pure bending, at the stroke that the stress allows:
@@ -94,7 +94,7 @@ def sized(rate: float, length: float, youngs_modulus: float, stress: float, rota
 
 def rotations(linkage: Linkage, unloaded: float, travel: FloatArray) -> FloatArray:
     """Return how far the three joints have turned where the slider has travelled, (3, n) [rad]."""
-    from cfmkit.bodies.slider_crank_springs import along_slider
+    from cfmkit.families.slider_crank.unit_springs import along_slider
 
     side = -1 if linkage.knee(unloaded) < 0 else 1
     return along_slider(linkage, unloaded, side, np.asarray(travel)).turn[:3]

@@ -13,7 +13,7 @@ from cfmkit.families.slider_crank.flexures.chain import SLIDER, STRIP
 from cfmkit.families.slider_crank.flexures.pressing import Ending
 
 if TYPE_CHECKING:
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.families.slider_crank.flexures.chain import Elasticity
     from cfmkit.families.slider_crank.flexures.course import Course
     from cfmkit.families.slider_crank.flexures.pressing import Chain, Pressed

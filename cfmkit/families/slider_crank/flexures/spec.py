@@ -7,9 +7,9 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from cfmkit.materials.spec import MaterialField, SafetyFactor
-from cfmkit.spec import Analysis, Model
-from cfmkit.units import Length, Ratio
+from cfmkit.specs.spec import Analysis, Model
+from cfmkit.specs.units import Length, Ratio
+from cfmkit.stock.spec import MaterialField, SafetyFactor
 
 PositiveLength = Annotated[Length, Field(gt=0)]
 Share = Annotated[Ratio, Field(gt=0, lt=1)]

@@ -19,7 +19,7 @@ from cfmkit.families.slider_crank.flexures.chain import STRIP
 from cfmkit.numerics.barycentric import differentiation, interpolation
 
 if TYPE_CHECKING:
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.elastica import Path
 
 LAST, BETWEEN = 4, 13

@@ -11,7 +11,7 @@ import numpy as np
 from cfmkit.families.slider_crank.flexures.chain import Strip, spread
 
 if TYPE_CHECKING:
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.families.slider_crank.flexures.chain import Elasticity
 
 SMALL = 1e-3

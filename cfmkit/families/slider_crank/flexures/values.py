@@ -11,7 +11,7 @@ from cfmkit.families.slider_crank.flexures.chain import kink
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from cfmkit.curves import FloatArray
+    from cfmkit.arrays import FloatArray
     from cfmkit.families.slider_crank.flexures.solution import Printed
 
 

@@ -1,1 +1,0 @@
-"""Rigid parts that families share: cam profiles and the tracks of rollers on them."""

@@ -1,0 +1,230 @@
+"""Planar outlines as values: what families draw and `cfmkit.export` writes.
+
+A contour is a chain of edges, each ending where the next begins. Smooth curves
+carry exact points and exact unit tangents, so that an exporter can fit arcs or
+splines within a stated tolerance instead of chopping them into a polyline.
+All lengths in metres.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.arrays import FloatArray, read_only
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+
+TOLERANCE = 5e-6
+"""How far outlines may be from the exact ones unless told otherwise [m]."""
+
+
+@dataclass(frozen=True)
+class Line:
+    """A straight edge from `start` to `end`, each (2,) [m]."""
+
+    start: tuple[float, float]
+    end: tuple[float, float]
+
+    @property
+    def ends(self) -> tuple[complex, complex]:
+        """First and last point as x + iy [m]."""
+        return complex(*self.start), complex(*self.end)
+
+    def reversed(self) -> Line:
+        """Return the same edge, run the other way."""
+        return Line(self.end, self.start)
+
+    def mirrored(self) -> Line:
+        """Return the mirror image about the y axis, run in the same order of points."""
+        return Line((-self.start[0], self.start[1]), (-self.end[0], self.end[1]))
+
+
+@dataclass(frozen=True)
+class Arc:
+    """A circular edge about `center` [m], from angle `start` to `end` [rad].
+
+    Counter-clockwise if ``end > start``, else clockwise; ``end - start = 2 pi`` is a full circle.
+    """
+
+    center: tuple[float, float]
+    radius: float
+    start: float
+    end: float
+
+    @property
+    def ends(self) -> tuple[complex, complex]:
+        """First and last point as x + iy [m]."""
+        return self._at(self.start), self._at(self.end)
+
+    def _at(self, angle: float) -> complex:
+        return complex(*self.center) + self.radius * complex(math.cos(angle), math.sin(angle))
+
+    @property
+    def full(self) -> bool:
+        """Whether the edge is one whole circle."""
+        return math.isclose(abs(self.end - self.start), 2 * math.pi, rel_tol=1e-12)
+
+    def reversed(self) -> Arc:
+        """Return the same edge, run the other way."""
+        return Arc(self.center, self.radius, self.end, self.start)
+
+    def mirrored(self) -> Arc:
+        """Return the mirror image about the y axis, run in the same order of points."""
+        return Arc((-self.center[0], self.center[1]), self.radius, math.pi - self.start, math.pi - self.end)
+
+
+@dataclass(frozen=True)
+class Smooth:
+    """A smooth edge: exact `points` (n, 2) [m] with exact unit `tangents` (n, 2) along it."""
+
+    points: FloatArray
+    tangents: FloatArray
+
+    def __post_init__(self) -> None:
+        """Freeze the arrays and check their shapes."""
+        object.__setattr__(self, "points", read_only(self.points))
+        object.__setattr__(self, "tangents", read_only(self.tangents))
+        if self.points.shape != self.tangents.shape or self.points.ndim != 2 or self.points.shape[1] != 2:
+            raise ValueError("points and tangents of a smooth edge must both be (n, 2)")
+
+    @property
+    def ends(self) -> tuple[complex, complex]:
+        """First and last point as x + iy [m]."""
+        return complex(*self.points[0]), complex(*self.points[-1])
+
+    def reversed(self) -> Smooth:
+        """Return the same edge, run the other way."""
+        return Smooth(self.points[::-1], -self.tangents[::-1])
+
+    def mirrored(self) -> Smooth:
+        """Return the mirror image about the y axis, run in the same order of points."""
+        flip = np.array([-1.0, 1.0])
+        return Smooth(self.points * flip, self.tangents * flip)
+
+
+Edge = Line | Arc | Smooth
+
+
+@dataclass(frozen=True)
+class Contour:
+    """A chain of edges on one layer; `closed` contours end where they begin.
+
+    `hole` marks a closed contour that bounds material from inside (kerf goes the other way).
+    """
+
+    edges: tuple[Edge, ...]
+    layer: str
+    closed: bool = False
+    hole: bool = False
+
+    @property
+    def extents(self) -> tuple[float, float, float, float]:
+        """Smallest x and y, largest x and y of the edges' points [m]; arcs count as whole circles."""
+        corners = np.concatenate([_corners(edge) for edge in self.edges])
+        return (*corners.min(axis=0).tolist(), *corners.max(axis=0).tolist())
+
+
+def _corners(edge: Edge) -> FloatArray:
+    if isinstance(edge, Smooth):
+        return edge.points
+    if isinstance(edge, Line):
+        return np.array([edge.start, edge.end])
+    return np.array(edge.center) + edge.radius * np.array([[-1.0, -1.0], [1.0, 1.0]])
+
+
+def circle(center: tuple[float, float], radius: float, layer: str, hole: bool = False) -> Contour:
+    """Return a full circle [m] as a closed contour."""
+    return Contour((Arc(center, radius, 0.0, 2 * math.pi),), layer, closed=True, hole=hole)
+
+
+def polygon(corners: Sequence[tuple[float, float]], layer: str, hole: bool = False) -> Contour:
+    """Return a closed contour of straight edges through `corners` [m]."""
+    ends = (*corners[1:], corners[0])
+    return Contour(tuple(Line(a, b) for a, b in zip(corners, ends, strict=True)), layer, closed=True, hole=hole)
+
+
+def reference_square(size: float = 0.05, corner: tuple[float, float] = (0.0, 0.0)) -> Contour:
+    """Return a square on layer `reference`, with which a user checks the scale of a print.
+
+    Parameters
+    ----------
+    size : float
+        Length of a side [m].
+    corner : (float, float)
+        The lower left corner [m].
+    """
+    x, y = corner
+    return polygon([(x, y), (x + size, y), (x + size, y + size), (x, y + size)], "reference")
+
+
+@dataclass(frozen=True)
+class Curve2D:
+    """A named table of exact points along a curve, for CSV: x, y [m] and what goes with them."""
+
+    name: str
+    columns: dict[str, tuple[FloatArray, str]]
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """Everything about a part that can be cut: contours for DXF and SVG, tables for CSV.
+
+    `name` is the file stem; `cut`, `path` and `reference` are the usual layers. `notes` say what the contours do not
+    show: how often a part is to be made.
+    """
+
+    name: str
+    contours: tuple[Contour, ...]
+    tables: tuple[Curve2D, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    def with_reference_square(self, size: float = 0.05) -> Drawing:
+        """Return the drawing with a reference square [m] to its right, unless it has a reference already."""
+        if not self.contours or any(contour.layer == "reference" for contour in self.contours):
+            return self
+        boxes = np.array([contour.extents for contour in self.contours])
+        corner = (float(boxes[:, 2].max()) + size / 5, float(boxes[:, 1].min()))
+        return replace(self, contours=(*self.contours, reference_square(size, corner)))
+
+
+def polygons(contours: Sequence[Contour], layer: str, points: int = 240) -> list[FloatArray]:
+    """Return the closed contours of one layer as closed chains of points, for pictures only.
+
+    Parameters
+    ----------
+    contours : sequence of Contour
+        Of a drawing.
+    layer : str
+        Which of them.
+    points : int
+        Most points that are taken of a smooth edge, evenly by index; its ends are always among them.
+
+    Returns
+    -------
+    list of (n, 2) array
+        Counter-clockwise, holes clockwise [m].
+    """
+    chosen = [contour for contour in contours if contour.closed and contour.layer == layer]
+    found = []
+    for contour in chosen:
+        chain = np.concatenate([_chain(edge, points) for edge in contour.edges])
+        x, y = chain[:, 0], chain[:, 1]
+        counter_clockwise = bool(x @ np.roll(y, -1) > np.roll(x, -1) @ y)
+        found.append(chain if counter_clockwise != contour.hole else chain[::-1])
+    return found
+
+
+def _chain(edge: Edge, points: int) -> FloatArray:
+    if isinstance(edge, Smooth):
+        chosen = np.unique(np.linspace(0, len(edge.points) - 1, points).astype(int))
+        return np.asarray(edge.points[chosen])
+    if isinstance(edge, Line):
+        return np.array([edge.start, edge.end], dtype=float)
+    angle = np.linspace(edge.start, edge.end, 73)
+    return np.column_stack([edge.center[0] + edge.radius * np.cos(angle), edge.center[1] + edge.radius * np.sin(angle)])

@@ -1,0 +1,119 @@
+"""The cam as it is cut: the roller path shifted by the roller radius, and where that fails.
+
+The cam's flank is the roller-centre path shifted by the roller radius along the
+normal. Where the path is curved more tightly than the roller the shifted curve
+turns back on itself: material that another position of the roller needs is gone,
+the cam ends in a corner, and the roller pivots on that corner instead of
+following the path (undercut). The published design does so at its start.
+
+The path begins at x0, so the shifted curve does not cross itself there: the corner
+is the point of it that is one roller radius from the path's first point. Elsewhere
+there is no undercut: where the slider rises, paths are curved most at their start
+(`SlopeLaw.curvature_radius`), for rollers smaller than the brace.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from cfmkit.numerics.roots import bracketed_root
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from cfmkit.families.cam.geometry.path import Path
+    from cfmkit.families.cam.geometry.profile import Real
+
+
+@dataclass(frozen=True)
+class Corner:
+    """The corner at which an undercut cam begins.
+
+    Attributes
+    ----------
+    point : (float, float)
+        Where it is [m], right flank.
+    first_contact : float
+        Path coordinate x at which the roller leaves the corner for the flank [m].
+    cusp : float
+        Path coordinate x at which the path's radius of curvature equals the roller's [m].
+    """
+
+    point: tuple[float, float]
+    first_contact: float
+    cusp: float
+
+
+@dataclass(frozen=True)
+class CamProfile:
+    """A flank cut for one roller radius along one path, up to path coordinate `end` [m]."""
+
+    path: Path
+    roller_radius: float
+    end: float
+    corner: Corner | None = None
+
+    def normal(self, x: Real) -> tuple[Real, Real]:
+        """Return the unit normal from cam to roller on the right flank, (f, -1)/sqrt(1 + f^2)."""
+        f = self.path.law.slope(x)
+        length = (1.0 + f * f) ** 0.5
+        return f / length, -1.0 / length
+
+    def shifted(self, x: Real, offset: float) -> tuple[Real, Real]:
+        """Return the points at a distance `offset` [m] from the path along the normal, towards the roller."""
+        nx, ny = self.normal(x)
+        return x + offset * nx, self.path.height(x) + offset * ny
+
+    def flank(self, x: Real) -> tuple[Real, Real]:
+        """Return the flank's points for path coordinates x; part of the cam only from `start` on."""
+        return self.shifted(x, -self.roller_radius)
+
+    @property
+    def start(self) -> float:
+        """Path coordinate of the first point of the flank that is part of the cam [m]."""
+        return self.corner.first_contact if self.corner else self.path.law.rest_half_width
+
+
+class WholeCamUndercut(ValueError):
+    """The roller is so large that no part of the flank is left."""
+
+
+def cut(path: Path, roller_radius: float, end: float) -> CamProfile:
+    """Return the cam that a roller path gives, trimmed where the roller undercuts its start.
+
+    Parameters
+    ----------
+    path : Path
+        The roller-centre path.
+    roller_radius : float
+        Of the roller that the cam is cut for [m].
+    end : float
+        Path coordinate at which the cam ends [m].
+
+    Raises
+    ------
+    WholeCamUndercut
+        If every point of the flank would be cut away.
+    """
+    profile = CamProfile(path, roller_radius, end)
+    law, x0 = path.law, path.law.rest_half_width
+    if law.curvature_radius(x0) >= roller_radius:
+        return profile
+    cusp = _crossing(lambda x: law.curvature_radius(x) - roller_radius, x0, end)
+
+    def clear_of_start(x: float) -> float:
+        cx, cy = profile.flank(x)
+        return math.hypot(cx - x0, cy) - roller_radius
+
+    contact = _crossing(clear_of_start, cusp, end)
+    cx, cy = profile.flank(contact)
+    return CamProfile(path, roller_radius, end, Corner((float(cx), float(cy)), contact, cusp))
+
+
+def _crossing(function: Callable[[float], float], low: float, high: float) -> float:
+    try:
+        return bracketed_root(function, low, high)
+    except ValueError:
+        raise WholeCamUndercut from None

@@ -1,0 +1,219 @@
+"""Roller-centre path of a constant-force cam: its slope, integrated.
+
+With x as the independent variable the height is one integral of the slope
+(`cfmkit.families.cam.geometry.profile`); without friction it has a closed form,
+
+    y = c ((x - x0)^2 / 2A + sqrt(l^2 - x0^2) - sqrt(l^2 - x^2)),
+
+and the slider's travel is (x - x0)^2 / 2A if c = 1: the energy of the springs over the force.
+
+Reference
+---------
+[SS] S. Sanchez-Salinas et al., Mech. Mach. Theory 173 (2022) 104819.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from cfmkit.families.cam.geometry.profile import Real, brace_tangent, drop
+from cfmkit.numerics.quadrature import RunningIntegral
+from cfmkit.numerics.roots import bracketed_root
+
+if TYPE_CHECKING:
+    from cfmkit.arrays import FloatArray
+    from cfmkit.families.cam.geometry.profile import SlopeLaw
+
+Method = Literal["quadrature", "ode"]
+
+
+class Path:
+    """The roller-centre path y(x) from (x0, 0), by the closed form, a quadrature or the paper's ODE.
+
+    Parameters
+    ----------
+    law : SlopeLaw
+        The slope.
+    end : float
+        The largest x that will be asked for [m].
+    method : {"quadrature", "ode"}
+        "quadrature" (default) integrates the slope over x by Gauss-Legendre panels;
+        "ode" integrates [SS, eq. 2] over y with scipy's DOP853.
+    """
+
+    def __init__(self, law: SlopeLaw, end: float, method: Method = "quadrature") -> None:
+        """Integrate the slope once."""
+        self.law, self.end, self.method = law, end, method
+        self._height: _ClosedHeight | _QuadratureHeight | _OdeHeight
+        if method == "ode":
+            self._height = _OdeHeight(law, end)
+        elif law.friction:
+            self._height = _QuadratureHeight(law, end)
+        else:
+            self._height = _ClosedHeight(law)
+
+    def height(self, x: Real) -> Real:
+        """Return y(x) [m] for an array x between x0 and `end` [m]."""
+        return self._height(x)
+
+    def travel(self, x: Real) -> Real:
+        """Return the slider's travel with the profile's own brace, y + sqrt(l^2 - x^2) less its start [m]."""
+        law = self.law
+        return self.height(x) + drop(x, law.rest_half_width, law.brace_length)
+
+
+class _ClosedHeight:
+    """Height without friction: y = c (D^2/2A + sqrt(l^2 - x0^2) - sqrt(l^2 - x^2))."""
+
+    def __init__(self, law: SlopeLaw) -> None:
+        self.law = law
+
+    def __call__(self, x: Real) -> Real:
+        law = self.law
+        stretch = (x - law.rest_half_width) ** 2 / (2.0 * law.force_constant)
+        return law.slope_factor * (stretch - drop(x, law.rest_half_width, law.brace_length))
+
+
+class _QuadratureHeight:
+    """Height by Gauss-Legendre panels over theta, x = l sin(theta): smooth up to x = l."""
+
+    def __init__(self, law: SlopeLaw, end: float) -> None:
+        self.law = law
+        start = math.asin(law.rest_half_width / law.brace_length)
+        self.integral = RunningIntegral(self._slope_by_angle, start, math.asin(min(end / law.brace_length, 1.0)))
+
+    def _slope_by_angle(self, theta: FloatArray) -> FloatArray:
+        """Return dy/dtheta [m]."""
+        law = self.law
+        cos, sin = np.cos(theta), np.sin(theta)
+        stretch = (law.brace_length * sin - law.rest_half_width) / law.force_constant
+        p_cos = law.slope_factor * (stretch * cos + sin)
+        return law.brace_length * cos * (p_cos + law.friction * cos) / (cos - law.friction * p_cos)
+
+    def __call__(self, x: Real) -> Real:
+        share: Any = x / self.law.brace_length
+        height: Any = self.integral(math.asin(share) if isinstance(share, float) else np.arcsin(share))
+        return height
+
+
+class _OdeHeight:
+    """Height from dx/dy = (1 - mu p)/(mu + p) [SS, eq. 2], integrated over y and inverted."""
+
+    def __init__(self, law: SlopeLaw, end: float) -> None:
+        from scipy.integrate import solve_ivp
+
+        self.law = law
+
+        def reached(_y: float, x: FloatArray) -> float:
+            return float(x[0]) - end
+
+        reached.terminal = True  # type: ignore[attr-defined]
+        far, inside = 1e3 * law.brace_length, (law.rest_half_width, law.vertical_at * (1 - 1e-12))
+        solution: Any = solve_ivp(
+            lambda _y, x: 1.0 / law.slope(np.clip(x, *inside)),  # trial steps may go far outside
+            (0.0, far),
+            [law.rest_half_width],
+            method="DOP853",
+            rtol=1e-12,
+            atol=1e-14,
+            dense_output=True,
+            events=reached,
+        )
+        self.interpolant, self.knots = solution.sol, (solution.y[0], solution.t)
+
+    def __call__(self, x: Real) -> Real:
+        if not np.size(x):
+            return x
+        at, heights = self.knots
+        step = np.clip(np.searchsorted(at, x), 1, len(at) - 1)
+        y: Any = np.interp(x, at, heights)
+        for _ in range(12):
+            change = (x - self.interpolant(y)[0]) * self.law.slope(x)
+            y = np.clip(y + change, heights[step - 1], heights[step])
+            if np.max(np.abs(change)) < 1e-15:
+                break
+        return y
+
+
+def ideal_position(law: SlopeLaw, travel: Real) -> Real:
+    """Return x after a slider travel [m]: exact without friction and weight, where s = (x - x0)^2/2A, else near it."""
+    return law.rest_half_width + (2.0 * law.force_constant * travel / law.slope_factor) ** 0.5
+
+
+def reach(law: SlopeLaw, travel: float, method: Method = "quadrature") -> tuple[Path, float]:
+    """Return the path up to a slider travel, and the x at its end.
+
+    Parameters
+    ----------
+    law : SlopeLaw
+        The slope.
+    travel : float
+        Slider travel wanted, with the profile's own brace [m].
+    method : {"quadrature", "ode"}
+        How to integrate.
+
+    Returns
+    -------
+    path, end : Path, float
+        The path reaches at least `end` [m]. If the geometry cannot give the travel
+        (the brace turns horizontal, the path vertical, or the slider stops rising first),
+        `end` is short of it: compare ``path.travel(end)``.
+    """
+    x0, ideal = law.rest_half_width, float(ideal_position(law, travel))
+    if not law.friction and law.slope_factor == 1:
+        end = min(ideal, _farthest(law))
+        return Path(law, end, method), end
+    high = x0 + 1.02 * (ideal - x0)
+    if high > 0.99 * law.brace_length or law.friction * law.frictionless(high) > 0.9:
+        high = min(high, _farthest(law))
+    path = Path(law, high)
+    if float(path.travel(high)) < travel:
+        path, high = _farther(path, travel)
+    end = _position(path, travel, (x0, high), x0 + 0.97 * (ideal - x0))
+    return (path if method == "quadrature" else Path(law, end, method)), end
+
+
+def _farther(path: Path, travel: float) -> tuple[Path, float]:
+    """Return a path that reaches a travel [m], or as far as any does, and its end."""
+    law, limit = path.law, _farthest(path.law)
+    high = min(path.end, limit)
+    while high < limit and float(path.travel(high)) < travel:
+        high = min(law.rest_half_width + 1.3 * (high - law.rest_half_width), limit)
+        path = Path(law, high)
+    return path, high
+
+
+def _position(path: Path, travel: float, bracket: tuple[float, float], below: float) -> float:
+    """Return x at a travel [m], or the bracket's end if that is short of it; `below` is a guess on the low side."""
+    low, high = bracket
+
+    def excess(x: float) -> float:
+        return float(path.travel(x)) - travel
+
+    if excess(high) <= 0:
+        return high
+    return bracketed_root(excess, below if below < high and excess(below) < 0 else low, high)
+
+
+def _farthest(law: SlopeLaw) -> float:
+    """Return the x at which the path must end at the latest: vertical, at the brace's reach, or falling [m]."""
+    x0 = law.rest_half_width
+    limit = max(law.vertical_at - max(1e-9 * (law.vertical_at - x0), 4e-15 * law.vertical_at), x0)
+    if law.friction >= 0:
+        return limit
+    # Cut for the way down the slider falls at first (friction exceeds the springs) and again near x = l.
+    x = law.brace_length * np.sin(
+        np.linspace(math.asin(x0 / law.brace_length), math.asin(limit / law.brace_length), 257)
+    )
+    rising = law.slope(x) > brace_tangent(x, law.brace_length)
+    if not rising.any():
+        return x0
+    first = int(np.argmax(rising))
+    if rising[first:].all():
+        return limit
+    top = first + int(np.argmin(rising[first:]))
+    margin = lambda u: float(law.slope(u) - brace_tangent(u, law.brace_length))  # noqa: E731
+    return bracketed_root(margin, float(x[top - 1]), float(x[top]))

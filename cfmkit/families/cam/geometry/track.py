@@ -1,0 +1,283 @@
+"""The track on which a roller's centre really runs, with the brace and roller that are built in.
+
+On the flank the centre is one roller radius from the cam along the normal; on the corner
+of an undercut cam the roller pivots. The slider position is what drives the mechanism, so
+the track is the part over which the slider rises while the rollers move out: where another
+brace or friction makes the slider fall first, that part is passed over (a dead point), and
+where the slider would fall again near the end of the brace the track ends.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from cfmkit.families.cam.geometry.path import ideal_position
+from cfmkit.families.cam.geometry.profile import Real, brace_tangent
+from cfmkit.families.cam.geometry.track_states import NoTrack, Stretch, TrackStates
+from cfmkit.numerics.roots import bracketed_root, invert_increasing
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from cfmkit.arrays import FloatArray
+    from cfmkit.families.cam.geometry.cut import CamProfile
+
+KNOTS = 65
+
+
+class Pivot(NamedTuple):
+    """A roller that pivots on a corner, of one cam or of many side by side.
+
+    Attributes
+    ----------
+    x, y : float or array
+        The corner [m].
+    radius, brace : float or array
+        Between corner and roller centre, and between that and the slider's pin [m].
+    low, high : float or array
+        Angles of the contact normal between which it pivots [rad].
+    """
+
+    x: Any
+    y: Any
+    radius: Any
+    brace: Any
+    low: Any
+    high: Any
+
+
+def pivot_angle(slider: FloatArray, pivot: Pivot) -> FloatArray:
+    """Return the angle of the contact normal on the corner [rad], from a triangle of known sides."""
+    rise, brace, radius = slider - pivot.y, pivot.brace, pivot.radius
+    side = np.hypot(pivot.x, rise)
+    along = ((radius - brace) * (radius + brace) + side * side) / (2.0 * side)
+    square = (brace - side + radius) * (brace + side - radius) * (side + radius - brace) * (side + radius + brace)
+    off = np.sqrt(np.maximum(square, 0.0)) / (2.0 * side)
+    turn = np.arctan2(off * rise - along * pivot.x, -(along * rise + off * pivot.x))
+    return np.asarray(np.minimum(np.maximum(turn, pivot.low), pivot.high))
+
+
+class Track:
+    """The track of a roller's centre on a given cam.
+
+    Parameters
+    ----------
+    profile : CamProfile
+        The cam as cut.
+    roller_radius : float
+        Of the roller that runs on it [m].
+    brace_length : float
+        Of the brace built in [m].
+    offset : float
+        Material left on the flank beyond the profile, >= 0 [m]; it rounds a corner. Missing
+        material is not an offset: it is the cam cut for a larger roller (`cam_cut.cut`).
+
+    Attributes
+    ----------
+    start : float
+        Slider position at the start of the track [m], height above the path's first point.
+    dead_point : float
+        Smallest slider position the track can hold [m]; below `start` only where the
+        slider has to fall before it can rise.
+    corner_end, end : float
+        Slider positions at which the roller leaves the corner (`start` if there is none,
+        or it is passed over) and at which the track ends [m].
+    turns_back : bool
+        Whether the track ends because the slider would fall beyond, before the flank does.
+
+    Raises
+    ------
+    NoTrack
+        If the roller cannot run on the cam.
+    """
+
+    def __init__(self, profile: CamProfile, roller_radius: float, brace_length: float, offset: float = 0.0) -> None:
+        """Find the ends of the track."""
+        self.profile, self.brace_length = profile, brace_length
+        self.radius = roller_radius + offset
+        self.shift = self.radius - profile.roller_radius
+        self._corner_point = profile.corner.point if profile.corner else (0.0, 0.0)
+        x_first = float(profile.shifted(profile.start, self.shift)[0])
+        self._pivots = self._pivot_range()
+        begins = self._corner_point[0] + self.radius * math.sin(self._pivots[0]) if profile.corner else x_first
+        if min(x_first, begins) <= 0:
+            raise NoTrack("crossed", begins)
+        if max(x_first, begins) >= brace_length * (1 - 1e-6):
+            raise NoTrack("brace", max(x_first, begins))
+        self._follows_law = not self.shift and brace_length == profile.path.law.brace_length
+        self._limits(x_first)
+
+    def _pivot_range(self) -> tuple[float, float]:
+        """Return the angles of the contact normal between which the roller turns about the corner [rad]."""
+        xc, yc = self._corner_point
+        law = self.profile.path.law
+        return math.atan2(law.rest_half_width - xc, yc), math.atan(law.slope(self.profile.start))
+
+    def _limits(self, x_first: float) -> None:
+        """Set the slider positions at which pieces begin and end."""
+        pivots = self.profile.corner is not None
+        at_corner, rate = self._on_corner(self._pivots[0]) if pivots else self._on_flank(self.profile.start)
+        self.start = self.dead_point = float(at_corner)
+        if pivots and self._on_corner(self._pivots[1])[1] > 0:
+            self.flank_range, self.turns_back = self._rising(skip=False)
+            self.corner_end = float(self._on_flank(self.flank_range[0])[0])
+            self.dead_point = float(at_corner) if rate >= 0 else self._collinear()
+        else:
+            self.flank_range, self.turns_back = self._rising(skip=True)
+            low = float(self._on_flank(self.flank_range[0])[0])
+            self.dead_point, self.corner_end = min(low, self.start), self.start
+        self.end = float(self._on_flank(self.flank_range[1])[0])
+        if self.end - self.start <= 1e-11 * self.brace_length:
+            raise NoTrack("dead", x_first)
+
+    def _collinear(self) -> float:
+        """Return the slider position at which brace and roller are in line over the corner [m]."""
+        xc, yc = self._corner_point
+        across = self.brace_length - self.radius
+        return float(yc + ((across - xc) * (across + xc)) ** 0.5)
+
+    def _rising(self, skip: bool) -> tuple[tuple[float, float], bool]:
+        """Return the path coordinates between which the slider rises on the flank, and whether it falls beyond.
+
+        With `skip`, a part at the beginning on which it falls is left out.
+        """
+        low, high = self.profile.start, self._brace_limit()
+        if self._follows_law and self.profile.path.law.friction >= 0:
+            return (low, high), False
+        knots = np.linspace(low, high, KNOTS)
+        rising = self._on_flank(knots)[1] > 0
+        rising[0] |= not skip or self._on_flank(low)[1] >= -1e-12
+        if not rising.any():
+            raise NoTrack("dead", low)
+        first = int(np.argmax(rising))
+        falls = first + int(np.argmin(rising[first:])) if not rising[first:].all() else 0
+        rate = lambda u: float(self._on_flank(u)[1])  # noqa: E731
+        begin = bracketed_root(rate, float(knots[first - 1]), float(knots[first])) if first else low
+        return (begin, bracketed_root(rate, float(knots[falls - 1]), float(knots[falls])) if falls else high), falls > 0
+
+    def _brace_limit(self) -> float:
+        """Return the largest path coordinate at which the brace still reaches the axis [m]."""
+        low, high = self.profile.start, self.profile.end
+
+        def margin(u: float) -> float:
+            return self.brace_length * (1 - 1e-12) - float(self.profile.shifted(u, self.shift)[0])
+
+        return high if margin(high) >= 0 else bracketed_root(margin, low, high)
+
+    def _slider(self, x: Real, y: Real | float) -> Real:
+        return y + ((self.brace_length - x) * (self.brace_length + x)) ** 0.5
+
+    def _on_flank(self, u: Real) -> tuple[Real, Real]:
+        """Return slider position and its derivative along the flank."""
+        law = self.profile.path.law
+        if self._follows_law:
+            return self._slider(u, self.profile.path.height(u)), law.slope(u) - brace_tangent(u, law.brace_length)
+        x, y = self.profile.shifted(u, self.shift)
+        rate = (law.slope(u) - brace_tangent(x, self.brace_length)) * (1.0 + self.shift / law.curvature_radius(u))
+        return self._slider(x, y), rate
+
+    def _on_corner(self, turn: float) -> tuple[float, float]:
+        """Return slider position, and the sign of its derivative, while the roller pivots on the corner."""
+        slider, x, slope = self._corner_piece(turn)
+        return slider, slope - brace_tangent(x, self.brace_length)
+
+    def states(self, slider: FloatArray) -> TrackStates:
+        """Return the roller's states at slider positions between `start` and `end` [m]."""
+        on_corner = slider < self.corner_end
+        if not on_corner.any():
+            return self._flank_states(slider)
+        corner = self._corner_states(slider[on_corner])
+        if on_corner.all():
+            return corner
+        flank = self._flank_states(slider[~on_corner])
+        place = np.argsort(~on_corner, kind="stable").argsort()  # from corner first, flank then, to the order asked for
+        return TrackStates(*(np.concatenate(pair)[place] for pair in zip(corner.fields(), flank.fields(), strict=True)))
+
+    def _flank_states(self, slider: FloatArray) -> TrackStates:
+        law, u = self.profile.path.law, self._flank_parameter(slider)
+        x, bend = u, law.slope_derivative(u)
+        if self.shift:
+            x = u + self.shift * self.profile.normal(u)[0]
+            bend = bend / (1.0 + self.shift / law.curvature_radius(u))
+        # Where the path is nearly vertical y follows from the slider far better than from x.
+        y = slider - self._slider(x, 0.0)
+        return TrackStates(x, y, law.slope(u), bend, np.zeros(slider.shape, dtype=bool), u)
+
+    def _corner_states(self, slider: FloatArray) -> TrackStates:
+        """Return states on the corner: with the centre and the slider's pin it is a triangle of known sides."""
+        xc, yc = self._corner_point
+        radius = self.radius
+        turn = pivot_angle(slider, self.pivot)
+        if self.dead_point == self.start:
+            turn[slider <= self.start] = self._pivots[0]
+        sin, cos = np.sin(turn), np.cos(turn)
+        bend, always = 1.0 / (radius * cos * cos * cos), np.ones(slider.shape, dtype=bool)
+        contact = np.full(slider.shape, self.profile.start)
+        return TrackStates(xc + radius * sin, yc - radius * cos, sin / cos, bend, always, contact)
+
+    @property
+    def pivot(self) -> Pivot:
+        """The triangle that a brace and the corner make."""
+        return Pivot(*self._corner_point, self.radius, self.brace_length, *self._pivots)
+
+    def stretches(self) -> Iterator[Stretch]:
+        """Yield the parts of the track on which the slider rises, in order, from `start` on."""
+        passed = self.start - self.dead_point
+        if self.corner_end > self.start:
+            low = float(np.arctan(self._corner_states(np.array([self.start])).slope[0])) if passed else self._pivots[0]
+            yield Stretch(True, low, self._pivots[1], self._corner_piece)
+        low, high = self.flank_range
+        if passed and self.corner_end <= self.start:
+            low = float(self._flank_parameter(np.array([self.start]))[0])
+        yield Stretch(False, low, high, self._flank_piece)
+
+    def slider_at(self, x: float) -> float:
+        """Return the slider position with the roller's centre at `x` [m], or at the nearer end of the track."""
+        for part in self.stretches():
+
+            def past(u: float, part: Stretch = part) -> float:
+                return float(part.at(u)[1]) - x
+
+            if past(part.low) >= 0 or past(part.high) >= 0:
+                place = part.low if past(part.low) >= 0 else bracketed_root(past, part.low, part.high)
+                return float(part.at(place)[0])
+        return self.end
+
+    def _corner_piece(self, turn: Real) -> tuple[Real, Real, Real]:
+        """Return slider position, x and slope where the contact normal on the corner is turned by an angle [rad]."""
+        xc, yc = self._corner_point
+        sin, cos = np.sin(turn), np.cos(turn)
+        x = xc + self.radius * sin
+        return self._slider(x, yc - self.radius * cos), x, sin / cos
+
+    def _flank_piece(self, u: Real) -> tuple[Real, Real, Real]:
+        x, y = self.profile.shifted(u, self.shift) if self.shift else (u, self.profile.path.height(u))
+        return self._slider(x, y), x, self.profile.path.law.slope(u)
+
+    def _flank_parameter(self, slider: FloatArray) -> FloatArray:
+        """Return the path coordinate of the contact on the flank."""
+        law = self.profile.path.law
+        low, high = self.flank_range
+        if self._follows_law and not law.friction and law.slope_factor == 1:
+            travel = np.maximum(slider - self._slider(law.rest_half_width, 0.0), 0.0)
+            return np.minimum(np.maximum(ideal_position(law, travel), low), high)
+        zero, places, excess = self._guide
+        root = np.sqrt(np.maximum(slider - zero, 0.0))
+        guess = ideal_position(law, root * root) + np.interp(root, places, excess)
+        return invert_increasing(self._on_flank, slider, self.flank_range, guess)
+
+    @cached_property
+    def _guide(self) -> tuple[float, FloatArray, FloatArray]:
+        """First estimates: a slider position, square roots of the travel from it, and path coordinates less ideal ones.
+
+        The difference from the ideal profile is smooth and small, so that straight lines do.
+        """
+        knots = np.linspace(*self.flank_range, KNOTS)
+        slider = self._on_flank(knots)[0]
+        zero = min(self.start, float(slider[0]))
+        root = np.sqrt(np.maximum(slider - zero, 0.0))
+        return zero, root, knots - ideal_position(self.profile.path.law, root * root)

@@ -1,0 +1,157 @@
+"""An eccentric slider-crank: where crank, coupler and slider can be.
+
+The crank turns about A = (0, 0), carries the coupler at B = r1 (cos t, sin t), and the coupler
+ends in the slider C = (x, e), which moves along x.
+
+Reference
+---------
+[LH] B. Li, G. Hao, Chin. J. Mech. Eng. 32 (2019) 10.1186/s10033-019-0369-z, sec. 2 and 3.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from cfmkit.arrays import FloatArray
+
+STRETCHED = 1e-12
+"""An unloaded position so near to the stretched one [rad] is the stretched one."""
+
+
+@dataclass(frozen=True)
+class Linkage:
+    """The four lengths and the way it is put together.
+
+    Attributes
+    ----------
+    crank, coupler : float
+        r1 and r2 [m].
+    offset : float
+        e, height of the slider's way above the pivot; either sign [m].
+    branch : int
+        1: the slider is to the right of the crank pin, x = r1 cos t + a; -1: to its left.
+    """
+
+    crank: float
+    coupler: float
+    offset: float
+    branch: int = 1
+
+    @property
+    def assemblable(self) -> bool:
+        """Whether crank and coupler reach the slider's way at all [LH, eq. 1]: this is not a full turn yet."""
+        return abs(self.offset) < self.crank + self.coupler
+
+    @property
+    def turns_fully(self) -> bool:
+        """Whether the crank can go round."""
+        return self.crank + abs(self.offset) < self.coupler
+
+    @property
+    def stretched_angle(self) -> float:
+        """Crank angle at which crank and coupler are stretched into one line [rad] [LH, eq. 13b]."""
+        angle = math.asin(self.offset / (self.crank + self.coupler))
+        return angle if self.branch > 0 else math.pi - angle
+
+    @property
+    def folded_angle(self) -> float | None:
+        """Crank angle at which the coupler lies folded over the crank [rad]; None if that cannot be reached.
+
+        [LH, eq. 13a] prints the principal value of the arcsine, which is another position.
+        """
+        if abs(self.offset) >= abs(self.crank - self.coupler):
+            return None
+        angle = math.asin(self.offset / (self.crank - self.coupler))
+        return math.pi - angle if self.branch > 0 else angle
+
+    @property
+    def stretched_position(self) -> float:
+        """Distance of the slider along its way from the pivot in the stretched position [m]."""
+        reach = self.crank + self.coupler
+        return math.sqrt((reach - self.offset) * (reach + self.offset))
+
+    def way(self, angle: float) -> tuple[float, float]:
+        """Return the ends of the slider's way around the place it has at a crank angle [m], seen to the right.
+
+        Distances along the way from the pivot's foot; of the left branch those of its mirror image. From stretched
+        to folded on one side of the foot; where the offset is too large to fold, stretched on either side.
+        """
+        short, far = self.crank - self.coupler, self.stretched_position
+        if abs(self.offset) > abs(short):
+            return -far, far
+        near = math.sqrt((short - self.offset) * (short + self.offset))
+        return (near, far) if self.branch * float(self.slider_position(np.asarray(angle))) >= 0.0 else (-far, -near)
+
+    def room(self, angle: float) -> tuple[float, float]:
+        """Return how far the slider is from the ends of its `way` at a crank angle [m], from the low and the high one.
+
+        Next to an end the difference of two places has no digits left; the knee angle psi has: x_s^2 - x^2 is
+        4 r1 r2 sin^2(psi/2), and x^2 exceeds that of the folded position by 4 r1 r2 cos^2(psi/2).
+        """
+        place, half = self.branch * float(self.slider_position(np.asarray(angle))), 0.5 * self.knee(angle)
+        square, far = 4.0 * self.crank * self.coupler, self.stretched_position
+
+        def to(end: float) -> float:
+            if end * place <= 0.0:
+                return abs(end - place)
+            share = math.sin(half) if abs(end) == far else math.cos(half)
+            return square * share**2 / abs(end + place)
+
+        low, high = self.way(angle)
+        return to(low), to(high)
+
+    def arc(self, angle: float) -> tuple[float, float]:
+        """Return the ends of the crank angles that can be reached from `angle` [rad]; infinite for a full turn.
+
+        At a finite end the coupler stands across the slider's way: a dead point of the slider's drive.
+        """
+        if self.turns_fully:
+            return -math.inf, math.inf
+        ends = []
+        for height in (self.offset + self.coupler, self.offset - self.coupler):
+            if abs(height) <= self.crank:
+                base = math.asin(height / self.crank)
+                turns = 2.0 * math.pi * np.arange(-2.0, 3.0) + 2.0 * math.pi * round(angle / (2.0 * math.pi))
+                ends += [*(base + turns).tolist(), *(math.pi - base + turns).tolist()]
+        return max(end for end in ends if end <= angle), min(end for end in ends if end >= angle)
+
+    def reaches(self, angle: float) -> bool:
+        """Return whether the linkage can be assembled at a crank angle [rad]."""
+        return abs(self.crank * math.sin(angle) - self.offset) <= self.coupler
+
+    def mirrored(self) -> Linkage:
+        """Return the mirror image about a line across the slider's way: the other branch, with angles pi - t."""
+        return Linkage(self.crank, self.coupler, self.offset, -self.branch)
+
+    def coupler_angle(self, angle: FloatArray) -> FloatArray:
+        """Return the direction of the coupler from the crank pin to the slider [rad]."""
+        lift = self.crank * np.sin(angle) - self.offset
+        turn: FloatArray = np.arctan2(-lift, self._run(lift))
+        return turn if self.branch > 0 else math.pi - turn
+
+    def slider_position(self, angle: FloatArray) -> FloatArray:
+        """Return the slider's x [m] [LH, eq. 7]."""
+        lift = self.crank * np.sin(angle) - self.offset
+        position: FloatArray = self.crank * np.cos(angle) + self.branch * self._run(lift)
+        return position
+
+    def knee(self, angle: float) -> float:
+        """Return the angle from the coupler's direction to the crank's [rad]: 0 where stretched, pi where folded."""
+        if abs(math.remainder(angle - self.stretched_angle, 2.0 * math.pi)) <= STRETCHED:
+            return 0.0
+        folded = self.folded_angle
+        if folded is not None and abs(math.remainder(angle - folded, 2.0 * math.pi)) <= STRETCHED:
+            return math.pi
+        return math.remainder(angle - float(self.coupler_angle(np.asarray(angle))), 2.0 * math.pi)
+
+    def _run(self, lift: FloatArray) -> FloatArray:
+        """Return the length of the coupler along x, not negative [LH, eq. 5a]."""
+        squared = (self.coupler - lift) * (self.coupler + lift)
+        with np.errstate(invalid="ignore"):
+            run: FloatArray = np.sqrt(squared)
+        return run

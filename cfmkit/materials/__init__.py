@@ -1,5 +1,0 @@
-"""What mechanisms are made of: the library of named materials, and how a specification names or describes one."""
-
-from cfmkit.materials.library import MATERIALS, Material, UnknownMaterial, material
-
-__all__ = ["MATERIALS", "Material", "UnknownMaterial", "material"]

@@ -1,0 +1,497 @@
+"""Many specifications, one after the other or several at once, each like a run of its own, and what became of them."""
+
+from __future__ import annotations
+
+import os
+import time
+import traceback
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import TYPE_CHECKING, Any, Literal, Protocol
+
+from cfmkit.errors import CfmError, ExitCode, OutputError, SpecError, UsageError, code_of, lines_of, visible
+from cfmkit.results import Status
+from cfmkit.runs.report import worst
+from cfmkit.runs.run import Outcome, Request, Verb, analysed, designed, journal_of, long_run, spec_of
+from cfmkit.runs.run import carry_out as carried_out
+from cfmkit.studies.batch import LEFT, Entry
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Mapping, Sequence
+
+    from cfmkit.runs.run import Noting
+    from cfmkit.specs.spec import Spec
+    from cfmkit.store import RunFolder
+    from cfmkit.studies.executors import Executor, Lost
+    from cfmkit.studies.kept import KeptRuns
+    from cfmkit.tables import Table
+
+
+@dataclass(frozen=True)
+class Job:
+    """One specification of a batch and the folder it writes to, below the batch's own."""
+
+    index: int
+    spec: str
+    folder: str
+
+
+@dataclass(frozen=True)
+class BatchWork:
+    """What a worker needs to do any job of a batch.
+
+    Attributes
+    ----------
+    common : Request
+        What holds for every specification; its folder is that of the batch.
+    verb : str or None
+        ``design`` or ``analyze``; None: design what has a block `design`.
+    arguments : tuple of str
+        The command line, for the manifests.
+    fresh : bool
+        Whether searches begin anew, too, where an earlier one was ended.
+    """
+
+    common: Request
+    verb: str | None
+    arguments: tuple[str, ...]
+    fresh: bool = False
+
+    @property
+    def deciding(self) -> list[Any]:
+        """Everything in it that decides what a run finds and writes."""
+        given = self.common
+        return [list(given.changes), given.fidelity, given.seed, not given.plots, self.verb]
+
+    def __call__(self, job: Job) -> Entry:
+        """Return what becomes of one specification; nothing is raised but what ends the process."""
+        start = time.perf_counter()
+        entry = Entry(job.spec, job.folder)
+        try:
+            entry = self._done(entry)
+        except CfmError as error:
+            entry = _failed(entry, error)
+        except Exception as error:
+            entry = replace(_failed(entry, error), bug="".join(traceback.format_exception(error)))
+        return replace(entry, seconds=time.perf_counter() - start)
+
+    def refusal(self, job: Job) -> Entry | None:
+        """Return what is wrong with a specification; None if it is valid."""
+        try:
+            spec_of(replace(self.common, spec=job.spec))
+        except CfmError as error:
+            return _failed(Entry(job.spec, job.folder), error)
+        return None
+
+    def _done(self, entry: Entry) -> Entry:
+        wanted = replace(self.common, spec=entry.spec, out=os.path.join(self.common.out, entry.folder))
+        spec = spec_of(wanted)
+        verb = _verb(self.verb or _natural(spec), self.fresh)
+        name = " ".join(spec.name.split())
+        known = replace(entry, verb=verb.name, family=spec.family, name=name, data=_data_of(spec))
+        try:
+            outcome = carried_out(verb, wanted, self.arguments)
+        except CfmError as error:
+            return _failed(known, error)
+        return _ended(known, outcome)
+
+
+def _natural(spec: Spec) -> str:
+    """Return the verb that a specification asks for."""
+    from cfmkit.families import family
+
+    designs = getattr(spec, "design", None) is not None and family(spec.family).design is not None
+    return "design" if designs else "analyze"
+
+
+def _data_of(spec: Spec) -> tuple[tuple[str, str | None], ...]:
+    """Return the data files that a specification names, and the hashes of their content."""
+    from cfmkit.store import file_hash
+    from cfmkit.tables.source import named_in
+
+    return tuple((str(source), file_hash(source.path.resolve())) for source in named_in(spec.model_dump()))
+
+
+def _verb(name: str, fresh: bool) -> Verb:
+    if name == "design":
+        # One process: the specifications of the batch share the cores already.
+        return Verb("design", "designed and analysed", designed, running=partial(long_run, 1, fresh))
+    return Verb("analyze", "analysed", analysed)
+
+
+def _ended(entry: Entry, outcome: Outcome) -> Entry:
+    """Return what became of a specification that was computed."""
+    data, code = outcome.report.as_json(), ExitCode(outcome.report.exit_code)
+    told = [one["sentence"] for one in data["requirements"] if not one["ok"]]
+    if code not in (ExitCode.OK, ExitCode.REQUIREMENT_MISSED):
+        told = [data["message"]]
+    return replace(
+        entry,
+        status=data["status"],
+        code=code,
+        message="; ".join(told),
+        requirements=tuple(data["requirements"]),
+        warnings=tuple(data["warnings"]),
+        written=True,
+    )
+
+
+def _failed(entry: Entry, error: Exception) -> Entry:
+    code, complaints = code_of(error), tuple(_of_one(entry, error))
+    first, *more = complaints
+    told = first.removeprefix("error    ") + (f" (and {len(more)} more)" if more else "")
+    return replace(entry, status=code.name.lower(), code=code, message=told, errors=complaints)
+
+
+def _of_one(entry: Entry, error: Exception) -> Iterator[str]:
+    """Yield what standard error shows of a fault; of one in an option, too, which specification has it."""
+    if not isinstance(error, SpecError):
+        yield from lines_of(error)
+        return
+    for problem in error.problems:
+        yield str(problem) if not problem.source.startswith("--") else f"{visible(entry.spec)}: {problem}"
+
+
+def lost(job: Job, outcome: Lost) -> Entry:
+    """Return what became of a specification whose process did not answer."""
+    bug = outcome.status is Status.CRASHED
+    code = ExitCode.BUG if bug else outcome.status.exit_code
+    return Entry(job.spec, job.folder, "", "", "", outcome.status.key, code, outcome.message, bug=outcome.bug)
+
+
+class Monitor(Protocol):
+    """Who is told how far a batch is, and may end it."""
+
+    @property
+    def stopped(self) -> bool:
+        """Whether the batch is to end."""
+
+    def total(self, points: int) -> None:
+        """Take how many specifications there are."""
+
+    def done(self, points: int, failed: int, reused: bool) -> None:
+        """Take that more are finished."""
+
+    def stopping(self) -> bool:
+        """Return whether the batch is to end."""
+
+
+@dataclass
+class Unwatched:
+    """A monitor that tells nobody."""
+
+    stopped: bool = False
+
+    def total(self, points: int) -> None:
+        """Tell nobody."""
+
+    def done(self, points: int, failed: int, reused: bool) -> None:
+        """Tell nobody."""
+
+    def stopping(self) -> bool:
+        """Never end."""
+        return False
+
+
+@dataclass(frozen=True)
+class Crew:
+    """How a batch gets done: by what, until when, and who is told."""
+
+    executor: Executor
+    fail_fast: bool
+    progress: Monitor
+    kept: KeptRuns
+
+
+def carry_out(work: BatchWork, jobs: Sequence[Job], crew: Crew) -> tuple[Entry, ...]:
+    """Return what became of every specification, in their order; those that were not run are skipped.
+
+    What an earlier batch has finished and nobody has changed since is not computed again.
+    """
+    found: dict[int, Entry] = {}
+
+    def stopping() -> bool:
+        failed = crew.fail_fast and any(one.code is not ExitCode.OK for one in found.values())
+        return failed or crew.progress.stopping()
+
+    def note(job: Job, entry: Entry) -> None:
+        found[job.index] = entry
+        crew.progress.done(1, int(entry.code is not ExitCode.OK), entry.reused)
+
+    def new() -> Iterator[Job]:
+        for job in jobs:
+            if stopping():
+                return
+            entry = crew.kept.recall(job.spec, job.folder)
+            if entry is not None and not entry.verb:
+                entry = work.refusal(job)
+            if entry is None:
+                yield job
+            else:
+                note(job, entry)
+
+    crew.progress.total(len(jobs))
+    for job, outcome in crew.executor(work, new(), stopping):
+        entry = outcome if isinstance(outcome, Entry) else lost(job, outcome)
+        crew.kept.keep(entry)
+        note(job, entry)
+    told = "not run: interrupted" if crew.progress.stopped else LEFT
+    return tuple(found.get(job.index) or Entry(job.spec, job.folder, message=told) for job in jobs)
+
+
+def executor_for(jobs: int | None, count: int, timeout: float | None) -> Executor:
+    """Return what gets specifications done: this process, or several.
+
+    Raises
+    ------
+    cfmkit.errors.UsageError
+        If the time allowed is none.
+    """
+    from cfmkit.studies.executors import cores, serial
+    from cfmkit.studies.pool import Pool
+
+    if timeout is not None and timeout <= 0:
+        raise UsageError(f"--timeout-per-point: {timeout:g} is not allowed: must be > 0")
+    wanted = min(jobs or cores(), count)
+    return serial if wanted <= 1 and timeout is None else Pool(max(wanted, 1), timeout)
+
+
+def prepared(path: str) -> Callable[[bytes], None]:
+    """Return what writes a file; its folder is made now, and a folder in its place is told now.
+
+    Raises
+    ------
+    cfmkit.errors.OutputError
+        If it will not be possible to write it.
+    """
+    from cfmkit.store import atomic_write
+    from cfmkit.store.disk import reporting
+
+    if not path.strip():
+        raise UsageError("--junit is empty; name a file")
+    with reporting(path):
+        os.makedirs(os.path.dirname(os.path.abspath(path)), exist_ok=True)
+    if os.path.isdir(path):
+        raise OutputError(f"cannot write {path}: it is a folder")
+
+    def write(data: bytes) -> None:
+        atomic_write(path, data)
+
+    return write
+
+
+def exit_code(entries: Sequence[Entry], interrupted: bool) -> ExitCode:
+    """Return what the process is to say: the first of 70, 7, 3, 4, 6, 5 that occurs."""
+    return ExitCode.INTERRUPTED if interrupted else worst([one.code for one in entries])
+
+
+def complaints(entries: Sequence[Entry], tracebacks: bool) -> Iterator[str]:
+    """Yield what belongs on standard error: faults of files with their places, bugs."""
+    for one in entries:
+        yield from one.errors
+        if one.bug and not one.errors:
+            yield f"error    {visible(one.spec)}: {one.message}"
+        if one.bug and tracebacks:
+            yield from one.bug.rstrip("\n").split("\n")
+
+
+@dataclass(frozen=True)
+class BatchResult:
+    """What became of a batch.
+
+    Attributes
+    ----------
+    entries : tuple of Entry
+        One a specification, in their order.
+    exit_code : ExitCode
+        The worst of them: what the command would return.
+    folder : str
+        The output folder; each specification has one of its own below.
+    files : tuple of str
+        What was written there.
+    """
+
+    entries: tuple[Entry, ...]
+    exit_code: ExitCode
+    folder: str
+    files: tuple[str, ...]
+
+    @property
+    def summary(self) -> Mapping[str, Any]:
+        """What metrics.json says."""
+        return _data(self.entries, self.exit_code)
+
+    @property
+    def table(self) -> Table:
+        """What results.csv says: one row a specification."""
+        from cfmkit.studies.batch import results_table
+
+        return results_table(self.entries)
+
+    @property
+    def requirements(self) -> Table:
+        """What requirements.csv says: one row a requirement."""
+        from cfmkit.studies.batch import requirements_table
+
+        return requirements_table(self.entries)
+
+
+def batch(
+    specs: str | os.PathLike[str] | Iterable[str | os.PathLike[str]],
+    out: str | os.PathLike[str] = "cfm-out/batch",
+    *,
+    verb: Literal["design", "analyze"] | None = None,
+    changes: Iterable[str] = (),
+    fidelity: str | None = None,
+    seed: int = 0,
+    plots: bool = True,
+    jobs: int | None = 1,
+    timeout_per_point: float | None = None,
+    fail_fast: bool = False,
+    fresh: bool = False,
+    junit: str | None = None,
+    arguments: Sequence[str] = (),
+    monitor: Monitor | None = None,
+    noting: Noting = journal_of,
+) -> BatchResult:
+    """Design or analyse many specifications, check their requirements, and write a folder for each and for all.
+
+    A specification that an earlier batch in the same folder has finished is reused as long as nothing has changed.
+
+    Parameters
+    ----------
+    specs : path-like or iterable of path-like
+        YAML files, folders, or patterns such as ``configs/**/*.yaml``.
+    out : path-like
+        The output folder.
+    verb : {"design", "analyze"}, optional
+        Default: design where there is a block `design`, else analyze.
+    changes : iterable of str
+        As ``--set`` takes them; ``cam:mechanism...=`` for one family only.
+    fidelity : str, optional
+        For all of them.
+    seed : int
+        Of everything random.
+    plots : bool
+        Whether to draw.
+    jobs : int, optional
+        Processes; None: all cores.
+    timeout_per_point : float, optional
+        Time allowed for each specification [s].
+    fail_fast : bool
+        Start no more once one has failed.
+    fresh : bool
+        Reuse nothing.
+    junit : str, optional
+        A file for JUnit XML, a test for each requirement.
+    arguments : sequence of str
+        What manifests say of the command line.
+    monitor : Monitor, optional
+        Who is told how far it is, and may end it.
+    noting : callable
+        What opens the journal of the folder.
+
+    Raises
+    ------
+    cfmkit.errors.UsageError
+        If a name stands for no file, or an option is malformed.
+    cfmkit.errors.OutputError
+        If the folder cannot be written.
+
+    Examples
+    --------
+    >>> import cfmkit, tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     found = cfmkit.batch(["configs/cam.yaml"], folder, plots=False)
+    >>> found.exit_code.name, [(one.spec, one.status) for one in found.entries]
+    ('OK', [('configs/cam.yaml', 'complete')])
+    """
+    from cfmkit.runs.specfile import addressed
+    from cfmkit.store import RunFolder
+    from cfmkit.studies.batch import folders, sources
+    from cfmkit.studies.junit import junit as junit_of
+    from cfmkit.studies.kept import KeptRuns
+
+    place, given = os.fspath(out), (changes,) if isinstance(changes, str) else tuple(changes)
+    if not place.strip():
+        raise UsageError("--out is empty; give a folder")
+    if verb not in (None, "design", "analyze"):
+        raise UsageError(f"verb: {verb!r} is not one of 'design', 'analyze'")
+    for change in given:
+        addressed(change)
+    named = _named(specs)
+    files = sources(named, place)
+    work = BatchWork(Request("", place, given, fidelity, seed, plots, of_many=True), verb, tuple(arguments), fresh)
+    todo = [Job(k, *pair) for k, pair in enumerate(zip(files, folders(files), strict=True))]
+    executor = executor_for(jobs, len(todo), timeout_per_point)
+    report = None if junit is None else prepared(junit)
+    watched = monitor or Unwatched()
+    with RunFolder(place) as folder, noting(folder, fresh) as journal:
+        folder.check("results.csv", "requirements.csv", "metrics.json")
+        entries = carry_out(work, todo, Crew(executor, fail_fast, watched, KeptRuns(place, work.deciding, journal)))
+        code = exit_code(entries, watched.stopped)
+        written = _write(folder, entries, _about(work, named, code))
+    if report is not None:
+        report(junit_of(entries))
+    return BatchResult(entries, code, place, written)
+
+
+def _named(specs: Any) -> list[str]:
+    """Return the names of the files, folders and patterns that are given."""
+    if isinstance(specs, str | os.PathLike):
+        specs = [specs]
+    named = list(specs) if isinstance(specs, Iterable) else [specs]
+    if odd := [one for one in named if not isinstance(one, str | os.PathLike)]:
+        raise UsageError(f"a batch reads files: a path is needed, not {type(odd[0]).__name__}; cfmkit.dumps writes one")
+    if not named:
+        raise UsageError("there is no specification: name files, folders or patterns")
+    return [str(os.fspath(one)) for one in named]
+
+
+def unreached(entries: Sequence[Entry], changes: Iterable[str]) -> Iterator[str]:
+    """Yield the options that are for a family of which there is no specification."""
+    from cfmkit.runs.specfile import addressed
+
+    families = {one.family for one in entries}
+    for change in changes if "" not in families else ():  # what is not valid may be of any family
+        family, _ = addressed(change)
+        if family is not None and family not in families:
+            yield f"warning  --set {visible(change)}: no specification is of the family {family!r}"
+
+
+def _about(work: BatchWork, named: Sequence[str], code: ExitCode) -> dict[str, Any]:
+    """Return what the manifest says about the batch."""
+    return {
+        "command": "batch",
+        "arguments": list(work.arguments),
+        "seed": work.common.seed,
+        "spec": {"source": list(named)},
+        "status": code.name.lower(),
+        "exit_code": int(code),
+    }
+
+
+def _write(folder: RunFolder, entries: Sequence[Entry], about: dict[str, Any]) -> tuple[str, ...]:
+    from cfmkit.studies.batch import requirements_table, results_table
+    from cfmkit.tables import to_csv
+    from cfmkit.tables.jsontext import json_bytes
+
+    folder.write("results.csv", to_csv(results_table(entries)))
+    folder.write("requirements.csv", to_csv(requirements_table(entries)))
+    folder.write("metrics.json", json_bytes(_data(entries, ExitCode(about["exit_code"]))))
+    return (*folder.commit(about).files, "manifest.json")
+
+
+def _data(entries: Sequence[Entry], code: ExitCode) -> dict[str, Any]:
+    from cfmkit.studies.batch import message
+
+    required = [{"spec": one.spec, **requirement} for one in entries for requirement in one.requirements]
+    return {
+        "status": "complete" if code is ExitCode.OK else code.name.lower(),
+        "message": message(entries),
+        "metrics": {},
+        "requirements": required,
+        "warnings": [{"spec": one.spec, **item} for one in entries for item in one.warnings],
+        "specs": [one.as_json() for one in entries],
+    }

@@ -1,0 +1,236 @@
+"""What a run found out, as one value, and as the files that it writes.
+
+`report_on` gathers metrics, requirements and warnings of a result; `files` yields
+them, with curve, figures and geometry, by name below the output folder. Nothing here
+touches a disk, and nothing depends on the time: the same result gives the same bytes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+from cfmkit import api
+from cfmkit.errors import ExitCode, SolutionError
+from cfmkit.results import Result, Status
+from cfmkit.tables.jsontext import json_bytes
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Mapping
+
+    from cfmkit.curves import Curve
+    from cfmkit.metrics import Outcome
+    from cfmkit.results import Design, Finding, Quantity
+    from cfmkit.specs.spec import Spec
+
+SEVERITY = (
+    ExitCode.BUG,
+    ExitCode.IO,
+    ExitCode.INVALID,
+    ExitCode.NO_SOLUTION,
+    ExitCode.PARTIAL,
+    ExitCode.REQUIREMENT_MISSED,
+)
+"""Which exit code counts where several apply: the first of these."""
+
+
+@dataclass(frozen=True)
+class Supplement:
+    """What a verb adds to the report on a result.
+
+    Attributes
+    ----------
+    data : mapping
+        More keys of metrics.json.
+    files : mapping of str to callable
+        More files: what makes the content of each.
+    lines : tuple of (str, str)
+        More paragraphs of the page: the word that begins each, and the text.
+    warnings : tuple of Finding
+        More of them.
+    curves : tuple of Curve
+        What curve.csv holds, where that is not what the result has.
+    shortfall : str
+        What was asked besides the result and is missing, in one sentence.
+    """
+
+    data: Mapping[str, Any] = field(default_factory=dict)
+    files: Mapping[str, Callable[[], bytes]] = field(default_factory=dict)
+    lines: tuple[tuple[str, str], ...] = ()
+    warnings: tuple[Finding, ...] = ()
+    curves: tuple[Curve, ...] = ()
+    shortfall: str = ""
+
+    def plus(self, more: Supplement) -> Supplement:
+        """Return both, this one first."""
+        return Supplement(
+            {**self.data, **more.data},
+            {**self.files, **more.files},
+            (*self.lines, *more.lines),
+            (*self.warnings, *more.warnings),
+            (*self.curves, *more.curves),
+            "; ".join(text for text in (self.shortfall, more.shortfall) if text),
+        )
+
+
+@dataclass(frozen=True)
+class Report:
+    """A result with everything that is read off it.
+
+    Attributes
+    ----------
+    result : Result
+        Of any status.
+    metrics : mapping of str to Quantity
+        By name, in SI.
+    requirements : tuple of Outcome
+        In the order of the specification.
+    design : Design or None
+        What led to the result, if it was designed.
+    supplement : Supplement
+        What else the verb has to say.
+    """
+
+    result: Result
+    metrics: Mapping[str, Quantity]
+    requirements: tuple[Outcome, ...]
+    design: Design | None = None
+    supplement: Supplement = Supplement()
+
+    @property
+    def warnings(self) -> tuple[Finding, ...]:
+        """Those of the design, of the analysis and of the supplement; none twice."""
+        designed = self.design.warnings if self.design else ()
+        return tuple(dict.fromkeys((*designed, *self.result.warnings, *self.supplement.warnings)))
+
+    @property
+    def status(self) -> Status:
+        """How the run ended: as the result did, but partial where something else that was asked is missing."""
+        solved = self.result.status is Status.COMPLETE
+        return Status.PARTIAL if solved and self.supplement.shortfall else self.result.status
+
+    @property
+    def message(self) -> str:
+        """One sentence on the outcome."""
+        return self.result.message if self.status is self.result.status else self.supplement.shortfall
+
+    @property
+    def missed(self) -> tuple[Outcome, ...]:
+        """The requirements that are not met."""
+        return tuple(outcome for outcome in self.requirements if not outcome.ok)
+
+    @property
+    def exit_code(self) -> ExitCode:
+        """What the process is to say: how the solve ended counts before the requirements."""
+        missed = [ExitCode.REQUIREMENT_MISSED] if self.missed else []
+        return worst([self.status.exit_code, *missed])
+
+    def beside(self, metrics: Mapping[str, Quantity], supplement: Supplement) -> Report:
+        """Return the report with more to say."""
+        both = self.supplement.plus(supplement)
+        return replace(self, metrics={**self.metrics, **metrics}, supplement=both)
+
+    def as_json(self) -> dict[str, Any]:
+        """Return what metrics.json says; what only a design search knows is a block of its own, no metric."""
+        from cfmkit.metrics import metrics_json, search_json
+
+        searched = {"search": search_json(self.design.search)} if self.design and self.design.search else {}
+        return (
+            {
+                "status": self.status.key,
+                "message": self.message,
+                "metrics": metrics_json(self.metrics),
+                "requirements": [outcome.as_json() for outcome in self.requirements],
+                "warnings": [{"name": item.name, "message": item.message} for item in self.warnings],
+            }
+            | searched
+            | dict(self.supplement.data)
+        )
+
+
+def worst(codes: list[ExitCode]) -> ExitCode:
+    """Return the exit code that counts among several.
+
+    Examples
+    --------
+    >>> worst([ExitCode.OK, ExitCode.REQUIREMENT_MISSED, ExitCode.PARTIAL]).name
+    'PARTIAL'
+    """
+    return next((code for code in (*SEVERITY, *codes) if code in codes and code is not ExitCode.OK), ExitCode.OK)
+
+
+def report_on(result: Result, design: Design | None = None) -> Report:
+    """Return the report on a result, and on the design that led to it."""
+    return Report(result, api.evaluate(result), api.check(result), design)
+
+
+def undesigned(spec: Spec, design: Design) -> Result:
+    """Return the empty result of a design that failed: nothing was analysed."""
+    return Result(spec, design.status, design.message)
+
+
+def files(report: Report, plots: bool = True) -> Iterator[tuple[str, bytes]]:
+    """Yield every file of a run as (name below the folder, content), each when it is asked for.
+
+    Parameters
+    ----------
+    report : Report
+        Of any status: without a curve only what is known is written.
+    plots : bool
+        Whether to draw figures.
+    """
+    result, designed = report.result, report.design.spec if report.design else None
+    if designed is not None:
+        yield "design.yaml", api.dumps(designed).encode()
+    if curves := report.supplement.curves or result.curves:
+        from cfmkit.tables import curve_table, to_csv
+
+        yield "curve.csv", to_csv(curve_table(curves))
+        for stem, table in result.tables.items():
+            yield f"{stem}.csv", to_csv(table())
+    yield "metrics.json", json_bytes(report.as_json())
+    yield "resolved.yaml", api.dumps(api.resolve(result.spec), complete=True).encode()
+    yield from sources(result.spec)
+    if designed is not None and result.status.usable:
+        yield from geometry(result.spec)
+    if plots:
+        yield from pictures(result)
+    for name, make in report.supplement.files.items():
+        if plots or not name.startswith("figures/"):
+            yield name, make()
+
+
+def sources(spec: Spec) -> Iterator[tuple[str, bytes]]:
+    """Yield the data files that a specification names, under the same names: resolved.yaml names them, too."""
+    from cfmkit.tables.source import named_in
+
+    for source in named_in(spec.model_dump()):
+        yield str(source), source.path.read_bytes()
+
+
+def geometry(spec: Spec) -> Iterator[tuple[str, bytes]]:
+    """Yield what is to be cut or printed, below ``geometry/``; nothing where there is no part."""
+    from cfmkit.families import family
+
+    if family(spec.family).outline:
+        from cfmkit.export import files as drawn
+
+        try:
+            drawing = api.drawing(spec)
+        except SolutionError:  # the analysis has a curve all the same, and a warning that says why
+            return
+        for name, data in drawn(drawing).items():
+            yield f"geometry/{name}", data
+
+
+def pictures(result: Result) -> Iterator[tuple[str, bytes]]:
+    """Yield the family's pictures of a result as PNG, below ``figures/``."""
+    makers = api.figures(result)
+    if makers:
+        from cfmkit.plots.style import png
+
+        for stem, draw in makers.items():
+            yield f"figures/{stem}.png", png(draw())
+
+
+__all__ = ["Report", "Supplement", "files", "geometry", "json_bytes", "pictures", "report_on", "undesigned", "worst"]

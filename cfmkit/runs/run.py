@@ -1,0 +1,234 @@
+"""A run over one specification: read it, compute, and write a folder of files."""
+
+from __future__ import annotations
+
+import time
+from contextlib import contextmanager, nullcontext
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import TYPE_CHECKING, Any, Protocol
+
+from cfmkit import api
+from cfmkit.errors import SpecError, UsageError
+from cfmkit.families.base import Run
+from cfmkit.results import Status
+from cfmkit.runs import report
+from cfmkit.runs.specfile import bind, placed, read_spec, renamed
+from cfmkit.store import RunFolder, stable_hash
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Mapping, Sequence
+    from contextlib import AbstractContextManager
+
+    from cfmkit.runs.report import Report
+    from cfmkit.specs.spec import Spec
+    from cfmkit.specs.yamlio import Document
+    from cfmkit.store import Manifest
+    from cfmkit.studies.journal import Journal
+    from cfmkit.tables import Table
+
+    Noting = Callable[[RunFolder, bool], AbstractContextManager[Journal]]
+
+FIRST = ("metrics.json", "resolved.yaml", "curve.csv")
+"""Files that every run may write: what is in their way is found before anything is computed."""
+
+
+def journal_of(folder: RunFolder, fresh: bool) -> Journal:
+    """Return the journal of a folder, to be opened."""
+    from cfmkit.studies.journal import Journal
+
+    return Journal(folder.journal, fresh)
+
+
+def _as_it_is(_folder: RunFolder, run: Run) -> AbstractContextManager[Run]:
+    """Leave a run as it is."""
+    return nullcontext(run)
+
+
+@dataclass(frozen=True)
+class Verb:
+    """What distinguishes one computing verb from another.
+
+    `compute` returns the report on a spec; `done` is the word for it, in the header; `inputs` is
+    what the manifest says about other files than the spec; `running` makes of a run in the folder one
+    that works in several processes, or notes what it has finished.
+    """
+
+    name: str
+    done: str
+    compute: Callable[[Spec, Run], Report]
+    inputs: Mapping[str, Any] = field(default_factory=dict)
+    running: Callable[[RunFolder, Run], AbstractContextManager[Run]] = _as_it_is
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Everything about a finished run that is shown: the report, where it was written, how long it took."""
+
+    verb: Verb
+    report: Report
+    source: str
+    changes: tuple[str, ...]
+    folder: str
+    manifest: Manifest
+    kept: dict[str, str]
+    seconds: float
+
+    @property
+    def written(self) -> tuple[str, ...]:
+        """The files, in the order in which they were written."""
+        return tuple(self.manifest.files)
+
+
+class Wish(Protocol):
+    """What says which specification is meant: its file, what replaces its values, and a fidelity."""
+
+    @property
+    def spec(self) -> str:
+        """The file; ``-`` is standard input."""
+
+    @property
+    def changes(self) -> tuple[str, ...]:
+        """What ``--set`` says, in order."""
+
+    @property
+    def fidelity(self) -> str | None:
+        """What ``--fidelity`` says."""
+
+
+@dataclass(frozen=True)
+class Request:
+    """What a run is to do.
+
+    Attributes
+    ----------
+    spec : str
+        The file; ``-`` is standard input.
+    out : str
+        The output folder.
+    changes : tuple of str
+        What ``--set`` says.
+    fidelity : str, optional
+        What ``--fidelity`` says.
+    seed : int
+        Of everything random.
+    plots : bool
+        Whether to draw.
+    of_many : bool
+        Whether it is one of many, and changes may be for others.
+    """
+
+    spec: str
+    out: str
+    changes: tuple[str, ...] = ()
+    fidelity: str | None = None
+    seed: int = 0
+    plots: bool = True
+    of_many: bool = False
+
+
+def carry_out(
+    verb: Verb, wanted: Request, arguments: Sequence[str], progress: Callable[[float, str], None] | None = None
+) -> Outcome:
+    """Return what a run found, after writing its folder.
+
+    Parameters
+    ----------
+    verb : Verb
+        What to compute.
+    wanted : Request
+        Of what, and where to.
+    arguments : sequence of str
+        The command line, for the manifest.
+    progress : callable, optional
+        Is told how far the run is.
+    """
+    start = time.perf_counter()
+    document = _document(wanted)
+    spec = _bound(document, wanted)
+    with RunFolder(wanted.out) as folder:
+        folder.check(*FIRST)
+        with verb.running(folder, Run(wanted.seed, progress) if progress else Run(wanted.seed)) as run:
+            found = _computed(verb, spec, run, document)
+        for name, data in report.files(found, plots=wanted.plots):
+            folder.write(name, data)
+        origin = provenance(verb.name, spec, wanted.spec, arguments)
+        manifest = folder.commit(origin | dict(verb.inputs) | {"seed": wanted.seed} | _ending(found))
+        kept = dict(folder.kept)
+    seconds = time.perf_counter() - start
+    return Outcome(verb, found, wanted.spec, wanted.changes, wanted.out, manifest, kept, seconds)
+
+
+def spec_of(wanted: Wish) -> Spec:
+    """Return the checked specification that is meant, with what is changed in it."""
+    return _bound(_document(wanted), wanted)
+
+
+def _document(wanted: Wish) -> Document:
+    of_many = getattr(wanted, "of_many", False)
+    if wanted.fidelity is None:
+        return read_spec(wanted.spec, wanted.changes, of_many)
+    if not wanted.fidelity.strip():
+        raise UsageError("--fidelity is empty; `cfmkit show` and the family's name lists what there is")
+    return read_spec(wanted.spec, (*wanted.changes, f"analysis.fidelity={wanted.fidelity}"), of_many)
+
+
+def _bound(document: Document, wanted: Wish) -> Spec:
+    try:
+        return bind(document)
+    except SpecError as error:
+        raise (renamed(error, "--set analysis.fidelity", "--fidelity") if wanted.fidelity else error) from None
+
+
+def _computed(verb: Verb, spec: Spec, run: Run, document: Document) -> Report:
+    found = verb.compute(spec, run)
+    if found.result.status is Status.INVALID:
+        raise SpecError([placed(document, verb.name, found.result.message)])
+    return found
+
+
+def family_package(name: str) -> dict[str, Any]:
+    """Return what a manifest says about a family of another package; nothing about those of this one."""
+    from cfmkit.families import origin
+
+    found = origin(name)
+    return {"family": found} if found else {}
+
+
+def provenance(command: str, spec: Spec, source: str, arguments: Sequence[str]) -> dict[str, Any]:
+    """Return what every manifest says about its run: the command line and the content of the spec."""
+    content = {"source": source, "sha256": stable_hash(spec.model_dump(mode="json")), **family_package(spec.family)}
+    return {"command": command, "arguments": list(arguments), "spec": content}
+
+
+def _ending(found: Report) -> dict[str, Any]:
+    return {"status": found.status.key, "exit_code": int(found.exit_code)}
+
+
+def analysed(spec: Spec, run: Run) -> Report:
+    """Return the report on a mechanism as it is."""
+    return report.report_on(api.analyze(spec, run))
+
+
+def designed(spec: Spec, run: Run) -> Report:
+    """Return the report on the designed mechanism, or on why there is none."""
+    design = api.design(spec, run)
+    result = api.analyze(design.spec, run) if design.spec is not None else report.undesigned(spec, design)
+    tables = {f"{stem}.csv": partial(_csv, table) for stem, table in design.tables.items()}
+    return report.report_on(result, design).beside({}, report.Supplement(files=tables, lines=design.notes))
+
+
+def _csv(table: Callable[[], Table]) -> bytes:
+    from cfmkit.tables import to_csv
+
+    return to_csv(table())
+
+
+@contextmanager
+def long_run(jobs: int, fresh: bool, folder: RunFolder, plain: Run, noting: Noting = journal_of) -> Iterator[Run]:
+    """Yield a run that works in several processes and notes what it has finished in the folder's journal."""
+    from cfmkit.studies.executors import serial
+    from cfmkit.studies.pool import Pool
+
+    with noting(folder, fresh) as journal:
+        yield replace(plain, executor=serial if jobs == 1 else Pool(jobs), notes=journal)

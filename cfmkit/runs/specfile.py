@@ -1,0 +1,267 @@
+"""Specifications on their way in: from a file or standard input to a checked one of the right family."""
+
+from __future__ import annotations
+
+import difflib
+import os
+import re
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from cfmkit.errors import Problem, SpecError, UsageError, visible
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Sequence
+
+    from cfmkit.families.base import Family
+    from cfmkit.specs.spec import Requirement, Spec
+    from cfmkit.specs.yamlio import Document
+
+STDIN = "-"
+
+
+def read_spec(name: str, changes: Iterable[str] = (), of_many: bool = False) -> Document:
+    """Return what a file says, changed by options such as ``a.b=1 mm``; nothing is checked yet.
+
+    Parameters
+    ----------
+    name : str
+        Path of a YAML file; ``-`` is standard input.
+    changes : iterable of str
+        What ``--set`` takes.
+    of_many : bool
+        Whether there are other specifications, for which some options may be.
+
+    Raises
+    ------
+    cfmkit.errors.UsageError
+        If the file cannot be read, or an option is malformed or for a specification of another family.
+    """
+    from cfmkit.specs.yamlio import read_document
+
+    if name == STDIN:
+        return changed(read_document(standard_input(), "stdin", Path.cwd()), changes, of_many)
+    return changed(read_document(content(name), name, Path(name).absolute().parent), changes, of_many)
+
+
+def changed(document: Document, changes: Iterable[str], of_many: bool = False) -> Document:
+    """Return a document with options applied in their order.
+
+    Options for specifications of another family are for others of many; of one alone they would change nothing.
+
+    Raises
+    ------
+    cfmkit.errors.UsageError
+        If an option is malformed, for a family that does not exist, or for none that there is.
+    """
+    for change in changes:
+        family, option = addressed(change)
+        own = _family_of(document)
+        if family in (None, own):
+            document = document.set(option)
+        elif own is not None and not of_many:
+            raise UsageError(f"--set {visible(change)}: {visible(document.source)} is of the family {visible(own)!r}")
+    return document
+
+
+def addressed(change: str) -> tuple[str | None, str]:
+    """Return the family that an option such as ``cam:mechanism.roller_radius=10 mm`` is for, and the option itself.
+
+    Raises
+    ------
+    cfmkit.errors.UsageError
+        If there is no such family.
+
+    Examples
+    --------
+    >>> addressed("cam:analysis.points=51"), addressed("analysis.points=51")
+    (('cam', 'analysis.points=51'), (None, 'analysis.points=51'))
+    """
+    path = change.partition("=")[0]
+    family, colon, _ = path.partition(":")
+    if not colon or not _FAMILY.fullmatch(family):
+        return None, change
+    from cfmkit import families
+
+    if family not in families.names():
+        near = difflib.get_close_matches(family, families.names(), n=1)
+        hint = f"; did you mean {near[0]!r}?" if near else f": there are {', '.join(families.names())}"
+        raise UsageError(f"--set {visible(change)}: there is no family {family!r}{hint}")
+    return family, change[len(family) + 1 :]
+
+
+_FAMILY = re.compile("[A-Za-z][A-Za-z0-9_-]*")
+"""What may stand before the colon of an option for one family; a path with a colon has dots or quotes before it."""
+
+
+def _family_of(document: Document) -> str | None:
+    named = document.tree.get("family") if isinstance(document.tree, dict) else None
+    return named if isinstance(named, str) else None
+
+
+def standard_input() -> bytes:
+    """Return what comes in, up to the size that no specification has.
+
+    Raises
+    ------
+    cfmkit.errors.UsageError
+        If nothing can come in.
+    """
+    from cfmkit.specs.yamlio.source import LARGEST
+
+    if sys.stdin is None:
+        raise UsageError("standard input is closed; name a file")
+    return sys.stdin.buffer.read(LARGEST + 1)
+
+
+def content(name: str) -> bytes:
+    """Return the bytes of a file.
+
+    Raises
+    ------
+    cfmkit.errors.UsageError
+        In one sentence, if it is not there, a folder or not readable.
+    """
+    from cfmkit.specs.yamlio.source import LARGEST
+
+    if not name or "\0" in name:
+        raise UsageError(f"{name!r} is not the name of a file")
+    try:
+        if Path(name).is_dir():
+            raise UsageError(f"{visible(name)} is a folder; name the specification in it{_inside(name)}")
+        with open(name, "rb") as file:
+            return file.read(LARGEST + 1)
+    except FileNotFoundError:
+        raise UsageError(f"{visible(name)}: there is no such file{_similar(name)}") from None
+    except OSError as error:
+        raise UsageError(f"{visible(name)} cannot be read: {(error.strerror or str(error)).lower()}") from None
+
+
+def bind(document: Document) -> Spec:
+    """Return the checked specification of the family that it names.
+
+    Raises
+    ------
+    cfmkit.errors.SpecError
+        With every problem at once, those of the requirements' metrics included.
+    """
+    family = _family_record(document)
+    try:
+        spec = document.bind(family.spec_type)
+    except SpecError as error:
+        told = {problem.path for problem in error.problems}
+        raw = _entries(document.tree)
+        more = [found for found in _requirement_faults(document, family, raw) if not _below(found.path, told)]
+        raise SpecError(_in_order([*error.problems, *more])) from None
+    found = [*_requirement_faults(document, family, enumerate(spec.requirements)), *_sweep_faults(document, spec)]
+    found += _sensitivity_faults(document, spec)
+    if found:
+        raise SpecError(found)
+    return spec
+
+
+def _known(named: str | None) -> Sequence[str]:
+    """Return the families among which one is looked for; other packages are not asked for one that is here."""
+    from cfmkit import families
+
+    if named in families.FAMILIES:
+        return tuple(families.FAMILIES)
+    return (named,) if named in families.clashing() else families.names()
+
+
+def _family_record(document: Document) -> Family:
+    """Return the family that a document names; one that cannot be used is a problem at that place."""
+    from cfmkit import families
+
+    try:
+        return families.family(document.family(_known(_family_of(document))))
+    except families.Unusable as problem:
+        raise SpecError([document.problem(("family",), str(problem))]) from None
+
+
+def _requirement_faults(
+    document: Document, family: Family, requirements: Iterable[tuple[int, Requirement]]
+) -> Iterator[Problem]:
+    """Yield what is wrong with metric names, bounds and windows, each with its place in the file."""
+    from cfmkit.metrics import known_metrics, requirement_problems, values_of_family
+
+    known = known_metrics(None, values_of_family(family.values))
+    for index, requirement in requirements:
+        for problem in requirement_problems((requirement,), known, branches=family.branches):
+            key = problem.path.rpartition(".")[2]
+            yield placed(document, f"requirements.{index}.{key}", problem.message)
+
+
+def _sweep_faults(document: Document, spec: Spec) -> Iterator[Problem]:
+    """Yield what is wrong with paths and values of the block `sweep`, each with its place in the file."""
+    if spec.sweep is None:
+        return
+    from cfmkit.studies.variation import faults, wishes
+
+    drawn, joint = spec.sweep.combine in ("lhs", "sobol"), spec.sweep.combine == "zip"
+    for wish, message in faults(spec, wishes(spec.sweep.vary), drawn, joint):
+        yield document.problem(("sweep", "vary", wish.path), message)
+
+
+def _sensitivity_faults(document: Document, spec: Spec) -> Iterator[Problem]:
+    """Yield what is wrong with parameters and groups of the block `sensitivity`, each with its place in the file."""
+    if spec.sensitivity is None:
+        return
+    from cfmkit.studies.sensitivity.parameters import faults
+
+    for path, message in faults(spec, spec.sensitivity):
+        yield document.problem(path, message)
+
+
+def placed(document: Document, path: str, message: str) -> Problem:
+    """Return a problem with the place of a path in the file, or the option that set it."""
+    line, column = document.place(path)
+    return Problem(document.source if line else "--set", line, column, path, message)
+
+
+def _entries(tree: Any) -> Iterator[tuple[int, Requirement]]:
+    """Yield those requirements of an unchecked tree that can be read."""
+    from cfmkit.specs.spec import readable_requirement
+
+    entries = tree.get("requirements") if isinstance(tree, dict) else None
+    for index, entry in enumerate(entries if isinstance(entries, tuple) else ()):
+        if (requirement := readable_requirement(entry)) is not None:
+            yield index, requirement
+
+
+def _below(path: str, told: set[str]) -> bool:
+    return any(path == other or path.startswith(f"{other}.") for other in told if other)
+
+
+def _in_order(problems: Sequence[Problem]) -> list[Problem]:
+    return sorted(problems, key=lambda one: (one.line == 0, one.line, one.column))
+
+
+def renamed(error: SpecError, old: str, new: str) -> SpecError:
+    """Return the error with another name for the source of some problems."""
+    return SpecError([replace(one, source=new) if one.source == old else one for one in error.problems])
+
+
+def _similar(name: str) -> str:
+    """Return a hint with the names in that folder that look alike."""
+    folder, base = os.path.split(name)
+    if folder and not os.path.isdir(folder):
+        return f" (nor a folder {visible(folder)})"
+    # without their endings: those are alike in any two names
+    files = {os.path.splitext(file)[0]: file for file in _yaml_files(folder or ".")}
+    near = difflib.get_close_matches(os.path.splitext(base)[0], files, n=1)
+    return f"; did you mean {visible(os.path.join(folder, files[near[0]]))!r}?" if near else ""
+
+
+def _inside(folder: str) -> str:
+    found = _yaml_files(folder)
+    return f", e.g. {visible(os.path.join(folder, found[0]))}" if found else ""
+
+
+def _yaml_files(folder: str) -> list[str]:
+    try:
+        return sorted(entry for entry in os.listdir(folder) if entry.lower().endswith((".yaml", ".yml")))
+    except OSError:
+        return []

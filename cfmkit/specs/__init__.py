@@ -1,0 +1,1 @@
+"""From text to a specification and back: YAML with places, quantities with units, the models of what may be said."""

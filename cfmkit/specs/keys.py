@@ -1,0 +1,182 @@
+"""The keys of a specification as a list: path, kind of value, default and meaning, read off the models."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+from cfmkit.specs.yamlio import json_schema
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Mapping
+
+    from cfmkit.specs.spec import Spec
+
+DIALECT = "https://json-schema.org/draft/2020-12/schema"
+_NOTHING = object()
+_KINDS = {
+    "string": "text",
+    "integer": "whole number",
+    "number": "number",
+    "boolean": "true or false",
+    "object": "block",
+}
+
+
+@dataclass(frozen=True)
+class Key:
+    """One key.
+
+    Attributes
+    ----------
+    path : str
+        Dotted; ``[]`` stands for the items of a list, ``.NAME`` for those of a block whose names are free.
+    kind : str
+        What is written there: ``length``, ``text``, ``block``, or the words of a closed choice.
+    example : str
+        Of a quantity, with its unit; else empty.
+    allowed : str
+        Bounds, with units; empty where there are none.
+    default : str
+        As it would be written; empty where there is none.
+    required : bool
+        Whether the block needs it.
+    description : str
+        What it means.
+    """
+
+    path: str
+    kind: str
+    example: str
+    allowed: str
+    default: str
+    required: bool
+    description: str
+
+
+def schema(models: Mapping[str, type[Spec]]) -> dict[str, Any]:
+    """Return the JSON schema of one family's specifications, or of any one of several.
+
+    Parameters
+    ----------
+    models : mapping of str to type
+        Families by name, each with the model of its specifications; their order is kept.
+    """
+    each = {name: json_schema(model) for name, model in models.items()}
+    if len(each) == 1:
+        return {"$schema": DIALECT} | next(iter(each.values()))
+    shared = {f"{name}.{key}": _renamed(block, name) for name, one in each.items() for key, block in _blocks(one)}
+    choices = [
+        {key: value for key, value in _renamed(one, name).items() if key != "$defs"} for name, one in each.items()
+    ]
+    return {"$schema": DIALECT, "title": "cfmkit specification", "oneOf": choices, "$defs": shared}
+
+
+def keys(model: type[Spec]) -> tuple[Key, ...]:
+    """Return every key that a specification of a family may have, in the order of its model."""
+    whole = json_schema(model)
+    return tuple(_below(whole, dict(_blocks(whole)), ""))
+
+
+def _blocks(whole: dict[str, Any]) -> Iterable[tuple[str, Any]]:
+    found: dict[str, Any] = whole.get("$defs", {})
+    return found.items()
+
+
+def _renamed(node: Any, prefix: str) -> Any:
+    """Return a schema whose references point to definitions with a prefix."""
+    if isinstance(node, list):
+        return [_renamed(item, prefix) for item in node]
+    if not isinstance(node, dict):
+        return node
+    start = "#/$defs/"
+    result = {key: _renamed(value, prefix) for key, value in node.items()}
+    if isinstance(target := node.get("$ref"), str) and target.startswith(start):
+        result["$ref"] = f"{start}{prefix}.{target.removeprefix(start)}"
+    return result
+
+
+def _below(block: dict[str, Any], blocks: dict[str, Any], path: str) -> Iterator[Key]:
+    required = block.get("required", ())
+    for name, node in block.get("properties", {}).items():
+        here = f"{path}.{name}" if path else name
+        key = _key(here, node, blocks, name in required)
+        if path and "const" in node and not key.description:
+            # the one word that makes a block the kind it is means what the block means
+            key = replace(key, description=block.get("description", ""))
+        yield key
+        for inner, marker in _inner_blocks(node, blocks):
+            yield from _below(inner, blocks, here + marker)
+
+
+def _inner_blocks(node: dict[str, Any], blocks: dict[str, Any]) -> Iterator[tuple[dict[str, Any], str]]:
+    """Yield the blocks that may stand at a node, with ``[]`` if they stand in a list."""
+    for member in _members(node, blocks):
+        if "properties" in member:
+            yield member, ""
+        elif "items" in member:
+            yield from ((item, "[]") for item in _members(member["items"], blocks) if "properties" in item)
+        elif isinstance(named := member.get("additionalProperties"), dict):
+            yield from ((item, ".NAME") for item in _members(named, blocks) if "properties" in item)
+
+
+def _members(node: dict[str, Any], blocks: dict[str, Any]) -> list[dict[str, Any]]:
+    """Return what a node may be, references followed, nothing (null) left out."""
+    if "$ref" in node:
+        return [blocks[node["$ref"].rpartition("/")[2]]]
+    choices = node.get("anyOf") or node.get("oneOf") or node.get("allOf")
+    if choices:
+        return [one for choice in choices for one in _members(choice, blocks)]
+    return [] if node.get("type") == "null" else [node]
+
+
+def _key(path: str, node: dict[str, Any], blocks: dict[str, Any], required: bool) -> Key:
+    members = _members(node, blocks)
+    quantities = [one for one in members if "x-dimension" in one]
+    default = node.get("default", _NOTHING)
+    return Key(
+        path,
+        " or ".join(dict.fromkeys(_kind(one, blocks) for one in members)),
+        next((one["examples"][0] for one in quantities if one.get("examples")), ""),
+        "; ".join(dict.fromkeys(filter(None, map(_allowed, members)))),
+        _default(default) if default not in (_NOTHING, None, "", []) else "",
+        required,
+        node.get("description") or next((one["description"] for one in members if "description" in one), ""),
+    )
+
+
+def _kind(node: dict[str, Any], blocks: dict[str, Any]) -> str:
+    if "x-dimension" in node:
+        return str(node["x-dimension"]).replace("_", " ")
+    if "enum" in node or "const" in node:
+        return " | ".join(map(str, node.get("enum") or [node["const"]]))
+    if "properties" in node:
+        return "block"
+    if node.get("type") == "array":
+        return f"list of {_items(node, blocks)}"
+    kind = node.get("type", "value")
+    return "number or text" if isinstance(kind, list) else _KINDS.get(kind, "value")
+
+
+def _items(node: dict[str, Any], blocks: dict[str, Any]) -> str:
+    inner = node.get("prefixItems") or [node.get("items", {})]
+    kinds = dict.fromkeys(_kind(one, blocks) for item in inner for one in _members(item, blocks))
+    count = f"{len(inner)} x " if "prefixItems" in node else ""
+    return count + " or ".join(kinds)
+
+
+def _allowed(node: dict[str, Any]) -> str:
+    if "x-allowed" in node:
+        return str(node["x-allowed"])
+    if node.get("type") == "array":
+        return _allowed(node.get("items", {}))
+    signs = {"minimum": ">=", "exclusiveMinimum": ">", "maximum": "<=", "exclusiveMaximum": "<"}
+    return " and ".join(f"{sign} {node[word]:g}" for word, sign in signs.items() if word in node)
+
+
+def _default(value: Any) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, list):
+        return f"[{', '.join(map(_default, value))}]"
+    return f"{value:g}" if isinstance(value, float) else str(value)

@@ -1,0 +1,319 @@
+"""Specifications: frozen, strict models of what a user says about a mechanism.
+
+A family subclasses `Spec` with its own `mechanism`, `design` and `analysis`
+blocks. Numbers are SI floats inside; text with units exists only at the border
+(`cfmkit.specs.yamlio`, `cfmkit.specs.units`).
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+
+from cfmkit.specs.units import (
+    DIMENSIONS,
+    SHARE,
+    Displacement,
+    Ends,
+    Length,
+    MetricValue,
+    Ratio,
+    dimension_of_end,
+    ends_increase,
+)
+
+
+class Model(BaseModel):
+    """Base of every block: frozen, no unknown keys, no silent type changes."""
+
+    # Blocks stand in others, and only the whole is validated: built with it, each is built once, and quicker to import.
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", strict=True, allow_inf_nan=False, validate_default=True, defer_build=True
+    )
+
+
+class OldWords:
+    """Words of a closed choice that are still understood, and that nobody is to be told of (an annotation)."""
+
+    def __init__(self, *words: str) -> None:
+        """Keep them."""
+        self.old_words = words
+
+
+class Requirement(Model):
+    """One condition that a finished run is checked against."""
+
+    metric: str = Field(description="name of a metric, as `show metrics` lists them; `[branch]` picks a branch")
+    min: MetricValue | None = Field(None, description="smallest value allowed, with its unit")
+    max: MetricValue | None = Field(None, description="largest value allowed, with its unit")
+    over: Ends | None = Field(
+        None,
+        description="window, e.g. [2 mm, 240 mm], or shares of the travel: [1 %, 100 %]; default: analysis.window",
+    )
+
+    @field_validator("metric")
+    @classmethod
+    def _well_formed(cls, text: str) -> str:
+        if not re.fullmatch(r"[a-z_0-9]+(\[[a-z_0-9-]+\])?", text):
+            raise ValueError("must be a metric's name, with a branch in brackets where wanted: 'force_mean[load]'")
+        return text
+
+    @model_validator(mode="after")
+    def _bounded(self) -> Self:
+        if self.min is None and self.max is None:
+            raise ValueError("needs 'min', 'max' or both")
+        if self.over is not None and not ends_increase(self.over):
+            raise ValueError("'over' must be increasing")
+        return self
+
+
+class Analysis(Model):
+    """What every family's `analysis` block has; families add their own keys."""
+
+    points: int = Field(481, ge=5, le=1_000_000, description="points per branch of the curve")
+    window: Ends | None = Field(
+        None,
+        description="where the metrics are taken, e.g. [2 mm, 240 mm] or, in shares of the travel, [1 %, 100 %]; "
+        "default: the full travel",
+    )
+    band: Annotated[Ratio, Field(gt=0, lt=1)] = Field(
+        0.05, description="half width of the force band of `usable_stroke`"
+    )
+
+    @model_validator(mode="after")
+    def _window_increases(self) -> Self:
+        if self.window is not None and not ends_increase(self.window):
+            raise ValueError("'window' must be increasing")
+        return self
+
+
+SweepValue = str | int | float | bool
+
+
+class Sweep(Model):
+    """What `cfmkit sweep` varies: the durable form of ``--vary``."""
+
+    vary: dict[str, str | tuple[SweepValue, ...]] = Field(
+        description="dotted path: 'start:stop:n' with units, e.g. '8 mm:16 mm:5', or a list of values", min_length=1
+    )
+    combine: Literal["grid", "zip", "lhs", "sobol"] = Field(
+        "grid",
+        description=(
+            "every combination, values side by side, a Latin hypercube or a Sobol sequence; "
+            "ranges of the last two are 'start:stop'"
+        ),
+    )
+    samples: int | None = Field(None, ge=1, description="points of a Latin hypercube or a Sobol sequence")
+    design: bool = Field(False, description="design the mechanism anew at each point")
+    metrics: tuple[str, ...] = Field((), description="columns of results.csv; default: all metrics and values")
+    curves: bool = Field(False, description="keep the curve of every point in curves.csv")
+
+    @model_validator(mode="after")
+    def _samples_where_drawn(self) -> Self:
+        if (self.combine in ("lhs", "sobol")) != (self.samples is not None):
+            raise ValueError("'samples' and 'combine: lhs' or 'sobol' belong together: give both or neither")
+        return self
+
+
+class Tolerance(Model):
+    """How far a value may be off its nominal one; a percentage is of the nominal value."""
+
+    normal: MetricValue | None = Field(None, description="standard deviation, e.g. '0.1 mm' or '2 %'")
+    uniform: MetricValue | None = Field(None, description="half width of a range in which every value is as likely")
+    truncate: MetricValue | None = Field(None, description="parts farther off than this are sorted out before assembly")
+
+    @model_validator(mode="after")
+    def _one_distribution(self) -> Self:
+        if (self.normal is None) == (self.uniform is None):
+            raise ValueError("give either 'normal' (a standard deviation) or 'uniform' (a half width)")
+        if self.truncate is not None and self.normal is None:
+            raise ValueError("'truncate' cuts the tails of 'normal'; a 'uniform' tolerance has none")
+        return self
+
+
+class Correlated(Model):
+    """Parameters that deviate together, such as all springs of one batch."""
+
+    parameters: tuple[str, ...] = Field(
+        min_length=1, description="paths as under 'parameters'; `.*` takes a list whole"
+    )
+    correlation: Ratio = Field(1.0, ge=-1, le=1, description="of each two of them; 1: all are off by the same share")
+
+
+class Sensitivity(Model):
+    """What `cfmkit sensitivity` varies, and how."""
+
+    method: Literal["oat", "local", "morris", "sobol", "tolerance"] = Field(
+        "oat", description="one at a time, gradients, Morris screening, Sobol indices, Monte Carlo over tolerances"
+    )
+    parameters: dict[str, tuple[MetricValue, MetricValue] | Tolerance] = Field(
+        min_length=1, description="dotted path: a range [199 mm, 201 mm] or a tolerance {normal: 0.1 mm}"
+    )
+    correlated: tuple[Correlated, ...] = Field((), description="parameters that deviate together; for tolerances")
+    samples: int | None = Field(
+        None, ge=2, description="oat: points per parameter; morris: trajectories; sobol: base samples; tolerance: parts"
+    )
+    seed: int | None = Field(None, ge=0, description="of everything random; `--seed` goes before")
+    metrics: tuple[str, ...] = Field((), description="default: those of the requirements, over their windows")
+    on_failure: Literal["fail", "resample", "bound"] = Field(
+        "fail", description="samples without a result: state no index, draw their block anew, or state intervals"
+    )
+    min_yield: Ratio | None = Field(None, gt=0, le=1, description="share of parts that must meet all requirements")
+    design: bool = Field(False, description="design the mechanism anew at each point")
+
+
+class Spec(Model):
+    """A complete specification of one mechanism; families narrow the blocks."""
+
+    cfmkit: Literal[1] = Field(1, description="schema version")
+    family: str = Field(description="which family of mechanisms")
+    name: str = Field("unnamed", min_length=1, max_length=200, description="a name for tables and titles")
+    description: str = Field("", description="free text")
+    requirements: tuple[Requirement, ...] = Field((), description="checked after every run")
+    sweep: Sweep | None = Field(None, description="what `cfmkit sweep` varies")
+    sensitivity: Sensitivity | None = Field(None, description="what `cfmkit sensitivity` varies")
+
+    @property
+    def fidelity(self) -> str | None:
+        """The model that the analysis uses; None where its family has one only."""
+        found: str | None = getattr(getattr(self, "analysis", None), "fidelity", None)
+        return found
+
+    @property
+    def motion(self) -> Literal["length", "angle"] | None:
+        """What the curves run over: displacements, or angles; None where a family does not say."""
+        return None
+
+    @model_validator(mode="after")
+    def _windows_are_of_the_motion(self) -> Self:
+        if self.motion is None:
+            return self
+        right = DIMENSIONS[self.motion]
+        faults = {
+            path: f"the curve runs over {right.phrase}: write its window in {right.unit}, or in shares of the travel: "
+            "[1 %, 100 %]"
+            for path, ends in self.windows()
+            if {dimension_of_end(end) for end in ends} - {self.motion, SHARE}
+        }
+        refuse("Spec", faults)
+        return self
+
+    def windows(self) -> Iterator[tuple[tuple[str | int, ...], Ends]]:
+        """Yield (path, window) of the analysis, then of each requirement that has its own."""
+        # a family need not have this block, and no family is named here
+        window = getattr(getattr(self, "analysis", None), "window", None)
+        if window is not None:
+            yield ("analysis", "window"), window
+        for index, one in enumerate(self.requirements):
+            if one.over is not None:
+                yield ("requirements", index, "over"), one.over
+
+    def at(self, path: str) -> Any:
+        """Return the value at a dotted path, SI for quantities: ``spec.at("mechanism.springs.stiffness")``.
+
+        Raises
+        ------
+        KeyError
+            If there is nothing at that path.
+        """
+        value: Any = self
+        for part in path.split("."):
+            value = _child(value, part, path)
+        return value
+
+    def replace(self, changes: Mapping[str, Any]) -> Self:
+        """Return a validated copy with the values at some dotted paths changed.
+
+        Values may be SI numbers or text with a unit (``"190 mm"``).
+
+        Raises
+        ------
+        cfmkit.errors.SpecError
+            If the changed specification is not valid.
+        """
+        data = self.model_dump(exclude_unset=True) | {"family": self.family}
+        for path, value in changes.items():
+            data = _with(data, path.split("."), value, path)
+        try:
+            return type(self).model_validate(data)
+        except ValidationError as error:
+            from cfmkit.specs.yamlio import spec_error
+
+            raise spec_error(error, type(self), data) from None
+
+    def leaves(self) -> Iterator[tuple[str, float | int]]:
+        """Yield every numeric leaf of the mechanism and its analysis as (dotted path, SI value)."""
+        yield from _leaves(self.model_dump(exclude_none=True, exclude={"sweep", "sensitivity"}), "")
+
+
+def readable_requirement(entry: Any) -> Requirement | None:
+    """Return a requirement from what a file says, None if it cannot be read: to go on looking for errors."""
+    try:
+        return Requirement.model_validate(entry)
+    except ValidationError:
+        return None
+
+
+def refuse(title: str, faults: Mapping[tuple[str | int, ...], str]) -> None:
+    """Raise an error that names the place of each fault: path below the block being checked -> what is wrong.
+
+    For validators of a block that find what is wrong deep inside it. Nothing is raised without faults.
+    """
+    if faults:
+        lines = [
+            {"type": "value_error", "loc": place, "input": None, "ctx": {"error": ValueError(message)}}
+            for place, message in faults.items()
+        ]
+        raise ValidationError.from_exception_data(title, lines)  # type: ignore[arg-type]
+
+
+def _child(value: Any, part: str, path: str) -> Any:
+    if isinstance(value, tuple) and part.isdigit() and int(part) < len(value):
+        return value[int(part)]
+    if isinstance(value, Mapping) and part in value:
+        return value[part]
+    if isinstance(value, BaseModel) and part in type(value).model_fields:
+        return getattr(value, part)
+    raise KeyError(f"there is no {part!r} on the way to {path!r}")
+
+
+def _with(data: Any, parts: list[str], value: Any, path: str) -> Any:
+    """Return `data` with `value` at `parts`; blocks on the way are made where they are missing."""
+    head, rest = parts[0], parts[1:]
+    if isinstance(data, tuple | list):
+        if not head.isdigit() or int(head) >= len(data):
+            raise KeyError(f"{head!r} is not an index from 0 to {len(data) - 1} on the way to {path!r}")
+        items = list(data)
+        items[int(head)] = _with(items[int(head)], rest, value, path) if rest else frozen(value)
+        return tuple(items)
+    if data is not None and not isinstance(data, Mapping):
+        raise KeyError(f"{head!r} of {path!r} is below a value; only blocks and lists have something below them")
+    block = dict(data or {})
+    block[head] = _with(block.get(head), rest, value, path) if rest else frozen(value)
+    return block
+
+
+def frozen(value: Any) -> Any:
+    """Return `value` with lists turned into tuples, as the strict models want them."""
+    if isinstance(value, list | tuple):
+        return tuple(frozen(item) for item in value)
+    if isinstance(value, Mapping):
+        return {key: frozen(item) for key, item in value.items()}
+    return value
+
+
+def _leaves(value: Any, path: str) -> Iterator[tuple[str, float | int]]:
+    if isinstance(value, Mapping):
+        for key, item in value.items():
+            yield from _leaves(item, f"{path}.{key}" if path else key)
+    elif isinstance(value, tuple | list):
+        for index, item in enumerate(value):
+            yield from _leaves(item, f"{path}.{index}")
+    elif isinstance(value, int | float) and not isinstance(value, bool):
+        yield path, value
+
+
+__all__ = ["Analysis", "Displacement", "Length", "Model", "Requirement", "Sensitivity", "Spec", "Sweep", "frozen"]

@@ -1,0 +1,113 @@
+"""Units: the border between text such as ``0.69 N/mm`` and SI floats.
+
+Inside cfmkit every number is SI (m, N, rad, Pa, kg, s). Text with units exists in
+specifications, options, tables and messages only, and passes through here.
+
+`numbers` reads decimals strictly, `table` lists dimensions and units, `registry`
+knows the exact size of a unit (pint, loaded on first use), `quantities` reads and
+writes text, `fields` holds the annotated types for specifications.
+"""
+
+from cfmkit.specs.units.fields import (
+    Acceleration,
+    Angle,
+    AngularAcceleration,
+    AngularVelocity,
+    Area,
+    Bare,
+    BareFloat,
+    BareInt,
+    Curvature,
+    Damping,
+    Density,
+    Displacement,
+    Energy,
+    Factor,
+    FlexuralRigidity,
+    Force,
+    Frequency,
+    Inertia,
+    Length,
+    LineLoad,
+    Mass,
+    MetricValue,
+    Place,
+    Quantity,
+    Ratio,
+    RotationalDamping,
+    RotationalStiffness,
+    SecondMoment,
+    Stiffness,
+    Stress,
+    Time,
+    Torque,
+    Velocity,
+    Volume,
+    quantity,
+)
+from cfmkit.specs.units.numbers import read_number
+from cfmkit.specs.units.quantities import decimal_text, format_quantity, read_one_of, read_quantity
+from cfmkit.specs.units.registry import unit_table
+from cfmkit.specs.units.short import format_short
+from cfmkit.specs.units.table import DIMENSIONS, UNITS, Dimension, border_factor, border_unit, from_border, to_border
+from cfmkit.specs.units.windows import SHARE, Ends, Share, WindowEnd, between, dimension_of_end, ends_increase, place_of
+
+__all__ = [
+    "DIMENSIONS",
+    "SHARE",
+    "UNITS",
+    "Acceleration",
+    "Angle",
+    "AngularAcceleration",
+    "AngularVelocity",
+    "Area",
+    "Bare",
+    "BareFloat",
+    "BareInt",
+    "Curvature",
+    "Damping",
+    "Density",
+    "Dimension",
+    "Displacement",
+    "Ends",
+    "Energy",
+    "Factor",
+    "FlexuralRigidity",
+    "Force",
+    "Frequency",
+    "Inertia",
+    "Length",
+    "LineLoad",
+    "Mass",
+    "MetricValue",
+    "Place",
+    "Quantity",
+    "Ratio",
+    "RotationalDamping",
+    "RotationalStiffness",
+    "SecondMoment",
+    "Share",
+    "Stiffness",
+    "Stress",
+    "Time",
+    "Torque",
+    "Velocity",
+    "Volume",
+    "WindowEnd",
+    "between",
+    "border_factor",
+    "border_unit",
+    "decimal_text",
+    "dimension_of_end",
+    "ends_increase",
+    "format_quantity",
+    "format_short",
+    "from_border",
+    "place_of",
+    "quantity",
+    "read_number",
+    "read_one_of",
+    "read_quantity",
+    "to_border",
+    "unit_table",
+]

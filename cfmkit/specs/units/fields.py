@@ -1,0 +1,298 @@
+"""Annotated types for specifications: ``Length``, ``Force``, ... and two special ones.
+
+A field ``width: Length = Field(gt=0)`` takes text with a unit, or a Python number
+that is SI already (so do defaults); inside it is a plain SI float. A number that
+comes from a file or an option is a `Bare` one and refused, unless it is zero.
+Bounds are SI. ``model_dump()`` gives SI, ``model_dump(mode="json")`` text with units.
+"""
+
+from __future__ import annotations
+
+import math
+import numbers
+import operator
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cfmkit.errors import QuantityError
+from cfmkit.specs.units.numbers import shown
+from cfmkit.specs.units.quantities import check_quantity, decimal_text, example, format_quantity, needed, read_one_of
+from cfmkit.specs.units.table import DIMENSIONS, UNITLESS, dimension_of
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from pydantic import GetCoreSchemaHandler
+    from pydantic_core import CoreSchema
+
+PLACES = ("length", "angle")
+SMALLEST, LARGEST = 1e-30, 1e30
+"""Sizes that a specification may give, in SI units: their squares and products are still numbers."""
+
+MOST_TURNS = 10_000
+"""Angles that a specification may give, in turns: arrays are made as long as a shape winds."""
+
+_BOUNDS: dict[str, tuple[str, Callable[[float, float], bool]]] = {
+    "gt": (">", operator.gt),
+    "ge": (">=", operator.ge),
+    "lt": ("<", operator.lt),
+    "le": ("<=", operator.le),
+}
+
+
+class BareInt(int):
+    """A whole number as it stands in a file or an option: nobody said in which unit."""
+
+
+class BareFloat(float):
+    """A number as it stands in a file or an option: nobody said in which unit."""
+
+
+Bare = BareInt | BareFloat
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """The annotation that makes a float field read, check and write units.
+
+    `dimensions` holds one name, or several where the text decides.
+    """
+
+    dimensions: tuple[str, ...]
+
+    def read(self, value: Any) -> tuple[float, str]:
+        """Return (SI value, dimension) of text, or of a number that is SI already.
+
+        Raises
+        ------
+        cfmkit.errors.QuantityError
+            With what is wrong and what to write instead.
+        """
+        number, dimension = self._read(value)
+        if number and not SMALLEST <= abs(number) <= LARGEST:
+            told = value.strip() if isinstance(value, str) else decimal_text(number)
+            raise QuantityError(f"{told} is beyond what is computed with: {SMALLEST:g} to {LARGEST:g} in SI units")
+        if dimension == "angle" and abs(number) > MOST_TURNS * math.tau:
+            told = value.strip() if isinstance(value, str) else format_quantity(number, "angle")
+            raise QuantityError(f"{told} is beyond what is computed with: at most {MOST_TURNS} turns of 360 deg")
+        return number, dimension
+
+    def _read(self, value: Any) -> tuple[float, str]:
+        if isinstance(value, str):
+            return read_one_of(value, self.dimensions)
+        number = _finite(value, self.dimensions)
+        if isinstance(value, Bare) and number != 0 and self.needs_unit:
+            text = decimal_text(number)
+            raise QuantityError(f"{text} has no unit; write {example(self.dimensions, text)}")
+        return number, self.dimensions[0]
+
+    def write(self, value: float) -> str | float:
+        """Return text that `read` takes back; a ratio stays a number."""
+        return format_quantity(value, self.dimensions[0]) if self.needs_unit else float(value)
+
+    def check(self, value: float, bounds: Mapping[str, float], given: Any = None) -> float:
+        """Return `value` if it keeps its SI bounds: gt, ge, lt, le.
+
+        Raises
+        ------
+        cfmkit.errors.QuantityError
+            With the value as it was given, and the bounds with units.
+        """
+        if all(_BOUNDS[name][1](value, bound) for name, bound in bounds.items()):
+            return value
+        told = given.strip() if isinstance(given, str) else self.told(value)
+        raise QuantityError(f"{told} is not allowed: must be {self.limits(bounds)}")
+
+    def limits(self, bounds: Mapping[str, float]) -> str:
+        """Return bounds in words with units: ``> 0 and <= 500 mm``."""
+        return " and ".join(f"{_BOUNDS[name][0]} {self.told(bound)}" for name, bound in bounds.items())
+
+    @property
+    def needs_unit(self) -> bool:
+        """Whether a number other than zero must carry a unit in a file."""
+        return self.dimensions[0] not in UNITLESS
+
+    def told(self, value: float) -> str:
+        """Return an SI value with its unit, for a message."""
+        return format_quantity(value, self.dimensions[0]) if value else "0"
+
+    def json_schema(self, bounds: Mapping[str, float]) -> dict[str, Any]:
+        """Return the JSON schema of such a value."""
+        items = [DIMENSIONS[name] for name in self.dimensions]
+        kind = "string" if self.needs_unit else ["number", "string"]
+        about = {"x-dimension": " or ".join(item.name for item in items), "examples": [item.example for item in items]}
+        return {"type": kind} | about | ({"x-allowed": self.limits(bounds)} if bounds else {})
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        """Build the validator and the serialiser around the schema of a plain float."""
+        from pydantic_core import core_schema
+
+        inner: Any = handler(source)
+        bounds = {name: inner.pop(name) for name in _BOUNDS if name in inner}
+
+        def read(value: Any) -> float:
+            return self.check(self.read(value)[0], bounds, value)
+
+        def describe(_core: Any, _handler: Any) -> dict[str, Any]:
+            return self.json_schema(bounds)
+
+        return core_schema.no_info_before_validator_function(
+            read,
+            inner,
+            serialization=core_schema.plain_serializer_function_ser_schema(self.write, when_used="json"),
+            metadata={"pydantic_js_functions": [describe]},
+        )
+
+
+class Place(float):
+    """An SI float that knows whether it is a length [m] or an angle [rad].
+
+    As a field it takes text of either kind; a plain number is a length.
+    """
+
+    __slots__ = ("dimension",)
+    dimension: str
+
+    def __new__(cls, value: float, dimension: str = "length") -> Place:
+        """Return `value` as a place of that dimension."""
+        if dimension not in PLACES:
+            raise ValueError(f"a place is a length or an angle, not {dimension!r}")
+        place = super().__new__(cls, value)
+        place.dimension = dimension
+        return place
+
+    def __reduce__(self) -> tuple[type[Place], tuple[float, str]]:
+        """Return what copying and pickling need."""
+        return type(self), (float(self), self.dimension)
+
+    def __repr__(self) -> str:
+        """Return ``Place(0.002, 'length')``."""
+        return f"Place({float(self)!r}, {self.dimension!r})"
+
+    @classmethod
+    def __get_pydantic_core_schema__(cls, _source: Any, _handler: Any) -> CoreSchema:
+        """Build the validator and the serialiser."""
+        return plain_schema(_read_place, write_place)
+
+    @classmethod
+    def __get_pydantic_json_schema__(cls, _core: Any, _handler: Any) -> dict[str, Any]:
+        """Describe the text that is expected."""
+        return PLACE.json_schema({})
+
+
+PLACE = Quantity(PLACES)
+
+
+def _read_place(value: Any) -> Place:
+    return value if isinstance(value, Place) and value.dimension in PLACES else Place(*PLACE.read(value))
+
+
+def write_place(value: float) -> str:
+    """Return a place as text with its unit."""
+    return format_quantity(value, getattr(value, "dimension", "length"))
+
+
+@dataclass(frozen=True)
+class _OpenQuantity:
+    """Text whose dimension is known only later: a requirement's bound."""
+
+    def read(self, value: Any) -> str:
+        """Return tidy text; numbers become text."""
+        return check_quantity(value) if isinstance(value, str) else decimal_text(_finite(value, ()))
+
+    def __get_pydantic_core_schema__(self, _source: Any, _handler: Any) -> CoreSchema:
+        """Build the validator."""
+        return plain_schema(self.read, _number_or_text)
+
+    def __get_pydantic_json_schema__(self, _core: Any, _handler: Any) -> dict[str, Any]:
+        """Describe the text that is expected."""
+        return {"type": ["number", "string"], "examples": ["5 %", "140 mm", 0.05]}
+
+
+def quantity(dimension: str) -> Quantity:
+    """Return the annotation for a float of that dimension: ``Annotated[float, quantity("length")]``.
+
+    Raises
+    ------
+    KeyError
+        If there is no such dimension.
+    """
+    return Quantity((dimension_of(dimension).name,))
+
+
+def plain_schema(read: Callable[[Any], Any], write: Callable[[Any], Any]) -> CoreSchema:
+    """Return the schema of what is read and written by two functions."""
+    from pydantic_core import core_schema
+
+    written = core_schema.plain_serializer_function_ser_schema(write, when_used="json")
+    return core_schema.no_info_plain_validator_function(read, serialization=written)
+
+
+def _finite(value: Any, dimensions: tuple[str, ...]) -> float:
+    """Return a Python or numpy number as a finite float; nothing else is one, least of all a bool."""
+    if value is None:
+        raise QuantityError(f"nothing is given here; {needed(dimensions)} is needed, e.g. {example(dimensions)}")
+    if isinstance(value, bool) or not isinstance(value, numbers.Real):
+        raise QuantityError(f"{described(value)} is not {needed(dimensions)}; write e.g. {example(dimensions)}")
+    try:
+        number = float(value)
+    except OverflowError:
+        raise QuantityError("the number is too large: at most 1.8e308") from None
+    if not math.isfinite(number):
+        raise QuantityError(f"{number} is not a finite number")
+    return number
+
+
+def described(value: Any) -> str:
+    """Return a value in the words of a specification: ``'text'``, ``5``, ``true``, ``a list``, ``nothing``."""
+    if value is None:
+        return "nothing"
+    if isinstance(value, str):
+        return shown(value)
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, int | float):
+        return shown(repr(value + 0)).strip("'")
+    if isinstance(value, Mapping) or hasattr(type(value), "model_fields"):
+        return "a block"
+    return "a list" if isinstance(value, list | tuple) else f"a {type(value).__name__}"
+
+
+def _number_or_text(text: str) -> str | float:
+    """Return text that is a bare number as that number, for tidy files."""
+    try:
+        return float(text)
+    except ValueError:
+        return text
+
+
+Length = Annotated[float, quantity("length")]
+Angle = Annotated[float, quantity("angle")]
+Ratio = Annotated[float, quantity("ratio")]
+Factor = Annotated[float, quantity("factor")]
+Force = Annotated[float, quantity("force")]
+Torque = Annotated[float, quantity("torque")]
+Energy = Annotated[float, quantity("energy")]
+Stiffness = Annotated[float, quantity("stiffness")]
+RotationalStiffness = Annotated[float, quantity("rotational_stiffness")]
+Stress = Annotated[float, quantity("stress")]
+Mass = Annotated[float, quantity("mass")]
+Inertia = Annotated[float, quantity("inertia")]
+Density = Annotated[float, quantity("density")]
+Time = Annotated[float, quantity("time")]
+Velocity = Annotated[float, quantity("velocity")]
+Acceleration = Annotated[float, quantity("acceleration")]
+Frequency = Annotated[float, quantity("frequency")]
+LineLoad = Annotated[float, quantity("line_load")]
+Area = Annotated[float, quantity("area")]
+Volume = Annotated[float, quantity("volume")]
+SecondMoment = Annotated[float, quantity("second_moment")]
+Curvature = Annotated[float, quantity("curvature")]
+FlexuralRigidity = Annotated[float, quantity("flexural_rigidity")]
+AngularVelocity = Annotated[float, quantity("angular_velocity")]
+AngularAcceleration = Annotated[float, quantity("angular_acceleration")]
+Damping = Annotated[float, quantity("damping")]
+RotationalDamping = Annotated[float, quantity("rotational_damping")]
+Displacement = Place
+MetricValue = Annotated[str, _OpenQuantity()]

@@ -1,0 +1,221 @@
+"""Text with a unit to an SI float and back, both to the last bit.
+
+The number is read by `cfmkit.specs.units.numbers`, never by pint. Sizes of units are
+exact fractions, so that the result is the correctly rounded float: "68 mm",
+"6.8 cm" and "0.068 m" are the same number.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+import sys
+from decimal import Context, Decimal
+from fractions import Fraction
+
+from cfmkit.errors import QuantityError
+from cfmkit.specs.units.hints import unit_complaint
+from cfmkit.specs.units.numbers import NUMBER, number_complaint, odd_character, read_number, shown
+from cfmkit.specs.units.registry import Size, border_size, is_unit, unit_size
+from cfmkit.specs.units.table import COMMON, DIMENSIONS, UNITLESS, dimension_of
+
+LONGEST = 100
+_UNIT_START = re.compile(r"$| *[^\W\d_]| *[%°\"'(]| *1 */")
+_PREFIX = re.compile("[-+]?0[xXoObB][0-9a-fA-F]")
+_PRECISE = Context(prec=60)
+
+
+def read_quantity(text: str, dimension: str) -> float:
+    """Return the SI value of text such as ``"0.69 N/mm"``.
+
+    Parameters
+    ----------
+    text : str
+        A number and a unit; a zero, a ratio and a count need no unit.
+    dimension : str
+        The name of the dimension that is wanted, a key of `DIMENSIONS`.
+
+    Raises
+    ------
+    cfmkit.errors.QuantityError
+        With what is wrong and what to write instead.
+
+    Examples
+    --------
+    >>> read_quantity("68 mm", "length") == read_quantity("6.8 cm", "length") == 0.068
+    True
+    """
+    return read_one_of(text, (dimension,))[0]
+
+
+def read_one_of(text: str, dimensions: tuple[str, ...]) -> tuple[float, str]:
+    """Return (SI value, dimension) of text that may be of several dimensions; a bare zero is of the first.
+
+    Raises
+    ------
+    cfmkit.errors.QuantityError
+        With what is wrong and what to write instead.
+    """
+    number, unit = _split(text, dimensions)
+    value = read_number(number)
+    if not unit:
+        return _bare(value, number, dimensions), dimensions[0]
+    for name in dimensions:
+        if (name, unit) in COMMON:
+            return _scaled(number, unit, COMMON[name, unit]), name
+    if not is_unit(unit):
+        raise QuantityError(unit_complaint(unit, dimensions))
+    size = unit_size(unit)
+    for name in dimensions:
+        if size.powers == border_size(name).powers:
+            return _scaled(number, unit, size.factor), name
+    found = f"{shown(f'{number} {unit}')} is {_kind(size)}"
+    raise QuantityError(f"{found}; {needed(dimensions)} is needed, e.g. {example(dimensions, number)}")
+
+
+def check_quantity(text: str) -> str:
+    """Return text that is a number, with or without some known unit, tidied; the dimension is left open.
+
+    Raises
+    ------
+    cfmkit.errors.QuantityError
+        If it is not a number, or its unit is not known.
+    """
+    number, unit = _split(text, ())
+    value = read_number(number)
+    if not unit:
+        return decimal_text(value)
+    if not is_unit(unit):
+        raise QuantityError(unit_complaint(unit, ()))
+    return f"{number} {unit}"
+
+
+def format_quantity(value: float, dimension: str, unit: str | None = None) -> str:
+    """Return the shortest text that `read_quantity` reads back as exactly `value`.
+
+    Parameters
+    ----------
+    value : float
+        SI value, finite.
+    dimension : str
+        Its dimension, a key of `DIMENSIONS`.
+    unit : str, optional
+        The unit to write; default: the border unit of the dimension.
+
+    Examples
+    --------
+    >>> format_quantity(0.068, "length")
+    '68 mm'
+    """
+    item = dimension_of(dimension)
+    unit = item.unit if unit is None else unit
+    if unit in ("1", ""):
+        return decimal_text(value)
+    factor = COMMON.get((dimension, unit)) or unit_size(unit).factor
+    return f"{_shortest(float(value), factor)} {unit}"
+
+
+def decimal_text(value: float) -> str:
+    """Return the shortest decimal text that reads back as `value`, without a trailing ``.0``."""
+    return _shortest(float(value), Fraction(1))
+
+
+def needed(dimensions: tuple[str, ...]) -> str:
+    """Return ``a length`` or ``a length or an angle``."""
+    return " or ".join(DIMENSIONS[name].phrase for name in dimensions) or "a number with a unit"
+
+
+def example(dimensions: tuple[str, ...], number: str = "") -> str:
+    """Return what to write, quoted: the user's own number with a unit that fits, or the dimension's example."""
+    if not dimensions:
+        return "'5 mm'"
+    items = [DIMENSIONS[name] for name in dimensions]
+    texts = [f"{number} {item.unit}" if number and item.name not in UNITLESS else item.example for item in items]
+    return " or ".join(shown(text) for text in texts)
+
+
+def _split(text: str, dimensions: tuple[str, ...]) -> tuple[str, str]:
+    """Cut text into number and unit; what does not start with a number is refused with the reason."""
+    if odd := odd_character(text):
+        raise QuantityError(f"{shown(text)} holds {odd[1]}")
+    text = text.strip(" ")
+    if not text:
+        raise QuantityError(f"the text is empty; {needed(dimensions)} is needed, e.g. {example(dimensions)}")
+    if len(text) > LONGEST:
+        raise QuantityError(f"{shown(text)} is too long for {needed(dimensions)}: at most {LONGEST} characters")
+    match = NUMBER.match(text)
+    if not match or not _UNIT_START.match(rest := text[match.end() :]) or _PREFIX.match(text):
+        raise QuantityError(_no_number(text, dimensions))
+    return match[0], rest.strip(" ")
+
+
+def _no_number(text: str, dimensions: tuple[str, ...]) -> str:
+    """Say what is wrong with text that does not start with a number."""
+    for part in (text.split(" ")[0], re.split("[A-Za-z%]", text)[0].strip(" "), text):
+        if complaint := number_complaint(part):
+            return complaint
+    return f"{shown(text)} is not {needed(dimensions)}; write e.g. {example(dimensions)}"
+
+
+def _bare(value: float, number: str, dimensions: tuple[str, ...]) -> float:
+    """Return a number without a unit, where that is enough."""
+    if value == 0:
+        return 0.0
+    if dimensions[0] not in UNITLESS:
+        raise QuantityError(f"{number} has no unit; write {example(dimensions, number)}")
+    return value
+
+
+def _kind(size: Size) -> str:
+    """Return what a unit measures: ``a force``."""
+    names = (name for name in DIMENSIONS if name != "text" and border_size(name).powers == size.powers)
+    return next((DIMENSIONS[name].phrase for name in names), "of another kind")
+
+
+def _scaled(number: str, unit: str, factor: Fraction) -> float:
+    """Return number times unit, correctly rounded; `number` is known to be finite and of bounded length."""
+    if float(number) == 0:
+        return 0.0
+    exact = Fraction(Decimal(number)) * factor
+    try:
+        value = float(exact)
+    except OverflowError:
+        raise QuantityError(f"{shown(f'{number} {unit}')} is too large") from None
+    if value == 0:
+        raise QuantityError(f"{shown(f'{number} {unit}')} is too small to be told from zero; write 0 if zero is meant")
+    return value
+
+
+def _shortest(value: float, factor: Fraction) -> str:
+    """Return the shortest decimal number that, times `factor`, rounds to `value`.
+
+    Two decimals of 15 digits are never the same float, so one that fits is unique
+    and only its trailing zeros can go; 17 digits always fit. Below the normal
+    range floats are so coarse that fewer digits do.
+    """
+    if not math.isfinite(value):
+        raise QuantityError(f"{value} cannot be written: it is not a finite number")
+    if value == 0:
+        return "0"
+    exact = Fraction(value) / factor
+    decimal = _PRECISE.divide(Decimal(exact.numerator), Decimal(exact.denominator))
+    for digits in (15, 16, 17) if abs(value) > sys.float_info.min * 16 else range(1, 18):
+        rounded = Context(prec=digits).plus(decimal)
+        if _fits(rounded, factor, value):
+            break
+    return _plain(rounded)
+
+
+def _fits(decimal: Decimal, factor: Fraction, value: float) -> bool:
+    try:
+        return float(Fraction(decimal) * factor) == value
+    except OverflowError:
+        return False
+
+
+def _plain(decimal: Decimal) -> str:
+    """Return a decimal as people write it: ``0.05``, ``1200``, ``1e-9``."""
+    short = decimal.normalize()
+    if -4 <= short.adjusted() <= 15:
+        return format(short, "f")
+    return format(short, "e").replace("e+", "e")

@@ -1,0 +1,122 @@
+"""Windows of the motion: between places, or between shares of a travel, which they follow wherever it goes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cfmkit.errors import InputError, QuantityError
+from cfmkit.specs.units.fields import PLACES, Place, Quantity, plain_schema, write_place
+from cfmkit.specs.units.quantities import format_quantity
+
+if TYPE_CHECKING:
+    from pydantic_core import CoreSchema
+
+SHARE = "ratio"
+"""Dimension of an end of a window that is given as a share of the travel."""
+
+
+class Share(Place):
+    """A part of the travel, from 0 at its start to 1 at its end; never equal to a place of the same number."""
+
+    __slots__ = ()
+
+    def __new__(cls, value: float) -> Share:
+        """Return `value` as a share."""
+        share = float.__new__(cls, value)
+        share.dimension = SHARE
+        return share
+
+    def __eq__(self, other: object) -> bool:
+        """Return whether the other is the same share."""
+        return isinstance(other, Share) and float(self) == float(other)
+
+    def __ne__(self, other: object) -> bool:
+        """Return whether the other is anything else; that of floats would compare the numbers."""
+        return not self == other
+
+    def __hash__(self) -> int:
+        """Tell a share from a place of the same number."""
+        return hash((SHARE, float(self)))
+
+    def __reduce__(self) -> tuple[type[Share], tuple[float]]:  # type: ignore[override]
+        """Return what copying and pickling need."""
+        return type(self), (float(self),)
+
+    def __repr__(self) -> str:
+        """Return ``Share(0.01)``."""
+        return f"Share({float(self)!r})"
+
+
+@dataclass(frozen=True)
+class _WindowEnd(Quantity):
+    """Text such as ``2 mm``, ``3 deg`` or ``100 %`` of the travel; a plain number is a length."""
+
+    def read(self, value: Any) -> tuple[float, str]:
+        number, dimension = super().read(value)
+        if dimension == SHARE and not 0 <= number <= 1:
+            raise QuantityError(f"{str(value).strip()} is not allowed: shares of the travel are 0 % to 100 %")
+        return number, dimension
+
+    def write(self, value: float) -> str:
+        return format_quantity(value, SHARE, "%") if isinstance(value, Share) else write_place(value)
+
+    def __get_pydantic_core_schema__(self, _source: Any, _handler: Any) -> CoreSchema:
+        """Build the validator and the serialiser."""
+
+        def read(value: Any) -> Place:
+            return value if isinstance(value, Place) else place_of(*self.read(value))
+
+        return plain_schema(read, self.write)
+
+    def __get_pydantic_json_schema__(self, _core: Any, _handler: Any) -> dict[str, Any]:
+        """Describe the text that is expected."""
+        return self.json_schema({})
+
+
+def place_of(value: float, dimension: str) -> Place:
+    """Return a number that knows what it is: a length, an angle, or with the dimension ``ratio`` a share."""
+    return Share(value) if dimension == SHARE else Place(value, dimension)
+
+
+WindowEnd = Annotated[float, _WindowEnd((*PLACES, SHARE))]
+Ends = tuple[WindowEnd, WindowEnd]
+
+
+def ends_increase(ends: Ends) -> bool:
+    """Return whether the ends are in order, as far as that needs no travel: 2 mm and 100 % may be in either."""
+    kinds = {dimension_of_end(end) for end in ends}
+    return len(kinds) > 1 or ends[0] < ends[1]
+
+
+def dimension_of_end(end: float) -> str:
+    """Return ``length``, ``angle`` or ``ratio``; a plain number is a length."""
+    return str(getattr(end, "dimension", PLACES[0]))
+
+
+def between(ends: Ends, travel: tuple[float, float]) -> tuple[float, float]:
+    """Return a window as places, increasing [m or rad].
+
+    Parameters
+    ----------
+    ends : tuple of WindowEnd
+        Places, or shares of the travel.
+    travel : (float, float)
+        Where the motion starts and where it ends, in this order [m or rad].
+
+    Raises
+    ------
+    cfmkit.errors.InputError
+        If nothing is left between the ends.
+
+    Examples
+    --------
+    >>> between((Share(0.25), Share(1.0)), (0.0, 0.2)), between((0.002, Share(1.0)), (0.0, -0.2))
+    ((0.05, 0.2), (-0.2, 0.002))
+    """
+    start, stop = travel
+    places = [start + float(end) * (stop - start) if isinstance(end, Share) else float(end) for end in ends]
+    if places[0] == places[1]:
+        told = " and ".join(_WindowEnd((*PLACES, SHARE)).write(end) for end in ends)
+        raise InputError(f"a window from {told} has no width on this travel")
+    return min(places), max(places)

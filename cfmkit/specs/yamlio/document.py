@@ -1,0 +1,195 @@
+"""A specification as it was written: the tree, the place of everything in it, and what is wrong."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from pydantic import BaseModel, ValidationError
+
+from cfmkit.errors import Problem, SpecError
+from cfmkit.specs.units.fields import BareFloat, BareInt
+from cfmkit.specs.yamlio.explain import explain, not_among
+from cfmkit.specs.yamlio.options import NoSuchPlace, Option, parse_option, with_value
+from cfmkit.specs.yamlio.paths import Path, dotted, typed
+from cfmkit.specs.yamlio.reader import Reading, read
+from cfmkit.specs.yamlio.source import Fault
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path as FilePath
+
+SpecType = TypeVar("SpecType", bound=BaseModel)
+
+MOST_PROBLEMS = 100
+
+
+@dataclass(frozen=True)
+class Document:
+    """What a file and the options after it say, before any type is known.
+
+    Attributes
+    ----------
+    tree : Any
+        Nested dicts, tuples, text, numbers, bools and None.
+    source : str
+        The file's name for messages.
+    folder : pathlib.Path or None
+        What file names in the specification are relative to.
+    problems : tuple of cfmkit.errors.Problem
+        Every fault found while reading.
+    """
+
+    tree: Any
+    source: str
+    folder: FilePath | None = None
+    problems: tuple[Problem, ...] = ()
+    _reading: Reading = field(default_factory=Reading, repr=False, compare=False)
+    _spoilt: tuple[Path, ...] = field(default=(), repr=False, compare=False)
+    _options: tuple[tuple[Path, str], ...] = field(default=(), repr=False, compare=False)
+
+    def place(self, path: str | Path) -> tuple[int, int]:
+        """Return (line, column) of the value at a path, or of the nearest block above it; (0, 0) in an option."""
+        return self._place(self._path(path), self._reading.values)[:2]
+
+    def set(self, option: str) -> Document:
+        """Return the document changed by an option such as ``a.b=1 mm``.
+
+        Faults in the value become problems of the new document.
+
+        Raises
+        ------
+        cfmkit.errors.UsageError
+            If the option has no path or no value.
+        """
+        parsed = parse_option(option)
+        if parsed.faults:
+            return self._with_problems(parsed, [(fault.path, fault.message) for fault in parsed.faults])
+        if self._reading.broken:
+            return self
+        try:
+            tree = with_value(self.tree, parsed.path, parsed.value)
+        except NoSuchPlace as error:
+            return self._with_problems(parsed, [((), str(error))])
+        path = typed(parsed.path, tree)
+        options = [old for old in self._options if old[0][: len(path)] != path]
+        return dataclasses.replace(self, tree=tree, _options=(*options, (path, parsed.label)))
+
+    def family(self, known: Sequence[str]) -> str:
+        """Return what the specification says its family is.
+
+        Raises
+        ------
+        cfmkit.errors.SpecError
+            If it says none of the `known` ones, or cannot be read.
+        """
+        family = self.tree.get("family") if isinstance(self.tree, dict) else None
+        if self._reading.broken or not isinstance(self.tree, dict):
+            raise SpecError(_sorted(self.problems))
+        if isinstance(family, str) and family in known:
+            return family
+        missing = f"the key 'family' is missing: one of {', '.join(known)}"
+        problem = self.problem(("family",), not_among(family, known)) if family else self.problem((), missing)
+        raise SpecError(_sorted((*self.problems, problem)))
+
+    def bind(self, spec_type: type[SpecType]) -> SpecType:
+        """Return the specification, checked.
+
+        Raises
+        ------
+        cfmkit.errors.SpecError
+            With every problem of the file and the options.
+        """
+        if self._reading.broken or not isinstance(self.tree, dict):
+            raise SpecError(_sorted(self.problems))
+        problems = list(self.problems)
+        try:
+            spec = spec_type.model_validate(_marked(self.tree), context={"border": True, "folder": self.folder})
+        except ValidationError as error:
+            for complaint in explain(error, spec_type, self.tree):
+                if not any(complaint.path[: len(spoilt)] == spoilt for spoilt in self._spoilt):
+                    problems.append(self.problem(complaint.path, complaint.message, complaint.at_key))
+        if problems:
+            raise SpecError(_sorted(problems))
+        return spec
+
+    def problem(self, path: str | Path, message: str, at_key: bool = False) -> Problem:
+        """Return a problem at a path, with its place in the file or the option that set it."""
+        path = self._path(path)
+        line, column, option = self._place(path, self._reading.keys if at_key else self._reading.values)
+        told = dotted(path)
+        if option:
+            return Problem(option, 0, 0, "" if option == f"--set {told}" else told, message)
+        return Problem(self.source, line, column, told, message)
+
+    def _with_problems(self, option: Option, faults: list[tuple[Path, str]]) -> Document:
+        new = [Problem(option.label, 0, 0, dotted(path), message) for path, message in faults]
+        spoilt = (*self._spoilt, typed(option.path, self.tree))
+        return dataclasses.replace(self, problems=(*self.problems, *new), _spoilt=spoilt)
+
+    def _place(self, path: Path, table: dict[Path, tuple[int, int]]) -> tuple[int, int, str]:
+        """Return (line, column, option): the option that set it or made its block, else where the file has it."""
+        for own, label in reversed(self._options):
+            if path[: len(own)] == own or (own[: len(path)] == path and path not in self._reading.values):
+                return 0, 0, label
+        for length in range(len(path), -1, -1):
+            if found := table.get(path[:length]) or self._reading.values.get(path[:length]):
+                return *found, ""
+        return 1, 1, ""
+
+    def _path(self, path: str | Path) -> Path:
+        return typed(tuple(path.split(".")) if path else (), self.tree) if isinstance(path, str) else path
+
+
+def read_document(data: bytes | str, source: str, folder: FilePath | None = None) -> Document:
+    """Return what a text says; nothing is raised, faults become the document's problems.
+
+    Parameters
+    ----------
+    data : bytes or str
+        The specification, UTF-8.
+    source : str
+        Its name for messages.
+    folder : pathlib.Path, optional
+        What file names in it are relative to.
+    """
+    reading = read(data)
+    if not reading.broken and not isinstance(reading.tree, dict):
+        reading.broken = True
+        reading.faults.append(_no_block(reading))
+    problems = tuple(_located(fault, source) for fault in reading.faults)
+    spoilt = tuple(fault.path for fault in reading.faults if fault.path and fault.spoils)
+    return Document(reading.tree, source, folder, problems, reading, spoilt)
+
+
+def _no_block(reading: Reading) -> Fault:
+    what = "a list" if isinstance(reading.tree, tuple) else "a single value"
+    told = "the file is empty" if reading.tree is None else f"the file holds {what}, not keys"
+    line, column = reading.values.get((), (1, 1))
+    return Fault(line, column, (), f"{told}; a specification starts with 'cfmkit: 1' and 'family: ...'")
+
+
+def _located(fault: Fault, source: str) -> Problem:
+    return Problem(source, fault.line, fault.column, dotted(fault.path), fault.message)
+
+
+def _sorted(problems: Sequence[Problem]) -> list[Problem]:
+    """Return problems in the order of the file, those of options last, and not more than can be read."""
+    ordered = sorted(dict.fromkeys(problems), key=lambda one: (one.line == 0, one.line, one.column))
+    if len(ordered) <= MOST_PROBLEMS:
+        return ordered
+    last = ordered[MOST_PROBLEMS]
+    more = Problem(last.source, 0, 0, "", f"{len(ordered) - MOST_PROBLEMS} more problems are not listed")
+    return [*ordered[:MOST_PROBLEMS], more]
+
+
+def _marked(tree: Any) -> Any:
+    """Return a tree whose numbers say that they came without a unit."""
+    if isinstance(tree, dict):
+        return {key: _marked(value) for key, value in tree.items()}
+    if isinstance(tree, tuple):
+        return tuple(_marked(value) for value in tree)
+    if isinstance(tree, bool) or not isinstance(tree, int | float):
+        return tree
+    return BareInt(tree) if isinstance(tree, int) else BareFloat(tree)

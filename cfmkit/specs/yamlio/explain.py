@@ -1,0 +1,285 @@
+"""What pydantic found, in the words of the person who wrote the specification.
+
+One fault gives one message: of a union only the member that the user can have
+meant is heard, and a missing key is not told where a misspelt one explains it.
+"""
+
+from __future__ import annotations
+
+import difflib
+import re
+from dataclasses import dataclass
+from itertools import groupby
+from typing import TYPE_CHECKING, Any
+
+from cfmkit.errors import Problem, QuantityError, SpecError
+from cfmkit.specs.units.fields import described
+from cfmkit.specs.units.numbers import shown
+from cfmkit.specs.yamlio.paths import Path, dotted
+from cfmkit.specs.yamlio.shape import Slot, Trace, expected, trace
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from pydantic import BaseModel, ValidationError
+
+MOST_LISTED = 15
+MOST_EXPLAINED = 500
+_OLD_BOOLS = {"yes": "true", "on": "true", "y": "true", "no": "false", "off": "false", "n": "false"}
+
+
+@dataclass(frozen=True)
+class Complaint:
+    """One fault: the path it is at, and what to say. `at_key` points at the key, not at its value."""
+
+    path: Path
+    message: str
+    at_key: bool = False
+
+
+@dataclass(frozen=True)
+class _Error:
+    """One line of a pydantic error, traced."""
+
+    kind: str
+    trace: Trace
+    context: dict[str, Any]
+    text: str
+
+    @property
+    def misfit(self) -> bool:
+        """Whether only the shape is wrong: a list where a number is wanted, and the like."""
+        node = self.trace.node
+        if isinstance(self.context.get("error"), QuantityError):
+            return isinstance(node, dict | tuple | bool) or (isinstance(node, str) and not re.match(" *[-+.0-9]", node))
+        return self.kind.endswith("_type") or self.kind in ("int_from_float", "literal_error", "enum")
+
+    @property
+    def echo(self) -> bool:
+        """Whether something has too few items only because pydantic does not count those that are wrong themselves."""
+        node = self.trace.node
+        return self.kind == "too_short" and isinstance(node, tuple | dict) and len(node) >= self.context["min_length"]
+
+
+def spec_error(error: ValidationError, model: type[BaseModel], tree: Any) -> SpecError:
+    """Return a pydantic error about values that come from no file, with the paths that are wrong."""
+    return SpecError([Problem("", 0, 0, dotted(one.path), one.message) for one in explain(error, model, tree)])
+
+
+def explain(error: ValidationError, model: type[BaseModel], tree: Any) -> list[Complaint]:
+    """Return what is wrong with a tree, one complaint a fault.
+
+    Parameters
+    ----------
+    error : pydantic.ValidationError
+        What validating `tree` as `model` raised.
+    model : type of BaseModel
+        The type that was wanted.
+    tree : mapping
+        What was validated: nested dicts and tuples.
+    """
+    lines = [
+        _Error(line["type"], trace(model, tree, line["loc"]), line.get("ctx", {}), line["msg"])
+        for line in error.errors(include_url=False, include_input=False)[:MOST_EXPLAINED]
+    ]
+    complaints = [_complaint(line) for line in _meant([line for line in lines if not line.echo], 0)]
+    return _without_echoes(list(dict.fromkeys(complaints)))
+
+
+def _meant(lines: list[_Error], depth: int) -> list[_Error]:
+    """Return the errors without those of union members that cannot have been meant."""
+    kept = [line for line in lines if len(line.trace.tags) <= depth]
+    inside = [line for line in lines if len(line.trace.tags) > depth]
+    by_place = sorted(inside, key=lambda line: str(line.trace.tags[depth][0]))
+    for _, group in groupby(by_place, key=lambda line: line.trace.tags[depth][0]):
+        kept += _meant(_one_member(list(group), depth), depth + 1)
+    return kept
+
+
+def _one_member(lines: list[_Error], depth: int) -> list[_Error]:
+    """Return the errors of the likeliest member of one union."""
+    members: dict[str, list[_Error]] = {}
+    for line in lines:
+        members.setdefault(line.trace.tags[depth][1], []).append(line)
+    place = lines[0].trace.tags[depth][0]
+    fitting = [own for own in members.values() if not any(line.misfit and line.trace.path == place for line in own)]
+    if fitting:
+        return min(fitting, key=len)
+    return lines[:1] if len(members) == 1 else [_nothing_fits(lines, place)]
+
+
+def _nothing_fits(lines: list[_Error], place: Path) -> _Error:
+    allowed = tuple(slot for line in lines if line.trace.path == place for slot in line.trace.slots)
+    first = lines[0].trace
+    return _Error("union", Trace(place, first.node, allowed, first.parents, first.tags), {}, "")
+
+
+def _complaint(line: _Error) -> Complaint:
+    if line.kind == "missing":
+        return _missing(line.trace)
+    if line.kind == "extra_forbidden":
+        return Complaint(line.trace.path, _unknown_key(line.trace), at_key=True)
+    if line.kind.startswith("union_tag"):
+        return _unknown_kind(line)
+    explainer = _EXPLAINERS.get(line.kind, _in_pydantics_words)
+    return Complaint(line.trace.path, " ".join(explainer(line).split()))
+
+
+def _missing(found: Trace) -> Complaint:
+    if not found.path:
+        return Complaint((), f"{expected(found.slots)} is missing")
+    last = found.path[-1]
+    what = f"the key {last!r}" if isinstance(last, str) else f"item {last + 1} of the list"
+    return Complaint(found.path[:-1], f"{what} is missing: {expected(found.slots)}")
+
+
+def _unknown_key(found: Trace) -> str:
+    names = [name for slot in found.parents if slot.model is not None for name in slot.model.model_fields]
+    key = str(found.path[-1]) if found.path else ""
+    hint = did_you_mean(key, names) or listed("allowed are", names)
+    return f"unknown key {shown(key)}" + (f"; {hint}" if hint else "")
+
+
+def _unknown_kind(line: _Error) -> Complaint:
+    """Explain a block whose telling key is missing or says something unknown."""
+    key = str(line.context.get("discriminator", "")).strip("'")
+    allowed = re.findall("'([^']*)'", str(line.context.get("expected_tags", ""))) or [
+        str(choice) for slot in line.trace.slots for choice in _choices(slot, key)
+    ]
+    if line.kind == "union_tag_not_found":
+        return Complaint(line.trace.path, f"the key {key!r} is missing: one of {', '.join(map(repr, allowed))}")
+    return Complaint((*line.trace.path, key), not_among(line.context.get("tag"), allowed))
+
+
+def _choices(slot: Slot, key: str) -> tuple[Any, ...]:
+    return tuple(choice for inner in slot.child(key) for choice in inner.choices)
+
+
+def not_among(value: Any, allowed: Sequence[Any]) -> str:
+    """Say that a value is none of a closed list of words, and which one comes near."""
+    if len(allowed) == 1:
+        return f"{described(value)} is not allowed here, only {described(allowed[0])} is"
+    hint = did_you_mean(str(value), [str(item) for item in allowed])
+    told = listed("one of", allowed) or "a known choice"
+    return f"{described(value)} is not {told}" + (f"; {hint}" if hint else "")
+
+
+def did_you_mean(word: str, known: Sequence[str]) -> str:
+    """Return ``did you mean 'x'?`` if something known is near, else nothing."""
+    tidy = word.lower().replace("-", "_").replace(" ", "_")
+    by_tidy = {name.lower().replace("-", "_"): name for name in known}
+    near = difflib.get_close_matches(tidy[:100], list(by_tidy), n=1, cutoff=0.65)
+    return f"did you mean {by_tidy[near[0]]!r}?" if near else ""
+
+
+def listed(words: str, items: Sequence[Any]) -> str:
+    """Return ``allowed are a, b, c``, or nothing where that would be long."""
+    return f"{words} {', '.join(str(item) for item in items)}" if 0 < len(items) <= MOST_LISTED else ""
+
+
+def _without_echoes(complaints: list[Complaint]) -> list[Complaint]:
+    """Drop missing keys that a misspelt key beside them explains."""
+    hinted = {
+        (complaint.path[:-1], match[1])
+        for complaint in complaints
+        if complaint.at_key and (match := re.search("did you mean '(.+)'", complaint.message))
+    }
+    kept = []
+    for complaint in complaints:
+        match = re.match("the key '(.+?)' is missing", complaint.message)
+        if not match or (complaint.path, match[1]) not in hinted:
+            kept.append(complaint)
+    return kept
+
+
+def _needs(line: _Error) -> str:
+    """Say what is wanted in place of what is there."""
+    value = line.trace.node
+    if value is None:
+        return f"nothing is given here; {expected(line.trace.slots)} is needed"
+    choices = [str(choice) for slot in line.trace.slots for choice in slot.choices]
+    hint = f"; write [{value}]" if line.kind == "tuple_type" and isinstance(value, str) and "," in value[:60] else ""
+    hint = hint or (f"; {near}" if isinstance(value, str) and (near := did_you_mean(value, choices)) else "")
+    return f"{described(value)} does not fit here; {expected(line.trace.slots)} is needed{hint}"
+
+
+def _no_text(line: _Error) -> str:
+    value = line.trace.node
+    if isinstance(value, bool | int | float):
+        return f"{described(value)} is not text; quote it, if text is meant"
+    return _needs(line)
+
+
+def _no_bool(line: _Error) -> str:
+    value = line.trace.node
+    hint = _OLD_BOOLS.get(value.lower()) if isinstance(value, str) else None
+    return f"{described(value)} is not true or false" + (f"; write {hint}" if hint else "")
+
+
+def _no_number(line: _Error) -> str:
+    value = line.trace.node
+    kind = "a whole number" if line.kind.startswith("int") else "a number"
+    if isinstance(value, str):
+        unit = "; a plain number without a unit is needed" if re.match("[-+.0-9]", value) else ""
+        return f"{described(value)} is not {kind}{unit}"
+    return f"{described(value)} is not {kind}" if isinstance(value, bool | float) else _needs(line)
+
+
+def _no_choice(line: _Error) -> str:
+    choices = [choice for slot in line.trace.slots for choice in slot.choices]
+    if not choices:
+        return f"{described(line.trace.node)} is not allowed; allowed are {line.context.get('expected', '')}"
+    return not_among(line.trace.node, choices)
+
+
+def _out_of_bounds(line: _Error) -> str:
+    """Name the value and all its bounds, with units where it has some."""
+    slot = next((slot for slot in line.trace.slots if slot.bounds), None)
+    given = line.trace.node
+    if slot is not None and slot.quantity is not None:
+        told = given.strip() if isinstance(given, str) else slot.quantity.told(float(given))
+        return f"{told} is not allowed: must be {slot.quantity.limits(slot.bounds)}"
+    signs = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
+    bounds = slot.bounds if slot else {name: line.context[name] for name in signs if name in line.context}
+    limits = " and ".join(f"{signs[name]} {bound}" for name, bound in bounds.items())
+    return f"{described(given).strip(chr(39))} is not allowed: must be {limits}"
+
+
+def _too_few_or_many(line: _Error) -> str:
+    least, most = line.context.get("min_length"), line.context.get("max_length")
+    limit = f"at least {least} must be there" if least is not None else f"at most {most} may be there"
+    value = line.trace.node
+    if isinstance(value, str):
+        return f"the text has {len(value)} characters; {limit}" if value else "the text is empty"
+    return f"the list has {len(value)} items; {limit}" if isinstance(value, tuple) else _needs(line)
+
+
+def _own_words(line: _Error) -> str:
+    return str(line.context.get("error", line.text)) or "is not allowed"
+
+
+def _in_pydantics_words(line: _Error) -> str:
+    return line.text.replace("Input should", f"{described(line.trace.node)} should").replace("Value error, ", "")
+
+
+_EXPLAINERS: dict[str, Callable[[_Error], str]] = {
+    "value_error": _own_words,
+    "assertion_error": _own_words,
+    "string_type": _no_text,
+    "bool_type": _no_bool,
+    "bool_parsing": _no_bool,
+    "int_type": _no_number,
+    "int_parsing": _no_number,
+    "int_from_float": _no_number,
+    "float_type": _no_number,
+    "float_parsing": _no_number,
+    "literal_error": _no_choice,
+    "enum": _no_choice,
+    "too_short": _too_few_or_many,
+    "too_long": _too_few_or_many,
+    "string_too_short": _too_few_or_many,
+    "string_too_long": _too_few_or_many,
+    **dict.fromkeys(("greater_than", "greater_than_equal", "less_than", "less_than_equal"), _out_of_bounds),
+    **dict.fromkeys(("model_type", "model_attributes_type", "dict_type", "mapping_type"), _needs),
+    **dict.fromkeys(("tuple_type", "list_type", "union"), _needs),
+}

@@ -1,0 +1,241 @@
+"""From the parser's events to plain Python, with the place of every key and value.
+
+Only PyYAML's scanner and parser are used: what a scalar means is decided in
+`cfmkit.specs.yamlio.scalars`, and tags, anchors, merge keys and second documents do not
+exist here.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import yaml
+from yaml.events import (
+    AliasEvent,
+    DocumentStartEvent,
+    Event,
+    MappingEndEvent,
+    MappingStartEvent,
+    ScalarEvent,
+    SequenceEndEvent,
+    SequenceStartEvent,
+)
+
+from cfmkit.errors import QuantityError
+from cfmkit.specs.units.numbers import shown
+from cfmkit.specs.yamlio.scalars import check_text, read_plain
+from cfmkit.specs.yamlio.source import Fault, Unreadable, decode, without_odd_characters
+from cfmkit.specs.yamlio.syntax import fault_of
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from cfmkit.specs.yamlio.paths import Path
+
+_LOADERS: list[Any] = [*filter(None, [getattr(yaml, "CSafeLoader", None)]), yaml.SafeLoader]
+"""libyaml where PyYAML has it; its complaints vary with its version, so errors are told by the one in Python."""
+
+DEEPEST = 32
+MOST_NODES = 100_000
+MOST_FAULTS = 1000
+_WHOLE, _DIGITS = re.compile("[-+]?[0-9]+"), re.compile("[0-9]")
+_ZERO, _WITH_UNIT = re.compile("[-+]?0+"), re.compile("(?>[0-9]+(?:[eE][-+]?[0-9]+)?) *[^-+0-9., ].*")
+
+
+@dataclass
+class Reading:
+    """A source as far as it could be read.
+
+    `keys` and `values` hold (line, column) by path. `broken` says that the tree is
+    not complete, so that what is missing in it means nothing; `unparsed` that this is
+    because it is no YAML.
+    """
+
+    tree: Any = None
+    keys: dict[Path, tuple[int, int]] = field(default_factory=dict)
+    values: dict[Path, tuple[int, int]] = field(default_factory=dict)
+    faults: list[Fault] = field(default_factory=list)
+    broken: bool = False
+    unparsed: bool = False
+
+
+def read(data: bytes | str) -> Reading:
+    """Return what a source says, with every fault found in it."""
+    try:
+        text, faults = without_odd_characters(decode(data))
+    except Unreadable as stop:
+        return Reading(faults=[stop.fault], broken=True)
+    reading = _parsed(text)
+    # An odd character may well be the reason why the rest is no YAML.
+    reading.faults = faults if reading.unparsed and faults else faults + reading.faults
+    return reading
+
+
+def _parsed(text: str) -> Reading:
+    """Return the reading of clean text, by the fast parser, or in the words of the one that is everywhere."""
+    for loader in _LOADERS:
+        reading = Reading()
+        try:
+            reading.tree = _Builder(reading, yaml.parse(text, Loader=loader)).document()
+            return reading
+        except Unreadable as stop:
+            reading.broken = True
+            reading.faults.append(stop.fault)
+            return reading
+        except yaml.YAMLError as error:
+            fault = fault_of(error)
+    return Reading(faults=[fault], broken=True, unparsed=True)
+
+
+class _Builder:
+    """Takes events one by one and fills a `Reading`."""
+
+    def __init__(self, reading: Reading, events: Iterator[Event]) -> None:
+        self.reading = reading
+        self.events = events
+        self.nodes = 0
+
+    def document(self) -> Any:
+        """Return the only document of the stream; None if there is none."""
+        next(self.events)
+        event = next(self.events)
+        if not isinstance(event, DocumentStartEvent):
+            return None
+        tree = self._node(next(self.events), ())
+        next(self.events)
+        event = next(self.events)
+        if isinstance(event, DocumentStartEvent):
+            raise Unreadable(_fault(event, (), "a second document starts here; write one specification per file"))
+        return tree
+
+    def _node(self, event: Event, path: Path) -> Any:
+        self._count(event, path)
+        self.reading.values.setdefault(path, _place(event))
+        self._refuse_decoration(event, path)
+        if isinstance(event, ScalarEvent):
+            return self._scalar(event, path)
+        if isinstance(event, SequenceStartEvent):
+            return self._sequence(path)
+        return self._mapping(path, bool(event.flow_style)) if isinstance(event, MappingStartEvent) else None
+
+    def _count(self, event: Event, path: Path) -> None:
+        self.nodes += 1
+        if self.nodes > MOST_NODES:
+            raise Unreadable(_fault(event, (), f"more than {MOST_NODES} values; put long data into a file of its own"))
+        if len(path) > DEEPEST:
+            raise Unreadable(_fault(event, (), f"blocks and lists are nested more than {DEEPEST} deep"))
+
+    def _refuse_decoration(self, event: Event, path: Path) -> None:
+        anchor = getattr(event, "anchor", None)
+        if isinstance(event, AliasEvent):
+            self._complain(event, path, f"'*{anchor}' (an alias) is not read; write the value out")
+        elif anchor:
+            self._complain(event, path, f"'&{anchor}' (an anchor) is not read; remove it")
+        if tag := getattr(event, "tag", None):
+            told = tag.replace("tag:yaml.org,2002:", "!!")
+            self._complain(event, path, f"the tag {shown(told)} is not read; write the plain value")
+
+    def _scalar(self, event: ScalarEvent, path: Path) -> Any:
+        try:
+            return check_text(event.value) if event.style else read_plain(event.value)
+        except QuantityError as error:
+            self._complain(event, path, str(error))
+            return event.value
+
+    def _sequence(self, path: Path) -> tuple[Any, ...]:
+        items: list[Any] = []
+        last, zeros, spaced = None, [], False  # the item before, and what may be a zero or the start of 0,5 mm
+        while not isinstance(event := next(self.events), SequenceEndEvent):
+            if last is not None and _split_at_comma(last, event):
+                if _ZERO.fullmatch(getattr(last, "value", "")):
+                    zeros.append((last, event))
+                else:
+                    self._decimal_comma(last, event, (*path, len(items) - 1))
+                    last = None
+                    continue
+            elif last is not None:
+                spaced = spaced or not _adjacent(last, event)
+            items.append(self._node(event, (*path, len(items))))
+            last = event
+        if zeros and spaced:  # [0,240 mm] alone is two values, as zero needs no unit
+            self._decimal_comma(*zeros[0], path)
+        return tuple(items)
+
+    def _mapping(self, path: Path, flow: bool) -> dict[str, Any]:
+        block: dict[str, Any] = {}
+        last, key = None, ""  # the value before, and its key
+        while not isinstance(event := next(self.events), MappingEndEvent):
+            if flow and last is not None and _goes_on(last, event):
+                self._decimal_comma(last, event, (*path, key))
+                if not _is_empty(following := next(self.events)):
+                    self._node(following, (*path, ""))
+                continue
+            key = self._key(event, path)
+            here = (*path, key)
+            if first := self.reading.keys.get(here):
+                told = f"the key {shown(key)} was given in line {first[0]} already; keep one"
+                self._complain(event, here, told, spoils=False)
+            self.reading.keys.setdefault(here, _place(event))
+            last = next(self.events)
+            block.setdefault(key, self._node(last, here))
+        return block
+
+    def _decimal_comma(self, whole: Event, rest: Event, path: Path) -> None:
+        """Complain about a number that YAML ended at its decimal comma, as in ``{pivot: 28,303 N*mm/rad}``."""
+        before, after = getattr(whole, "value", ""), getattr(rest, "value", "")
+        told = f"{shown(f'{before},{after}')} has a decimal comma; write {before}.{after}"
+        if not any(fault.path == path for fault in self.reading.faults):  # thousands have more than one
+            self._complain(whole, path, told)
+
+    def _key(self, event: Event, path: Path) -> str:
+        """Return a key; what is not a plain name is complained about and replaced by its text."""
+        self._refuse_decoration(event, path)
+        if not isinstance(event, ScalarEvent):
+            self._node(event, (*path, ""))
+            self._complain(event, path, "a key must be a name, not a list or a block")
+            return ""
+        key = self._scalar(event, path)
+        if not isinstance(key, str):
+            self._complain(event, path, f"the key {shown(event.value)} is not a name; keys start with a letter")
+        elif key == "<<" and not event.style:
+            self._complain(event, path, "'<<' (a merge key) is not read; write the keys out")
+        return event.value
+
+    def _complain(self, event: Event, path: Path, message: str, spoils: bool = True) -> None:
+        if len(self.reading.faults) >= MOST_FAULTS:
+            raise Unreadable(_fault(event, (), f"more than {MOST_FAULTS} faults; reading stopped here"))
+        self.reading.faults.append(Fault(*_place(event), path, message, spoils))
+
+
+def _goes_on(value: Event, key: Event) -> bool:
+    """Tell whether what stands where a key should be is the rest of the number before it."""
+    if not isinstance(value, ScalarEvent) or not isinstance(key, ScalarEvent) or value.style or key.style:
+        return False
+    return bool(_WHOLE.fullmatch(value.value) and _DIGITS.match(key.value))
+
+
+def _split_at_comma(value: Event, item: Event) -> bool:
+    """Tell whether two items of a list are the halves of one quantity: 2 and 5 mm, with no space after the comma."""
+    return _goes_on(value, item) and _adjacent(value, item) and bool(_WITH_UNIT.fullmatch(getattr(item, "value", "")))
+
+
+def _adjacent(value: Event, item: Event) -> bool:
+    """Tell whether nothing but a comma is between two items."""
+    end: Any = value.end_mark
+    start: Any = item.start_mark
+    return bool((end.line, end.column + 1) == (start.line, start.column))
+
+
+def _is_empty(event: Event) -> bool:
+    return isinstance(event, ScalarEvent) and not event.value and not event.style
+
+
+def _place(event: Event) -> tuple[int, int]:
+    mark: Any = event.start_mark
+    return mark.line + 1, mark.column + 1
+
+
+def _fault(event: Event, path: Path, message: str) -> Fault:
+    return Fault(*_place(event), path, message)

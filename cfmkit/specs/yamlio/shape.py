@@ -1,0 +1,193 @@
+"""What a specification's type allows at a path: its fields, choices and examples.
+
+pydantic tells where an error is by `loc`, which mixes keys with the labels of
+union members. `trace` follows it through the types and the tree side by side, so
+that the user gets the path he wrote.
+"""
+
+from __future__ import annotations
+
+import types
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Union, get_args, get_origin
+
+from pydantic import BaseModel
+
+from cfmkit.specs.units.fields import PLACE, MetricValue, Place, Quantity
+from cfmkit.specs.units.quantities import example, needed
+
+if TYPE_CHECKING:
+    from cfmkit.specs.yamlio.paths import Path
+
+_PRIMITIVES = {int: "a whole number", float: "a number", str: "text", bool: "true or false", dict: "a block"}
+_OPEN = get_args(MetricValue)[1]
+MISSING = object()
+
+
+@dataclass(frozen=True)
+class Slot:
+    """One type that is allowed somewhere, with the annotations on it."""
+
+    kind: Any
+    metadata: tuple[Any, ...] = ()
+
+    @property
+    def model(self) -> type[BaseModel] | None:
+        """The block's type, if a block is meant."""
+        return self.kind if isinstance(self.kind, type) and issubclass(self.kind, BaseModel) else None
+
+    @property
+    def origin(self) -> Any:
+        """``tuple`` for ``tuple[int, ...]``, the type itself where it has no arguments."""
+        return get_origin(self.kind) or self.kind
+
+    @property
+    def quantity(self) -> Quantity | None:
+        """The quantity, if a number with a unit is meant."""
+        if self.kind is Place:
+            return PLACE
+        return next((item for item in self.metadata if isinstance(item, Quantity)), None)
+
+    @property
+    def choices(self) -> tuple[Any, ...]:
+        """The words of a closed choice, but old ones that are only still understood."""
+        if self.origin is not Literal:
+            return ()
+        old = [word for item in self.metadata for word in getattr(item, "old_words", ())]
+        return tuple(word for word in get_args(self.kind) if word not in old)
+
+    @property
+    def bounds(self) -> dict[str, Any]:
+        """The bounds gt, ge, lt, le that the annotations set."""
+        names = ("gt", "ge", "lt", "le")
+        return {name: getattr(item, name) for item in self.metadata for name in names if hasattr(item, name)}
+
+    def child(self, key: str | int) -> tuple[Slot, ...]:
+        """Return what is allowed below a key or index; nothing if it does not exist."""
+        if self.model is not None:
+            field = self.model.model_fields.get(str(key))
+            return slots(field.annotation, tuple(field.metadata)) if field else ()
+        arguments = get_args(self.kind)
+        if isinstance(self.origin, type) and issubclass(self.origin, Mapping):
+            return slots(arguments[1]) if len(arguments) == 2 else ()
+        if self.origin in (tuple, list) and isinstance(key, int) and arguments:
+            fixed = self.origin is tuple and arguments[-1] is not Ellipsis
+            return slots(arguments[key]) if fixed and key < len(arguments) else slots(arguments[0])
+        return ()
+
+    def matches(self, tag: str) -> bool:
+        """Return whether pydantic may mean this one by a union member's label."""
+        if self.model is None:
+            return str(getattr(self.origin, "__name__", self.origin)).lower() in tag.lower()
+        fields = self.model.model_fields.values()
+        return self.model.__name__ in tag or any(tag in map(str, get_args(f.annotation)) for f in fields)
+
+    def expected(self) -> str:
+        """Return what to write, with an example: ``a length, e.g. '200 mm'``."""
+        if self.quantity:
+            return f"{needed(self.quantity.dimensions)}, e.g. {example(self.quantity.dimensions)}"
+        if _OPEN in self.metadata:
+            return "a number with the unit of the metric, e.g. '5 %'"
+        if self.choices:
+            return "one of " + ", ".join(map(repr, self.choices)) if len(self.choices) > 1 else repr(self.choices[0])
+        if self.model is not None:
+            return "a block with " + ", ".join(required(self.model) or list(self.model.model_fields)[:6])
+        if self.origin in (tuple, list):
+            return f"a list{self._length()}, each item {expected(self.child(0), plain=True)}"
+        return _PRIMITIVES.get(self.origin, "a value")
+
+    def _length(self) -> str:
+        arguments = get_args(self.kind)
+        fixed = self.origin is tuple and arguments and arguments[-1] is not Ellipsis
+        return f" of {len(arguments)}" if fixed else ""
+
+
+@dataclass(frozen=True)
+class Trace:
+    """Where a pydantic error is: the path in the tree, what is there, and what is allowed."""
+
+    path: Path
+    node: Any
+    slots: tuple[Slot, ...]
+    parents: tuple[Slot, ...]
+    tags: tuple[tuple[Path, str], ...]
+
+
+def slots(annotation: Any, metadata: tuple[Any, ...] = ()) -> tuple[Slot, ...]:
+    """Return every type that an annotation allows, unions and aliases taken apart, None left out."""
+    origin = get_origin(annotation)
+    if origin is Annotated:
+        inner, *extra = get_args(annotation)
+        return slots(inner, metadata + _flat(extra))
+    if origin in (Union, types.UnionType):
+        members = (item for item in get_args(annotation) if item is not type(None))
+        return tuple(slot for item in members for slot in slots(item, metadata))
+    if hasattr(annotation, "__value__"):
+        return slots(annotation.__value__, metadata)
+    return () if annotation is type(None) else (Slot(annotation, metadata),)
+
+
+def _flat(extra: list[Any]) -> tuple[Any, ...]:
+    """Return annotations with those inside a ``Field(...)`` beside the others."""
+    return tuple(one for item in extra for one in (*getattr(item, "metadata", ()), item))
+
+
+def required(model: type[BaseModel]) -> list[str]:
+    """Return the keys that a block must have."""
+    return [name for name, field in model.model_fields.items() if field.is_required()]
+
+
+def expected(allowed: tuple[Slot, ...], plain: bool = False) -> str:
+    """Return what to write where several types are allowed; `plain` leaves the examples out."""
+    words = dict.fromkeys(slot.expected().split(", e.g.")[0] if plain else slot.expected() for slot in allowed)
+    joint = ", or " if any("," in word for word in words) else " or "
+    return joint.join(words) or "a value"
+
+
+def trace(model: type[BaseModel], tree: Any, loc: tuple[str | int, ...]) -> Trace:
+    """Return where in the tree pydantic's `loc` points."""
+    here = Trace((), tree, (Slot(model),), (), ())
+    label_due = False
+    for item in loc:
+        if label_due:
+            here, label_due = _narrowed(here, str(item)), False
+            continue
+        before = here
+        here = _below(here, item)
+        label_due = here is not before and len(here.slots) > 1
+    return here
+
+
+def _narrowed(here: Trace, tag: str) -> Trace:
+    members = tuple(slot for slot in here.slots if slot.matches(tag)) or here.slots
+    return Trace(here.path, here.node, members, here.parents, (*here.tags, (here.path, tag)))
+
+
+def _below(here: Trace, item: str | int) -> Trace:
+    """Go one step down.
+
+    What neither the tree nor the types know is a label. A key or index that a
+    validator put around what the user wrote adds nothing to the path.
+    """
+    allowed = tuple(slot for parent in here.slots for slot in parent.child(item))
+    step = _step(here.node, item)
+    if step is MISSING and not allowed:
+        return here
+    if (
+        step is MISSING
+        and here.node is not MISSING
+        and not isinstance(here.node, dict if isinstance(item, str) else tuple)
+    ):
+        return Trace(here.path, here.node, allowed, here.slots, here.tags)
+    return Trace((*here.path, item), step, allowed, here.slots, here.tags)
+
+
+def _step(node: Any, item: str | int) -> Any:
+    if isinstance(node, BaseModel):
+        return getattr(node, str(item), MISSING)
+    if isinstance(node, dict):
+        return node.get(item, MISSING)
+    if isinstance(node, tuple) and isinstance(item, int) and 0 <= item < len(node):
+        return node[item]
+    return MISSING

@@ -1,0 +1,91 @@
+"""How every family's specification says what a part is made of, and how much of its strength may be used.
+
+One grammar: a name from the library, a block of values, or a name with some of its values changed.
+One rule: the allowable stress is the yield strength over `safety_factor`, which is 1 unless given.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Self
+
+from pydantic import BeforeValidator, Field, model_validator
+
+from cfmkit.specs.spec import Model, refuse
+from cfmkit.specs.units import Ratio, Stress
+from cfmkit.specs.units.fields import described
+from cfmkit.stock.materials import UnknownMaterial, material
+
+PositiveStress = Annotated[Stress, Field(gt=0)]
+SafetyFactor = Annotated[Ratio, Field(ge=1, description="allowable stress: yield strength over this; 1 unless given")]
+
+_POISSON_RATIO = 0.3
+"""Of a material described by its values alone: between that of metals and that of plastics."""
+
+
+class MaterialSpec(Model):
+    """A material: a name from `show materials`, own values, or a name with some of its values changed.
+
+    What a name stands for is filled in, so that every value is there to be used and varied. Only what was written
+    counts as set: with another name come that material's values.
+    """
+
+    name: str | None = Field(None, description="a name from `show materials`")
+    youngs_modulus: PositiveStress | None = Field(None, description="E; default: the named material's")
+    poisson_ratio: Annotated[Ratio, Field(gt=-1, le=0.5)] | None = Field(
+        None, description="for the shear stiffness; default: the named material's, else 0.3"
+    )
+    yield_strength: PositiveStress | None = Field(
+        None, description="for the allowable stress; default: the named material's, if known"
+    )
+
+    @model_validator(mode="after")
+    def _filled_in(self) -> Self:
+        given: dict[str, float | None] = {"poisson_ratio": _POISSON_RATIO}
+        if self.name is not None:
+            try:
+                known = material(self.name)
+            except UnknownMaterial as error:
+                refuse("Material", {("name",): str(error)})
+                raise
+            given = {key: getattr(known, key) for key in ("youngs_modulus", "poisson_ratio", "yield_strength")}
+        elif self.youngs_modulus is None:
+            raise ValueError("needs 'name' or 'youngs_modulus'")
+        for key, value in given.items():
+            if getattr(self, key) is None:
+                object.__setattr__(self, key, value)  # past the frozen model, and not counted as set
+        return self
+
+    @property
+    def modulus(self) -> float:
+        """Young's modulus E [Pa]."""
+        return float(self.youngs_modulus or 0.0)
+
+    @property
+    def poisson(self) -> float:
+        """Poisson's ratio."""
+        return _POISSON_RATIO if self.poisson_ratio is None else self.poisson_ratio
+
+    def allowable(self, safety_factor: float) -> float | None:
+        """Return the yield strength over a safety factor [Pa]; None where no strength is known."""
+        return None if self.yield_strength is None else self.yield_strength / safety_factor
+
+
+def _as_block(value: Any) -> Any:
+    """Return a bare name as the block that it is short for."""
+    if isinstance(value, str):
+        return {"name": material(value).name}
+    if isinstance(value, bool | int | float | tuple | list):
+        raise ValueError(
+            f"{described(value)} is no material: give a name from `show materials`, or values such as "
+            "{youngs_modulus: 2 GPa, yield_strength: 50 MPa}"
+        )
+    return value
+
+
+def material_input(kind: type[MaterialSpec]) -> BeforeValidator:
+    """Return the annotation that lets a bare name stand for a block of that kind."""
+    return BeforeValidator(_as_block, json_schema_input_type=str | kind)
+
+
+MaterialField = Annotated[MaterialSpec, material_input(MaterialSpec)]
+"""The type of a key that says what something is made of."""
