@@ -10,10 +10,10 @@ from flanks import flanks
 import cfmkit
 from cfmkit.families.base import Run
 from cfmkit.families.cam.build import assemble
-from cfmkit.families.cam.built import Sides
 from cfmkit.families.cam.geometry.flank import BuiltFlank, arc_lengths
-from cfmkit.families.cam.manufacturing.band import Drawn, _track, force_band
-from cfmkit.families.cam.manufacturing.spec import Manufacturing
+from cfmkit.families.cam.manufacturing import DrawnError, _track, force_band
+from cfmkit.families.cam.solution import Sides
+from cfmkit.families.cam.spec import Manufacturing
 
 TRAVEL = np.linspace(0.005, 0.23, 120)
 
@@ -24,7 +24,7 @@ def one_error(offset=0.0, angle=0.0, travel=TRAVEL):
     arc = arc_lengths(flank)
     places = np.linspace(0.0, arc[1][-1], 4000)
     nominal = flank.frame(np.interp(places, arc[1], arc[0]))
-    error = Drawn(0.0, np.array([1.0]), np.array([0.0]), offset, angle, nominal, places)
+    error = DrawnError(0.0, np.array([1.0]), np.array([0.0]), offset, angle, nominal, places)
     x, slope = _track(assembly, BuiltFlank(flank, error, arc).frame(places), assembly.track.start + travel)
     force = Sides((x, x), (slope, slope)).forces(assembly.loads, 0.0, assembly.loads.rest_half_width)[0]
     return force / (4 * assembly.loads.stiffness * assembly.profile.path.law.force_constant) - 1
@@ -57,7 +57,7 @@ def test_the_error_grows_with_the_waviness():
 
 
 def test_the_drawn_waviness_has_the_stated_deviation():
-    from cfmkit.families.cam.manufacturing.band import _drawn
+    from cfmkit.families.cam.manufacturing import _drawn
 
     places = np.linspace(0, 0.27, 1600)
     flank = flanks()[0]
@@ -72,7 +72,7 @@ def test_the_derivatives_of_a_drawn_error_are_its_differences():
     arc = arc_lengths(flank)
     places = np.linspace(0, arc[1][-1], 40_001)
     nominal = flank.frame(np.interp(places, arc[1], arc[0]))
-    error = Drawn(1e-5, np.array([300.0, 90.0]), np.array([1.0, 2.0]), 1e-5, 1e-3, nominal, places)
+    error = DrawnError(1e-5, np.array([300.0, 90.0]), np.array([1.0, 2.0]), 1e-5, 1e-3, nominal, places)
     inside = slice(100, -100)
     assert np.gradient(error.at(places), places)[inside] == pytest.approx(error.at(places, 1)[inside], abs=2e-6)
 

@@ -9,12 +9,13 @@ import numpy as np
 
 from cfmkit.families import family
 from cfmkit.families.base import Run
-from cfmkit.families.cam.build import Assembly, assemble
+from cfmkit.families.cam.build import assemble
 from cfmkit.families.cam.spec import CamSpec
 from cfmkit.families.cam.statics import forces
 from cfmkit.specs.spec import frozen
 
 if TYPE_CHECKING:
+    from cfmkit.families.cam.solution import Assembly
     from cfmkit.results import Design, Result
 
 MM = 1e-3

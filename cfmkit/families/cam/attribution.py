@@ -19,8 +19,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.cam.built import Built, Sides
-from cfmkit.families.cam.model import Solution
+from cfmkit.families.cam.solution import Built, Sides, Solution
 from cfmkit.results import Quantity
 
 if TYPE_CHECKING:

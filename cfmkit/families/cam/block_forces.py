@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.families.cam.block_windows import Spread
-from cfmkit.families.cam.places import nodes
+from cfmkit.families.cam.model import nodes
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

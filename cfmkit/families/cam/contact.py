@@ -16,15 +16,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.cam.findings import finding
-from cfmkit.families.findings import mm, mpa
-
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.cam.build import Assembly
     from cfmkit.families.cam.geometry.track_states import TrackStates
+    from cfmkit.families.cam.solution import Assembly
     from cfmkit.families.cam.spec import Contact, Mechanism
-    from cfmkit.results import Finding
+
 
 YIELD_PRESSURE = 1.67
 """Pressure at which a line contact first yields, over the yield strength [J, eq. 6.4]."""
@@ -89,29 +86,3 @@ def allowable_stress(mechanism: Mechanism) -> float | None:
 def stress(pressures: FloatArray) -> FloatArray:
     """Return the stress below the surface that is compared with the yield strength [Pa]."""
     return pressures / YIELD_PRESSURE
-
-
-def overstressed(mechanism: Mechanism, largest: float | None, place: str) -> Finding | None:
-    """Return what to say where the contact yields; None where it does not.
-
-    Parameters
-    ----------
-    mechanism : Mechanism
-        With its contact.
-    largest : float or None
-        Largest pressure [Pa].
-    place : str
-        Where that is.
-    """
-    contact, allowable = mechanism.contact, allowable_stress(mechanism)
-    if contact is None or allowable is None or largest is None or largest <= YIELD_PRESSURE * allowable * (1 + 1e-9):
-        return None
-    limit = YIELD_PRESSURE * allowable
-    wider = contact.width * (largest / limit) ** 2
-    safety = f" over a safety factor of {mechanism.safety_factor:g}" if mechanism.safety_factor != 1 else ""
-    return finding(
-        "overstressed",
-        f"the contact pressure of {mpa(largest)} {place} is above {mpa(limit)}, at which the material first yields "
-        f"below the surface (1.67 times its yield strength{safety}); use a contact of at least {mm(wider)} "
-        "('mechanism.contact.width'), a stronger material or a larger roller",
-    )

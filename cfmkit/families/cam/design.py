@@ -18,8 +18,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.cam.build import CLOSE, assemble_sides, check_start, hanging_weights
-from cfmkit.families.cam.existence import rollers_overlap
+from cfmkit.families.cam.build import CLOSE, assemble_sides, check_start, hanging_weights, rollers_overlap
 from cfmkit.families.cam.findings import finding
 from cfmkit.families.cam.geometry.path import reach
 from cfmkit.families.cam.geometry.profile import SlopeLaw, brace_tangent

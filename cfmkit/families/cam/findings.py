@@ -1,12 +1,30 @@
-"""Everything a cam mechanism can suffer from, by name.
+"""What a cam mechanism can suffer from, by name, and the checks that find it and put it into numbers.
 
-The names are stable; the sentences say what the name means. The message that a
-run reports carries the numbers that decide and the cure.
+The names are stable; the sentences say what the name means. The message that a run reports carries the numbers that
+decide and the cure.
 """
 
 from __future__ import annotations
 
-from cfmkit.families.findings import finder
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.families.cam.contact import YIELD_PRESSURE, allowable_stress, worst
+from cfmkit.families.cam.values import contact_pressure, errors_used, half_extent, pressure_of, root_mean_square
+from cfmkit.families.findings import finder, mm, mpa
+from cfmkit.numerics.robust import neighbour_noise
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from numpy.typing import NDArray
+
+    from cfmkit.arrays import FloatArray
+    from cfmkit.families.cam.solution import Built, Solution
+    from cfmkit.families.cam.spec import CamSpec, Mechanism
+    from cfmkit.results import Finding
+
 
 FINDINGS = {
     "brace_too_short": "the roller is, or comes, as far from the axis as the brace is long",
@@ -45,3 +63,259 @@ FINDINGS = {
 
 finding = finder(FINDINGS)
 """Return a finding of this family; the name must be one that `FINDINGS` explains."""
+
+
+def overstressed(mechanism: Mechanism, largest: float | None, place: str) -> Finding | None:
+    """Return what to say where the contact yields; None where it does not.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        With its contact.
+    largest : float or None
+        Largest pressure [Pa].
+    place : str
+        Where that is.
+    """
+    contact, allowable = mechanism.contact, allowable_stress(mechanism)
+    if contact is None or allowable is None or largest is None or largest <= YIELD_PRESSURE * allowable * (1 + 1e-9):
+        return None
+    limit = YIELD_PRESSURE * allowable
+    wider = contact.width * (largest / limit) ** 2
+    safety = f" over a safety factor of {mechanism.safety_factor:g}" if mechanism.safety_factor != 1 else ""
+    return finding(
+        "overstressed",
+        f"the contact pressure of {mpa(largest)} {place} is above {mpa(limit)}, at which the material first yields "
+        f"below the surface (1.67 times its yield strength{safety}); use a contact of at least {mm(wider)} "
+        "('mechanism.contact.width'), a stronger material or a larger roller",
+    )
+
+
+def findings_of(solution: Solution) -> tuple[Finding, ...]:
+    """Return every finding about a solved mechanism, the gravest first."""
+    checks = (_undercut, _jam, _dead_point, _springs, _contact, _pressure)
+    return tuple(found for check in checks for found in check(solution))
+
+
+def left_out(spec: CamSpec) -> tuple[Finding, ...]:
+    """Return what to say where the two sides differ: the quasi-static model is symmetric."""
+    errors, found = spec.mechanism.errors, []
+    if errors and (errors.slider_deviation or errors.flank_angle):
+        found.append("'mechanism.errors'")
+    if spec.mechanism.left:
+        found.append("'mechanism.left'")
+    if not found:
+        return ()
+    verb = "counts" if len(found) == 1 else "count"
+    message = (
+        f"the quasi-static model is symmetric: {' and '.join(found)} {verb} in the dynamic model only; "
+        "give 'analysis.dynamics' a slow motion to see the effect"
+    )
+    return (finding("symmetric_model", message),)
+
+
+def _undercut(solution: Solution) -> Iterator[Finding]:
+    profile, corner = solution.assembly.track.profile, solution.corner_travel
+    if not profile.corner or not corner:
+        return
+    law = profile.path.law
+    radius, missing = float(law.curvature_radius(law.rest_half_width)), max(-_offset(solution), 0.0)
+    roller = f"the {mm(profile.roller_radius - missing)} roller"
+    roller += f", with {mm(missing)} of the flank missing," if missing else ""
+    cure = law.smallest_force_constant(profile.roller_radius)
+    larger = f" or A >= {mm(cure)}" if cure else ""
+    fits = f"a roller <= {mm(radius - missing)}" if radius > missing else "less missing material"
+    yield finding(
+        "undercut",
+        f"{roller} is larger than the path's smallest radius of curvature "
+        f"({mm(radius)}, at the start); the first {mm(corner)} run on a corner, without the constant force. "
+        f"Use {fits}{larger}",
+        *(["design.avoid_undercut=true"] if cure and solution.assembly.spec.design else []),
+    )
+    yield finding(
+        "contact_not_single_valued",
+        f"for the first {mm(corner)} of travel the contact stays on the corner at x = {mm(profile.corner.point[0])}, "
+        f"y = {mm(profile.corner.point[1])}: a profile x(y) measured by the roller's height is not single-valued there",
+    )
+    if solution.assembly.spec.mechanism.contact:
+        yield finding(
+            "corner_pressure",
+            f"on a sharp corner the contact pressure has no bound: it is reported from {mm(corner)} of travel on",
+        )
+
+
+def _offset(solution: Solution) -> float:
+    return solution.assembly.spec.mechanism.profile.offset
+
+
+def _jam(solution: Solution) -> Iterator[Finding]:
+    friction = solution.assembly.spec.mechanism.rolling_friction
+    for low, high in solution.jams:
+        yield finding(
+            "up_jam",
+            f"on the way up friction ({friction:g}) holds the roller from {mm(low)} to {mm(high)} of travel: "
+            "no force moves the slider there; use less friction, or start beyond",
+        )
+
+
+def _dead_point(solution: Solution) -> Iterator[Finding]:
+    track, loads = solution.assembly.track, solution.assembly.loads
+    if track.dead_point < track.start - 1e-9 * track.brace_length:
+        yield finding(
+            "dead_point",
+            "at the start the slider must go down before the rollers move out, by "
+            f"{mm(track.start - track.dead_point)}: the brace is too short for this profile",
+        )
+    elif np.isnan(solution.up.slider[0]) or np.isnan(solution.down.slider[0]):
+        cause = "weight" if loads.roller_weight else "spring pretension or friction"
+        yield finding(
+            "dead_point",
+            f"at the start the slider has no lever on the rollers: the force from {cause} has no bound there; "
+            "state a window that begins later, or avoid it with a gravity-compensated profile",
+        )
+
+
+def _travel_at(solution: Solution, elongation: float) -> float:
+    """Return the travel at which the springs are stretched by so much [m]."""
+    track, rest = solution.assembly.track, solution.assembly.loads.rest_half_width
+    return min(track.slider_at(rest + 0.5 * elongation) - track.start, float(solution.travel[-1]))
+
+
+def _springs(solution: Solution) -> Iterator[Finding]:
+    slack = solution.elongation < -1e-12
+    if slack.any():
+        last = _travel_at(solution, 0.0)
+        yield finding(
+            "spring_slack",
+            f"the springs are shorter than their rest length for the first {mm(last)} of travel, by up to "
+            f"{mm(-float(solution.elongation.min()))}: they carry nothing there",
+        )
+    limit = solution.assembly.spec.mechanism.springs.max_elongation
+    longest = float(solution.elongation[-1])
+    if limit and longest > limit * (1 + 1e-9):
+        past = _travel_at(solution, limit)
+        yield finding(
+            "spring_overstretched",
+            f"the springs are stretched by {mm(longest)}, their limit is {mm(limit)}, reached at {mm(past)} of travel",
+        )
+
+
+def _contact(solution: Solution) -> Iterator[Finding]:
+    # Springs that pull keep the rollers on the cam as long as nothing accelerates: the contact force is positive.
+    for way, state in (("up", solution.up), ("down", solution.down)):
+        slack = (solution.elongation > 0) & (state.slider <= 0)
+        if slack.any():
+            yield finding(
+                "slack_cable",
+                f"on the way {way} the force on the slider is not positive from {_where(solution.travel, slack)} "
+                "of travel: a cable would go slack",
+            )
+
+
+def _pressure(solution: Solution) -> Iterator[Finding]:
+    pressed = contact_pressure(solution)
+    if (top := worst(pressed)) is not None:
+        place = f"at {mm(float(solution.travel[top]))} of travel"
+        if told := overstressed(solution.assembly.spec.mechanism, float(pressed[top]), place):
+            yield told
+
+
+def _where(travel: FloatArray, mask: NDArray[np.bool_]) -> str:
+    hits = np.flatnonzero(mask)
+    return f"{mm(float(travel[hits[0]]))} to {mm(float(travel[hits[-1]]))}"
+
+
+TOO_NOISY = 2.0
+"""Points are noisier than stated if their neighbours say so by this factor."""
+
+
+def findings_of_built(built: Built) -> list[Finding]:
+    """Return what the user must know about the measured profile."""
+    found = [*_built_mechanics(built), *_weak_registration(built), *_doubtful_points(built)]
+    last = built.assembly.stroke
+    if built.travel[-1] < last * (1 - 1e-9) or built.travel[0] > 0:
+        span = f"{mm(float(built.travel[0]))} to {mm(float(built.travel[-1]))}"
+        found.append(finding("part_measured", f"the flanks were measured for {span} of travel only, of {mm(last)}"))
+    return found
+
+
+def _built_mechanics(built: Built) -> Iterator[Finding]:
+    """Yield what is wrong with the mechanism that the measured cam is built into."""
+    limit, longest = built.assembly.spec.mechanism.springs.max_elongation, float(built.elongation.max())
+    if limit and longest > limit * (1 + 1e-9):
+        past = float(built.travel[np.argmax(built.elongation > limit)])
+        yield finding(
+            "spring_overstretched",
+            f"the springs are stretched by {mm(longest)}, their limit is {mm(limit)}, reached at {mm(past)} of travel",
+        )
+    if (slack := built.elongation < 0).any():
+        last = float(built.travel[slack][-1])
+        yield finding("spring_slack", f"the springs carry nothing up to {mm(last)} of travel: they are too long")
+    pressed = pressure_of(built, 1.0)
+    if (top := worst(pressed)) is not None:
+        place = f"at {mm(float(built.travel[top]))} of travel"
+        if told := overstressed(built.assembly.spec.mechanism, float(pressed[top]), place):
+            yield told
+    held = ~np.isfinite(built.forces(1.0)[0])
+    if held.any():
+        friction, places = built.assembly.spec.mechanism.rolling_friction, built.travel[held]
+        yield finding(
+            "up_jam",
+            f"on the way up friction ({friction:g}) holds a roller at {int(held.sum())} of {len(held)} points, from "
+            f"{mm(float(places[0]))} to {mm(float(places[-1]))} of travel: no force moves the slider there",
+        )
+
+
+def _weak_registration(built: Built) -> Iterator[Finding]:
+    """Yield how uncertain the place of the cam is along the direction that the points tell least of."""
+    direction, deviation = built.registration.weakest(half_extent(built))
+    rmse, lifted = root_mean_square(errors_used(built)), float(built.registration.growth[1])
+    if built.registration.width:
+        more = "more" if built.registration.width > 0 else "less"
+        yield finding(
+            "width_error",
+            f"the points are those of a cam with {mm(abs(built.registration.width))} {more} material on both flanks, "
+            f"± {mm(built.registration.width_deviation)} (one standard deviation), and are laid on the design so; "
+            "'mechanism.profile.registration: motion' takes it for a place, 'datum' moves nothing",
+        )
+    if deviation > 0.1 * rmse and rmse > 0:
+        names = ("the angle", "the shift in x", "the shift in y")
+        parts = [f"{100 * part**2:.0f} % {name}" for part, name in zip(direction, names, strict=True) if part**2 > 0.05]
+        taken = (
+            f"; and 0.01 mm more on both flanks would be taken for a cam that lies {mm(1e-5 * abs(lifted))} "
+            f"{'lower' if lifted > 0 else 'higher'}: the flanks are steep"
+        )
+        yield finding(
+            "registration_weak",
+            f"where the cam lies is known to ± {mm(deviation)} (one standard deviation) along its weakest "
+            f"direction: {', '.join(parts)}{'' if built.registration.width else taken}",
+        )
+
+
+def _doubtful_points(built: Built) -> Iterator[Finding]:
+    """Yield what speaks against the measured points, or against what is said of their noise."""
+    outliers = sum(int((~keep).sum()) for keep in built.registration.used)
+    if outliers:
+        count = sum(len(keep) for keep in built.registration.used)
+        yield finding("profile_outliers", f"{outliers} of {count} points lie far off or beyond the flank: left out")
+    stated = float(built.assembly.spec.mechanism.profile.noise or 0.0)
+    seen = max(neighbour_noise(one, use) for one, use in _along(built))
+    if seen > TOO_NOISY * stated:
+        yield finding(
+            "noise_understated",
+            f"neighbouring points differ as with a noise of {mm(seen)}, but 'mechanism.profile.noise' is {mm(stated)}: "
+            "the difference is taken for waves of the flank, and the force follows their slope",
+        )
+    elif root_mean_square(errors_used(built)) < 0.8 * stated:
+        yield finding(
+            "noise_overstated",
+            f"the points are {mm(root_mean_square(errors_used(built)))} (rms) off the design, less than the stated "
+            f"noise of {mm(stated)}: nothing of the profile's errors is left to be seen",
+        )
+
+
+def _along(built: Built) -> Iterator[tuple[FloatArray, FloatArray]]:
+    """Yield path coordinates and errors of the points that count, one flank after the other [m]."""
+    registration = built.registration
+    for place, error, keep in zip(registration.parameters, registration.errors, registration.used, strict=True):
+        yield place[keep], error[keep]

@@ -20,14 +20,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.curves import Column, Curve
-from cfmkit.families.cam.build import CLOSE, Assembly, assemble, displacement_origin
-from cfmkit.families.cam.checks import findings_of, left_out
-from cfmkit.families.cam.contact import allowable_stress, stress
-from cfmkit.families.cam.existence import check_first_pose, check_springs
-from cfmkit.families.cam.findings import finding
-from cfmkit.families.cam.geometry.profile import brace_tangent
-from cfmkit.families.cam.places import Places
-from cfmkit.families.cam.statics import Forces, forces, jams
+from cfmkit.families.cam.build import CLOSE, assemble, check_first_pose, check_springs, displacement_origin
+from cfmkit.families.cam.contact import allowable_stress, flank_pressure, stress
+from cfmkit.families.cam.findings import finding, findings_of, left_out
+from cfmkit.families.cam.solution import Assembly, Solution
+from cfmkit.families.cam.statics import Forces, forces
 from cfmkit.families.cam.values import contact_pressure, theoretical_force, values_of
 from cfmkit.families.findings import mm
 from cfmkit.families.refusals import CannotBuild, no_result
@@ -37,68 +34,8 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.families.base import Run
     from cfmkit.families.cam.geometry.track_states import TrackStates
-    from cfmkit.families.cam.manufacturing.band import Band
     from cfmkit.families.cam.spec import CamSpec
     from cfmkit.results import Finding
-
-
-@dataclass(frozen=True)
-class Solution:
-    """A solved mechanism, as the checks, the scalar values and the pictures need it.
-
-    Attributes
-    ----------
-    assembly : Assembly
-        The parts.
-    travel : (n,) array
-        Slider travel from the start of the roller path, increasing [m].
-    states : TrackStates
-        Where the rollers are at those travels.
-    up, down : Forces
-        On the way up and on the way down, both ordered by increasing travel.
-    origin : float
-        What is added to the travel to give the displacement [m].
-    band : Band or None
-        Forces of cams that are cut with errors.
-    """
-
-    assembly: Assembly
-    travel: FloatArray
-    states: TrackStates
-    up: Forces
-    down: Forces
-    origin: float
-    band: Band | None = None
-
-    @cached_property
-    def pressure_angle(self) -> FloatArray:
-        """Angle between the brace's pull and the roller's motion [rad]; at 90 deg the slider moves nothing."""
-        slope, tangent = self.states.slope, brace_tangent(self.states.x, self.assembly.track.brace_length)
-        angle: FloatArray = np.arctan2(1.0 + slope * tangent, slope - tangent)
-        return angle
-
-    @cached_property
-    def elongation(self) -> FloatArray:
-        """Elongation of the springs [m]."""
-        return 2.0 * (self.states.x - self.assembly.loads.rest_half_width)
-
-    @property
-    def corner_travel(self) -> float:
-        """Travel at which the roller leaves the corner [m]; 0 if there is none."""
-        track = self.assembly.track
-        return max(track.corner_end - track.start, 0.0)
-
-    @cached_property
-    def jams(self) -> tuple[tuple[float, float], ...]:
-        """Intervals of travel in which no force moves the slider up [m]."""
-        track, friction = self.assembly.track, self.assembly.spec.mechanism.rolling_friction
-        if not friction:
-            return ()
-        total = float(self.travel[-1])
-        missing = bool(np.isnan(self.up.slider).any())
-        states = self.states if missing or len(self.travel) < 100 else None
-        found = ((low - track.start, high - track.start) for low, high in jams(track, friction, states))
-        return tuple((max(low, 0.0), min(high, total)) for low, high in found if low < total)
 
 
 def analyze(spec: CamSpec, run: Run) -> Result:
@@ -118,7 +55,7 @@ def analyze(spec: CamSpec, run: Run) -> Result:
         be built, PARTIAL if the curve ends before the travel asked for.
     """
     if spec.mechanism.profile.file is not None:
-        from cfmkit.families.cam.built import analyze_built
+        from cfmkit.families.cam.as_built import analyze_built
 
         return analyze_built(spec)
     try:
@@ -148,7 +85,7 @@ def analyze(spec: CamSpec, run: Run) -> Result:
         valid=((solution.corner_travel + solution.origin, float(solution.travel[-1]) + solution.origin),),
         target=spec.design.force if spec.design else theoretical_force(solution),
         allowable_stress=allowable_stress(spec.mechanism),
-        closed=Places(solution),
+        closed=DenseLoop(solution),
         state=solution,
     )
 
@@ -158,7 +95,7 @@ def with_band(solution: Solution, seed: int) -> Solution:
     tolerance = solution.assembly.spec.analysis.manufacturing
     if tolerance is None:
         return solution
-    from cfmkit.families.cam.manufacturing.band import force_band
+    from cfmkit.families.cam.manufacturing import force_band
 
     return replace(solution, band=force_band(solution.assembly, tolerance, solution.travel, seed))
 
@@ -241,3 +178,66 @@ def _curve(solution: Solution) -> Curve:
         extra |= {"contact_pressure": Column(pressed, "stress"), "max_stress": Column(stress(pressed), "stress")}
     branch = np.repeat(["load", "unload"], points)
     return Curve(loop(solution.travel) + solution.origin, force, branch, stable, extra)
+
+
+_SHARES = np.concatenate(
+    [np.geomspace(1e-14, 1e-4, 51), np.linspace(0.0, 1.0, 181) ** 2, 1.0 - np.geomspace(1e-9, 0.03, 24)]
+)
+"""Shares of the travel at which the force is looked at.
+
+With friction it rises from zero to its constant value within nanometres: nodes stand at even shares of the logarithm
+there, at even steps of the springs' stretch beyond, and close together before the end, where a brace may come near
+horizontal.
+"""
+
+_ON_CORNER = np.concatenate([np.geomspace(1e-9, 0.02, 30), np.linspace(0.0, 1.0, 61)])
+"""The same on a corner, where it rises within a tenth of a millimetre."""
+
+
+def nodes(total: FloatArray, corner: FloatArray) -> FloatArray:
+    """Return travels so dense that the force hides nothing between two of them, (d, n), increasing [m].
+
+    Parameters
+    ----------
+    total, corner : (d,) array
+        Travel of each cam, and that at which its roller leaves the corner; 0 without one [m].
+    """
+    on_corner = np.minimum(corner, total)[:, None] * _ON_CORNER
+    return np.sort(np.concatenate([total[:, None] * _SHARES, on_corner], axis=1), axis=1)
+
+
+@dataclass(frozen=True, eq=False)
+class DenseLoop:
+    """The loop of a solved mechanism at every place (a `cfmkit.results.ClosedForm`)."""
+
+    solution: Solution
+
+    @cached_property
+    def places(self) -> FloatArray:
+        """Increasing displacements [m]."""
+        solution = self.solution
+        grid = nodes(solution.travel[-1:], np.array([solution.corner_travel]))[0]
+        return np.asarray(grid + solution.origin)
+
+    @property
+    def peaks(self) -> FloatArray:
+        """None: between two samples of a usual curve no cam has a peak of its own."""
+        return np.empty(0)
+
+    def effort(self, branch: str, places: FloatArray) -> FloatArray:
+        """Return the force on the way up or down at displacements of any shape [N]."""
+        return np.asarray(self._at(branch, places)[1].slider.reshape(np.shape(places)))
+
+    def stress(self, branch: str, places: FloatArray) -> FloatArray:
+        """Return the stress below the contact at displacements of any shape [Pa]; NaN on the corner."""
+        states, found = self._at(branch, places)
+        pressed = flank_pressure(self.solution.assembly, states, found.contact)
+        return np.asarray(stress(pressed).reshape(np.shape(places)))
+
+    def _at(self, branch: str, places: FloatArray) -> tuple[TrackStates, Forces]:
+        """Return where the rollers are at displacements, and the forces there, as one row."""
+        solution = self.solution
+        track, friction = solution.assembly.track, solution.assembly.spec.mechanism.rolling_friction
+        travel = np.clip(np.ravel(places) - solution.origin, 0.0, solution.travel[-1])
+        states = track.states(track.start + travel)
+        return states, forces(states, solution.assembly.loads, friction if branch == "load" else -friction)

@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.export.geometry import TOLERANCE, Arc, Contour, Curve2D, Drawing, Edge, Line, Smooth
-from cfmkit.families.cam.build import assemble_sides
-from cfmkit.families.cam.existence import flanks_crossing
+from cfmkit.families.cam.build import assemble_sides, flanks_crossing
 from cfmkit.families.findings import mm
 from cfmkit.families.refusals import CannotBuild
 

@@ -15,7 +15,7 @@ from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.cam.model import Solution
+    from cfmkit.families.cam.solution import Solution
 
 Point = tuple[float, float]
 

@@ -7,7 +7,6 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
-from cfmkit.families.cam.manufacturing.spec import Manufacturing
 from cfmkit.specs.spec import Analysis, Model, OldWords, Spec, refuse
 from cfmkit.specs.units import Angle, Force, Inertia, Length, Mass, Ratio, Stiffness, Time, format_short
 from cfmkit.stock.spec import MaterialField, MaterialSpec, SafetyFactor
@@ -264,6 +263,16 @@ class Dynamics(Model):
         if stroke == 0:
             raise ValueError("must not be 0: the slider has to move")
         return stroke
+
+
+class Manufacturing(Model):
+    """Standard deviations of the errors with which flanks are cut, each flank drawn by itself."""
+
+    waviness: Annotated[Length, Field(ge=0)] = Field(0.0, description="of the flank's distance from the design")
+    wavelength: Annotated[Length, Field(gt=0)] = Field(0.010, description="of the shortest waves")
+    offset: Annotated[Length, Field(ge=0)] = Field(0.0, description="of the material left on a whole flank")
+    angle: Annotated[Angle, Field(ge=0)] = Field(0.0, description="of the angle at which a flank is cut")
+    samples: int = Field(200, ge=10, le=100_000, description="cams that are drawn")
 
 
 class CamAnalysis(Analysis):

@@ -1,4 +1,4 @@
-"""Scalar results of a cam mechanism, beside the constant-force metrics of every family."""
+"""Scalar results of a cam mechanism, as designed or as measured, beside the constant-force metrics of every family."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.cam.built_values import BUILT_DEFINITIONS
 from cfmkit.families.cam.contact import flank_pressure
 from cfmkit.families.cam.statics import forces
 from cfmkit.numerics import sampled
 from cfmkit.results import Quantity
+from cfmkit.specs.units import between
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -18,9 +18,43 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.cam.build import Assembly
-    from cfmkit.families.cam.model import Solution
+    from cfmkit.families.cam.solution import Assembly, Built, Solution
     from cfmkit.families.cam.statics import Forces
+
+
+BUILT_DEFINITIONS = {
+    "profile_rmse": ("length", "root mean square distance of the measured points from the design, along its normal"),
+    "profile_sd": ("length", "standard deviation (n - 1) of those distances"),
+    "profile_mean": ("length", "mean of those distances: positive where material is left"),
+    "profile_rmse_x": ("length", "root mean square error in x at the same y [SS, fig. 3]"),
+    "profile_sd_x": ("length", "standard deviation (n - 1) of the error in x"),
+    "profile_outliers": ("count", "measured points that the registration gave no weight"),
+    "registration_angle": ("angle", "turn that lays the measured points on the design"),
+    "registration_x": ("length", "shift in x after that turn"),
+    "registration_y": ("length", "shift in y after that turn"),
+    "registration_width": (
+        "length",
+        "material on both flanks, along the normal, that the registration fitted; 0: none",
+    ),
+    "registration_uncertainty": ("length", "standard deviation of the least certain motion of the registration"),
+    "registration_y_per_width": (
+        "ratio",
+        "shift in y with which the registration answers a cam that is wider on both flanks, per width along its normal",
+    ),
+    "profile_force_sd": ("force", "standard deviation (n - 1) of what the profile's errors add to the force"),
+    "profile_force_share": ("ratio", "that, over the mean force of the design [SS, fig. 13: 0.8 %]"),
+    "rest_force_mean": ("force", "mean of what the springs' rest length adds to the force of the design"),
+    "manufacturing_force_share": (
+        "ratio",
+        "median over the cams that are drawn of the standard deviation of the force error along the travel, over the "
+        "mean force [SS, fig. 13: 0.8 %]",
+    ),
+    "manufacturing_force_share_95": ("ratio", "what 95 % of the cams that are drawn stay below in that"),
+    "loop_area_per_friction": (
+        "energy",
+        "area of the loop per unit of rolling friction, over the window: a measured area over it is the friction",
+    ),
+}
 
 DEFINITIONS = {
     "force_constant": ("length", "A of the cut profile; the force is 4 K A [SS, eq. 1]"),
@@ -143,3 +177,78 @@ def _corner_peak(solution: Solution) -> float | None:
     if not 0 < top < len(force) - 1:
         return float(force[top])
     return float(sampled.largest(travel, force)[0])
+
+
+def values_of_built(built: Built) -> Mapping[str, Quantity]:
+    """Return the scalar results by name."""
+    found, used = built.registration, built.registration.used
+    errors = errors_used(built)
+    across = np.concatenate([item[keep] for item, keep in zip(built.across, used, strict=True)])
+    inside = window_mask(built)
+    share = built.shares["profile"][inside]
+    numbers = {
+        "profile_rmse": root_mean_square(errors),
+        "profile_sd": float(errors.std(ddof=1)),
+        "profile_mean": float(errors.mean()),
+        "profile_rmse_x": root_mean_square(across),
+        "profile_sd_x": float(across.std(ddof=1)),
+        "profile_outliers": float(sum(int((~keep).sum()) for keep in used)),
+        "registration_angle": found.angle,
+        "registration_x": float(found.shift[0]),
+        "registration_y": float(found.shift[1]),
+        "registration_width": found.width,
+        "registration_uncertainty": found.weakest(half_extent(built))[1],
+        "registration_y_per_width": float(found.growth[1]),
+        "profile_force_sd": float(np.nanstd(share, ddof=1)),
+        "profile_force_share": float(np.nanstd(share, ddof=1) / np.nanmean(built.shares["design"][inside])),
+        "rest_force_mean": float(np.nanmean(built.shares["rest"][inside])),
+        "loop_area_per_friction": loop_area_per_friction(built),
+    }
+    return {name: Quantity(value, *BUILT_DEFINITIONS[name]) for name, value in numbers.items()}
+
+
+def pressure_of(built: Built, way: float) -> FloatArray:
+    """Return the larger pressure of both contacts on the way up (1) or down (-1), the flank curved as designed [Pa]."""
+    track, forces = built.assembly.track, built.forces(way)
+    return flank_pressure(built.assembly, track.states(track.start + built.travel), np.maximum(forces[1], forces[2]))
+
+
+def window_mask(built: Built) -> NDArray[np.bool_]:
+    """Return which travels lie in ``analysis.window``."""
+    place, window = built.travel + built.origin, built.assembly.spec.analysis.window
+    if window is None:
+        return np.ones(len(place), dtype=bool)
+    low, high = between(window, requested_travel(built))
+    inside: NDArray[np.bool_] = (place >= low) & (place <= high)
+    return inside if inside.sum() > 2 else np.ones(len(place), dtype=bool)
+
+
+def requested_travel(built: Built) -> tuple[float, float]:
+    """Return where the displacement starts and where it was to end [m]."""
+    start, end = float(built.travel[0]), built.assembly.spec.analysis.travel or float(built.travel[-1])
+    return start + built.origin, end + built.origin
+
+
+def loop_area_per_friction(built: Built) -> float:
+    """Return d(loop area)/d(friction) over the window [J], from a small friction either way."""
+    loads, small = built.assembly.loads, 1e-6
+    up, down = (built.sides.forces(loads, way * small, loads.rest_half_width)[0] for way in (1.0, -1.0))
+    inside = window_mask(built)
+    return float(np.trapezoid((up - down)[inside], built.travel[inside]) / small)
+
+
+def half_extent(built: Built) -> float:
+    """Return half the height of the measured part [m]: where an angle is felt."""
+    heights = np.concatenate([points[:, 1] for points in built.registration.points])
+    return 0.5 * float(np.ptp(heights))
+
+
+def errors_used(built: Built) -> FloatArray:
+    """Return the errors of the points that count, both flanks [m]."""
+    registration = built.registration
+    return np.concatenate([error[keep] for error, keep in zip(registration.errors, registration.used, strict=True)])
+
+
+def root_mean_square(values: FloatArray) -> float:
+    """Return the root mean square of values."""
+    return float(np.sqrt(np.mean(values**2)))

@@ -2,43 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from cfmkit.families.cam.build import Assembly, assemble_sides, cam_start_height
-from cfmkit.families.cam.dynamics.center import pieces_of
-from cfmkit.families.cam.dynamics.machine import Machine
-from cfmkit.families.cam.dynamics.motion import Cycloid
-from cfmkit.families.cam.dynamics.side import NoRise, Parts, Side
+from cfmkit.families.cam.build import assemble_sides, cam_start_height
+from cfmkit.families.cam.dynamics.machine import Cycloid, Machine
+from cfmkit.families.cam.dynamics.side import NoRise, Side, SideParts, pieces_of
+from cfmkit.families.cam.dynamics.solution import Build
 from cfmkit.families.cam.findings import finding
 from cfmkit.families.cam.statics import GRAVITY
 from cfmkit.families.refusals import CannotBuild
 
 if TYPE_CHECKING:
+    from cfmkit.families.cam.solution import Assembly
     from cfmkit.families.cam.spec import CamSpec, Dynamics, Errors, LeftMasses, Masses, Mechanism
-
-
-@dataclass(frozen=True)
-class Build:
-    """A mechanism put together for a motion.
-
-    Attributes
-    ----------
-    right, left : Assembly
-        The parts of each side.
-    machine : Machine
-        What moves.
-    motion : Cycloid
-        How the slider moves.
-    lift : float
-        Height of the origin of slider positions above the start of the roller path [m].
-    """
-
-    right: Assembly
-    left: Assembly
-    machine: Machine
-    motion: Cycloid
-    lift: float
 
 
 def build(spec: CamSpec) -> Build:
@@ -99,7 +75,7 @@ def _angles(errors: Errors | None) -> tuple[float, float]:
     return errors.slider_deviation - errors.flank_angle, -errors.slider_deviation - errors.flank_angle
 
 
-def parts_of(mechanism: Mechanism, masses: Masses | None, own: LeftMasses | None = None) -> Parts:
+def parts_of(mechanism: Mechanism, masses: Masses | None, own: LeftMasses | None = None) -> SideParts:
     """Return brace and roller of a side; `own` replaces what it states. Defaults: a slender rod, a solid cylinder."""
     length, radius = mechanism.brace_length, mechanism.roller_radius
 
@@ -109,7 +85,7 @@ def parts_of(mechanism: Mechanism, masses: Masses | None, own: LeftMasses | None
 
     brace, roller = stated("brace") or 0.0, stated("roller") or 0.0
     rod, cylinder = stated("brace_inertia"), stated("roller_inertia")
-    return Parts(
+    return SideParts(
         brace_length=length,
         brace_mass=brace,
         brace_inertia=slender_rod(brace, length) if rod is None else rod,

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.families.cam.build import flanks_cross, rollers_overlap
 from cfmkit.families.cam.dynamics.inverse import respond
-from cfmkit.families.cam.existence import flanks_cross, rollers_overlap
 from cfmkit.families.cam.findings import finding
 from cfmkit.families.findings import mm, newton
 from cfmkit.families.refusals import CannotBuild
@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.cam.dynamics.build import Build
     from cfmkit.families.cam.dynamics.machine import Machine
+    from cfmkit.families.cam.dynamics.solution import Build
     from cfmkit.results import Finding
 
 BISECTIONS = 60

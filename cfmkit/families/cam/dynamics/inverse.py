@@ -31,7 +31,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from cfmkit.families.cam.dynamics.motion import Moment
+from cfmkit.families.cam.dynamics.machine import Moment
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -63,7 +63,7 @@ class Kinematics(NamedTuple):
     sway: FloatArray
 
 
-class Loads(NamedTuple):
+class MovingLoads(NamedTuple):
     """What acts on rollers and braces beside the contact, each (2, n).
 
     `roller`, `middle`: acceleration of the roller's axis and of the brace's middle, weight
@@ -208,13 +208,13 @@ def kinematics(stances: tuple[Stance, Stance], position: FloatArray, length: Flo
     return Kinematics(center, tangent, brace, lever, way, bend, first, second, swing, sway)
 
 
-def _loads(machine: Machine, parts: Constants, at: Kinematics, moment: Moment) -> Loads:
+def _loads(machine: Machine, parts: Constants, at: Kinematics, moment: Moment) -> MovingLoads:
     push, square = moment.acceleration, moment.speed * moment.speed
     lift = 1j * machine.gravity
     roller = at.first * push + at.second * square + lift
     middle: ComplexArray = 0.5 * (roller + (1j * push + lift))
     along = at.way * push + at.bend * square
-    return Loads(
+    return MovingLoads(
         roller=roller,
         middle=middle,
         turning=at.swing * push + at.sway * square,

@@ -1,10 +1,10 @@
-"""The whole mechanism in motion: two sides, a slider, springs between the rollers."""
+"""What moves: two sides, a slider and springs; and how the slider is moved."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -70,3 +70,49 @@ class Machine:
         """
         right = self.right.stance(position)
         return right, right if self.left.runs_like(self.right) else self.left.stance(position)
+
+
+class Moment(NamedTuple):
+    """Slider position [m], speed [m/s] and acceleration [m/s^2], each (n,) or a number."""
+
+    position: Any
+    speed: Any
+    acceleration: Any
+
+
+@dataclass(frozen=True)
+class Cycloid:
+    """Cycloidal motion: rest to rest without a jump of acceleration [SS, eq. 17].
+
+    Attributes
+    ----------
+    start : float
+        Slider position at the beginning [m].
+    stroke : float
+        Travel, negative for lowering [m].
+    time : float
+        Duration [s].
+    """
+
+    start: float
+    stroke: float
+    time: float
+
+    def times(self, points: int) -> FloatArray:
+        """Return `points` equal steps from beginning to end [s]."""
+        return np.linspace(0.0, self.time, points)
+
+    def at(self, times: FloatArray | np.float64) -> Moment:
+        """Return position, speed and acceleration at times between 0 and `time` [s].
+
+        Examples
+        --------
+        >>> middle = Cycloid(0.2, 0.1, 0.5).at(np.array([0.25]))
+        >>> [round(float(values[0]), 12) for values in middle]
+        [0.25, 0.4, 0.0]
+        """
+        share = times / self.time
+        turn = (2.0 * np.pi) * share
+        sine, speed = np.sin(turn), self.stroke / self.time
+        position = self.start + self.stroke * (share - sine / (2.0 * np.pi))
+        return Moment(position, speed * (1.0 - np.cos(turn)), (2.0 * np.pi * speed / self.time) * sine)

@@ -18,13 +18,12 @@ import numpy as np
 from cfmkit.curves import Column, Curve
 from cfmkit.families.cam.build import displacement_origin
 from cfmkit.families.cam.contact import allowable_stress, stress
-from cfmkit.families.cam.dynamics.build import Build, build, stated_motion
-from cfmkit.families.cam.dynamics.checks import findings_of, old_word, outside, runs_on_corner
+from cfmkit.families.cam.dynamics.build import build, stated_motion
 from cfmkit.families.cam.dynamics.ending import ending
-from cfmkit.families.cam.dynamics.history import History, inverse_history, multibody_history
-from cfmkit.families.cam.dynamics.inverse import statics
-from cfmkit.families.cam.dynamics.multibody import CornerContact
-from cfmkit.families.cam.dynamics.solution import Moved
+from cfmkit.families.cam.dynamics.findings import findings_of, old_word, outside, runs_on_corner
+from cfmkit.families.cam.dynamics.inverse import respond, statics
+from cfmkit.families.cam.dynamics.multibody import CornerContact, NineCoordinates, reactions
+from cfmkit.families.cam.dynamics.solution import Build, History, Moved
 from cfmkit.families.cam.dynamics.values import contact_pressure, slow_force, values_of
 from cfmkit.families.cam.values import constant_force
 from cfmkit.families.refusals import CannotBuild, no_result
@@ -33,6 +32,8 @@ from cfmkit.results import Result, Status
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.families.base import Run
+    from cfmkit.families.cam.dynamics.machine import Cycloid, Machine
+    from cfmkit.families.cam.dynamics.multibody import Scheme
     from cfmkit.families.cam.spec import CamSpec
     from cfmkit.results import Finding
 
@@ -185,3 +186,52 @@ def _curve(moved: Moved) -> Curve:
     with np.errstate(invalid="ignore"):
         stable = (history.contact[0] > 0) & (history.contact[1] > 0)
     return Curve(moved.displacement, history.force, branch, stable, extra)
+
+
+def inverse_history(machine: Machine, motion: Cycloid, times: FloatArray) -> History:
+    """Return the history by inverse dynamics."""
+    found = respond(machine, motion.at(times))
+    return History(
+        times=times,
+        moment=found.moment,
+        force=found.force,
+        contact=found.contact,
+        traction=found.traction,
+        spin=found.spin,
+        brace=np.abs(found.roller_pin),
+        pin=np.abs(found.slider_pin),
+        elongation=found.elongation,
+        center=found.at.center,
+        on_corner=found.on_corner,
+    )
+
+
+def multibody_history(
+    machine: Machine, motion: Cycloid, points: int, scheme: Scheme | None = None, first: int | None = None
+) -> History:
+    """Return the history by the nine-coordinate formulation, without rolling resistance.
+
+    Of `points` equally spaced times over the motion, it is known at the `first` ones where the motion ends early.
+
+    Raises
+    ------
+    CornerContact
+        If a roller runs on the corner of its cam.
+    """
+    model = NineCoordinates(machine)
+    found = model.run(motion, points, scheme, first)
+    right, left = reactions(model, found)
+    center = np.array([right.center, left.center])
+    return History(
+        times=found.times,
+        moment=motion.at(found.times),
+        force=found.force,
+        contact=np.array([right.contact, left.contact]),
+        traction=np.array([right.traction, left.traction]),
+        spin=np.array([right.spin, left.spin]),
+        brace=np.abs([right.roller_pin, left.roller_pin]),
+        pin=np.abs([right.slider_pin, left.slider_pin]),
+        elongation=np.abs(center[0] + center[1].conj()) - machine.rest_length,
+        center=center,
+        on_corner=np.zeros(len(found.times), dtype=bool),
+    )

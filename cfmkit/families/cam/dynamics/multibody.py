@@ -1,12 +1,25 @@
 """The paper's model: nine coordinates, nine constraints, forces by Lagrange multipliers.
 
+The coordinates are x = (s2, theta3, theta4, xi4, y4, theta5, theta6, xi6, y6) [SS, eq. 4]:
+slider, right brace, right roller, its contact seen from the roller, height of the contact
+on the right flank, and the same on the left. Rows: six holonomic constraints [SS, eq. 5],
+of which the first and third block are plane vectors (the paper writes a third component
+that is always zero), two rolling constraints [eq. 15] and the given motion [eq. 16]; their
+Jacobians and second time derivatives are analytic.
+
 Positions follow from the integration of the first derivatives of the constraints with
 Baumgarte's stabilisation [SS, eq. 19 to 22] by the classical Runge-Kutta method, accelerations from
 their second derivatives [eq. 23 to 25], the multipliers from inverse dynamics [eq. 28];
 the force on the slider is minus the last one.
 
+The rows of the closure and of rolling act where roller and flank touch, so that the cam
+pushes the roller with -(lambda_x, lambda_y) - lambda_roll (dx/dy, 1). The pins follow from the
+balance of roller and brace. Left vectors are given as on the right, in a mirror.
+
 This is a check on `cfmkit.families.cam.dynamics.inverse`, which needs no integration. It has
 no rolling resistance, like the paper's model, and starts beyond the corner of an undercut cam.
+
+Everything works for one vector of coordinates and for many, (..., 9).
 
 Reference
 ---------
@@ -16,22 +29,122 @@ Reference
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from cfmkit.families.cam.dynamics.center import Flank
-from cfmkit.families.cam.dynamics.constraints import GIVEN, HOLONOMIC, ROLLING, SIZE, Chain
 from cfmkit.families.cam.dynamics.flankline import FlankLine
+from cfmkit.families.cam.dynamics.side import Flank
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from numpy.typing import NDArray
+
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.cam.dynamics.constraints import Posture
-    from cfmkit.families.cam.dynamics.machine import Machine
-    from cfmkit.families.cam.dynamics.motion import Cycloid
-    from cfmkit.families.cam.dynamics.side import Side
+    from cfmkit.families.cam.dynamics.flankline import FlankPoint
+    from cfmkit.families.cam.dynamics.machine import Cycloid, Machine
+    from cfmkit.families.cam.dynamics.side import Side, SideParts
+
+    ComplexArray = NDArray[np.complex128]
+
+
+SIZE = 9
+HOLONOMIC, ROLLING, GIVEN = slice(0, 6), slice(6, 8), 8
+
+
+class Posture(NamedTuple):
+    """Sines and cosines of a side: of its brace, and of the direction from roller axis to contact; and the flank."""
+
+    sin: Any
+    cos: Any
+    contact_sin: Any
+    contact_cos: Any
+    flank: FlankPoint
+
+
+@dataclass(frozen=True)
+class SideChain:
+    """One side: brace, roller, flank.
+
+    Attributes
+    ----------
+    hand : float
+        1 on the right, -1 on the left: the left flank is the mirror image of `line`.
+    length, radius : float
+        Of brace and roller [m].
+    line : FlankLine
+        The flank, as on the right.
+    """
+
+    hand: float
+    length: float
+    radius: float
+    line: FlankLine
+
+    @property
+    def columns(self) -> slice:
+        """Where this side's four coordinates are."""
+        return slice(1, 5) if self.hand > 0 else slice(5, 9)
+
+    @property
+    def rows(self) -> tuple[int, int, int, int]:
+        """Where this side's constraints are: x and y of the closure, tangency, rolling."""
+        return (0, 1, 2, 6) if self.hand > 0 else (3, 4, 5, 7)
+
+    def posture(self, x: FloatArray, guess: Any) -> Posture:
+        """Return the angles and the contact of this side."""
+        brace, roller, contact, height = np.moveaxis(x[..., self.columns], -1, 0)
+        turned = roller + contact
+        flank = self.line.at(height, guess)
+        return Posture(np.sin(brace), np.cos(brace), np.sin(turned), np.cos(turned), flank)
+
+    def residual(self, x: FloatArray, at: Posture, out: FloatArray) -> None:
+        """Write the three holonomic constraints [SS, eq. 5]."""
+        i, j, k, _ = self.rows
+        out[..., i] = self.length * at.cos + self.radius * at.contact_cos - self.hand * at.flank.x
+        height = x[..., self.columns.stop - 1]
+        out[..., j] = x[..., 0] + self.length * at.sin + self.radius * at.contact_sin - height
+        out[..., k] = self.radius * (self.hand * at.flank.first * at.contact_cos + at.contact_sin)
+
+    def jacobian(self, at: Posture, out: FloatArray) -> None:
+        """Write the rows of the Jacobian that belong to this side [SS, eq. 27]."""
+        i, j, k, roll = self.rows
+        brace, roller, contact, height = range(self.columns.start, self.columns.stop)
+        length, radius, steep = self.length, self.radius, self.hand * at.flank.first
+        out[..., i, brace] = -length * at.sin
+        out[..., i, roller] = out[..., i, contact] = -radius * at.contact_sin
+        out[..., i, height] = -steep
+        out[..., j, 0] = 1.0
+        out[..., j, brace] = length * at.cos
+        out[..., j, roller] = out[..., j, contact] = radius * at.contact_cos
+        out[..., j, height] = -1.0
+        out[..., k, roller] = out[..., k, contact] = radius * (at.contact_cos - steep * at.contact_sin)
+        out[..., k, height] = self.hand * radius * at.flank.second * at.contact_cos
+        out[..., roll, 0] = 1.0
+        out[..., roll, brace] = length * (at.cos - steep * at.sin)
+        out[..., roll, roller] = radius * (at.contact_cos - steep * at.contact_sin)
+
+    def quadratic(self, at: Posture, velocity: FloatArray, out: FloatArray) -> None:
+        """Write d/dx (D x') x', what the second time derivative has beside D x'' [SS, eq. 23 and 24]."""
+        i, j, k, roll = self.rows
+        brace, roller, contact, height = np.moveaxis(velocity[..., self.columns], -1, 0)
+        turned, hand, flank = roller + contact, self.hand, at.flank
+        length, radius, steep = self.length, self.radius, hand * flank.first
+        steepening = hand * flank.second * height
+        out[..., i] = -length * at.cos * brace**2 - radius * at.contact_cos * turned**2 - steepening * height
+        out[..., j] = -length * at.sin * brace**2 - radius * at.contact_sin * turned**2
+        out[..., k] = radius * (
+            hand * flank.third * at.contact_cos * height**2
+            - 2.0 * steepening * at.contact_sin * turned
+            - (steep * at.contact_cos + at.contact_sin) * turned**2
+        )
+        swing, spin = length * brace, radius * roller
+        out[..., roll] = (
+            -steepening * (swing * at.sin + spin * at.contact_sin)
+            - swing * brace * (steep * at.cos + at.sin)
+            - spin * turned * (steep * at.contact_cos + at.contact_sin)
+        )
 
 
 @dataclass(frozen=True)
@@ -256,13 +369,13 @@ class NineCoordinates:
         return rate
 
 
-def _chain(side: Side, hand: float) -> Chain:
+def _chain(side: Side, hand: float) -> SideChain:
     flank = side.pieces[-1]
     if not isinstance(flank, Flank):
         raise TypeError("the last piece of a roller's curve must run along the flank")
     distance = flank.shift - side.parts.roller_radius
     line = FlankLine(flank.profile.path, distance, side.angle, side.height, flank.ends)
-    return Chain(hand, side.parts.brace_length, side.parts.roller_radius, line)
+    return SideChain(hand, side.parts.brace_length, side.parts.roller_radius, line)
 
 
 def _angle(hand: float, direction: complex) -> float:
@@ -273,3 +386,66 @@ def _angle(hand: float, direction: complex) -> float:
 def _solve(matrices: FloatArray, right: FloatArray) -> FloatArray:
     solution: Any = np.linalg.solve(matrices, right[..., None])[..., 0]
     return np.asarray(solution, dtype=np.float64)
+
+
+class Reactions(NamedTuple):
+    """Of one side, each (n,), x outwards.
+
+    `center` of the roller [m], normal `contact` force and `traction` along the way up [N], force on the
+    brace at the roller and at the slider [N], `spin` of the roller, positive on the way up [rad/s].
+    """
+
+    center: ComplexArray
+    contact: FloatArray
+    traction: FloatArray
+    roller_pin: ComplexArray
+    slider_pin: ComplexArray
+    spin: FloatArray
+
+
+def reactions(model: NineCoordinates, found: Trajectory) -> tuple[Reactions, Reactions]:
+    """Return the reactions on the right and on the left."""
+    machine, x = model.machine, found.coordinates
+    right, left = (chain.length * np.exp(1j * x[:, chain.columns.start]) for chain in model.chains)
+    distance = np.abs(right - left)
+    pull = machine.stiffness * np.maximum(distance - machine.rest_length, 0.0) * (right - left) / distance
+    first, second = (_side(model, found, index, spring) for index, spring in enumerate((-pull, -pull.conj())))
+    return first, second
+
+
+def _side(model: NineCoordinates, found: Trajectory, index: int, springs: ComplexArray) -> Reactions:
+    chain, posture, parts = model.chains[index], found.postures[index], model.sides[index].parts
+    push = _contact_force(chain, posture, found.multipliers)
+    tangent = (posture.flank.first + 1j) / np.sqrt(1.0 + posture.flank.first**2)
+    arm, bent = _brace(chain, parts, found)
+    lift = 1j * (found.accelerations[:, 0] + model.machine.gravity)
+    roller_pin = push + springs - parts.roller_mass * (bent + lift)
+    return Reactions(
+        center=1j * found.coordinates[:, 0] + arm,
+        contact=(push * (-1j * tangent).conj()).real,
+        traction=(push * tangent.conj()).real,
+        roller_pin=roller_pin,
+        slider_pin=parts.brace_mass * (0.5 * bent + lift) - roller_pin,
+        spin=chain.hand * found.velocities[:, chain.columns.start + 1],
+    )
+
+
+def _contact_force(chain: SideChain, posture: Posture, multipliers: FloatArray) -> ComplexArray:
+    """Return the force of the cam on the roller [N]."""
+    i, j, _, roll = chain.rows
+    force = -(multipliers[:, i] + 1j * multipliers[:, j])
+    force = force - multipliers[:, roll] * (chain.hand * posture.flank.first + 1j)
+    return _as_on_the_right(chain, force)
+
+
+def _brace(chain: SideChain, parts: SideParts, found: Trajectory) -> tuple[ComplexArray, ComplexArray]:
+    """Return the brace from slider to roller [m] and its second time derivative [m/s^2]."""
+    column = chain.columns.start
+    angle, rate = found.coordinates[:, column], found.velocities[:, column]
+    arm = parts.brace_length * np.exp(1j * angle)
+    bent = arm * (1j * found.accelerations[:, column] - rate * rate)
+    return _as_on_the_right(chain, arm), _as_on_the_right(chain, bent)
+
+
+def _as_on_the_right(chain: SideChain, vector: ComplexArray) -> ComplexArray:
+    return vector if chain.hand > 0 else -vector.conj()

@@ -1,4 +1,7 @@
-"""One side of the mechanism: which place of its roller belongs to a position of the slider.
+"""One side of the mechanism: the curve of its roller's centre, and which place belongs to a position of the slider.
+
+The curve has two kinds of pieces: the line at a constant distance from the roller path, and, where the cam is
+undercut, a circle about the corner before it. Points, tangents and curvature are analytic.
 
 The slider's pin is on the axis at i S, the roller's centre C on its curve, the brace
 between them: |C - i S| = L, that is
@@ -9,7 +12,7 @@ an explicit function of the curve's parameter, which is inverted by Newton's met
 curve may be turned about the origin (a slider that deviates from the axis of the cam, or
 a flank cut at a wrong angle). The side works where the slider rises along the curve.
 
-Complex numbers x + iy, x outwards; the left side is mirrored.
+Complex numbers x + iy [m], x outwards; the left side is mirrored.
 """
 
 from __future__ import annotations
@@ -18,20 +21,102 @@ import cmath
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 
-from cfmkit.families.cam.dynamics.center import Places
 from cfmkit.numerics.roots import EPS, bracketed_root, invert_increasing
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.cam.dynamics.center import Piece
+    from cfmkit.families.cam.geometry.cut import CamProfile
+    from cfmkit.families.cam.geometry.track import Track
 
     ComplexArray = NDArray[np.complex128]
+
+
+class CurvePoints(NamedTuple):
+    """Points of a curve for values of its parameter, each (n,).
+
+    `point` [m], unit `tangent`, `curvature` [1/m] (positive to the left of the tangent),
+    and `pace`, the length of curve per unit of the parameter.
+    """
+
+    point: ComplexArray
+    tangent: ComplexArray
+    curvature: FloatArray
+    pace: FloatArray
+
+
+class CurvePiece(Protocol):
+    """A smooth piece of a curve between two values of its parameter."""
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """First and last value of the parameter."""
+        ...
+
+    @property
+    def on_corner(self) -> bool:
+        """Whether the roller pivots on the cam's corner."""
+        ...
+
+    def at(self, parameter: FloatArray) -> CurvePoints:
+        """Return the points for values of the parameter."""
+        ...
+
+
+@dataclass(frozen=True)
+class Flank:
+    """The line at a distance `shift` [m] outwards from the roller path; its parameter is the path coordinate."""
+
+    profile: CamProfile
+    shift: float
+    ends: tuple[float, float]
+    on_corner: bool = False
+
+    def at(self, parameter: FloatArray) -> CurvePoints:
+        """Return the points for path coordinates [m]."""
+        slope, bend = self.profile.path.law.slopes(parameter)
+        square = 1.0 + slope * slope
+        length = np.sqrt(square)
+        tangent, curvature = (1.0 + 1j * slope) / length, bend / (square * length)
+        point = parameter + 1j * self.profile.path.height(parameter)
+        if self.shift:
+            stretch = 1.0 + self.shift * curvature
+            point, curvature, length = point - 1j * self.shift * tangent, curvature / stretch, length * stretch
+        return CurvePoints(point, tangent, curvature, length)
+
+
+@dataclass(frozen=True)
+class CornerArc:
+    """The circle on which the centre turns about the cam's corner; its parameter is the angle [rad]."""
+
+    corner: complex
+    radius: float
+    ends: tuple[float, float]
+    on_corner: bool = True
+
+    def at(self, parameter: FloatArray) -> CurvePoints:
+        """Return the points for angles of the centre as seen from the corner [rad]."""
+        toward = np.exp(1j * parameter)
+        size = np.full(parameter.shape, self.radius)
+        return CurvePoints(self.corner + self.radius * toward, 1j * toward, 1.0 / size, size)
+
+
+def pieces_of(track: Track) -> tuple[CurvePiece, ...]:
+    """Return the curve of the roller's centre on a cam, from the start of the track to the cam's end."""
+    profile = track.profile
+    flank = Flank(profile, track.shift, (profile.start, profile.end))
+    if profile.corner is None:
+        return (flank,)
+    corner = complex(*profile.corner.point)
+    first = profile.path.law.rest_half_width - corner
+    last = flank.at(np.array([profile.start])).point[0] - corner
+    return CornerArc(corner, track.radius, (float(np.angle(first)), float(np.angle(last)))), flank
+
 
 KNOTS = 129
 GUIDE_KNOTS = 2049
@@ -39,7 +124,7 @@ NEWTON_STEPS = 5
 
 
 @dataclass(frozen=True)
-class Parts:
+class SideParts:
     """What one side is made of: SI units; the brace's centre of mass is at mid-length."""
 
     brace_length: float
@@ -64,10 +149,10 @@ class NoRise(ValueError):
 
 
 @dataclass(frozen=True)
-class Stretch:
+class RisingStretch:
     """A part of the curve on which the slider rises: piece, ends of the parameter, slider positions there [m]."""
 
-    piece: Piece
+    piece: CurvePiece
     ends: tuple[float, float]
     span: tuple[float, float]
 
@@ -78,9 +163,9 @@ class Side:
 
     Attributes
     ----------
-    parts : Parts
+    parts : SideParts
         Brace and roller.
-    pieces : tuple of Piece
+    pieces : tuple of CurvePiece
         The curve of the roller's centre, before it is turned.
     angle : float
         Counter-clockwise, as seen on the right side [rad].
@@ -88,8 +173,8 @@ class Side:
         Of the origin of all positions above the start of the roller path [m].
     """
 
-    parts: Parts
-    pieces: tuple[Piece, ...]
+    parts: SideParts
+    pieces: tuple[CurvePiece, ...]
     angle: float = 0.0
     height: float = 0.0
 
@@ -98,32 +183,32 @@ class Side:
         """What a point is multiplied by to be turned."""
         return cmath.exp(1j * self.angle)
 
-    def turned(self, places: Places) -> Places:
+    def turned(self, places: CurvePoints) -> CurvePoints:
         """Return points of the curve about the origin of all positions."""
         point, tangent, curvature, pace = places
         if self.height:
             point = point - 1j * self.height
         if self.angle:
             point, tangent = point * self.turn, tangent * self.turn
-        return Places(point, tangent, curvature, pace)
+        return CurvePoints(point, tangent, curvature, pace)
 
-    def at(self, piece: Piece, parameter: FloatArray) -> tuple[Places, FloatArray]:
+    def at(self, piece: CurvePiece, parameter: FloatArray) -> tuple[CurvePoints, FloatArray]:
         """Return the turned points of a piece and the positions of the slider that belong to them [m]."""
         places = self.turned(piece.at(parameter))
         return places, places.point.imag + self._drop(places)
 
-    def _drop(self, places: Places) -> FloatArray:
+    def _drop(self, places: CurvePoints) -> FloatArray:
         """Return how far the rollers' axes are below the slider [m]."""
         x, length = places.point.real, self.parts.brace_length
         return np.sqrt((length - x) * (length + x))
 
-    def rate(self, places: Places) -> FloatArray:
+    def rate(self, places: CurvePoints) -> FloatArray:
         """Return the derivative of the slider's position by the parameter."""
         tangent = places.tangent
         return places.pace * (tangent.imag - tangent.real * places.point.real / self._drop(places))
 
     @cached_property
-    def stretches(self) -> tuple[Stretch, ...]:
+    def stretches(self) -> tuple[RisingStretch, ...]:
         """The parts of the curve on which the slider rises, one after the other.
 
         Raises
@@ -131,7 +216,7 @@ class Side:
         NoRise
             If there is none.
         """
-        found: list[Stretch] = []
+        found: list[RisingStretch] = []
         for piece in self.pieces:
             ends = self._rising(piece)
             if ends is None:
@@ -140,14 +225,14 @@ class Side:
             if ends[0] > piece.ends[0]:
                 found = []
             span = self.at(piece, np.array(ends))[1]
-            found.append(Stretch(piece, ends, (float(span[0]), float(span[1]))))
+            found.append(RisingStretch(piece, ends, (float(span[0]), float(span[1]))))
             if ends[1] < piece.ends[1]:
                 break
         if not found:
             raise NoRise
         return tuple(found)
 
-    def _rising(self, piece: Piece) -> tuple[float, float] | None:
+    def _rising(self, piece: CurvePiece) -> tuple[float, float] | None:
         """Return between which values of the parameter the slider rises; None if nowhere."""
         low, high = piece.ends
         knots = low + (high - low) * np.linspace(0.0, 1.0, KNOTS) ** 2
@@ -164,7 +249,7 @@ class Side:
         begin = bracketed_root(rate, float(knots[first - 1]), float(knots[first])) if first else low
         return begin, self._end(piece, float(knots[stop - 1]), float(knots[stop])) if stop else high
 
-    def _end(self, piece: Piece, low: float, high: float) -> float:
+    def _end(self, piece: CurvePiece, low: float, high: float) -> float:
         """Return where the slider stops rising, or the brace is too short for the curve, whichever is first."""
 
         def steepness(u: float) -> float:
@@ -201,7 +286,7 @@ class Side:
                 target[here] = values
         return whole
 
-    def _on(self, stretch: Stretch, slider: FloatArray) -> Stance:
+    def _on(self, stretch: RisingStretch, slider: FloatArray) -> Stance:
         piece, (low, high) = stretch.piece, stretch.ends
         u = self._guides[stretch.span].parameter(slider)
         for _ in range(NEWTON_STEPS):
@@ -216,7 +301,7 @@ class Side:
             places = self.at(piece, u)[0]
         return Stance(places.point, places.tangent, places.curvature, np.full(slider.shape, piece.on_corner))
 
-    def _rise(self, piece: Piece, parameter: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _rise(self, piece: CurvePiece, parameter: FloatArray) -> tuple[FloatArray, FloatArray]:
         places, value = self.at(piece, parameter)
         return value, self.rate(places)
 
@@ -225,7 +310,7 @@ class Side:
         """First estimates on each stretch."""
         return {stretch.span: self._guide(stretch) for stretch in self.stretches}
 
-    def _guide(self, stretch: Stretch) -> Guide:
+    def _guide(self, stretch: RisingStretch) -> Guide:
         low, high = stretch.ends
         knots = np.linspace(low, high, GUIDE_KNOTS)
         slider, rate = self._rise(stretch.piece, knots)

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.cam.contact import overstressed, worst
+from cfmkit.families.cam.contact import worst
 from cfmkit.families.cam.dynamics.build import slender_rod, solid_cylinder
 from cfmkit.families.cam.dynamics.values import contact_pressure
-from cfmkit.families.cam.findings import finding
+from cfmkit.families.cam.findings import finding, overstressed
 from cfmkit.families.findings import mm, newton
 from cfmkit.specs.units import format_short
 
@@ -18,10 +18,10 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from cfmkit.families.cam.dynamics.build import Build
-    from cfmkit.families.cam.dynamics.solution import Moved
+    from cfmkit.families.cam.dynamics.solution import Build, Moved
     from cfmkit.families.cam.spec import CamSpec
     from cfmkit.results import Finding
+
 
 ROLLER_SHARE = (0.25, 2.0)
 """Moment of inertia of a roller over that of a solid cylinder: below, its mass would lie within half the

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from cfmkit.families.cam.dynamics.solution import Moved
     from cfmkit.results import Result
 
+
 TIME = Scale("time", "time")
 ALIKE = 1e-9
 """Sides whose values differ by less than this fraction of the largest are drawn as one line."""

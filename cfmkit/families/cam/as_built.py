@@ -13,23 +13,26 @@ Reference
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cfmkit.curves import Column, Curve
 from cfmkit.errors import DataError
-from cfmkit.families.cam.build import Assembly, assemble, displacement_origin
-from cfmkit.families.cam.built_values import findings_of_built, pressure_of, requested_travel, values_of_built
-from cfmkit.families.cam.checks import left_out
+from cfmkit.families.cam.build import assemble, check_first_pose, check_springs, displacement_origin, until_overlap
 from cfmkit.families.cam.contact import allowable_stress, stress
-from cfmkit.families.cam.existence import check_first_pose, check_springs, until_overlap
-from cfmkit.families.cam.findings import finding
+from cfmkit.families.cam.findings import finding, findings_of_built, left_out
 from cfmkit.families.cam.geometry.built_track import BuiltTrack, built_flank, built_track
 from cfmkit.families.cam.geometry.flank import DesignFlank
-from cfmkit.families.cam.geometry.profile import brace_tangent
-from cfmkit.families.cam.values import DEFINITIONS, design_values, largest
+from cfmkit.families.cam.solution import Assembly, Built, Sides
+from cfmkit.families.cam.values import (
+    DEFINITIONS,
+    design_values,
+    largest,
+    pressure_of,
+    requested_travel,
+    values_of_built,
+)
 from cfmkit.families.findings import mm
 from cfmkit.families.refusals import CannotBuild, no_result
 from cfmkit.numerics.registration import Registration, gaps_across, register, registered_where_it_is
@@ -42,7 +45,6 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.families.cam.spec import CamSpec
-    from cfmkit.families.cam.statics import Loads
     from cfmkit.results import Finding
 
 
@@ -54,82 +56,6 @@ WIDTH_CERTAIN = 5.0
 
 WIDTH_EXPLAINS = 0.6
 """and where it leaves less than this part of the variance of their errors."""
-
-
-@dataclass(frozen=True)
-class Sides:
-    """Right and left roller at some slider positions: x [m] and slope of the track, each (n,)."""
-
-    x: tuple[FloatArray, FloatArray]
-    slope: tuple[FloatArray, FloatArray]
-
-    def spring(self, loads: Loads, rest: float) -> FloatArray:
-        """Return the spring force on each roller [N]; springs do not push."""
-        return loads.stiffness * np.maximum(self.x[0] + self.x[1] - 2.0 * rest, 0.0)
-
-    def forces(self, loads: Loads, friction: float, rest: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return the force on the slider and at the right and left contact [N]; NaN where nothing moves a side.
-
-        Parameters
-        ----------
-        loads : Loads
-            Springs and weights.
-        friction : float
-            Positive on the way up, negative on the way down.
-        rest : float
-            Half width at which the springs are at rest [m].
-        """
-        pull, contacts = np.full_like(self.x[0], loads.slider_weight), []
-        spring, weight = self.spring(loads, rest), loads.roller_weight
-        for x, slope in zip(self.x, self.slope, strict=True):
-            tangent = brace_tangent(x, loads.brace_length)
-            turn = 1.0 + friction * slope
-            lever = slope - friction - tangent * turn
-            lever = np.where(lever > 0, lever, np.nan)
-            pull = pull + (spring * turn + weight * (slope - friction)) / lever
-            contacts.append(np.hypot(1.0, slope) * (spring + weight * tangent) / lever)
-        return pull, contacts[0], contacts[1]
-
-
-@dataclass(frozen=True)
-class Built:
-    """A solved mechanism with a measured cam.
-
-    Attributes
-    ----------
-    assembly : Assembly
-        The design and the loads.
-    registration : Registration
-        Of the right and the left flank.
-    across : tuple of (n,) array
-        Errors in x at the same y, positive outside [m].
-    travel : (n,) array
-        From the start of the design's roller path [m].
-    sides : Sides
-        Where the rollers are.
-    shares : mapping
-        Parts of the force [N]: design, rest, profile, friction_up, friction_down, each (n,).
-    origin : float
-        What is added to the travel to give the displacement [m].
-    """
-
-    assembly: Assembly
-    registration: Registration
-    across: tuple[FloatArray, FloatArray]
-    travel: FloatArray
-    sides: Sides
-    shares: dict[str, FloatArray]
-    origin: float
-
-    @property
-    def elongation(self) -> FloatArray:
-        """Elongation of the springs, (n,) [m]."""
-        return self.sides.x[0] + self.sides.x[1] - 2.0 * self.assembly.loads.rest_half_width
-
-    def forces(self, way: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return the force on the slider and at both contacts on the way up (1) or down (-1), each (n,) [N]."""
-        loads, friction = self.assembly.loads, self.assembly.spec.mechanism.rolling_friction
-        return self.sides.forces(loads, way * friction, loads.rest_half_width)
 
 
 def analyze_built(spec: CamSpec) -> Result:

@@ -16,21 +16,22 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.cam.built import Sides
 from cfmkit.families.cam.geometry.flank import BuiltFlank, DesignFlank, arc_lengths
+from cfmkit.families.cam.solution import ForceBand, Sides
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.cam.build import Assembly
-    from cfmkit.families.cam.manufacturing.spec import Manufacturing
+    from cfmkit.families.cam.solution import Assembly
+    from cfmkit.families.cam.spec import Manufacturing
     from cfmkit.numerics.registration import Frame
+
 
 WAVES = 24
 PLACES = 1600
 
 
 @dataclass(frozen=True)
-class Drawn:
+class DrawnError:
     """The error of one flank that was drawn, with its derivatives over the arc length of the design.
 
     Attributes
@@ -82,38 +83,7 @@ class Drawn:
         return np.asarray((along, 1.0 - at.curvature * beside, np.zeros_like(along))[derivative])
 
 
-@dataclass(frozen=True)
-class Band:
-    """Forces of all drawn cams over the travel.
-
-    Attributes
-    ----------
-    travel : (n,) array
-        [m].
-    forces : (samples, n) array
-        Without friction [N].
-    design : (n,) array
-        Force of the design [N].
-    """
-
-    travel: FloatArray
-    forces: FloatArray
-    design: FloatArray
-
-    def quantile(self, share: float) -> FloatArray:
-        """Return the force that a share of the cams stays below at each travel [N]; NaN where not all have a flank."""
-        found, all_there = np.full(len(self.travel), np.nan), np.isfinite(self.forces).all(axis=0)
-        found[all_there] = np.quantile(self.forces[:, all_there], share, axis=0)
-        return found
-
-    def deviations(self) -> FloatArray:
-        """Return every cam's standard deviation of the error along the travel, over the mean force [SS, fig. 13]."""
-        errors = self.forces - self.design
-        found: FloatArray = np.nanstd(errors, axis=1, ddof=1) / float(np.nanmean(self.design))
-        return found
-
-
-def force_band(assembly: Assembly, tolerance: Manufacturing, travel: FloatArray, seed: int) -> Band:
+def force_band(assembly: Assembly, tolerance: Manufacturing, travel: FloatArray, seed: int) -> ForceBand:
     """Return the forces of cams that are cut with errors.
 
     Parameters
@@ -146,14 +116,14 @@ def force_band(assembly: Assembly, tolerance: Manufacturing, travel: FloatArray,
         row[:] = Sides((right_x, left_x), (right, left)).forces(loads, 0.0, loads.rest_half_width)[0]
     states = assembly.track.states(slider)
     designed = Sides((states.x, states.x), (states.slope, states.slope))
-    return Band(travel, forces, designed.forces(loads, 0.0, loads.rest_half_width)[0])
+    return ForceBand(travel, forces, designed.forces(loads, 0.0, loads.rest_half_width)[0])
 
 
-def _drawn(generator: np.random.Generator, tolerance: Manufacturing, nominal: Frame, places: FloatArray) -> Drawn:
+def _drawn(generator: np.random.Generator, tolerance: Manufacturing, nominal: Frame, places: FloatArray) -> DrawnError:
     longest = float(places[-1])
     shortest = min(tolerance.wavelength, longest)
     lengths = np.exp(generator.uniform(np.log(shortest), np.log(longest), WAVES))
-    return Drawn(
+    return DrawnError(
         tolerance.waviness * (2.0 / WAVES) ** 0.5,
         2.0 * np.pi / lengths,
         generator.uniform(0.0, 2.0 * np.pi, WAVES),

@@ -1,0 +1,219 @@
+"""What is known of a cam mechanism that was put together and solved.
+
+Types only: every other file of this family may import them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.families.cam.geometry.profile import brace_tangent
+from cfmkit.families.cam.statics import Forces, Loads, jams
+
+if TYPE_CHECKING:
+    from cfmkit.arrays import FloatArray
+    from cfmkit.families.cam.geometry.cut import CamProfile
+    from cfmkit.families.cam.geometry.track import Track
+    from cfmkit.families.cam.geometry.track_states import TrackStates
+    from cfmkit.families.cam.spec import CamSpec
+    from cfmkit.numerics.registration import Registration
+    from cfmkit.results import Finding
+
+
+@dataclass(frozen=True)
+class Assembly:
+    """A mechanism put together.
+
+    Attributes
+    ----------
+    spec : CamSpec
+        With every derived value written out.
+    profile : CamProfile
+        The cam as cut.
+    track : Track
+        Where the roller runs.
+    loads : Loads
+        Springs and weights.
+    stroke : float
+        Travel that the cut profile offers with its own brace [m]; short of the
+        specified stroke where the geometry ends first.
+    shortfall : Finding or None
+        Why `stroke` is short, if it is.
+    """
+
+    spec: CamSpec
+    profile: CamProfile
+    track: Track
+    loads: Loads
+    stroke: float
+    shortfall: Finding | None = None
+
+
+@dataclass(frozen=True)
+class ForceBand:
+    """Forces of all drawn cams over the travel.
+
+    Attributes
+    ----------
+    travel : (n,) array
+        [m].
+    forces : (samples, n) array
+        Without friction [N].
+    design : (n,) array
+        Force of the design [N].
+    """
+
+    travel: FloatArray
+    forces: FloatArray
+    design: FloatArray
+
+    def quantile(self, share: float) -> FloatArray:
+        """Return the force that a share of the cams stays below at each travel [N]; NaN where not all have a flank."""
+        found, all_there = np.full(len(self.travel), np.nan), np.isfinite(self.forces).all(axis=0)
+        found[all_there] = np.quantile(self.forces[:, all_there], share, axis=0)
+        return found
+
+    def deviations(self) -> FloatArray:
+        """Return every cam's standard deviation of the error along the travel, over the mean force [SS, fig. 13]."""
+        errors = self.forces - self.design
+        found: FloatArray = np.nanstd(errors, axis=1, ddof=1) / float(np.nanmean(self.design))
+        return found
+
+
+@dataclass(frozen=True)
+class Solution:
+    """A solved mechanism, as the checks, the scalar values and the pictures need it.
+
+    Attributes
+    ----------
+    assembly : Assembly
+        The parts.
+    travel : (n,) array
+        Slider travel from the start of the roller path, increasing [m].
+    states : TrackStates
+        Where the rollers are at those travels.
+    up, down : Forces
+        On the way up and on the way down, both ordered by increasing travel.
+    origin : float
+        What is added to the travel to give the displacement [m].
+    band : ForceBand or None
+        Forces of cams that are cut with errors.
+    """
+
+    assembly: Assembly
+    travel: FloatArray
+    states: TrackStates
+    up: Forces
+    down: Forces
+    origin: float
+    band: ForceBand | None = None
+
+    @cached_property
+    def pressure_angle(self) -> FloatArray:
+        """Angle between the brace's pull and the roller's motion [rad]; at 90 deg the slider moves nothing."""
+        slope, tangent = self.states.slope, brace_tangent(self.states.x, self.assembly.track.brace_length)
+        angle: FloatArray = np.arctan2(1.0 + slope * tangent, slope - tangent)
+        return angle
+
+    @cached_property
+    def elongation(self) -> FloatArray:
+        """Elongation of the springs [m]."""
+        return 2.0 * (self.states.x - self.assembly.loads.rest_half_width)
+
+    @property
+    def corner_travel(self) -> float:
+        """Travel at which the roller leaves the corner [m]; 0 if there is none."""
+        track = self.assembly.track
+        return max(track.corner_end - track.start, 0.0)
+
+    @cached_property
+    def jams(self) -> tuple[tuple[float, float], ...]:
+        """Intervals of travel in which no force moves the slider up [m]."""
+        track, friction = self.assembly.track, self.assembly.spec.mechanism.rolling_friction
+        if not friction:
+            return ()
+        total = float(self.travel[-1])
+        missing = bool(np.isnan(self.up.slider).any())
+        states = self.states if missing or len(self.travel) < 100 else None
+        found = ((low - track.start, high - track.start) for low, high in jams(track, friction, states))
+        return tuple((max(low, 0.0), min(high, total)) for low, high in found if low < total)
+
+
+@dataclass(frozen=True)
+class Sides:
+    """Right and left roller at some slider positions: x [m] and slope of the track, each (n,)."""
+
+    x: tuple[FloatArray, FloatArray]
+    slope: tuple[FloatArray, FloatArray]
+
+    def spring(self, loads: Loads, rest: float) -> FloatArray:
+        """Return the spring force on each roller [N]; springs do not push."""
+        return loads.stiffness * np.maximum(self.x[0] + self.x[1] - 2.0 * rest, 0.0)
+
+    def forces(self, loads: Loads, friction: float, rest: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return the force on the slider and at the right and left contact [N]; NaN where nothing moves a side.
+
+        Parameters
+        ----------
+        loads : Loads
+            Springs and weights.
+        friction : float
+            Positive on the way up, negative on the way down.
+        rest : float
+            Half width at which the springs are at rest [m].
+        """
+        pull, contacts = np.full_like(self.x[0], loads.slider_weight), []
+        spring, weight = self.spring(loads, rest), loads.roller_weight
+        for x, slope in zip(self.x, self.slope, strict=True):
+            tangent = brace_tangent(x, loads.brace_length)
+            turn = 1.0 + friction * slope
+            lever = slope - friction - tangent * turn
+            lever = np.where(lever > 0, lever, np.nan)
+            pull = pull + (spring * turn + weight * (slope - friction)) / lever
+            contacts.append(np.hypot(1.0, slope) * (spring + weight * tangent) / lever)
+        return pull, contacts[0], contacts[1]
+
+
+@dataclass(frozen=True)
+class Built:
+    """A solved mechanism with a measured cam.
+
+    Attributes
+    ----------
+    assembly : Assembly
+        The design and the loads.
+    registration : Registration
+        Of the right and the left flank.
+    across : tuple of (n,) array
+        Errors in x at the same y, positive outside [m].
+    travel : (n,) array
+        From the start of the design's roller path [m].
+    sides : Sides
+        Where the rollers are.
+    shares : mapping
+        Parts of the force [N]: design, rest, profile, friction_up, friction_down, each (n,).
+    origin : float
+        What is added to the travel to give the displacement [m].
+    """
+
+    assembly: Assembly
+    registration: Registration
+    across: tuple[FloatArray, FloatArray]
+    travel: FloatArray
+    sides: Sides
+    shares: dict[str, FloatArray]
+    origin: float
+
+    @property
+    def elongation(self) -> FloatArray:
+        """Elongation of the springs, (n,) [m]."""
+        return self.sides.x[0] + self.sides.x[1] - 2.0 * self.assembly.loads.rest_half_width
+
+    def forces(self, way: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return the force on the slider and at both contacts on the way up (1) or down (-1), each (n,) [N]."""
+        loads, friction = self.assembly.loads, self.assembly.spec.mechanism.rolling_friction
+        return self.sides.forces(loads, way * friction, loads.rest_half_width)
