@@ -172,9 +172,9 @@ def executor_for(work: Work, options: Studying) -> Executor:
                 "--timeout-per-point needs processes of this machine: a cluster cannot end one point alone"
             )
         return Cluster(options.cluster, jobs)
-    count = -(-len(work.plan) // work.step)
+    count = -(-len(work.plan) // work.together)
     if timeout is not None:
-        return Pool(min(jobs, count), timeout * work.step)
+        return Pool(min(jobs, count), timeout * work.together)
     return serial if min(jobs, count) == 1 else Pool(min(jobs, count))
 
 

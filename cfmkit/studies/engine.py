@@ -32,17 +32,34 @@ if TYPE_CHECKING:
 SMALLEST, JOBS = 64, 64
 """Points in a block at least, and blocks that a study is cut into unless they become too large."""
 
+TOGETHER, SHARES = 256, 12
+"""Points that small blocks are computed together up to, where that leaves a dozen processes something to do.
+
+A sweep of 3600 cams takes a seventh less time per row in 256 at a time than in 64, in 1024 another fifteenth.
+"""
+
 MISSING, HELD = -1, -2
 """In place of where a row lies in the journal: it is not there yet; it is held in memory."""
 
 
 @dataclass(frozen=True)
 class Job:
-    """The points from `start` up to `stop`, and what the journal calls them."""
+    """The points from `start` up to `stop`, and what the journal calls them.
+
+    Attributes
+    ----------
+    start, stop : int
+        Points.
+    key : str
+        Name by content.
+    blocks : tuple of Job
+        Neighbours that are computed together and noted one by one; empty: the job itself.
+    """
 
     start: int
     stop: int
     key: str = field(compare=False)
+    blocks: tuple[Job, ...] = field(default=(), compare=False)
 
 
 @dataclass(frozen=True)
@@ -72,6 +89,12 @@ class Work:
             return SMALLEST
         # A power of two, so that a study with a few more points has the same blocks and finds them in the journal.
         return 1 << (min(BLOCK, max(SMALLEST, len(self.plan) // JOBS)).bit_length() - 1)
+
+    @property
+    def together(self) -> int:
+        """Number of points that a process computes at once: those of one block, or of a few small ones."""
+        few = min(TOGETHER, len(self.plan) // SHARES) // self.step
+        return self.step * (max(1, few) if self.vectorised and not self.study.curves else 1)
 
     def jobs(self) -> Iterator[Job]:
         """Yield every job in the order of the points."""
@@ -306,27 +329,28 @@ def run(
         raise UsageError(f"{family(study.spec.family).phrase} cannot be designed, only analysed")
     records, watch = Records(work, journal if journal is not None else Memory()), monitor or Silent()
     watch.total(len(work.plan))
-    queue = work.jobs()
+    queue = _neighbours(_new(records, work.jobs(), watch), work.together)
     while True:
         lost = _round(records, executor, queue, watch)
         if not lost or watch.stopping():
             return records
         # A block that was lost costs only those of its points that are lost alone, too.
-        queue = (job for block in lost for job in _singles(work, block))
+        queue = _new(records, (job for block in lost for job in _singles(work, block)), watch)
 
 
 def _round(records: Records, executor: Executor, queue: Iterator[Job], watch: Monitor) -> list[Job]:
     """Do the jobs of a queue; return the blocks that were lost."""
     lost: list[Job] = []
     work = records.work
-    with closing(executor(work, _new(records, queue, watch), watch.stopping)) as outcomes:  # type: ignore[type-var]
+    with closing(executor(work, queue, watch.stopping)) as outcomes:  # type: ignore[type-var]
         for job, outcome in outcomes:
             if isinstance(outcome, Lost):
                 if job.stop - job.start > 1:
                     lost.append(job)
                     continue
                 outcome = work.gather(Row(outcome.status, message=outcome.message, bug=outcome.bug))
-            records.keep(job, outcome)
+            for block in job.blocks or (job,):
+                records.keep(block, cut(outcome, block.start - job.start, block.stop - job.start))
             watch.done(len(outcome), outcome.failed, False)
     return lost
 
@@ -339,6 +363,26 @@ def _new(records: Records, queue: Iterator[Job], watch: Monitor) -> Iterator[Job
             yield job
         else:
             watch.done(len(rows), rows.failed, True)
+
+
+def _neighbours(queue: Iterator[Job], most: int) -> Iterator[Job]:
+    """Yield jobs whose points follow each other as one, of at most so many points."""
+    held: list[Job] = []
+    for job in queue:
+        if held and (job.start != held[-1].stop or job.stop - held[0].start > most):
+            yield _merged(held)
+            held = []
+        held.append(job)
+        if job.stop - held[0].start >= most:
+            yield _merged(held)
+            held = []
+    if held:
+        yield _merged(held)
+
+
+def _merged(jobs: list[Job]) -> Job:
+    first, last = jobs[0], jobs[-1]
+    return first if first is last else Job(first.start, last.stop, first.key, tuple(jobs))
 
 
 def _singles(work: Work, block: Job) -> Iterator[Job]:

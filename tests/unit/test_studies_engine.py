@@ -339,3 +339,30 @@ def test_the_default_columns_are_every_metric_that_such_a_curve_can_have():
 def test_an_unknown_metric_is_refused(name):
     with pytest.raises(UsageError, match=r"no metric|not a matter of one branch"):
         metrics_of(SPEC, (name,))
+
+
+def test_small_blocks_are_computed_together_and_noted_one_by_one(tmp_path):
+    many = work("mechanism.roller_radius=6 mm:10 mm:60", "mechanism.rolling_friction=0:0.003:60", names=("force_mean",))
+    assert (many.vectorised, many.step, many.together) == (True, 64, 256)
+    jobs = []
+
+    def noting(work, queue, _stopping):
+        for job in queue:
+            jobs.append((job.start, job.stop))
+            yield job, work(job)
+
+    with Journal(tmp_path / "journal") as journal:
+        first = values(run(many, noting, journal))
+    assert [stop - start for start, stop in jobs] == 14 * [256] + [16]
+    with Journal(tmp_path / "journal") as journal:
+        assert len(journal) == 57
+        again = run(many, journal=journal)
+        assert again.reused == 3600
+        assert np.array_equal(values(again), first)
+    # Of a study with one value more, whose last blocks are other ones, only these are computed.
+    jobs.clear()
+    more = work("mechanism.roller_radius=6 mm:10 mm:60", "mechanism.rolling_friction=0:0.003:60", names=("force_mean",))
+    more = dataclasses.replace(more, plan=more.plan.part(0, 3590))
+    with Journal(tmp_path / "journal") as journal:
+        assert run(more, noting, journal).reused == 3584
+    assert jobs == [(3584, 3590)]

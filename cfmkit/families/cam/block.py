@@ -32,8 +32,8 @@ if TYPE_CHECKING:
     from cfmkit.families.base import Block
     from cfmkit.families.cam.spec import CamSpec
 
-SLAB = 60_000
-"""Samples that are worked on together: few enough to stay in a processor's cache."""
+SLAB = 80_000
+"""Samples that are worked on together: few enough to stay in a processor's cache, 256 curves of 301 points."""
 
 Settings = tuple[int, bool, float]
 

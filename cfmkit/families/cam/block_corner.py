@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.cam.block_forces import Forces, Slab, force_at, tangents
+from cfmkit.families.cam.block_forces import Forces, Pose, Slab, tangents
 from cfmkit.families.cam.build import CLOSE
 from cfmkit.families.cam.geometry.cut import WholeCamUndercut, cut
 from cfmkit.families.cam.geometry.path import reach
@@ -149,20 +149,21 @@ class CornerSlab(Slab):
         """Travel at the start over which friction lets no force move the slider up [m]."""
         return np.array([next((high for low, high in each if low <= 0), 0.0) for each in self.jams])
 
-    def somewhere(self, way: float | FloatArray, travel: FloatArray, rows: NDArray[np.intp]) -> FloatArray:
-        """Return the force at travels of some designs, on the corner or the flank, (r, m) [N]."""
-        force, corner = super().somewhere(way, travel, rows), travel < self.corner_travel[rows, None]
+    def pose(self, travel: FloatArray, rows: NDArray[np.intp]) -> Pose:
+        """Return how the rollers stand at travels of some designs, on the corner or the flank, (r, m) [m]."""
+        flank, corner = super().pose(travel, rows), travel < self.corner_travel[rows, None]
         few = np.flatnonzero(corner.any(axis=1))
         if not few.size:
-            return force
+            return flank
         chosen = rows[few]
         cams, pivot = self.designs.take(chosen), Pivot(*(part[chosen, None] for part in self.pivots))
         angle = pivot_angle(self.starts[chosen, None] + np.maximum(travel[few], 0.0), pivot)
         angle = np.where(travel[few] <= 0.0, pivot.low, angle)
         stretch = pivot.x + pivot.radius * np.sin(angle) - cams.x0[:, None]
-        moved = force_at(cams, stretch, np.tan(angle), way if np.ndim(way) == 0 else np.asarray(way)[few])
-        force[few] = np.where(corner[few], moved, force[few])
-        return force
+        tangent = tangents(cams.x0[:, None] + stretch, cams.brace[:, None])
+        for whole, part in zip(flank, (stretch, np.tan(angle), tangent), strict=True):
+            whole[few] = np.where(corner[few], part, whole[few])
+        return flank
 
     @cached_property
     def pivots(self) -> Pivot:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -83,6 +83,24 @@ class Designs:
         fits = (self.radius <= self.brace) & (self.radius <= self.x0)
         starts = self.x0 < self.brace * (1 - 1e-5)
         return positive & reaches & fits & starts & (self.friction >= 0) & (self.friction < 1)
+
+
+class Pose(NamedTuple):
+    """How the rollers stand, (designs, points) each.
+
+    Attributes
+    ----------
+    stretch : array
+        Of the springs on one side [m].
+    slope : array
+        Of the roller's path.
+    tangent : array
+        Of the brace's angle from the axis.
+    """
+
+    stretch: FloatArray
+    slope: FloatArray
+    tangent: FloatArray
 
 
 @dataclass(frozen=True)
@@ -183,8 +201,8 @@ class Slab:
     @cached_property
     def everywhere(self) -> tuple[FloatArray, FloatArray]:
         """Force at `places` on the way up, and on the way down [N]."""
-        rows = np.arange(len(self.designs))
-        return self.somewhere(1.0, self.places, rows), self.somewhere(-1.0, self.places, rows)
+        pose = self.pose(self.places, np.arange(len(self.designs)))
+        return force_at(self.designs, pose, 1.0), force_at(self.designs, pose, -1.0)
 
     def exact(self, branch: str, travel: FloatArray) -> FloatArray:
         """Return the force of a branch at travels of each design, (designs, m) [N]; NaN where there is none."""
@@ -198,13 +216,18 @@ class Slab:
         way : float or (r, 1) array
             1 on the way up, -1 on the way down.
         travel : (r, m) array
-            On the flank [m].
+            [m].
         rows : (r,) array of int
             Which designs.
         """
-        cams = self.designs.take(rows)
-        stretch, slope = _on_flank(cams, np.minimum(np.maximum(travel, 0.0), self.travel[rows, -1:]))
-        return force_at(cams, stretch, slope, way)
+        return force_at(self.designs.take(rows), self.pose(travel, rows), way)
+
+    def pose(self, travel: FloatArray, rows: NDArray[np.intp]) -> Pose:
+        """Return how the rollers stand at travels of some designs, (r, m) [m]."""
+        cams, travel = self.designs.take(rows), np.minimum(np.maximum(travel, 0.0), self.travel[rows, -1:])
+        stretch = (2.0 * cams.constant[:, None] * travel) ** 0.5
+        tangent = tangents(cams.x0[:, None] + stretch, cams.brace[:, None])
+        return Pose(stretch, stretch / cams.constant[:, None] + tangent, tangent)
 
     @cached_property
     def flank(self) -> NDArray[np.bool_]:
@@ -263,18 +286,18 @@ class Slab:
         return self.spreads[branch, window]
 
 
-def _on_flank(cams: Designs, travel: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the springs' stretch on one side [m] and the slope of the path at travels, (designs, m) [m]."""
-    stretch = (2.0 * cams.constant[:, None] * travel) ** 0.5
-    return stretch, stretch / cams.constant[:, None] + tangents(cams.x0[:, None] + stretch, cams.brace[:, None])
-
-
-def force_at(cams: Designs, stretch: FloatArray, slope: FloatArray, way: float | FloatArray) -> FloatArray:
+def force_at(cams: Designs, pose: Pose, way: float | FloatArray) -> FloatArray:
     """Return the force on the slider on the way up (1) or down (-1) [N]; NaN where friction holds a roller."""
-    mu, tangent = way * cams.friction[:, None], tangents(cams.x0[:, None] + stretch, cams.brace[:, None])
+    mu, (stretch, slope, tangent) = way * cams.friction[:, None], pose
     turn = 1.0 + mu * slope
     lever, spring = slope - mu - tangent * turn, 4.0 * cams.stiffness[:, None] * np.maximum(stretch, 0.0) * turn
-    force = np.where(lever > 0, spring / np.where(lever > 0, lever, 1.0), np.where(spring == 0, 0.0, np.nan))
-    # A start without friction has no lever and no load: the limit is the constant force.
-    limit = (stretch == 0) & (mu == 0) & (np.abs(lever) < 1e-13)
-    return np.asarray(np.where(limit, 4.0 * cams.stiffness[:, None] * cams.constant[:, None], force))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        force = np.asarray(spring / lever)
+    held = ~(lever > 0)
+    if held.any():
+        force[held] = np.where(spring[held] == 0, 0.0, np.nan)
+    if not mu.all():
+        # A start without friction has no lever and no load: the limit is the constant force.
+        limit = (stretch == 0) & (mu == 0) & (np.abs(lever) < 1e-13)
+        force = np.where(limit, 4.0 * cams.stiffness[:, None] * cams.constant[:, None], force)
+    return force

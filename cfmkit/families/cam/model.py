@@ -190,6 +190,7 @@ there, at even steps of the springs' stretch beyond, and close together before t
 horizontal.
 """
 
+_SORTED = np.sort(_SHARES)
 _ON_CORNER = np.concatenate([np.geomspace(1e-9, 0.02, 30), np.linspace(0.0, 1.0, 61)])
 """The same on a corner, where it rises within a tenth of a millimetre."""
 
@@ -202,6 +203,8 @@ def nodes(total: FloatArray, corner: FloatArray) -> FloatArray:
     total, corner : (d,) array
         Travel of each cam, and that at which its roller leaves the corner; 0 without one [m].
     """
+    if not corner.any():
+        return np.asarray(total[:, None] * _SORTED)
     on_corner = np.minimum(corner, total)[:, None] * _ON_CORNER
     return np.sort(np.concatenate([total[:, None] * _SHARES, on_corner], axis=1), axis=1)
 
