@@ -21,10 +21,10 @@ from timing import best
 
 import cfmkit
 from cfmkit.families.base import Block, Measure
-from cfmkit.families.slider_crank.block import analyze_block
 from cfmkit.families.slider_crank.linkage import Linkage
-from cfmkit.families.slider_crank.rates import Goal, minimax
-from cfmkit.families.slider_crank.unit_springs import along_crank, crank_torques
+from cfmkit.families.slider_crank.springs.block import analyze_block
+from cfmkit.families.slider_crank.springs.rates import Goal, minimax
+from cfmkit.families.slider_crank.unit_springs import along_crank, crank_efforts
 
 CONFIGS = Path(__file__).resolve().parent.parent / "configs"
 MILLION, DESIGNS = 1_000_000, 65_536
@@ -66,7 +66,7 @@ def main() -> None:
     """Print one line per task."""
     angle = np.linspace(-0.1, 0.3, MILLION)
     link, rates = Linkage(10.0, 50.0, 3.0), np.array([1.0, 1.0, 1.0, 1.0])
-    ours = best(lambda: rates @ crank_torques(link, np.radians(-5.0), angle))
+    ours = best(lambda: rates @ crank_efforts(link, np.radians(-5.0), angle))
     peer = best(lambda: eq_10(angle, rates))
     print(
         f"a million torques            {ours:7.3f} s    eq. 10 as printed {peer:.3f} s, {peer / ours:.2f} times as long"

@@ -20,10 +20,10 @@ import numpy as np
 import cfmkit
 from cfmkit.elastica.verification.corotational import recheck
 from cfmkit.families.slider_crank.build import linkage_of, resolve, unloaded_angle
-from cfmkit.families.slider_crank.flexures.design import form_of, task_of
-from cfmkit.families.slider_crank.flexures.model import chain_of
-from cfmkit.families.slider_crank.flexures.program import StripProgram
-from cfmkit.families.slider_crank.flexures.search import search
+from cfmkit.families.slider_crank.printed.design import form_of, task_of
+from cfmkit.families.slider_crank.printed.model import chain_of
+from cfmkit.families.slider_crank.printed.program import StripProgram
+from cfmkit.families.slider_crank.printed.search import search
 
 if TYPE_CHECKING:
     from collections.abc import Callable

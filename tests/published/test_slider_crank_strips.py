@@ -13,13 +13,18 @@ import numpy as np
 import pytest
 from flexure_support import ABS, LINKAGE, MM, SHARES, THICKNESS, UNLOADED, WIDTH, corners, strip_chain
 
-from cfmkit.families.slider_crank.flexures.chain import Elasticity, joints
-from cfmkit.families.slider_crank.flexures.chain import kink as offset
-from cfmkit.families.slider_crank.flexures.descent import descend
-from cfmkit.families.slider_crank.flexures.program import StripProgram
-from cfmkit.families.slider_crank.flexures.search import Found, Ranges, search, uniform_for_stroke, uniform_thickness
-from cfmkit.families.slider_crank.flexures.solution import first_at
-from cfmkit.families.slider_crank.flexures.task import Form, Task
+from cfmkit.families.slider_crank.printed.chain import Elasticity, joints
+from cfmkit.families.slider_crank.printed.chain import kink as offset
+from cfmkit.families.slider_crank.printed.program import Form, StripProgram, Task
+from cfmkit.families.slider_crank.printed.search import (
+    Found,
+    Ranges,
+    descend,
+    search,
+    uniform_for_stroke,
+    uniform_thickness,
+)
+from cfmkit.families.slider_crank.printed.solution import first_at
 from cfmkit.numerics.sqp import Ending
 
 TASK = Task(corners(), np.pi, ABS, 1.5, 1 * MM, 20 * MM, 0.01, "stroke", 60 * MM)

@@ -6,19 +6,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.slider_crank.flexures.chain import (
+from cfmkit.families.slider_crank.linkage import Linkage
+from cfmkit.families.slider_crank.printed.chain import (
     FLEXURES,
     STRIP,
     Elasticity,
+    Flexure,
     Strip,
     flexure_ends,
     joints,
     lumped,
     spread,
 )
-from cfmkit.families.slider_crank.flexures.pressing import Chain
-from cfmkit.families.slider_crank.flexures.sizing import Flexure
-from cfmkit.families.slider_crank.linkage import Linkage
+from cfmkit.families.slider_crank.printed.pressing import Chain
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -12,7 +12,7 @@ from cfmkit import api
 from cfmkit.errors import ExitCode
 from cfmkit.families.base import Run
 from cfmkit.families.beam.shaping import multistart
-from cfmkit.families.slider_crank.flexures import search
+from cfmkit.families.slider_crank.printed import search
 from cfmkit.results import Status
 from cfmkit.runs.run import designed as compute
 from cfmkit.studies.executors import Lost, serial

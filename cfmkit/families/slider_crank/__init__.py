@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from cfmkit.families.base import Family, Search
-from cfmkit.families.slider_crank.block import analyze_block
 from cfmkit.families.slider_crank.build import resolve
-from cfmkit.families.slider_crank.classes import CLASSES
-from cfmkit.families.slider_crank.design import design
+from cfmkit.families.slider_crank.dispatch import design
 from cfmkit.families.slider_crank.findings import FINDINGS
-from cfmkit.families.slider_crank.gradient import gradient
-from cfmkit.families.slider_crank.model import analyze
+from cfmkit.families.slider_crank.printed.values import DEFINITIONS as OF_PARTS
 from cfmkit.families.slider_crank.spec import SliderCrankSpec
-from cfmkit.families.slider_crank.values import DEFINITIONS
+from cfmkit.families.slider_crank.springs.block import analyze_block
+from cfmkit.families.slider_crank.springs.model import analyze, gradient
+from cfmkit.families.slider_crank.springs.stiffness import CLASSES
+from cfmkit.families.slider_crank.springs.values import DEFINITIONS as OF_SPRINGS
 
-PRINTED = "cfmkit.families.slider_crank.flexures.model:analyze"
+PRINTED = "cfmkit.families.slider_crank.printed.model:analyze"
 """One model for flexures and strips: the chain is another one."""
 
 FAMILY = Family(
@@ -24,12 +24,12 @@ FAMILY = Family(
     analyze_block=analyze_block,
     design=design,
     search=Search(findings=("near_optima", "spring_dropped", "window_not_proven")),
-    values=DEFINITIONS,
+    values=OF_SPRINGS | OF_PARTS,
     words={"stiffness_class": CLASSES},
     resolve=resolve,
     gradient=gradient,
-    draw="cfmkit.families.slider_crank.draw",
-    outline="cfmkit.families.slider_crank.outline",
+    draw="cfmkit.families.slider_crank.dispatch",
+    outline="cfmkit.families.slider_crank.dispatch",
     headline=("stiffness_class", "band_range_05pct", "half_band", "energy_max", "crank_pin_rotation_max"),
     template="cfmkit/families/slider_crank/template.yaml",
     findings=FINDINGS,

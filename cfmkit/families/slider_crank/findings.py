@@ -7,7 +7,6 @@ run reports carries the numbers that decide and the cure.
 from __future__ import annotations
 
 from cfmkit.families.findings import finder
-from cfmkit.families.slider_crank.flexures.findings import FINDINGS as OF_PARTS
 
 FINDINGS = {
     "not_assemblable": "crank and coupler do not reach the slider's way, or not in the unloaded position",
@@ -35,7 +34,24 @@ FINDINGS = {
     "spring_dropped": "the best rate of a spring is zero: the design does without it",
     "near_optima": "many designs are as good: which one is chosen was decided by something else",
     "window_not_proven": "a widest window of which not all others were ruled out: a wider one may exist",
-    **OF_PARTS,
+    "straight_start": "the chain is exactly straight: it buckles, and only chance or a guide says to which side",
+    "kink_too_small": "the kink that sends the chain to one side is smaller than the process can make",
+    "long_run_in": "the kink is so large that the force needs much of the travel to reach its level",
+    "meets_itself": "the chain is pressed through its own anchor, or crosses itself: the curve ends before",
+    "wrong_branch": "the chain bends to the other side than asked for: the force is another one",
+    "unstable": "the equilibrium is unstable while the slider is held: the chain would jump",
+    "limit_point": "the slider cannot be pressed further in equilibrium",
+    "not_converged": "a solver gave up: nothing is shown of what it had",
+    "branch_begins_late": "the branch to which the kink does not lead exists only beyond some travel",
+    "force_negative": "the chain pulls instead of pushing back",
+    "overstressed": "the stress exceeds the allowable one within the travel",
+    "too_thin": "a thickness is below the thinnest wall of the process",
+    "lateral_buckling": "the part is nearly as easily bent out of its plane as in it",
+    "side_force": "the slider is pushed across its way: friction in its guide adds to the force",
+    "pulled": "the travel asked for pulls the chain instead of pressing it",
+    "second_opinion": "corotational elements give another force or stress",
+    "optimizer_stopped": "the optimiser ended without converging: the design is the best it saw",
+    "target_unreachable": "the force wanted is not reached within the ranges given",
 }
 
 finding = finder(FINDINGS)

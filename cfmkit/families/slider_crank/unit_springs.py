@@ -123,42 +123,6 @@ def _first(
     return first, rise, level
 
 
-CHUNK = 8192
-"""Angles that are worked on together: few enough to stay in a processor's cache."""
-
-
-def crank_torques(linkage: Linkage, unloaded: float, angle: FloatArray) -> FloatArray:
-    """Return the torque of a unit spring at each joint, (4, n): `along_crank` without anything else, and faster."""
-    torques = np.empty((4, len(angle)))
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        for start in range(0, len(angle), CHUNK):
-            _torques(linkage, unloaded, angle[start : start + CHUNK], torques[:, start : start + CHUNK])
-    return torques
-
-
-def _torques(linkage: Linkage, unloaded: float, angle: FloatArray, out: FloatArray) -> None:
-    """Write the torques of unit springs; every angle is made from the sine and cosine of half the crank's turn."""
-    r1, r2, e, way = linkage.crank, linkage.coupler, linkage.offset, linkage.branch
-    sin0, cos0 = math.sin(unloaded), math.cos(unloaded)
-    lift0 = r1 * sin0 - e
-    run0 = math.sqrt(max((r2 - lift0) * (r2 + lift0), 0.0))
-    turn = np.subtract(angle, unloaded, out=out[0])
-    half = 0.5 * turn
-    sine, cosine = np.sin(half), np.cos(half)
-    swing = 2.0 * r1 * sine
-    rise = swing * (cosine * cos0 - sine * sin0)
-    fall = swing * (sine * cos0 + cosine * sin0)
-    lift = lift0 + rise
-    run = np.sqrt((r2 - lift) * (r2 + lift))
-    shorter = rise * (lift + lift0) / (run + run0)
-    coupler = np.arctan2(rise * run0 + lift0 * shorter, run * run0 + lift * lift0)
-    level = r1 * cos0 - fall  # r1 cos t
-    slope = level / run
-    out[2] = coupler * slope
-    out[1] = (way * coupler + turn) * (way * slope + 1.0)
-    out[3] = (fall + way * shorter) * (lift + e + way * lift * slope)
-
-
 def _turns(linkage: Linkage, unloaded: float, angle: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return q of the four joints, (4, n), and the slider's x."""
     r1, r2, e = linkage.crank, linkage.coupler, linkage.offset

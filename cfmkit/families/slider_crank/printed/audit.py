@@ -1,0 +1,186 @@
+"""A strip that was found, rounded, pressed again at many places and looked at by independent elements."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.families.findings import mm, mpa
+from cfmkit.families.slider_crank.printed.assembly import strip_chain
+from cfmkit.families.slider_crank.printed.pressing import Ending
+from cfmkit.families.slider_crank.printed.solution import SecondOpinion, Solution, first_at
+
+if TYPE_CHECKING:
+    from cfmkit.arrays import FloatArray
+    from cfmkit.families.slider_crank.printed.chain import Strip
+    from cfmkit.families.slider_crank.printed.program import Form
+    from cfmkit.families.slider_crank.printed.search import Found
+
+
+PLACES = 240
+
+DIGITS = 6  # of millimetres
+
+MESHED = 2e-4  # of the stress: by how much its peak depends on how finely the strip is sampled
+
+HELD = 0.02  # a limit that is so near, as a share of itself, holds the design
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A finished strip.
+
+    Attributes
+    ----------
+    strip : Strip
+        Rounded.
+    shares : tuple of tuples or None
+        Where its stations are, as `mechanism.beam.shares` says it.
+    window : (float, float)
+        Travel over which it keeps its limits [m].
+    ripple, rms : float
+        Largest deviation in it as a share, and root mean square of ten points [N].
+    active : tuple of str
+        What holds it.
+    opinion : SecondOpinion
+        Of corotational elements.
+    overstress : float
+        Largest stress over the allowed one where the stroke is given; 1 where the stress ends it.
+    """
+
+    strip: Strip
+    shares: tuple[tuple[float, ...], ...] | None
+    window: tuple[float, float]
+    ripple: float
+    rms: float
+    active: tuple[str, ...]
+    opinion: SecondOpinion
+    overstress: float
+
+
+def rounded(values: FloatArray, ranges: FloatArray) -> FloatArray:
+    """Return the numbers of a form rounded to nanometres, and kept inside their ranges."""
+    return np.clip(np.round(values, DIGITS), *ranges.T)
+
+
+def judge(
+    values: FloatArray,
+    found: Found,
+    limits: tuple[float | None, float | None],
+    pins: FloatArray,
+) -> Judged | None:
+    """Return what became of a strip; None if it has no equilibrium over its travel.
+
+    Parameters
+    ----------
+    values : (n,) array
+        Numbers of the form.
+    found : Found
+        The search that they come from.
+    limits : (float or None, float or None)
+        Ripple as a share and stress [Pa] that end the stroke, where it is what is sought.
+    pins : (3, 2) array
+        Where it is kinked, as `assembly.pins_of` says [m].
+    """
+    task, form = found.task, found.form
+    strip = form.strip(values, task.corners)
+    chain = strip_chain(strip, task.material, pins, task.direction)
+    end = found.program.stroke(found.descent.z)
+    first = max(task.start, 1e-3 * end)
+    travel = np.unique(np.concatenate([np.geomspace(first, end, PLACES // 4), np.linspace(first, end, PLACES)]))
+    pressed = chain.press(travel)
+    if pressed.ending is not Ending.COMPLETE:
+        return None
+    solution = Solution("beam", chain, pressed, task.material, 1, (task.start, end), True)
+    ratio = solution.force / task.force - 1.0
+    ripple, stress = limits
+    stroke = min(end, _last(solution, ratio, ripple, stress))
+    stroke = float(np.floor(stroke * 1e6) / 1e6) if task.goal == "stroke" else end
+    inside = (travel >= task.start) & (travel <= stroke)
+    opinion = solution.recheck
+    if not inside.any() or opinion is None:
+        return None
+    return Judged(
+        strip,
+        _shares(form, values),
+        (task.start, stroke),
+        float(np.abs(ratio[inside]).max()),
+        _rms(chain_force(solution, task.start, stroke), task.force),
+        (*_at_bounds(found, values), *_held(solution, ratio, inside, limits)),
+        opinion,
+        1.0 if stress is None or task.goal == "stroke" else float(solution.stress.max() / stress),
+    )
+
+
+def chain_force(solution: Solution, start: float, stroke: float) -> FloatArray:
+    """Return the force at ten even places of the travel, its start left out [N]."""
+    places = start + (stroke - start) * np.arange(1, 11) / 10
+    return np.asarray(solution.chain.press(places).force)
+
+
+def _rms(force: FloatArray, target: float) -> float:
+    return float(np.sqrt(np.mean((force - target) ** 2)))
+
+
+def _last(solution: Solution, ratio: FloatArray, ripple: float | None, stress: float | None) -> float:
+    """Return the travel at which the first limit is met [m]."""
+    ends = [float(solution.travel[-1])]
+    if ripple is not None:
+        place = first_at(solution.travel, np.abs(ratio), ripple * (1.0 + 1e-12))
+        ends += [] if place is None else [place]
+    if stress is not None:
+        place = first_at(solution.travel, solution.stress, stress * (1.0 - MESHED))
+        ends += [] if place is None else [place]
+    return min(ends)
+
+
+def _shares(form: Form, values: FloatArray) -> tuple[tuple[float, ...], ...] | None:
+    if not form.per_piece:
+        return form.shares or None
+    ends = np.cumsum((0, *form.per_piece))
+    own = values[form.count : form.count + form.placed]
+    return tuple(tuple(float(v) for v in own[a:b]) for a, b in itertools.pairwise(ends))
+
+
+def _at_bounds(found: Found, values: FloatArray) -> list[str]:
+    """Return which numbers are at an end of their range."""
+    form, told = found.form, []
+    for k, (value, (low, high)) in enumerate(zip(values, found.ranges.form, strict=True)):
+        if not (np.isclose(value, low, atol=1e-6) or np.isclose(value, high, atol=1e-6)):
+            continue
+        side = "smallest" if np.isclose(value, low, atol=1e-6) else "largest"
+        if k < form.count:
+            told.append(f"mechanism.beam.thickness.{k} at its {side}, {mm(value * 1e-3)}")
+        elif k < form.count + form.placed:
+            told.append(f"mechanism.beam.shares, number {k - form.count + 1}, at its {side}, {value:.4g}")
+        else:
+            told.append(f"mechanism.beam.width at its {side}, {mm(value * 1e-3)}")
+    if found.task.goal == "stroke" and np.isclose(0.01 * found.descent.z[-1], found.ranges.longest, rtol=1e-6):
+        told.append(f"stroke at its longest, {mm(found.ranges.longest)}")
+    return told
+
+
+def _held(solution: Solution, ratio: FloatArray, inside: Any, limits: tuple[float | None, float | None]) -> list[str]:
+    """Return where the band and the stress hold the strip."""
+    told = []
+    ripple, stress = limits
+    if ripple is not None:
+        for sign, name in ((1.0, "upper"), (-1.0, "lower")):
+            off = np.where(inside, sign * ratio, -np.inf)
+            peaks = [k for k in np.flatnonzero(off > (1.0 - HELD) * ripple).tolist() if _peak(off, k)]
+            if peaks:
+                places = ", ".join(mm(float(solution.travel[k])) for k in peaks)
+                told.append(f"{name} edge of the band at {places}")
+    last = np.flatnonzero(inside)[-1]
+    if stress is not None and solution.stress[last] > (1.0 - 0.5 * HELD) * stress:
+        where = mm(float(solution.place[last]))
+        told.append(f"stress {mpa(stress)} at the end, {where} along the strip")
+    return told
+
+
+def _peak(values: FloatArray, k: int) -> bool:
+    """Return whether a value is not below its neighbours."""
+    return all(values[k] >= values[j] for j in (k - 1, k + 1) if 0 <= j < len(values))

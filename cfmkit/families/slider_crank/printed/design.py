@@ -1,0 +1,366 @@
+"""From a force and a ripple to a strip, or from springs to flexures: a complete specification again.
+
+The strip is searched with a little of the band and of the stress in reserve, rounded, pressed again at many places, and
+its stroke is where the first limit is met. Independent elements then compute force and stress once more.
+
+Reference
+---------
+[B] P. Bilancia, A. Geraci, G. Berselli, SMASIS2019-5519, sec. 2.2 and 3.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.errors import InputError
+from cfmkit.families.findings import mm, newton, percent
+from cfmkit.families.refusals import CannotBuild, no_design
+from cfmkit.families.slider_crank.build import linkage_of, resolve, unloaded_angle
+from cfmkit.families.slider_crank.findings import finding
+from cfmkit.families.slider_crank.printed.assembly import corners, elasticity, pins_of, travel_direction
+from cfmkit.families.slider_crank.printed.audit import Judged, judge, rounded
+from cfmkit.families.slider_crank.printed.model import analyze, slider_reach
+from cfmkit.families.slider_crank.printed.program import Form, Task
+from cfmkit.families.slider_crank.printed.search import (
+    LOOSE,
+    SHORTEST,
+    Found,
+    Ranges,
+    infeasible,
+    search,
+    uniform_for_stroke,
+)
+from cfmkit.families.slider_crank.printed.sizing import design_flexures
+from cfmkit.families.slider_crank.printed.spec import StripSpec
+from cfmkit.metrics import Window, evaluate
+from cfmkit.numerics.sqp import Ending
+from cfmkit.results import Design, Finding, Quantity, Searched, Status
+
+if TYPE_CHECKING:
+    from cfmkit.arrays import FloatArray
+    from cfmkit.families.base import Run
+    from cfmkit.families.slider_crank.linkage import Linkage
+    from cfmkit.families.slider_crank.printed.spec import StripDesign
+    from cfmkit.families.slider_crank.spec import SliderCrankSpec
+
+
+RESERVES, RESERVE_STRESS = (4e-5, 2e-4), 5e-4
+"""What the search keeps of the band (a share of the force), more if that was not enough, and of the stress allowed."""
+
+ENOUGH = 0.99
+"""Share of the stroke searched that the finished strip must have, or the search is repeated with more in reserve."""
+
+TOLD = 4
+"""So many of the limits that hold a strip are named in the message; all are in the document of `--json`."""
+
+DECIMALS = 9
+"""Of lengths in metres."""
+
+DEFAULT_THICKNESS = (0.5e-3, 2e-3)
+
+DEFAULT_WIDTH = (5e-3, 8e-3)
+"""Ranges where none is given [m]: what printing makes, and the width of [B, Table 3]."""
+
+
+def design(spec: SliderCrankSpec, run: Run) -> Design:
+    """Return a specification with the strip, or the flexures, that the `design` block asks for.
+
+    Parameters
+    ----------
+    spec : SliderCrankSpec
+        With `design.beam` or `design.flexures`.
+    run : Run
+        Seed of the random starts, and progress.
+
+    Returns
+    -------
+    Design
+        INFEASIBLE, with the reason and the nearest, where the targets contradict the ranges.
+    """
+    wanted = spec.design
+    if wanted is None or wanted.force is None:
+        return Design(None, Status.INVALID, "a part that is pressed needs 'design.force'")
+    try:
+        spec = resolve(spec)
+        linkage = linkage_of(spec.mechanism)
+        unloaded = unloaded_angle(spec.mechanism, linkage)
+        if wanted.beam is None:
+            return design_flexures(spec, linkage, unloaded)
+        return _strip(spec, linkage, unloaded, run)
+    except CannotBuild as problem:
+        return no_design(problem.finding)
+    except InputError as problem:
+        return Design(None, Status.INVALID, str(problem))
+
+
+def _strip(spec: SliderCrankSpec, linkage: Linkage, unloaded: float, run: Run) -> Design:
+    wanted = spec.design.beam if spec.design else None
+    assert wanted is not None
+    task = task_of(spec, linkage, unloaded)
+    form, ranges = form_of(spec, wanted, task, linkage, unloaded)
+    if wanted.shape == "uniform" and task.goal != "stroke":
+        return _closed(spec, wanted, task, ranges)
+    judged, reported, pins, allowed = (
+        None,
+        None,
+        pins_of(spec.mechanism, linkage, unloaded),
+        task.material.allowable_stress,
+    )
+    for reserve in RESERVES:
+        made_of = replace(task.material, allowable_stress=allowed)
+        kept = replace(task, ripple=task.ripple - reserve, material=made_of)
+        found = search(kept, form, ranges, wanted.seeds, run.seed, run.progress)
+        if not found.descent.feasible:
+            return infeasible(found)
+        judged = judge(rounded(found.values, ranges.form), found, _limits(spec), pins)
+        if judged is not None and allowed is not None:
+            allowed /= max(1.0, judged.overstress)
+        reported = None if judged is None else _reported(_written(spec, judged, wanted), judged, run)
+        good = judged is None or judged.window[1] > ENOUGH * found.program.stroke(found.descent.z)
+        good = good and (reported is None or reported.keeps(*_limits(spec)))
+        if good and allowed == made_of.allowable_stress:
+            break
+    if judged is None or reported is None:
+        return infeasible(found)
+    return Design(
+        reported.spec,
+        Status.COMPLETE,
+        _message(found, judged, reported),
+        active_bounds=judged.active,
+        warnings=_warnings(found, judged),
+        search=_search_of(found, judged),
+    )
+
+
+@dataclass(frozen=True)
+class Reported:
+    """What the analysis of a finished strip says of it: what is told of a design are these numbers.
+
+    Attributes
+    ----------
+    spec : SliderCrankSpec
+        With the strip.
+    deviation, rms : float or None
+        Over the window: as a share of the force, and in N; None where the analysis ends before it.
+    stress : float or None
+        Largest one in the window [Pa].
+    opinion : (float, float) or None
+        Differences of corotational elements in force and stress, where the analysis computes them.
+    """
+
+    spec: SliderCrankSpec
+    deviation: float | None
+    rms: float | None
+    stress: float | None
+    opinion: tuple[float, float] | None
+
+    def keeps(self, ripple: float | None, stress: float | None) -> bool:
+        """Return whether the strip is within its band and below its stress at the points of its analysis, too."""
+        pairs = (self.deviation, ripple), (self.stress, stress)
+        return all(limit is None or (value is not None and value <= limit) for value, limit in pairs)
+
+
+def _reported(spec: SliderCrankSpec, judged: Judged, run: Run) -> Reported:
+    result = analyze(spec, run)
+    names = ("deviation_from_target", "rms_to_target", "stress_max", "recheck_force", "recheck_stress")
+    found = evaluate(result, names, Window(*judged.window)) if result.curves else {}
+    deviation, rms, stress, *opinion = (found[name].value if found else None for name in names)
+    said = None if None in opinion else (float(opinion[0] or 0.0), float(opinion[1] or 0.0))
+    return Reported(spec, deviation, rms, stress, said)
+
+
+def _search_of(found: Found, judged: Judged) -> dict[str, Searched]:
+    """Return what only the search knows."""
+    numbers = {
+        "strips_tried": (float(found.descent.evaluations), "count", "strips that the last descent pressed"),
+        "elements_force": (
+            judged.opinion.force,
+            "ratio",
+            "most that corotational elements differ in force in the audit",
+        ),
+        "elements_stress": (judged.opinion.stress, "ratio", "most that they differ in stress in the audit"),
+    }
+    if _compared(found):
+        text = "longest travel that a strip of one thickness reaches within the band and the stress"
+        numbers["one_thickness_travel"] = (_one_thickness(found), "length", text)
+    return {name: Searched(Quantity(*about), "beam", judged.window) for name, about in numbers.items()}
+
+
+def _compared(found: Found) -> bool:
+    """Return whether a strip of one thickness is known to compare with."""
+    return found.uniform is not None and found.uniform.feasible and found.form.count > 1 and found.task.goal == "stroke"
+
+
+def _one_thickness(found: Found) -> float:
+    """Return the stroke of a strip of one thickness [m]."""
+    return 0.0 if found.uniform is None else 0.01 * float(found.uniform.z[-1])
+
+
+def task_of(spec: SliderCrankSpec, linkage: Linkage, unloaded: float) -> Task:
+    """Return what the strip of a `design` block is to do, with its reserve.
+
+    Raises
+    ------
+    cfmkit.errors.InputError
+        If the goal lacks its tolerance or its travel.
+    """
+    wanted = spec.design
+    assert wanted is not None
+    assert wanted.beam is not None
+    assert wanted.force is not None
+    beam, ripple, travel = wanted.beam, wanted.tolerance, wanted.travel
+    if beam.goal == "stroke" and (ripple is None or travel is not None):
+        raise InputError("the longest stroke needs 'design.tolerance', and no 'design.travel'; else set 'goal: ripple'")
+    if beam.goal != "stroke" and travel is None:
+        raise InputError(f"the goal {beam.goal!r} needs 'design.travel', over which the force is wanted")
+    reach = slider_reach(linkage, unloaded)
+    start, stroke = travel if travel is not None else (beam.start, 0.2 * reach)
+    if beam.goal != "rms" and start <= 0:
+        raise InputError("'design.travel' must begin behind the run-in, above 0: the force begins at zero there")
+    if beam.goal == "stroke" and beam.longest is not None and beam.longest <= start + SHORTEST:
+        raise InputError(
+            f"'design.beam.longest' must be more than {mm(SHORTEST)} beyond 'design.beam.start', {mm(float(start))}"
+        )
+    made_of = elasticity(spec.mechanism)
+    limit = made_of.allowable_stress if beam.stressed else None
+    limit = None if limit is None else limit * (1.0 - RESERVE_STRESS)
+    line = corners(spec.mechanism, spec.mechanism.beam, linkage, unloaded)
+    return Task(
+        line,
+        travel_direction(linkage),
+        type(made_of)(made_of.youngs_modulus, made_of.poisson_ratio, limit),
+        wanted.force / spec.mechanism.legs,
+        float(start),
+        float(stroke),
+        ripple or LOOSE,
+        beam.goal,
+        beam.longest or 0.5 * reach,
+    )
+
+
+def form_of(
+    spec: SliderCrankSpec, wanted: StripDesign, task: Task, linkage: Linkage, unloaded: float
+) -> tuple[Form, Ranges]:
+    """Return how the strip is described, and the ranges of its numbers."""
+    beam = spec.mechanism.beam
+    width = wanted.width if wanted.width is not None else (beam.width if beam is not None else DEFAULT_WIDTH)
+    fixed = None if isinstance(width, tuple) else float(width)
+    per_piece: tuple[int, ...] = ()
+    shares: tuple[tuple[float, ...], ...] = ()
+    count = {"uniform": 1, "even": wanted.nodes}.get(wanted.shape, 0)
+    if wanted.shape == "shares":
+        if beam is None or beam.shares is None:
+            raise InputError("the shape 'shares' needs 'mechanism.beam.shares'")
+        count = 2 + sum(len(piece) for piece in beam.shares)
+        moving = wanted.shares is not None
+        per_piece = tuple(len(piece) for piece in beam.shares) if moving else ()
+        shares = () if moving else beam.shares
+    rows = list(wanted.thicknesses or [wanted.thickness or DEFAULT_THICKNESS] * count)
+    if len(rows) != count:
+        raise InputError(f"design.beam.thicknesses has {len(rows)} ranges, and there are {count} thicknesses")
+    form = Form(count, per_piece, shares, fixed)
+    if form.placed and len(wanted.shares or ()) != form.placed:
+        raise InputError(
+            f"design.beam.shares has {len(wanted.shares or ())} ranges, and there are {form.placed} shares"
+        )
+    table = [(low * 1e3, high * 1e3) for low, high in rows] + list(wanted.shares or ())
+    if isinstance(width, tuple):
+        table.append((width[0] * 1e3, width[1] * 1e3))
+    return form, Ranges(np.array(table), task.longest)
+
+
+def _limits(spec: SliderCrankSpec) -> tuple[float | None, float | None]:
+    """Return the ripple and the stress that the finished strip is held to."""
+    wanted = spec.design
+    assert wanted is not None
+    assert wanted.beam is not None
+    stress = elasticity(spec.mechanism).allowable_stress if wanted.beam.stressed else None
+    return (wanted.tolerance if wanted.beam.goal == "stroke" else None), stress
+
+
+def _closed(spec: SliderCrankSpec, wanted: StripDesign, task: Task, ranges: Ranges) -> Design:
+    """Return the uniform strip for a stroke: thickness from the stress, width from the force."""
+    found = uniform_for_stroke(task)
+    if found is None:
+        return no_design(
+            finding(
+                "target_unreachable",
+                "the strip has no equilibrium over 'design.travel', or 'mechanism.material' no yield strength",
+            )
+        )
+    thickness, width = found
+    low, high = ranges.form[0] / 1e3
+    if not low <= thickness <= high:
+        text = f"the stress asks for a thickness of {mm(thickness)}, outside 'design.beam.thickness', "
+        text += f"{mm(low)} to {mm(high)}"
+        return no_design(finding("target_unreachable", text), {"design.beam.thickness": mm(thickness)})
+    if isinstance(wanted.width, tuple) and not wanted.width[0] <= width <= wanted.width[1]:
+        reached = task.force * np.clip(width, *wanted.width) / width
+        text = (
+            f"{newton(task.force)} need a width of {mm(width)}; within 'design.beam.width', {mm(wanted.width[0])} to "
+            f"{mm(wanted.width[1])}, the nearest is {newton(float(reached))}"
+        )
+        nearest = {"design.force": newton(float(reached)), "design.beam.width": mm(width)}
+        return no_design(finding("target_unreachable", text), nearest)
+    part = _part(spec, {"width": round(width, DECIMALS), "thickness": round(thickness, DECIMALS), "shares": None})
+    text = f"thickness {mm(thickness)} from the stress at {mm(task.stroke)}, width {mm(width)} from the force"
+    return Design(_with_part(spec, part, (task.start, task.stroke)), Status.COMPLETE, text)
+
+
+def _part(spec: SliderCrankSpec, changes: dict[str, object]) -> StripSpec:
+    """Return the strip as the specification says it, with changes."""
+    kept = {} if spec.mechanism.beam is None else spec.mechanism.beam.model_dump(exclude_unset=True)
+    kept.pop("offset", None)
+    return StripSpec.model_validate(kept | changes)
+
+
+def _with_part(spec: SliderCrankSpec, part: StripSpec, window: tuple[float, float]) -> SliderCrankSpec:
+    analysis = spec.analysis.model_copy(
+        update={"travel": (0.0, window[1]), "window": window, "fidelity": None, "drive": "force"}
+    )
+    mechanism = spec.mechanism.model_copy(update={"beam": part})
+    return spec.model_copy(update={"mechanism": mechanism, "analysis": analysis})
+
+
+def _written(spec: SliderCrankSpec, judged: Judged, wanted: StripDesign) -> SliderCrankSpec:
+    strip = judged.strip
+    values: FloatArray = np.asarray(strip.thickness)
+    listed = tuple(round(float(value), DECIMALS) for value in values)
+    thickness = listed[0] if wanted.shape == "uniform" else listed
+    width = round(float(strip.width), DECIMALS)
+    part = _part(spec, {"width": width, "thickness": thickness, "shares": judged.shares})
+    return _with_part(spec, part, judged.window)
+
+
+def _message(found: Found, judged: Judged, reported: Reported) -> str:
+    descent, count = found.descent, found.form.count
+    what = "one thickness" if count == 1 else f"{count} thicknesses"
+    if found.task.goal == "rms":
+        head = f"root mean square {newton(reported.rms or 0.0)} over {mm(judged.window[1])}"
+    else:
+        head = f"within {percent(reported.deviation or 0.0)} from {mm(judged.window[0])} to {mm(judged.window[1])}"
+    compared = ""
+    if _compared(found):
+        within = percent(max(found.task.ripple, LOOSE))
+        compared = f"; one thickness reaches {mm(_one_thickness(found))} within {within}"
+    force, stress = reported.opinion or (judged.opinion.force, judged.opinion.stress)
+    opinion, shown = judged.opinion, judged.active[:TOLD]
+    more = f" and {len(judged.active) - TOLD} more" if len(judged.active) > TOLD else ""
+    held = f"; held by {', '.join(shown)}{more}" if shown else ""
+    return (
+        f"{what}, {head}{compared}; {descent.ending.value} after {descent.evaluations} strips{held}; "
+        f"{opinion.elements} corotational elements: force {100 * force:+.2g} %, stress {100 * stress:+.2g} %"
+    )
+
+
+def _warnings(found: Found, judged: Judged) -> tuple[Finding, ...]:
+    told = []
+    if found.descent.ending is not Ending.OPTIMUM:
+        text = f"the search was {found.descent.ending.value}: a better strip may exist; try 'design.beam.seeds'"
+        told.append(finding("optimizer_stopped", text))
+    if not judged.opinion.stable:
+        told.append(finding("second_opinion", "corotational elements call the equilibrium unstable"))
+    return tuple(told)

@@ -1,0 +1,154 @@
+"""Pictures of a printed slider-crank: its force, its stress, and itself to scale while it is pressed."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.families.slider_crank.printed.chain import STRIP
+from cfmkit.plots import parts
+from cfmkit.plots.diagram import Diagram, Limit, Scale, Series, diagram_figure
+from cfmkit.plots.loop import loop_figure
+from cfmkit.plots.place import Label, place_labels
+from cfmkit.plots.style import BLUE, GREY, INK, OCHRE, PURPLE, VERMILLION, axes_mm, new_figure, styled
+from cfmkit.plots.text import Heading, value_text, write_heading
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from cfmkit.arrays import FloatArray
+    from cfmkit.families.slider_crank.printed.solution import Solution
+    from cfmkit.results import Result
+
+
+POSES = 4
+"""Poses drawn, evenly over the travel."""
+
+LINK = 2.4e-3
+"""Width of rigid links in pictures [m]."""
+
+
+def figures(result: Result) -> dict[str, Callable[[], Figure]]:
+    """Return what draws each picture of a printed slider-crank, by file stem."""
+    return {maker.__name__: partial(maker, result) for maker in (curve, stress, guide, part)}
+
+
+@styled
+def curve(result: Result) -> Figure:
+    """Return the force over the slider's travel, the band that it should keep enlarged."""
+    solution: Solution = result.state
+    what = "a strip" if solution.model == "beam" else "flexures and rigid links"
+    return loop_figure(result, None, f"force over travel of the slider: {what}")
+
+
+@styled
+def stress(result: Result) -> Figure:
+    """Return the largest stress over the travel, with the allowable one, and where it is."""
+    solution: Solution = result.state
+    over, allowed = Scale("travel of the slider", "length"), solution.material.allowable_stress
+    limits = () if allowed is None else (Limit(allowed, "allowable", True),)
+    upper = Diagram(
+        solution.travel, over, Scale("stress", "stress"), [Series(solution.stress, "largest", BLUE)], limits
+    )
+    place = np.concatenate([solution.place[1:2], solution.place[1:]])
+    lower = Diagram(solution.travel, over, Scale("place", "length"), [Series(place, "along the part", PURPLE)])
+    return diagram_figure(Heading.of(result, "largest stress, and where it is"), [upper, lower])
+
+
+@styled
+def guide(result: Result) -> Figure:
+    """Return what the slider's guide carries beside the force."""
+    solution: Solution = result.state
+    over = Scale("travel of the slider", "length")
+    forces = [Series(solution.force, "force", INK), Series(solution.side_force, "on the guide, across the way", OCHRE)]
+    upper = Diagram(solution.travel, over, Scale("force", "force"), forces)
+    moment = [Series(solution.guide_moment, "on the guide", OCHRE)]
+    lower = Diagram(solution.travel, over, Scale("moment", "torque"), moment)
+    return diagram_figure(Heading.of(result, "what the guide of the slider carries"), [upper, lower])
+
+
+@styled
+def part(result: Result) -> Figure:
+    """Return the part to scale at some travels, with the place of the largest stress at the end."""
+    solution: Solution = result.state
+    chosen = np.unique(np.linspace(0, len(solution.travel) - 1, POSES).astype(int))
+    shapes = [list(_shapes(solution, int(solution.pressed.path.at_asked[k]))) for k in chosen]
+    figure = new_figure(160.0, 120.0)
+    heading = Heading.of(result, "the part to scale while it is pressed")
+    write_heading(figure, heading)
+    ax = axes_mm(figure, (17.0, 12.0, 138.0, 106.0 - heading.height_mm))
+    everything = np.concatenate([points for shape in shapes for points, _ in shape])
+    low, high = everything.min(axis=0), everything.max(axis=0)
+    room = 0.08 * float((high - low).max())
+    for number, shape in enumerate(shapes):
+        for points, half in shape:
+            _body(ax, points, half, number == len(shapes) - 1)
+    ends = [shape[-1][0][-1] for shape in shapes]
+    height = float(ends[0][1])
+    ax.axhline(float(parts.mm(height)), color=GREY, linewidth=0.6, dashes=(6, 3), zorder=1.1, gid="guide")
+    parts.slider(ax, tuple(ends[-1]), 0.5 * room)
+    worst = _place(solution, shapes[-1], float(solution.place[chosen[-1]]))
+    parts.contact(ax, tuple(worst))
+    parts.to_scale(ax, (low[0] - room, low[1] - room, high[0] + 2.5 * room, high[1] + 2.0 * room))
+    ax.set_ylabel("y [mm]")
+    names = [
+        Label(value_text(float(solution.travel[k]), "length"), INK, parts.mm(end)[None], toward=(0.0, 1.0))
+        for k, end in zip(chosen, ends, strict=True)
+        if k in (chosen[0], chosen[-1]) or abs(end[0] - ends[0][0]) > 2.0 * room * np.flatnonzero(chosen == k)[0]
+    ]
+    top = value_text(float(solution.stress[chosen[-1]]), "stress")
+    names.append(Label(f"largest stress, {top}", VERMILLION, parts.mm(worst)[None], toward=(-1.0, 1.0)))
+    place_labels(ax, names)
+    return figure
+
+
+def _shapes(solution: Solution, index: int) -> Iterator[tuple[FloatArray, FloatArray]]:
+    """Yield centre lines and half thicknesses from the ground to the slider at one point of the path [m]."""
+    path = solution.pressed.path
+    names, last = list(path.layout.network.beams), None
+    for name in names:
+        points = path.shape(name, index)
+        thickness = path.layout.network.beams[name].section.thickness
+        place = path.places(name)
+        if isinstance(thickness, float):
+            half = np.full(len(points), 0.5 * thickness)
+        else:
+            half = 0.5 * np.interp(place, thickness.stations, np.real(thickness.values))
+        if last is not None:
+            yield np.array([last, points[0]]), np.full(2, 0.5 * LINK)
+        yield points, half
+        last = points[-1]
+
+
+def _body(ax: Axes, points: FloatArray, half: FloatArray, solid: bool) -> None:
+    """Draw a body around a centre line: filled, or as a ghost."""
+    from matplotlib.patches import Polygon
+
+    way = np.gradient(points, axis=0)
+    way /= np.maximum(np.hypot(*way.T), 1e-300)[:, None]
+    normal = np.column_stack([-way[:, 1], way[:, 0]])
+    around = parts.mm(np.concatenate([points + half[:, None] * normal, (points - half[:, None] * normal)[::-1]]))
+    look = {"facecolor": BLUE, "edgecolor": INK} if solid else {"facecolor": "#d9dde2", "edgecolor": GREY}
+    ax.add_patch(Polygon(around, closed=True, linewidth=0.5, zorder=3 if solid else 2, **look))
+
+
+def _place(solution: Solution, shape: list[tuple[FloatArray, FloatArray]], along: float) -> FloatArray:
+    """Return the point of a drawn shape at a length along the unloaded part [m]."""
+    names = list(solution.pressed.path.layout.network.beams)
+    if names == [STRIP]:
+        points = shape[0][0]
+        return np.asarray(points[round(along / _length(solution.chain.points) * (len(points) - 1))])
+    marks = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(solution.chain.points, axis=0).T))])
+    piece = int(np.clip(np.searchsorted(marks, along, side="right") - 1, 0, len(shape) - 1))
+    points = shape[piece][0]
+    share = (along - marks[piece]) / (marks[piece + 1] - marks[piece])
+    return np.asarray(points[round(share * (len(points) - 1))])
+
+
+def _length(points: FloatArray) -> float:
+    return float(np.hypot(*np.diff(points, axis=0).T).sum())

@@ -1,0 +1,133 @@
+"""What the user of a printed slider-crank must know, with the numbers that decide."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.families.findings import mm, mpa, newton
+from cfmkit.families.slider_crank.findings import finding
+from cfmkit.families.slider_crank.printed.chain import kink
+from cfmkit.families.slider_crank.printed.values import stress_stroke
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from cfmkit.families.slider_crank.printed.solution import Solution
+    from cfmkit.families.slider_crank.spec import SliderCrankSpec
+    from cfmkit.results import Finding
+
+
+THINNEST_RATIO = 2.0
+"""Width over thickness below which out-of-plane bending is less than four times as stiff as that in the plane."""
+
+SIDE_SHARE = 0.5
+"""Side force over force above which friction in the guide deserves a word."""
+
+RUN_IN_SHARE = 0.1
+"""Travel to 98 % of the force, as a share of all, above which the kink is called large."""
+
+CLOSE = 5e-3
+"""Difference of the second opinion, as a share, above which it is told."""
+
+
+def findings_of(spec: SliderCrankSpec, solution: Solution) -> tuple[Finding, ...]:
+    """Return everything worth a warning, the gravest first."""
+    return tuple(
+        (
+            *_strength(solution),
+            *_signs(solution),
+            *_kink(spec, solution),
+            *_making(spec, solution),
+            *_guide(solution),
+            *_opinion(solution),
+        )
+    )
+
+
+def _strength(solution: Solution) -> Iterator[Finding]:
+    limit = solution.material.allowable_stress
+    place, _ = stress_stroke(solution)
+    if limit is None or place is None or place >= solution.travel[-1]:
+        return
+    worst = int(np.argmax(solution.stress))
+    yield finding(
+        "overstressed",
+        f"beyond {mm(place)} of travel the stress exceeds the allowable {mpa(limit)}; it reaches "
+        f"{mpa(float(solution.stress[worst]))} at {mm(float(solution.travel[worst]))}, "
+        f"{mm(float(solution.place[worst]))} along the part from its clamped end",
+        f"analysis.travel=[{mm(float(solution.travel[0]))}, {place * 1e3:.4g} mm]",
+    )
+
+
+def _signs(solution: Solution) -> Iterator[Finding]:
+    moved = solution.travel > 0.01 * solution.travel[-1]
+    if (solution.force[moved] < 0).any():
+        first = float(solution.travel[moved][solution.force[moved] < 0][0])
+        yield finding("force_negative", f"from {mm(first)} on the chain pulls the slider towards the pivot")
+
+
+def _kink(spec: SliderCrankSpec, solution: Solution) -> Iterator[Finding]:
+    off = abs(kink(solution.chain.pins))
+    if solution.chain.side == 0:
+        yield finding(
+            "straight_start",
+            f"the chain is exactly straight: it holds {newton(float(solution.force[1]))} before it "
+            "moves sideways, and any 0.1 um decides to which side; give it a kink of 0.25 to 0.5 mm by "
+            "'mechanism.unloaded_offset'",
+        )
+        return
+    process = spec.mechanism.process
+    if process is not None and process.layer is not None and off < process.layer:
+        yield finding(
+            "kink_too_small",
+            f"the kink of {mm(off)} that sends the chain to one side is smaller than what the process resolves "
+            f"({mm(process.layer)}): the part may bend to the other side, with another force; 0.25 to 0.5 mm is safe",
+        )
+    run_in = solution.first_at(0.98 * solution.level)
+    if run_in is not None and run_in > RUN_IN_SHARE * solution.travel[-1] and off > 1e-3 * solution.chain.length:
+        yield finding(
+            "long_run_in",
+            f"with a kink of {mm(off)} the force needs {mm(run_in)} of travel to 98 % of its level; a smaller kink is "
+            "quicker",
+        )
+
+
+def _making(spec: SliderCrankSpec, solution: Solution) -> Iterator[Finding]:
+    process = spec.mechanism.process
+    if process is not None and process.thinnest is not None and solution.thinnest < process.thinnest:
+        yield finding(
+            "too_thin",
+            f"the thinnest place is {mm(solution.thinnest)}, the process makes {mm(process.thinnest)} at least",
+        )
+    if solution.width_ratio < THINNEST_RATIO:
+        yield finding(
+            "lateral_buckling",
+            f"the width is {solution.width_ratio:.3g} times the largest thickness: out of its plane the part bends "
+            "nearly as easily as in it; guide it between plates, or make it wider",
+        )
+
+
+def _guide(solution: Solution) -> Iterator[Finding]:
+    share = np.abs(solution.side_force) / np.maximum(np.abs(solution.force), 1e-300)
+    worst = int(np.argmax(np.abs(solution.side_force)))
+    if share[worst] > SIDE_SHARE and solution.travel[worst] > 0:
+        side = float(abs(solution.side_force[worst]))
+        yield finding(
+            "side_force",
+            f"the guide carries up to {newton(side)} across the way, {100 * share[worst]:.0f} % of the "
+            f"force: friction of 0.1 there changes it by {newton(0.1 * side)}; a mirrored pair on one "
+            "slider cancels it",
+        )
+
+
+def _opinion(solution: Solution) -> Iterator[Finding]:
+    check = solution.recheck
+    if check is None or (max(abs(check.force), abs(check.stress)) <= CLOSE and check.stable):
+        return
+    yield finding(
+        "second_opinion",
+        f"{check.elements} corotational elements differ by {100 * check.force:.2g} % in force and "
+        f"{100 * check.stress:.2g} % in stress" + ("" if check.stable else ", and call the equilibrium unstable"),
+    )

@@ -1,0 +1,178 @@
+"""Analysis of a printed slider-crank: the force of flexures or of a strip over the slider's travel.
+
+Reference
+---------
+[B] P. Bilancia, A. Geraci, G. Berselli, SMASIS2019-5519, sec. 2.2 and 3.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.curves import Column, Curve
+from cfmkit.errors import InputError
+from cfmkit.families.refusals import CannotBuild, no_result
+from cfmkit.families.slider_crank.build import linkage_of, resolve, side_of, unloaded_angle
+from cfmkit.families.slider_crank.findings import finding
+from cfmkit.families.slider_crank.printed.assembly import (
+    elasticity,
+    lumped_chain,
+    pins_of,
+    strip_chain,
+    strip_of,
+    travel_direction,
+)
+from cfmkit.families.slider_crank.printed.findings import findings_of
+from cfmkit.families.slider_crank.printed.pressing import Ending, kept_clear
+from cfmkit.families.slider_crank.printed.solution import Solution
+from cfmkit.families.slider_crank.printed.values import DEFINITIONS, numbers
+from cfmkit.families.slider_crank.springs.values import DEFINITIONS as OF_SPRINGS
+from cfmkit.results import Quantity, Result, Status
+from cfmkit.specs.units import between
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from cfmkit.arrays import FloatArray
+    from cfmkit.families.base import Run
+    from cfmkit.families.slider_crank.linkage import Linkage
+    from cfmkit.families.slider_crank.printed.pressing import Chain
+    from cfmkit.families.slider_crank.spec import SliderCrankSpec
+
+
+DEFAULT_SHARE = 0.35
+"""Travel where none is asked for, in lengths of the slider's way from the pivot: that of [B, sec. 2.1]."""
+
+_NAMES = {
+    Ending.LIMIT_POINT: "limit_point",
+    Ending.UNSTABLE: "unstable",
+    Ending.NOT_CONVERGED: "not_converged",
+    Ending.WRONG_BRANCH: "wrong_branch",
+    Ending.CROSSES: "wrong_branch",
+    Ending.BLOCKED: "meets_itself",
+    Ending.STARTS_LATE: "branch_begins_late",
+}
+
+
+def analyze(spec: SliderCrankSpec, run: Run) -> Result:
+    """Return the force of a printed slider-crank over its slider's travel, with everything that is wrong with it.
+
+    Parameters
+    ----------
+    spec : SliderCrankSpec
+        With `mechanism.flexures` or `mechanism.beam`.
+    run : Run
+        Not needed here: nothing is random.
+
+    Returns
+    -------
+    Result
+        One branch, ``load``. PARTIAL if equilibrium ends within the travel, NO_EQUILIBRIUM if
+        nothing was found that is on the branch asked for.
+    """
+    try:
+        spec = resolve(spec)
+        linkage = linkage_of(spec.mechanism)
+        unloaded = unloaded_angle(spec.mechanism, linkage)
+        spec = _as_run(spec, linkage, unloaded)
+        chain = chain_of(spec, linkage, unloaded)
+    except CannotBuild as problem:
+        return no_result(spec, problem.finding)
+    except InputError as problem:
+        return Result(spec, Status.INVALID, str(problem))
+    low, high = spec.analysis.travel or (0.0, 0.0)
+    if low < 0:
+        pulled = finding("pulled", "a printed chain is pressed, not pulled: 'analysis.travel' must not begin below 0")
+        return no_result(spec, pulled)
+    side = side_of(spec, linkage, unloaded) if spec.analysis.side is not None else 0
+    pressed = chain.press(np.linspace(low, high, spec.analysis.points), side, spec.analysis.accuracy)
+    pressed = kept_clear(pressed, _thickness(chain))
+    usable = len(pressed.travel) > 1 and pressed.ending is not Ending.WRONG_BRANCH
+    told = () if pressed.ending is Ending.COMPLETE else (finding(_NAMES[pressed.ending], pressed.message),)
+    if not usable:
+        return Result(spec, Status.NO_EQUILIBRIUM, pressed.message, warnings=told)
+    whole = (float(pressed.travel[0]), float(pressed.travel[-1]))
+    window = whole if spec.analysis.window is None else between(spec.analysis.window, (low, high))
+    solution = Solution(
+        "lumped" if spec.fidelity == "lumped" else "beam",
+        chain,
+        pressed,
+        elasticity(spec.mechanism),
+        spec.mechanism.legs,
+        window,
+        spec.analysis.recheck,
+        side,
+        spec.analysis.accuracy,
+    )
+    return Result(
+        spec=spec,
+        status=Status.PARTIAL if told else Status.COMPLETE,
+        message=told[0].message if told else "",
+        curves=(_curve(solution),),
+        values=_values(solution),
+        warnings=(*told, *findings_of(spec, solution)),
+        travel=(low, high),
+        target=spec.design.force if spec.design else None,
+        reference=spec.analysis.reference_travel,
+        allowable_stress=solution.material.allowable_stress,
+        closed=solution.course,
+        state=solution,
+    )
+
+
+def _thickness(chain: Chain) -> float:
+    """Return the mean thickness of both ends of a chain [m]."""
+    beams = list(chain.build(chain.points).beams.values())
+    given = [beam.section.thickness for beam in (beams[0], beams[-1])]
+    first, last = ([one] if isinstance(one, float) else one.values for one in given)
+    return 0.5 * (float(first[0]) + float(last[-1]))
+
+
+def chain_of(spec: SliderCrankSpec, linkage: Linkage, unloaded: float) -> Chain:
+    """Return the chain that a specification's fidelity asks for."""
+    if spec.fidelity == "lumped":
+        return lumped_chain(spec.mechanism, linkage, unloaded)
+    strip = strip_of(spec.mechanism, linkage, unloaded)
+    pins = pins_of(spec.mechanism, linkage, unloaded)
+    return strip_chain(strip, elasticity(spec.mechanism), pins, travel_direction(linkage))
+
+
+def slider_reach(linkage: Linkage, unloaded: float) -> float:
+    """Return the slider's distance from the pivot along its way, unloaded [m]."""
+    return abs(float(linkage.slider_position(np.array(unloaded))))
+
+
+def _as_run(spec: SliderCrankSpec, linkage: Linkage, unloaded: float) -> SliderCrankSpec:
+    """Return the spec with what the analysis fell back on written out."""
+    travel = spec.analysis.travel or (0.0, DEFAULT_SHARE * slider_reach(linkage, unloaded))
+    written = {"travel": travel, "fidelity": spec.fidelity}
+    return spec.model_copy(update={"analysis": spec.analysis.model_copy(update=written)})
+
+
+def _curve(solution: Solution) -> Curve:
+    stress: FloatArray = solution.stress
+    extra = {
+        "max_stress": Column(stress, "stress"),
+        "stress_place": Column(solution.place, "length"),
+        "side_force": Column(solution.side_force, "force"),
+        "guide_moment": Column(solution.guide_moment, "torque"),
+        "energy": Column(solution.energy, "energy"),
+    }
+    points = len(solution.travel)
+    return Curve(solution.travel, solution.force, np.repeat("load", points), solution.stable, extra)
+
+
+def _values(solution: Solution) -> Mapping[str, Quantity]:
+    """Return the scalar results; those of springs and pins are there without a value."""
+    found = {
+        name: Quantity(value, *_about(name), why if value is None else "") for name, value, why in numbers(solution)
+    }
+    for name in ("stiffness_class", "crank_pin_rotation_max"):
+        found[name] = Quantity(None, *OF_SPRINGS[name], "it belongs to springs at pins: see fidelity 'prb'")
+    return found
+
+
+def _about(name: str) -> tuple[str, str]:
+    return DEFINITIONS[name] if name in DEFINITIONS else OF_SPRINGS[name]

@@ -1,0 +1,148 @@
+"""The outline of a printed slider-crank: one piece with flexures or a strip.
+
+Flexures, strip and distances of pins are exact. What is around them is a sensible choice: pads behind the clamped
+end and at the slider, links wider than any flexure.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.export.geometry import Contour, Curve2D, Drawing, Line, polygon
+from cfmkit.families.slider_crank.build import linkage_of, unloaded_angle
+from cfmkit.families.slider_crank.printed.assembly import corners, flexures_of, strip_of
+
+if TYPE_CHECKING:
+    from cfmkit.arrays import FloatArray
+    from cfmkit.families.slider_crank.printed.chain import Strip
+    from cfmkit.families.slider_crank.spec import SliderCrankSpec
+
+
+PAD = (0.012, 0.010)
+"""Length and width of the pads [m]."""
+
+STRAIGHT, MITRE = 1e-9, 2.0
+"""Sine of an angle that is no corner; reach of the edges at a sharp corner, in half widths."""
+
+LINK_RATIO = 5.0
+"""Width of a rigid link in flexure thicknesses."""
+
+
+def drawing(spec: SliderCrankSpec) -> Drawing:
+    """Return the outline of one leg, with a table of its sections."""
+    linkage = linkage_of(spec.mechanism)
+    unloaded = unloaded_angle(spec.mechanism, linkage)
+    if spec.fidelity == "beam":
+        return _strip(
+            strip_of(spec.mechanism, linkage, unloaded), spec.mechanism.beam.offset if spec.mechanism.beam else 0
+        )
+    parts = flexures_of(spec.mechanism)
+    points = corners(spec.mechanism, None, linkage, unloaded)
+    thick = [0.5 * one.thickness for one in parts]
+    bar = 0.5 * LINK_RATIO * max(2.0 * half for half in thick)
+    order = [0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 5, 5]
+    own = [thick[0], thick[0], bar, bar, thick[1], thick[1], bar, bar, thick[2], thick[2]]
+    half = np.array([0.5 * PAD[1], *own, 0.5 * PAD[1]])
+    table = {
+        "x": (points[:, 0], "length"),
+        "y": (points[:, 1], "length"),
+        "thickness": (np.repeat([one.thickness for one in parts], 2), "length"),
+        "width": (np.repeat([one.width for one in parts], 2), "length"),
+    }
+    return Drawing("slider-crank", _piece(points[order], half), (Curve2D("flexures", table),))
+
+
+def _strip(strip: Strip, offset: float) -> Drawing:
+    """Return a strip as it is drawn: without what printing adds."""
+    marks = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(strip.corners, axis=0).T))])
+    fractions = np.unique(np.concatenate([marks / marks[-1], strip.places]))
+    points = np.column_stack([np.interp(fractions * marks[-1], marks, strip.corners[:, k]) for k in (0, 1)])
+    thickness = np.interp(fractions, strip.places, np.asarray(strip.thickness)) - offset
+    half = np.array([0.5 * PAD[1], *(0.5 * thickness), 0.5 * PAD[1]])
+    order = [0, *range(len(points)), len(points) - 1]
+    table = {
+        "place": (fractions * marks[-1], "length"),
+        "x": (points[:, 0], "length"),
+        "y": (points[:, 1], "length"),
+        "thickness": (thickness, "length"),
+    }
+    return Drawing("slider-crank", _piece(points[order], half), (Curve2D("strip", table),))
+
+
+def _piece(points: FloatArray, half: FloatArray) -> tuple[Contour, ...]:
+    """Return the outline around a chain of points with half widths [m], between two pads, and its centre line."""
+    begin, end = _direction(points, 0), _direction(points, len(points) - 1)
+    line = np.vstack([points[0] - PAD[0] * begin, points, points[-1] + PAD[0] * end])
+    wide = np.concatenate([[half[0]], half, [half[-1]]])
+    around = [(float(x), float(y)) for x, y in (*_edge(line, wide), *reversed(_edge(line, -wide)))]
+    kept = [point for point, following in zip(around, [*around[1:], around[0]], strict=True) if point != following]
+    centre = [(float(x), float(y)) for x, y in dict.fromkeys(map(tuple, points))]
+    path = Contour(tuple(Line(a, b) for a, b in itertools.pairwise(centre)), "path")
+    return polygon(kept, "cut"), path
+
+
+def _direction(points: FloatArray, k: int) -> FloatArray:
+    """Return the unit vector along a chain at one of its points, between its distinct neighbours."""
+    apart = np.flatnonzero(np.hypot(*(points - points[k]).T) > 0)
+    before, after = apart[apart < k], apart[apart > k]
+    start = points[before[-1]] if len(before) else points[k]
+    stop = points[after[0]] if len(after) else points[k]
+    way: FloatArray = (stop - start) / np.hypot(*(stop - start))
+    return way
+
+
+@dataclass(frozen=True)
+class _Side:
+    """One side of a straight piece of a chain: its last point on the centre line, and both ends of the edge [m]."""
+
+    along: FloatArray
+    end: FloatArray
+    first: FloatArray
+    last: FloatArray
+
+
+def _edge(line: FloatArray, half: FloatArray) -> list[FloatArray]:
+    """Return the corners of the edge to the left of a chain, or to the right where half widths are negative [m].
+
+    Every straight piece has exactly its width up to where its edge meets the next one.
+    """
+    sides = []
+    for k in range(len(line) - 1):
+        way = line[k + 1] - line[k]
+        if (length := np.hypot(*way)) > 0:
+            normal = np.array([-way[1], way[0]]) / length
+            sides.append(
+                _Side(way / length, line[k + 1], line[k] + half[k] * normal, line[k + 1] + half[k + 1] * normal)
+            )
+    inner = [corner for one, other in itertools.pairwise(sides) for corner in _corner(one, other)]
+    return [sides[0].first, *inner, sides[-1].last]
+
+
+def _corner(one: _Side, other: _Side) -> list[FloatArray]:
+    """Return where two edges meet; where the width steps, both ends on the line that halves the angle."""
+    if abs(_cross(one.along, other.along)) < STRAIGHT:
+        return [one.last, other.first]
+    at, reach = one.end, float(np.hypot(*(one.last - one.end)))
+    ways = one.last - one.first, other.last - other.first
+    if np.isclose(reach, np.hypot(*(other.first - at)), rtol=1e-9, atol=0.0):
+        met = _meeting(one.last, ways[0], other.first, ways[1])
+        if np.hypot(*(met - at)) <= MITRE * reach:
+            return [met]
+        middle = one.last + other.first - 2.0 * at
+        return [at + reach * middle / np.hypot(*middle)]
+    halving = other.along - one.along
+    return [_meeting(one.last, ways[0], at, halving), _meeting(other.first, ways[1], at, halving)]
+
+
+def _meeting(a: FloatArray, way: FloatArray, b: FloatArray, other: FloatArray) -> FloatArray:
+    """Return where the lines through two points along two ways meet."""
+    met: FloatArray = a + _cross(b - a, other) / _cross(way, other) * way
+    return met
+
+
+def _cross(a: FloatArray, b: FloatArray) -> float:
+    return float(a[0] * b[1] - a[1] * b[0])

@@ -1,0 +1,327 @@
+"""What is optimised: a strip that holds a force over the longest travel, or the flattest force over a given one.
+
+The force is computed at Chebyshev points of the root of the travel, where it is smooth down to the steep start, and
+interpolated between them, so that the band is kept everywhere and not at a few points. The stress is looked at along
+the whole strip, its peaks included, near the end of the travel: it is largest there. Derivatives by the thicknesses
+are exact (implicit differentiation); those of the force by the stroke too. The force is proportional to the width, the
+stress does not depend on it. Places of stations are differentiated by central differences.
+"""
+
+from __future__ import annotations
+
+import itertools
+from contextlib import suppress
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from cfmkit.elastica import Control, Displacement, PathStatus, gradient, trace
+from cfmkit.elastica.sensitivity.neighbour import drive_slope, neighbouring
+from cfmkit.errors import InputError
+from cfmkit.families.slider_crank.printed.chain import SLIDER, STRIP, Strip, spread
+from cfmkit.families.slider_crank.printed.pressing import FIRST_STEP
+from cfmkit.families.slider_crank.printed.strength import LAST, Watched, watched
+from cfmkit.numerics.barycentric import differentiation, interpolation
+
+if TYPE_CHECKING:
+    from cfmkit.arrays import FloatArray
+    from cfmkit.elastica import Network, Path
+    from cfmkit.families.slider_crank.printed.chain import Elasticity
+
+
+SMALL = 1e-3
+"""Thicknesses and widths are counted in mm."""
+
+Goal = Literal["stroke", "ripple", "rms"]
+
+
+@dataclass(frozen=True)
+class Task:
+    """What the strip is to do.
+
+    Attributes
+    ----------
+    corners : (k, 2) array
+        Its centre line [m].
+    direction : float
+        Of the slider's travel [rad].
+    material : Elasticity
+        With the stress allowed, if there is a limit.
+    force : float
+        Wanted [N].
+    start, stroke : float
+        Ends of the travel over which it is wanted [m]; the stroke is the first guess where it is maximised.
+    ripple : float
+        Largest deviation allowed, as a share of the force; of no use where it is minimised.
+    goal : {"stroke", "ripple", "rms"}
+        Longest stroke within the ripple; smallest ripple, or smallest root mean square, over the stroke.
+    longest : float
+        Stroke never exceeded [m].
+    """
+
+    corners: FloatArray
+    direction: float
+    material: Elasticity
+    force: float
+    start: float
+    stroke: float
+    ripple: float
+    goal: Goal = "stroke"
+    longest: float = 0.08
+
+
+@dataclass(frozen=True)
+class Form:
+    """How a strip is described by numbers: thicknesses, then shares that place them, then the width.
+
+    Attributes
+    ----------
+    count : int
+        Thicknesses; 1: the same everywhere.
+    per_piece : tuple of int
+        How many stations each straight piece has where their shares vary; empty: evenly spaced, fixed.
+    shares : tuple of tuples
+        Shares at which stations are fixed, by piece; empty with `per_piece` empty: evenly spaced.
+    width : float or None
+        Fixed width [m]; None: it varies too.
+    """
+
+    count: int
+    per_piece: tuple[int, ...] = ()
+    shares: tuple[tuple[float, ...], ...] = ()
+    width: float | None = None
+
+    @property
+    def placed(self) -> int:
+        """How many shares vary."""
+        return sum(self.per_piece)
+
+    @property
+    def size(self) -> int:
+        """How many numbers describe the strip."""
+        return self.count + self.placed + (self.width is None)
+
+    def places(self, x: FloatArray, corners: FloatArray) -> FloatArray:
+        """Return the stations as fractions of the length."""
+        if not self.per_piece:
+            return spread(corners, self.shares) if self.shares else np.linspace(0.0, 1.0, self.count)
+        ends = np.cumsum((0, *self.per_piece))
+        own = np.real(x[self.count : self.count + self.placed])
+        return spread(corners, [own[a:b].tolist() for a, b in itertools.pairwise(ends)])
+
+    def width_of(self, x: FloatArray) -> float:
+        """Return the width [m]."""
+        return float(np.real(x[-1])) * SMALL if self.width is None else self.width
+
+    def strip(self, x: Any, corners: FloatArray) -> Strip:
+        """Return the strip that numbers describe: thicknesses and width in mm, shares of the pieces' lengths."""
+        thickness = np.asarray(x[: self.count]) * SMALL
+        if self.count == 1:
+            return Strip(corners, self.width_of(x), np.repeat(thickness, 2), np.array([0.0, 1.0]))
+        return Strip(corners, self.width_of(x), thickness, self.places(x, corners))
+
+
+POINTS, DENSE = 12, 81
+"""Where the force is computed, and where its band is kept."""
+
+RMS_POINTS = 10
+"""Points of the root mean square, even in the travel, its start left out [B, eq. 14]."""
+
+TOLERANCE = 1e-6
+
+_NUDGE = 1e-5  # of a share, for its central difference
+
+
+@dataclass(frozen=True)
+class State:
+    """A strip pressed to the points of a task.
+
+    Attributes
+    ----------
+    path : Path
+        Its equilibria.
+    force : (p,) array
+        [N].
+    watched : Watched
+        Where the stress is looked at.
+    """
+
+    path: Path
+    force: FloatArray
+    watched: Watched
+
+    @cached_property
+    def stress(self) -> FloatArray:
+        """Stress at the tops of the strip's pieces near the end of the travel, (r,) [Pa]."""
+        sections, last = self.path.sections(STRIP), self.path.at_asked[-LAST:]
+        return self.watched.stress(sections.bending_stress[last], sections.axial_stress[last])
+
+
+@dataclass
+class StripProgram:
+    """Objective and constraints of a task over a form; a `cfmkit.numerics.sqp.Program`.
+
+    The variables are those of the form, then the stroke [cm] or the ripple [%] where that is the goal.
+    """
+
+    task: Task
+    form: Form
+    known: Path | None = None
+    _last: tuple[FloatArray, State] | None = field(default=None, repr=False)
+
+    def __post_init__(self) -> None:
+        """Set the fixed places and the matrices that go with them."""
+        if self.task.goal == "rms":
+            self.spots = np.arange(1, RMS_POINTS + 1) / RMS_POINTS
+            self.between = np.eye(RMS_POINTS)
+            return
+        self.spots = 0.5 * (1.0 - np.cos(np.pi * np.arange(POINTS) / (POINTS - 1)))
+        dense = 0.5 * (1.0 - np.cos(np.pi * np.linspace(0.0, 1.0, DENSE)))
+        self.between = interpolation(self.spots, dense)
+        self.slope = differentiation(self.spots)
+
+    @property
+    def extra(self) -> int:
+        """Number of variables beside the form's."""
+        return 0 if self.task.goal == "rms" else 1
+
+    def travel(self, z: FloatArray) -> FloatArray:
+        """Return the travels at which the force is computed [m]."""
+        if self.task.goal == "rms":
+            return np.asarray(self.task.start + (self.task.stroke - self.task.start) * self.spots)
+        first, last = np.sqrt(self.task.start), np.sqrt(self.stroke(z))
+        travel: FloatArray = (first + (last - first) * self.spots) ** 2
+        return travel
+
+    def stroke(self, z: FloatArray) -> float:
+        """Return the end of the travel [m]."""
+        return 0.01 * float(z[-1]) if self.task.goal == "stroke" else self.task.stroke
+
+    def ripple(self, z: FloatArray) -> float:
+        """Return the deviation allowed, as a share."""
+        return 0.01 * float(z[-1]) if self.task.goal == "ripple" else self.task.ripple
+
+    def network(self, x: Any) -> Network:
+        """Return the network of a form's variables."""
+        return self.form.strip(x, self.task.corners).network(self.task.material)
+
+    def state(self, z: FloatArray) -> State | None:
+        """Return the pressed strip; None where it has no stable equilibrium at all points."""
+        if self._last is not None and np.array_equal(self._last[0], z):
+            return self._last[1]
+        path = self._path(self.network(z[: self.form.size]), self.travel(z))
+        if path is None:
+            return None
+        at = path.at_asked
+        found = State(path, path.effort[at], watched(path, self.spots))
+        self.known, self._last = path, (z.copy(), found)
+        return found
+
+    def _path(self, network: Network, travel: FloatArray) -> Path | None:
+        """Return the equilibria near the last ones, else from rest."""
+        drive = Displacement(SLIDER, self.task.direction, travel)
+        if self.known is not None:
+            with suppress(InputError):  # stations that move can change how finely the strip is cut
+                near = neighbouring(self.known, network, drive)
+                if near.status is PathStatus.COMPLETE:
+                    return near
+        path = trace(network, drive, Control(first_step=FIRST_STEP, tolerance=TOLERANCE))
+        good = path.status is PathStatus.COMPLETE and bool(path.stable[path.at_asked].all())
+        return path if good else None
+
+    def values(self, z: FloatArray) -> tuple[float, FloatArray] | None:
+        """Return the objective and the constraints, at least zero where they hold."""
+        state = self.state(z)
+        if state is None:
+            return None
+        ratio = state.force / self.task.force - 1.0
+        return self._objective(z, ratio), np.concatenate([self._band(z, ratio), self._strength(state)])
+
+    def _objective(self, z: FloatArray, ratio: FloatArray) -> float:
+        if self.task.goal == "rms":
+            return 1e4 * float(np.mean((self.between @ ratio) ** 2))
+        return -float(z[-1]) if self.task.goal == "stroke" else float(z[-1])
+
+    def _band(self, z: FloatArray, ratio: FloatArray) -> FloatArray:
+        if self.task.goal == "rms":
+            return np.zeros(0)
+        off = 100.0 * (self.between @ ratio)
+        return np.concatenate([100.0 * self.ripple(z) - off, 100.0 * self.ripple(z) + off])
+
+    def _strength(self, state: State) -> FloatArray:
+        limit = self.task.material.allowable_stress
+        return np.zeros(0) if limit is None else np.asarray(10.0 * (1.0 - state.stress / limit))
+
+    def slopes(self, z: FloatArray) -> tuple[FloatArray, FloatArray] | None:
+        """Return the derivatives of objective and constraints."""
+        state = self.state(z)
+        if state is None:
+            return None
+        force, stress = self._by_form(z, state)
+        if self.extra:
+            by_last = (
+                self._by_stroke(z, state) if self.task.goal == "stroke" else (0.0 * state.force, 0.0 * state.stress)
+            )
+            force, stress = np.column_stack([force, by_last[0]]), np.column_stack([stress, by_last[1]])
+        ratio, by = state.force / self.task.force - 1.0, force / self.task.force
+        off, limit = 100.0 * self.between @ by, self.task.material.allowable_stress
+        rows = [] if limit is None else [-10.0 * stress / limit]
+        if self.task.goal == "rms":
+            objective = 2e4 / len(self.between) * (self.between @ ratio) @ (self.between @ by)
+            return objective, np.concatenate(rows) if rows else np.zeros((0, len(z)))
+        objective = np.zeros(len(z))
+        objective[-1] = -1.0 if self.task.goal == "stroke" else 1.0
+        if self.task.goal == "ripple":
+            upper, lower = -off, off.copy()
+            upper[:, -1], lower[:, -1] = 1.0, 1.0
+            return objective, np.concatenate([upper, lower, *rows])
+        return objective, np.concatenate([-off, off, *rows])
+
+    def _by_form(self, z: FloatArray, state: State) -> tuple[FloatArray, FloatArray]:
+        """Return the derivatives of force (p, k) and stress (r, k) by the form's variables."""
+        form, path, x = self.form, state.path, z[: self.form.size]
+
+        def build(values: Any) -> Network:
+            return self.network(np.concatenate([values, x[form.count :]]))
+
+        inner = x[: form.count]
+        force = [gradient(path, build, inner).effort]
+        last = gradient(path, build, inner, points=path.at_asked[-LAST:]).sections(STRIP)
+        stress = [state.watched.stress(last.bending_stress, last.axial_stress)]
+        for k in range(form.count, form.count + form.placed):
+            by = self._by_difference(z, k, state)
+            force.append(by[0][:, None])
+            stress.append(by[1][:, None])
+        if form.width is None:
+            force.append((state.force / x[-1])[:, None])
+            stress.append(np.zeros((len(state.stress), 1)))
+        return np.concatenate(force, axis=1), np.concatenate(stress, axis=1)
+
+    def _by_difference(self, z: FloatArray, k: int, state: State) -> tuple[FloatArray, FloatArray]:
+        """Return the derivatives by one variable by a central difference of neighbouring equilibria."""
+        drive = Displacement(SLIDER, self.task.direction, self.travel(z))
+        sides = []
+        for step in (-_NUDGE, _NUDGE):
+            moved = z[: self.form.size].copy()
+            moved[k] += step
+            path = neighbouring(state.path, self.network(moved), drive)
+            if path.status is not PathStatus.COMPLETE:
+                return 0.0 * state.force, 0.0 * state.stress
+            side = State(path, path.effort, watched(path, self.spots))
+            sides.append((side.force, side.stress))
+        (low, weak), (high, strong) = sides
+        return (high - low) / (2 * _NUDGE), (strong - weak) / (2 * _NUDGE)
+
+    def _by_stroke(self, z: FloatArray, state: State) -> tuple[FloatArray, FloatArray]:
+        """Return the derivatives by the stroke in cm: all points move with it, and the stress with its point."""
+        travel, at = self.travel(z), state.path.at_asked
+        first, last = np.sqrt(self.task.start), np.sqrt(self.stroke(z))
+        moves = np.sqrt(travel) / last * self.spots
+        by_travel = self.slope[-LAST:] * (self.spots / (2.0 * last * (last - first)))[-LAST:, None]
+        sections = state.path.sections(STRIP)
+        stress = state.watched.stress(
+            *(by_travel @ part[at] for part in (sections.bending_stress, sections.axial_stress))
+        )
+        return 0.01 * drive_slope(state.path) * moves, 0.01 * stress

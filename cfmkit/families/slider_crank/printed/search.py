@@ -1,0 +1,326 @@
+"""From a task to a strip: the uniform one first, then more and more thicknesses, each from the one before."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.families.findings import mm, mpa, newton, percent
+from cfmkit.families.refusals import no_design
+from cfmkit.families.slider_crank.findings import finding
+from cfmkit.families.slider_crank.printed.program import SMALL, Form, StripProgram
+from cfmkit.numerics.sqp import Effort, Ending, Optimum, minimize
+from cfmkit.specs.units import format_short
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from cfmkit.arrays import FloatArray
+    from cfmkit.families.slider_crank.printed.program import Task
+    from cfmkit.results import Design
+
+
+VIOLATION = 5e-3
+"""Of a constraint that counts as none: 0.005 % of the force, 0.05 % of the stress allowed."""
+
+
+def descend(
+    program: StripProgram, start: FloatArray, bounds: FloatArray, steps: int = 100, tolerance: float = 1e-6
+) -> Optimum:
+    """Return where the steps from a start end.
+
+    Parameters
+    ----------
+    program : StripProgram
+        What is minimised.
+    start : (n,) array
+        Moved into the bounds first.
+    bounds : (n, 2) array
+        Smallest and largest values.
+    steps : int
+        At most.
+    tolerance : float
+        Change of the objective that ends the search.
+    """
+    return minimize(program, start, bounds, Effort(steps, tolerance, VIOLATION, last=True))
+
+
+COARSE = 5
+"""Thicknesses of the first tapered strip; then twice as many intervals each time."""
+
+LOOSE = 0.01
+"""Ripple within which the coarse strip is sought: few thicknesses cannot keep less."""
+
+SCATTER = 0.15
+"""Standard deviation of the logarithm of the thicknesses that other starts begin with."""
+
+SHORTEST = 2e-3
+"""Length of the band that is sought at least [m]."""
+
+WIDEST, NARROWING = 0.1, 5
+"""Largest share of the force by which a band is widened at first where it is out of reach, and steps back to it."""
+
+_ROUNDS = 12
+
+
+@dataclass(frozen=True)
+class Ranges:
+    """Smallest and largest value of every number of a form, (n, 2) in its units, and of the stroke [m]."""
+
+    form: FloatArray
+    longest: float
+
+
+@dataclass(frozen=True)
+class Found:
+    """A strip that was found.
+
+    Attributes
+    ----------
+    task, form, ranges : Task, Form, Ranges
+        What was asked.
+    program : StripProgram
+        Of the last search.
+    descent : Optimum
+        Its outcome.
+    uniform : Optimum or None
+        That of one thickness, within `LOOSE` at least, for comparison; None where it has no equilibrium.
+    """
+
+    task: Task
+    form: Form
+    ranges: Ranges
+    program: StripProgram
+    descent: Optimum
+    uniform: Optimum | None
+
+    @property
+    def values(self) -> FloatArray:
+        """Numbers of the form."""
+        return self.descent.z[: self.form.size]
+
+
+def uniform_thickness(task: Task, width: float, guess: float = 1e-3) -> float:
+    """Return the thickness [m] with which a strip of one thickness has the force, on average of its extremes.
+
+    The force follows the third power of the thickness but for stretching and shear: a few corrections do.
+    """
+    program = StripProgram(replace(task, goal="ripple"), Form(1, width=width))
+    thickness = guess
+    for _ in range(_ROUNDS):
+        state = program.state(np.array([thickness / SMALL, 1.0]))
+        if state is None:
+            return guess
+        level = 0.5 * (state.force.max() + state.force.min())
+        factor = float((task.force / level) ** (1.0 / 3.0))
+        thickness *= factor
+        if abs(factor - 1.0) < 1e-10:
+            break
+    return thickness
+
+
+def uniform_for_stroke(task: Task, guess: float = 1e-3) -> tuple[float, float] | None:
+    """Return thickness and width [m] of the strip that has the allowable stress at the stroke, and the force.
+
+    The stress does not depend on the width and the force is proportional to it: first the thickness from
+    the stress, then the width from the force. None where there is no stress limit or no equilibrium.
+    """
+    limit = task.material.allowable_stress
+    if limit is None:
+        return None
+    thickness, width = guess, 5e-3
+    for _ in range(_ROUNDS):
+        program = StripProgram(replace(task, goal="ripple"), Form(1, width=width))
+        state = program.state(np.array([thickness / SMALL, 1.0]))
+        if state is None:
+            return None
+        worst = float(state.path.peak_stress().value[state.path.at_asked[-1]])
+        level = 0.5 * (state.force.max() + state.force.min())
+        width *= task.force / level
+        factor = limit / worst
+        thickness *= factor
+        width /= factor**3
+        if abs(factor - 1.0) < 1e-10:
+            break
+    return thickness, width
+
+
+def search(
+    task: Task, form: Form, ranges: Ranges, starts: int, seed: int, report: Callable[[float, str], None]
+) -> Found:
+    """Return the best strip found: from the uniform one coarse to fine, and from random ones where asked.
+
+    Parameters
+    ----------
+    task : Task
+        What the strip is to do.
+    form : Form
+        How it is described.
+    ranges : Ranges
+        Of its numbers.
+    starts : int
+        How many, the uniform strip included.
+    seed : int
+        Of the random ones.
+    report : callable
+        Takes a fraction and a text.
+    """
+    uniform = _uniform(task, form, ranges)
+    steps = _ladder(form)
+    best: Found | None = None
+    rng = np.random.default_rng(seed)
+    for number in range(starts):
+        report(number / starts, f"start {number + 1} of {starts}")
+        found = _climb(task, form, ranges, steps if number == 0 else (form.count,), uniform, rng if number else None)
+        if best is None or _rank(found.descent) < _rank(best.descent):
+            best = found
+    assert best is not None
+    if task.goal == "stroke" and not (best.descent.feasible and best.descent.ending is Ending.OPTIMUM):
+        found = _tightened(task, form, ranges, uniform)
+        best = min(best, found, key=lambda one: _rank(one.descent))
+    report(1.0, "done")
+    return best
+
+
+def _rank(descent: Optimum) -> tuple[bool, float]:
+    return not descent.feasible, descent.objective if descent.feasible else descent.violation
+
+
+def _ladder(form: Form) -> tuple[int, ...]:
+    """Return the numbers of thicknesses that are gone through."""
+    if form.per_piece or form.shares or form.count <= COARSE:
+        return (form.count,)
+    count, steps = COARSE, [COARSE]
+    while 2 * count - 1 < form.count:
+        count = 2 * count - 1
+        steps.append(count)
+    return (*steps, form.count)
+
+
+def _climb(
+    task: Task,
+    form: Form,
+    ranges: Ranges,
+    steps: tuple[int, ...],
+    uniform: Optimum | None,
+    rng: np.random.Generator | None,
+) -> Found:
+    """Return the outcome of one start: every search begins where the one with fewer thicknesses ended."""
+    x, last = _begin(task, form, ranges, uniform, steps[0])
+    if rng is not None:
+        x[: steps[0]] *= np.exp(SCATTER * rng.standard_normal(steps[0]))
+    for count in steps:
+        now = replace(form, count=count)
+        own = len(x) - (form.size - form.count)
+        x = np.concatenate([_refined(x[:own], count), x[own:]])
+        coarse = count < steps[-1]
+        goal = replace(task, ripple=max(task.ripple, LOOSE)) if coarse else task
+        program = StripProgram(goal, now)
+        bounds = _bounds(task, ranges, form, count)
+        start = np.append(x, last) if program.extra else x
+        descent = descend(program, start, bounds, 20 if coarse else 100, 1e-3 if coarse else _precise(task))
+        x = descent.z[: now.size]
+        last = descent.z[-1]
+    return Found(task, form, ranges, program, descent, uniform)
+
+
+def _tightened(task: Task, form: Form, ranges: Ranges, uniform: Optimum | None) -> Found:
+    """Return the outcome of a band that begins as wide as the uniform strip needs it, and is made narrower in steps.
+
+    Where a band is out of reach of the first strip, the steps towards it get stuck; those within bands do not.
+    """
+    x, last = _begin(task, form, ranges, uniform, form.count)
+    missed = 0.0 if uniform is None else min(0.01 * uniform.violation, WIDEST)
+    loose = max(task.ripple, LOOSE) + missed
+    for ripple in np.geomspace(loose, task.ripple, NARROWING):
+        program = StripProgram(replace(task, ripple=float(ripple)), form)
+        start = np.append(x, last)
+        descent = descend(program, start, _bounds(task, ranges, form, form.count))
+        x, last = descent.z[: form.size], descent.z[-1]
+    return Found(task, form, ranges, program, descent, uniform)
+
+
+def _precise(task: Task) -> float:
+    return 1e-9 if task.goal == "rms" else 1e-6
+
+
+def _refined(values: FloatArray, count: int) -> FloatArray:
+    """Return thicknesses on more nodes, the same strip."""
+    old = np.linspace(0.0, 1.0, len(values))
+    return values if len(values) == count else np.interp(np.linspace(0.0, 1.0, count), old, values)
+
+
+def _begin(task: Task, form: Form, ranges: Ranges, uniform: Optimum | None, count: int) -> tuple[FloatArray, float]:
+    """Return the first numbers, and the first value of the goal."""
+    low, high = ranges.form.T
+    middle = 0.5 * (low + high)
+    if form.per_piece or form.shares or uniform is None:
+        x = middle.copy()
+        return x, _first_goal(task, uniform)
+    x = np.concatenate([np.full(count, uniform.z[0]), middle[form.count :]])
+    return x, _first_goal(task, uniform)
+
+
+def _first_goal(task: Task, uniform: Optimum | None) -> float:
+    if task.goal == "stroke":
+        known = None if uniform is None or not np.isfinite(uniform.violation) else float(uniform.z[-1])
+        return known if known is not None else 100.0 * task.stroke
+    return 2.0
+
+
+def _bounds(task: Task, ranges: Ranges, form: Form, count: int) -> FloatArray:
+    """Return the bounds of a search with another number of thicknesses, and of its goal."""
+    own = ranges.form
+    thickness = own[: form.count] if count == form.count else np.tile(own[0], (count, 1))
+    rows = np.concatenate([thickness, own[form.count :]])
+    if task.goal == "rms":
+        return rows
+    goal = [100.0 * (task.start + SHORTEST), 100.0 * ranges.longest] if task.goal == "stroke" else [1e-3, 100.0]
+    return np.concatenate([rows, [goal]])
+
+
+def _uniform(task: Task, form: Form, ranges: Ranges) -> Optimum | None:
+    """Return the best strip of one thickness."""
+    own = ranges.form
+    width = form.width or float(own[-1].mean()) * SMALL
+    first = uniform_thickness(task, width, float(own[0].mean()) * SMALL) / SMALL
+    program = StripProgram(replace(task, ripple=max(task.ripple, LOOSE)), Form(1, width=width))
+    last = [100.0 * task.stroke] if task.goal == "stroke" else [2.0]
+    bounds = _bounds(task, Ranges(own[:1], ranges.longest), Form(1, width=width), 1)
+    start = np.array([first, *last]) if program.extra else np.array([first])
+    found = descend(program, start, bounds)
+    return None if found.ending is Ending.NO_ANSWER else found
+
+
+def infeasible(found: Found) -> Design:
+    """Return what the nearest strip misses, and the target that it would meet."""
+    descent, program, task = found.descent, found.program, found.task
+    if descent.ending is Ending.NO_ANSWER:
+        why = "could not begin: the first strip has no equilibrium over 'design.travel'; ask for less of it, or "
+        why += "for other ranges in 'design.beam'"
+        return no_design(finding("target_unreachable", f"the search {why}"))
+    state = program.state(descent.z)
+    if state is None:
+        return no_design(
+            finding("target_unreachable", f"the search {descent.ending.value}; change 'design.travel' or 'design.beam'")
+        )
+    low, high = float(state.force.min()), float(state.force.max())
+    level, missed, nearest = 0.5 * (low + high), [], {}
+    off, limit = max(high / task.force - 1.0, 1.0 - low / task.force), task.material.allowable_stress
+    if off > program.ripple(descent.z):
+        missed.append(f"is up to {percent(off)} off the force")
+        flat = high - low <= 2.0 * level * program.ripple(descent.z)
+        name = "design.force" if flat else "design.tolerance"
+        nearest[name] = newton(level) if flat else format_short(off, "ratio")
+    worst = float(state.stress.max())
+    if limit is not None and worst > limit * (1.0 + 0.1 * VIOLATION):
+        missed.append(f"has a stress of {mpa(worst)}")
+        nearest["allowable stress"] = mpa(worst)
+    text = (
+        f"no strip within the ranges keeps the force, the band and the stress: from {mm(task.start)} to "
+        f"{mm(program.stroke(descent.z))} the nearest {' and '.join(missed)} ({descent.ending.value}); change "
+        "'design.force', 'design.travel' or the ranges in 'design.beam'"
+    )
+    return no_design(finding("target_unreachable", text), nearest)

@@ -1,0 +1,341 @@
+"""A printed slider-crank, pressed: what its values, findings and pictures need.
+
+A nearly straight chain yields within a thousandth of its travel: over the logarithm of the travel its force is a row of
+Chebyshev polynomials, each on a panel of its own. A panel whose polynomial has not converged is halved, and the chain
+is pressed again at the nodes of the halves. Below the first node the force is proportional to the travel.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from cfmkit.elastica.verification.corotational import recheck as by_elements
+from cfmkit.families.slider_crank.printed.chain import SLIDER, STRIP
+from cfmkit.families.slider_crank.printed.pressing import Ending
+from cfmkit.metrics.closed import mean
+from cfmkit.numerics.panels import nodes_of, resolved
+from cfmkit.numerics.roots import bracketed_root
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from cfmkit.arrays import FloatArray
+    from cfmkit.families.slider_crank.printed.chain import Elasticity
+    from cfmkit.families.slider_crank.printed.pressing import Chain, Pressed
+    from cfmkit.numerics.panels import Panels
+
+
+NEAREST = 1e-6
+"""Share of the travel at which the first node stands: the force there is about a thousandth of its level."""
+
+WIDE = 1.5
+"""Width of a panel at first, in the logarithm of the travel: a path that has no corner is resolved at once."""
+
+CLOSE = (1e-8, 1e-7)
+"""Size of the last coefficients, relative to the largest, at which force and stress have converged: the force of a good
+chain changes by a hundredth over its travel, and a place on it is to be right to a millionth of that."""
+
+HALVINGS = 12
+"""At most so many: the stress has a kink where its place jumps, and a chain without a kink has a sharp corner."""
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """Force and stress of a chain at every travel (a `cfmkit.results.ClosedForm`).
+
+    Attributes
+    ----------
+    ends : (float, float)
+        Of the curve [m].
+    first : (float, float)
+        Force [N] and stress [Pa] where it begins.
+    laws : (Panels, Panels)
+        Force [N], of all legs, and stress [Pa] over the logarithm of the travel [m].
+    """
+
+    ends: tuple[float, float]
+    first: tuple[float, float]
+    laws: tuple[Panels, Panels]
+
+    @cached_property
+    def places(self) -> FloatArray:
+        """Increasing travels: the nodes, and the ends of their panels [m]."""
+        borders = self.laws[0].ends
+        nodes = [nodes_of(ends) for ends in pairwise(borders.tolist())]
+        own = np.exp(np.sort(np.concatenate([borders, *nodes])))
+        low, high = self.ends
+        return np.concatenate([[low], own[(own > low) & (own < high)], [high]])
+
+    @property
+    def peaks(self) -> FloatArray:
+        """All places: a chain without a kink has its peak before the second point of a curve [m]."""
+        return self.places
+
+    def effort(self, _branch: str, places: FloatArray, /) -> FloatArray:
+        """Return the force of all legs at travels of any shape [N]."""
+        return self._at(places, 0)
+
+    def stress(self, _branch: str, places: FloatArray, /) -> FloatArray:
+        """Return the largest stress of a leg at travels of any shape [Pa]."""
+        return self._at(places, 1)
+
+    def force(self, places: FloatArray) -> FloatArray:
+        """Return the force of all legs at travels of any shape [N]."""
+        return self._at(places, 0)
+
+    def _at(self, places: FloatArray, which: int) -> FloatArray:
+        law, first = self.laws[which], self.first[which]
+        nearest = float(np.exp(law.ends[0]))
+        size = np.clip(np.ravel(places), *self.ends)
+        found = law.at(np.clip(np.log(np.maximum(size, nearest)), law.ends[0], law.ends[-1]))
+        share = np.minimum(size / nearest, 1.0)
+        return np.asarray(np.where(size < nearest, first + (found - first) * share, found).reshape(np.shape(places)))
+
+    def mean(self, window: tuple[float, float]) -> float:
+        """Return the mean force in a window of the travel [N]."""
+        return mean(self.force, self.places, *window)
+
+    def first_at(self, level: float, which: int = 0) -> float | None:
+        """Return the travel at which the force [N], or the stress [Pa] (1), first reaches a level; None if nowhere."""
+        places = self.places
+        above = np.flatnonzero(self._at(places, which) >= level)
+        if not len(above) or above[0] == 0:
+            return float(places[0]) if len(above) else None
+
+        def off(travel: float) -> float:
+            return float(self._at(np.array([travel]), which)[0]) - level
+
+        return bracketed_root(off, float(places[above[0] - 1]), float(places[above[0]]))
+
+
+def course(
+    pressed: Callable[[FloatArray], tuple[FloatArray, FloatArray] | None],
+    ends: tuple[float, float],
+    first: tuple[float, float],
+) -> Course | None:
+    """Return the course between two travels; None where the chain cannot be pressed to every node.
+
+    Parameters
+    ----------
+    pressed : callable
+        Force [N] and stress [Pa] at increasing travels [m]; None where one of them is not reached.
+    ends : (float, float)
+        Of the curve [m].
+    first : (float, float)
+        Force and stress where it begins.
+    """
+    low, high = np.log(max(ends[0], NEAREST * ends[1])), np.log(ends[1])
+
+    def values(places: FloatArray) -> FloatArray:
+        found = pressed(np.exp(places))
+        return np.full((2, len(places)), np.nan) if found is None else np.array(found)
+
+    borders = np.linspace(low, high, int(np.ceil((high - low) / WIDE)) + 1)
+    force, stress = resolved(values, borders, CLOSE, HALVINGS)
+    whole = np.isfinite(force.coefficients).all() and np.isfinite(stress.coefficients).all()
+    return Course(ends, first, (force, stress)) if whole else None
+
+
+Model = Literal["lumped", "beam"]
+
+FOLLOWED = (Ending.COMPLETE, Ending.UNSTABLE)
+"""Endings of a path that has all points that were requested."""
+
+CHECKED = 6
+"""Places at which the second opinion is asked for."""
+
+
+@dataclass(frozen=True)
+class SecondOpinion:
+    """Largest differences of force and stress by corotational elements, as shares, and how many elements."""
+
+    force: float
+    stress: float
+    stable: bool
+    elements: int
+
+
+@dataclass(frozen=True)
+class Solution:
+    """A chain with its equilibria; forces of all legs together, stresses of one.
+
+    Attributes
+    ----------
+    model : {"lumped", "beam"}
+        Which.
+    chain : Chain
+        What is pressed.
+    pressed : Pressed
+        The outcome.
+    material : Elasticity
+        With the stress allowed.
+    legs : int
+        Equal ones on one slider.
+    window : (float, float)
+        Where metrics are taken [m].
+    checked : bool
+        Whether a second opinion was asked for.
+    side : int
+        To which it was to bend, as `Chain.press` takes it.
+    accuracy : float
+        Of the path, relative.
+    """
+
+    model: Model
+    chain: Chain
+    pressed: Pressed
+    material: Elasticity
+    legs: int
+    window: tuple[float, float]
+    checked: bool = False
+    side: int = 0
+    accuracy: float = 1e-7
+
+    @cached_property
+    def _at(self) -> Any:
+        return self.pressed.path.at_asked
+
+    @property
+    def travel(self) -> FloatArray:
+        """Slider travel [m]."""
+        return self.pressed.travel
+
+    @cached_property
+    def force(self) -> FloatArray:
+        """Force against the travel, of all legs [N]."""
+        force: FloatArray = self.legs * self.pressed.force
+        return force
+
+    @cached_property
+    def stable(self) -> Any:
+        """Whether the equilibrium is stable while the slider is held, (n,) of bool."""
+        return self.pressed.path.stable[self._at]
+
+    @cached_property
+    def _reaction(self) -> FloatArray:
+        reaction: FloatArray = self.legs * self.pressed.path.reaction(SLIDER)[self._at]
+        return reaction
+
+    @property
+    def side_force(self) -> FloatArray:
+        """Force of the slider on its guide, across its way [N]."""
+        return -self._reaction[:, 1]
+
+    @property
+    def guide_moment(self) -> FloatArray:
+        """Moment of the slider on its guide [N m]."""
+        return -self._reaction[:, 2]
+
+    @cached_property
+    def _peak(self) -> tuple[FloatArray, FloatArray]:
+        peak = self.pressed.path.peak_stress()
+        return peak.value[self._at], self._along(peak.beam[self._at], peak.place[self._at])
+
+    @property
+    def stress(self) -> FloatArray:
+        """Largest stress of the part [Pa]."""
+        return self._peak[0]
+
+    @property
+    def place(self) -> FloatArray:
+        """Where the stress is largest: along the centre line from the clamped end [m]."""
+        return self._peak[1]
+
+    def _along(self, beams: FloatArray, shares: FloatArray) -> FloatArray:
+        """Return places on beams as lengths along the chain [m]."""
+        points = self.chain.points
+        marks = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
+        names = list(self.pressed.path.layout.network.beams)
+        if names == [STRIP]:
+            return np.asarray(shares * marks[-1])
+        first = {name: (marks[2 * k], marks[2 * k + 1]) for k, name in enumerate(names)}
+        return np.array(
+            [first[name][0] + u * (first[name][1] - first[name][0]) for name, u in zip(beams, shares, strict=True)]
+        )
+
+    @cached_property
+    def energy(self) -> FloatArray:
+        """Strain energy of all legs [J]."""
+        energy: FloatArray = self.legs * self.pressed.path.energy[self._at]
+        return energy
+
+    @cached_property
+    def course(self) -> Course | None:
+        """Force and stress at every travel; None where the chain cannot be followed to places between its points."""
+        low, high = float(self.travel[0]), float(self.travel[-1])
+        return course(self._at_travels, (low, high), (float(self.force[0]), float(self.stress[0])))
+
+    def _at_travels(self, travel: FloatArray) -> tuple[FloatArray, FloatArray] | None:
+        """Return force [N] and stress [Pa] at other travels than those of the points; None where one is not reached."""
+        found = self.chain.press(travel, self.side, self.accuracy)
+        if found.ending not in FOLLOWED or len(found.travel) < len(travel):
+            return None
+        other = replace(self, pressed=found)
+        return other.force, other.stress
+
+    @cached_property
+    def level(self) -> float:
+        """Mean force in the window [N]."""
+        low, high = max(self.window[0], float(self.travel[0])), min(self.window[1], float(self.travel[-1]))
+        if self.course is not None and low < high:
+            return self.course.mean((low, high))
+        inside = (self.travel >= low) & (self.travel <= high)
+        chosen = inside if inside.any() else np.ones(len(self.travel), dtype=bool)
+        return float(self.force[chosen].mean())
+
+    def first_at(self, level: float, stress: bool = False) -> float | None:
+        """Return the travel at which the force [N], or the stress [Pa], first reaches a level; None if nowhere."""
+        if self.course is not None:
+            return self.course.first_at(level, int(stress))
+        return first_at(self.travel, self.stress if stress else self.force, level)
+
+    @cached_property
+    def width_ratio(self) -> float:
+        """Smallest width over thickness."""
+        ratios = []
+        for beam in self.pressed.path.layout.network.beams.values():
+            section = beam.section
+            thickest = float(
+                np.max(section.thickness if isinstance(section.thickness, float) else section.thickness.values)
+            )
+            ratios.append(float(section.width) / thickest)
+        return min(ratios)
+
+    @cached_property
+    def thinnest(self) -> float:
+        """Smallest thickness [m]."""
+        values = []
+        for beam in self.pressed.path.layout.network.beams.values():
+            given = beam.section.thickness
+            values.append(float(np.min(given if isinstance(given, float) else given.values)))
+        return min(values)
+
+    @cached_property
+    def recheck(self) -> SecondOpinion | None:
+        """What corotational elements say; None if they were not asked."""
+        if not self.checked:
+            return None
+        moved = np.flatnonzero(self.travel > 0.0)
+        chosen = moved[np.unique(np.linspace(0, len(moved) - 1, CHECKED).astype(int))]
+        found = by_elements(self.pressed.path, self._at[chosen])
+        force = found.effort / self.pressed.force[chosen] - 1.0
+        stress = found.stress / self.stress[chosen] - 1.0
+        worst = [float(part[np.abs(part).argmax()]) for part in (force, stress)]
+        return SecondOpinion(worst[0], worst[1], bool(found.stable.all()), found.elements)
+
+
+def first_at(place: FloatArray, values: FloatArray, level: float) -> float | None:
+    """Return where values first reach a level from below, linear between points; None where they do not."""
+    above = np.flatnonzero(values >= level)
+    if not len(above):
+        return None
+    k = int(above[0])
+    if k == 0:
+        return float(place[0])
+    share = (level - values[k - 1]) / (values[k] - values[k - 1])
+    return float(place[k - 1] + share * (place[k] - place[k - 1]))

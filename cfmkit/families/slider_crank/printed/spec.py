@@ -1,0 +1,184 @@
+"""What a specification may say about flexures, the strip, their material and how they are made and designed."""
+
+from __future__ import annotations
+
+import itertools
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from cfmkit.specs.spec import Analysis, Model
+from cfmkit.specs.units import Length, Ratio
+from cfmkit.stock.spec import MaterialField, SafetyFactor
+
+PositiveLength = Annotated[Length, Field(gt=0)]
+
+Share = Annotated[Ratio, Field(gt=0, lt=1)]
+
+Point = tuple[Length, Length]
+
+LengthRange = tuple[PositiveLength, PositiveLength]
+
+ShareRange = tuple[Share, Share]
+
+MOST_TAPER = 100
+"""Largest thickness of a strip over its smallest: a million in stiffness. What is softer turns within its own length,
+and following its shape takes minutes for a curve that three flexures give at once."""
+
+
+class FlexureSpec(Model):
+    """A flexure with a rectangular section across a joint."""
+
+    length: PositiveLength = Field(description="along the link, L")
+    thickness: PositiveLength = Field(description="in the plane of bending, h")
+    width: PositiveLength = Field(description="out of the plane, b")
+    before: Annotated[Ratio, Field(ge=0, le=1)] = Field(0.5, description="share of the length before the joint")
+
+
+class Flexures(Model):
+    """The three flexures of one leg; rigid links between them."""
+
+    pivot: FlexureSpec = Field(description="between ground and crank")
+    crank_pin: FlexureSpec = Field(description="between crank and coupler; straight, the chord across the kink")
+    slider_pin: FlexureSpec = Field(description="between coupler and slider")
+
+    @property
+    def all(self) -> tuple[FlexureSpec, FlexureSpec, FlexureSpec]:
+        """From the ground to the slider."""
+        return self.pivot, self.crank_pin, self.slider_pin
+
+
+class StripSpec(Model):
+    """One strip from the ground to the slider in the place of links and flexures."""
+
+    width: PositiveLength = Field(description="out of the plane, B")
+    thickness: PositiveLength | Annotated[tuple[PositiveLength, ...], Field(min_length=2)] = Field(
+        description="one value, or a list: linear between, evenly spaced unless 'shares' says where"
+    )
+    shares: tuple[tuple[Share, ...], ...] | None = Field(
+        None,
+        description="where the thicknesses between the first and the last are: for each straight piece, shares of it",
+    )
+    flexure_length: PositiveLength | None = Field(
+        None, description="of the flexures whose ends the centre line passes; default: 'flexures', else a fifth of r1"
+    )
+    centreline: Annotated[tuple[Point, ...], Field(min_length=2)] | None = Field(
+        None, description="corners [x, y] from the ground to the slider instead, the pivot at [0, 0]"
+    )
+    offset: Length = Field(0.0, description="printed thicker than drawn by so much everywhere; negative: thinner")
+
+    @property
+    def values(self) -> tuple[float, ...]:
+        """The thicknesses as drawn [m], at least two."""
+        one = self.thickness
+        return one if isinstance(one, tuple) else (one, one)
+
+    @model_validator(mode="after")
+    def _as_many_places_as_thicknesses(self) -> Self:
+        if self.shares is not None:
+            inner = [share for piece in self.shares for share in piece]
+            if len(inner) + 2 != len(self.values):
+                raise ValueError(
+                    f"'shares' places {len(inner)} thicknesses between the ends, and {len(self.values) - 2} are given"
+                )
+            if any(a >= b for piece in self.shares for a, b in itertools.pairwise(piece)):
+                raise ValueError("'shares' must increase within each piece")
+        if any(a == b for a, b in itertools.pairwise(self.centreline or ())):
+            raise ValueError("'centreline' has the same corner twice in a row")
+        if min(self.values) + self.offset <= 0:
+            raise ValueError("'offset' leaves no thickness")
+        if max(self.values) + self.offset > MOST_TAPER * (min(self.values) + self.offset):
+            raise ValueError(
+                f"the largest thickness is over {MOST_TAPER} times the smallest: a place that is a million times as "
+                "soft is a hinge; make it thicker, or say 'flexures'"
+            )
+        return self
+
+
+class Process(Model):
+    """What the process can make: parts below it are warned of."""
+
+    layer: PositiveLength | None = Field(None, description="layer or position error in the plane: hides smaller kinks")
+    thinnest: PositiveLength | None = Field(None, description="thinnest wall: a nozzle, a cutter, a wire")
+
+
+class Printed(Model):
+    """What makes a slider-crank one piece: lumped flexures or a strip, and their material."""
+
+    material: MaterialField | None = Field(
+        None, description="of 'flexures' or 'beam': a name from `show materials`, or {youngs_modulus, ...}"
+    )
+    safety_factor: SafetyFactor = 1.0
+    flexures: Flexures | None = Field(None, description="small flexures at the joints, rigid links between: 'lumped'")
+    beam: StripSpec | None = Field(None, description="one strip of varying thickness: fidelity 'beam'")
+    process: Process | None = Field(None, description="how it is made, for warnings")
+
+    @property
+    def finest(self) -> Literal["prb", "lumped", "beam"]:
+        """The finest model that there is data for."""
+        if self.beam is not None:
+            return "beam"
+        return "prb" if self.flexures is None else "lumped"
+
+    @model_validator(mode="after")
+    def _parts_need_a_material(self) -> Self:
+        if (self.flexures or self.beam) and self.material is None:
+            raise ValueError("'flexures' and 'beam' need 'material'")
+        return self
+
+
+class FlexureDesign(Model):
+    """Sections of the flexures from the springs' rates and the stress: closed forms, then the exact force."""
+
+    length: PositiveLength | None = Field(None, description="of all three; default: as they are, else a fifth of r1")
+    exact: bool = Field(True, description="correct the closed forms until the beams have the force and the stress")
+
+
+class StripDesign(Model):
+    """Thickness along a strip for the longest stroke, or for the flattest force."""
+
+    shape: Literal["uniform", "even", "shares"] = Field(
+        "even", description="one thickness; nodes evenly spaced; or stations as 'beam.shares', which may move"
+    )
+    goal: Literal["stroke", "ripple", "rms"] = Field(
+        "stroke", description="longest stroke within `tolerance`, or smallest deviation over `travel`"
+    )
+    nodes: int = Field(17, ge=2, le=65, description="thicknesses of the shape 'even'")
+    thickness: LengthRange | None = Field(None, description="smallest and largest everywhere")
+    thicknesses: tuple[LengthRange, ...] | None = Field(None, description="or for each of them")
+    shares: tuple[ShareRange, ...] | None = Field(None, description="ranges of 'beam.shares'; default: fixed")
+    width: PositiveLength | LengthRange | None = Field(
+        None, description="one value, or a range to choose from; default: as the beam has it"
+    )
+    start: PositiveLength = Field(1e-3, description="where the band of the force begins: the run-in is before it")
+    longest: PositiveLength | None = Field(None, description="stroke never exceeded; default: half the slider's way")
+    seeds: int = Field(1, ge=1, le=64, description="starts: the uniform strip, then strips with random thickness")
+    stressed: bool = Field(True, description="whether the allowable stress limits the design")
+
+    @model_validator(mode="after")
+    def _ranges_increase(self) -> Self:
+        ranges = [self.thickness, *(self.thicknesses or ()), *(self.shares or ())]
+        ranges += [self.width] if isinstance(self.width, tuple) else []
+        if any(one is not None and not one[0] <= one[1] for one in ranges):
+            raise ValueError("a range goes from the smallest to the largest value")
+        return self
+
+
+class PrintedDesign(Model):
+    """What `cfmkit design` makes of the springs."""
+
+    flexures: FlexureDesign | None = Field(None, description="size the flexures for the springs' rates")
+    beam: StripDesign | None = Field(None, description="shape a strip for the force")
+
+    @model_validator(mode="after")
+    def _one_part(self) -> Self:
+        if self.flexures and self.beam:
+            raise ValueError("give either 'flexures' or 'beam'")
+        return self
+
+
+class PrintedAnalysis(Analysis):
+    """How flexures and strips are computed."""
+
+    accuracy: Annotated[Ratio, Field(ge=1e-10, le=1e-3)] = Field(1e-7, description="of the beams' forces")
+    recheck: bool = Field(False, description="compute force and stress again by corotational elements at a few places")

@@ -1,0 +1,234 @@
+"""A slider-crank with springs put together: linkage, rates, the motion that it can run through, the forces inside.
+
+The coupler is in equilibrium under the forces at its ends and the moments of the springs at crank pin and
+slider pin; the slider passes on its own spring's force and what drives it.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from cfmkit.families.slider_crank.build import linkage_of, side_of, unloaded_angle
+from cfmkit.families.slider_crank.unit_springs import (
+    UnitCurves,
+    along_crank,
+    along_slider,
+    crank_efforts,
+    slider_forces,
+)
+
+if TYPE_CHECKING:
+    from cfmkit.arrays import FloatArray
+    from cfmkit.curves import Kind
+    from cfmkit.families.slider_crank.linkage import Linkage
+    from cfmkit.families.slider_crank.spec import SliderCrankSpec
+
+
+TURN = 2.0 * math.pi
+
+SHORT_OF_END = 1e-3
+"""Share of an arc that a motion stays away from its ends, where efforts have no bound."""
+
+CLOSEST = 1e-6
+"""Nearer to such an end, as a share of the way to it, the last digits of the motion decide the effort's."""
+
+
+@dataclass(frozen=True)
+class Assembly:
+    """A slider-crank put together.
+
+    Attributes
+    ----------
+    linkage : Linkage
+        The lengths, the coupler's written out.
+    unloaded : float
+        Crank angle with all springs relaxed [rad].
+    rates : (4,) array
+        Of the springs of all legs together [N m/rad; the last N/m].
+    drive : {"torque", "force"}
+        What the motion is: the crank's angle or the slider's travel.
+    side : int
+        Of a force drive: 1 beyond, -1 before the stretched position.
+    """
+
+    linkage: Linkage
+    unloaded: float
+    rates: FloatArray
+    drive: Kind = "torque"
+    side: int = 1
+
+    def units(self, motion: FloatArray) -> UnitCurves:
+        """Return what unit springs do along the motion of the drive."""
+        if self.drive == "torque":
+            return along_crank(self.linkage, self.unloaded, motion)
+        return along_slider(self.linkage, self.unloaded, self.side, motion)
+
+    def forces(self, motion: FloatArray) -> FloatArray:
+        """Return the efforts of `units` alone, (4, n)."""
+        if self.drive == "torque":
+            return crank_efforts(self.linkage, self.unloaded, motion)
+        return slider_forces(self.linkage, self.unloaded, self.side, motion)
+
+    @property
+    def motion_name(self) -> Literal["angle", "travel"]:
+        """What the motion is called in a specification and among the values."""
+        return "angle" if self.drive == "torque" else "travel"
+
+    @property
+    def dimension(self) -> Literal["angle", "length"]:
+        """Dimension of the motion."""
+        return "angle" if self.drive == "torque" else "length"
+
+    @property
+    def start(self) -> float:
+        """The motion in the unloaded position."""
+        return self.unloaded if self.drive == "torque" else 0.0
+
+    @property
+    def rest(self) -> float:
+        """The motion at which the springs are relaxed; NaN on the side of the stretched position where they are not."""
+        knee = self.linkage.knee(self.unloaded)
+        other_side = self.drive == "force" and self.side * knee < 0.0 and knee != math.pi
+        return math.nan if other_side else self.start
+
+    @property
+    def reach(self) -> tuple[float, float]:
+        """Ends of the motion that the linkage allows [rad or m]; infinite where the crank turns fully."""
+        if self.drive == "torque":
+            return self.linkage.arc(self.unloaded)
+        inward, outward = self.linkage.room(self.unloaded)
+        first, last = self._relaxed_ends
+        return 0.0 if first else -outward, 0.0 if last else inward
+
+    @property
+    def _relaxed_ends(self) -> tuple[bool, bool]:
+        """Whether the springs are relaxed at the first, and at the last place that a driven slider can reach."""
+        stretched, folded = (self.linkage.knee(self.unloaded) == knee for knee in (0.0, math.pi))
+        past = self.linkage.branch * float(self.linkage.slider_position(np.asarray(self.unloaded))) < 0.0
+        return (folded, stretched) if past else (stretched, folded)
+
+    @property
+    def poles(self) -> tuple[bool, bool]:
+        """Whether the effort grows without bound towards the first, and towards the last place of the reach.
+
+        A drive loses its hold in a dead point: nothing but springs that are relaxed there, or that it drives itself,
+        give it a finite effort.
+        """
+        if self.drive == "torque":
+            held = bool(self.rates[1:].any())
+            first, last = (held and math.isfinite(end) and end != self.unloaded for end in self.reach)
+            return first, last
+        link, held = self.linkage, bool(self.rates[:3].any())
+        ends = link.way(self.unloaded)[::-1]
+        first, last = (held and end != 0.0 and not rest for end, rest in zip(ends, self._relaxed_ends, strict=True))
+        return first, last
+
+    def within(self, low: float, high: float) -> tuple[float, float]:
+        """Return the part of a motion that is within reach, and ends before the efforts grow without bound.
+
+        What keeps off a pole by itself is left as it is. What touches or passes it ends `SHORT_OF_END` of the way
+        from the unloaded position before it: there the effort is some thirty times what it is elsewhere.
+        """
+        (first, last), (at_first, at_last) = self.reach, self.poles
+        to_first, to_last = self._ways
+        if at_first and low < first + CLOSEST * to_first:
+            first += SHORT_OF_END * to_first
+        if at_last and high > last - CLOSEST * to_last:
+            last -= SHORT_OF_END * to_last
+        return max(low, first), min(high, last)
+
+    @property
+    def _ways(self) -> tuple[float, float]:
+        """How far the motion is from the unloaded position to the first, and to the last place of the reach.
+
+        On the other side of the stretched position the slider gets to the folded one by way of the stretched one,
+        the springs turned all the way, however near to it the unloaded position is.
+        """
+        first, last = self.reach
+        ways = [self.start - first, last - self.start]
+        if self.drive == "force" and math.isnan(self.rest):
+            ends, far = self.linkage.way(self.unloaded)[::-1], self.linkage.stretched_position
+            ways = [way if abs(end) == far else last - first for way, end in zip(ways, ends, strict=True)]
+        return ways[0], ways[1]
+
+    @property
+    def stretched(self) -> float:
+        """The motion in the stretched position nearest to the unloaded one."""
+        if self.drive == "force":
+            first, last = self.reach
+            return first if self.linkage.way(self.unloaded)[1] == self.linkage.stretched_position else last
+        return self.unloaded - math.remainder(self.unloaded - self.linkage.stretched_angle, TURN)
+
+
+def assemble(spec: SliderCrankSpec) -> Assembly:
+    """Return the slider-crank put together.
+
+    Raises
+    ------
+    CannotBuild
+        If it cannot exist as described; the finding says why.
+    """
+    mechanism, analysis = spec.mechanism, spec.analysis
+    linkage = linkage_of(mechanism)
+    unloaded = unloaded_angle(mechanism, linkage)
+    springs = mechanism.springs
+    rates = np.array([springs.pivot, springs.crank_pin, springs.slider_pin, springs.slider]) * mechanism.legs
+    rates.setflags(write=False)
+    return Assembly(linkage, unloaded, rates, analysis.drive, side_of(spec, linkage, unloaded))
+
+
+def default_motion(assembly: Assembly) -> tuple[float, float]:
+    """Return the motion that is run through where none is asked for: all of it, a full turn at most."""
+    low, high = assembly.reach
+    if math.isinf(low):
+        return assembly.start, assembly.start + TURN
+    room = SHORT_OF_END * (high - low)
+    if assembly.drive == "force":
+        return (0.0, high - room) if high > room else (low + room, 0.0)  # relaxed folded, it can only be pulled
+    return low + room, high - room
+
+
+def reactions(assembly: Assembly, units: UnitCurves, drive: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the force along the coupler and that of the slider on its guide.
+
+    Parameters
+    ----------
+    assembly : Assembly
+        The mechanism; rates of all legs.
+    units : UnitCurves
+        Along the motion, n places.
+    drive : (n,) array
+        Force that drives the slider towards the pivot [N]; zero where a torque drives the crank.
+
+    Returns
+    -------
+    coupler, guide : (n,) array
+        Tension in the coupler, and force on the guide across the slider's way (positive
+        upwards) [N]; for the rates and the drive given, so of all legs together or of one.
+    """
+    link, rates, turn = assembly.linkage, assembly.rates, units.turn
+    beta = _coupler_angle(link, units)
+    along = -rates[3] * turn[3] - link.branch * drive  # force of spring and drive on the slider, along x
+    moment = -rates[1] * turn[1] - rates[2] * turn[2]  # of both torsion springs on the coupler
+    sine, cosine = np.sin(beta), np.cos(beta)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        # moments about the crank pin: r2 (cos b Y - sin b X) + moment = 0, X and Y the slider's pull on the coupler
+        across = (link.coupler * sine * along - moment) / (link.coupler * cosine)
+    coupler: FloatArray = along * cosine + across * sine
+    return coupler, -across
+
+
+def _coupler_angle(link: Linkage, units: UnitCurves) -> FloatArray:
+    """Return the direction of the coupler [rad].
+
+    A slider that is driven takes the crank pin past the place where the coupler stands across its way; from there on
+    the coupler points to the other side than the branch says.
+    """
+    beta = link.coupler_angle(units.angle)
+    turned = link.branch * (units.position - link.crank * np.cos(units.angle)) < 0.0
+    angle: FloatArray = np.where(turned, np.pi - beta, beta)
+    return angle

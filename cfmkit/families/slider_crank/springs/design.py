@@ -1,0 +1,337 @@
+"""From targets to springs, and to lengths where the design may choose them.
+
+The effort is linear in the springs' rates: with the lengths given, the best rates are the solution of a linear
+programme or of a least-squares problem. Lengths are searched outside of that, on a grid
+and then inside its best cell, the unloaded position's lead on a logarithmic scale.
+
+Reference
+---------
+[LH] B. Li, G. Hao, Chin. J. Mech. Eng. 32 (2019) 10.1186/s10033-019-0369-z, sec. 6.
+[B] P. Bilancia, A. Geraci, G. Berselli, SMASIS2019-5519, sec. 2.1.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.families.refusals import CannotBuild, Infeasible, no_design
+from cfmkit.families.slider_crank.build import resolve
+from cfmkit.families.slider_crank.findings import finding
+from cfmkit.families.slider_crank.springs.assembly import TURN, default_motion
+from cfmkit.families.slider_crank.springs.outcome import (
+    Solved,
+    about_springs,
+    active_bounds,
+    audited,
+    cannot_hold,
+    check_reach,
+    hopeless,
+    message,
+    not_proven,
+    nowhere,
+    search_of,
+    too_far,
+)
+from cfmkit.families.slider_crank.springs.rates import least_squares, minimax, preferred, ranges
+from cfmkit.families.slider_crank.springs.solution import EDGE
+from cfmkit.families.slider_crank.springs.targets import DENSE, FREE, task_of, with_lengths
+from cfmkit.families.slider_crank.springs.windows import widest, widest_of_all
+from cfmkit.families.slider_crank.unit_springs import JOINTS
+from cfmkit.numerics.boxes import Axis, Lowest, lowest
+from cfmkit.results import Design, Status
+from cfmkit.specs.units import Place, format_short
+
+if TYPE_CHECKING:
+    from cfmkit.arrays import FloatArray
+    from cfmkit.families.base import Run
+    from cfmkit.families.slider_crank.spec import CrankDesign, SliderCrankSpec
+    from cfmkit.families.slider_crank.springs.rates import Goal
+    from cfmkit.families.slider_crank.springs.targets import Task
+    from cfmkit.results import Finding
+
+
+HOPELESS = 0.5
+"""Springs that miss the target by more are no design, even where no tolerance is stated."""
+
+EFFORT = {"least-squares": (13, 20), "minimax": (11, 14), "widest": (5, 10)}
+"""Values of each free length on the grid, and around its best: a least-squares problem costs the least."""
+
+
+def design(spec: SliderCrankSpec, run: Run) -> Design:
+    """Return a complete specification with the springs, and the lengths left free, that meet the `design` block best.
+
+    Parameters
+    ----------
+    spec : SliderCrankSpec
+        With a `design` block.
+    run : Run
+        Only its progress is used: the search is deterministic.
+
+    Returns
+    -------
+    Design
+        INFEASIBLE, with the reason and what would be feasible, if nothing keeps the tolerance.
+    """
+    wanted = spec.design
+    if wanted is None:
+        return Design(None, Status.INVALID, "this spec has no 'design' block: add 'torque' or 'force', and a window")
+    try:
+        solved, search = _searched(spec, wanted, run)
+        solved = _kept(audited(solved, _written(solved)))
+    except Infeasible as problem:
+        return no_design(problem.finding, problem.nearest)
+    except CannotBuild as problem:
+        return no_design(problem.finding)
+    warnings = (*about_springs(solved), *alternatives(solved, search))
+    if wanted.window is None and (search is not None or not solved.proven):
+        warnings = (*warnings, not_proven(solved, search is not None))
+    return Design(
+        _written(solved),
+        Status.COMPLETE,
+        message(solved),
+        active_bounds(solved, wanted),
+        warnings=warnings,
+        search=search_of(solved),
+    )
+
+
+def _kept(solved: Solved) -> Solved:
+    """Return a design that keeps its tolerance where it was audited.
+
+    A widest window whose springs are farther off between the places that the search looked at than its reserve allows
+    is looked for again, by as much stricter.
+
+    Raises
+    ------
+    Infeasible
+        If a given window does not allow it.
+    """
+    tolerance = solved.task.wanted.tolerance
+    if tolerance is None or not solved.exact or solved.deviation <= tolerance * EDGE:
+        return solved
+    if solved.task.wanted.window is None:
+        again = solve(solved.task, tolerance * tolerance / solved.deviation)
+        again = audited(again, _written(again))
+        if again.deviation <= tolerance * EDGE:
+            return again
+    raise Infeasible(*too_far(solved.task, solved.deviation))
+
+
+def _searched(spec: SliderCrankSpec, wanted: CrankDesign, run: Run) -> tuple[Solved, Lowest | None]:
+    """Return the best design, and the search that led to its lengths."""
+    axes = {name: _axis(name, getattr(wanted, name)) for name in FREE if getattr(wanted, name) is not None}
+    if not axes:
+        return solve(task_of(spec)), None
+
+    count = 0
+
+    def height(place: tuple[float, ...]) -> float:
+        nonlocal count
+        count += 1
+        run.progress(1.0 - 1.0 / (1.0 + count / 200.0), f"{count} choices of lengths")
+        return _height(spec, dict(zip(axes, place, strict=True)))
+
+    grid, fine = EFFORT["widest" if wanted.window is None else wanted.objective]
+    found = lowest(height, tuple(axes.values()), grid if len(axes) < 3 else min(grid, 7), fine)
+    if not math.isfinite(found.value):
+        names = " or ".join(f"'design.{name}'" for name in axes)
+        text = f"no lengths in the ranges given reach the window within the limits of the joints; widen {names}"
+        raise Infeasible(finding("infeasible_targets", text))
+    place = even_best(spec, tuple(axes), found) if wanted.slack else found.place
+    return solve(task_of(with_lengths(spec, dict(zip(axes, place, strict=True))))), found
+
+
+def _axis(name: str, ends: tuple[float, float]) -> Axis:
+    return Axis(*ends, log=name != "offset")
+
+
+def _height(spec: SliderCrankSpec, lengths: dict[str, float]) -> float:
+    """Return what a choice of lengths is judged by: the deviation, or the width of the window with a minus."""
+    try:
+        task = task_of(with_lengths(spec, lengths))
+    except CannotBuild:
+        return math.inf
+    wanted = task.wanted
+    if wanted.window is None:
+        found = widest(task, wanted.tolerance or 0.0)
+        return math.inf if found is None else -found.width
+    first, last = task.allowed
+    if wanted.window[0] < first - 1e-9 or wanted.window[1] > last + 1e-9:
+        return math.inf
+    try:
+        goal = task.goal(wanted.window)
+    except Infeasible:
+        goal = None
+    if goal is None:
+        return math.inf
+    least = wanted.objective == "least-squares"
+    rates = least_squares(goal) if least else minimax(goal)
+    if rates is None:
+        return math.inf
+    return goal.rms(rates) if least else goal.deviation(rates)
+
+
+def solve(task: Task, tolerance: float | None = None) -> Solved:
+    """Return the best springs for given lengths, for the design's tolerance or another one.
+
+    Raises
+    ------
+    Infeasible
+        If nothing keeps the tolerance, or the window cannot be reached.
+    """
+    wanted, proven = task.wanted, True
+    if wanted.window is None:
+        found, proven = widest_of_all(task, tolerance or wanted.tolerance or 0.0)
+        if found is None:
+            raise Infeasible(nowhere(task))
+        window = found.low, found.high
+    else:
+        window = wanted.window
+        check_reach(task, window)
+    goal = task.goal(window, None if wanted.objective == "least-squares" else DENSE)
+    if goal is None:
+        text = "in the window the effort has no bound: a dead point, or the stretched position, lies in it"
+        text += f"; change 'design.{task.assembly.motion_name}'"
+        raise Infeasible(finding("infeasible_targets", text))
+    rates = least_squares(goal) if wanted.objective == "least-squares" else minimax(goal)
+    if rates is None:
+        raise Infeasible(cannot_hold(task))
+    if not rates.any():
+        raise Infeasible(cannot_hold(task) if wanted.hold_stiffness else nowhere(task))
+    if wanted.slack:
+        rates = chosen_rates(goal, rates, wanted)
+    deviation = goal.deviation(rates)
+    if deviation > HOPELESS and wanted.tolerance is None:
+        raise Infeasible(hopeless(task, deviation))
+    if wanted.window is not None and wanted.tolerance is not None and deviation > wanted.tolerance:
+        raise Infeasible(*too_far(task, deviation))
+    return Solved(task, window, rates, deviation, goal.rms(rates), proven, len(goal.wanted))
+
+
+def _written(solved: Solved) -> SliderCrankSpec:
+    """Return the spec with springs and lengths written in, and an analysis that looks where the design did."""
+    spec, wanted = resolve(solved.task.spec), solved.task.wanted
+    springs = spec.mechanism.springs.model_copy(update=dict(zip(JOINTS, solved.rates.tolist(), strict=True)))
+    mechanism = spec.mechanism.model_copy(update={"springs": springs})
+    if any(getattr(wanted, name) is not None for name in ("crank_length", "offset")):
+        mechanism = solved.task.spec.mechanism.model_copy(update={"springs": springs})
+    assembly = solved.task.assembly
+    written: dict[str, object] = {"drive": assembly.drive, f"reference_{assembly.motion_name}": _reference(solved)}
+    if wanted.window is None or spec.analysis.window is None:
+        written["window"] = tuple(Place(end, assembly.dimension) for end in solved.window)
+    written |= _seen(solved)
+    analysis = spec.analysis.model_copy(update=written)
+    return spec.model_copy(update={"mechanism": mechanism, "analysis": analysis})
+
+
+def _seen(solved: Solved) -> dict[str, tuple[float, float]]:
+    """Return the motion of the analysis, if it has to be another one to show all of the window, and nothing forbidden.
+
+    Where none is asked for, the joints' limits are those of the motion, too.
+    """
+    name = solved.task.assembly.motion_name
+    asked: tuple[float, float] | None = getattr(solved.task.spec.analysis, name)
+    if asked is None and solved.task.spec.mechanism.limits is not None:
+        return {name: solved.task.allowed}
+    low, high = asked or default_motion(solved.task.assembly)
+    if low <= solved.window[0] and solved.window[1] <= high:
+        return {}
+    if asked is None and high - low >= TURN and solved.window[1] <= low:
+        return {name: (low - TURN, low)}
+    return {name: (min(low, solved.window[0]), max(high, solved.window[1]))}
+
+
+def _reference(solved: Solved) -> float:
+    """Return the place nearest to the middle of the window at which the effort is exactly the target."""
+    from cfmkit.numerics.roots import bracketed_root
+
+    low, high = solved.window
+    places = np.linspace(low, high, DENSE)
+    legs, target = solved.task.spec.mechanism.legs, solved.task.wanted.target
+    unit = solved.task.assembly
+    offset = solved.rates @ unit.units(places).effort * legs - target
+    change = np.flatnonzero(np.isfinite(offset[:-1]) & (offset[:-1] * offset[1:] <= 0.0))
+    if not len(change):
+        return 0.5 * (low + high)
+    at = int(change[np.argmin(np.abs(places[change] - 0.5 * (low + high)))])
+
+    def off(motion: float) -> float:
+        return float(solved.rates @ unit.units(np.array([motion])).effort[:, 0]) * legs - target
+
+    return bracketed_root(off, float(places[at]), float(places[at + 1]))
+
+
+NEGLIGIBLE = 5e-4
+"""More deviation, as a fraction of the target, that nobody would notice: such designs are told of as equals."""
+
+PLACES = 60
+"""Places of the window for the programmes that say how far the rates may move."""
+
+
+def chosen_rates(goal: Goal, best: FloatArray, wanted: CrankDesign) -> FloatArray:
+    """Return the rates preferred among those whose deviation is worse than the best by no more than the slack."""
+    if wanted.prefer == "small-rotation":  # a matter of lengths only
+        return best
+    found = preferred(goal, goal.deviation(best) + wanted.slack, wanted.prefer)
+    return best if found is None else found
+
+
+def even_best(spec: SliderCrankSpec, names: tuple[str, ...], search: Lowest) -> tuple[float, ...]:
+    """Return the lengths preferred among those on the search's first axis that are worse by no more than the slack."""
+    wanted = spec.design
+    if wanted is None or wanted.window is None or wanted.prefer != "small-rotation":
+        return search.place
+    good = [place for place, value in search.profile if value <= search.value + wanted.slack]
+
+    def rotation(place: tuple[float, ...]) -> float:
+        task = task_of(with_lengths(spec, dict(zip(names, place, strict=True))))
+        return task.rotation(wanted.window or (0.0, 0.0))
+
+    return min([search.place, *good], key=rotation)
+
+
+def alternatives(solved: Solved, search: Lowest | None) -> tuple[Finding, ...]:
+    """Return how far rates and lengths may move without harm, if they may move far."""
+    told = [text for text in (_of_lengths(solved, search), _of_rates(solved)) if text]
+    if not told:
+        return ()
+    wanted = solved.task.wanted
+    extra = max(wanted.slack, NEGLIGIBLE)
+    cure = "" if wanted.slack else "; 'design.slack' and 'design.prefer' choose among them"
+    text = f"within another {100 * extra:.2g} % of deviation lie many designs: {'; '.join(told)}{cure}"
+    return (finding("near_optima", text),)
+
+
+def _of_rates(solved: Solved) -> str:
+    """Return the range of each rate with nearly the same deviation; empty if all are well determined."""
+    goal = solved.task.goal(solved.window, PLACES)
+    if goal is None:
+        return ""
+    span = ranges(goal, goal.deviation(solved.rates) + max(solved.task.wanted.slack, NEGLIGIBLE))
+    if np.isnan(span).any():
+        return ""
+    wide = span[:, 1] - span[:, 0] > 0.2 * np.maximum(solved.rates, 1e-300)
+    told = []
+    for k, name in enumerate(JOINTS):
+        if name in solved.task.wanted.springs and wide[k] and math.isfinite(span[k, 1]):
+            dimension = "stiffness" if name == "slider" else "rotational_stiffness"
+            low, high = (format_short(float(end), dimension) for end in span[k])
+            told.append(f"{name.replace('_', ' ')} {low} to {high}")
+    return ", ".join(told) if len(told) > 1 else ""
+
+
+def _of_lengths(solved: Solved, search: Lowest | None) -> str:
+    """Return the range of the first free length with nearly the same deviation; empty if it is well determined."""
+    wanted = solved.task.wanted
+    if search is None or wanted.window is None:
+        return ""
+    good = [place[0] for place, value in search.profile if value <= search.value + max(wanted.slack, NEGLIGIBLE)]
+    if len(good) < 2:
+        return ""
+    name = next(name for name in FREE if getattr(wanted, name) is not None)
+    dimension = "angle" if name == "unloaded_offset" else "length"
+    low, high = (format_short(end, dimension) for end in (min(good), max(good)))
+    return f"{name.replace('_', ' ')} {low} to {high}"

@@ -1,0 +1,369 @@
+"""Pictures of a slider-crank: its curve, the energy with its wells, what each spring adds, itself to scale."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.families.slider_crank.springs.stiffness import NEGATIVE
+from cfmkit.families.slider_crank.unit_springs import JOINTS
+from cfmkit.plots import parts
+from cfmkit.plots.bands import limits_on
+from cfmkit.plots.curves import Look, plot_curve
+from cfmkit.plots.diagram import Diagram, Limit, Scale, Series, diagram_figure
+from cfmkit.plots.loop import loop_figure
+from cfmkit.plots.place import Label, place_labels
+from cfmkit.plots.style import BLUE, BROWN, GREY, INK, OCHRE, PURPLE, VERMILLION, axes_mm, new_figure, styled
+from cfmkit.plots.text import Heading, value_text, write_heading
+from cfmkit.specs.units import format_short, to_border
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from cfmkit.arrays import FloatArray
+    from cfmkit.families.slider_crank.springs.solution import Solution
+    from cfmkit.results import Result
+
+
+KEY_ROOM = 42.0
+"""Room for the small curve above the linkages [mm of print]."""
+
+Point = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class KeyPosition:
+    """The linkage at one place of its motion.
+
+    Attributes
+    ----------
+    name : str
+        What is special about it.
+    motion, angle : float
+        The place [rad or m], and the crank's angle there [rad].
+    crank_pin, slider_pin : (float, float)
+        B and C [m].
+    """
+
+    name: str
+    motion: float
+    angle: float
+    crank_pin: Point
+    slider_pin: Point
+
+    def title(self, solution: Solution) -> str:
+        """Return what stands above its panel."""
+        angle = format_short(self.angle, "angle", 3)
+        if solution.assembly.drive == "torque":
+            return f"{self.name}: crank at {angle}"
+        return f"{self.name}: {format_short(self.motion, 'length', 3)},\ncrank at {angle}"
+
+    @property
+    def joints(self) -> tuple[Point, Point, Point]:
+        """A, B and C."""
+        return (0.0, 0.0), self.crank_pin, self.slider_pin
+
+    @property
+    def directions(self) -> tuple[float, float, float]:
+        """Direction of the link at each joint that its spring turns with [rad]."""
+        (bx, by), (cx, cy) = self.crank_pin, self.slider_pin
+        coupler = math.atan2(cy - by, cx - bx)
+        return math.atan2(by, bx), coupler, coupler + math.pi
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What all panels have in common.
+
+    Attributes
+    ----------
+    box : (float, float, float, float)
+        Left, bottom, right, top [m].
+    size : float
+        Of symbols [m].
+    wall : float
+        Where the slider's spring is fixed: its x [m].
+    """
+
+    box: tuple[float, float, float, float]
+    size: float
+    wall: float
+
+
+def key(solution: Solution, name: str, motion: float) -> KeyPosition:
+    """Return the linkage at one place of its motion."""
+    units, link = solution.assembly.units(np.array([motion])), solution.assembly.linkage
+    angle = float(units.angle[0])
+    pin = link.crank * math.cos(angle), link.crank * math.sin(angle)
+    return KeyPosition(name, motion, angle, pin, (float(units.position[0]), link.offset))
+
+
+def key_positions(solution: Solution) -> tuple[KeyPosition, ...]:
+    """Return three telling positions: unloaded, stretched or unstable, and the second stable one or the last."""
+    low, high = float(solution.motion[0]), float(solution.motion[-1])
+    start, stretched = solution.assembly.start, solution.assembly.stretched
+    first = key(solution, "unloaded", start) if low <= solution.assembly.rest <= high else key(solution, "first", low)
+    unstable, stable = solution.nearest(False), solution.nearest(True)
+    if unstable is not None:
+        middle = key(solution, "unstable", unstable.motion)
+    elif solution.assembly.drive == "torque" and low < stretched < high and abs(stretched - start) > 1e-9:
+        middle = key(solution, "stretched", stretched)
+    else:
+        middle = key(solution, "half way", 0.5 * (low + high))
+    far = high if abs(high - start) >= abs(low - start) else low
+    last = key(solution, "last", far) if stable is None else key(solution, "second stable", stable.motion)
+    return first, middle, last
+
+
+def scene(solution: Solution) -> Scene:
+    """Return a box around all positions of the motion, with room for symbols."""
+    link, units = solution.assembly.linkage, solution.units
+    x = np.concatenate([[0.0], link.crank * np.cos(units.angle), units.position])
+    y = np.concatenate([[0.0, link.offset], link.crank * np.sin(units.angle)])
+    extent = max(float(np.ptp(x)), float(np.ptp(y)))
+    size = 0.045 * extent
+    far = float(units.position.max()) if link.branch > 0 else float(units.position.min())
+    wall = far + link.branch * 4.0 * size
+    ends = [
+        float(x.min()),
+        float(x.max()),
+        wall if solution.assembly.rates[3] > 0.0 else far + 3.0 * size * link.branch,
+    ]
+    room = 1.6 * size
+    bottom, top = min(float(y.min()), -size) - room, max(float(y.max()), link.offset + size) + room
+    return Scene((min(ends) - room, bottom, max(ends) + room, top), size, wall)
+
+
+def torsion_spring(joint: Point, direction: float, radius: float) -> FloatArray:
+    """Return a spiral of one and a half turns around a joint that ends on a link, (n, 2) [m]."""
+    turn = np.linspace(-3.0 * math.pi, 0.0, 60)
+    reach = radius * np.linspace(0.35, 1.0, 60)
+    return np.column_stack([joint[0] + reach * np.cos(direction + turn), joint[1] + reach * np.sin(direction + turn)])
+
+
+STACK_BELOW = 0.55
+"""Mechanisms less high than this fraction of their width are drawn below each other, not side by side."""
+
+COLOURS = (BLUE, VERMILLION, PURPLE, BROWN)
+"""Of the springs, in the order of the joints."""
+
+
+def figures(result: Result) -> dict[str, Callable[[], Figure]]:
+    """Return what draws each picture of a solved mechanism, by file stem."""
+    makers = [curve, energy, springs, joints, linkage] if result.state.assembly.rates.any() else [joints, linkage]
+    return {maker.__name__: partial(maker, result) for maker in makers}
+
+
+def motion_scale(solution: Solution) -> Scale:
+    """Return the horizontal axis of every diagram."""
+    if solution.assembly.drive == "torque":
+        return Scale("crank angle", "angle")
+    return Scale("travel of the slider", "length")
+
+
+@styled
+def curve(result: Result) -> Figure:
+    """Return torque or force over the motion: the constant band named, equilibria marked."""
+    solution: Solution = result.state
+    drive = solution.assembly.drive
+    over = "crank angle" if drive == "torque" else "travel of the slider"
+    heading = f"{drive} over {over}: {_kind(solution)}"
+    figure = loop_figure(result, None, heading)
+    for ax in figure.axes:
+        _equilibria(ax, solution, lambda _motion, _energy: 0.0)
+        _band(ax, solution)
+    return figure
+
+
+def _kind(solution: Solution) -> str:
+    """Return the class of the stiffness in words for a heading."""
+    name = solution.character.name
+    return name if name in ("bistable", "tristable", "snap-through") else f"{name} stiffness"
+
+
+def _band(ax: Axes, solution: Solution) -> None:
+    """Shade the constant band and name it; of a mechanism that snaps through it says nothing."""
+    if solution.band is None or solution.character.kind > NEGATIVE:
+        return
+    dimension = motion_scale(solution).dimension
+    low, high = (float(to_border(end, dimension)) for end in solution.band)
+    ax.axvspan(low, high, color=BLUE, alpha=0.10, linewidth=0, zorder=0.5, gid="no-obstacle")
+    width = value_text(solution.band[1] - solution.band[0], dimension)
+    text = f"within {100.0 * solution.character.tolerance:g} %: {width}"
+    floor, ceiling = ax.get_ylim()
+    places = np.column_stack([np.full(40, 0.5 * (low + high)), np.linspace(floor, ceiling, 42)[1:-1]])
+    place_labels(ax, [Label(text, BLUE, places, prefer=0.12)])
+
+
+def _equilibria(ax: Axes, solution: Solution, height: Callable[[float, float], float]) -> None:
+    """Mark stable equilibria with a full, unstable ones with an open circle."""
+    dimension = motion_scale(solution).dimension
+    for item in solution.character.equilibria:
+        x, y = float(to_border(item.motion, dimension)), height(item.motion, item.energy)
+        if not ax.get_ylim()[0] <= y <= ax.get_ylim()[1]:
+            continue
+        face = INK if item.stable else "white"
+        ax.plot(
+            [x], [y], marker="o", markersize=5, color=INK, markerfacecolor=face,
+            linestyle="", zorder=5, clip_on=False, gid="stable" if item.stable else "unstable",
+        )  # fmt: skip
+
+
+@styled
+def energy(result: Result) -> Figure:
+    """Return the energy over the motion with its wells, and the share of each spring."""
+    solution: Solution = result.state
+    rates = solution.assembly.rates
+    shares = 0.5 * rates[:, None] * solution.units.turn**2
+    series = [Series(solution.energy, "all springs", INK, prefer=0.75)]
+    if (rates > 0.0).sum() > 1:
+        series += [
+            Series(shares[k], name.replace("_", " "), COLOURS[k], dashed=True, prefer=0.9 - 0.1 * k)
+            for k, name in enumerate(JOINTS)
+            if rates[k] > 0.0
+        ]
+    diagram = Diagram(solution.motion, motion_scale(solution), Scale("energy", "energy"), series)
+    figure = diagram_figure(Heading.of(result, "energy of the springs, and where it has its wells"), [diagram])
+    _equilibria(figure.axes[0], solution, lambda _motion, height: float(to_border(height, "energy")))
+    _name_wells(figure.axes[0], solution)
+    return figure
+
+
+def _name_wells(ax: Axes, solution: Solution) -> None:
+    dimension, found = motion_scale(solution).dimension, []
+    for item in solution.character.equilibria:
+        place = float(to_border(item.motion, dimension)), float(to_border(item.energy, "energy"))
+        text = f"{'stable' if item.stable else 'unstable'}, {value_text(item.motion, dimension)}"
+        found.append(Label(text, INK if item.stable else GREY, np.array([place]), toward=(0.0, 1.0)))
+    place_labels(ax, found)
+
+
+@styled
+def springs(result: Result) -> Figure:
+    """Return the effort of each spring over the motion, and the stiffness of all."""
+    solution: Solution = result.state
+    drive, over = solution.assembly.drive, motion_scale(solution)
+    there = [k for k in range(4) if solution.assembly.rates[k] > 0.0]
+    series = [
+        Series(solution.shares[k], JOINTS[k].replace("_", " "), COLOURS[k], prefer=0.9 - 0.12 * n)
+        for n, k in enumerate(there)
+    ]
+    if len(there) > 1:
+        series.insert(0, Series(solution.effort, "all springs", INK, prefer=0.7))
+    rate = "rotational_stiffness" if drive == "torque" else "stiffness"
+    slope = [Series(solution.stiffness, "", INK)]
+    upper = Diagram(solution.motion, over, Scale(f"{drive} of a spring", drive), series)
+    lower = Diagram(solution.motion, over, Scale("stiffness", rate), slope, _zero())
+    heading = Heading.of(result, f"what each spring adds to the {drive}, and the slope of all")
+    return diagram_figure(heading, [upper, lower])
+
+
+def _zero() -> list[Limit]:
+    return [Limit(0.0, "zero stiffness")]
+
+
+@styled
+def joints(result: Result) -> Figure:
+    """Return how far each joint turns, against its limit, and the forces inside."""
+    solution: Solution = result.state
+    turn, over = solution.units.turn, motion_scale(solution)
+    series = [Series(turn[k], JOINTS[k].replace("_", " "), COLOURS[k], prefer=0.85 - 0.15 * k) for k in range(3)]
+    limits = [limit for name in JOINTS[:3] for limit in limits_on(result, f"{name}_rotation_max")]
+    coupler, guide = solution.reactions
+    forces = [
+        Series(coupler, "along the coupler, tension", BLUE),
+        Series(guide, "on the guide", VERMILLION, prefer=0.8),
+    ]
+    diagrams = [
+        Diagram(solution.motion, over, Scale("rotation", "angle"), series, limits),
+        Diagram(solution.motion, over, Scale("force of one leg", "force"), forces),
+    ]
+    return diagram_figure(Heading.of(result, "rotations of the joints, and forces inside"), diagrams)
+
+
+@styled
+def linkage(result: Result) -> Figure:
+    """Return the linkage to scale in its key positions, above each other if it is flat, with the curve they are on."""
+    solution: Solution = result.state
+    keys, view = key_positions(solution), scene(solution)
+    heading = Heading.of(result, "linkage to scale in its key positions")
+    width, height = view.box[2] - view.box[0], view.box[3] - view.box[1]
+    slender = height / width
+    stacked = slender < STACK_BELOW
+    size = (138.0, 138.0 * slender) if stacked else (43.5, min(43.5 * slender, 90.0))
+    rows = len(keys) if stacked else 1
+    figure = new_figure(160.0, 12.0 + rows * (size[1] + parts.TITLE) + KEY_ROOM + heading.height_mm)
+    write_heading(figure, heading)
+    panels = parts.panels(figure, size, [key.title(solution) for key in keys], stacked)
+    for number, (ax, key) in enumerate(zip(panels, keys, strict=True)):
+        draw_linkage(solution, key, ax, view)
+        last = number == len(keys) - 1
+        ax.tick_params(labelleft=stacked or number == 0, labelbottom=not stacked or last)
+        ax.set_xlabel("x [mm]" if not stacked or last else "")
+        ax.set_ylabel("y [mm]" if stacked or number == 0 else "")
+    place_labels(panels[0], _names(solution, keys[0], view))
+    _key_curve(figure, result, keys, (17.0, 20.0 + rows * (size[1] + parts.TITLE), 138.0, KEY_ROOM - 12.0))
+    return figure
+
+
+def _key_curve(
+    figure: Figure, result: Result, keys: tuple[KeyPosition, ...], box: tuple[float, float, float, float]
+) -> None:
+    """Draw the curve small, with the key positions on it."""
+    solution: Solution = result.state
+    ax = axes_mm(figure, box)
+    plot_curve(result, ax, Look(bands=False, arrows=False, names=False))
+    drive, dimension = solution.assembly.drive, motion_scale(solution).dimension
+    names = []
+    for key in keys:
+        place = float(to_border(key.motion, dimension)), float(to_border(solution.character.effort(key.motion), drive))
+        ax.plot(*[[value] for value in place], marker="o", markersize=4, color=VERMILLION, linestyle="", zorder=5)
+        names.append(Label(key.name, VERMILLION, np.array([place]), toward=(0.0, 1.0)))
+    place_labels(ax, names)
+
+
+@styled
+def draw_linkage(solution: Solution, key: KeyPosition, ax: Axes, view: Scene) -> Axes:
+    """Draw the linkage at one place of its motion; return the axes, which are in millimetres."""
+    link, rates, size = solution.assembly.linkage, solution.assembly.rates, view.size
+    pin, end = key.crank_pin, key.slider_pin
+    ax.axhline(float(parts.mm(link.offset)), color=GREY, linewidth=0.6, dashes=(6, 3), zorder=1.1, gid="guide")
+    if rates[3] > 0.0:
+        parts.spring(ax, end, (view.wall, link.offset), 0.5 * size, "spring-slider")
+        wall = np.array([[view.wall, link.offset - size], [view.wall, link.offset + size]])
+        parts.edge(ax, wall, "wall", color=INK, linewidth=1.6)
+    parts.slider(ax, end, 0.9 * size)
+    parts.link(ax, (0.0, 0.0), pin, "crank")
+    parts.link(ax, pin, end, "coupler")
+    base = np.array([[-0.5, -0.8], [0.5, -0.8], [0.0, 0.0]]) * size
+    parts.plate(ax, [base], "ground")
+    for rate, joint, direction in zip(rates[:3], key.joints, key.directions, strict=True):
+        if rate > 0.0:
+            parts.edge(ax, torsion_spring(joint, direction, 0.55 * size), "torsion-spring", color=OCHRE, zorder=3.6)
+    if solution.assembly.drive == "force":
+        tail = end[0] + 2.6 * size * link.branch, end[1]
+        parts.force_arrow(ax, tail, (end[0] + 0.6 * size * link.branch, end[1]))
+    parts.to_scale(ax, view.box)
+    return ax
+
+
+def _names(solution: Solution, key: KeyPosition, view: Scene) -> list[Label]:
+    """Return the names of the parts."""
+    crank = np.linspace(0.2, 0.8, 20)[:, None] * np.array(key.crank_pin)
+    coupler = key.crank_pin + np.linspace(0.3, 0.8, 20)[:, None] * (np.array(key.slider_pin) - key.crank_pin)
+    found = [
+        parts.part_name("crank", crank, (0.3, -1.0)),
+        parts.part_name("coupler", coupler, (0.0, 1.0)),
+        parts.part_name("slider", [key.slider_pin], (0.0, -1.0)),
+    ]
+    if solution.assembly.drive == "force":
+        tail = np.array([key.slider_pin[0] + 1.8 * view.size * solution.assembly.linkage.branch, key.slider_pin[1]])
+        found.append(parts.part_name("F", [tail], (0.0, 1.0), VERMILLION))
+    return found

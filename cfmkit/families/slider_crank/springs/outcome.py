@@ -1,0 +1,231 @@
+"""A design that was found, or why there is none, in the user's words."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from cfmkit.families.findings import percent
+from cfmkit.families.refusals import Infeasible
+from cfmkit.families.slider_crank.findings import finding
+from cfmkit.families.slider_crank.springs.targets import FREE
+from cfmkit.families.slider_crank.springs.windows import widest
+from cfmkit.families.slider_crank.unit_springs import JOINTS
+from cfmkit.metrics import Window, evaluate
+from cfmkit.results import Quantity, Searched
+from cfmkit.specs.units import format_short
+
+if TYPE_CHECKING:
+    from cfmkit.arrays import FloatArray
+    from cfmkit.families.slider_crank.spec import CrankDesign, SliderCrankSpec
+    from cfmkit.families.slider_crank.springs.targets import Task
+    from cfmkit.results import Finding
+
+
+@dataclass(frozen=True)
+class Solved:
+    """A design that was found.
+
+    Attributes
+    ----------
+    task : Task
+        With the lengths chosen.
+    window : tuple of (float, float)
+        Where the target is kept [rad or m].
+    rates : (4,) array
+        Of the springs of one leg [N m/rad; the last N/m].
+    deviation, rms : float
+        Largest and root mean square deviation, as fractions of the target.
+    proven : bool
+        Of a widest window: whether all others were ruled out.
+    places : int
+        At so many of the window the deviations were looked at.
+    exact : bool
+        Whether deviation and rms are those that the analysis of the design measures.
+    """
+
+    task: Task
+    window: tuple[float, float]
+    rates: FloatArray
+    deviation: float
+    rms: float
+    proven: bool = True
+    places: int = 0
+    exact: bool = False
+
+    @property
+    def judged(self) -> tuple[float, float]:
+        """Where deviations are looked at [rad or m]: the window, its start left out where the force begins there."""
+        places = self.task.places(self.window, self.places or None)
+        return float(places[0]), float(places[-1])
+
+
+def audited(solved: Solved, spec: SliderCrankSpec) -> Solved:
+    """Return a design with the deviations that the analysis of its specification measures.
+
+    Those from a line that is not level are none of its metrics: they stay what the search found at its places.
+    """
+    from cfmkit.families.base import Run
+    from cfmkit.families.slider_crank.springs.model import analyze
+
+    if solved.task.wanted.stiffness is not None:
+        return solved
+    result, target = analyze(spec, Run()), abs(solved.task.wanted.target)
+    if not result.curves or not result.target:
+        return solved
+    largest = evaluate(result, ["deviation_from_target"], Window(*solved.judged))["deviation_from_target"].value
+    rms = evaluate(result, ["rms_to_target"], Window(*solved.window))["rms_to_target"].value
+    if largest is None or rms is None:
+        return solved
+    return replace(solved, deviation=largest, rms=rms / target, exact=True)
+
+
+def check_reach(task: Task, window: tuple[float, float]) -> None:
+    """Refuse a window that linkage or joint limits do not allow."""
+    first, last = task.allowed
+    slack = 1e-9 * (window[1] - window[0])
+    if window[0] >= first - slack and window[1] <= last + slack:
+        return
+    ends = [format_short(end, task.assembly.dimension) for end in (*window, first, last)]
+    text = (
+        f"the window {ends[0]} to {ends[1]} is not reached: linkage and limits of the joints allow {ends[2]} to "
+        f"{ends[3]}; change 'design.{task.assembly.motion_name}', the lengths, or 'mechanism.limits'"
+    )
+    raise Infeasible(finding("infeasible_targets", text))
+
+
+def cannot_hold(task: Task) -> Finding:
+    """Return why a slope in the stretched position cannot be had."""
+    text = (
+        "no springs, none of them negative, have 'design.stiffness' in the stretched position within 'design.max_rates'"
+    )
+    if task.assembly.stretched == task.assembly.start:
+        text += ": the springs are relaxed there, and only positive slopes exist"
+    elif task.goal((task.assembly.start, task.assembly.stretched)) is not None and "slider" not in task.wanted.springs:
+        text += ": torsion springs alone have positive slopes; use the spring at the slider"
+    return finding("no_zero_stiffness", text)
+
+
+def nowhere(task: Task) -> Finding:
+    """Return why no window keeps the tolerance, or why no springs are better than none in the window."""
+    window = task.wanted.window
+    goal = task.goal(window) if window is not None else None
+    if goal is not None and task.assembly.drive == "torque" and (goal.matrix[:, :3] <= 0.0).all():
+        other = format_short(-task.wanted.target, "torque")
+        text = f"in the window torsion springs turn the crank the other way; ask for 'design.torque: {other}'"
+        return finding("infeasible_targets", text)
+    if "slider" not in task.wanted.springs and task.assembly.drive == "torque":
+        text = "torsion springs alone give no constant torque next to the stretched position; "
+        text += "use the slider's, too, in 'design.springs'"
+        return finding("no_zero_stiffness", text)
+    if window is not None:
+        text = f"in the window the best springs are none: no others come closer to a constant {task.assembly.drive}"
+        return finding("infeasible_targets", f"{text}; change 'design.{task.assembly.motion_name}' or 'design.springs'")
+    return finding(
+        "infeasible_targets", "no window keeps 'design.tolerance'; allow more, or change the lengths in 'mechanism'"
+    )
+
+
+def hopeless(task: Task, deviation: float) -> Finding:
+    """Return that even the best springs have nothing of a constant effort, and why."""
+    text = f"even the best springs are off by {percent(deviation)}: that is no constant {task.assembly.drive}"
+    ahead = (task.assembly.stretched - task.assembly.start) * task.wanted.target
+    if task.assembly.drive == "torque" and ahead <= 0.0:
+        text += "; the stretched position does not lie ahead of the unloaded one, and the torque only rises there; "
+        text += "change 'mechanism.unloaded_angle' (or 'unloaded_offset'), or the sign of 'design.torque'"
+        return finding("no_zero_stiffness", text)
+    return finding(
+        "infeasible_targets",
+        f"{text}; narrow 'design.{task.assembly.motion_name}', or change the lengths in 'mechanism'",
+    )
+
+
+def too_far(task: Task, deviation: float) -> tuple[Finding, dict[str, str]]:
+    """Return that a window is too wide for its tolerance, and what would be feasible."""
+    wanted = task.wanted
+    nearest = {"design.tolerance": f"{100 * deviation:.4g} %"}
+    allowed = f"'design.tolerance' allows {percent(wanted.tolerance or 0)}"
+    text = f"the best springs are off by {percent(deviation)}, and {allowed}"
+    text += f"; allow more, or narrow 'design.{task.assembly.motion_name}'"
+    found = widest(task, wanted.tolerance or 0.0)
+    if found is not None:
+        low, high = (format_short(end, task.assembly.dimension) for end in (found.low, found.high))
+        nearest[f"design.{task.assembly.motion_name}"] = f"[{low}, {high}]"
+        text += f": a window that keeps it is {low} to {high}"
+    return finding("infeasible_targets", text), nearest
+
+
+def active_bounds(solved: Solved, wanted: CrankDesign) -> tuple[str, ...]:
+    """Return the paths of the design whose limit is reached."""
+    active = []
+    for name in FREE:
+        ends = getattr(wanted, name)
+        if ends is not None and getattr(solved.task.spec.mechanism, name) in ends:
+            active.append(f"design.{name}")
+    for name, rate in zip(JOINTS, solved.rates.tolist(), strict=True):
+        cap = None if wanted.max_rates is None else getattr(wanted.max_rates, name)
+        if cap and rate >= cap * (1 - 1e-9):
+            active.append(f"design.max_rates.{name}")
+    return tuple(active)
+
+
+def about_springs(solved: Solved) -> tuple[Finding, ...]:
+    """Return what to say about springs that are not needed, and about those that would like to be stiffer."""
+    found, wanted = [], solved.task.wanted
+    gone = [name for name, rate in zip(JOINTS, solved.rates, strict=True) if rate == 0.0 and name in wanted.springs]
+    if gone:
+        names = " and ".join(name.replace("_", " ") for name in gone)
+        found.append(finding("spring_dropped", f"the best rate at {names} is zero: no spring is needed there"))
+    at_cap = [path for path in active_bounds(solved, wanted) if "max_rates" in path]
+    if at_cap:
+        found.append(finding("spring_at_bound", f"{' and '.join(at_cap)} limits the design: more would be better"))
+    return tuple(found)
+
+
+def not_proven(solved: Solved, of_lengths: bool) -> Finding:
+    """Return what to say about a widest window that may not be the widest of all."""
+    low, high = (_place(solved, end) for end in solved.window)
+    if of_lengths:
+        text = "is the widest window for the lengths chosen, which a local search compared: others may have wider ones"
+    else:
+        name = f"'design.{solved.task.assembly.motion_name}_within'"
+        text = f"is the widest window found, and the search of the whole motion was cut short; {name} narrows it"
+    return finding("window_not_proven", f"{low} to {high} {text}")
+
+
+def _place(solved: Solved, motion: float) -> str:
+    return format_short(motion, solved.task.assembly.dimension)
+
+
+def message(solved: Solved) -> str:
+    """Return the outcome in one sentence."""
+    rms = f"rms {percent(solved.rms)}"
+    if solved.exact:
+        low, high = (_place(solved, end) for end in solved.judged)
+        return f"off by at most {percent(solved.deviation)} ({rms}) over {low} to {high}"
+    low, high = (_place(solved, end) for end in solved.window)
+    return f"off by at most {percent(solved.deviation)} ({rms}) at {solved.places} places of {low} to {high}"
+
+
+def search_of(solved: Solved) -> dict[str, Searched]:
+    """Return what only the search knows: how far the springs are off a line at the places that it looked at.
+
+    From a level line they are off by what the analysis measures, as ``deviation_from_target`` and ``rms_to_target``.
+    """
+    if solved.exact:
+        return {}
+    about = {
+        "largest_miss": (
+            solved.deviation,
+            f"farthest from the target, over it, at the {solved.places} places searched",
+        ),
+        "mean_square_miss": (
+            solved.rms,
+            f"root mean square distance from the target, over it, at those {solved.places}",
+        ),
+    }
+    dimension = solved.task.assembly.dimension
+    return {
+        name: Searched(Quantity(value, "ratio", text), "prb", solved.window, dimension)
+        for name, (value, text) in about.items()
+    }

@@ -1,0 +1,36 @@
+"""The parts of a slider-crank with springs: two links with pin holes, eyes around the pins."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.export.geometry import Arc, Contour, Drawing, Line, circle
+from cfmkit.families.slider_crank.build import linkage_of
+
+if TYPE_CHECKING:
+    from cfmkit.families.slider_crank.spec import SliderCrankSpec
+
+
+EYE_SHARE, HOLE_SHARE = 0.08, 0.04
+"""Radii of eyes and pin holes in lengths of the shorter link."""
+
+
+def drawing(spec: SliderCrankSpec) -> Drawing:
+    """Return crank and coupler of one leg, with a hole for each pin, beside each other."""
+    linkage = linkage_of(spec.mechanism)
+    short = min(linkage.crank, linkage.coupler)
+    eye, hole = EYE_SHARE * short, HOLE_SHARE * short
+    contours: list[Contour] = []
+    for number, length in enumerate((linkage.crank, linkage.coupler)):
+        y = -3.0 * eye * number
+        edges = (
+            Line((0.0, y - eye), (length, y - eye)),
+            Arc((length, y), eye, -0.5 * np.pi, 0.5 * np.pi),
+            Line((length, y + eye), (0.0, y + eye)),
+            Arc((0.0, y), eye, 0.5 * np.pi, 1.5 * np.pi),
+        )
+        contours.append(Contour(edges, "cut", closed=True))
+        contours += [circle((x, y), hole, "cut", hole=True) for x in (0.0, length)]
+    return Drawing("slider-crank", tuple(contours))

@@ -1,0 +1,147 @@
+"""What a specification may say about springs at the joints, their limits, and their design."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from cfmkit.specs.spec import Model
+from cfmkit.specs.units import Angle, Force, Length, Ratio, RotationalStiffness, Stiffness, Torque
+
+PositiveLength = Annotated[Length, Field(gt=0)]
+PositiveAngle = Annotated[Angle, Field(gt=0)]
+TorsionRate = Annotated[RotationalStiffness, Field(ge=0)]
+ExtensionRate = Annotated[Stiffness, Field(ge=0)]
+
+
+class Springs(Model):
+    """Rates of the springs of one leg; all are relaxed in the unloaded position."""
+
+    pivot: TorsionRate = Field(0.0, description="torsion between ground and crank, K_RA; say per rad or per deg")
+    crank_pin: TorsionRate = Field(0.0, description="torsion between crank and coupler, K_RB")
+    slider_pin: TorsionRate = Field(0.0, description="torsion between coupler and slider, K_RC")
+    slider: ExtensionRate = Field(0.0, description="extension between slider and ground, K_PC")
+
+
+class Limits(Model):
+    """How far each spring may be moved from the unloaded position, either way."""
+
+    pivot: PositiveAngle | None = Field(None, description="rotation at the pivot")
+    crank_pin: PositiveAngle | None = Field(None, description="rotation at the crank pin")
+    slider_pin: PositiveAngle | None = Field(None, description="rotation at the slider pin")
+    slider: PositiveLength | None = Field(None, description="travel of the slider")
+
+
+JointName = Literal["pivot", "crank_pin", "slider_pin", "slider"]
+PositiveForce = Annotated[Force, Field(gt=0)]
+
+
+class MaxRates(Model):
+    """Largest rates that a design may give the springs of one leg."""
+
+    pivot: TorsionRate | None = Field(None, description="torsion at the pivot")
+    crank_pin: TorsionRate | None = Field(None, description="torsion at the crank pin")
+    slider_pin: TorsionRate | None = Field(None, description="torsion at the slider pin")
+    slider: ExtensionRate | None = Field(None, description="extension at the slider")
+
+
+class SpringDesign(Model):
+    """What the springs are to keep constant, and what may be chosen for it."""
+
+    torque: Torque | None = Field(
+        None, description="wanted at the crank, all legs together; negative: towards smaller angles"
+    )
+    force: PositiveForce | None = Field(None, description="wanted at the slider, all legs together")
+    angle: tuple[Angle, Angle] | None = Field(None, description="crank angles at which the torque is wanted")
+    travel: tuple[Length, Length] | None = Field(
+        None, description="slider travel over which the force is wanted; without window: the widest at `tolerance`"
+    )
+    angle_within: tuple[Angle, Angle] | None = Field(
+        None, description="crank angles among which the widest window is looked for; default: all that can be reached"
+    )
+    travel_within: tuple[Length, Length] | None = Field(
+        None, description="slider travel in which the widest window is looked for; default: all that can be reached"
+    )
+    tolerance: Annotated[Ratio, Field(gt=0, lt=1)] | None = Field(
+        None, description="largest deviation allowed, as a fraction of what is wanted"
+    )
+    objective: Literal["minimax", "least-squares"] = Field(
+        "minimax", description="smallest largest deviation, or smallest root mean square"
+    )
+    stiffness: RotationalStiffness | None = Field(
+        None, description="slope wanted of the torque: it is then to follow a line through the stretched position"
+    )
+    hold_stiffness: bool = Field(
+        False, description="the slope in the stretched position exactly; the torque itself as constant as that allows"
+    )
+    springs: tuple[JointName, ...] = Field(
+        ("pivot", "crank_pin", "slider_pin", "slider"), min_length=1, description="those that may be used"
+    )
+    max_rates: MaxRates | None = Field(None, description="largest rates; no limit unless given")
+    crank_length: tuple[PositiveLength, PositiveLength] | None = Field(
+        None, description="range in which it may be chosen; as the mechanism has it unless given"
+    )
+    offset: tuple[Length, Length] | None = Field(None, description="range of the slider's offset")
+    unloaded_offset: tuple[Angle, Angle] | None = Field(
+        None, description="range of the unloaded position, as an angle from the stretched one; one sign"
+    )
+    spacing: Literal["even", "crank"] = Field(
+        "even", description="points of the window: even in the motion, or in the crank's angle"
+    )
+    points: int = Field(100, ge=10, le=10_000, description="points of the window, its start left out")
+    slack: Annotated[Ratio, Field(ge=0, lt=1)] = Field(
+        0.0, description="how much more deviation than the best is as good: among those designs `prefer` decides"
+    )
+    prefer: Literal["small-rotation", "even-rates", "soft-springs"] = Field(
+        "small-rotation", description="which of several designs that are as good"
+    )
+
+    @model_validator(mode="after")
+    def _one_target(self) -> Self:
+        if (self.torque is None) == (self.force is None):
+            raise ValueError("give either 'torque' or 'force': what is wanted constant")
+        if self.torque == 0.0:
+            raise ValueError("'torque' must not be 0: springs that are absent do that")
+        if self.torque is None and (self.angle or self.stiffness is not None or self.hold_stiffness):
+            raise ValueError("'angle', 'stiffness' and 'hold_stiffness' belong to 'torque'; with 'force' give 'travel'")
+        if self.force is None and self.travel:
+            raise ValueError("'travel' belongs to 'force'; with 'torque' give 'angle'")
+        if (self.angle_within and self.torque is None) or (self.travel_within and self.force is None):
+            raise ValueError("'angle_within' belongs to 'torque', 'travel_within' to 'force'")
+        return self
+
+    @model_validator(mode="after")
+    def _window_or_tolerance(self) -> Self:
+        if self.window is None and self.tolerance is None:
+            raise ValueError("give a window ('angle' or 'travel'), or a 'tolerance' for the widest one, or both")
+        if self.window is None and self.objective == "least-squares":
+            raise ValueError("the widest window is a matter of the largest deviation: remove 'objective'")
+        if self.hold_stiffness and self.stiffness is None:
+            raise ValueError("'hold_stiffness' needs the 'stiffness' to hold")
+        return self
+
+    @model_validator(mode="after")
+    def _ranges(self) -> Self:
+        for name in ("angle", "travel", "angle_within", "travel_within", "crank_length", "offset", "unloaded_offset"):
+            ends = getattr(self, name)
+            if ends is not None and not ends[0] < ends[1]:
+                raise ValueError(f"'{name}' must be increasing")
+        if self.unloaded_offset and self.unloaded_offset[0] < 0 < self.unloaded_offset[1]:
+            raise ValueError("'unloaded_offset' must have one sign: before or beyond the stretched position")
+        return self
+
+    @property
+    def window(self) -> tuple[float, float] | None:
+        """Where the target is wanted [rad or m]; None: as wide as possible."""
+        return self.angle if self.torque is not None else self.travel
+
+    @property
+    def within(self) -> tuple[float, float] | None:
+        """Where the widest window is looked for [rad or m]; None: everywhere."""
+        return self.angle_within if self.torque is not None else self.travel_within
+
+    @property
+    def target(self) -> float:
+        """What is wanted [N m or N]."""
+        return self.torque or self.force or 0.0

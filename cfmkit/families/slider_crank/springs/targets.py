@@ -1,0 +1,177 @@
+"""What a design asks of the springs, for one choice of lengths: places, goal and where it may lie."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.families.refusals import Infeasible
+from cfmkit.families.slider_crank.findings import finding
+from cfmkit.families.slider_crank.springs.assembly import assemble
+from cfmkit.families.slider_crank.springs.rates import Goal
+from cfmkit.families.slider_crank.unit_springs import JOINTS
+
+if TYPE_CHECKING:
+    from cfmkit.arrays import FloatArray
+    from cfmkit.families.slider_crank.spec import CrankDesign, SliderCrankSpec
+    from cfmkit.families.slider_crank.springs.assembly import Assembly
+
+
+FREE = ("crank_length", "offset", "unloaded_offset")
+"""Lengths that a design may choose."""
+
+PROBES = 721
+"""Places at which the limits of the joints are looked at."""
+
+REFINED = 3
+"""Times that they are looked at, each between two neighbours of the last: a window may end where a limit is reached."""
+
+DENSE = 1001
+"""Places of a window over which the largest deviation is kept."""
+
+
+@dataclass(frozen=True)
+class Task:
+    """A design that is wanted of a mechanism with certain lengths.
+
+    Attributes
+    ----------
+    spec : SliderCrankSpec
+        With the lengths; its springs do not matter.
+    assembly : Assembly
+        The same put together; its rates do not matter.
+    """
+
+    spec: SliderCrankSpec
+    assembly: Assembly
+
+    @property
+    def wanted(self) -> CrankDesign:
+        """The block `design`."""
+        design = self.spec.design
+        assert design is not None
+        return design
+
+    @cached_property
+    def allowed(self) -> tuple[float, float]:
+        """Ends of the motion that linkage and joint limits allow around the unloaded position [rad or m]."""
+        low, high = replace(self.assembly, rates=np.ones(len(JOINTS))).within(*self.assembly.reach)
+        start = self.assembly.start
+        if self.assembly.drive == "torque":
+            low, high = max(low, start - math.pi), min(high, start + math.pi)
+        else:
+            low = max(low, 0.0)
+        limits = self.spec.mechanism.limits
+        if limits is None:
+            return low, high
+        most = np.array([getattr(limits, name) or math.inf for name in JOINTS])
+        return self._farthest(low, most), self._farthest(high, most)
+
+    @property
+    def searched(self) -> tuple[float, float]:
+        """Ends of the motion in which the widest window is looked for [rad or m]."""
+        low, high = self.allowed
+        within = self.wanted.within
+        return (low, high) if within is None else (max(low, within[0]), min(high, within[1]))
+
+    def _farthest(self, end: float, most: FloatArray) -> float:
+        """Return the last place from the unloaded position towards an end up to which no joint is moved too far."""
+        good = self.assembly.start
+        for _ in range(REFINED):
+            places = np.linspace(good, end, PROBES)
+            turn = self.assembly.units(places).turn
+            bad = np.flatnonzero(~(np.abs(turn) <= most[:, None] * (1 + 1e-12)).all(axis=0))
+            if not len(bad):
+                return end
+            good, end = float(places[max(bad[0] - 1, 0)]), float(places[bad[0]])
+        return good
+
+    def places(self, window: tuple[float, float], count: int | None = None) -> FloatArray:
+        """Return where the goal is looked at: at the `points` of the design, or on more places.
+
+        Where the force has to begin at zero, the first of the design's intervals is left out.
+
+        Raises
+        ------
+        Infeasible
+            If places even in the crank's angle are wanted, and the crank turns back.
+        """
+        low, high = window
+        points, start = self.wanted.points, self.assembly.start
+        runs_in = self.assembly.drive == "force" and low <= start and self.assembly.reach[0] < -1e-15
+        share = np.linspace(1.0 / points if runs_in else 0.0, 1.0, count or points + (not runs_in))
+        if self.wanted.spacing == "even" or self.assembly.drive == "torque":
+            return low + (high - low) * share
+        angle = self.assembly.units(np.linspace(low, high, PROBES)).angle
+        if np.ptp(np.sign(np.diff(angle))) > 0.0:
+            text = "the crank turns back within the window, where the coupler stands across the slider's way"
+            raise Infeasible(finding("infeasible_targets", f"{text}: set 'design.spacing: even', or change the window"))
+        return self._travels(angle[0] + (angle[-1] - angle[0]) * share, high)
+
+    def _travels(self, angle: FloatArray, last: float) -> FloatArray:
+        """Return the travels at crank angles, of the two that each allows: those that lead up to a last one."""
+        link = self.assembly.linkage
+        start, own = float(link.slider_position(np.asarray(self.assembly.unloaded))), link.slider_position(angle)
+        away: FloatArray = link.branch * (start - own)
+        other: FloatArray = link.branch * (start - (2.0 * link.crank * np.cos(angle) - own))
+        return away if abs(away[-1] - last) <= abs(other[-1] - last) else other
+
+    def goal(self, window: tuple[float, float], count: int | None = None) -> Goal | None:
+        """Return the goal over a window; None where the linkage does not get there with finite efforts."""
+        places = self.places(window, count)
+        effort = self.assembly.units(places).effort
+        if not np.isfinite(effort).all():
+            return None
+        legs, target = self.spec.mechanism.legs, self.wanted.target
+        goal = Goal(effort.T * (legs / target), np.ones(len(places)), self._upper())
+        return goal if self.wanted.stiffness is None else self._sloping(goal, places)
+
+    def _sloping(self, goal: Goal, places: FloatArray) -> Goal:
+        """Return a goal that is a line through the stretched position."""
+        wanted, at = self.wanted, self.assembly.stretched
+        slope = (wanted.stiffness or 0.0) / wanted.target
+        line = 1.0 + slope * (places - at)
+        if not wanted.hold_stiffness:
+            return replace(goal, wanted=line)
+        row = self.assembly.units(np.array([at])).stiffness[:, 0] * (self.spec.mechanism.legs / wanted.target)
+        return replace(goal, wanted=line, held=(row, slope))
+
+    def _upper(self) -> FloatArray:
+        most, used = self.wanted.max_rates, self.wanted.springs
+        caps = [None if most is None else getattr(most, name) for name in JOINTS]
+        limits = [math.inf if cap is None else cap for cap in caps]
+        return np.array([limit if name in used else 0.0 for name, limit in zip(JOINTS, limits, strict=True)])
+
+    def rotation(self, window: tuple[float, float]) -> float:
+        """Return the largest rotation of a joint that may have a spring, up to the end of the window [rad]."""
+        ends = min(self.assembly.start, window[0]), max(self.assembly.start, window[1])
+        turn = np.abs(self.assembly.units(np.linspace(*ends, PROBES)).turn[:3])
+        used = [k for k, name in enumerate(JOINTS[:3]) if name in self.wanted.springs]
+        return float(turn[used].max()) if used else 0.0
+
+
+def with_lengths(spec: SliderCrankSpec, lengths: dict[str, float]) -> SliderCrankSpec:
+    """Return the spec with lengths chosen by the design written into the mechanism."""
+    if not lengths:
+        return spec
+    written: dict[str, float | None] = dict(lengths)
+    if "unloaded_offset" in lengths:
+        written["unloaded_angle"] = None
+    return spec.model_copy(update={"mechanism": spec.mechanism.model_copy(update=written)})
+
+
+def task_of(spec: SliderCrankSpec) -> Task:
+    """Return the design of a specification, put together for its own drive, whatever the analysis says.
+
+    Raises
+    ------
+    CannotBuild
+        If the mechanism cannot exist.
+    """
+    design = spec.design
+    assert design is not None
+    return Task(spec, replace(assemble(spec), drive="torque" if design.torque is not None else "force"))

@@ -1,0 +1,172 @@
+"""Scalar results of a slider-crank with springs, beside the constant-force metrics of every family."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.families.slider_crank.springs.stiffness import CLASSES, scale_factors, small_angle_number
+from cfmkit.results import Quantity
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    from cfmkit.families.slider_crank.springs.solution import Solution
+
+
+_AT = "the reference (`analysis.reference_angle` or `reference_travel`)"
+
+DEFINITIONS = {
+    "stiffness_class": (
+        "text",
+        "positive, zero, local negative, snap-through (the second stable position lies outside), bistable or "
+        "tristable over the motion; a fall of at most twice `analysis.tolerance` is zero [LH, sec. 3]",
+    ),
+    "stiffness_drop": (
+        "ratio",
+        "largest fall of the effort after a peak, as a fraction of the peak, on the way from the unloaded position; "
+        "from 1 on there is a second equilibrium",
+    ),
+    "stable_positions": ("count", "stable equilibria in the motion, the unloaded position included"),
+    "unstable_positions": ("count", "unstable equilibria in the motion: behind each the mechanism snaps through"),
+    "snap_through_angle": ("angle", "crank angle of the first unstable equilibrium from the unloaded position"),
+    "snap_through_travel": ("length", "slider travel of the first unstable equilibrium from the unloaded position"),
+    "second_stable_angle": ("angle", "crank angle of the next stable equilibrium from the unloaded position"),
+    "second_stable_travel": ("length", "slider travel of the next stable equilibrium from the unloaded position"),
+    "energy_barrier": ("energy", "energy at the first unstable equilibrium"),
+    "constant_angle": ("angle", f"width of the interval around {_AT} with the torque within `analysis.tolerance`"),
+    "constant_angle_start": ("angle", "where that interval begins"),
+    "constant_angle_end": ("angle", "where that interval ends"),
+    "constant_travel": ("length", f"width of the interval around {_AT} with the force within `analysis.tolerance`"),
+    "constant_travel_start": ("length", "where that interval begins"),
+    "constant_travel_end": ("length", "where that interval ends"),
+    "reference_torque": ("torque", f"torque at {_AT}"),
+    "reference_force": ("force", f"force at {_AT}"),
+    "start_force": ("force", "force that moves the slider from the unloaded position; where stretched, the limit"),
+    "stretched_torque": ("torque", "torque in the stretched position"),
+    "stretched_stiffness": ("rotational_stiffness", "slope of the torque in the stretched position [LH, eq. 31]"),
+    "bistable_factor": (
+        "factor",
+        "factor on all torsion springs below which the mechanism has a second equilibrium: max(-P/G), G and P the "
+        "efforts of the torsion springs and of the slider's spring",
+    ),
+    "positive_factor": ("factor", "factor on all torsion springs above which the stiffness is positive: max(-P'/G')"),
+    "small_angle_number": (
+        "factor",
+        "K_P kappa^2 phi^2/(2 k), k = K_A + (1 + r1/r2)^2 K_B + (r1/r2)^2 K_C, kappa = r1 (1 + r1/r2)/cos t2, phi the "
+        "lead of the unloaded position; for small phi above 4 bistable, 1 zero stiffness, below 1 positive",
+    ),
+    "stretched_angle": ("angle", "crank angle with crank and coupler in one line, theta_A2 [LH, eq. 13b]"),
+    "folded_angle": ("angle", "crank angle with the coupler folded over the crank [LH, eq. 13a, other branch]"),
+    "unloaded_angle": ("angle", "crank angle with all springs relaxed, theta_A0"),
+    "energy_max": ("energy", "largest energy in the springs"),
+    "pivot_rotation_max": ("angle", "largest rotation of the spring at the pivot"),
+    "crank_pin_rotation_max": ("angle", "largest rotation of the spring at the crank pin"),
+    "slider_pin_rotation_max": ("angle", "largest rotation of the spring at the slider pin"),
+    "slider_travel_max": ("length", "largest travel of the slider from the unloaded position"),
+    "coupler_compression_max": ("force", "largest compression of the coupler of one leg; negative: only tension"),
+    "guide_force_max": ("force", "largest force of the slider of one leg on its guide, across its way"),
+}
+
+
+def values_of(solution: Solution) -> Mapping[str, Quantity]:
+    """Return the scalar results by name; those that a torque drive, or a force drive, does not have are left out."""
+    found = dict(_numbers(solution))
+    return {name: Quantity(value, *DEFINITIONS[name], reason) for name, (value, reason) in found.items()} | {
+        "stiffness_class": Quantity(float(solution.character.kind), *DEFINITIONS["stiffness_class"], words=CLASSES)
+    }
+
+
+def _numbers(solution: Solution) -> Iterator[tuple[str, tuple[float | None, str]]]:
+    """Yield names with values, or the reason why there is none."""
+    for name, value in (*_positions(solution), *_band(solution), *_pose(solution), *_extremes(solution)):
+        reason = "" if value is not None else _WHY.get(name.removesuffix("_start").removesuffix("_end"), "")
+        yield name, (value, reason)
+
+
+_WHY = {
+    "snap_through_angle": "there is no unstable equilibrium",
+    "snap_through_travel": "there is no unstable equilibrium",
+    "energy_barrier": "there is no unstable equilibrium",
+    "second_stable_angle": "there is no second stable equilibrium in the motion",
+    "second_stable_travel": "there is no second stable equilibrium in the motion",
+    "constant_angle": "the reference is outside the motion, or the torque there is zero",
+    "constant_travel": "the reference is outside the motion, or the force there is zero",
+    "bistable_factor": "it needs torsion springs and a spring at the slider",
+    "positive_factor": "it needs torsion springs and a spring at the slider",
+    "small_angle_number": "the unloaded position is the stretched one, or there is no torsion spring",
+    "folded_angle": "the coupler cannot fold over the crank",
+}
+
+Pairs = tuple[tuple[str, float | None], ...]
+
+
+def _positions(solution: Solution) -> Pairs:
+    """Return drop and equilibria."""
+    found, place = solution.character, solution.assembly.motion_name
+    unstable, stable = solution.nearest(False), solution.nearest(True)
+    return (
+        ("stiffness_drop", found.drop),
+        ("stable_positions", float(found.classified.stable[0])),
+        ("unstable_positions", float(found.classified.unstable[0])),
+        (f"snap_through_{place}", None if unstable is None else unstable.motion),
+        (f"second_stable_{place}", None if stable is None else stable.motion),
+        ("energy_barrier", None if unstable is None else unstable.energy),
+    )
+
+
+def _band(solution: Solution) -> Pairs:
+    """Return the constant band around the reference."""
+    drive, found = solution.assembly.drive, solution.character
+    name = f"constant_{solution.assembly.motion_name}"
+    low, high = solution.band or (None, None)
+    width = None if low is None or high is None else high - low
+    inside = found.low <= solution.reference <= found.high
+    level = found.effort(solution.reference) if inside else None
+    return (
+        (name, width),
+        (f"{name}_start", low),
+        (f"{name}_end", high),
+        (f"reference_{drive}", level),
+    )
+
+
+def _pose(solution: Solution) -> Pairs:
+    """Return what belongs to the stretched position, and the limits of the classes."""
+    assembly, found = solution.assembly, solution.character
+    factors = scale_factors(assembly, found.low, found.high) or (None, None)
+    finite = tuple(value if value is not None and np.isfinite(value) else None for value in factors)
+    special: Pairs = (("start_force", found.effort(0.0)),)
+    if assembly.drive == "torque":
+        at = assembly.stretched
+        special = (("stretched_torque", found.effort(at)), ("stretched_stiffness", found.stiffness(at)))
+    return (
+        *special,
+        ("bistable_factor", finite[0]),
+        ("positive_factor", finite[1]),
+        ("small_angle_number", small_angle_number(assembly)),
+        ("stretched_angle", assembly.linkage.stretched_angle),
+        ("folded_angle", assembly.linkage.folded_angle),
+        ("unloaded_angle", assembly.unloaded),
+    )
+
+
+def _extremes(solution: Solution) -> Pairs:
+    """Return the largest loads and motions along the curve."""
+    turn = np.abs(solution.units.turn).max(axis=1)
+    coupler, guide = solution.reactions
+    return (
+        ("energy_max", float(solution.energy.max())),
+        ("pivot_rotation_max", float(turn[0])),
+        ("crank_pin_rotation_max", float(turn[1])),
+        ("slider_pin_rotation_max", float(turn[2])),
+        ("slider_travel_max", float(turn[3])),
+        ("coupler_compression_max", _largest(-coupler)),
+        ("guide_force_max", _largest(np.abs(guide))),
+    )
+
+
+def _largest(values: np.ndarray) -> float | None:
+    finite = values[np.isfinite(values)]
+    return float(finite.max()) if len(finite) else None

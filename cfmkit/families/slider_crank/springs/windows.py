@@ -1,0 +1,248 @@
+"""The widest window in which springs can keep an effort within a tolerance.
+
+First a local search, from the neighbourhood of the stretched position, or, where that has none, from the flattest place
+of the motion: for a width the place with the smallest largest deviation, the width by steps in the law
+deviation ~ width^3 inside a shrinking bracket.
+
+Then all other places are ruled out, or found to be better. A part of a window never deviates more than the window. So
+if a window that begins in [a, b] is to be wider than w, springs must keep the tolerance from b to a + w: one linear
+programme says whether they do. Where they do, the interval is halved, and windows from its middle are tried.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections import deque
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.families.slider_crank.springs.rates import minimax
+from cfmkit.families.slider_crank.springs.targets import DENSE
+
+if TYPE_CHECKING:
+    from cfmkit.arrays import FloatArray
+    from cfmkit.families.slider_crank.springs.targets import Task
+
+
+COARSE = 48
+"""Places of a window during the search; the result is judged on `DENSE` ones."""
+
+LAW = 0.533
+"""Width of the best window over the lead of the unloaded position, for 0.5 % and small angles."""
+
+STEPS = 24
+
+CLOSE = 1.0 - 1e-4
+"""A deviation between this share of the tolerance and all of it ends the search: the width is then right to 3e-5."""
+
+GAIN, NARROWEST = 1e-3, 5e-4
+"""A window wider by less than the first share is not looked for; nor one below the second share of the motion."""
+
+BEGINNINGS, PROGRAMMES = 32, 4000
+"""Intervals of beginnings that the search of the whole motion starts with, and its largest number of programmes."""
+
+NARROW = 0.08
+"""Once a window is found, the next one is looked for so near, as a share of its width."""
+
+POOR, PLACES = 0.5, 25
+"""A window narrower than this share of what was expected is also looked for elsewhere, at so many places."""
+
+KEPT = 1.0 - 2e-5
+"""Between the places on which it is judged, a deviation can be larger by this."""
+
+
+@dataclass(frozen=True)
+class Window:
+    """A window, its springs and how far they are off.
+
+    Attributes
+    ----------
+    low, high : float
+        Ends [rad or m].
+    rates : (4,) array
+        Of the springs of one leg.
+    deviation : float
+        Largest one, as a fraction of the target.
+    """
+
+    low: float
+    high: float
+    rates: FloatArray
+    deviation: float
+
+    @property
+    def width(self) -> float:
+        """High less low."""
+        return self.high - self.low
+
+
+def widest(task: Task, tolerance: float) -> Window | None:
+    """Return a wide window with no deviation above a tolerance, by the local search; None if that finds none."""
+    first, last = task.searched
+    if not last > first:
+        return None
+    tolerance *= KEPT
+    width, middle = _first_guess(task, tolerance)
+    width = min(width, last - first)
+    best = _grown(task, tolerance, width, middle, 0.6)
+    if best is not None and best.width >= POOR * width:
+        return best
+    elsewhere = _flattest(task, width)
+    found = None if elsewhere is None else _grown(task, tolerance, width, elsewhere, NARROW)
+    return max((item for item in (best, found) if item is not None), key=lambda item: item.width, default=None)
+
+
+def widest_of_all(task: Task, tolerance: float) -> tuple[Window | None, bool]:
+    """Return the widest window of the whole motion, and whether all that are wider by `GAIN` are ruled out."""
+    first, last = task.searched
+    if not last > first:
+        return None, True
+    search = _Everywhere(task, tolerance * KEPT)
+    found = search.run()
+    if found is None:
+        return widest(task, tolerance), search.finished
+    low, high = found
+    return _grown(task, tolerance * KEPT, high - low, 0.5 * (low + high), NARROW), search.finished
+
+
+class _Everywhere:
+    """The search of all beginnings of a window for the widest one."""
+
+    def __init__(self, task: Task, tolerance: float) -> None:
+        self.task, self.tolerance = task, tolerance
+        self.first, self.last = task.searched
+        self.width = NARROWEST * (self.last - self.first)
+        self.left, self.finished = PROGRAMMES, True
+
+    def run(self) -> tuple[float, float] | None:
+        """Return the widest window, judged on `COARSE` places; None if there is none above `NARROWEST`."""
+        best: tuple[float, float] | None = None
+        ends = np.linspace(self.first, self.last, BEGINNINGS + 1).tolist()
+        queue = deque(itertools.pairwise(ends))
+        while queue:
+            low, high = queue.popleft()
+            wanted = self.width * (1.0 + GAIN)
+            if low + wanted > self.last or not self._may(low, min(high, self.last - wanted), wanted):
+                continue
+            if self.left <= 0:
+                self.finished = False
+                break
+            middle = 0.5 * (low + high)
+            if middle + wanted <= self.last and self._keeps(middle, middle + wanted):
+                best = middle, self._end(middle, middle + wanted)
+                self.width = best[1] - best[0]
+            if high - low > 0.5 * self.width * (GAIN if best else 1.0):
+                queue += [(low, middle), (middle, high)]
+        return best
+
+    def _may(self, low: float, high: float, width: float) -> bool:
+        """Return whether a window of a width may begin in an interval: its part common to all of them must keep."""
+        return low + width <= high or self._keeps(high, low + width)
+
+    def _keeps(self, low: float, high: float) -> bool:
+        """Return whether springs keep the tolerance over a window."""
+        self.left -= 1
+        found = _solved(self.task, low, high, COARSE)
+        return found is not None and found.deviation <= self.tolerance
+
+    def _end(self, low: float, high: float) -> float:
+        """Return where the widest window from its beginning ends: double, then halve."""
+        step, bad = high - low, math.inf
+        while high < self.last and bad - high > 0.25 * GAIN * (high - low):
+            trial = min(high + step, self.last) if math.isinf(bad) else 0.5 * (high + bad)
+            if self._keeps(low, trial):
+                high, step = trial, 2.0 * step
+            else:
+                bad = trial
+        return high
+
+
+def _flattest(task: Task, width: float) -> float | None:
+    """Return the middle of the window of a width with the smallest deviation, of some all over the motion."""
+    first, last = task.searched
+    places = (first + (last - width - first) * k / (PLACES - 1) for k in range(PLACES))
+    found = [item for item in (_solved(task, low, low + width, COARSE) for low in places) if item is not None]
+    best = min(found, key=lambda item: item.deviation, default=None)
+    return None if best is None else 0.5 * (best.low + best.high)
+
+
+def _grown(task: Task, tolerance: float, width: float, middle: float, look: float) -> Window | None:
+    """Return the widest window found from a width and a middle on, looking aside by a share of the width."""
+    first, last = task.searched
+    best: Window | None = None
+    low, high = 0.0, last - first
+    for _ in range(STEPS):
+        width = min(width, last - first)
+        found = _best_place(task, width, middle, look)
+        if found is not None:
+            middle, look = 0.5 * (found.low + found.high), NARROW
+        if found is not None and found.deviation <= tolerance:
+            best, low = found, max(low, width)
+            if found.deviation >= tolerance * CLOSE or width >= last - first:
+                break
+            if width > 0.9 * high and found.deviation < 0.5 * tolerance:
+                high = last - first  # the window has moved on from where that width had failed
+        else:
+            high = min(high, width)
+        if high - low <= 1e-6 * high:
+            break
+        width = _next_width(found, tolerance, (low, high), width)
+    return best
+
+
+def _first_guess(task: Task, tolerance: float) -> tuple[float, float]:
+    """Return width and middle from the law for small angles, or a tenth of the motion next to its start."""
+    first, last = task.searched
+    assembly = task.assembly
+    lead = assembly.stretched - assembly.start
+    if assembly.drive == "torque" and abs(lead) > 1e-6:
+        return LAW * abs(lead) * (tolerance / 0.005) ** (1 / 3), assembly.stretched
+    return 0.1 * (last - first), first + 0.1 * (last - first)
+
+
+def _next_width(found: Window | None, tolerance: float, bracket: tuple[float, float], width: float) -> float:
+    low, high = bracket
+    if found is None or found.deviation <= 0.0:
+        return 0.5 * (low + high)
+    wanted = tolerance * (0.5 + 0.5 * CLOSE)
+    step = width * min(max((wanted / found.deviation) ** (1 / 3), 0.5), 2.0)
+    return step if low < step < high else 0.5 * (low + high)
+
+
+def _best_place(task: Task, width: float, middle: float, look: float) -> Window | None:
+    """Return the window of a width with the smallest largest deviation near a place, by shares of the width."""
+    from scipy.optimize import minimize_scalar
+
+    first, last = task.searched
+    room = last - width
+    if room <= first:
+        return judged(task, first, last)
+
+    def deviation(low: float) -> float:
+        found = _solved(task, low, low + width, COARSE)
+        return found.deviation if found else 1e300
+
+    start = min(max(middle - 0.5 * width, first), room)
+    bracket = max(first, start - look * width), min(room, start + look * width)
+    found = minimize_scalar(deviation, bounds=bracket, method="bounded", options={"xatol": 1e-4 * width, "maxiter": 25})
+    ends = [end for end in (first, room) if end in bracket]
+    low = min([float(found.x), *ends], key=deviation) if ends else float(found.x)
+    if look < 0.5 and min(abs(low - bracket[0]), abs(low - bracket[1])) < 1e-3 * width and low not in ends:
+        return _best_place(task, width, low + 0.5 * width, 0.6)
+    return judged(task, low, low + width)
+
+
+def judged(task: Task, low: float, high: float) -> Window | None:
+    """Return the best springs for a window, judged on many places; None where there are none."""
+    return _solved(task, low, high, DENSE)
+
+
+def _solved(task: Task, low: float, high: float, count: int) -> Window | None:
+    goal = task.goal((low, high), count)
+    rates = None if goal is None else minimax(goal)
+    if goal is None or rates is None or not math.isfinite(goal.deviation(rates)):
+        return None
+    return Window(low, high, rates, goal.deviation(rates))

@@ -1,0 +1,590 @@
+"""Flexures and strips of slider-cranks: identities, limits, and everything that can go wrong, by its name."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+from flexure_support import (
+    ABS,
+    LINKAGE,
+    MM,
+    RATES,
+    TABLE_2,
+    THICKNESS,
+    UNLOADED,
+    WIDTH,
+    corners,
+    lumped_chain,
+    strip_chain,
+)
+
+import cfmkit
+from cfmkit import api
+from cfmkit.elastica.verification.corotational import recheck
+from cfmkit.families.slider_crank.findings import FINDINGS
+from cfmkit.families.slider_crank.findings import FINDINGS as OF_PARTS
+from cfmkit.families.slider_crank.printed.chain import Elasticity, Flexure, joints, kink, mirrored, spread
+from cfmkit.families.slider_crank.printed.pressing import Ending
+from cfmkit.families.slider_crank.printed.program import Form, StripProgram, Task
+from cfmkit.families.slider_crank.printed.sizing import rotations, sized
+from cfmkit.families.slider_crank.printed.solution import first_at
+from cfmkit.numerics import sqp
+from cfmkit.numerics.barycentric import differentiation, interpolation
+from cfmkit.results import Status
+
+if TYPE_CHECKING:
+    from cfmkit.results import Result
+
+CONFIGS = Path(__file__).parents[2] / "configs"
+TRAVEL = np.array([0.1, 1.0, 5.0, 18.0]) * MM
+
+
+def spec(name: str, *changes: str) -> Any:
+    return cfmkit.load(CONFIGS / f"slider_crank_{name}.yaml", changes)
+
+
+def names(result: Result) -> set[str]:
+    return {item.name for item in result.warnings}
+
+
+# --- closed forms ---------------------------------------------------------------------------------------------
+
+
+def test_sized_flexures_have_the_rate_and_the_stress() -> None:
+    one = sized(0.0354, 10.8 * MM, 1.8e9, 42.5e6, 0.53)
+    assert one.rate(1.8e9) == pytest.approx(0.0354)
+    assert one.rotation(1.8e9, 42.5e6) == pytest.approx(0.53)
+    volume = one.length * one.thickness * one.width  # the same for any length
+    assert volume == pytest.approx(3 * 1.8e9 * 0.0354 * 0.53**2 / 42.5e6**2)
+
+
+@pytest.mark.parametrize(
+    ("stroke", "thickness", "width"), [(4, 1.055, 2.17), (10, 0.666, 8.61), (18, 0.497, 20.75), (35, 0.359, 55.1)]
+)
+def test_flexures_at_the_crank_pin_grow_wide_with_the_stroke(stroke: float, thickness: float, width: float) -> None:
+    """Width with the third power of the rotation: small flexures cannot have a long stroke."""
+    turn = float(abs(rotations(LINKAGE, UNLOADED, np.array([stroke * MM]))[1, 0]))
+    one = sized(float(RATES[1]), 10.8 * MM, 1.8e9, 42.5e6, turn)
+    assert one.thickness / MM == pytest.approx(thickness, abs=6e-4)
+    assert one.width / MM == pytest.approx(width, rel=2e-3)
+
+
+def test_a_short_flexure_is_the_spring_it_stands_for() -> None:
+    """The correction goes to one with the length."""
+    from cfmkit.families.slider_crank.unit_springs import along_slider
+
+    parts = []
+    for rate in RATES:
+        thickness = (12 * rate * 0.3 * MM / (1.8e9 * 2.73)) ** 0.25
+        parts.append(Flexure(0.3 * MM, thickness, 2.73 * thickness))
+    springs = RATES @ along_slider(LINKAGE, 0.56, 1, np.array([5 * MM])).effort[:3]
+    assert lumped_chain(0.56, parts).press(np.array([5 * MM])).force[0] == pytest.approx(springs[0], rel=4e-3)
+
+
+# --- chains and branches ------------------------------------------------------------------------------------
+
+
+def test_mirroring_about_the_line_turns_the_kink_and_keeps_the_ends() -> None:
+    pins = joints(LINKAGE, UNLOADED)
+    other = mirrored(pins, pins)
+    assert kink(other) == pytest.approx(-kink(pins))
+    np.testing.assert_allclose(other[[0, 2]], pins[[0, 2]], atol=1e-15)
+
+
+def test_places_at_the_corners_are_those_of_the_corners() -> None:
+    line = np.array([[0.0, 0.0], [3.0, 4.0], [3.0, 14.0]])
+    np.testing.assert_allclose(spread(line, [[0.5], [0.1, 0.9]]), [0, 1 / 6, 0.4, 14 / 15, 1], atol=1e-15)
+
+
+def test_force_is_proportional_to_the_width_and_the_stress_does_not_know_it() -> None:
+    one, two = (strip_chain(width=w).press(TRAVEL) for w in (WIDTH, 2 * WIDTH))
+    np.testing.assert_allclose(two.force, 2 * one.force, rtol=1e-8)
+    np.testing.assert_allclose(two.path.peak_stress().value, one.path.peak_stress().value, rtol=1e-8)
+
+
+def test_force_is_proportional_to_the_modulus() -> None:
+    soft, hard = (strip_chain(material=Elasticity(e, 0.35)).press(TRAVEL).force for e in (1e9, 3e9))
+    np.testing.assert_allclose(hard, 3 * soft, rtol=1e-8)
+
+
+@pytest.mark.parametrize("unloaded", [LINKAGE.stretched_angle, LINKAGE.stretched_angle + 1e-7, UNLOADED, 0.53])
+def test_both_sides_are_found_stable_and_on_the_side_asked_for(unloaded: float) -> None:
+    """Straight, nearly straight, kinked either way; the energy is at a minimum by independent elements, too."""
+    for side in (1, -1):
+        found = strip_chain(0.977 * MM, unloaded=unloaded).press(np.array([2.0, 10.0]) * MM, side)
+        assert found.ending is Ending.COMPLETE
+        assert found.side == side
+        assert recheck(found.path, elements=24).stable.all()
+
+
+def test_the_branch_found_is_the_lowest() -> None:
+    """The next buckling mode would need many times the force: the first is the one that a column of pins has."""
+    straight = strip_chain(0.977 * MM, unloaded=LINKAGE.stretched_angle)
+    forces = [straight.press(np.array([0.2 * MM]), side).force[0] for side in (1, -1)]
+    rigidity, length = 1.8e9 * WIDTH * (0.977 * MM) ** 3 / 12, 127.42 * MM
+    first = 4 * np.pi**2 * rigidity / length**2  # clamped at both ends, the slider held across its way
+    along = np.cos(LINKAGE.stretched_angle)
+    np.testing.assert_allclose(forces, first * along, rtol=0.02)
+
+
+def test_the_side_of_a_straight_chain_hardly_matters_at_first() -> None:
+    chain = strip_chain(0.977 * MM, unloaded=LINKAGE.stretched_angle)
+    one, other = (chain.press(np.array([0.05 * MM]), side).force[0] for side in (1, -1))
+    assert one == pytest.approx(other, rel=2e-3)
+
+
+def test_a_chain_that_begins_late_on_its_other_side_says_from_where() -> None:
+    """With a large kink the other branch begins with a snap."""
+    found = strip_chain(0.977 * MM, unloaded=0.60).press(np.linspace(0.0, 20.0, 41) * MM, -1)
+    assert found.ending is Ending.STARTS_LATE
+    assert "mm on only" in found.message
+    assert found.travel[0] > 0
+
+
+LONG_WAYS = {
+    "right": ("56.9 mm", "-30.2 mm", "110.5 mm", "5.48 deg", "131.6 mm"),
+    "left": ("69.4 mm", "-41.1 mm", "110.4 mm", "-0.87 deg", "115.5 mm"),
+}
+
+
+@pytest.mark.parametrize("branch", LONG_WAYS)
+def test_a_chain_that_turns_with_its_slider_keeps_its_side(branch: str) -> None:
+    """The crank pin comes back past where the line to the slider had been, but never crosses the line as it is."""
+    crank, offset, stretched, lead, travel = LONG_WAYS[branch]
+    lengths = [
+        f"crank_length={crank}",
+        f"offset={offset}",
+        f"stretched_position={stretched}",
+        f"unloaded_offset={lead}",
+    ]
+    changes = [f"mechanism.{item}" for item in (*lengths, "unloaded_angle=null", f"branch={branch}")]
+    about = [
+        f"analysis.travel=[0 mm, {travel}]",
+        "analysis.points=31",
+        "analysis.recheck=false",
+        "analysis.window=null",
+    ]
+    result = api.analyze(spec("lumped", *changes, *about))
+    assert result.status is Status.COMPLETE, result.message
+    springs = api.analyze(spec("lumped", *changes, *about, "analysis.fidelity=prb"))
+    # no closer: flexures of 10.8 mm are stiffer than springs, and turn by more than a right angle here
+    np.testing.assert_allclose(result.curve.force[1:], springs.curve.force[1:], rtol=0.35)
+
+
+def test_a_chain_that_goes_over_to_the_other_side_has_a_curve_up_to_there() -> None:
+    """The crank pin of a real chain, but for a jump beyond 6 mm that stands for going over."""
+    chain = lumped_chain()
+    travel = np.linspace(0.0, 10.0, 11) * MM
+
+    def knee(path: Any, index: int) -> np.ndarray:
+        place = chain.knee(path, index)
+        return place if path.drive[index] < 6.5 * MM else place + np.array([0.0, -40.0 * MM])
+
+    found = replace(chain, knee=knee).press(travel)
+    assert found.ending is Ending.CROSSES
+    assert "between 6 and 7 mm" in found.message
+    np.testing.assert_allclose(found.travel, travel[:7])
+    np.testing.assert_allclose(found.force, chain.press(travel).force[:7])
+
+
+def test_pressing_beyond_all_reason_is_not_complete() -> None:
+    found = strip_chain().press(np.array([1.0, 400.0]) * MM)
+    assert found.ending is not Ending.COMPLETE
+    assert len(found.travel) <= 1
+
+
+# --- the program ----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("goal", ["stroke", "ripple", "rms"])
+@pytest.mark.parametrize("moving", [False, True])
+def test_slopes_of_the_program_are_those_of_differences(goal: Any, moving: bool) -> None:
+    shares = ((0.285, 0.803), (0.582, 0.851), (0.245, 0.842), (0.578, 0.798), (0.231, 0.765))
+    form = Form(12, (2,) * 5) if moving else Form(4, width=WIDTH)
+    x = np.concatenate([THICKNESS / MM, np.concatenate(shares), [5.1]]) if moving else np.array([0.95, 1.02, 0.9, 0.99])
+    program = StripProgram(Task(corners(), np.pi, ABS, 1.5, MM, 21 * MM, 0.01, goal), form)
+    z = np.append(x, 2.1) if program.extra else x
+    answer = program.slopes(z)
+    assert answer is not None
+    for k in {0, 3, form.size - 1, len(z) - 1} | ({13} if moving else set()):
+        sides = []
+        for step in (-1e-4, 1e-4):
+            moved = z.copy()
+            moved[k] += step
+            value = program.values(moved)
+            assert value is not None
+            sides.append(np.append(value[1], value[0]))
+        slope = (sides[1] - sides[0]) / 2e-4
+        exact = np.append(answer[1][:, k], answer[0][k])
+        np.testing.assert_allclose(exact, slope, atol=2e-5 * np.abs(slope).max() + 1e-9)
+
+
+def test_a_strip_without_equilibrium_has_no_answer() -> None:
+    program = StripProgram(Task(corners(), np.pi, ABS, 1.5, MM, 20 * MM, 0.01), Form(3, width=WIDTH))
+    assert program.values(np.array([1.0, 1.0, 1.0, 1000.0])) is None  # [mm]; the strip is 125 mm long
+
+
+def test_polynomials_through_nodes_are_exact() -> None:
+    nodes, places = np.cos(np.linspace(0, np.pi, 6)), np.linspace(-1, 1, 9)
+    np.testing.assert_allclose(interpolation(nodes, places) @ nodes**5, places**5, atol=1e-14)
+    np.testing.assert_allclose(differentiation(nodes) @ nodes**5, 5 * nodes**4, atol=1e-13)
+
+
+def test_first_at_is_the_first_crossing_and_none_where_there_is_none() -> None:
+    x, y = np.arange(4.0), np.array([0.0, 2.0, 1.0, 3.0])
+    assert first_at(x, y, 1.5) == pytest.approx(0.75)
+    assert first_at(x, y, 9.0) is None
+    assert first_at(x, y + 5.0, 1.0) == 0.0
+
+
+# --- findings ---------------------------------------------------------------------------------------------------
+
+CASES = {
+    "straight_start": ("strip", ["mechanism.unloaded_angle=30.963756532073525 deg"]),
+    "kink_too_small": ("strip", []),
+    "long_run_in": ("strip", ["mechanism.unloaded_angle=0.58 rad"]),
+    "overstressed": ("strip", ["analysis.travel=[0 mm, 37 mm]"]),
+    "too_thin": ("strip", ["mechanism.process.thinnest=1.2 mm"]),
+    "lateral_buckling": ("strip", ["mechanism.beam.width=1.5 mm"]),
+    "side_force": ("strip", []),
+    "pulled": ("strip", ["analysis.travel=[-1 mm, 5 mm]"]),
+    "force_negative": ("strip", ["analysis.travel=[0 mm, 150 mm]"]),
+    "wrong_branch": ("strip", ["mechanism.beam.centreline=[[0 mm,0 mm],[10 mm,7.5 mm],[50 mm,29 mm],[100 mm,60 mm]]"]),
+    "branch_begins_late": ("strip", ["mechanism.unloaded_angle=0.60 rad", "analysis.side=before"]),
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_what_can_go_wrong_is_found_by_name(name: str) -> None:
+    config, changes = CASES[name]
+    result = api.analyze(spec(config, "analysis.points=61", "analysis.recheck=false", *changes))
+    assert name in names(result), result.message
+    if name in ("pulled", "wrong_branch"):
+        assert result.status is Status.NO_EQUILIBRIUM
+        assert not result.curves
+
+
+def test_a_travel_beyond_all_reason_is_never_a_complete_curve() -> None:
+    result = api.analyze(spec("strip", "analysis.points=21", "analysis.travel=[0 mm, 300 mm]"))
+    assert result.status in (Status.PARTIAL, Status.NO_EQUILIBRIUM)
+    assert names(result) & {"limit_point", "unstable", "not_converged"}
+
+
+def test_a_second_opinion_that_differs_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two elements to a strip are too few to agree; with enough of them nothing is told."""
+    from cfmkit.families.slider_crank.printed import solution
+
+    wanted = spec("strip", "analysis.points=21", "analysis.recheck=true")
+    assert "second_opinion" not in names(api.analyze(wanted))
+    monkeypatch.setattr(solution, "by_elements", lambda path, points: recheck(path, points, elements=2))
+    assert "second_opinion" in names(api.analyze(wanted))
+
+
+def test_a_strip_is_on_its_side_from_the_first_micrometre() -> None:
+    """Its centre line passes the kink on a chord, farther off the crank pin than it has moved by then."""
+    result = api.analyze(spec("strip", "analysis.travel=[0 mm, 1 um]", "analysis.window=[0 mm, 1 um]"))
+    assert result.status is Status.COMPLETE
+    assert result.curve.effort[-1] == pytest.approx(0.0517, abs=1e-3)
+
+
+def test_the_kink_of_a_line_of_its_own_is_that_of_the_line() -> None:
+    points = ["analysis.points=21", "analysis.recheck=false"]
+    line = "mechanism.beam.centreline=[[0 mm, 0 mm], [50 mm, {} mm], [100 mm, 60 mm]]"
+    right = api.analyze(spec("strip", line.format(29), *points))
+    assert right.values["kink"].value == pytest.approx(-np.cos(np.arctan(0.6)) * MM)
+    assert right.status is Status.COMPLETE
+    assert "straight_start" in names(api.analyze(spec("strip", line.format(30), *points)))
+
+
+def test_flexures_longer_than_their_links_are_refused() -> None:
+    """A line that runs back on itself would have an equilibrium, too."""
+    for changes in (("strip", "mechanism.beam.flexure_length=80 mm"), ("lumped", "design.flexures.length=80 mm")):
+        result = (api.analyze if changes[0] == "strip" else api.design)(spec(*changes))
+        assert result.status is Status.INVALID
+        assert "take 80 mm of the crank" in result.message
+    with pytest.raises(cfmkit.SpecError, match="same corner twice"):
+        spec("strip", "mechanism.beam.centreline=[[0 mm, 0 mm], [0 mm, 0 mm], [1 mm, 0 mm]]")
+
+
+@pytest.mark.parametrize("model", ["strip", "lumped"])
+def test_a_chain_is_not_pressed_through_its_own_anchor(model: str) -> None:
+    """Without an offset the slider runs onto the anchor; lines without thickness would let it pass."""
+    lengths = ["mechanism.offset=0 mm", "mechanism.unloaded_angle=null", "mechanism.unloaded_offset=1 deg"]
+    about = ["analysis.travel=[0 mm, 150 mm]", "analysis.points=61", "analysis.recheck=false"]
+    result = api.analyze(spec(model, *lengths, *about))
+    assert result.status is Status.PARTIAL
+    assert result.warnings[0].name == "meets_itself"
+    assert 0.07 < result.curve.displacement[-1] < 0.105
+    beside = api.analyze(spec(model, *about))  # 60 mm beside the anchor there is room
+    assert "meets_itself" not in names(beside)
+
+
+def test_flexures_longer_than_their_link_are_refused_at_their_place(tmp_path: Path) -> None:
+    text = (CONFIGS / "slider_crank_lumped.yaml").read_text()
+    for joint, line in (("pivot", 15), ("slider_pin", 17)):
+        path = tmp_path / f"{joint}.yaml"
+        path.write_text(text.replace(f"{joint}: {{length: 10.8 mm", f"{joint}: {{length: 200 mm"))
+        with pytest.raises(cfmkit.SpecError, match="make them shorter") as caught:
+            cfmkit.load(path)
+        problem = caught.value.problems[0]
+        assert (problem.path, problem.line) == (f"mechanism.flexures.{joint}.length", line)
+
+
+def test_the_run_in_is_solved_for_and_not_read_off_the_points() -> None:
+    """Points 1.1 mm apart gave 1.09 mm where 0.076 mm are right; what is left is their mean force."""
+    few, many = (api.analyze(spec("strip", f"analysis.points={n}", "analysis.recheck=false")) for n in (31, 301))
+    assert few.values["run_in_95"].value == pytest.approx(many.values["run_in_95"].value, rel=0.02)
+    assert many.values["run_in_95"].value == pytest.approx(0.0758 * MM, rel=0.01)
+
+
+def test_findings_of_parts_are_findings_of_the_family() -> None:
+    assert set(OF_PARTS) <= set(FINDINGS)
+
+
+def test_a_part_that_is_missing_is_refused_with_its_name() -> None:
+    with pytest.raises(cfmkit.SpecError, match=r"mechanism\.beam"):
+        spec("lumped", "analysis.fidelity=beam")
+    with pytest.raises(cfmkit.SpecError, match="springs"):
+        spec("strip", "analysis.fidelity=prb")
+    with pytest.raises(cfmkit.SpecError, match="drive: force"):
+        spec("strip", "analysis.drive=torque")
+
+
+def test_shares_that_do_not_fit_are_refused() -> None:
+    with pytest.raises(cfmkit.SpecError, match="places 2 thicknesses"):
+        spec("strip", "mechanism.beam.shares=[[0.2, 0.8], [], [], [], []]")
+    result = api.analyze(spec("tapered", "mechanism.beam.centreline=[[0 mm, 0 mm], [105 mm, 63 mm]]"))
+    assert result.status is Status.INVALID
+    assert "5 pieces" in result.message
+
+
+# --- designs ----------------------------------------------------------------------------------------------------
+
+
+def test_flexures_designed_for_springs_have_their_force_and_the_stress_allowed() -> None:
+    wanted = spec("lumped")
+    found = api.design(wanted)
+    assert found.status is Status.COMPLETE
+    result = api.analyze(found.spec)
+    assert result.curve.extra["max_stress"].values.max() == pytest.approx(42.5e6, rel=1e-4)
+    springs = api.analyze(wanted.replace({"analysis.fidelity": "prb"})).curve
+    both = [np.interp(np.linspace(0.4, 4, 40) * MM, c.motion, c.effort).mean() for c in (result.curve, springs)]
+    assert both[0] == pytest.approx(both[1], rel=1e-3)
+    widths = {found.spec.at(f"mechanism.flexures.{name}.width") for name in ("pivot", "crank_pin", "slider_pin")}
+    assert len(widths) == 1
+
+
+def test_uncorrected_flexures_push_a_tenth_too_hard() -> None:
+    found = api.design(spec("lumped", "design.flexures.exact=false"))
+    assert "flexures push 9.99" in found.message
+    level = api.analyze(found.spec).values["kink"].value
+    assert level == pytest.approx(0.0853e-3, abs=1e-6)
+
+
+def test_a_strip_too_wide_for_its_range_is_infeasible_and_says_what_would_do() -> None:
+    found = api.design(spec("strip", "design.force=5 N"))
+    assert found.status is Status.INFEASIBLE
+    assert {item.name for item in found.warnings} == {"target_unreachable"}
+    assert set(found.nearest_feasible) == {"design.force", "design.beam.width"}
+    wider = spec("strip", "design.force=5 N", "design.beam.width=[5 mm, 30 mm]")
+    assert api.design(wider).status is Status.COMPLETE
+
+
+def test_a_design_tells_what_holds_it() -> None:
+    found = api.design(spec("taper_design"))
+    text = " | ".join(found.active_bounds)
+    assert "upper edge of the band" in text
+    assert "lower edge of the band" in text
+    assert "stress 42.5 MPa at the end" in text
+    assert "converged to a local optimum" in found.message
+    assert "corotational elements" in found.message
+
+
+def test_a_thickness_at_its_bound_is_told() -> None:
+    found = api.design(spec("taper_design", "design.beam.thickness=[0.5 mm, 1.5 mm]"))
+    assert any("mechanism.beam.thickness.6 at its largest, 1.5 mm" in item for item in found.active_bounds)
+
+
+def test_a_band_that_no_strip_keeps_is_infeasible() -> None:
+    narrow = ["design.tolerance=0.05 %", "design.beam.nodes=2", "design.beam.thickness=[0.9 mm, 0.91 mm]"]
+    found = api.design(spec("taper_design", *narrow))
+    assert found.status is Status.INFEASIBLE
+    assert {item.name for item in found.warnings} == {"target_unreachable"}
+
+
+def test_what_would_be_feasible_is_said_with_its_number() -> None:
+    found = api.design(spec("taper_design", "design.force=100 N", "design.beam.nodes=3"))
+    assert found.status is Status.INFEASIBLE
+    nearest = found.nearest_feasible["design.force"]
+    assert api.design(spec("taper_design", f"design.force={nearest}", "design.beam.nodes=3")).status is Status.COMPLETE
+
+
+def test_a_given_travel_keeps_the_stress_at_its_exact_peak() -> None:
+    """Between the samples of the search the stress is higher: it is then searched again."""
+    wanted = ["design={force: 1.5 N, travel: [1 mm, 60 mm], beam: {goal: ripple, nodes: 5}}", "analysis.recheck=false"]
+    result = api.analyze(api.design(spec("taper_design", *wanted)).spec)
+    assert result.curve.extra["max_stress"].values.max() <= 42.5e6
+    assert "overstressed" not in names(result)
+
+
+def test_an_optimiser_that_stops_is_told() -> None:
+    """The root mean square of 25 mm has a flat valley: the steps allowed do not reach its end."""
+    wanted = "design={force: 1.5 N, travel: [1 mm, 25 mm], beam: {goal: rms, nodes: 5}}"
+    found = api.design(spec("taper_design", wanted))
+    assert sqp.Ending.OPTIMUM.value not in found.message
+    assert "optimizer_stopped" in {item.name for item in found.warnings}
+
+
+def test_a_longest_stroke_before_the_band_is_refused() -> None:
+    found = api.design(spec("taper_design", "design.beam.longest=0.5 mm"))
+    assert found.status is Status.INVALID
+    assert "design.beam.longest" in found.message
+
+
+def test_random_starts_repeat_with_their_seed() -> None:
+    from cfmkit.families.base import Run
+
+    wanted = spec("taper_design", "design.beam.seeds=2", "design.beam.nodes=5")
+    one, two = (api.design(wanted, Run(seed=3)) for _ in range(2))
+    assert one.spec == two.spec
+
+
+def test_goals_without_what_they_need_are_refused() -> None:
+    assert "design.tolerance" in api.design(spec("taper_design", "design.travel=[1 mm, 20 mm]")).message
+    assert "design.travel" in api.design(spec("taper_design", "design.beam.goal=ripple")).message
+
+
+@pytest.mark.parametrize(("name", "end", "stroke"), [("tapered", 18, 16.01), ("strip", 40, 34.01)])
+def test_the_travel_up_to_the_allowable_stress_is_found_within_a_longer_travel(
+    name: str, end: int, stroke: float
+) -> None:
+    """The numbers of the README's table: results, not the travel at which the configurations end."""
+    changes = f"analysis.travel=[0 mm, {end} mm]", "analysis.points=161", "analysis.recheck=false"
+    found = api.analyze(spec(name, *changes)).values["stress_stroke"].value
+    assert found == pytest.approx(stroke * MM, abs=0.01 * MM)
+
+
+# --- outline ----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["lumped", "strip", "tapered"])
+def test_the_outline_has_the_flexures_thickness(name: str) -> None:
+    drawn = api.drawing(spec(name))
+    cut = next(contour for contour in drawn.contours if contour.layer == "cut")
+    points = np.array([edge.start for edge in cut.edges])  # type: ignore[union-attr]
+    sides = points[: len(points) // 2], points[len(points) // 2 :][::-1]
+    gaps = np.hypot(*(sides[0] - sides[1]).T)
+    table = drawn.tables[0].columns["thickness"][0]
+    assert gaps.min() == pytest.approx(table.min(), rel=1e-6)
+
+
+@pytest.mark.parametrize("changes", [(), ("mechanism.unloaded_angle=60 deg",)])
+@pytest.mark.parametrize("name", ["lumped", "strip", "tapered"])
+def test_every_straight_piece_has_its_thickness_up_to_its_corners(name: str, changes: tuple[str, ...]) -> None:
+    """The distance from the centre line of every piece to the edge is half its thickness there, also beside corners."""
+    drawn = api.drawing(spec(name, *changes), 1e-9)
+    cut = next(contour for contour in drawn.contours if contour.layer == "cut")
+    edges = [(complex(*edge.start), complex(*edge.end)) for edge in cut.edges]  # type: ignore[union-attr]
+    table = {key: values for key, (values, _) in drawn.tables[0].columns.items()}
+    points = table["x"] + 1j * table["y"]
+    pieces = range(0, len(points) - 1, 2) if name == "lumped" else range(len(points) - 1)
+    for k in pieces:  # a lumped chain has links between its flexures
+        along = points[k + 1] - points[k]
+        for share in (0.3, 0.5, 0.7):
+            half = 0.5 * (table["thickness"][k] * (1 - share) + table["thickness"][k + 1] * share)
+            at, normal = points[k] + share * along, 1j * along / abs(along)
+            for side in (1, -1):
+                reach = [hit for edge in edges if (hit := _ray(at, side * normal, *edge)) is not None]
+                assert min(reach) == pytest.approx(half, abs=1e-9)
+
+
+def _ray(at: complex, way: complex, start: complex, end: complex) -> float | None:
+    """Return how far a ray goes to an edge [m]; None where it misses it."""
+    edge, off = (end - start) / way, (start - at) / way
+    if edge.imag == 0:
+        return None
+    share = -off.imag / edge.imag
+    reach = off.real + share * edge.real
+    return reach if 0 <= share <= 1 and reach > 0 else None
+
+
+@pytest.mark.parametrize(("change", "allowed"), [("0.0099 mm", False), ("0.0101 mm", True), ("1e-9 mm", False)])
+def test_a_strip_with_a_place_a_hundred_times_thinner_is_a_hinge_and_refused(change: str, allowed: bool) -> None:
+    values = f"mechanism.beam.thickness=[1 mm, 0.8 mm, {change}, 1 mm]"
+    if allowed:
+        assert min(spec("strip", values).mechanism.beam.values) == pytest.approx(1.01e-5)
+        return
+    with pytest.raises(cfmkit.SpecError, match=r"over 100 times the smallest.* is a hinge"):
+        spec("strip", values)
+
+
+def test_the_side_of_a_strip_is_found_without_its_stresses(monkeypatch: pytest.MonkeyPatch) -> None:
+    """They were computed along the whole strip at every point, for each point anew."""
+    calls: list[int] = []
+    monkeypatch.setattr("cfmkit.elastica.outcome.path.along_beam", lambda *_: calls.append(1))
+    assert api.analyze(spec("strip", "analysis.points=7", "analysis.recheck=false")).status.usable
+    assert not calls
+
+
+def test_printing_allowance_is_not_drawn() -> None:
+    thin = api.drawing(spec("strip", "mechanism.beam.offset=0.1 mm")).tables[0].columns["thickness"][0]
+    np.testing.assert_allclose(thin, 0.97721 * MM)
+
+
+def test_two_links_with_pins_are_drawn_for_springs() -> None:
+    drawn = api.drawing(spec("bilancia2019"))
+    holes = [contour for contour in drawn.contours if contour.hole]
+    apart = holes[1].edges[0].center[0] - holes[0].edges[0].center[0]  # type: ignore[union-attr]
+    assert apart == pytest.approx(54 * MM)
+    assert TABLE_2[0].length == pytest.approx(54 * MM / 5)
+
+
+# --- places ---------------------------------------------------------------------------------------------------
+
+PLACES = ("usable_stroke", "usable_start", "usable_end", "range_95", "band_range_05pct", "band_range_1pct")
+PLACES += ("band_range_5pct", "run_in_95", "run_in_98")
+
+
+@pytest.mark.parametrize(
+    ("name", "changes"),
+    [
+        ("lumped", ()),
+        ("strip", ()),
+        ("tapered", ()),
+        ("tapered", ("analysis.fidelity=lumped",)),
+        ("strip", ("mechanism.unloaded_angle=0.5404195002705842 rad",)),  # a corner, where the straight strip buckles
+        ("strip", ("analysis.side=beyond", "mechanism.material.yield_strength=30 MPa")),
+        ("strip", ("analysis.travel=[5 mm, 30 mm]", "analysis.window=[6 mm, 29 mm]")),
+    ],
+)
+def test_places_do_not_depend_on_the_number_of_points(name: str, changes: tuple[str, ...]) -> None:
+    found = []
+    for points in (21, 301):
+        one = spec(name, *changes, f"analysis.points={points}", "analysis.recheck=false")
+        metrics = api.evaluate(api.analyze(one))
+        found.append([metrics[each].value for each in PLACES])
+        found[-1].append(metrics["stress_stroke"].value or 0.0)
+    assert one.analysis.travel is not None
+    assert None not in found[0]
+    assert found[0] == pytest.approx(found[1], rel=0, abs=1e-7 * one.analysis.travel[1])
+
+
+def test_the_course_between_the_points_is_that_of_the_chain_pressed_there() -> None:
+    one = api.analyze(spec("tapered", "analysis.points=11", "analysis.recheck=false"))
+    travel = np.sort(np.random.default_rng(3).uniform(1e-7, 16 * MM, 40))
+    again = one.state.chain.press(travel)
+    np.testing.assert_allclose(one.closed.effort("load", travel), again.force, rtol=1e-8)
+    np.testing.assert_allclose(
+        one.closed.stress("load", travel), again.path.peak_stress().value[again.path.at_asked], 1e-6
+    )
+
+
+def test_the_stress_stroke_is_where_the_pressed_chain_has_the_allowable_stress() -> None:
+    one = api.analyze(spec("tapered", "analysis.fidelity=lumped", "analysis.points=11", "analysis.recheck=false"))
+    place = one.values["stress_stroke"].value
+    path = one.state.chain.press(np.array([place])).path
+    assert path.peak_stress().value[path.at_asked[0]] == pytest.approx(42.5e6, rel=1e-6)
