@@ -18,9 +18,9 @@ import cfmkit
 from cfmkit import api
 from cfmkit.elastica import Displacement, trace
 from cfmkit.families.vcfm.exact import DOWN, leaf_network
-from cfmkit.families.vcfm.springs import Diamond
-from cfmkit.families.vcfm.strip import Strip
-from cfmkit.families.vcfm.vbeam import VBeam
+from cfmkit.families.vcfm.leaves.springs import Diamond
+from cfmkit.families.vcfm.leaves.strip import Strip
+from cfmkit.families.vcfm.leaves.v_beam import VBeam
 from cfmkit.studies.engine import run
 from cfmkit.studies.sensitivity.methods import carry_out
 from cfmkit.studies.sensitivity.setup import prepare

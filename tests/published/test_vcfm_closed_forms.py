@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 from vcfm_support import leaf, side
 
-from cfmkit.families.vcfm import springs, truss, vbeam
-from cfmkit.families.vcfm.arch import CosineArch
-from cfmkit.families.vcfm.hybrid import HybridLeaf
-from cfmkit.families.vcfm.preload import force_change, measured_stiffness_for, rest_shift
-from cfmkit.families.vcfm.strip import Strip
+from cfmkit.families.vcfm.leaves import springs, truss
+from cfmkit.families.vcfm.leaves import v_beam as vbeam
+from cfmkit.families.vcfm.leaves.cosine import CosineLeaf
+from cfmkit.families.vcfm.leaves.hybrid import HybridLeaf
+from cfmkit.families.vcfm.leaves.springs import force_change, measured_stiffness_for, rest_shift
+from cfmkit.families.vcfm.leaves.strip import Strip
 
 
 def printed_diamond_stiffness(strip):
@@ -151,7 +152,7 @@ def test_straight_beam_stiffens_as_it_bends():
 
 def test_cosine_arch_against_finite_elements():
     """Pair of leaves: force at 1, 2, 3, 4 and 6 mm, slope and stiffness as made."""
-    arch = CosineArch(leaf())
+    arch = CosineLeaf(leaf())
     assert 2 * arch.force(np.array([1.0, 2, 3, 4, 6])) == pytest.approx(
         [5.59261, 4.988087, 3.643617, 2.28771, -0.432483], abs=0.03
     )
@@ -160,7 +161,7 @@ def test_cosine_arch_against_finite_elements():
 
 
 @pytest.mark.parametrize(
-    ("law", "balance", "tolerance"), [(CosineArch, 4.0 / 3.0, 2e-3), (vbeam.VBeam, 1.0, 2e-3)], ids=["cosine", "v"]
+    ("law", "balance", "tolerance"), [(CosineLeaf, 4.0 / 3.0, 2e-3), (vbeam.VBeam, 1.0, 2e-3)], ids=["cosine", "v"]
 )
 def test_shallow_leaves_follow_the_normalised_lines(law, balance, tolerance):
     """f = F (2X)^3/(E I h) of a pair is 64 pi^2 (4/3 - D) for the cosine and 64 pi^2 (1 - D) for the V, D = d/h."""

@@ -11,8 +11,7 @@ from vcfm_support import CONFIGS, MM, analyzed, force_at
 
 import cfmkit
 from cfmkit import api
-from cfmkit.families.vcfm.design import closed_form
-from cfmkit.families.vcfm.refine import fit_widths
+from cfmkit.families.vcfm.design import closed_form, fit_widths
 from cfmkit.results import Status
 from cfmkit.studies.engine import run
 from cfmkit.studies.sensitivity.methods import carry_out

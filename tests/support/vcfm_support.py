@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 import cfmkit
-from cfmkit.families.vcfm.strip import Strip
+from cfmkit.families.vcfm.leaves.strip import Strip
 
 if TYPE_CHECKING:
     from cfmkit.results import Result

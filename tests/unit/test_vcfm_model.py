@@ -13,14 +13,15 @@ from cfmkit import api
 from cfmkit.export import files
 from cfmkit.families.base import Block, Measure
 from cfmkit.families.vcfm.block import METRICS, SCALARS, VARIED, analyze_block
-from cfmkit.families.vcfm.checks import extreme_sums
-from cfmkit.families.vcfm.model import force_of, rest_of, rests_of
-from cfmkit.families.vcfm.parts import parts
-from cfmkit.families.vcfm.sbranch import POLE, axial_root, compliance, end_curvature, pose
-from cfmkit.families.vcfm.shapes import centre_line
-from cfmkit.families.vcfm.springs import Diamond
-from cfmkit.families.vcfm.strip import Strip
-from cfmkit.families.vcfm.vbeam import VBeam
+from cfmkit.families.vcfm.build import parts
+from cfmkit.families.vcfm.findings import extreme_sums
+from cfmkit.families.vcfm.leaves.s_form import POLE, axial_root, compliance, end_curvature, pose
+from cfmkit.families.vcfm.leaves.springs import Diamond
+from cfmkit.families.vcfm.leaves.strip import Strip
+from cfmkit.families.vcfm.leaves.v_beam import VBeam
+from cfmkit.families.vcfm.model import rest_of, rests_of
+from cfmkit.families.vcfm.scene import centre_line
+from cfmkit.families.vcfm.solution import force_of
 from cfmkit.families.vcfm.windows import longest_window
 from cfmkit.metrics import Window, evaluate
 from cfmkit.results import Status

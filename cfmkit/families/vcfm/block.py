@@ -13,13 +13,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.families.base import BlockAnswer
-from cfmkit.families.vcfm.checks import PRESSED, ROUNDING, returns
-from cfmkit.families.vcfm.parts import RIM, share_of
-from cfmkit.families.vcfm.preload import measured_stiffness_for
-from cfmkit.families.vcfm.springs import Diamond
-from cfmkit.families.vcfm.strip import Strip
-from cfmkit.families.vcfm.truss import TrussDiamond, TrussLeaf
-from cfmkit.families.vcfm.vbeam import (
+from cfmkit.families.vcfm.build import RIM, share_of
+from cfmkit.families.vcfm.findings import PRESSED, ROUNDING, returns
+from cfmkit.families.vcfm.leaves.springs import Diamond, measured_stiffness_for
+from cfmkit.families.vcfm.leaves.strip import Strip
+from cfmkit.families.vcfm.leaves.truss import TrussDiamond, TrussLeaf
+from cfmkit.families.vcfm.leaves.v_beam import (
     FLAT_BUCKLED_ABOVE,
     LINEAR_ABOVE,
     NEGATIVE_ABOVE,

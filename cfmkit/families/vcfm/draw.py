@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.curves import Curve
-from cfmkit.families.vcfm.model import force_of, rest_of
-from cfmkit.families.vcfm.preload import force_change, rest_shift
+from cfmkit.families.vcfm.leaves.springs import force_change, rest_shift
+from cfmkit.families.vcfm.leaves.truss import TrussLeaf
+from cfmkit.families.vcfm.model import rest_of
 from cfmkit.families.vcfm.scene import scene
-from cfmkit.families.vcfm.truss import TrussLeaf
+from cfmkit.families.vcfm.solution import force_of
 from cfmkit.families.vcfm.windows import flat_window
 from cfmkit.plots import parts
 from cfmkit.plots.curves import Look, plot_curve
@@ -40,8 +41,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.vcfm.model import Push, Solution
     from cfmkit.families.vcfm.scene import Scene
+    from cfmkit.families.vcfm.solution import Push, Solution
     from cfmkit.results import Result
 
 TRAVEL = Scale("displacement", "length")

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.families.findings import mm
-from cfmkit.families.vcfm.model import rest_of, result_of, solve, travel_grid
-from cfmkit.families.vcfm.parts import parts, share_of, strip_of
-from cfmkit.families.vcfm.samples import Character, LawSampler, Samples
+from cfmkit.families.vcfm.build import parts, share_of, strip_of
+from cfmkit.families.vcfm.model import LawSampler, rest_of, result_of, solve, travel_grid
+from cfmkit.families.vcfm.solution import Characteristics, LeafSamples
 from cfmkit.families.vcfm.traced import traced
 
 if TYPE_CHECKING:
@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica import Network
     from cfmkit.families.base import Run
+    from cfmkit.families.vcfm.leaves.strip import Strip
     from cfmkit.families.vcfm.spec import VcfmSpec
-    from cfmkit.families.vcfm.strip import Strip
     from cfmkit.families.vcfm.traced import Traced
     from cfmkit.results import Result
 
@@ -66,7 +66,7 @@ def leaf_network(spec: VcfmSpec) -> Network:
 
 
 @dataclass(frozen=True)
-class Chain:
+class SpringChain:
     """A part of the spring that is traced: its network, the node that moves, and how it counts.
 
     `travel` is the node's share of the compression, `count` the number of such parts in parallel.
@@ -78,7 +78,7 @@ class Chain:
     count: float
 
 
-def spring_chain(spec: VcfmSpec) -> Chain:
+def spring_chain(spec: VcfmSpec) -> SpringChain:
     """Return what is traced of the spring."""
     from cfmkit.elastica import CLAMPED, Beam, Network, Node, Support, arc, guided
 
@@ -98,14 +98,14 @@ def spring_chain(spec: VcfmSpec) -> Chain:
             "bend": Beam("low", "high", made, arc(np.pi)),
             "upper": Beam("high", "end", made),
         }
-        return Chain(Network(nodes, beams), "end", 1.0, 2.0 * share)
+        return SpringChain(Network(nodes, beams), "end", 1.0, 2.0 * share)
     # the corner of a diamond or the joint of folded beams moves across as it likes; a straight beam is held
     support = guided(0.5 * np.pi) if about.structure == "straight" else Support(rotation=True)
     network = Network(
         {"wall": wall, "end": Node(strip.reach, strip.rise, support)}, {"leaf": Beam("wall", "end", made)}
     )
     travel, count = {"diamond": (0.5, 2.0), "folded": (0.5, 4.0), "straight": (1.0, 2.0)}[about.structure]
-    return Chain(network, "end", travel, count * share)
+    return SpringChain(network, "end", travel, count * share)
 
 
 class ExactSampler:
@@ -135,12 +135,12 @@ class ExactSampler:
             "spring was", self.sides, self.chain.travel
         )
 
-    def leaves(self, travel: FloatArray) -> Samples:
+    def leaves(self, travel: FloatArray) -> LeafSamples:
         """Return what all leaves do at some travels [m]; NaN beyond what was reached."""
         ahead, behind = self.pushed.at(np.maximum(travel, 0.0)), self.pulled.at(np.minimum(travel, 0.0))
         back = travel < 0
         force, stress, stable, buckled = (np.where(back, one, other) for one, other in zip(behind, ahead, strict=True))
-        return Samples(self.each * force, stress, stable, buckled)
+        return LeafSamples(self.each * force, stress, stable, buckled)
 
     def leaf_force(self, travel: FloatArray) -> FloatArray:
         """Return the force of all leaves alone [N]."""
@@ -154,11 +154,11 @@ class ExactSampler:
         return self.chain.count * force, stress
 
     @cached_property
-    def character(self) -> Character:
+    def character(self) -> Characteristics:
         """Stiffnesses and linear range as traced."""
         push = self.pushed
         if not push.edges[-1]:
-            return Character(np.nan, 0.0, np.nan, (np.nan, np.nan))
+            return Characteristics(np.nan, 0.0, np.nan, (np.nan, np.nan))
         first, last = push.buckled_range
         places = np.linspace(first + 0.1 * (last - first), last - 0.1 * (last - first), 41)
         if np.isfinite(first):
@@ -170,7 +170,7 @@ class ExactSampler:
         first_stiffness = float((push.at(np.array([tiny]))[0] - self.pulled.at(np.array([-tiny]))[0])[0] / (2.0 * tiny))
         ends = np.array([-tiny, tiny])
         forces = self.spring(ends)[0]
-        return Character(
+        return Characteristics(
             float((forces[1] - forces[0]) / (2.0 * tiny)),
             self.each * steepest,
             self.each * first_stiffness,

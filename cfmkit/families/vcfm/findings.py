@@ -1,8 +1,36 @@
-"""Everything a mechanism of snap-through leaves and a preloaded spring can suffer from, by name."""
+"""What a mechanism of snap-through leaves and a preloaded spring can suffer from, by name, and the checks for it."""
 
 from __future__ import annotations
 
-from cfmkit.families.findings import finder
+from math import degrees
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.families.findings import at_least, at_most, finder, mm, mpa, newton, percent, rate
+from cfmkit.families.vcfm.build import spring_room
+from cfmkit.families.vcfm.leaves.hybrid import HybridLeaf
+from cfmkit.families.vcfm.leaves.s_form import POLE
+from cfmkit.families.vcfm.leaves.springs import Diamond, measured_stiffness_for
+from cfmkit.families.vcfm.leaves.v_beam import (
+    FLAT_BUCKLED_ABOVE,
+    LINEAR_ABOVE,
+    NEGATIVE_ABOVE,
+    RELIABLE,
+    STEEP,
+    STOCKY,
+    THICK,
+    VBeam,
+    overrated,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from cfmkit.arrays import FloatArray
+    from cfmkit.families.vcfm.solution import Push, Solution
+    from cfmkit.results import Finding
+
 
 FINDINGS = {
     "no_negative_stiffness": "the leaves are too thick for their rise: no negative stiffness anywhere",
@@ -29,3 +57,418 @@ FINDINGS = {
 
 finding = finder(FINDINGS)
 """Return a finding of this family; the name must be one that `FINDINGS` explains."""
+
+WAVY = 0.02
+"""Waviness over thickness from which on the flatness suffers."""
+
+TURNING = POLE / (4.0 * np.pi**2)
+"""Load at which a leaf buckles whose shuttle can turn, over that with a shuttle that cannot; each in E I/L^2."""
+
+PRESSED, STRETCHED = 0.3, 0.12
+"""Deflection of a diamond's leaf over its length beyond which its stiffness is off by more than 3 and 4 percent."""
+
+ROUNDING = 1e-9
+
+ALIKE = 0.01
+"""Stiffnesses that differ by less than this share cancel."""
+
+TRIED = (0.998, 0.99, 0.97, 0.94, 0.9)
+"""Shares of the flatness that are looked for where a window is proposed: by the samples of a curve, with a corner cut
+off, the whole must be kept."""
+
+WIDEST = 50.0
+"""Factor on a width up to which one is looked for that makes the force flat."""
+
+EXACT_FORM = 2e-4
+"""Share of a stress that counts for nothing: designs are fitted to 1e-4."""
+
+
+def findings_of(solution: Solution) -> tuple[Finding, ...]:
+    """Return every finding about a solved mechanism, the gravest first."""
+    checks = (
+        _measured,
+        spring_closed,
+        _truss,
+        _leaf_shape,
+        _flatness,
+        _returns,
+        _preloads,
+        _strength,
+        _buckling,
+        _imperfect,
+        _range,
+    )
+    return tuple(found for check in checks for found in check(solution))
+
+
+def _leaf_shape(solution: Solution) -> Iterator[Finding]:
+    kind, one = solution.spec.mechanism.bistable.structure, solution.character
+    if kind == "hybrid" or solution.spec.analysis.fidelity == "truss":
+        return
+    q = float(solution.parts.strip.slenderness)
+    negative, straight = q >= NEGATIVE_ABOVE, q > LINEAR_ABOVE
+    told = f"rise over thickness is {q:.4g}"
+    if kind == "cosine":  # whose limits depend on the angle: as the curve has it
+        negative, straight = one.negative_stiffness > 0, bool(np.isfinite(one.linear[0]))
+    limits = {"v-beam": (f", below {NEGATIVE_ABOVE}", ", not above pi"), "cosine": ("", "")}[kind]
+    if not negative:
+        yield finding(
+            "no_negative_stiffness",
+            f"{told}{limits[0]}: the force of the leaves only rises, nothing cancels the spring; "
+            "use thinner or steeper leaves",
+        )
+    elif not straight:
+        yield finding(
+            "no_linear_region",
+            f"{told}{limits[1]}: the leaves do not buckle and their force is a curve; the constant-force window is "
+            "its top only. Use thinner or steeper leaves",
+        )
+
+
+def _flatness(solution: Solution) -> Iterator[Finding]:
+    push, (low, high) = solution.nominal, solution.window
+    force = push.inside((low, high))
+    if not len(force) or force.max() <= 0:
+        return
+    ripple, allowed = _ripple(force), solution.spec.analysis.flatness
+    if ripple <= allowed or solution.window_is_flat:
+        return
+    one = solution.character
+    alike = one.positive_stiffness > 0 and abs(one.negative_stiffness / one.positive_stiffness - 1.0) < ALIKE
+    told = f"K_p = {rate(one.positive_stiffness)} and K_n = {rate(one.negative_stiffness)}"
+    cause = f"{told} cancel, but not in the whole window" if alike else f"{told} do not cancel"
+    low, high = max(low, float(push.travel[0])), min(high, float(push.travel[-1]))  # what is beyond is not known
+    words, cures = _flattening(solution, ripple)
+    yield finding(
+        "not_flat",
+        f"{cause}: over {mm(low)} ... {mm(high)} the force varies by {percent(ripple)} of its maximum, "
+        f"{percent(allowed)} is allowed{words}",
+        *cures,
+    )
+
+
+def _flattening(solution: Solution, ripple: float) -> tuple[str, tuple[str, ...]]:
+    """Return what makes the force flat, in words and as changes of the specification: only what has been tried.
+
+    Forces are linear in the widths, so that other widths need no other solution. Where none is flat over the window,
+    the window is wrong: then the flat part is named.
+    """
+    factor, left = _better_width(solution)
+    allowed = solution.spec.analysis.flatness
+    if left <= allowed and left < ripple:
+        text = f"; leaves {factor:.3g} times as wide, or a spring {1.0 / factor:.3g} times as wide, make them equal"
+        return text, ()
+    (first, last), (low, high) = solution.character.linear, solution.window
+    why = ""
+    if np.isfinite(first) and (low < first or high > last):
+        why = f"; the leaves are buckled from {mm(first)} to {mm(last)} only"
+    for share in TRIED:
+        flat = solution.flat_part(solution.nominal, share * allowed)
+        if flat is not None and _ripple(solution.nominal.inside(flat)) <= (1.0 - ROUNDING) * allowed:
+            start, end = at_least(flat[0]), at_most(flat[1])
+            cure = f"analysis.window=[{start}, {end}]"
+            return f"{why}; the force is flat from {start} to {end}: state that as the window", (cure,)
+    return f"{why}; no width of leaves or spring makes it flat", ()
+
+
+def _ripple(force: FloatArray) -> float:
+    """Return (max - min)/max of some forces."""
+    return float((force.max() - force.min()) / force.max()) if len(force) and force.max() > 0 else np.inf
+
+
+def _better_width(solution: Solution) -> tuple[float, float]:
+    """Return the factor on the leaves' width that makes the force flattest in the window, and the ripple left."""
+    low, high = solution.window
+    travel = solution.nominal.travel
+    places = np.unique(np.concatenate([np.linspace(low, high, 201), travel[(travel > low) & (travel < high)]]))
+    leaves = solution.sampler.leaf_force(places)
+    spring = solution.sampler.spring(places + solution.nominal.preload)[0]
+    if not np.isfinite(leaves + spring).all():
+        return 1.0, np.inf
+    one = solution.character
+    factors = np.geomspace(1.0 / WIDEST, WIDEST, 801)
+    if one.negative_stiffness > 0:  # the nearest at hand where the slopes are constant
+        factors = np.append(factors, one.positive_stiffness / one.negative_stiffness)
+    top, bottom = (extreme_sums(factors, leaves, spring, way) for way in (1.0, -1.0))
+    with np.errstate(all="ignore"):
+        left = np.where(bottom > 0, (top - bottom) / top, np.inf)
+    # stiffnesses that cancel are what a reader expects: another factor only where that one does not do
+    best = len(factors) - 1 if left[-1] <= solution.spec.analysis.flatness else int(left.argmin())
+    return float(factors[best]), float(left[best])
+
+
+def extreme_sums(factors: FloatArray, slopes: FloatArray, offsets: FloatArray, way: float) -> FloatArray:
+    """Return the largest (`way` 1) or smallest (-1) of factor * slope + offset over many lines, for each factor.
+
+    Only lines of the convex hull of (slope, offset) are ever extreme: some dozen of hundreds.
+
+    Examples
+    --------
+    >>> extreme_sums(np.array([0.0, 2.0]), np.array([1.0, -1.0, 0.5]), np.array([0.0, 3.0, 1.0]), 1.0).tolist()
+    [3.0, 2.0]
+    """
+    hull: list[int] = []
+    # Where leaves are buckled the lines meet in one point: without a margin, rounding keeps all of them.
+    margin = 1e-14 * float(np.ptp(slopes)) * float(np.abs(offsets).max(initial=0.0))
+    x, y = (way * slopes).tolist(), (way * offsets).tolist()
+    for k in np.lexsort((-way * offsets, way * slopes)).tolist():
+        if hull and x[k] == x[hull[-1]]:
+            continue
+        while len(hull) > 1:
+            i, j = hull[-2:]
+            if (x[j] - x[i]) * (y[k] - y[i]) < (y[j] - y[i]) * (x[k] - x[i]) - margin:
+                break
+            hull.pop()
+        hull.append(k)
+    sums = factors[:, None] * slopes[hull] + offsets[hull]
+    return np.asarray(way * (way * sums).max(axis=1))
+
+
+def _returns(solution: Solution) -> Iterator[Finding]:
+    push, (low, high) = solution.nominal, solution.window
+    if solution.least and not returns(solution.least[1], float(np.abs(push.force).max())):
+        place, force = solution.least
+        yield finding(
+            "bistable",
+            f"past the peak of the leaves the force falls to {newton(force)} at {mm(place)} (followed to "
+            f"{mm(float(push.travel[-1]))}): the mechanism stays there until it is pulled back; use a stiffer spring, "
+            "thicker or fewer leaves, or a preload",
+        )
+    inside = push.inside((low, high))
+    beyond = push.rest is None or push.rest > low
+    if beyond or (len(inside) and inside.min() <= 0):
+        told = newton(float(inside.min())) if len(inside) and not beyond else "zero and below"
+        yield finding(
+            "force_reversal",
+            f"within {mm(low)} ... {mm(high)} the force falls to {told}: no outward force is "
+            f"left; a preload above {mm(-solution.parts.balance)} and K_p >= K_n keep it positive",
+        )
+    yield from _overload(solution, push)
+
+
+def returns(least: FloatArray | float, largest: FloatArray | float) -> Any:
+    """Return whether a mechanism comes back by itself: its least force past the peak of the leaves is a real one.
+
+    Parameters
+    ----------
+    least, largest : float or array
+        That force, and the largest of the curve [N].
+    """
+    return np.asarray(least > ROUNDING * largest)
+
+
+def _overload(solution: Solution, push: Push) -> Iterator[Finding]:
+    end = solution.character.linear[1]
+    if np.isfinite(end) and push.travel[-1] > end * (1 + 1e-9):
+        at_end, last = float(np.interp(end, push.travel, push.force)), float(push.force[-1])
+        if last - at_end <= solution.spec.analysis.flatness * abs(last):
+            return
+        yield finding(
+            "overload",
+            f"beyond {mm(end)} the leaves straighten and stiffen: the force goes from {newton(at_end)} to "
+            f"{newton(last)} at {mm(float(push.travel[-1]))}; a stop at {mm(end)} keeps to the linear range",
+        )
+
+
+def _preloads(solution: Solution) -> Iterator[Finding]:
+    for push in solution.pushes:
+        if push.preload >= 0:
+            continue
+        inside = push.inside(solution.window)
+        if push.rest is None or push.rest > solution.window[0] or inside.min(initial=np.inf) <= 0:
+            low, high = solution.window
+            yield finding(
+                "preload_out_of_range",
+                f"with a preload of {mm(push.preload)} no outward force is left somewhere in {mm(low)} ... {mm(high)}: "
+                f"where the leaves are flat it is K_p (h + dr), which vanishes at {mm(-solution.parts.balance)}",
+            )
+            return
+
+
+def _strength(solution: Solution) -> Iterator[Finding]:
+    allowed = solution.spec.mechanism.allowable_stress
+    if allowed is None:
+        return
+    exact = solution.spec.analysis.fidelity == "exact"
+    slack = EXACT_FORM if exact else overrated(float(solution.parts.strip.angle))
+    parts = [
+        (push, name, stress)
+        for push in solution.pushes
+        for name, stress in (("spring", push.spring_stress), ("leaves", push.leaves.stress))
+    ]
+    push, name, stress = max(parts, key=lambda part: float(part[2].max()))
+    over = np.flatnonzero(stress > allowed * (1 + slack))
+    if len(over):
+        first, top = int(over[0]), int(stress.argmax())
+        yield finding(
+            "overstressed",
+            f"in the {name} the stress passes {mpa(allowed)} at {mm(float(push.travel[first]))} with a preload "
+            f"of {mm(push.preload)} and reaches {mpa(float(stress[top]))} at {mm(float(push.travel[top]))}; "
+            "use longer or thinner leaves, or less preload",
+        )
+
+
+def _buckling(solution: Solution) -> Iterator[Finding]:
+    about = solution.spec.mechanism.bistable
+    if not about.guided:
+        hint = "" if solution.spec.analysis.fidelity == "exact" else "; only 'analysis.fidelity: exact' shows it"
+        yield finding(
+            "asymmetric_buckling",
+            f"the shuttle can turn, so the leaves buckle at {percent(TURNING)} of the load and lose their straight "
+            f"line{hint}. Use two Vs at a distance, or a guide",
+            "mechanism.bistable.guided=true",
+        )
+    if about.width < 2.0 * about.thickness:
+        yield finding(
+            "out_of_plane_buckling",
+            f"the leaves are {mm(about.width)} wide and {mm(about.thickness)} thick: below twice the thickness they "
+            "buckle out of the plane; use wider (and longer) leaves",
+        )
+
+
+def _imperfect(solution: Solution) -> Iterator[Finding]:
+    about, exact = solution.spec.mechanism.bistable, solution.spec.analysis.fidelity == "exact"
+    share = about.waviness / about.thickness
+    if share > WAVY or (about.waviness and not exact):
+        told = "is counted in" if exact else "is left out: only 'analysis.fidelity: exact' has it"
+        effect = "; it rounds the peak and lowers the negative stiffness" if share > WAVY else ""
+        yield finding(
+            "imperfection", f"waviness of {mm(about.waviness)}, {percent(share)} of the thickness, {told}{effect}"
+        )
+    push = solution.nominal
+    if not push.leaves.stable.all():
+        lost = push.travel[~push.leaves.stable]
+        told = (
+            f"from {mm(float(lost[0]))} to {mm(float(lost[-1]))} the leaves are in a form that they leave for another"
+        )
+        if solution.spec.analysis.branch == "stable":
+            yield finding("unstable_branch", f"{told}, which was not found")
+        else:
+            follow = "analysis.branch: stable follows them"
+            yield finding("unstable_branch", f"{told}: {follow}", "analysis.branch=stable")
+
+
+def _range(solution: Solution) -> Iterator[Finding]:
+    strip = solution.parts.strip
+    share = float(strip.thickness / strip.length)
+    if share > STOCKY and solution.spec.analysis.fidelity != "truss":
+        yield finding(
+            "theory_range",
+            f"leaves {percent(share)} as thick as long are no beams: no model here has their force or stress; "
+            "use longer or thinner leaves",
+        )
+        return
+    if solution.spec.analysis.fidelity != "analytic":
+        return
+    angle, reach = float(strip.angle), RELIABLE * solution.parts.balance
+    if isinstance(solution.parts.leaf, HybridLeaf):
+        much = (
+            f"with a rise of {float(strip.slenderness):.3g} flexure thicknesses and an axial force of up to "
+            f"{percent(solution.parts.leaf.crushing)} of the flexures' own buckling load these bend and buckle, which "
+            "pseudo-rigid bodies do not: the force is overrated, up to several times"
+            if solution.parts.leaf.flexures_buckle
+            else "as pseudo-rigid bodies hybrid leaves have their force to about 10 % up to the peak, worse beyond"
+        )
+        yield finding(
+            "theory_range",
+            f"{much}; their stress is up to half too low. Verify with 'analysis.fidelity: exact'",
+            "analysis.fidelity=exact",
+        )
+    elif share > THICK:
+        yield finding(
+            "theory_range",
+            f"leaves {percent(share)} as thick as long: the closed forms are for thin ones, and off by 5 to 10 % and "
+            "more; verify with 'analysis.fidelity: exact'",
+            "analysis.fidelity=exact",
+        )
+    elif angle > STEEP:
+        yield finding(
+            "theory_range",
+            f"leaves at {degrees(angle):.3g} deg: beyond 15 deg the closed forms are for small angles no more; "
+            "verify with 'analysis.fidelity: exact'",
+            "analysis.fidelity=exact",
+        )
+    elif float(solution.nominal.travel[-1]) > reach * (1 + ROUNDING):
+        yield finding(
+            "theory_range",
+            f"the travel goes to {mm(float(solution.nominal.travel[-1]))}, beyond {RELIABLE} times the rise "
+            f"({mm(reach)}): the force there is off by percents; verify with 'analysis.fidelity: exact'",
+            "analysis.fidelity=exact",
+        )
+    yield from _spring_range(solution)
+
+
+def _spring_range(solution: Solution) -> Iterator[Finding]:
+    spring = solution.parts.spring
+    if not isinstance(spring, Diamond):
+        return
+    angle, length = float(spring.strip.angle), float(spring.strip.length)
+    ends = [push.preload + float(place) for push in solution.pushes for place in (push.travel[0], push.travel[-1])]
+    worst = max(ends, key=lambda end: end / PRESSED if end > 0 else -end / STRETCHED)
+    share = abs(worst) / (2.0 * length)
+    if angle > STEEP:
+        told = f"the leaves of the spring are at {degrees(angle):.3g} deg: its stiffness changes with its compression"
+    elif share > (PRESSED if worst > 0 else STRETCHED):
+        what = "compressed" if worst > 0 else "stretched"
+        told = f"the spring is {what} by {mm(abs(worst))}, each leaf by {percent(share)} of its length"
+    else:
+        return
+    yield finding(
+        "theory_range",
+        f"{told}; the closed form's constant stiffness is off by percents: verify with 'analysis.fidelity: exact'",
+        "analysis.fidelity=exact",
+    )
+
+
+def spring_closed(solution: Solution) -> Iterator[Finding]:
+    """Yield that the spring is pressed together, with the travel up to which the worst preload leaves it open."""
+    spec, room = solution.spec, spring_room(solution.spec)
+    most = max(spec.analysis.preloads)
+    if most + spec.travel <= room * (1 + ROUNDING):
+        return
+    positive, needed = spec.mechanism.positive, most + spec.travel - room
+    place = f"at {mm(room - most)} of the travel" if room > most else "before the shuttle moves"
+    if positive.structure == "diamond":
+        key, size = "mechanism.frame.corner", at_least(spec.mechanism.frame.corner + needed)
+    else:
+        key, size = "mechanism.positive.radius", at_least(float(positive.radius or 0.0) + 0.5 * needed)
+    yield finding(
+        "spring_closed",
+        f"the spring closes: its blocks meet when it is compressed by {mm(room)}, with a preload of {mm(most)} "
+        f"{place}, and curves end there; use less preload ('analysis.preloads') or travel ('analysis.travel'), or "
+        f"'{key}' of {size}",
+        f"{key}={size}",
+    )
+
+
+def _truss(solution: Solution) -> Iterator[Finding]:
+    if solution.spec.analysis.fidelity != "truss":
+        return
+    law, places = VBeam(solution.parts.strip), np.linspace(0.0, 1.0, 401) * float(solution.parts.strip.rise)
+    bars, leaves = np.asarray(solution.parts.leaf.force(places)), law.force(places)
+    high, where = bars.max() / leaves.max() - 1.0, places[bars.argmax()] / places[leaves.argmax()]
+    steep = float(solution.parts.leaf.negative_stiffness / law.negative_stiffness) if law.negative_stiffness else np.inf
+    yield finding(
+        "truss_law",
+        f"the paper's laws know no buckling and no clamping: against the corrected ones the peak of the leaves is "
+        f"{percent(high)} higher at {where:.2g} times the travel, their steepest slope {steep:.2g} times as steep, "
+        "and the sum with a spring never flat",
+        "analysis.fidelity=analytic",
+    )
+
+
+def _measured(solution: Solution) -> Iterator[Finding]:
+    told = solution.spec.analysis.measured
+    if told is None or float(solution.parts.strip.slenderness) < FLAT_BUCKLED_ABOVE:
+        return
+    if solution.spec.mechanism.bistable.structure == "hybrid":  # whose flexures push where it is flat
+        return
+    balance = float(solution.parts.balance)
+    there, needed = told.positive_stiffness * balance, measured_stiffness_for(told.force, balance)
+    if abs(there / told.force - 1.0) > solution.spec.analysis.flatness:
+        yield finding(
+            "measured_contradiction",
+            f"the reported {newton(told.force)} and K_p = {rate(told.positive_stiffness)} contradict each other: at "
+            f"{mm(balance)} the leaves carry nothing, whatever their number, width or modulus, and the force is "
+            f"K_p h = {newton(there)}; {newton(told.force)} needs {rate(needed)}",
+        )

@@ -14,17 +14,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.curves import Column, Curve
-from cfmkit.families.vcfm.checks import findings_of, spring_closed
-from cfmkit.families.vcfm.parts import parts, spring_room
-from cfmkit.families.vcfm.places import Places
-from cfmkit.families.vcfm.samples import LawSampler
-from cfmkit.families.vcfm.tables import adjustability, readings
-from cfmkit.families.vcfm.values import values_of
-from cfmkit.families.vcfm.windows import extreme, flat_window
+from cfmkit.families.vcfm.build import parts, spring_room
+from cfmkit.families.vcfm.findings import findings_of, spring_closed
+from cfmkit.families.vcfm.leaves.v_beam import VBeam
+from cfmkit.families.vcfm.solution import Characteristics, LeafSamples, Push, Solution
+from cfmkit.families.vcfm.values import adjustability, readings, values_of
 from cfmkit.metrics.ends import last_places
 from cfmkit.numerics.roots import bracketed_root
 from cfmkit.results import Result, Status
-from cfmkit.specs.units import between
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -33,171 +30,13 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.families.base import Run
-    from cfmkit.families.vcfm.parts import Parts
-    from cfmkit.families.vcfm.samples import Character, Sampler, Samples
+    from cfmkit.families.vcfm.build import Parts
+    from cfmkit.families.vcfm.solution import PartSampler
     from cfmkit.families.vcfm.spec import VcfmSpec
 
 
 LEAST = 5
 """Points below which there is no curve to speak of."""
-
-
-@dataclass(frozen=True)
-class Push:
-    """One curve: the mechanism at one preload.
-
-    Attributes
-    ----------
-    preload : float
-        Of the spring's far end [m].
-    travel : (n,) array
-        Of the shuttle from the as-made pose, increasing [m].
-    leaves : Samples
-        All leaves.
-    spring_force, spring_stress : (n,) array
-        Of the spring [N, Pa].
-    rest : float or None
-        Where the shuttle rests [m]; None where nothing holds it short of the end.
-    """
-
-    preload: float
-    travel: FloatArray
-    leaves: Samples
-    spring_force: FloatArray
-    spring_stress: FloatArray
-    rest: float | None
-
-    @cached_property
-    def force(self) -> FloatArray:
-        """Force on the shuttle [N]."""
-        total: FloatArray = np.add(self.leaves.force, self.spring_force)
-        return total
-
-    def inside(self, window: tuple[float, float]) -> FloatArray:
-        """Return the forces at the samples in a window, its interpolated ends included [N]."""
-        low, high = window
-        own = self.force[(self.travel > low) & (self.travel < high)]
-        ends = np.interp([low, high], self.travel, self.force, left=np.nan, right=np.nan)
-        found = np.concatenate([ends[:1], own, ends[1:]])
-        known: FloatArray = found[np.isfinite(found)]
-        return known
-
-
-@dataclass(frozen=True)
-class Solution:
-    """A solved mechanism: its parts, the model used, what characterises it, and one curve a preload."""
-
-    spec: VcfmSpec
-    parts: Parts
-    sampler: Sampler
-    character: Character
-    pushes: tuple[Push, ...]
-
-    @property
-    def nominal(self) -> Push:
-        """The curve of the first preload."""
-        return self.pushes[0]
-
-    @cached_property
-    def constant_force(self) -> float | None:
-        """Force of the spring at the nominal preload where the leaves carry nothing [N]; None if they do carry there.
-
-        Leaves that do not buckle push where they are flat, and so do hybrid ones; a straight beam as the spring has no
-        constant stiffness. Then no single number stands for the curve.
-        """
-        kinds = self.spec.mechanism.positive.structure, self.spec.mechanism.bistable.structure
-        place = np.array([self.parts.balance])
-        force = float(self.sampler.spring(place + self.nominal.preload)[0][0])
-        # leaves with a stated waviness carry a little there, which no flatness tells
-        bears = abs(float(self.sampler.leaf_force(place)[0])) > self.spec.analysis.flatness * abs(force) and not (
-            np.isfinite(self.character.linear[0]) and kinds[1] != "hybrid"
-        )
-        return None if bears or kinds[0] == "straight" else force
-
-    @cached_property
-    def windows(self) -> tuple[tuple[float, float] | None, ...]:
-        """Constant-force window of each curve [m]; None where the force is nowhere positive."""
-        return self._flat(self.pushes, self.spec.analysis.flatness)
-
-    def flat_part(self, push: Push, flatness: float) -> tuple[float, float] | None:
-        """Return the longest stretch of a curve on which (max - min)/max of the force is within `flatness` [m]."""
-        return self._flat((push,), flatness)[0]
-
-    def _flat(self, pushes: tuple[Push, ...], flatness: float) -> tuple[tuple[float, float] | None, ...]:
-        """Return `flat_part` of some curves: all together, because calls of the model are what takes the time."""
-        most, preload = max(len(push.travel) for push in pushes), np.array([[push.preload] for push in pushes])
-        travel = np.stack([np.pad(push.travel, (0, most - len(push.travel)), "edge") for push in pushes])
-        force = np.full(travel.shape, np.nan)
-        for row, push in zip(force, pushes, strict=True):
-            row[: len(push.force)] = push.force
-
-        def force_at(places: FloatArray) -> FloatArray:
-            shuttle = self.sampler.leaf_force(places.ravel())
-            spring = self.sampler.spring((places + preload).ravel())[0]
-            return np.asarray((shuttle + spring).reshape(places.shape))
-
-        ends = zip(*flat_window(travel, force, flatness, force_at), strict=True)
-        return tuple((float(low), float(high)) if np.isfinite(low) else None for low, high in ends)
-
-    @cached_property
-    def least(self) -> tuple[float, float] | None:
-        """Where and how small the nominal force becomes past the peak of the leaves [m, N]; None without one."""
-        push, sampler = self.nominal, self.sampler
-        falls = np.flatnonzero((np.diff(push.leaves.force) < 0) & (push.travel[:-1] >= 0))
-        if not len(falls):
-            return None
-        step, end = float(push.travel[-1] - push.travel[-2]), float(push.travel[-1])
-        # thin leaves have their peak between the first two points: it is looked for, not taken from them
-        peak = extreme(sampler.leaf_force, float(push.travel[falls[0]]), step, (max(float(push.travel[0]), 0.0), end))
-        beyond = np.flatnonzero(push.travel >= peak)
-        lowest = float(push.travel[beyond[push.force[beyond].argmin()]]) if len(beyond) else peak
-        place = extreme(lambda travel: -force_of(sampler, travel, push.preload), max(lowest, peak), step, (peak, end))
-        return place, float(force_of(sampler, np.array([place]), push.preload)[0])
-
-    def largest_stress(self, push: Push, end: float = np.inf) -> tuple[float, float]:
-        """Return the largest stress of leaves and spring of a curve up to a travel [m], that one included, in Pa."""
-        before = push.travel <= end
-        leaves, spring = push.leaves.stress[before], push.spring_stress[before]
-        if push.travel[0] < end < push.travel[-1]:
-            place = np.array([end])
-            leaves = np.append(leaves, self.sampler.leaves(place).stress)
-            spring = np.append(spring, self.sampler.spring(place + push.preload)[1])
-        return float(leaves.max(initial=0.0)), float(spring.max(initial=0.0))
-
-    @property
-    def window_force(self) -> float | None:
-        """Mean of the nominal force over its constant-force window [N]; None where there is none."""
-        if self.windows[0] is None or not self.windows[0][1] > self.windows[0][0]:
-            return None
-        places = np.linspace(*self.windows[0], 401)
-        force = force_of(self.sampler, places, self.nominal.preload)
-        return float(np.trapezoid(force, places) / (places[-1] - places[0]))
-
-    @property
-    def course(self) -> tuple[float, float]:
-        """Where the shuttle starts from at the nominal preload, and where it was to go [m]."""
-        return float(self.nominal.travel[0]), self.spec.travel
-
-    @property
-    def window(self) -> tuple[float, float]:
-        """Where forces are compared [m]: the analysis' window, else the linear range, else the longest flat stretch."""
-        if self.spec.analysis.window is not None:
-            return between(self.spec.analysis.window, self.course)
-        low, high = self.character.linear
-        if self.is_linear:
-            return low, min(high, self.spec.travel)
-        return self.windows[0] or (0.0, self.spec.travel)
-
-    @property
-    def is_linear(self) -> bool:
-        """Whether the leaves buckle within the travel, and so have a range of constant negative stiffness."""
-        low = self.character.linear[0]
-        return bool(np.isfinite(low) and low < self.spec.travel)
-
-    @property
-    def window_is_flat(self) -> bool:
-        """Whether `window` is the longest flat stretch itself: flat by what it is, whatever the last digit says."""
-        return self.spec.analysis.window is None and not self.is_linear and self.windows[0] is not None
 
 
 def analyze(spec: VcfmSpec, run: Run) -> Result:
@@ -243,7 +82,7 @@ def result_of(solution: Solution) -> Result:
         target=spec.design.force if spec.design else None,
         allowable_stress=spec.mechanism.allowable_stress,
         load_cases=curves[1:],
-        closed=Places(solution),
+        closed=DenseCurve(solution),
         tables={"adjustability": partial(adjustability, solution), "readings": partial(readings, solution)},
         state=solution,
     )
@@ -261,7 +100,7 @@ def travel_grid(spec: VcfmSpec) -> FloatArray:
     return np.asarray(spec.travel * (np.arange(spec.analysis.points) / (spec.analysis.points - 1.0)))
 
 
-def solve(spec: VcfmSpec, made: Parts, sampler: Sampler) -> Solution:
+def solve(spec: VcfmSpec, made: Parts, sampler: PartSampler) -> Solution:
     """Return the curves at all preloads by a model of leaves and spring."""
     grid = travel_grid(spec)
     room, rests = spring_room(spec), rests_of(sampler, spec.analysis.preloads, grid)
@@ -272,12 +111,7 @@ def solve(spec: VcfmSpec, made: Parts, sampler: Sampler) -> Solution:
     return Solution(spec, made, sampler, sampler.character, pushes)
 
 
-def force_of(sampler: Sampler, travel: FloatArray, preload: float) -> FloatArray:
-    """Return the force on the shuttle at some travels and a preload [N]."""
-    return np.asarray(sampler.leaf_force(travel) + sampler.spring(travel + preload)[0])
-
-
-def rests_of(sampler: Sampler, preloads: Sequence[float], grid: FloatArray) -> tuple[float | None, ...]:
+def rests_of(sampler: PartSampler, preloads: Sequence[float], grid: FloatArray) -> tuple[float | None, ...]:
     """Return where the shuttle rests at each preload [m]: the first place without force, from the as-made pose on.
 
     None where there is none, or where the spring could not be followed so far.
@@ -294,7 +128,7 @@ def rests_of(sampler: Sampler, preloads: Sequence[float], grid: FloatArray) -> t
     return tuple(found[preload] for preload in preloads)
 
 
-def _pushed_back(sampler: Sampler, preloads: FloatArray) -> Iterator[float | None]:
+def _pushed_back(sampler: PartSampler, preloads: FloatArray) -> Iterator[float | None]:
     """Yield where the shuttle rests at positive preloads [m]: all are solved for together."""
 
     def force(travel: FloatArray, compression: FloatArray) -> FloatArray:
@@ -320,7 +154,7 @@ def _pushed_back(sampler: Sampler, preloads: FloatArray) -> Iterator[float | Non
     yield from (place if some else None for place, some in zip(places.tolist(), rests.tolist(), strict=True))
 
 
-def _balanced(sampler: Sampler, preload: float, low: float, high: float) -> float | None:
+def _balanced(sampler: PartSampler, preload: float, low: float, high: float) -> float | None:
     """Return where the force vanishes between a place where it is negative and one where it is not, if any."""
 
     def force(travel: float) -> float:
@@ -334,12 +168,12 @@ def _balanced(sampler: Sampler, preload: float, low: float, high: float) -> floa
     return bracketed_root(force, float(low), float(high))
 
 
-def rest_of(sampler: Sampler, preload: float, grid: FloatArray) -> float | None:
+def rest_of(sampler: PartSampler, preload: float, grid: FloatArray) -> float | None:
     """Return `rests_of` for one preload [m]."""
     return rests_of(sampler, (preload,), grid)[0]
 
 
-def _push(sampler: Sampler, pose: tuple[float, float | None], grid: FloatArray, room: float) -> Push:
+def _push(sampler: PartSampler, pose: tuple[float, float | None], grid: FloatArray, room: float) -> Push:
     preload, rest = pose
     start = rest or 0.0
     if start < 0:
@@ -379,3 +213,83 @@ def _curve(push: Push) -> Curve:
     }
     branch = np.full(len(push.travel), "load")
     return Curve(push.travel, push.force, branch, leaves.stable, extra, label={"preload": (push.preload, "length")})
+
+
+class LawSampler:
+    """Samples of closed forms."""
+
+    problem = ""
+
+    def __init__(self, parts: Parts) -> None:
+        """Keep the laws."""
+        self.parts = parts
+
+    def leaves(self, travel: FloatArray) -> LeafSamples:
+        """Return what all leaves do at some travels [m]."""
+        leaf = self.parts.leaf
+        force, stress = leaf.state(travel) if isinstance(leaf, VBeam) else (leaf.force(travel), leaf.stress(travel))
+        force = self.parts.half_beams * np.asarray(force, dtype=float)
+        buckled = np.asarray(leaf.buckled(travel))
+        return LeafSamples(force, np.asarray(stress, dtype=float), np.ones(travel.shape, dtype=bool), buckled)
+
+    def leaf_force(self, travel: FloatArray) -> FloatArray:
+        """Return the force of all leaves alone [N]."""
+        return np.asarray(self.parts.half_beams * np.asarray(self.parts.leaf.force(travel), dtype=float))
+
+    def spring(self, compression: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return force [N] and largest stress [Pa] of the spring at some compressions [m]."""
+        spring = self.parts.spring
+        return np.asarray(spring.force(compression)), np.asarray(spring.stress(compression))
+
+    @property
+    def character(self) -> Characteristics:
+        """Stiffnesses and linear range by the laws."""
+        parts = self.parts
+        return Characteristics(parts.positive_stiffness, parts.negative_stiffness, parts.first_stiffness, parts.linear)
+
+
+EVEN = 257
+"""Places at even steps: the force beyond the peak is smooth, and the leaves' law has no shorter waves."""
+
+CROWDED = np.geomspace(1e-6, 1.0, 73)
+"""Shares of the travel, and of the way from an end of the constant stiffness, at which more places stand."""
+
+
+@dataclass(frozen=True, eq=False)
+class DenseCurve:
+    """The force at the nominal preload (a `cfmkit.results.ClosedForm`), with the stress of all preloads."""
+
+    solution: Solution
+
+    @cached_property
+    def places(self) -> FloatArray:
+        """Increasing travels of the shuttle [m]."""
+        travel = self.solution.nominal.travel
+        low, high = float(travel[0]), float(travel[-1])
+        marks = [mark for mark in (*self.solution.character.linear, 0.0) if np.isfinite(mark) and low <= mark < high]
+        around = [mark + sign * CROWDED * (high - low) for mark in marks for sign in (-1.0, 1.0)]
+        grid = np.unique(np.concatenate([np.linspace(low, high, EVEN), marks, *around]))
+        return grid[(grid >= low) & (grid <= high)]
+
+    @property
+    def peaks(self) -> FloatArray:
+        """All places: thin leaves have their peak before the second point of a curve [m]."""
+        return self.places
+
+    def effort(self, _branch: str, places: FloatArray, /) -> FloatArray:
+        """Return the force at travels of any shape [N]."""
+        sampler, travel = self.solution.sampler, np.ravel(places)
+        force = sampler.leaf_force(travel) + sampler.spring(travel + self.solution.nominal.preload)[0]
+        return np.asarray(force.reshape(np.shape(places)))
+
+    def stress(self, _branch: str, places: FloatArray, /) -> FloatArray:
+        """Return the largest stress of leaves and spring at travels of any shape, of all preloads there [Pa]."""
+        travel = np.ravel(places)
+        leaves = self.solution.sampler.leaves(travel).stress
+        found = np.max([np.maximum(leaves, self._spring(push, travel)) for push in self.solution.pushes], axis=0)
+        return np.asarray(found.reshape(np.shape(places)))
+
+    def _spring(self, push: Push, travel: FloatArray) -> FloatArray:
+        """Return the stress of the spring at a preload, none beyond its curve [Pa]."""
+        beyond = (travel < push.travel[0]) | (travel > push.travel[-1])
+        return np.where(beyond, 0.0, self.solution.sampler.spring(travel + push.preload)[1])

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.export.geometry import TOLERANCE, Arc, Contour, Curve2D, Drawing, Edge, Line, Smooth
-from cfmkit.families.vcfm.parts import RIM, strip_of
+from cfmkit.families.vcfm.build import RIM, strip_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

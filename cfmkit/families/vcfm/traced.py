@@ -60,7 +60,7 @@ EARLY = 0.25
 
 
 @dataclass(frozen=True)
-class Points:
+class PathPoints:
     """Converged points of a path in the order of travel: places [m], force [N], stress [Pa], stability, form; (n,)."""
 
     places: FloatArray
@@ -69,12 +69,12 @@ class Points:
     stable: Any
     buckled: Any
 
-    def joined(self, other: Points) -> Points:
+    def joined(self, other: PathPoints) -> PathPoints:
         """Return these points and others, each place once."""
         pairs = zip(self.columns, other.columns, strict=True)
         places, *columns = (np.concatenate(pair) for pair in pairs)
         _, kept = np.unique(np.abs(places), return_index=True)
-        return Points(places[kept], *(column[kept] for column in columns))
+        return PathPoints(places[kept], *(column[kept] for column in columns))
 
     @property
     def columns(self) -> tuple[Any, ...]:
@@ -88,7 +88,7 @@ class Traced:
 
     Attributes
     ----------
-    points : Points
+    points : PathPoints
         Travels all of one sign.
     panels : Panels
         Force [N] over the size of the travel [m].
@@ -98,7 +98,7 @@ class Traced:
         Why the path ends early; empty if it does not.
     """
 
-    points: Points
+    points: PathPoints
     panels: Panels | None
     edges: tuple[float, ...]
     problem: str = ""
@@ -203,7 +203,7 @@ def traced(network: Network, node: str, end: float, **control: Any) -> Traced:
 class First:
     """A first path: its points with that of zero, zero, bifurcations and end [m], what was requested, why it ends."""
 
-    points: Points
+    points: PathPoints
     edges: tuple[float, ...]
     grid: FloatArray
     problem: str
@@ -253,11 +253,11 @@ def _begun(route: Route, end: float, count: int) -> First:
         if 0 < sense * event < sense * reached and abs(event - (inner[-1] if inner else 0.0)) > 1e-10:
             inner.append(event)
     problem = "" if path.status is PathStatus.COMPLETE and whole else path.message
-    zero = Points(*(np.array([value]) for value in (0.0, 0.0, 0.0, True, False)))  # the pose as made
+    zero = PathPoints(*(np.array([value]) for value in (0.0, 0.0, 0.0, True, False)))  # the pose as made
     return First(zero.joined(points), (0.0, *inner, reached), places, problem)
 
 
-def _points(path: Path, places: FloatArray) -> Points:
+def _points(path: Path, places: FloatArray) -> PathPoints:
     """Return the accurate points of a path at which the drive is farther than ever before."""
     drive = np.array(path.drive)
     asked = path.asked >= 0
@@ -266,13 +266,13 @@ def _points(path: Path, places: FloatArray) -> Points:
     farthest = np.maximum.accumulate(np.concatenate([[-1e-30], size[:-1]])) if len(size) else size
     kept = np.flatnonzero(np.asarray(path.accurate) & (size > farthest + 1e-15))
     if not len(kept):
-        return Points(*(np.empty(0, kind) for kind in (float, float, float, bool, bool)))
+        return PathPoints(*(np.empty(0, kind) for kind in (float, float, float, bool, bool)))
     stress = np.max([path.beam_stress(name)[0] for name in path.layout.network.beams], axis=0)
     buckled = np.char.startswith(np.asarray(path.branch).astype(str), "bifurcated")
-    return Points(drive[kept], path.effort[kept], stress[kept], path.stable[kept].astype(bool), buckled[kept])
+    return PathPoints(drive[kept], path.effort[kept], stress[kept], path.stable[kept].astype(bool), buckled[kept])
 
 
-def _resolved(route: Route, first: First, number: int) -> tuple[Panels, Points, bool]:
+def _resolved(route: Route, first: First, number: int) -> tuple[Panels, PathPoints, bool]:
     """Return the force as panels that have converged, all points traced for them, and whether these keep their branch.
 
     Parameters
@@ -327,7 +327,7 @@ def _resolved(route: Route, first: First, number: int) -> tuple[Panels, Points, 
     return Panels(borders, spans, np.array([done[panel] for panel in ordered])), points, kept
 
 
-def _alike(first: First, points: Points) -> bool:
+def _alike(first: First, points: PathPoints) -> bool:
     """Tell whether points are on the branch that a first path took in each piece, where it has points there."""
     one, two = Traced(first.points, None, first.edges), Traced(points, None, first.edges)
     both = np.isin(np.arange(len(first.edges) - 1), one.piece(first.points.places))

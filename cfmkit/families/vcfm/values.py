@@ -1,18 +1,24 @@
-"""Scalar results of a mechanism, beside the constant-force metrics of every family."""
+"""Scalar results and tables of a mechanism, beside the constant-force metrics of every family."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.families.vcfm.tables import forces
+from cfmkit.families.vcfm.build import share_of, strip_of
+from cfmkit.families.vcfm.leaves.springs import measured_stiffness_for
+from cfmkit.families.vcfm.leaves.truss import TrussDiamond, TrussLeaf
 from cfmkit.results import Quantity
+from cfmkit.tables import Table, TableColumn, border_column
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterator, Mapping
 
-    from cfmkit.families.vcfm.model import Push, Solution
+    from cfmkit.arrays import FloatArray
+    from cfmkit.families.vcfm.solution import Push, Solution
+
 
 DEFINITIONS = {
     "positive_stiffness": ("stiffness", "K_p of the spring as made"),
@@ -109,3 +115,132 @@ def _adjustment(solution: Solution) -> dict[str, float | None]:
         return {"force_change_max": None, "force_per_preload": None}
     change, preload = max(changes, key=lambda pair: abs(pair[0]))
     return {"force_change_max": change, "force_per_preload": change / preload}
+
+
+PLACES = 201
+"""Even places of the window at which forces are averaged."""
+
+
+def adjustability(solution: Solution) -> Table:
+    """Return what each preload gives: force in the window, its change, rest position, start of the constant force."""
+    rows = [_at_preload(solution, number) for number in range(len(solution.pushes))]
+    return _table(rows, _PRELOAD_COLUMNS)
+
+
+_PRELOAD_COLUMNS = {
+    "preload": "length",
+    "force_mean": "force",
+    "force_change": "force",
+    "force_min": "force",
+    "force_max": "force",
+    "force_ripple": "ratio",
+    "rest_position": "length",
+    "window_start": "length",
+    "window_end": "length",
+    "window_start_from_rest": "length",
+    "window_length": "length",
+    "spring_stress_max": "stress",
+    "bistable_stress_max": "stress",
+}
+
+
+def _at_preload(solution: Solution, number: int) -> dict[str, Any]:
+    push, window = solution.pushes[number], solution.windows[number]
+    force, nominal = forces(solution, push), forces(solution, solution.nominal)
+    leaves, spring = solution.largest_stress(push, solution.window[1])
+    row: dict[str, Any] = {"preload": push.preload, "rest_position": push.rest} | spread(force)
+    row |= {"force_change": float(force.mean() - nominal.mean())}
+    row |= {"spring_stress_max": spring, "bistable_stress_max": leaves}
+    if window is not None:
+        start, end = window
+        row |= {"window_start": start, "window_end": end, "window_length": end - start}
+        row |= {"window_start_from_rest": start - push.rest if push.rest is not None else None}
+    return row
+
+
+def forces(solution: Solution, push: Push) -> FloatArray:
+    """Return the force of a curve at even places of the solution's window [N]; NaN beyond the curve."""
+    places = np.linspace(*solution.window, PLACES)
+    return np.asarray(np.interp(places, push.travel, push.force, left=np.nan, right=np.nan))
+
+
+def spread(force: FloatArray) -> dict[str, float]:
+    """Return mean, extremes and (max - min)/max of a force [N]."""
+    high, low = float(force.max()), float(force.min())
+    ripple = (high - low) / high if high > 0 else np.nan
+    return {"force_mean": float(force.mean()), "force_min": low, "force_max": high, "force_ripple": ripple}
+
+
+@dataclass(frozen=True)
+class TableReading:
+    """One way to read a table of sizes: how many leaves there are, and how stiff the spring is [N/m]."""
+
+    text: str
+    half_beams: int
+    positive_stiffness: float
+    truss: bool = False
+
+
+def readings(solution: Solution) -> Table:
+    """Return what the mechanism would give without preload with other numbers of leaves and parts of the spring.
+
+    Where a measured force and stiffness are stated, also with those.
+    """
+    rows = []
+    for one in _readings(solution):
+        found = spread(_force(solution, one))
+        about = {"reading": one.text, "half_beams": one.half_beams, "positive_stiffness": one.positive_stiffness}
+        rows.append(about | found)
+    return _table(rows, _READING_COLUMNS)
+
+
+_READING_COLUMNS = {
+    "reading": "text",
+    "half_beams": "count",
+    "positive_stiffness": "stiffness",
+    "force_mean": "force",
+    "force_min": "force",
+    "force_max": "force",
+    "force_ripple": "ratio",
+}
+
+
+def _readings(solution: Solution) -> Iterator[TableReading]:
+    mechanism, told = solution.spec.mechanism, solution.spec.analysis.measured
+    whole = solution.character.positive_stiffness / share_of(mechanism.positive)
+    for leaves in sorted({2, 4, mechanism.bistable.half_beams}):
+        for name, share in (("half", 0.5), ("whole", 1.0)):
+            same = leaves == mechanism.bistable.half_beams and name == mechanism.positive.loaded
+            mark = ", as specified" if same else ""
+            yield TableReading(f"{leaves} half-beams, {name} spring{mark}", leaves, share * whole)
+    if mechanism.positive.structure == "diamond" and mechanism.bistable.structure == "v-beam":
+        one_chain = TrussDiamond(strip_of(mechanism.positive, mechanism.material), 0.5).stiffness
+        yield TableReading("the paper's eq. 19 as printed: truss law", 2, float(one_chain), truss=True)
+    if told is not None:
+        yield TableReading("measured stiffness, 2 half-beams", 2, told.positive_stiffness)
+        yield TableReading("twice the measured stiffness, 4 half-beams", 4, 2.0 * told.positive_stiffness)
+        needed = measured_stiffness_for(told.force, solution.parts.balance)
+        yield TableReading("the stiffness that the measured force needs, 4 half-beams", 4, needed)
+
+
+def _force(solution: Solution, one: TableReading) -> FloatArray:
+    """Return the force of a reading without preload at even places of the window [N]."""
+    places = np.linspace(*solution.window, PLACES)
+    if one.truss:
+        law = TrussLeaf(solution.parts.strip)
+        return np.asarray(one.half_beams * law.force(places) + one.positive_stiffness * places)
+    leaves = solution.sampler.leaves(places).force / solution.parts.half_beams
+    spring = solution.sampler.spring(places)[0] / solution.character.positive_stiffness
+    return np.asarray(one.half_beams * leaves + one.positive_stiffness * spring)
+
+
+def _table(rows: list[dict[str, Any]], columns: dict[str, str]) -> Table:
+    found = []
+    for name, dimension in columns.items():
+        values = [row.get(name) for row in rows]
+        if dimension in ("text", "count"):
+            found.append(TableColumn(name, tuple(values)))
+        else:
+            known = np.array([np.nan if value is None else value for value in values])
+            found.append(border_column(name, known, dimension))
+    return Table(tuple(found))

@@ -19,11 +19,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.families.vcfm.sbranch import pose, s_force
+from cfmkit.families.vcfm.leaves.s_form import pose, s_force
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.vcfm.strip import Strip
+    from cfmkit.families.vcfm.leaves.strip import Strip
+
 
 NEGATIVE_ABOVE = 1.4246
 """Rise over thickness above which a V-beam has a negative stiffness anywhere."""
@@ -70,7 +71,7 @@ def negative_stiffness(strip: Strip) -> Any:
 
     Examples
     --------
-    >>> from cfmkit.families.vcfm.strip import Strip
+    >>> from cfmkit.families.vcfm.leaves.strip import Strip
     >>> leaf = Strip(35e-3, np.radians(7), 1e-3, 6e-3, 1477e6, 0.3)
     >>> float(negative_stiffness(leaf).round(3))
     681.202

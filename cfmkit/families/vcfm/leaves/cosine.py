@@ -18,11 +18,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.families.vcfm.sbranch import BUCKLED, POLE
+from cfmkit.families.vcfm.leaves.s_form import BUCKLED, POLE
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.vcfm.strip import Strip
+    from cfmkit.families.vcfm.leaves.strip import Strip
+
 
 _LOOSE = 1e5  # tension down to z = -1e5: strains beyond anything that bends
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
@@ -30,7 +31,7 @@ _PLACES = np.linspace(-1.0, 1.0, 41)
 
 
 @dataclass(frozen=True)
-class CosineArch:
+class CosineLeaf:
     """The law of one half of a cosine arch, of the same wall, shuttle, thickness and width as the straight leaf.
 
     Bending is scaled so that the load of the constrained mode is P_cr with stretching and shear, and lengths along the

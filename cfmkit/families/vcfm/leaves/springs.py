@@ -1,4 +1,4 @@
-"""Positive-stiffness structures as closed forms: diamond, folded beams, U-shaped and straight beams.
+"""Positive-stiffness structures as closed forms: diamond, folded, U-shaped and straight beams; rules for the preload.
 
 All are given for the whole structure: two chains of the diamond or of U-shaped beams, four of folded beams, one
 straight beam with a leaf to either side. A chain is two leaves in series, each taking half of the compression.
@@ -6,9 +6,12 @@ straight beam with a leaf to either side. A chain is two leaves in series, each 
 Departures from [D]: its eq. 15 counts one chain of the diamond and half of the shear term, L^3 cos^2 and not (L cos)^3
 belongs into the bending term, and the force F_1 inside its bracket is a misprint.
 
+[D] takes the force to rise by K_p dr (eq. 3), and the shuttle to move back by K_p dr/(K_p + K_b1) (eq. 6). The first is
+exact where K_p = K_n and both are constant; the second is not: pulled back, the leaves are in tension and stiffen.
+
 Reference
 ---------
-[D] B. Ding, X. Li, Y. Li, Robotica (2022), eq. 7-15.
+[D] B. Ding, X. Li, Y. Li, Robotica (2022), eq. 1-6, eq. 7-15 and Table II.
 """
 
 from __future__ import annotations
@@ -18,11 +21,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.families.vcfm.sbranch import s_force
+from cfmkit.families.vcfm.leaves.s_form import s_force
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.vcfm.strip import Strip
+    from cfmkit.families.vcfm.leaves.strip import Strip
 
 
 def leaf_compliance(strip: Strip) -> Any:
@@ -30,7 +33,7 @@ def leaf_compliance(strip: Strip) -> Any:
 
     Examples
     --------
-    >>> from cfmkit.families.vcfm.strip import Strip
+    >>> from cfmkit.families.vcfm.leaves.strip import Strip
     >>> leaf = Strip(25e-3, np.radians(7), 1.5e-3, 10e-3, 1477e6, 0.3)
     >>> float((1e-3 / leaf_compliance(leaf)).round(6))
     3.202276
@@ -112,7 +115,7 @@ class UShape:
 
 
 @dataclass(frozen=True)
-class Straight:
+class StraightSpring:
     """A straight beam clamped at both ends and pushed in the middle: two leaves at no angle, stretched as they bend.
 
     The usual sum of a bending and a cubic stretching term is 11 % high at 2 mm and 31 % at 5 mm of [D], Fig. 4's size;
@@ -145,9 +148,30 @@ class Straight:
         return strip.bending / strip.length**2, s_force(0.0, strip.thickness / strip.length, travel)
 
 
-Spring = Diamond | UShape | Straight
+Spring = Diamond | UShape | StraightSpring
 
 
 def folded(strip: Strip, share: Any = 1.0) -> Diamond:
     """Return eight folded beams: four chains of two straight leaves, whose joints move along the leaves."""
     return Diamond(strip, share, pairs=2.0)
+
+
+def force_change(positive_stiffness: Any, preload: Any) -> Any:
+    """Return K_p dr, the change of the constant force [N].
+
+    Examples
+    --------
+    >>> force_change(1400.0, 2.5e-3)
+    3.5
+    """
+    return positive_stiffness * preload
+
+
+def rest_shift(positive_stiffness: Any, first_stiffness: Any, preload: Any) -> Any:
+    """Return how far the preload moves the shuttle back, by constant stiffnesses [m] [D, eq. 6]."""
+    return positive_stiffness * preload / (positive_stiffness + first_stiffness)
+
+
+def measured_stiffness_for(force: float, balance: float) -> float:
+    """Return the K_p that a force at the balance point needs without preload [N/m]: the leaves carry nothing there."""
+    return force / balance

@@ -17,7 +17,7 @@ import numpy as np
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.vcfm.strip import Strip
+    from cfmkit.families.vcfm.leaves.strip import Strip
 
 
 SLENDER, CRUSHED = 6.0, 0.25

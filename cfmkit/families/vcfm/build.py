@@ -7,23 +7,24 @@ from functools import cached_property
 from math import inf, sin
 from typing import TYPE_CHECKING, Any
 
-from cfmkit.families.vcfm.arch import CosineArch
-from cfmkit.families.vcfm.hybrid import HybridLeaf
-from cfmkit.families.vcfm.springs import Diamond, Straight, UShape, folded
-from cfmkit.families.vcfm.strip import Strip
-from cfmkit.families.vcfm.truss import TrussDiamond, TrussLeaf
-from cfmkit.families.vcfm.vbeam import VBeam
+from cfmkit.families.vcfm.leaves.cosine import CosineLeaf
+from cfmkit.families.vcfm.leaves.hybrid import HybridLeaf
+from cfmkit.families.vcfm.leaves.springs import Diamond, StraightSpring, UShape, folded
+from cfmkit.families.vcfm.leaves.strip import Strip
+from cfmkit.families.vcfm.leaves.truss import TrussDiamond, TrussLeaf
+from cfmkit.families.vcfm.leaves.v_beam import VBeam
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from cfmkit.families.vcfm.leaves.springs import Spring
     from cfmkit.families.vcfm.spec import Bistable, LeafMaterial, Positive, VcfmSpec
-    from cfmkit.families.vcfm.springs import Spring
+
 
 RIM = 0.75
 """Half height of rigid blocks beyond the middle of a leaf, in its thicknesses."""
 
-Leaf = VBeam | CosineArch | HybridLeaf | TrussLeaf
+Leaf = VBeam | CosineLeaf | HybridLeaf | TrussLeaf
 
 
 @dataclass(frozen=True)
@@ -111,7 +112,7 @@ def _springs(strip: Strip, positive: Positive, share: float) -> Spring:
     kinds: dict[str, Callable[[], Spring]] = {
         "diamond": lambda: Diamond(strip, share),
         "folded": lambda: folded(strip, share),
-        "straight": lambda: Straight(strip, share),
+        "straight": lambda: StraightSpring(strip, share),
         "u-shape": lambda: UShape(strip, positive.radius, share),
     }
     return kinds[positive.structure]()
@@ -119,6 +120,6 @@ def _springs(strip: Strip, positive: Positive, share: float) -> Spring:
 
 _LEAVES: dict[str, Callable[[Strip, Any], Leaf]] = {
     "v-beam": lambda strip, _about: VBeam(strip),
-    "cosine": lambda strip, _about: CosineArch(strip),
+    "cosine": lambda strip, _about: CosineLeaf(strip),
     "hybrid": lambda strip, about: HybridLeaf(strip, about.flexure_length, about.bar_ratio),
 }

@@ -25,6 +25,7 @@ import numpy as np
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
 
+
 POLE = 20.190728556426629
 """z at which tan q = q: the S form can carry no more."""
 
@@ -49,7 +50,7 @@ _LEAST = 20.19  # below e(z) (POLE - z)^2 on 0 <= z < POLE, which falls from 40.
 
 
 @dataclass(frozen=True)
-class Pose:
+class ChordPose:
     """Chord of a leaf whose shuttle end was moved by u = d/L: length l/L, slope, turn alpha and shortening 1 - l/L."""
 
     chord: Any
@@ -59,12 +60,12 @@ class Pose:
     shortening: Any
 
 
-def pose(angle: Any, travel: Any) -> Pose:
+def pose(angle: Any, travel: Any) -> ChordPose:
     """Return the chord of a leaf at `angle` [rad] whose end has travelled u = d/L, without cancellation."""
     s, c = np.sin(angle), np.cos(angle)
     used = travel * (2.0 * s - travel)
     chord = np.sqrt(np.maximum(1.0 - used, c * c))
-    return Pose(chord, (s - travel) / chord, c / chord, np.arcsin(travel * c / chord), used / (1.0 + chord))
+    return ChordPose(chord, (s - travel) / chord, c / chord, np.arcsin(travel * c / chord), used / (1.0 + chord))
 
 
 def compliance(z: FloatArray) -> tuple[FloatArray, FloatArray]:

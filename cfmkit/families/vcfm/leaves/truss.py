@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 if TYPE_CHECKING:
-    from cfmkit.families.vcfm.strip import Strip
+    from cfmkit.families.vcfm.leaves.strip import Strip
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class TrussLeaf:
 
         Examples
         --------
-        >>> from cfmkit.families.vcfm.strip import Strip
+        >>> from cfmkit.families.vcfm.leaves.strip import Strip
         >>> leaf = TrussLeaf(Strip(35e-3, np.radians(7), 1e-3, 6e-3, 1477e6, 0.3))
         >>> float(leaf.force(1e-3).round(6))
         2.541452
@@ -87,6 +87,6 @@ class TrussDiamond:
 
     def stress(self, compression: Any) -> Any:
         """Return the largest bending stress [Pa]."""
-        from cfmkit.families.vcfm.springs import leaf_stress
+        from cfmkit.families.vcfm.leaves.springs import leaf_stress
 
         return leaf_stress(self.strip, 0.5 * compression)

@@ -1,0 +1,227 @@
+"""What is known of a solved mechanism: its parts, what a model gives at some travels, and one curve a preload.
+
+Every other file of this family may import these types.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+
+from cfmkit.families.vcfm.windows import extreme, flat_window
+from cfmkit.specs.units import between
+
+if TYPE_CHECKING:
+    from cfmkit.arrays import FloatArray
+    from cfmkit.families.vcfm.build import Parts
+    from cfmkit.families.vcfm.spec import VcfmSpec
+
+
+@dataclass(frozen=True)
+class LeafSamples:
+    """All leaves at some travels: force [N], largest stress [Pa], whether stable, whether buckled; (n,) each."""
+
+    force: FloatArray
+    stress: FloatArray
+    stable: Any
+    buckled: Any
+
+
+@dataclass(frozen=True)
+class Characteristics:
+    """Stiffness of spring and leaves [N/m], and where the negative one is constant [m] (NaN: nowhere).
+
+    `negative_stiffness` is a size: positive, or zero where there is none.
+    """
+
+    positive_stiffness: float
+    negative_stiffness: float
+    first_stiffness: float
+    linear: tuple[float, float]
+
+
+class PartSampler(Protocol):
+    """A model of leaves and spring."""
+
+    @property
+    def problem(self) -> str:
+        """Why a part could not be followed to the end; empty if all could."""
+
+    @property
+    def character(self) -> Characteristics:
+        """Stiffnesses and linear range."""
+
+    def leaves(self, travel: FloatArray) -> LeafSamples:
+        """Return what all leaves do at some travels [m]."""
+
+    def leaf_force(self, travel: FloatArray) -> FloatArray:
+        """Return the force of all leaves alone [N]."""
+
+    def spring(self, compression: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return force [N] and largest stress [Pa] of the spring at some compressions [m]."""
+
+
+@dataclass(frozen=True)
+class Push:
+    """One curve: the mechanism at one preload.
+
+    Attributes
+    ----------
+    preload : float
+        Of the spring's far end [m].
+    travel : (n,) array
+        Of the shuttle from the as-made pose, increasing [m].
+    leaves : LeafSamples
+        All leaves.
+    spring_force, spring_stress : (n,) array
+        Of the spring [N, Pa].
+    rest : float or None
+        Where the shuttle rests [m]; None where nothing holds it short of the end.
+    """
+
+    preload: float
+    travel: FloatArray
+    leaves: LeafSamples
+    spring_force: FloatArray
+    spring_stress: FloatArray
+    rest: float | None
+
+    @cached_property
+    def force(self) -> FloatArray:
+        """Force on the shuttle [N]."""
+        total: FloatArray = np.add(self.leaves.force, self.spring_force)
+        return total
+
+    def inside(self, window: tuple[float, float]) -> FloatArray:
+        """Return the forces at the samples in a window, its interpolated ends included [N]."""
+        low, high = window
+        own = self.force[(self.travel > low) & (self.travel < high)]
+        ends = np.interp([low, high], self.travel, self.force, left=np.nan, right=np.nan)
+        found = np.concatenate([ends[:1], own, ends[1:]])
+        known: FloatArray = found[np.isfinite(found)]
+        return known
+
+
+@dataclass(frozen=True)
+class Solution:
+    """A solved mechanism: its parts, the model used, what characterises it, and one curve a preload."""
+
+    spec: VcfmSpec
+    parts: Parts
+    sampler: PartSampler
+    character: Characteristics
+    pushes: tuple[Push, ...]
+
+    @property
+    def nominal(self) -> Push:
+        """The curve of the first preload."""
+        return self.pushes[0]
+
+    @cached_property
+    def constant_force(self) -> float | None:
+        """Force of the spring at the nominal preload where the leaves carry nothing [N]; None if they do carry there.
+
+        Leaves that do not buckle push where they are flat, and so do hybrid ones; a straight beam as the spring has no
+        constant stiffness. Then no single number stands for the curve.
+        """
+        kinds = self.spec.mechanism.positive.structure, self.spec.mechanism.bistable.structure
+        place = np.array([self.parts.balance])
+        force = float(self.sampler.spring(place + self.nominal.preload)[0][0])
+        # leaves with a stated waviness carry a little there, which no flatness tells
+        bears = abs(float(self.sampler.leaf_force(place)[0])) > self.spec.analysis.flatness * abs(force) and not (
+            np.isfinite(self.character.linear[0]) and kinds[1] != "hybrid"
+        )
+        return None if bears or kinds[0] == "straight" else force
+
+    @cached_property
+    def windows(self) -> tuple[tuple[float, float] | None, ...]:
+        """Constant-force window of each curve [m]; None where the force is nowhere positive."""
+        return self._flat(self.pushes, self.spec.analysis.flatness)
+
+    def flat_part(self, push: Push, flatness: float) -> tuple[float, float] | None:
+        """Return the longest stretch of a curve on which (max - min)/max of the force is within `flatness` [m]."""
+        return self._flat((push,), flatness)[0]
+
+    def _flat(self, pushes: tuple[Push, ...], flatness: float) -> tuple[tuple[float, float] | None, ...]:
+        """Return `flat_part` of some curves: all together, because calls of the model are what takes the time."""
+        most, preload = max(len(push.travel) for push in pushes), np.array([[push.preload] for push in pushes])
+        travel = np.stack([np.pad(push.travel, (0, most - len(push.travel)), "edge") for push in pushes])
+        force = np.full(travel.shape, np.nan)
+        for row, push in zip(force, pushes, strict=True):
+            row[: len(push.force)] = push.force
+
+        def force_at(places: FloatArray) -> FloatArray:
+            shuttle = self.sampler.leaf_force(places.ravel())
+            spring = self.sampler.spring((places + preload).ravel())[0]
+            return np.asarray((shuttle + spring).reshape(places.shape))
+
+        ends = zip(*flat_window(travel, force, flatness, force_at), strict=True)
+        return tuple((float(low), float(high)) if np.isfinite(low) else None for low, high in ends)
+
+    @cached_property
+    def least(self) -> tuple[float, float] | None:
+        """Where and how small the nominal force becomes past the peak of the leaves [m, N]; None without one."""
+        push, sampler = self.nominal, self.sampler
+        falls = np.flatnonzero((np.diff(push.leaves.force) < 0) & (push.travel[:-1] >= 0))
+        if not len(falls):
+            return None
+        step, end = float(push.travel[-1] - push.travel[-2]), float(push.travel[-1])
+        # thin leaves have their peak between the first two points: it is looked for, not taken from them
+        peak = extreme(sampler.leaf_force, float(push.travel[falls[0]]), step, (max(float(push.travel[0]), 0.0), end))
+        beyond = np.flatnonzero(push.travel >= peak)
+        lowest = float(push.travel[beyond[push.force[beyond].argmin()]]) if len(beyond) else peak
+        place = extreme(lambda travel: -force_of(sampler, travel, push.preload), max(lowest, peak), step, (peak, end))
+        return place, float(force_of(sampler, np.array([place]), push.preload)[0])
+
+    def largest_stress(self, push: Push, end: float = np.inf) -> tuple[float, float]:
+        """Return the largest stress of leaves and spring of a curve up to a travel [m], that one included, in Pa."""
+        before = push.travel <= end
+        leaves, spring = push.leaves.stress[before], push.spring_stress[before]
+        if push.travel[0] < end < push.travel[-1]:
+            place = np.array([end])
+            leaves = np.append(leaves, self.sampler.leaves(place).stress)
+            spring = np.append(spring, self.sampler.spring(place + push.preload)[1])
+        return float(leaves.max(initial=0.0)), float(spring.max(initial=0.0))
+
+    @property
+    def window_force(self) -> float | None:
+        """Mean of the nominal force over its constant-force window [N]; None where there is none."""
+        if self.windows[0] is None or not self.windows[0][1] > self.windows[0][0]:
+            return None
+        places = np.linspace(*self.windows[0], 401)
+        force = force_of(self.sampler, places, self.nominal.preload)
+        return float(np.trapezoid(force, places) / (places[-1] - places[0]))
+
+    @property
+    def course(self) -> tuple[float, float]:
+        """Where the shuttle starts from at the nominal preload, and where it was to go [m]."""
+        return float(self.nominal.travel[0]), self.spec.travel
+
+    @property
+    def window(self) -> tuple[float, float]:
+        """Where forces are compared [m]: the analysis' window, else the linear range, else the longest flat stretch."""
+        if self.spec.analysis.window is not None:
+            return between(self.spec.analysis.window, self.course)
+        low, high = self.character.linear
+        if self.is_linear:
+            return low, min(high, self.spec.travel)
+        return self.windows[0] or (0.0, self.spec.travel)
+
+    @property
+    def is_linear(self) -> bool:
+        """Whether the leaves buckle within the travel, and so have a range of constant negative stiffness."""
+        low = self.character.linear[0]
+        return bool(np.isfinite(low) and low < self.spec.travel)
+
+    @property
+    def window_is_flat(self) -> bool:
+        """Whether `window` is the longest flat stretch itself: flat by what it is, whatever the last digit says."""
+        return self.spec.analysis.window is None and not self.is_linear and self.windows[0] is not None
+
+
+def force_of(sampler: PartSampler, travel: FloatArray, preload: float) -> FloatArray:
+    """Return the force on the shuttle at some travels and a preload [N]."""
+    return np.asarray(sampler.leaf_force(travel) + sampler.spring(travel + preload)[0])
