@@ -1,4 +1,4 @@
-"""What a verb gives back: data for ``--json``, a view for the terminal, an exit code."""
+"""What a verb gives back: data for ``--json``, a page for the terminal, an exit code."""
 
 from __future__ import annotations
 
@@ -8,13 +8,9 @@ from typing import TYPE_CHECKING, Any
 from cfmkit.errors import ExitCode
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
-    from cfmkit.cli.terminal import Terminal
-
-
-def _nothing(_terminal: Terminal) -> None:
-    """Show nothing."""
+    from cfmkit.cli.page import Block
 
 
 @dataclass(frozen=True)
@@ -25,20 +21,20 @@ class Answer:
     ----------
     data : mapping
         More of the JSON document than the envelope has; values for its keys replace them.
-    view : callable
-        Shows the answer on a terminal; not called under ``--json`` and ``-q``.
+    page : iterable of Block
+        What a terminal shows; not looked at under ``--json`` and ``-q``, so it may be computed as it is read.
     exit_code : ExitCode
         Of the process.
     complaints : tuple of str
         Lines for standard error, whatever the options.
     quiet_complaints : tuple of str
-        More of them where the view is not shown.
+        More of them where the page is not shown.
     errors : tuple of mapping
         The same for the JSON document.
     """
 
     data: Mapping[str, Any] = field(default_factory=dict)
-    view: Callable[[Terminal], None] = _nothing
+    page: Iterable[Block] = ()
     exit_code: ExitCode = ExitCode.OK
     complaints: tuple[str, ...] = ()
     quiet_complaints: tuple[str, ...] = ()

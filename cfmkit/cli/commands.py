@@ -31,7 +31,7 @@ _STYLE: dict[str, Any] = {
 
 
 @dataclass(frozen=True)
-class Request:
+class Call:
     """A command line that was understood: what to call, and with which options."""
 
     run: Callable[[Any, Terminal], Answer]
@@ -74,14 +74,15 @@ def _module(name: str) -> ModuleType:
 
 
 def _command(name: str) -> Any:
-    """Return the command of a verb: its options are the fields of the module's `Options`."""
+    """Return the command of a verb: its options are the fields of what its `run` takes."""
     module = _module(name)
+    options = vars(module)[module.run.__annotations__["options"]]
 
-    def callback(**values: Any) -> Request:
-        return Request(module.run, module.Options(**values))
+    def callback(**values: Any) -> Call:
+        return Call(module.run, options(**values))
 
-    hints = get_type_hints(module.Options, include_extras=True)
-    fields = dataclasses.fields(module.Options)
+    hints = get_type_hints(options, include_extras=True)
+    fields = dataclasses.fields(options)
     callback.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
         [_parameter(field, hints[field.name]) for field in sorted(fields, key=_place)]
     )
@@ -103,7 +104,7 @@ def _place(field: dataclasses.Field[Any]) -> int:
     return int(field.name in {item.name for item in dataclasses.fields(Common)})
 
 
-def parse(app: typer.Typer, arguments: list[str]) -> Request | None:
+def parse(app: typer.Typer, arguments: list[str]) -> Call | None:
     """Return what a command line asks for; None if the parser answered it itself (``--help``).
 
     Raises
@@ -112,11 +113,11 @@ def parse(app: typer.Typer, arguments: list[str]) -> Request | None:
         Of typer's kind, if it is malformed.
     """
     try:
-        request = typer.main.get_command(app).main(arguments, "cfmkit", standalone_mode=False)
+        call = typer.main.get_command(app).main(arguments, "cfmkit", standalone_mode=False)
     except SystemExit:
         # The reader of the help text has left.
         return None
-    return request if isinstance(request, Request) else None
+    return call if isinstance(call, Call) else None
 
 
 def program(callback: Callable[..., Any], text: str, epilog: str) -> typer.Typer:

@@ -14,12 +14,11 @@ def families(incomplete: str) -> list[str]:
 
 def topics(incomplete: str) -> list[str]:
     """Return what `cfmkit show` explains and begins so: topics, families, and everything else that has a name."""
-    from cfmkit.cli import lookup
-    from cfmkit.cli.topics import TOPICS
+    from cfmkit.cli.topics import TOPICS, names
 
     known = [*TOPICS, *families("")]
     # names by the hundred only once somebody has begun one
-    every = [*known, *lookup.names()] if incomplete else known
+    every = [*known, *names()] if incomplete else known
     return list(dict.fromkeys(name for name in every if name.startswith(incomplete)))
 
 

@@ -89,25 +89,25 @@ def _run(given: list[str]) -> ExitCode:
 
 
 def _answer(given: list[str], terminal: Terminal) -> ExitCode:
-    request = parse(program(_before_the_verb, TEXT, EPILOG), given)
-    if request is None:
+    call = parse(program(_before_the_verb, TEXT, EPILOG), given)
+    if call is None:
         streams.put("")
         return ExitCode.OK
     wishes = replace(
         terminal,
-        json=request.options.json,
-        quiet=getattr(request.options, "quiet", False),
-        verbose=request.options.verbose,
+        json=call.options.json,
+        quiet=getattr(call.options, "quiet", False),
+        verbose=call.options.verbose,
     )
     if wishes.verbose:
         _tell_more()
-    answer = request.run(request.options, wishes)
+    answer = call.run(call.options, wishes)
     hidden = wishes.json or wishes.quiet
     wishes.complain((*answer.complaints, *(answer.quiet_complaints if hidden else ())))
     if wishes.json:
         wishes.document(document(answer))
     elif not wishes.quiet:
-        answer.view(wishes)
+        wishes.show(*answer.page)
     return answer.exit_code
 
 

@@ -5,52 +5,48 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
+from cfmkit.cli.options import Common, option
 
 if TYPE_CHECKING:
     from cfmkit.experiment.measured import Measured
 
-Units = Annotated[
-    str | None,
-    typer.Option(
-        "--units",
-        metavar="s=mm,F=N",
-        show_default=False,
-        help="Units by column name or number, where the header names none; also picks columns.",
-    ),
-]
-
-Tare = Annotated[
-    str | None,
-    typer.Option(
-        "--tare", metavar="FORCE", show_default=False,
-        help="What the force sensor shows without load, e.g. '0.4 N': taken off. 'start': what it shows at first.",
-    ),
-]  # fmt: skip
-Zero = Annotated[
-    str | None,
-    typer.Option(
-        "--zero", metavar="LENGTH", show_default=False,
-        help="What the displacement sensor shows at the mechanism's zero: taken off. 'start': the first point.",
-    ),
-]  # fmt: skip
-Flip = Annotated[
-    str | None,
-    typer.Option(
-        "--flip", metavar="NAMES", show_default=False,
-        help="What is recorded with the other sign: force, displacement (or torque, angle), or both with a comma.",
-    ),
-]  # fmt: skip
-
 
 @dataclass(frozen=True, kw_only=True)
-class Measuring:
+class Measuring(Common):
     """What a verb takes that reads a measurement."""
 
-    units: Units = None
-    tare: Tare = None
-    zero: Zero = None
-    flip: Flip = None
+    units: Annotated[
+        str | None,
+        option(
+            "--units",
+            metavar="s=mm,F=N",
+            text="Units by column name or number, where the header names none; also picks columns.",
+        ),
+    ] = None
+    tare: Annotated[
+        str | None,
+        option(
+            "--tare",
+            metavar="FORCE",
+            text="What the force sensor shows without load, e.g. '0.4 N': taken off. 'start': what it shows at first.",
+        ),
+    ] = None
+    zero: Annotated[
+        str | None,
+        option(
+            "--zero",
+            metavar="LENGTH",
+            text="What the displacement sensor shows at the mechanism's zero: taken off. 'start': the first point.",
+        ),
+    ] = None
+    flip: Annotated[
+        str | None,
+        option(
+            "--flip",
+            metavar="NAMES",
+            text="What is recorded with the other sign: force, displacement (or torque, angle), or both with a comma.",
+        ),
+    ] = None
 
     @property
     def flips(self) -> tuple[str, ...]:

@@ -1,64 +1,72 @@
-"""Options that mean the same in every verb, and the dataclasses that gather them."""
+"""Options: how one is declared, and those that several verbs take.
+
+An option or argument is a field of the dataclass that a verb's `run` takes: its type, `option`, `flag` or
+`argument` with what the help says, and its default.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from cfmkit.cli import completion
 
-SpecFile = Annotated[
-    str,
-    typer.Argument(
-        metavar="SPEC",
-        help="YAML file of one mechanism; - reads standard input.",
-        show_default=False,
-        autocompletion=completion.specs,
-    ),
-]
-OutFolder = Annotated[
-    str | None,
-    typer.Option("-o", "--out", metavar="DIR", help="Output folder; default: cfm-out/SPEC-VERB/.", show_default=False),
-]
-Changes = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--set",
-        metavar="A.B=VALUE",
-        help="Replace a value of the spec, with its unit, e.g. --set mechanism.roller_radius='10 mm'. A key that has "
-        """dots itself stands in quotes: 'sensitivity.parameters."mechanism.width"=[1 mm, 2 mm]'. Of many specs """
-        "those of one family only: --set cam:mechanism.roller_radius='10 mm'. Repeatable.",
-        show_default=False,
-    ),
-]
-Fidelity = Annotated[
-    str | None,
-    typer.Option("--fidelity", metavar="NAME", help="Short for --set analysis.fidelity=NAME.", show_default=False),
-]
-Seed = Annotated[int, typer.Option("--seed", metavar="N", min=0, max=2**63 - 1, help="Seed of everything random.")]
-Json = Annotated[bool, typer.Option("--json", help="Print one JSON document instead, also on failure.")]
-Quiet = Annotated[bool, typer.Option("-q", "--quiet", help="Print only what went wrong.")]
-Verbose = Annotated[
-    int, typer.Option("-v", "--verbose", count=True, help="Print more; -vv also tracebacks.", show_default=False)
-]
-NoPlots = Annotated[bool, typer.Option("--no-plots", help="Draw no figures.")]
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+
+def argument(metavar: str, text: str, completed: Callable[[str], list[str]] | None = None) -> Any:
+    """Return the declaration of an argument: its name in the help, what it is, and what a shell completes it to."""
+    return typer.Argument(metavar=metavar, help=text, show_default=False, autocompletion=completed)
+
+
+def option(*names: str, text: str, metavar: str | None = None, shown: bool = False, **limits: Any) -> Any:
+    """Return the declaration of an option that takes a value; `shown` says whether the help shows its default."""
+    return typer.Option(*names, metavar=metavar, help=text, show_default=shown, **limits)
+
+
+def flag(*names: str, text: str) -> Any:
+    """Return the declaration of an option that is there or not."""
+    return typer.Option(*names, help=text)
+
+
+MOST = 2**63 - 1
+"""The largest seed: what a signed 64-bit integer of files and generators holds."""
+
+Out = Annotated[str | None, option("-o", "--out", metavar="DIR", text="Output folder; default: cfm-out/SPEC-VERB/.")]
+Fidelity = Annotated[str | None, option("--fidelity", metavar="NAME", text="Short for --set analysis.fidelity=NAME.")]
+Seed = Annotated[int, option("--seed", metavar="N", shown=True, min=0, max=MOST, text="Seed of everything random.")]
+Quiet = Annotated[bool, flag("-q", "--quiet", text="Print only what went wrong.")]
+NoPlots = Annotated[bool, flag("--no-plots", text="Draw no figures.")]
+Jobs = Annotated[int | None, option("-j", "--jobs", metavar="N", min=1, text="Processes; default: all cores.")]
+Timeout = Annotated[float | None, option("--timeout-per-point", metavar="S", text="Give up a point after S seconds.")]
+Fresh = Annotated[bool, flag("--fresh", text="Compute anew what an earlier run has finished.")]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Common:
     """What every verb takes."""
 
-    json: Json = False
-    verbose: Verbose = 0
+    json: Annotated[bool, flag("--json", text="Print one JSON document instead, also on failure.")] = False
+    verbose: Annotated[int, option("-v", "--verbose", count=True, text="Print more; -vv also tracebacks.")] = 0
 
 
 @dataclass(frozen=True, kw_only=True)
-class Changing:
+class Changing(Common):
     """What a verb takes that reads specifications."""
 
-    set: Changes = None
+    set: Annotated[
+        list[str] | None,
+        option(
+            "--set",
+            metavar="A.B=VALUE",
+            text="Replace a value of the spec, with its unit, e.g. --set mechanism.roller_radius='10 mm'. A key that "
+            """has dots itself stands in quotes: 'sensitivity.parameters."mechanism.width"=[1 mm, 2 mm]'. Of many """
+            "specs those of one family only: --set cam:mechanism.roller_radius='10 mm'. Repeatable.",
+        ),
+    ] = None
 
     @property
     def changes(self) -> tuple[str, ...]:
@@ -70,8 +78,8 @@ class Changing:
 class OneSpec(Changing):
     """What a verb takes that reads one specification and writes a folder."""
 
-    spec: SpecFile
-    out: OutFolder = None
+    spec: Annotated[str, argument("SPEC", "YAML file of one mechanism; - reads standard input.", completion.specs)]
+    out: Out = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,3 +90,23 @@ class Computing(OneSpec):
     seed: Seed = 0
     no_plots: NoPlots = False
     quiet: Quiet = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class Studying(Computing):
+    """What a verb takes that evaluates many points."""
+
+    jobs: Jobs = None
+    cluster: Annotated[
+        str | None,
+        option(
+            "--cluster",
+            metavar="ADDRESS|local",
+            text="Dask scheduler to work on, e.g. tcp://host:8786, or a local one. Needs cfmkit\\[cluster].",
+        ),
+    ] = None
+    max_points: Annotated[
+        int, option("--max-points", metavar="N", shown=True, min=1, text="Refuse studies with more points.")
+    ] = 1_000_000
+    timeout_per_point: Timeout = None
+    fresh: Fresh = False

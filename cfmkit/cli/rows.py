@@ -33,7 +33,7 @@ HEADLINE = (
 
 
 @dataclass(frozen=True)
-class Row:
+class NumberRow:
     """One line: what it is, its value, and the bound that it had to keep."""
 
     label: str
@@ -42,7 +42,7 @@ class Row:
     ok: bool | None = None
 
 
-def rows(report: Report, everything: bool = False) -> list[Row]:
+def rows(report: Report, everything: bool = False) -> list[NumberRow]:
     """Return the lines of a report: numbers first, then what was required.
 
     Parameters
@@ -57,7 +57,7 @@ def rows(report: Report, everything: bool = False) -> list[Row]:
     asked = {outcome.metric for outcome in report.requirements}
     wanted = report.metrics if everything else (*family(report.result.spec.family).headline, *HEADLINE)
     plain = [name for name in dict.fromkeys(wanted) if name not in asked and "[" not in name]
-    found = [_row(report, name) for name in plain if _has_value(report, name)]
+    found = [_number(report, name) for name in plain if _has_value(report, name)]
     required = zip(report.result.spec.requirements, report.requirements, strict=True)
     return [*found, *(_requirement(report, *pair) for pair in required)]
 
@@ -101,13 +101,13 @@ def _has_value(report: Report, name: str) -> bool:
     return quantity is not None and quantity.value is not None
 
 
-def _row(report: Report, name: str) -> Row:
+def _number(report: Report, name: str) -> NumberRow:
     if name == "usable_stroke":
-        return Row(words(name), _stroke(report))
+        return NumberRow(words(name), _stroke(report))
     if name == "allowable_stress":
-        return Row(words(name), _short(report.metrics[name]) + _rule(report.result.spec))
+        return NumberRow(words(name), _short(report.metrics[name]) + _rule(report.result.spec))
     window = left_of(window_of(report.result), report.result)
-    return Row(words(name), _branches(report, name, report.metrics) + _over(report, name, window))
+    return NumberRow(words(name), _branches(report, name, report.metrics) + _over(report, name, window))
 
 
 def _stroke(report: Report) -> str:
@@ -152,15 +152,16 @@ def _over(report: Report, name: str, window: Window | None) -> str:
     return f" over {span(window.lo, window.hi, curve.motion_dimension)}"
 
 
-def _requirement(report: Report, requirement: Requirement, outcome: Outcome) -> Row:
+def _requirement(report: Report, requirement: Requirement, outcome: Outcome) -> NumberRow:
     label = words(outcome.metric)
     if outcome.value is None:
         reason = outcome.sentence.partition("no value (")[2].rpartition("), ")[0]
-        return Row(label, f"no value: {reason}", _bound(requirement), False)
+        return NumberRow(label, f"no value: {reason}", _bound(requirement), False)
     if outcome.ok:
-        return Row(label, _kept(report, outcome), _bound(requirement), True)
+        return NumberRow(label, _kept(report, outcome), _bound(requirement), True)
     # The sentence rounds so that the value stays on its side of the bound.
-    return Row(label, outcome.sentence.rpartition(", ")[0].removeprefix(label).strip(), _bound(requirement), False)
+    missed = outcome.sentence.rpartition(", ")[0].removeprefix(label).strip()
+    return NumberRow(label, missed, _bound(requirement), False)
 
 
 def _kept(report: Report, outcome: Outcome) -> str:

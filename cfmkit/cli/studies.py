@@ -1,59 +1,26 @@
-"""What the verbs that evaluate many points have in common: a folder, a journal, an executor, a page."""
+"""What the verbs that evaluate many points have in common: a folder, a journal, an executor."""
 
 from __future__ import annotations
 
 import time
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING
 
-import typer
-
-from cfmkit.cli.answer import Answer
-from cfmkit.cli.options import Computing
-from cfmkit.errors import ExitCode, UsageError
+from cfmkit.errors import UsageError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
+    from cfmkit.cli.options import Studying
     from cfmkit.cli.progress import StudyProgress
     from cfmkit.cli.terminal import Terminal
+    from cfmkit.errors import ExitCode
     from cfmkit.specs.spec import Spec
     from cfmkit.store import Manifest, RunFolder
     from cfmkit.studies.engine import Records, Work
     from cfmkit.studies.executors import Executor
     from cfmkit.studies.journal import Journal
-
-Jobs = Annotated[
-    int | None,
-    typer.Option("-j", "--jobs", metavar="N", min=1, help="Processes; default: all cores.", show_default=False),
-]
-ClusterAddress = Annotated[
-    str | None,
-    typer.Option(
-        "--cluster",
-        metavar="ADDRESS|local",
-        help="Dask scheduler to work on, e.g. tcp://host:8786, or a local one. Needs cfmkit\\[cluster].",
-        show_default=False,
-    ),
-]
-MaxPoints = Annotated[int, typer.Option("--max-points", metavar="N", min=1, help="Refuse studies with more points.")]
-Timeout = Annotated[
-    float | None,
-    typer.Option("--timeout-per-point", metavar="S", help="Give up a point after S seconds.", show_default=False),
-]
-Fresh = Annotated[bool, typer.Option("--fresh", help="Compute anew what an earlier run has finished.")]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Studying(Computing):
-    """What a verb takes that evaluates many points."""
-
-    jobs: Jobs = None
-    cluster: ClusterAddress = None
-    max_points: MaxPoints = 1_000_000
-    timeout_per_point: Timeout = None
-    fresh: Fresh = False
 
 
 @dataclass(frozen=True)
@@ -183,67 +150,6 @@ def compute(work: Work, options: Studying, place: Desk) -> Records:
     from cfmkit.studies.engine import run
 
     return run(work, executor_for(work, options), place.journal, place.progress)
-
-
-@dataclass(frozen=True)
-class Ending:
-    """How a study ended.
-
-    Attributes
-    ----------
-    records : Records
-        Its rows.
-    code : ExitCode
-        Of the process.
-    data : mapping
-        What metrics.json says.
-    folder : str
-        Where it was written.
-    files : tuple of str
-        What was written.
-    seconds : float
-        How long it took.
-    fresh : bool
-        Whether it reused nothing.
-    """
-
-    records: Records
-    code: ExitCode
-    data: dict[str, Any]
-    folder: str
-    files: tuple[str, ...]
-    seconds: float
-    fresh: bool = False
-
-    @property
-    def interrupted(self) -> bool:
-        """Whether points are missing because the user stopped."""
-        return self.code is ExitCode.INTERRUPTED
-
-
-def answer(ending: Ending, source: str) -> Answer:
-    """Return the answer of a finished study."""
-    spec = ending.records.work.study.spec
-    data = ending.data | {"family": spec.family, "name": spec.name, "out": ending.folder}
-    data |= {"files": list(ending.files), "reused": ending.records.reused}
-
-    def view(terminal: Terminal) -> None:
-        from cfmkit.cli.study_page import show_study
-
-        show_study(ending, source, terminal)
-
-    return Answer(data, view, ending.code, tuple(_complaints(ending)))
-
-
-def _complaints(ending: Ending) -> Iterator[str]:
-    from cfmkit.cli.failures import go_on
-
-    records = ending.records
-    if ending.interrupted:
-        missing = len(records) - records.finished
-        yield f"interrupted  {missing} of {len(records)} points were not computed; {go_on(ending.fresh)}"
-    if records.bugs:
-        yield f"error    {records.bugs} points hit a bug in cfmkit; -vv shows the first"
 
 
 def tracebacks(records: Records, terminal: Terminal) -> None:

@@ -1,8 +1,7 @@
 """How results reach the user: text for people on a terminal, or one JSON document.
 
-Results go to standard output, everything else to standard error. Colours only
-repeat what a word says, and blue stands against yellow, which everybody can tell
-apart.
+Results go to standard output, everything else to standard error. What a page consists of
+is said in `cfmkit.cli.page`; here it becomes characters, and nowhere else.
 """
 
 from __future__ import annotations
@@ -11,11 +10,13 @@ import io
 import json
 import shutil
 import sys
+import textwrap
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from cfmkit.cli import streams
+from cfmkit.cli.page import FAINT, Grid, JsonText, Paragraph, Span, TextLine, Verbatim
 from cfmkit.errors import visible
 
 if TYPE_CHECKING:
@@ -23,11 +24,22 @@ if TYPE_CHECKING:
 
     from rich.console import Console, ConsoleOptions, RenderableType
     from rich.segment import Segment
+    from rich.table import Table
+    from rich.text import Text
+
+    from cfmkit.cli.page import Block
 
     Report = Callable[[float, str], None]
 
 NARROWEST, WIDEST = 40, 108
-GOOD, BAD, LABEL, FAINT = "cyan", "bold yellow", "bold", "dim"
+"""Columns of a page: below the one a table has no room for a name and a value, above the other lines are hard to read
+(and 108 is what the widest page of the examples in the documentation takes)."""
+
+MARGIN = 9
+"""Columns of the words that begin a paragraph: ``warning`` or ``feasible`` and a blank."""
+
+LEAST_GAP = 2
+"""Columns between the two ends of a line: fewer would read as one text."""
 
 
 @dataclass(frozen=True)
@@ -67,24 +79,13 @@ class Terminal:
         """Whether the user wants to see them."""
         return self.verbose >= 2
 
-    def show(self, *items: RenderableType) -> None:
-        """Print renderables to standard output."""
-        page = io.StringIO()
-        console = self._console(page)
-        for item in items:
-            # What a text says about wrapping would be lost: rich prints a copy of it.
-            no_wrap, overflow = getattr(item, "no_wrap", None), getattr(item, "overflow", None)
-            console.print(_Visible(item), crop=False, no_wrap=no_wrap, overflow=overflow)
-        streams.put("\n".join(line.rstrip() for line in page.getvalue().split("\n")))
-
-    def text(self, text: str) -> None:
-        """Print text as it is."""
-        streams.put(text)
+    def show(self, *blocks: Block) -> None:
+        """Print blocks of a page to standard output."""
+        streams.put("".join(map(self._printed, blocks)))
 
     def document(self, data: Mapping[str, Any]) -> None:
         """Print one JSON document to standard output."""
-        ascii_only = not streams.speaks_utf8(sys.stdout)
-        streams.put(json.dumps(data, indent=2, ensure_ascii=ascii_only, allow_nan=False) + "\n")
+        streams.put(_json(data))
 
     def complain(self, lines: Sequence[str]) -> None:
         """Print lines to standard error."""
@@ -97,18 +98,85 @@ class Terminal:
         if self.json or self.quiet or not sys.stderr.isatty():
             yield lambda _fraction, _text: None
             return
+        from cfmkit.cli.progress import Bar
+
         bar = Bar()
         try:
             yield bar.report
         finally:
             bar.close()
 
-    def _console(self, page: io.StringIO) -> Console:
-        """Return a console that writes to a page what standard output could show."""
+    def _printed(self, block: Block) -> str:
+        """Return a block as this terminal prints it."""
+        if isinstance(block, Verbatim):
+            return block.text
+        if isinstance(block, JsonText):
+            return _json(block.data)
+        return self._rendered(block)
+
+    def _rendered(self, block: TextLine | Paragraph | Grid) -> str:
         from rich.console import Console
 
+        page = io.StringIO()
         colours = True if sys.stdout.isatty() else None
-        return Console(file=page, force_terminal=colours, width=self.width, highlight=False, markup=False, emoji=False)
+        console = Console(
+            file=page, force_terminal=colours, width=self.width, highlight=False, markup=False, emoji=False
+        )
+        for item in _renderables(block, self.width):
+            # What a text says about wrapping would be lost: rich prints a copy of it.
+            no_wrap, overflow = getattr(item, "no_wrap", None), getattr(item, "overflow", None)
+            console.print(_Visible(item), crop=False, no_wrap=no_wrap, overflow=overflow)
+        return "\n".join(line.rstrip() for line in page.getvalue().split("\n"))
+
+
+def _json(data: Mapping[str, Any]) -> str:
+    ascii_only = not streams.speaks_utf8(sys.stdout)
+    return json.dumps(data, indent=2, ensure_ascii=ascii_only, allow_nan=False) + "\n"
+
+
+def _renderables(block: TextLine | Paragraph | Grid, width: int) -> Iterator[RenderableType]:
+    """Yield what rich prints of a block; of a paragraph line by line."""
+    if isinstance(block, Grid):
+        yield _table(block)
+    elif isinstance(block, Paragraph):
+        lines = textwrap.wrap(block.text, width - MARGIN, break_long_words=False, break_on_hyphens=False) or [""]
+        yield _text(Span(f"{block.word:<{MARGIN}}", block.tone), Span(lines[0]), whole=True)
+        for text in lines[1:]:
+            yield _text(Span(" " * MARGIN + text), whole=True)
+    else:
+        yield _line(block, width)
+
+
+def _line(block: TextLine, width: int) -> Text:
+    left = _text(*block.spans, whole=block.whole)
+    room = width - left.cell_len - len(block.right)
+    if not block.right or (block.droppable and room < LEAST_GAP):
+        return left
+    return left.append(" " * max(LEAST_GAP, room)).append(block.right, FAINT)
+
+
+def _text(*spans: Span, whole: bool = False) -> Text:
+    from rich.text import Text
+
+    text = Text.assemble(*((span.text, span.tone) for span in spans))
+    if whole:
+        text.no_wrap, text.overflow = True, "ignore"
+    return text
+
+
+def _table(block: Grid) -> Table:
+    from rich.table import Table
+
+    headed = any(column.head for column in block.columns)
+    table = Table(box=None, show_header=headed, header_style=FAINT, padding=(0, block.gap, 0, 0), pad_edge=False)
+    if block.indented:
+        table.add_column("", width=0)
+    for column in block.columns:
+        table.add_column(column.head, overflow="fold", no_wrap=not column.wraps)
+    for row in block.rows:
+        cells = (_text(cell if isinstance(cell, Span) else Span(cell)) for cell in row)
+        table.add_row(*([""] if block.indented else []), *cells)
+    return table
 
 
 @dataclass(frozen=True)
@@ -122,37 +190,3 @@ class _Visible:
 
         for text, style, control in console.render(self.item, options):
             yield Segment("\n".join(map(visible, text.split("\n"))), style, control)
-
-
-class Bar:
-    """The progress bar on standard error, one for all verbs: it appears with the first report and leaves nothing."""
-
-    def __init__(self) -> None:
-        """Show nothing yet."""
-        self._progress: Any = None
-        self._task: Any = None
-
-    def report(self, fraction: float, text: str) -> None:
-        """Show how far a run is, by the share that is done."""
-        self.show(round(100 * fraction), 100, text)
-
-    def show(self, done: int, total: int, text: str) -> None:
-        """Show how many of how many things are done."""
-        if self._progress is None:
-            self._start(total)
-        self._progress.update(self._task, completed=done, total=total, description=text)
-
-    def close(self) -> None:
-        """Remove the bar."""
-        if self._progress is not None:
-            self._progress.stop()
-            self._progress = None
-
-    def _start(self, total: int) -> None:
-        from rich.console import Console
-        from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
-
-        columns = BarColumn(), TaskProgressColumn(), TextColumn("{task.description}", markup=False)
-        self._progress = Progress(*columns, console=Console(stderr=True), transient=True)
-        self._task = self._progress.add_task("", total=total)
-        self._progress.start()

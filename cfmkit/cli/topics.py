@@ -1,23 +1,34 @@
-"""What `cfmkit show` can explain: each topic as records for JSON, and as a table for people."""
+"""What `cfmkit show` can explain: topics and families as pages, and everything else by its name.
+
+A page is the answer of the command: records for ``--json``, and the same as tables for people.
+"""
 
 from __future__ import annotations
 
+import re
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from cfmkit import families
-from cfmkit.cli import lookup
-from cfmkit.cli.pages import Column, Page, Section, field
+from cfmkit.cli.answer import Answer
+from cfmkit.cli.page import LABEL, Field, Span, TextLine, field, listed
 from cfmkit.errors import UsageError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+
+    from cfmkit.cli.page import Block
 
     Record = Mapping[str, Any]
+    Section = tuple[str, Sequence[Record], tuple[Field, ...]]
+    """Heading, records and what is shown of each."""
+
+    Records = Mapping[str, Sequence[Record]]
+    """By every name under which it is found: what there is to say."""
 
 
-def page(name: str | None) -> Page:
-    """Return the page on a topic, a family, or whatever else has that name; without a name the list of topics.
+def explain(name: str | None) -> Answer:
+    """Return what there is to say of a topic, a family, or whatever else has that name; without a name what there is.
 
     Raises
     ------
@@ -30,13 +41,13 @@ def page(name: str | None) -> Page:
         return TOPICS[name][1]()
     if name in families.names() or name in families.clashing():
         return family_page(name)
-    if (found := lookup.found(name)) is not None:
-        return found
+    if (known := found(name)) is not None:
+        return known
     from cfmkit.specs.yamlio import did_you_mean
 
-    known = [*TOPICS, *families.names()]
-    every = f"there are {', '.join(known)}, and materials, metrics, values, warnings, units and papers by their names"
-    hint = did_you_mean(name, [*known, *lookup.names()]) or every
+    topics = [*TOPICS, *families.names()]
+    every = f"there are {', '.join(topics)}, and materials, metrics, values, warnings, units and papers by their names"
+    hint = did_you_mean(name, [*topics, *names()]) or every
     raise UsageError(f"there is nothing to show about {name!r}; {hint}")
 
 
@@ -46,16 +57,25 @@ def skipped(name: str | None) -> tuple[str, ...]:
     return families.skipped() if whole else ()
 
 
-def overview() -> Page:
+def _page(title: str, text: str, sections: Iterable[Section], data: Mapping[str, Sequence[Record]]) -> Answer:
+    def blocks() -> Iterator[Block]:
+        yield TextLine((Span(title, LABEL), Span(f"  {text}")))
+        for section in sections:
+            yield from listed(*section)
+
+    return Answer(data, blocks())
+
+
+def overview() -> Answer:
     """Return the list of families and topics."""
     mechanisms = [{"name": record.name, "summary": record.summary} for record in families.records()]
     topics = [{"name": name, "summary": summary} for name, (summary, _) in TOPICS.items()]
     columns = (field("name", ""), field("summary", "", wraps=True))
-    sections = (Section("families", mechanisms, columns), Section("topics", topics, columns))
-    return Page("cfmkit show", "explains one of these:", sections, {"families": mechanisms, "topics": topics})
+    sections = (("families", mechanisms, columns), ("topics", topics, columns))
+    return _page("cfmkit show", "explains one of these:", sections, {"families": mechanisms, "topics": topics})
 
 
-def units_page() -> Page:
+def units_page() -> Answer:
     """Return the closed list of units, and the dimensions with the unit that files are written in."""
     from cfmkit.specs.units import DIMENSIONS, unit_table
 
@@ -69,22 +89,22 @@ def units_page() -> Page:
     unit_columns = (
         field("symbol", "unit"),
         field("name"),
-        Column("measures", lambda unit: unit["dimension"].replace("_", " ")),
-        Column("in SI", lambda unit: f"{unit['si']:.12g}"),
-        Column("", lambda unit: "input only" if unit["input_only"] else ""),
+        Field("measures", lambda unit: unit["dimension"].replace("_", " ")),
+        Field("in SI", lambda unit: f"{unit['si']:.12g}"),
+        Field("", lambda unit: "input only" if unit["input_only"] else ""),
     )
     dimension_columns = (
-        Column("dimension", lambda item: item["name"].replace("_", " ")),
+        Field("dimension", lambda item: item["name"].replace("_", " ")),
         field("unit", "written in"),
         field("example"),
         field("description", "meaning", wraps=True),
     )
     text = "Case-sensitive; combine with *, / and ^: N*mm/rad, kg/m^3. Zero needs no unit."
-    sections = (Section("units", units, unit_columns), Section("dimensions", dimensions, dimension_columns))
-    return Page("units", text, sections, {"units": units, "dimensions": dimensions})
+    sections = (("units", units, unit_columns), ("dimensions", dimensions, dimension_columns))
+    return _page("units", text, sections, {"units": units, "dimensions": dimensions})
 
 
-def metrics_page() -> Page:
+def metrics_page() -> Answer:
     """Return the metrics that every family has."""
     from cfmkit.metrics import definitions
     from cfmkit.specs.units import border_unit
@@ -103,40 +123,40 @@ def metrics_page() -> Page:
         "counts; force_mean[load] picks one. On a torque curve force_... is called torque_..., in N*mm over deg. "
         "`cfmkit show FAMILY` lists what a family adds."
     )
-    return Page("metrics", text, (Section("", records, METRIC_COLUMNS),), {"metrics": records})
+    return _page("metrics", text, (("", records, METRIC_FIELDS),), {"metrics": records})
 
 
-def materials_page() -> Page:
+def materials_page() -> Answer:
     """Return the material library."""
     from cfmkit.stock import MATERIALS
 
     records = [asdict(item) for item in MATERIALS.values()]
     columns = (
         field("name", "material", wraps=True),
-        Column("E\n[GPa]", lambda item: f"{item['youngs_modulus'] / 1e9:.4g}"),
-        Column("from ... to", lambda item: _range(item["scatter"]["youngs_modulus"], 1e9), wraps=True),
-        Column("yield_strength\n[MPa]", lambda item: _number(item["yield_strength"], 1e6)),
-        Column("from ... to", lambda item: _range(item["scatter"]["yield_strength"], 1e6), wraps=True),
+        Field("E\n[GPa]", lambda item: f"{item['youngs_modulus'] / 1e9:.4g}"),
+        Field("from ... to", lambda item: _range(item["scatter"]["youngs_modulus"], 1e9), wraps=True),
+        Field("yield_strength\n[MPa]", lambda item: _number(item["yield_strength"], 1e6)),
+        Field("from ... to", lambda item: _range(item["scatter"]["yield_strength"], 1e6), wraps=True),
     )
     text = "At room temperature, for short loads; the ranges are what to expect in practice. In SI under --json."
     sources = (
         field("name", "material", wraps=True),
         field("poisson_ratio", "nu"),
-        Column("density\n[kg/m^3]", lambda item: f"{item['density']:.4g}"),
+        Field("density\n[kg/m^3]", lambda item: f"{item['density']:.4g}"),
         field("source", wraps=True),
     )
-    sections = (Section("", records, columns), Section("sources", records, sources))
-    return Page("materials", text, sections, {"materials": records})
+    sections = (("", records, columns), ("sources", records, sources))
+    return _page("materials", text, sections, {"materials": records})
 
 
-def references_page() -> Page:
+def references_page() -> Answer:
     """Return the papers behind all families."""
-    records = lookup.references()
+    records = references()
     columns = (field("name"), field("family"), field("reference", wraps=True))
-    return Page("references", "", (Section("", records, columns),), {"references": records})
+    return _page("references", "", (("", records, columns),), {"references": records})
 
 
-def family_page(name: str) -> Page:
+def family_page(name: str) -> Answer:
     """Return what a spec of a family may say, what a run can report, and where it comes from."""
     from cfmkit.specs.keys import keys
     from cfmkit.specs.units import border_unit
@@ -151,12 +171,12 @@ def family_page(name: str) -> Page:
     references = [{"reference": reference} for reference in record.references]
     sections = (
         *_key_sections(known),
-        Section("values beside the metrics", values, METRIC_COLUMNS),
-        Section("warnings and failures", findings, (field("name", ""), field("meaning", "", wraps=True))),
-        Section("references", references, (field("reference", "", wraps=True),)),
+        ("values beside the metrics", values, METRIC_FIELDS),
+        ("warnings and failures", findings, (field("name", ""), field("meaning", "", wraps=True))),
+        ("references", references, (field("reference", "", wraps=True),)),
     )
     data = {"keys": known, "values": values, "findings": findings, "references": references}
-    return Page(name, record.summary, sections, data)
+    return _page(name, record.summary, sections, data)
 
 
 def _key_sections(known: Sequence[Record]) -> list[Section]:
@@ -168,7 +188,7 @@ def _key_sections(known: Sequence[Record]) -> list[Section]:
     about = {key["path"]: key["description"] for key in known}
     top = [key for key in blocks.pop("", []) if key["path"] not in blocks]
     named = {f"{head}: {about.get(head, '')}": rows for head, rows in blocks.items()}
-    return [Section(heading, rows, KEY_COLUMNS) for heading, rows in ({"spec": top} | named).items()]
+    return [(heading, rows, KEY_FIELDS) for heading, rows in ({"spec": top} | named).items()]
 
 
 def _number(value: float | None, size: float) -> str:
@@ -188,15 +208,171 @@ def _default(key: Record) -> str:
     return "required" if key["required"] else str(key["default"])
 
 
-KEY_COLUMNS = (
-    field("path", "key"),
-    Column("value", _kind, wraps=True),
-    Column("default", _default),
-    Column("meaning", lambda key: "; ".join(filter(None, (key["description"], key["allowed"]))), wraps=True),
-)
-METRIC_COLUMNS = (field("name", "metric"), field("unit"), field("definition", wraps=True))
+def found(name: str) -> Answer | None:
+    """Return the page on everything that has a name; None if nothing has."""
+    sections = []
+    for kind, (records, fields) in _KINDS.items():
+        every = records()
+        if known := [one for key in _keys(kind, name) for one in every.get(key, ())]:
+            sections.append((kind, known, fields))
+    return _page(name, "", sections, {kind: known for kind, known, _ in sections}) if sections else None
 
-TOPICS: Mapping[str, tuple[str, Callable[[], Page]]] = {
+
+def names() -> list[str]:
+    """Return every name that `found` knows."""
+    return [name for records, _ in _KINDS.values() for name in records()]
+
+
+def references() -> list[dict[str, str]]:
+    """Return the papers behind all families: name, family and the reference in full."""
+    return [
+        {"name": _tag(text), "family": record.name, "reference": text}
+        for record in families.records()
+        for text in record.references
+    ]
+
+
+def _tag(reference: str) -> str:
+    """Return the first author's family name and the year: ``lan-2010``."""
+    author = reference.partition(",")[0].split()[-1].lower()
+    years = re.findall(r"\b(?:19|20)[0-9]{2}\b", reference)
+    return "-".join([author, *years[:1]])
+
+
+def _keys(kind: str, name: str) -> list[str]:
+    """Return a name as its kind is listed: a metric without its branch, a dimension also by any unit of it."""
+    if kind == "metrics":
+        return [name.partition("[")[0]]
+    return [name.replace(" ", "_"), *_measured_in(name)] if kind == "dimensions" else [name]
+
+
+def _measured_in(unit: str) -> list[str]:
+    """Return the dimensions that a unit such as ``N/mm`` measures; none if it is no unit."""
+    from cfmkit.specs.units import DIMENSIONS
+    from cfmkit.specs.units.registry import border_size, is_unit, unit_size
+
+    if not is_unit(unit):
+        return []
+    powers = unit_size(unit).powers
+    return [one.name for one in DIMENSIONS.values() if one.unit and border_size(one.name).powers == powers]
+
+
+def _gathered(pairs: Iterator[tuple[str, dict[str, Any]]]) -> Records:
+    known: dict[str, list[dict[str, Any]]] = {}
+    for name, record in pairs:
+        known.setdefault(name, []).append(record)
+    return known
+
+
+def _materials() -> Records:
+    from cfmkit.stock import MATERIALS
+
+    return _gathered((name, asdict(one)) for one in MATERIALS.values() for name in (one.name, *one.aliases))
+
+
+def _metrics() -> Records:
+    from cfmkit.metrics import definitions
+    from cfmkit.specs.units import border_unit
+
+    return _gathered(
+        (one.name, {"name": one.name, "unit": border_unit(one.dimension), "definition": one.definition})
+        for one in definitions(None)
+    )
+
+
+def _values() -> Records:
+    from cfmkit.specs.units import border_unit
+
+    return _gathered(
+        (key, {"name": key, "family": record.name, "unit": border_unit(dimension), "definition": definition})
+        for record in families.records()
+        for key, (dimension, definition) in record.values.items()
+    )
+
+
+def _findings() -> Records:
+    return _gathered(
+        (key, {"name": key, "family": record.name, "meaning": meaning})
+        for record in families.records()
+        for key, meaning in record.findings.items()
+    )
+
+
+def _units() -> Records:
+    from cfmkit.specs.units import unit_table
+
+    keys = ("symbol", "name", "dimension", "si", "input_only")
+    each = [dict(zip(keys, entry, strict=True)) for entry in unit_table()]
+    return _gathered((str(unit[key]), unit) for unit in each for key in ("symbol", "name"))
+
+
+def _dimensions() -> Records:
+    from cfmkit.specs.units import DIMENSIONS
+
+    return _gathered(
+        (one.name, {"name": one.name, "unit": one.unit, "meaning": one.description, "example": one.example})
+        for one in DIMENSIONS.values()
+        if one.unit
+    )
+
+
+def _references() -> Records:
+    each = references()
+    return _gathered((name, one) for one in each for name in {one["name"], re.sub(r"-[0-9]{4}$", "", one["name"])})
+
+
+def _property(item: Mapping[str, Any]) -> str:
+    """Return the numbers of a material in words."""
+    scatter, strength = item["scatter"], item["yield_strength"]
+    told = [
+        f"E = {item['youngs_modulus'] / 1e9:.4g} GPa ({_ends(scatter['youngs_modulus'], 1e9)})",
+        f"nu = {item['poisson_ratio']:.4g}",
+        f"density {item['density']:.4g} kg/m^3",
+    ]
+    if strength is not None:
+        told.insert(1, f"yield_strength = {strength / 1e6:.4g} MPa ({_ends(scatter['yield_strength'], 1e6)})")
+    return ", ".join(told)
+
+
+def _ends(ends: Sequence[float], size: float) -> str:
+    return " ... ".join(f"{end / size:.4g}" for end in ends)
+
+
+_ABOUT = (field("name"), field("family"), field("unit"), field("definition", wraps=True))
+_KINDS: Mapping[str, tuple[Callable[[], Records], tuple[Field, ...]]] = {
+    "materials": (
+        _materials,
+        (field("name", "material"), Field("properties", _property, wraps=True), field("source", wraps=True)),
+    ),
+    "metrics": (_metrics, (field("name"), field("unit"), field("definition", wraps=True))),
+    "values": (_values, _ABOUT),
+    "findings": (_findings, (field("name"), field("family"), field("meaning", wraps=True))),
+    "units": (
+        _units,
+        (
+            field("symbol", "unit"),
+            field("name"),
+            Field("measures", lambda unit: str(unit["dimension"]).replace("_", " ")),
+            Field("in SI", lambda unit: f"{unit['si']:.12g}"),
+        ),
+    ),
+    "dimensions": (
+        _dimensions,
+        (field("name"), field("unit", "written in"), field("example"), field("meaning", wraps=True)),
+    ),
+    "references": (_references, (field("name"), field("family"), field("reference", wraps=True))),
+}
+"""What is known by name: a heading, the records, and what is shown of each."""
+
+KEY_FIELDS = (
+    field("path", "key"),
+    Field("value", _kind, wraps=True),
+    Field("default", _default),
+    Field("meaning", lambda key: "; ".join(filter(None, (key["description"], key["allowed"]))), wraps=True),
+)
+METRIC_FIELDS = (field("name", "metric"), field("unit"), field("definition", wraps=True))
+
+TOPICS: Mapping[str, tuple[str, Callable[[], Answer]]] = {
     "units": ("the units that a spec may use, and those that files are written in", units_page),
     "metrics": ("the constant-force metrics: name, unit, definition", metrics_page),
     "materials": ("the named materials, with scatter and source", materials_page),

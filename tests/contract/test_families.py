@@ -15,7 +15,7 @@ import spare_family
 import cfmkit
 from cfmkit import api, families
 from cfmkit.cli.main import main
-from cfmkit.cli.templates import template
+from cfmkit.cli.verbs.new import template
 from cfmkit.export.geometry import Drawing
 from cfmkit.results import Status
 from cfmkit.runs import report

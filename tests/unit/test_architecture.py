@@ -133,7 +133,10 @@ def test_a_slow_library_is_imported_inside_the_function_that_needs_it(library):
 
 def test_the_command_line_starts_without_numpy_and_pydantic():
     light = [path for path in (ROOT / "cli").rglob("*.py") if path.parent.name == "verbs"]
-    light += [ROOT / "cli" / f"{name}.py" for name in ("main", "commands", "options", "answer", "failures", "terminal")]
+    light += [
+        ROOT / "cli" / f"{name}.py"
+        for name in ("main", "commands", "options", "measuring", "answer", "failures", "page", "terminal")
+    ]
     heavy = (
         "numpy",
         "pydantic",

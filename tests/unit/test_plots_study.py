@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 import cfmkit
-from cfmkit.cli.study_figures import _nominal, findings
 from cfmkit.plots.findings import Findings, Line, Scale
 from cfmkit.plots.study import figures
 from cfmkit.plots.style import png
 from cfmkit.studies.engine import run
+from cfmkit.studies.pictures import _nominal, findings
 from cfmkit.studies.sweep import Request, prepare, summary_of
 from cfmkit.studies.variation import wishes
 from cfmkit.tables import Table, TableColumn

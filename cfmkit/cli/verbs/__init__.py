@@ -2,8 +2,8 @@
 
 A verb module has
 
-- ``Options``: a frozen dataclass whose annotated fields are the arguments and options;
-- ``run(options, terminal) -> Answer``: its docstring is the help text;
+- a frozen dataclass whose fields are its arguments and options (see `cfmkit.cli.options`);
+- ``run(options, terminal) -> Answer``, which takes one: its docstring is the help text;
 - ``PLACE``: where it stands in ``cfmkit --help``.
 
 A module that is added here is a command; nothing else needs to know. Anything slow to

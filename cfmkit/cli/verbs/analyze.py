@@ -6,10 +6,8 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
-from cfmkit.cli.measuring import Measuring
-from cfmkit.cli.options import Common, Computing
+from cfmkit.cli.measuring import Measuring, data_record, read_measured, refuse_without_data
+from cfmkit.cli.options import Computing, flag, option
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -24,39 +22,29 @@ if TYPE_CHECKING:
 
 PLACE = 20
 
-Data = Annotated[
-    str | None,
-    typer.Option("--data", metavar="FILE.csv", help="Measured curve to lay over, with the errors.", show_default=False),
-]
-
-
-CompareFidelity = Annotated[
-    bool, typer.Option("--compare-fidelity", help="Lay the curves of all models over each other, with the differences.")
-]
-
 
 @dataclass(frozen=True, kw_only=True)
-class Options(Computing, Measuring, Common):
+class AnalyzeOptions(Computing, Measuring):
     """Arguments and options."""
 
-    data: Data = None
-    compare_fidelity: CompareFidelity = False
+    data: Annotated[
+        str | None, option("--data", metavar="FILE.csv", text="Measured curve to lay over, with the errors.")
+    ] = None
+    compare_fidelity: Annotated[
+        bool, flag("--compare-fidelity", text="Lay the curves of all models over each other, with the differences.")
+    ] = False
 
 
-def run(options: Options, terminal: Terminal) -> Answer:
+def run(options: AnalyzeOptions, terminal: Terminal) -> Answer:
     """Analyse a mechanism as it is: curve, metrics, requirements, figures; beside a measured curve if there is one."""
-    from cfmkit.cli.runs import Verb, execute
-    from cfmkit.runs.run import analysed
+    from cfmkit.cli.runs import execute
+    from cfmkit.runs.run import Verb, analysed
 
     work, inputs = analysed, {}
     if options.data is not None:
-        from cfmkit.cli.measuring import data_record, read_measured
-
         inputs = data_record(options.data)
         work = partial(compute_beside, read_measured(options.data, options))
     else:
-        from cfmkit.cli.measuring import refuse_without_data
-
         refuse_without_data(options)
     if options.compare_fidelity:
         work = partial(compute_each, work)

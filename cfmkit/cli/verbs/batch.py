@@ -2,60 +2,59 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Literal
-
-import typer
 
 from cfmkit.cli import completion
 from cfmkit.cli.answer import Answer
-from cfmkit.cli.options import Changing, Common, Fidelity, NoPlots, Quiet, Seed
-from cfmkit.cli.studies import Fresh, Jobs, Timeout
-from cfmkit.errors import ExitCode
+from cfmkit.cli.options import (
+    Changing,
+    Fidelity,
+    Fresh,
+    Jobs,
+    NoPlots,
+    Quiet,
+    Seed,
+    Timeout,
+    argument,
+    flag,
+    option,
+)
+from cfmkit.cli.page import BAD, BLANK, FAINT, GOOD, LABEL, Grid, Paragraph, Span, TextLine, Written, columns
+from cfmkit.errors import ExitCode, visible
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from cfmkit.cli.page import Block
     from cfmkit.cli.terminal import Terminal
     from cfmkit.runs.batch import BatchResult
+    from cfmkit.studies.batch import Entry
 
 PLACE = 26
 
-Specs = Annotated[
-    list[str],
-    typer.Argument(
-        metavar="SPEC...",
-        help="YAML files, folders, or quoted patterns such as 'configs/**/*.yaml'.",
-        show_default=False,
-        autocompletion=completion.specs,
-    ),
-]
-VerbOption = Annotated[
-    Literal["design", "analyze"] | None,
-    typer.Option(
-        "--verb",
-        help="What to do with every spec; default: design where there is a block design, else analyze.",
-        show_default=False,
-    ),
-]
-BatchFolder = Annotated[
-    str | None,
-    typer.Option("-o", "--out", metavar="DIR", help="Output folder; default: cfm-out/batch/.", show_default=False),
-]
-JUnit = Annotated[
-    str | None,
-    typer.Option("--junit", metavar="FILE", help="Write JUnit XML: a test for each requirement.", show_default=False),
-]
-FailFast = Annotated[bool, typer.Option("--fail-fast", help="Start no more specs once one has failed.")]
-
 
 @dataclass(frozen=True, kw_only=True)
-class Options(Changing, Common):
+class BatchOptions(Changing):
     """Arguments and options."""
 
-    specs: Specs
-    out: BatchFolder = None
-    verb: VerbOption = None
-    junit: JUnit = None
-    fail_fast: FailFast = False
+    specs: Annotated[
+        list[str],
+        argument("SPEC...", "YAML files, folders, or quoted patterns such as 'configs/**/*.yaml'.", completion.specs),
+    ]
+    out: Annotated[str | None, option("-o", "--out", metavar="DIR", text="Output folder; default: cfm-out/batch/.")] = (
+        None
+    )
+    verb: Annotated[
+        Literal["design", "analyze"] | None,
+        option(
+            "--verb", text="What to do with every spec; default: design where there is a block design, else analyze."
+        ),
+    ] = None
+    junit: Annotated[
+        str | None, option("--junit", metavar="FILE", text="Write JUnit XML: a test for each requirement.")
+    ] = None
+    fail_fast: Annotated[bool, flag("--fail-fast", text="Start no more specs once one has failed.")] = False
     jobs: Jobs = None
     timeout_per_point: Timeout = None
     fresh: Fresh = False
@@ -65,7 +64,7 @@ class Options(Changing, Common):
     quiet: Quiet = False
 
 
-def run(options: Options, terminal: Terminal) -> Answer:
+def run(options: BatchOptions, terminal: Terminal) -> Answer:
     """Design or analyse many specs, check their requirements, and sum up; the exit code says the worst.
 
     A spec that an earlier batch has finished is reused as long as nothing has changed: neither spec nor options, nor
@@ -74,6 +73,7 @@ def run(options: Options, terminal: Terminal) -> Answer:
     from cfmkit.cli import studies
     from cfmkit.cli.progress import watching
     from cfmkit.runs.batch import batch, unreached
+    from cfmkit.studies.batch import message
 
     start = studies.now()
     with watching(terminal, "specs") as progress:
@@ -94,39 +94,71 @@ def run(options: Options, terminal: Terminal) -> Answer:
             monitor=progress,
             noting=studies.noting,
         )
-    seconds = studies.now() - start
-    answer = _answer(found, Ending(found.folder, found.files, options.junit, seconds, options.fresh), terminal)
-    return replace(answer, complaints=(*answer.complaints, *unreached(found.entries, options.changes)))
+    written = Written(found.folder, found.files, studies.now() - start)
+    return Answer(
+        dict(found.summary) | written.data | {"junit": options.junit, "reused": _reused(found.entries)},
+        _page(found.entries, written, options.junit, terminal.verbose > 0),
+        found.exit_code,
+        (*_complaints(found, options, terminal), *unreached(found.entries, options.changes)),
+        () if found.exit_code is ExitCode.OK else (message(found.entries),),
+        tuple({"message": line} for one in found.entries for line in one.errors),
+    )
 
 
-@dataclass(frozen=True)
-class Ending:
-    """Where a batch was written, how long it took, and whether it reused nothing."""
-
-    folder: str
-    files: tuple[str, ...]
-    junit: str | None
-    seconds: float
-    fresh: bool = False
-
-
-def _answer(found: BatchResult, ending: Ending, terminal: Terminal) -> Answer:
+def _complaints(found: BatchResult, options: BatchOptions, terminal: Terminal) -> Iterator[str]:
     from cfmkit.cli.failures import go_on
     from cfmkit.runs.batch import complaints
+
+    yield from complaints(found.entries, terminal.tracebacks)
+    if found.exit_code is ExitCode.INTERRUPTED:
+        left = sum(one.skipped for one in found.entries)
+        yield f"interrupted  {left} of {len(found.entries)} specs were not run; {go_on(options.fresh)}"
+
+
+def _reused(entries: Sequence[Entry]) -> int:
+    return sum(one.reused for one in entries)
+
+
+def _page(entries: Sequence[Entry], written: Written, junit: str | None, everything: bool) -> Iterator[Block]:
+    """Yield one line a specification, and what is wrong below it."""
     from cfmkit.studies.batch import message
 
-    entries, code = found.entries, found.exit_code
-    data = dict(found.summary) | {"out": ending.folder, "files": list(ending.files), "junit": ending.junit}
-    data["reused"] = sum(one.reused for one in entries)
+    count = _reused(entries)
+    reused = f", {count} reused" if count else ""
+    yield TextLine((Span(message(entries), LABEL),), f"{written.seconds:.2f} s{reused}")
+    yield BLANK
+    yield Grid(columns(True, True, True, True), [_row(one) for one in entries], gap=2)
+    yield BLANK
+    for one in entries:
+        for requirement in one.missed if one.verb and not one.errors else ():
+            told = requirement["sentence"].removesuffix(": missed")
+            yield Paragraph("missed", f"{visible(one.spec)}: {told}", BAD)
+        for item in one.warnings if everything else ():
+            yield Paragraph("warning", f"{visible(one.spec)}: {item['name']}: {item['message']}", BAD)
+    yield written.block(everything)
+    if junit:
+        yield Paragraph("written", junit, GOOD)
 
-    def view(screen: Terminal) -> None:
-        from cfmkit.cli.batch_page import show_batch
 
-        show_batch(entries, ending, screen)
+def _row(one: Entry) -> tuple[str | Span, ...]:
+    from cfmkit.studies.batch import outcome
 
-    told = tuple(complaints(entries, terminal.tracebacks))
-    if code is ExitCode.INTERRUPTED:
-        left = sum(one.skipped for one in entries)
-        told += (f"interrupted  {left} of {len(entries)} specs were not run; {go_on(ending.fresh)}",)
-    quiet = () if code is ExitCode.OK else (message(entries),)
-    return Answer(data, view, code, told, quiet, tuple({"message": line} for one in entries for line in one.errors))
+    word = outcome(one)
+    good = word == "ok"
+    tone = GOOD if good else FAINT if one.skipped else BAD
+    return f"  {visible(one.spec)}", one.verb, Span(word if good or one.skipped else word.upper(), tone), _detail(one)
+
+
+def _detail(one: Entry) -> str:
+    """Return how many requirements are met, or what went wrong before any could be."""
+    if one.skipped:
+        return ""
+    if one.errors:
+        return "see above"
+    if one.missed and one.code is ExitCode.REQUIREMENT_MISSED:
+        return f"{len(one.missed)} of {len(one.requirements)} requirements"
+    if one.code:
+        return one.message
+    told = f"{len(one.requirements)} requirement{'s' * (len(one.requirements) != 1)} met"
+    count = len(one.warnings)
+    return told + (f", {count} warning{'s' * (count != 1)}" if count else "")

@@ -6,11 +6,9 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
 from cfmkit.cli import completion
-from cfmkit.cli.measuring import Measuring
-from cfmkit.cli.options import Common, Computing
+from cfmkit.cli.measuring import Measuring, data_record, read_measured
+from cfmkit.cli.options import Computing, argument, option
 
 if TYPE_CHECKING:
     from cfmkit.cli.answer import Answer
@@ -23,51 +21,36 @@ if TYPE_CHECKING:
 
 PLACE = 34
 
-DataFile = Annotated[
-    str,
-    typer.Argument(
-        metavar="DATA.csv",
-        help="The measured curve, as for `measure`.",
-        show_default=False,
-        autocompletion=completion.tables,
-    ),
-]
-Fit = Annotated[
-    str,
-    typer.Option(
-        "--fit",
-        metavar="A.B,C.D",
-        show_default=False,
-        help="Numbers of the spec to fit, e.g. mechanism.rolling_friction,mechanism.rest_half_width.",
-    ),
-]
-Bounds = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--bounds", metavar="A.B=LOW:HIGH", help="Bounds of a fitted value, with units. Repeatable.", show_default=False
-    ),
-]
-LossName = Annotated[
-    str, typer.Option("--loss", metavar="NAME", help="How large errors count: linear, soft_l1, huber, cauchy.")
-]
-
 
 @dataclass(frozen=True, kw_only=True)
-class Options(Computing, Measuring, Common):
+class CalibrateOptions(Computing, Measuring):
     """Arguments and options."""
 
-    data: DataFile
-    fit: Fit
-    bounds: Bounds = None
-    loss: LossName = "soft_l1"
+    data: Annotated[str, argument("DATA.csv", "The measured curve, as for `measure`.", completion.tables)]
+    fit: Annotated[
+        str,
+        option(
+            "--fit",
+            metavar="A.B,C.D",
+            text="Numbers of the spec to fit, e.g. mechanism.rolling_friction,mechanism.rest_half_width.",
+        ),
+    ]
+    bounds: Annotated[
+        list[str] | None,
+        option("--bounds", metavar="A.B=LOW:HIGH", text="Bounds of a fitted value, with units. Repeatable."),
+    ] = None
+    loss: Annotated[
+        str,
+        option("--loss", metavar="NAME", shown=True, text="How large errors count: linear, soft_l1, huber, cauchy."),
+    ] = "soft_l1"
 
 
-def run(options: Options, terminal: Terminal) -> Answer:
+def run(options: CalibrateOptions, terminal: Terminal) -> Answer:
     """Fit values of a spec to a measured curve: values, intervals, correlation, and what the data cannot tell."""
-    from cfmkit.cli.measuring import data_record, read_measured
-    from cfmkit.cli.runs import Verb, execute
+    from cfmkit.cli.runs import execute
     from cfmkit.errors import UsageError
     from cfmkit.numerics.fit import LOSSES
+    from cfmkit.runs.run import Verb
 
     if options.loss not in LOSSES:
         raise UsageError(f"--loss: there is no {options.loss!r}; there are {', '.join(LOSSES)}")
@@ -76,7 +59,7 @@ def run(options: Options, terminal: Terminal) -> Answer:
     return execute(verb, options, terminal)
 
 
-def compute(options: Options, source: Measured, spec: Spec, run: Run) -> Report:
+def compute(options: CalibrateOptions, source: Measured, spec: Spec, run: Run) -> Report:
     """Return the report on the fitted mechanism."""
     from cfmkit.experiment.parameters import split_bounds
     from cfmkit.numerics.fit import LOSSES

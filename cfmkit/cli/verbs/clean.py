@@ -6,38 +6,31 @@ import sys
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
 from cfmkit.cli.answer import Answer
-from cfmkit.cli.options import Common, Quiet
+from cfmkit.cli.options import Common, Quiet, argument, flag
+from cfmkit.cli.page import Verbatim, whole_line
 from cfmkit.errors import ExitCode, FolderInUse, UsageError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from rich.text import Text
-
+    from cfmkit.cli.page import TextLine
     from cfmkit.cli.terminal import Terminal
     from cfmkit.studies.cleaning import Remains
 
 PLACE = 80
 
-Folder = Annotated[
-    str, typer.Argument(metavar="DIR", help="Folder that runs have written to, or above such.", show_default=False)
-]
-Yes = Annotated[bool, typer.Option("-y", "--yes", help="Remove without asking.")]
-
 
 @dataclass(frozen=True, kw_only=True)
-class Options(Common):
+class CleanOptions(Common):
     """Arguments and options."""
 
-    folder: Folder
-    yes: Yes = False
+    folder: Annotated[str, argument("DIR", "Folder that runs have written to, or above such.")]
+    yes: Annotated[bool, flag("-y", "--yes", text="Remove without asking.")] = False
     quiet: Quiet = False
 
 
-def run(options: Options, terminal: Terminal) -> Answer:
+def run(options: CleanOptions, terminal: Terminal) -> Answer:
     """List what runs have written below a folder, ask, and remove it.
 
     Only what a manifest or a journal proves to be theirs goes: files that were edited, and all others, stay.
@@ -47,18 +40,14 @@ def run(options: Options, terminal: Terminal) -> Answer:
     _refuse_what_is_no_folder(options.folder)
     found = list(remains_below(options.folder))
     if not (terminal.json or terminal.quiet):
-        for line in _lines(found, everything=terminal.verbose > 0):
-            terminal.show(line)
+        terminal.show(*_lines(found, everything=terminal.verbose > 0))
     agreed = bool(found) and (options.yes or _agreed(found, terminal))
     removed, busy = _removed(found, options.folder) if agreed else ([], [])
     message = _message(found, removed)
 
-    def view(screen: Terminal) -> None:
-        screen.text(f"{message}\n")
-
     return Answer(
         _data(removed, found) | {"message": message},
-        view,
+        (Verbatim(f"{message}\n"),),
         ExitCode.IN_USE if busy else ExitCode.OK,
         complaints=tuple(f"error    {error}" for error in busy),
         errors=tuple({"message": str(error)} for error in busy),
@@ -117,18 +106,16 @@ def _message(found: Sequence[Remains], removed: Sequence[Remains]) -> str:
     return f"removed {_count(removed)}" if removed else "nothing was removed"
 
 
-def _lines(found: Sequence[Remains], everything: bool) -> Iterator[Text]:
-    from rich.text import Text
-
+def _lines(found: Sequence[Remains], everything: bool) -> Iterator[TextLine]:
     from cfmkit.store.disk import shown
     from cfmkit.studies.cleaning import EDITED
 
     for one in found:
-        yield Text(f"{shown(one.folder)}/  {_count([one])}", no_wrap=True, overflow="ignore")
+        yield whole_line(f"{shown(one.folder)}/  {_count([one])}")
         for name in one.files if everything else ():
-            yield Text(f"  {shown(name)}", no_wrap=True, overflow="ignore")
+            yield whole_line(f"  {shown(name)}")
         for name in one.edited:
-            yield Text(f"  stays: {shown(name)}: {EDITED}", no_wrap=True, overflow="ignore")
+            yield whole_line(f"  stays: {shown(name)}: {EDITED}")
 
 
 def _data(removed: Sequence[Remains], found: Sequence[Remains]) -> dict[str, Any]:

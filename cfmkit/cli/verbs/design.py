@@ -6,8 +6,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING
 
-from cfmkit.cli.options import Common, Computing
-from cfmkit.cli.studies import Fresh, Jobs
+from cfmkit.cli.options import Computing, Fresh, Jobs
 
 if TYPE_CHECKING:
     from contextlib import AbstractContextManager
@@ -21,17 +20,17 @@ PLACE = 10
 
 
 @dataclass(frozen=True, kw_only=True)
-class Options(Computing, Common):
+class DesignOptions(Computing):
     """Arguments and options."""
 
     jobs: Jobs = None
     fresh: Fresh = False
 
 
-def run(options: Options, terminal: Terminal) -> Answer:
+def run(options: DesignOptions, terminal: Terminal) -> Answer:
     """Design a mechanism for the targets of its spec, analyse it, and draw what is to be cut."""
-    from cfmkit.cli.runs import Verb, execute
-    from cfmkit.runs.run import designed
+    from cfmkit.cli.runs import execute
+    from cfmkit.runs.run import Verb, designed
     from cfmkit.studies.executors import cores
 
     running = partial(long_run, options.jobs or cores(), options.fresh)

@@ -13,11 +13,12 @@ from typing import TYPE_CHECKING, Any
 from cfmkit._version import __version__
 from cfmkit.cli.answer import Answer
 from cfmkit.cli.options import Common
+from cfmkit.cli.page import LABEL, Field, Span, TextLine, Verbatim, field, listed
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterator, Mapping, Sequence
 
-    from cfmkit.cli.pages import Page
+    from cfmkit.cli.page import Block
     from cfmkit.cli.terminal import Terminal
 
     Record = dict[str, Any]
@@ -26,17 +27,15 @@ PLACE = 86
 
 
 @dataclass(frozen=True, kw_only=True)
-class Options(Common):
+class DoctorOptions(Common):
     """Arguments and options."""
 
 
-def run(options: Options, terminal: Terminal) -> Answer:
+def run(options: DoctorOptions, terminal: Terminal) -> Answer:
     """Say which versions, packages, folders, compiled code and families there are, and what is wrong with them.
 
     Families of other packages are imported for it: installed code runs.
     """
-    from cfmkit.cli.verbs.show import rendered
-
     found = {
         "versions": {"cfmkit": __version__, "python": platform.python_version(), "system": platform.platform()},
         "packages": list(_packages()),
@@ -45,16 +44,10 @@ def run(options: Options, terminal: Terminal) -> Answer:
         "families": list(_families()),
     }
     troubles = tuple(_troubles(found))
-    page = _page(found)
     data = {"message": "; ".join(troubles) or "nothing is wrong", **found}
     warnings = [{"name": "doctor", "message": trouble} for trouble in troubles]
 
-    def view(screen: Terminal) -> None:
-        screen.show(*rendered(page))
-        told = [f"warning  {one}" for one in troubles] or ["nothing is wrong"]
-        screen.text("\n".join(["", *told, ""]))
-
-    return Answer({**data, "warnings": warnings}, view)
+    return Answer({**data, "warnings": warnings}, _page(found, troubles))
 
 
 def _packages() -> Iterator[Record]:
@@ -137,20 +130,18 @@ def _troubles(found: Mapping[str, Any]) -> Iterator[str]:
             yield one["reason"]
 
 
-def _page(found: Mapping[str, Any]) -> Page:
-    from cfmkit.cli.pages import Column, Page, Section, field
-
+def _page(found: Mapping[str, Any], troubles: Sequence[str]) -> Iterator[Block]:
+    yield TextLine((Span("cfmkit doctor", LABEL), Span("  what this installation has")))
     versions = [{"name": name, "version": version} for name, version in found["versions"].items()]
+    yield from listed("versions", versions, (field("name"), field("version", wraps=True)))
+    yield from listed("packages", found["packages"], (field("name"), Field("version", _version)))
+    yield from listed("folders", found["folders"], (field("name"), Field("", _access), field("path", wraps=True)))
     compiled = found["solver"]["folder"] or "not yet: about half a minute at the first use, or `cfmkit warm`"
-    state = Column("state", lambda one: one["reason"] or one["state"], wraps=True)
-    sections = (
-        Section("versions", versions, (field("name"), field("version", wraps=True))),
-        Section("packages", found["packages"], (field("name"), Column("version", _version))),
-        Section("folders", found["folders"], (field("name"), Column("", _access), field("path", wraps=True))),
-        Section("beam solver", [{"compiled": compiled}], (field("compiled", wraps=True),)),
-        Section("families", found["families"], (field("name"), field("package"), field("version"), state)),
-    )
-    return Page("cfmkit doctor", "what this installation has", sections, {})
+    yield from listed("beam solver", [{"compiled": compiled}], (field("compiled", wraps=True),))
+    state = Field("state", lambda one: one["reason"] or one["state"], wraps=True)
+    yield from listed("families", found["families"], (field("name"), field("package"), field("version"), state))
+    told = [f"warning  {one}" for one in troubles] or ["nothing is wrong"]
+    yield Verbatim("\n".join(["", *told, ""]))
 
 
 def _version(package: Mapping[str, Any]) -> str:

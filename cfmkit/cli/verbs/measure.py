@@ -6,79 +6,57 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
 from cfmkit.cli import completion
 from cfmkit.cli.answer import Answer
 from cfmkit.cli.measuring import Measuring, data_record
-from cfmkit.cli.options import Common, NoPlots, Quiet
+from cfmkit.cli.options import NoPlots, Quiet, argument, flag, option
+from cfmkit.cli.page import BAD, BLANK, LABEL, Grid, GridColumn, Paragraph, Span, TextLine, Written
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from rich.console import RenderableType
-
+    from cfmkit.cli.page import Block
     from cfmkit.cli.terminal import Terminal
     from cfmkit.experiment.report import MeasureReport
 
 PLACE = 32
 
-DataFile = Annotated[
-    str,
-    typer.Argument(
-        metavar="DATA.csv",
-        help="Columns with displacement and force, perhaps time.",
-        show_default=False,
-        autocompletion=completion.tables,
-    ),
-]
-MeasureFolder = Annotated[
-    str | None,
-    typer.Option(
-        "-o", "--out", metavar="DIR", help="Output folder; default: cfm-out/DATA-measure/.", show_default=False
-    ),
-]
-WindowOption = Annotated[
-    str | None,
-    typer.Option(
-        "--window", metavar="FROM:TO", show_default=False,
-        help="Where to measure, e.g. '40 mm:210 mm'; default: all that is measured on every branch.",
-    ),
-]  # fmt: skip
-Filter = Annotated[
-    str | None,
-    typer.Option(
-        "--filter", metavar="CUT-OFF", show_default=False,
-        help="Low-pass per branch: '2 Hz', '0.24 1/mm, order 3', '2 Hz, corrected', 'none'; "
-        "default: 60 cycles over the travel, order 6 per pass.",
-    ),
-]  # fmt: skip
-Target = Annotated[
-    str | None,
-    typer.Option("--target", metavar="FORCE", help="Force or torque it should have.", show_default=False),
-]
-AsRecorded = Annotated[
-    bool, typer.Option("--as-recorded", help="Leave out neither spikes nor what is next to reversals.")
-]
-OneBranch = Annotated[bool, typer.Option("--one-branch", help="Accept a recording that has no way back.")]
-
 
 @dataclass(frozen=True, kw_only=True)
-class Options(Measuring, Common):
+class MeasureOptions(Measuring):
     """Arguments and options."""
 
-    data: DataFile
-    out: MeasureFolder = None
-    window: WindowOption = None
-    filter: Filter = None
-    target: Target = None
-    one_branch: OneBranch = False
-    as_recorded: AsRecorded = False
+    data: Annotated[str, argument("DATA.csv", "Columns with displacement and force, perhaps time.", completion.tables)]
+    out: Annotated[
+        str | None, option("-o", "--out", metavar="DIR", text="Output folder; default: cfm-out/DATA-measure/.")
+    ] = None
+    window: Annotated[
+        str | None,
+        option(
+            "--window",
+            metavar="FROM:TO",
+            text="Where to measure, e.g. '40 mm:210 mm'; default: all that is measured on every branch.",
+        ),
+    ] = None
+    filter: Annotated[
+        str | None,
+        option(
+            "--filter",
+            metavar="CUT-OFF",
+            text="Low-pass per branch: '2 Hz', '0.24 1/mm, order 3', '2 Hz, corrected', 'none'; "
+            "default: 60 cycles over the travel, order 6 per pass.",
+        ),
+    ] = None
+    target: Annotated[str | None, option("--target", metavar="FORCE", text="Force or torque it should have.")] = None
+    one_branch: Annotated[bool, flag("--one-branch", text="Accept a recording that has no way back.")] = False
+    as_recorded: Annotated[
+        bool, flag("--as-recorded", text="Leave out neither spikes nor what is next to reversals.")
+    ] = False
     no_plots: NoPlots = False
     quiet: Quiet = False
 
 
-def run(options: Options, terminal: Terminal) -> Answer:
+def run(options: MeasureOptions, terminal: Terminal) -> Answer:
     """Measure a recorded force curve: branches, filter, metrics raw and filtered, hysteresis, repeatability."""
     from cfmkit.experiment.report import files
     from cfmkit.store import RunFolder
@@ -98,17 +76,11 @@ def run(options: Options, terminal: Terminal) -> Answer:
                 "exit_code": 0,
             }
         )
-    written = [*manifest.files, "manifest.json"]
-
-    def view(screen: Terminal) -> None:
-        from cfmkit.cli.layout import written as lines
-
-        screen.show(*_page(report, screen), *lines(out, written, screen))
-
-    return Answer(report.data | {"out": out, "files": written}, view)
+    written = Written(out, (*manifest.files, "manifest.json"))
+    return Answer(report.data | written.data, _page(report, written, terminal.verbose > 0))
 
 
-def _folder(options: Options) -> str:
+def _folder(options: MeasureOptions) -> str:
     from cfmkit.errors import UsageError
 
     if options.out is not None and not options.out.strip():
@@ -116,7 +88,7 @@ def _folder(options: Options) -> str:
     return options.out or str(Path("cfm-out") / f"{Path(options.data).stem}-measure")
 
 
-def _report(options: Options) -> MeasureReport:
+def _report(options: MeasureOptions) -> MeasureReport:
     from cfmkit.runs.recordings import measure
 
     return measure(
@@ -133,43 +105,34 @@ def _report(options: Options) -> MeasureReport:
     )
 
 
-def _page(report: MeasureReport, screen: Terminal) -> Iterator[RenderableType]:
-    from rich.text import Text
-
-    from cfmkit.cli.layout import paragraph
-    from cfmkit.cli.terminal import BAD, LABEL
-
+def _page(report: MeasureReport, written: Written, everything: bool) -> Iterator[Block]:
     source, data = report.source, report.data
     points = f"{len(source.recording)} points, {len(source.raw)} cycle{'s' * (len(source.raw) > 1)}"
-    yield Text.assemble((source.recording.name, LABEL), "  ", points)
-    for line in data["reading"]:
-        yield from paragraph("read", line, screen.width)
+    yield TextLine((Span(source.recording.name, LABEL), Span(f"  {points}")))
+    for text in data["reading"]:
+        yield Paragraph("read", text)
     if source.low_pass:
-        yield from paragraph("filter", source.low_pass.sentence, screen.width)
+        yield Paragraph("filter", source.low_pass.sentence)
     window = data["window"]
-    yield from paragraph("window", f"{window['from']:.6g} ... {window['to']:.6g} {window['unit']}", screen.width)
-    yield Text()
+    yield Paragraph("window", f"{window['from']:.6g} ... {window['to']:.6g} {window['unit']}")
+    yield BLANK
     yield _numbers(report)
-    yield Text()
+    yield BLANK
     for item in report.warnings:
-        yield from paragraph("warning", f"{item.name}: {item.message}", screen.width, BAD)
+        yield Paragraph("warning", f"{item.name}: {item.message}", BAD)
+    yield written.block(everything)
 
 
-def _numbers(report: MeasureReport) -> RenderableType:
+def _numbers(report: MeasureReport) -> Grid:
     """Return the table of what matters most: per branch, raw and filtered."""
-    from rich.table import Table
-    from rich.text import Text
-
     from cfmkit.cli.rows import words
-    from cfmkit.cli.terminal import FAINT
 
-    grid = Table(box=None, header_style=FAINT, padding=(0, 3, 0, 0), pad_edge=False)
-    for head in ("", "raw", "filtered" if report.source.filtered else ""):
-        grid.add_column(head)
+    heads = ("", "raw", "filtered" if report.source.filtered else "")
+    rows = []
     for name in _shown(report):
         raw, smooth = report.numbers.raw[name], report.numbers.filtered.get(name)
-        grid.add_row(Text(f"  {words(name)}"), _short(raw), _short(smooth) if smooth else "")
-    return grid
+        rows.append((f"  {words(name)}", _short(raw), _short(smooth) if smooth else ""))
+    return Grid(tuple(map(GridColumn, heads)), rows)
 
 
 def _shown(report: MeasureReport) -> list[str]:

@@ -6,63 +6,60 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
 from cfmkit.cli import completion
 from cfmkit.cli.answer import Answer
-from cfmkit.cli.options import Common
-from cfmkit.errors import visible
+from cfmkit.cli.options import Common, argument, option
+from cfmkit.cli.page import GOOD, Paragraph, Verbatim, command_line
+from cfmkit.errors import UsageError, visible
 
 if TYPE_CHECKING:
     from cfmkit.cli.terminal import Terminal
 
 PLACE = 50
 
-FamilyName = Annotated[
-    str,
-    typer.Argument(
-        metavar="FAMILY",
-        help="A family of mechanisms; `cfmkit show` lists them.",
-        show_default=False,
-        autocompletion=completion.families,
-    ),
-]
-OutFile = Annotated[
-    str | None,
-    typer.Option(
-        "-o", "--out", metavar="FILE", help="File to write, - prints it; default: FAMILY.yaml.", show_default=False
-    ),
-]
-
 
 @dataclass(frozen=True, kw_only=True)
-class Options(Common):
+class NewOptions(Common):
     """Arguments and options."""
 
-    family: FamilyName
-    out: OutFile = None
+    family: Annotated[str, argument("FAMILY", "A family of mechanisms; `cfmkit show` lists them.", completion.families)]
+    out: Annotated[
+        str | None,
+        option("-o", "--out", metavar="FILE", text="File to write, - prints it; default: FAMILY.yaml."),
+    ] = None
 
 
-def run(options: Options, terminal: Terminal) -> Answer:
+def run(options: NewOptions, terminal: Terminal) -> Answer:
     """Write a commented spec to start from; no file is ever replaced."""
-    from cfmkit.cli.templates import template
     from cfmkit.families import family
 
     text = template(options.family)
     name = f"{options.family}.yaml" if options.out is None else options.out
     if name == "-":
-        return Answer({"family": options.family, "text": text}, lambda screen: screen.text(text))
+        return Answer({"family": options.family, "text": text}, (Verbatim(text),))
     _write(Path(name), text)
     verb = "design" if family(options.family).design else "analyze"
+    page = Paragraph("written", visible(name), GOOD), Paragraph("next", command_line("cfmkit", verb, name))
+    return Answer({"family": options.family, "file": name}, page)
 
-    def view(screen: Terminal) -> None:
-        from cfmkit.cli.layout import paragraph, quoted
-        from cfmkit.cli.terminal import GOOD
 
-        screen.show(*paragraph("written", visible(name), screen.width, GOOD))
-        screen.show(*paragraph("next", " ".join(map(quoted, ["cfmkit", verb, name])), screen.width))
+def template(name: str) -> str:
+    """Return the commented spec of a family; it comes with the package that has the family.
 
-    return Answer({"family": options.family, "file": name}, view)
+    Raises
+    ------
+    cfmkit.errors.UsageError
+        If there is no such family, or it comes without a template.
+    """
+    from importlib.resources import files
+
+    from cfmkit.families import family
+
+    record = family(name)
+    if not record.template:
+        raise UsageError(f"the family {name!r} has no template; `cfmkit show {name}` lists its keys")
+    package, _, path = record.template.partition("/")
+    return files(package).joinpath(path).read_text(encoding="utf-8")
 
 
 def _write(path: Path, text: str) -> None:

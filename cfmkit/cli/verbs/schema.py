@@ -5,36 +5,25 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
 from cfmkit.cli import completion
 from cfmkit.cli.answer import Answer, told_of
-from cfmkit.cli.options import Common
+from cfmkit.cli.options import Common, argument
+from cfmkit.cli.page import JsonText
 
 if TYPE_CHECKING:
     from cfmkit.cli.terminal import Terminal
 
 PLACE = 70
 
-FamilyName = Annotated[
-    str | None,
-    typer.Argument(
-        metavar="[FAMILY]",
-        help="One family only; default: all.",
-        show_default=False,
-        autocompletion=completion.families,
-    ),
-]
-
 
 @dataclass(frozen=True, kw_only=True)
-class Options(Common):
+class SchemaOptions(Common):
     """Arguments and options."""
 
-    family: FamilyName = None
+    family: Annotated[str | None, argument("[FAMILY]", "One family only; default: all.", completion.families)] = None
 
 
-def run(options: Options, terminal: Terminal) -> Answer:
+def run(options: SchemaOptions, terminal: Terminal) -> Answer:
     """Print the JSON schema of specs, for editors."""
     from cfmkit import families
     from cfmkit.specs.keys import schema
@@ -45,4 +34,4 @@ def run(options: Options, terminal: Terminal) -> Answer:
 
 
 def _answer(found: dict[str, Any]) -> Answer:
-    return Answer({"schema": found}, lambda screen: screen.document(found))
+    return Answer({"schema": found}, (JsonText(found),))

@@ -2,100 +2,112 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-import typer
-
-from cfmkit.cli.options import Common
-from cfmkit.cli.studies import Studying
-from cfmkit.errors import UsageError
+from cfmkit.cli.answer import Answer
+from cfmkit.cli.options import MOST, Studying, flag, option
+from cfmkit.cli.page import (
+    BAD,
+    BLANK,
+    FAINT,
+    LABEL,
+    Grid,
+    GridColumn,
+    Paragraph,
+    Span,
+    Written,
+    columns,
+    line,
+    spaced,
+    title,
+    verdict,
+)
+from cfmkit.errors import ExitCode, UsageError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Mapping
 
-    from cfmkit.cli.answer import Answer
+    from cfmkit.cli.page import Block
     from cfmkit.cli.terminal import Terminal
     from cfmkit.specs.spec import Spec
     from cfmkit.store.disk import Data
-    from cfmkit.studies.sensitivity.findings import Findings
+    from cfmkit.studies.sensitivity.findings import Findings, Line
+    from cfmkit.studies.sensitivity.tolerance import Yield
 
 PLACE = 24
 
-Method = Annotated[
-    Literal["oat", "local", "morris", "sobol", "tolerance"] | None,
-    typer.Option(
-        "--method",
-        help="One at a time, gradients, Morris screening, Sobol indices, or Monte Carlo over tolerances; "
-        "default: the spec's, else oat.",
-        show_default=False,
-    ),
-]
-Samples = Annotated[
-    int | None,
-    typer.Option(
-        "--samples",
-        metavar="N",
-        min=2,
-        help="oat: points per parameter; morris: trajectories; sobol: base samples; tolerance: parts.",
-        show_default=False,
-    ),
-]
-Vary = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--vary",
-        metavar="A.B=SPREAD",
-        help="A parameter: low:high, normal:DEVIATION or uniform:HALF-WIDTH, e.g. "
-        "mechanism.roller_radius='normal:0.05 mm', 'uniform:2 %'. Repeatable; replaces the spec's parameters.",
-        show_default=False,
-    ),
-]
-OnFailure = Annotated[
-    Literal["fail", "resample", "bound"] | None,
-    typer.Option(
-        "--on-failure",
-        help="Samples without a result: state no index, draw their block anew, or state intervals; default: fail.",
-        show_default=False,
-    ),
-]
-Metrics = Annotated[
-    str | None,
-    typer.Option(
-        "--metrics",
-        metavar="A,B",
-        help="What to look at; default: the metrics of the requirements, over their windows.",
-        show_default=False,
-    ),
-]
-StatedSeed = Annotated[
-    int | None,
-    typer.Option(
-        "--seed",
-        metavar="N",
-        min=0,
-        max=2**63 - 1,
-        help="Seed of everything random; default: the spec's, else 0.",
-        show_default=False,
-    ),
-]
-Design = Annotated[bool, typer.Option("--design", help="Design the mechanism anew at each sample.")]
+SHOWN = {
+    "oat": ("swing", "normalised_slope"),
+    "local": ("normalised_slope", "gradient"),
+    "morris": ("mu_star", "sigma"),
+    "sobol": ("total_order", "first_order"),
+    "tolerance": ("yield_gain_when_halved", "variance_drop_when_halved"),
+}
+"""Indices on the page; the first says in which order."""
+
+PERCENT = SHOWN["tolerance"]
+NOTHING = 1e-12
+"""An index below this is the rounding of a difference of numbers near 1 (2e-16 each), not an influence."""
+
+MOST_PARAMETERS = 6
+"""Parameters of each metric that are shown without ``-v``."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Options(Studying, Common):
+class SensitivityOptions(Studying):
     """Arguments and options."""
 
-    method: Method = None
-    samples: Samples = None
-    seed: StatedSeed = None  # type: ignore[assignment]
-    vary: Vary = None
-    on_failure: OnFailure = None
-    metrics: Metrics = None
-    design: Design = False
+    method: Annotated[
+        Literal["oat", "local", "morris", "sobol", "tolerance"] | None,
+        option(
+            "--method",
+            text="One at a time, gradients, Morris screening, Sobol indices, or Monte Carlo over tolerances; "
+            "default: the spec's, else oat.",
+        ),
+    ] = None
+    samples: Annotated[
+        int | None,
+        option(
+            "--samples",
+            metavar="N",
+            min=2,
+            text="oat: points per parameter; morris: trajectories; sobol: base samples; tolerance: parts.",
+        ),
+    ] = None
+    seed: Annotated[
+        int | None,
+        option("--seed", metavar="N", min=0, max=MOST, text="Seed of everything random; default: the spec's, else 0."),
+    ] = None  # type: ignore[assignment]
+    vary: Annotated[
+        list[str] | None,
+        option(
+            "--vary",
+            metavar="A.B=SPREAD",
+            text="A parameter: low:high, normal:DEVIATION or uniform:HALF-WIDTH, e.g. "
+            "mechanism.roller_radius='normal:0.05 mm', 'uniform:2 %'. Repeatable; replaces the spec's parameters.",
+        ),
+    ] = None
+    on_failure: Annotated[
+        Literal["fail", "resample", "bound"] | None,
+        option(
+            "--on-failure",
+            text="Samples without a result: state no index, draw their block anew, or state intervals; default: fail.",
+        ),
+    ] = None
+    metrics: Annotated[
+        str | None,
+        option(
+            "--metrics",
+            metavar="A,B",
+            text="What to look at; default: the metrics of the requirements, over their windows.",
+        ),
+    ] = None
+    design: Annotated[bool, flag("--design", text="Design the mechanism anew at each sample.")] = False
 
 
-def run(options: Options, terminal: Terminal) -> Answer:
+def run(options: SensitivityOptions, terminal: Terminal) -> Answer:
     """Find out which value matters most, and how many made parts will meet the requirements.
 
     The spec's block `sensitivity` says what is uncertain. Finished samples are noted in the folder: after an
@@ -103,7 +115,6 @@ def run(options: Options, terminal: Terminal) -> Answer:
     """
     from cfmkit.cli import studies
     from cfmkit.cli.runs import folder_of
-    from cfmkit.cli.sensitivity_page import answer
     from cfmkit.studies.sensitivity.methods import carry_out
     from cfmkit.studies.sensitivity.output import exit_code
     from cfmkit.studies.sensitivity.setup import prepare
@@ -121,7 +132,8 @@ def run(options: Options, terminal: Terminal) -> Answer:
         made = studies.Made("sensitivity", options.spec, setup.study.spec, setup.seed, found.evaluator.count)
         manifest = studies.commit(place, made, terminal, exit_code(found))
         studies.finish(place, [piece.records for piece in found.evaluator.pieces])
-    return answer(found, out, (*manifest.files, "manifest.json"), studies.now() - start)
+    written = Written(out, (*manifest.files, "manifest.json"), studies.now() - start)
+    return _answer(found, written, terminal.verbose > 0)
 
 
 def files(found: Findings, plots: bool) -> Iterator[tuple[str, Data]]:
@@ -137,7 +149,7 @@ def files(found: Findings, plots: bool) -> Iterator[tuple[str, Data]]:
             yield f"figures/{stem}.png", png(draw())
 
 
-def spec_of(options: Options) -> Spec:
+def spec_of(options: SensitivityOptions) -> Spec:
     """Return the spec with what the options say about its block `sensitivity`.
 
     Raises
@@ -147,7 +159,7 @@ def spec_of(options: Options) -> Spec:
     cfmkit.errors.SpecError
         If the block is not valid with it.
     """
-    from cfmkit.cli.runs import spec_of as plain
+    from cfmkit.runs.run import spec_of as plain
     from cfmkit.studies.sensitivity.parameters import with_options
 
     spec = plain(options)
@@ -157,7 +169,7 @@ def spec_of(options: Options) -> Spec:
     return spec.replace({"sensitivity": with_options(spec.sensitivity, changes)})
 
 
-def changes_of(options: Options) -> dict[str, Any]:
+def changes_of(options: SensitivityOptions) -> dict[str, Any]:
     """Return what the options say, by key of the block."""
     from cfmkit.cli.studies import names
 
@@ -188,3 +200,111 @@ def spread(option: str) -> tuple[str, Any]:
         told = "write PATH=low:high, PATH=normal:DEVIATION or PATH=uniform:HALF-WIDTH, with units"
         raise UsageError(f"--vary {option!r}: {told}")
     return path, {first: second} if first in ("normal", "uniform") else (first, second)
+
+
+def _answer(found: Findings, written: Written, everything: bool) -> Answer:
+    from cfmkit.studies.sensitivity.output import as_json, exit_code
+
+    spec, code = found.setup.study.spec, exit_code(found)
+    records = [piece.records for piece in found.evaluator.pieces]
+    data = as_json(found) | {"family": spec.family, "name": spec.name} | written.data
+    data |= {"reused": sum(one.reused for one in records)}
+    bugs = sum(one.bugs for one in records)
+    complaints = (f"error    {bugs} samples hit a bug in cfmkit; -vv shows the first",) if bugs else ()
+    return Answer(data, _page(found, written, everything), code, complaints, tuple(_quiet(found, data, code)))
+
+
+def _quiet(found: Findings, data: Mapping[str, Any], code: ExitCode) -> Iterator[str]:
+    """Yield what a user must hear who has asked to hear nothing else."""
+    from cfmkit.studies.sensitivity.output import message
+
+    if code not in (ExitCode.OK, ExitCode.REQUIREMENT_MISSED):
+        yield f"{data['status']:<9}{message(found)}"
+    for one in data["requirements"]:
+        if not one["ok"]:
+            yield f"missed   {one['sentence'].removesuffix(': missed')}"
+
+
+def _page(found: Findings, written: Written, everything: bool) -> Iterator[Block]:
+    """Yield the yield, the parameters in the order of what they do, and what failed."""
+    from cfmkit.studies.sensitivity.output import message, warnings
+
+    evaluator = found.evaluator
+    reused = sum(piece.records.reused for piece in evaluator.pieces)
+    right = f"{found.setup.method}, {evaluator.count} samples in {written.seconds:.2f} s"
+    yield title(found.setup.study.spec, right + (f", {reused} from the journal" if reused else ""))
+    yield BLANK
+    if found.all_met is not None:
+        yield _yields(found, found.all_met)
+        yield BLANK
+    for metric, lines in _by_metric(found).items():
+        yield line(f"  {spaced(metric)}", LABEL)
+        yield _ranking(found, lines, everything)
+        yield BLANK
+    for outcome in found.setup.nominal.outcomes:
+        if not outcome.ok:
+            yield Paragraph("missed", f"without any deviation: {outcome.sentence}", BAD)
+    if found.interrupted:
+        yield Paragraph("stopped", message(found), BAD)
+    for item in warnings(found):
+        yield Paragraph("warning", f"{item.name}: {item.message}", BAD)
+    if evaluator.failed:
+        yield Paragraph("first", evaluator.first_failure)
+    yield written.block(everything)
+
+
+def _yields(found: Findings, share: Yield) -> Grid:
+    wanted = found.setup.block.min_yield
+    bound = "" if wanted is None else f">= {100 * wanted:.4g} %"
+    ok = None if wanted is None else share.value >= wanted
+    rows: list[tuple[str | Span, ...]] = [(Span("  yield", LABEL), _share(share), bound, verdict(ok))]
+    for outcome, one in zip(found.setup.nominal.outcomes, found.each_met, strict=True):
+        limits = outcome.sentence.rpartition(": ")[0].partition(", ")[2]
+        rows.append((f"  {spaced(outcome.metric)}", _share(one), Span(limits, FAINT), ""))
+    return Grid(columns(True, True, True, True), rows)
+
+
+def _share(one: Yield) -> str:
+    if one.value != one.value:
+        return f"not stated: {one.failed} of {one.count} parts have no result"
+    low, high = (f"{100 * end:.1f}" for end in one.wilson)
+    return f"{100 * one.value:.1f} %   95 %: {low} ... {high} %"
+
+
+def _by_metric(found: Findings) -> dict[str, dict[str, dict[str, Line]]]:
+    """Return metric -> parameter -> index -> line, the parameters that do most first."""
+    tree: dict[str, dict[str, dict[str, Line]]] = defaultdict(lambda: defaultdict(dict))
+    for one in found.lines:
+        tree[one.metric][one.parameter][one.index] = one
+    return {metric: dict(sorted(each.items(), key=_rank)) for metric, each in tree.items()}
+
+
+def _rank(item: tuple[str, dict[str, Line]]) -> float:
+    """Return how far up a parameter stands: largest first, those without a value before all."""
+    names = [names[0] for names in SHOWN.values()] + ["variance_drop_when_halved"]
+    line = next((item[1][name] for name in names if name in item[1]), None)
+    return 0.0 if line is None else -abs(line.value) if line.value is not None else -float("inf")
+
+
+def _ranking(found: Findings, each: dict[str, dict[str, Line]], everything: bool) -> Grid:
+    indices = [name for name in SHOWN[found.setup.method] if any(name in lines for lines in each.values())]
+    heads = (GridColumn(), *(GridColumn(spaced(name), wraps=False) for name in indices))
+    shown = list(each.items())[: None if everything else MOST_PARAMETERS]
+    rows = [(f"    {parameter}", *(_index(lines.get(name)) for name in indices)) for parameter, lines in shown]
+    return Grid(heads, rows)
+
+
+def _index(line: Line | None) -> str:
+    if line is None or line.value is None:
+        return "not stated"
+    percent = line.index in PERCENT
+    unit = " %" if percent else "" if line.unit == "1" else f" {line.unit}"
+    value, low, high = (None if end is None else _short(end, percent) for end in (line.value, line.low, line.high))
+    if low is None or low == value == high:
+        return f"{value}{unit}"
+    return f"at least {value}{unit}" if high is None else f"{value}{unit}  ({low} ... {high})"
+
+
+def _short(value: float, percent: bool) -> str:
+    """Return a number of three digits; what is nothing but rounding is zero."""
+    return "0" if abs(value) < NOTHING else f"{100 * value if percent else value:.3g}"

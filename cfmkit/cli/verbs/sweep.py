@@ -3,18 +3,31 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
-from cfmkit.cli.options import Common
-from cfmkit.cli.studies import Studying
+from cfmkit.cli.answer import Answer
+from cfmkit.cli.options import Studying, flag, option
+from cfmkit.cli.page import (
+    BAD,
+    BLANK,
+    FAINT,
+    GOOD,
+    LABEL,
+    Grid,
+    Paragraph,
+    Span,
+    Written,
+    columns,
+    spaced,
+    title,
+    within,
+)
 from cfmkit.errors import ExitCode, UsageError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Mapping
 
-    from cfmkit.cli.answer import Answer
+    from cfmkit.cli.page import Block
     from cfmkit.cli.terminal import Terminal
     from cfmkit.store.disk import Data
     from cfmkit.studies.engine import Records
@@ -23,53 +36,47 @@ if TYPE_CHECKING:
 
 PLACE = 22
 
-Vary = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--vary",
-        metavar="A.B=VALUES",
-        help="Vary a value: start:stop:n or \\[a, b], with units, e.g. mechanism.roller_radius='8 mm:16 mm:5'. "
-        "Repeatable; replaces what the spec's block sweep varies.",
-        show_default=False,
-    ),
-]
-Zip = Annotated[bool, typer.Option("--zip", help="Vary values side by side instead of in every combination.")]
-Sample = Annotated[
-    str | None,
-    typer.Option(
-        "--sample",
-        metavar="lhs:N|sobol:N",
-        help="Draw N points from ranges start:stop: a Latin hypercube or a Sobol sequence.",
-        show_default=False,
-    ),
-]
-Design = Annotated[bool, typer.Option("--design", help="Design the mechanism anew at each point.")]
-Curves = Annotated[bool, typer.Option("--curves", help="Keep the curve of every point in curves.csv.")]
-Metrics = Annotated[
-    str | None,
-    typer.Option("--metrics", metavar="A,B", help="Columns of results.csv; default: all.", show_default=False),
-]
+MOST_METRICS = 6
+"""Metrics of the best point that are shown without ``-v``."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Options(Studying, Common):
+class SweepOptions(Studying):
     """Arguments and options."""
 
-    vary: Vary = None
-    zip: Zip = False
-    sample: Sample = None
-    design: Design = False
-    curves: Curves = False
-    metrics: Metrics = None
+    vary: Annotated[
+        list[str] | None,
+        option(
+            "--vary",
+            metavar="A.B=VALUES",
+            text="Vary a value: start:stop:n or \\[a, b], with units, e.g. mechanism.roller_radius='8 mm:16 mm:5'. "
+            "Repeatable; replaces what the spec's block sweep varies.",
+        ),
+    ] = None
+    zip: Annotated[bool, flag("--zip", text="Vary values side by side instead of in every combination.")] = False
+    sample: Annotated[
+        str | None,
+        option(
+            "--sample",
+            metavar="lhs:N|sobol:N",
+            text="Draw N points from ranges start:stop: a Latin hypercube or a Sobol sequence.",
+        ),
+    ] = None
+    design: Annotated[bool, flag("--design", text="Design the mechanism anew at each point.")] = False
+    curves: Annotated[bool, flag("--curves", text="Keep the curve of every point in curves.csv.")] = False
+    metrics: Annotated[str | None, option("--metrics", metavar="A,B", text="Columns of results.csv; default: all.")] = (
+        None
+    )
 
 
-def run(options: Options, terminal: Terminal) -> Answer:
+def run(options: SweepOptions, terminal: Terminal) -> Answer:
     """Analyse a mechanism in many variants: one row a point, whatever becomes of it.
 
     Finished points are noted in the folder: after an interruption the same command goes on.
     """
     from cfmkit.cli import studies
-    from cfmkit.cli.runs import folder_of, spec_of
+    from cfmkit.cli.runs import folder_of
+    from cfmkit.runs.run import spec_of
     from cfmkit.studies.sweep import prepare, summary_of, writes_curves
 
     start = studies.now()
@@ -88,12 +95,13 @@ def run(options: Options, terminal: Terminal) -> Answer:
         manifest = studies.commit(place, made, terminal, code)
         studies.finish(place, [records])
         told = summary.as_json(records)
-    written = (*manifest.files, "manifest.json")
-    ending = studies.Ending(records, code, told, out, written, studies.now() - start, options.fresh)
-    return studies.answer(ending, options.spec)
+    written = Written(out, (*manifest.files, "manifest.json"), studies.now() - start)
+    about = {"family": spec.family, "name": spec.name} | written.data | {"reused": records.reused}
+    page = _page(records, told, code, written, terminal.verbose > 0)
+    return Answer(told | about, page, code, tuple(_complaints(records, code, options)))
 
 
-def request(options: Options) -> Request:
+def request(options: SweepOptions) -> Request:
     """Return what the options ask for.
 
     Raises
@@ -136,7 +144,7 @@ def files(records: Records, summary: Summary, curves: bool, plots: bool) -> Iter
 
     yield from outputs(records, summary, curves)
     if plots:
-        from cfmkit.cli.study_figures import pictures
+        from cfmkit.studies.pictures import pictures
 
         yield from pictures(records, summary)
 
@@ -146,3 +154,68 @@ def exit_code(records: Records, summary: Summary) -> ExitCode:
     if records.finished < len(records):
         return ExitCode.INTERRUPTED
     return summary.exit_code(records.bugs)
+
+
+def _complaints(records: Records, code: ExitCode, options: SweepOptions) -> Iterator[str]:
+    from cfmkit.cli.failures import go_on
+
+    if code is ExitCode.INTERRUPTED:
+        missing = len(records) - records.finished
+        yield f"interrupted  {missing} of {len(records)} points were not computed; {go_on(options.fresh)}"
+    if records.bugs:
+        yield f"error    {records.bugs} points hit a bug in cfmkit; -vv shows the first"
+
+
+def _page(
+    records: Records, data: Mapping[str, Any], code: ExitCode, written: Written, everything: bool
+) -> Iterator[Block]:
+    """Yield how many points ended how, the best of them, and where the files are."""
+    reused = f", {records.reused} from the journal" if records.reused else ""
+    yield title(records.work.study.spec, f"{records.finished} points in {written.seconds:.2f} s{reused}")
+    yield BLANK
+    yield Grid(columns(True, True, True), list(_numbers(records, data, everything)))
+    yield BLANK
+    if code is ExitCode.REQUIREMENT_MISSED:
+        yield Paragraph("missed", "no point meets every requirement", BAD)
+    for one in data["warnings"]:
+        yield Paragraph("warning", f"{one['name']}: {one['message']}", BAD)
+    yield written.block(everything)
+
+
+def _numbers(records: Records, data: Mapping[str, Any], everything: bool) -> Iterator[tuple[str | Span, ...]]:
+    for name, count in data["points"].items():
+        if name != "total":
+            yield Span(f"  {spaced(name)}", GOOD if name == "complete" else BAD), f"{count} points", ""
+    for one in data["requirements"]:
+        yield f"  {spaced(one['metric'])}", f"met at {one['met']} of {one['of']}", Span(within(one), FAINT)
+    if data["best"]:
+        yield from _best(records, data, everything)
+
+
+def _best(records: Records, data: Mapping[str, Any], everything: bool) -> Iterator[tuple[str | Span, ...]]:
+    best, metrics = data["best"], data["metrics"]
+    point = f"point {best['point']}" + (f", first of {best['ties']} as good" if best["ties"] > 1 else "")
+    yield "", "", ""
+    yield Span("  best", LABEL), point, Span(f"{best['sense']} {spaced(best['by'])}{_among(best)}", FAINT)
+    for path, value in best["values"].items():
+        yield f"  {path}", value, ""
+    dimensions = {one.name: one.dimension for one in records.work.study.metrics}
+    names = [best["by"], *(name for name in metrics if name != best["by"])]
+    for name in names if everything else names[:MOST_METRICS]:
+        if (value := metrics[name]["value"]) is not None:
+            yield f"  {spaced(name)}", _quantity(value, metrics[name]["unit"], dimensions[name]), ""
+
+
+def _among(best: Mapping[str, Any]) -> str:
+    if best["requirements_met"] is None:
+        return ""
+    return " of those that meet every requirement" if best["requirements_met"] else "; no point meets every requirement"
+
+
+def _quantity(value: float | str, unit: str, dimension: str) -> str:
+    """Return a value in its border unit; of what has none, shares are percentages, counts and factors are not."""
+    if isinstance(value, str):
+        return value
+    if dimension == "ratio":
+        return f"{100 * value:.4g} %"
+    return f"{value:.5g}" if unit == "1" else f"{value:.5g} {unit}"

@@ -7,22 +7,24 @@ from typing import TYPE_CHECKING
 
 from cfmkit.cli.answer import Answer
 from cfmkit.cli.options import Common, Quiet
-from cfmkit.errors import ExitCode
+from cfmkit.cli.page import Verbatim
 
 if TYPE_CHECKING:
     from cfmkit.cli.terminal import Terminal
 
 PLACE = 85
 
+READY = "the beam engine is ready"
+
 
 @dataclass(frozen=True, kw_only=True)
-class Options(Common):
+class WarmOptions(Common):
     """Arguments and options."""
 
     quiet: Quiet = False
 
 
-def run(options: Options, terminal: Terminal) -> Answer:
+def run(options: WarmOptions, terminal: Terminal) -> Answer:
     """Compile the beam engine now, and keep it: no later run waits for that.
 
     For images of containers and caches of pipelines. Code that is there already is only loaded.
@@ -33,10 +35,6 @@ def run(options: Options, terminal: Terminal) -> Answer:
     for part in warm():
         parts.append(part)
         if not (terminal.json or terminal.quiet):
-            terminal.text(f"  {part.name:<25} {part.seconds:6.1f} s\n")
-
-    def view(screen: Terminal) -> None:
-        screen.text("the beam engine is ready\n")
-
+            terminal.show(Verbatim(f"  {part.name:<25} {part.seconds:6.1f} s\n"))
     data = {"parts": [{"name": part.name, "seconds": round(part.seconds, 3)} for part in parts]}
-    return Answer(data | {"message": "the beam engine is ready"}, view, ExitCode.OK)
+    return Answer(data | {"message": READY}, (Verbatim(f"{READY}\n"),))
