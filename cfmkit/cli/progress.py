@@ -10,10 +10,11 @@ import signal
 import sys
 import time
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from cfmkit.cli import streams
 from cfmkit.cli.failures import Stopped
+from cfmkit.cli.terminal import Bar
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -29,40 +30,6 @@ DRAW_EVERY = 0.1
 
 RECENT = 30.0
 """Seconds over which the rate is taken."""
-
-
-class Bar:
-    """The progress bar on standard error, one for all verbs: it appears with the first report and leaves nothing."""
-
-    def __init__(self) -> None:
-        """Show nothing yet."""
-        self._progress: Any = None
-        self._task: Any = None
-
-    def report(self, fraction: float, text: str) -> None:
-        """Show how far a run is, by the share that is done."""
-        self.show(round(100 * fraction), 100, text)
-
-    def show(self, done: int, total: int, text: str) -> None:
-        """Show how many of how many things are done."""
-        if self._progress is None:
-            self._start(total)
-        self._progress.update(self._task, completed=done, total=total, description=text)
-
-    def close(self) -> None:
-        """Remove the bar."""
-        if self._progress is not None:
-            self._progress.stop()
-            self._progress = None
-
-    def _start(self, total: int) -> None:
-        from rich.console import Console
-        from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
-
-        columns = BarColumn(), TaskProgressColumn(), TextColumn("{task.description}", markup=False)
-        self._progress = Progress(*columns, console=Console(stderr=True), transient=True)
-        self._task = self._progress.add_task("", total=total)
-        self._progress.start()
 
 
 class StudyProgress:

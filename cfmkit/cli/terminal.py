@@ -98,8 +98,6 @@ class Terminal:
         if self.json or self.quiet or not sys.stderr.isatty():
             yield lambda _fraction, _text: None
             return
-        from cfmkit.cli.progress import Bar
-
         bar = Bar()
         try:
             yield bar.report
@@ -190,3 +188,37 @@ class _Visible:
 
         for text, style, control in console.render(self.item, options):
             yield Segment("\n".join(map(visible, text.split("\n"))), style, control)
+
+
+class Bar:
+    """The progress bar on standard error, one for all verbs: it appears with the first report and leaves nothing."""
+
+    def __init__(self) -> None:
+        """Show nothing yet."""
+        self._progress: Any = None
+        self._task: Any = None
+
+    def report(self, fraction: float, text: str) -> None:
+        """Show how far a run is, by the share that is done."""
+        self.show(round(100 * fraction), 100, text)
+
+    def show(self, done: int, total: int, text: str) -> None:
+        """Show how many of how many things are done."""
+        if self._progress is None:
+            self._start(total)
+        self._progress.update(self._task, completed=done, total=total, description=text)
+
+    def close(self) -> None:
+        """Remove the bar."""
+        if self._progress is not None:
+            self._progress.stop()
+            self._progress = None
+
+    def _start(self, total: int) -> None:
+        from rich.console import Console
+        from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
+
+        columns = BarColumn(), TaskProgressColumn(), TextColumn("{task.description}", markup=False)
+        self._progress = Progress(*columns, console=Console(stderr=True), transient=True)
+        self._task = self._progress.add_task("", total=total)
+        self._progress.start()
