@@ -166,9 +166,9 @@ def test_nothing_eliminated_leads_to_the_same_equilibria(seed: int) -> None:
     options = MarchOptions(1e-12, 0.01, 0.35, sense=1.0)
     paths = [solver.march(start, np.array([0.02, 0.04]), options, 200)[1] for solver in (plain, steady)]
     np.testing.assert_allclose(paths[1].y[-1], paths[0].y[-1], rtol=0, atol=1e-9 * np.abs(one.y).max())
-    fine, solved = steady.finer(1e-12).solve_each(one.y[None], np.array([0.02]))
+    fine, changes = steady.finer(1e-12).solve_each(one.y[None], np.array([0.02]))
     again, _ = plain.finer(1e-12).solve_each(one.y[None], np.array([0.02]))
-    assert solved.all()
+    assert np.isfinite(changes).all()
     np.testing.assert_allclose(fine, again, rtol=0, atol=1e-9 * np.abs(one.y).max())
 
 

@@ -8,12 +8,26 @@ Problems of the Theory of Elastic Stability, 1963.
 
 from __future__ import annotations
 
+from types import FunctionType
 from typing import Any
 
 import numpy as np
 import pytest
 
-from cfmkit.elastica import CLAMPED, Beam, Control, Loading, Network, Node, PathStatus, PointLoad, Section, trace
+from cfmkit.elastica import (
+    CLAMPED,
+    Beam,
+    Control,
+    LineSpring,
+    Loading,
+    Network,
+    Node,
+    PathStatus,
+    PointLoad,
+    Section,
+    trace,
+)
+from cfmkit.elastica.kernels import following
 
 LENGTH, RIGIDITY = 0.1, 2e9 * 8e-3 * 1e-9 / 12
 EULER = np.pi**2 * RIGIDITY / (4 * LENGTH**2)  # of a column clamped at its foot, free at its top
@@ -62,3 +76,42 @@ def test_a_limit_point_under_a_load_that_follows_is_told_as_one(tolerance: float
     assert [event.kind for event in ends.events] == ["bifurcation under constant loads"]
     assert [event.kind for event in passed.events] == ["bifurcation under constant loads", "limit point"]
     assert passed.events[1].drive == pytest.approx(ends.drive[-1], rel=max(10 * tolerance, 2e-6))
+
+
+@pytest.mark.parametrize("ratio", [3.9, 6.0])
+def test_two_columns_under_tangential_loads_diverge_no_more_than_one(ratio: float) -> None:
+    """The symmetric part of the tangent has two negative eigenvalues: the sign of the determinant does not show it."""
+    nodes = NODES | {"other": Node(0, LENGTH, CLAMPED), "end": Node(LENGTH, LENGTH)}
+    section = Section(2e9, 8e-3, 1e-3, axial=False)
+    beams = {"one": Beam("foot", "top", section), "two": Beam("other", "end", section)}
+    tangential = tuple(PointLoad(name, fx=-ratio * EULER, follows=True) for name in ("top", "end"))
+    weak = LineSpring("top", "end", 1e-3 * RIGIDITY / LENGTH**3)
+    push = Loading((PointLoad("top", fy=1e-6 * EULER),), np.array([0.5, 1.0]))
+    path = trace(Network(nodes, beams, springs=(weak,), loads=tangential), push)
+    assert path.status is PathStatus.COMPLETE, path.message
+    assert path.events == ()
+    assert path.stable.all()
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_real_positive_eigenvalues_are_counted_as_numpy_has_them(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    size = int(rng.integers(1, 13))
+    matrix = rng.standard_normal((size, size))
+    if seed % 3 == 0:
+        matrix = matrix + matrix.T
+    elif seed % 3 == 1:
+        matrix[size // 2 :, : size // 2] = 0.0
+    values = np.linalg.eigvals(matrix)
+    expected = int(((np.abs(values.imag) < 1e-12) & (values.real > 0)).sum())
+    assert _in_python(following.positive_real)(matrix.copy(), size) == expected
+
+
+def _in_python(kernel: Any) -> Any:
+    """Return a kernel as the Python function that it is compiled from, and all that it calls likewise."""
+    own = kernel.py_func
+    inner = {name: each.py_func for name, each in vars(following).items() if hasattr(each, "py_func")}
+    scope: dict[str, Any] = {**own.__globals__}
+    for name, each in inner.items():
+        scope[name] = FunctionType(each.__code__, scope)
+    return scope[own.__name__]

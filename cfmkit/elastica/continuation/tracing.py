@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from math import ceil
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -75,10 +75,10 @@ class Attempt:
         from cfmkit.elastica.outcome.path import Path
 
         problem, trail, tolerance = self.problem, self.trail, self.problem.control.tolerance
-        accurate = np.ones(len(trail.points), dtype=bool)
+        accurate: Any = np.ones(len(trail.points), dtype=bool)
         if not self.error <= tolerance:
             largest = float(largest_force(trail).max())
-            accurate = errors(problem, trail, range(len(trail.points)), largest) <= tolerance
+            accurate = np.array(errors(problem, trail, [*range(len(trail.points))], largest)) <= tolerance
             trail = inaccurate(problem, trail, self.error, int((~accurate).sum()))
         accurate.setflags(write=False)
         return Path(

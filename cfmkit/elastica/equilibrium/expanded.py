@@ -14,7 +14,6 @@ from cfmkit.elastica.equilibrium.mesh import assemble_model
 from cfmkit.elastica.equilibrium.solver import Points, Solver, Spot
 
 if TYPE_CHECKING:
-    from typing import Any
 
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.equilibrium.solver import MarchOptions
@@ -149,11 +148,16 @@ class UncondensedSolver(Solver):
         ys = [self._reduced(Spot(y, 0.0, self.wide.unit)).y for y in points.y]
         return code, Points(np.array(ys).reshape(len(points), self.size), points.drive, points.info)
 
-    def solve_each(self, ys: FloatArray, drives: FloatArray) -> tuple[FloatArray, Any]:
-        """Return the equilibria near ys (k, unknowns) at these drives (k,), and where there are any, (k,) bool."""
-        spots = [self.solve(y, drive) for y, drive in zip(ys, drives.tolist(), strict=True)]
-        new = np.array([y if spot is None else spot.y for y, spot in zip(ys, spots, strict=True)])
-        return new.reshape(ys.shape), np.array([spot is not None for spot in spots])
+    def solve_each(self, ys: FloatArray, drives: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the equilibria near ys (k, unknowns) at these drives (k,), and how far they are, (k, 3)."""
+        new, changes, free = ys.copy(), np.full((len(ys), 3), np.inf), self.wide.plain_free
+        for k, drive in enumerate(drives.tolist()):
+            spot = self.solve(ys[k], drive)
+            if spot is not None:
+                new[k], change = spot.y, np.abs(spot.y - ys[k])
+                parts = change[:free], change[free : self.n], change
+                changes[k] = [part.max(initial=0.0) for part in parts]
+        return new, changes
 
     def _reduced(self, spot: Spot) -> Spot:
         """Return an equilibrium with the unknowns and the tangent of a plain solver."""

@@ -90,7 +90,7 @@ class Grid:
 def grid(layout: Layout, mesh: Mesh) -> Grid:
     """Cut every beam at its corners and stations, then evenly."""
     if not layout.bundle.others:
-        return _even(len(layout.network.beams), mesh)
+        return _even(len(layout.network.beams), mesh.segments, mesh.steps)
     breaks = []
     for name, beam in layout.network.beams.items():
         fitted = layout.fits[name]
@@ -108,10 +108,10 @@ def grid(layout: Layout, mesh: Mesh) -> Grid:
 
 
 @lru_cache(maxsize=64)
-def _even(beams: int, mesh: Mesh) -> Grid:
+def _even(beams: int, segments: int, steps: int) -> Grid:
     """Return the grid of beams without corners or stations whose parameter is the fraction of the arc length."""
     whole = np.array([0.0, 1.0])
-    return _cut([(whole, whole)] * beams, mesh)
+    return _cut([(whole, whole)] * beams, Mesh(segments, steps))
 
 
 def _cut(breaks: list[tuple[FloatArray, FloatArray]], mesh: Mesh) -> Grid:
@@ -259,7 +259,7 @@ def assemble_model(layout: Layout, cut: Grid, values: Any, ramp: str = "") -> Mo
 
 def segment_turns(values: Any, segment_step: Any) -> Any:
     """Return the integrals of ds/EI over the segments, (segments,), from their table."""
-    turns: Any = np.add.reduceat(np.real(values[:, :, 2]).sum(axis=1), segment_step[:-1])
+    turns: Any = np.add.reduceat(values[:, :, 2].sum(axis=1).real, segment_step[:-1])
     return turns
 
 

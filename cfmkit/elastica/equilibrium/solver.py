@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from cfmkit.elastica.equilibrium.mesh import PRESTRESS, Mesh, assemble_model, grid, segment_turns, table
+from cfmkit.elastica.equilibrium.mesh import PRESTRESS, Mesh, assemble_model, grid, table
 from cfmkit.elastica.kernels import entry
 from cfmkit.elastica.kernels.codes import ASKED, DRIVE_RATE, REACHED, SHORTNESS, SOLVED, UNSTABLE
 from cfmkit.elastica.kernels.workspace import work_space
@@ -176,8 +176,7 @@ class Solver:
         fine.mesh, fine.tolerance = self.mesh.finer(), tolerance
         fine.cut = cut = grid(self.layout, fine.mesh)
         fine.table = table(self.layout, cut)
-        turns = segment_turns(fine.table, cut.segment_step)
-        fine.model = self.model._replace(table=fine.table, segment_step=cut.segment_step, segment_turn=turns)
+        fine.model = self.model._replace(table=fine.table, segment_step=cut.segment_step)
         fine.limits = np.array([tolerance, float(ITERATIONS)])
         return fine
 
@@ -283,8 +282,12 @@ class Solver:
         inner = change[self.n :].reshape(-1, 6)[:, :3]
         return float(max(inner.max(initial=0.0), change[: self.n_free].max(initial=0.0)))
 
-    def solve_each(self, ys: FloatArray, drives: FloatArray) -> tuple[FloatArray, Any]:
-        """Return the equilibria near ys (k, unknowns) at these drives (k,), and where there are any, (k,) bool."""
-        new, solved = ys.copy(), np.empty(len(drives))
-        entry.solve_each(self.model, self.n_free, new, drives, self.limits, solved, self.scratch)
-        return new, solved > 0
+    def solve_each(self, ys: FloatArray, drives: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the equilibria near ys (k, unknowns) at these drives (k,), and how far they are, (k, 3).
+
+        That is the largest change of the free degrees of freedom, of the forces on the beams' last sections, and of
+        all unknowns; infinite where there is no equilibrium.
+        """
+        new, changes = ys.copy(), np.empty((len(drives), 3))
+        entry.solve_each(self.model, self.n_free, new, drives, self.limits, changes, self.scratch)
+        return new, changes

@@ -70,26 +70,6 @@ def lu_solve(a, b):
 
 
 @kernel
-def negative_determinant(a):
-    """Tell whether a matrix (overwritten) has a negative determinant."""
-    n, negative = a.shape[0], False
-    for k in range(n):
-        pivot = k
-        for i in range(k + 1, n):
-            if abs(a[i, k]) > abs(a[pivot, k]):
-                pivot = i
-        if pivot != k:
-            negative = not negative
-            for j in range(k, n):
-                a[k, j], a[pivot, j] = a[pivot, j], a[k, j]
-        if a[k, k] < 0.0:
-            negative = not negative
-        if a[k, k] != 0.0:
-            _eliminate_one(a, k)
-    return negative
-
-
-@kernel
 def _swap(a, i, j):
     """Exchange rows and columns i and j of a symmetric matrix."""
     n = a.shape[0]

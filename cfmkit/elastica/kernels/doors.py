@@ -25,7 +25,7 @@ def solver(task, n_free, one, m, options, arrays, scratch, room):
     if task == MARCH:
         return _follow(m, n_free, f, one, c, b, options, (a, d, e), scratch, room)
     if task == EACH:
-        _each(m, n_free, a, d, (options[0], options[1]), b, scratch, room)
+        _each(m, n_free, a, d, (options[0], options[1]), e, scratch, room)
     elif task == TANGENT:
         _tangent(m, n_free, f, one, scratch)
     else:

@@ -107,9 +107,9 @@ def solve(
     return _solver(_numbers(SOLVE, n_free, target), m.block, objects(arrays), scratch.block, scratch.marching)
 
 
-def solve_each(m: Model, n_free: int, ys: Any, drives: Any, limits: Any, solved: Any, scratch: WorkSpace) -> None:
+def solve_each(m: Model, n_free: int, ys: Any, drives: Any, limits: Any, changes: Any, scratch: WorkSpace) -> None:
     """Solve at several drives; see `cfmkit.elastica.kernels.newton.solve_each`."""
-    arrays = (limits, ys, solved, drives, drives, _NONE, drives)
+    arrays = (limits, ys, drives, drives, drives, changes, drives)
     _solver(_numbers(EACH, n_free, 0.0), m.block, objects(arrays), scratch.block, scratch.marching)
 
 

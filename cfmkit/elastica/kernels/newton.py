@@ -7,7 +7,8 @@ import numpy as np
 from cfmkit.elastica.kernels.chain import C_D, E2, SMALL, E, F, G, flows, places_of, pose_of, sweep, unfold
 from cfmkit.elastica.kernels.codes import DIVERGED, SINGULAR, SLOW, SOLVED
 from cfmkit.elastica.kernels.compiler import inlined, kernel
-from cfmkit.elastica.kernels.dense import clear, copy_matrix, lu_solve, negative_determinant, positive_count
+from cfmkit.elastica.kernels.dense import clear, copy_matrix, lu_solve, positive_count
+from cfmkit.elastica.kernels.following import diverging
 from cfmkit.elastica.kernels.springs import acts, add_block, add_force, add_loads, add_springs, jacobian, wires_of
 
 LARGEST_TURN = 1.0  # longest Newton step [rad or lengths]: longer ones are shortened, not refused
@@ -169,23 +170,6 @@ def _log_determinant(factors, advance):
 
 
 @kernel
-def _divergent(m, h, unstable, directions, scratch):
-    """Return the number of unstable directions where loads may follow, and the Jacobian need not be symmetric.
-
-    Its symmetric part loses its definiteness before the determinant vanishes, where the network diverges: the count
-    is odd only if the determinant says so. directions: as many as there are, those that were eliminated left out.
-    """
-    count, n = 0, h.shape[0] - 1
-    for k in range(m.load_follows.shape[0]):
-        count += m.load_follows[k]
-    if count == 0:
-        return unstable
-    copy_matrix(scratch, h)
-    negative = negative_determinant(scratch[:n, :n])
-    return unstable - 1 if ((directions - unstable) % 2 == 1) != negative else unstable
-
-
-@kernel
 def solve(m, n_free, y, state, border, target, limits, tangent, scratch):
     """Newton's method for equilibrium with border . (z, drive) = target; y and state[0] (the drive) are updated.
 
@@ -225,7 +209,7 @@ def solve(m, n_free, y, state, border, target, limits, tangent, scratch):
                 state[5] = _log_determinant(h2, tangent[n])
             state[1] = tangent_index(h, n_free, index, h2)
             if m.load_follows.shape[0] > 0 and state[1] > 0.0:
-                state[1] = _divergent(m, h, int(state[1]), n_free + index, h2)
+                state[1] = diverging(m, h, int(state[1]), h2, rhs, residual, work[5])
             state[2], state[3] = least, size
             return SOLVED, iteration + 1
         before = size
@@ -235,14 +219,33 @@ def solve(m, n_free, y, state, border, target, limits, tangent, scratch):
 
 
 @kernel
-def solve_each(m, n_free, ys, drives, limits, solved, scratch, room):
-    """Solve for the equilibria near (ys, drives) at these drives; solved (points,) is set to one where it worked."""
-    _, _, state, (_, tangent, unit, _), _ = room
+def solve_each(m, n_free, ys, drives, limits, changes, scratch, room):
+    """Solve for the equilibria near (ys, drives) at these drives, in the place of ys.
+
+    changes (points, 3) is set to the largest changes of the free degrees of freedom, of the forces on the beams' last
+    sections, and of all unknowns; infinite where there is no equilibrium.
+    """
+    _, (before, _, _), state, (_, tangent, unit, _), _ = room
+    n = unit.shape[0] - 1
     state[5] = 0.0
     for p in range(ys.shape[0]):
         state[0], state[4] = drives[p], 0.0
+        for i in range(before.shape[0]):
+            before[i] = ys[p, i]
         code, _ = solve(m, n_free, ys[p], state, unit, drives[p], limits, tangent, scratch)
-        solved[p] = 1.0 if code == SOLVED else 0.0
+        pose, force, rest = 0.0, 0.0, 0.0
+        for i in range(before.shape[0]):
+            change = abs(ys[p, i] - before[i])
+            if i < n_free:
+                pose = max(pose, change)
+            elif i < n:
+                force = max(force, change)
+            else:
+                rest = max(rest, change)
+        most = max(max(pose, force), rest)
+        changes[p, 0], changes[p, 1], changes[p, 2] = pose, force, most
+        if code != SOLVED:
+            changes[p, 0] = changes[p, 1] = changes[p, 2] = np.inf
 
 
 @kernel

@@ -22,8 +22,9 @@ SOLVING = (
     floats(2),  # poses of a beam's ends
     floats(4),  # relations of the beams, see `cfmkit.elastica.kernels.chain`
     floats(4),  # what is kept of each segment
-    # small vectors and matrices, Jacobians, a block, outcomes of the segments, a complex state
-    (floats(3), floats(3), floats(2), floats(2), complexes(2)),
+    # small vectors and matrices, Jacobians, a block, outcomes of the segments, a complex state, what loads act on that
+    # turn with their node
+    (floats(3), floats(3), floats(2), floats(2), complexes(2), floats(2)),
     floats(1),  # increments of all unknowns
 )
 
@@ -92,6 +93,7 @@ def work_space(n: int, beams: int, dofs: int, segments: int) -> WorkSpace:
                 np.zeros((3, 3)),
                 np.zeros((segments, 22)),
                 np.zeros((1, 7), np.complex128),
+                np.empty((dofs, dofs)),
             ),
             np.zeros(n + 6 * segments),
         )

@@ -54,7 +54,9 @@ class Bundle:
         shapes: list[Any] = [beam.shape for beam in beams]
         given = [shape.coefficients or (0.0,) for shape in shapes]
         most = max(map(len, given))
-        c = np.array([(*own, *(0.0,) * (most - len(own))) for own in given]) + 0.0
+        if any(len(own) < most for own in given):
+            given = [(*own, *(0.0,) * (most - len(own))) for own in given]
+        c = np.array(given) + 0.0
         both = ends[beam_end]
         reach = both[:, 1] - both[:, 0]
         dx, dy = reach.T
@@ -166,7 +168,7 @@ def is_plain(beam: Beam) -> bool:
 
 def coils(beam: Beam) -> bool:
     """Tell whether the angle of a beam, a polynomial, may turn by more than COILED."""
-    return isinstance(beam.shape, Polynomial) and sum(abs(c.real) for c in beam.shape.coefficients[1:]) > COILED
+    return isinstance(beam.shape, Polynomial) and sum(map(abs, beam.shape.coefficients[1:])) > COILED
 
 
 def _rigidities(s: Section) -> tuple[Any, Any, Any]:

@@ -197,7 +197,7 @@ class Builder:
     def _beam_place(self, number: int, name: str, side: int) -> int:
         beam = self.network.beams[name]
         node, offset = ((beam.start, beam.start_offset), (beam.end, beam.end_offset))[side]
-        carried = nonzero(offset)
+        carried = any(offset)
         return self._place(node, 2 * number + side if carried else NOWHERE, carried, self.pins.get((name, side)))
 
     def _spring(self, number: int, spring: Spring) -> tuple[int, int, int]:
@@ -227,11 +227,6 @@ class Builder:
         if self.moved is not None:
             free[self.first[self.moved[0]] + self.moved[1] % 3] = False
         return free
-
-
-def nonzero(offset: tuple[Any, Any]) -> bool:
-    """Tell whether there is an offset."""
-    return bool(offset[0] != 0 or offset[1] != 0)
 
 
 def apart(network: Network, node: str) -> bool:

@@ -14,7 +14,7 @@ import numpy as np
 
 from cfmkit.elastica.model.drive import Drive, Loading, Rotation
 from cfmkit.elastica.model.network import LineLoad, Network, SlideSpring, TorsionSpring, same_direction
-from cfmkit.elastica.model.numbering import LINE, SLIDE, TURN, Builder, Plan, apart, nonzero
+from cfmkit.elastica.model.numbering import LINE, SLIDE, TURN, Builder, Plan, apart
 from cfmkit.errors import InputError
 
 if TYPE_CHECKING:
@@ -72,7 +72,7 @@ def _key(network: Network, drive: Drive, moved: tuple[str, int, float] | None) -
     """Return all that a plan depends on."""
     nodes = [(name, (s := node.support).along, s.across, s.rotation) for name, node in network.nodes.items()]
     beams = [
-        (name, b.start, b.end, b.start_joint, b.end_joint, nonzero(b.start_offset), nonzero(b.end_offset))
+        (name, b.start, b.end, b.start_joint, b.end_joint, any(b.start_offset), any(b.end_offset))
         for name, b in network.beams.items()
     ]
     key: list[Any] = [tuple(nodes), tuple(beams), moved and moved[:2]]

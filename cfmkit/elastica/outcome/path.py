@@ -110,8 +110,8 @@ class Path:
     def unstable(self) -> Any:
         """Number of unstable directions while the drive is held.
 
-        Under loads that follow they are those of the tangent's symmetric part, less one where its determinant, which
-        decides on divergence, does not agree.
+        Under loads that follow, what they act on is condensed to a small unsymmetric matrix, whose negative real
+        eigenvalues count: there the network diverges.
         """
         return read_only(self.points.unstable, np.int64)
 
