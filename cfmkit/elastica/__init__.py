@@ -12,29 +12,60 @@ References
 
 from __future__ import annotations
 
-from cfmkit.elastica.continuation.batch import Outcome, trace_many
-from cfmkit.elastica.continuation.tracing import trace
-from cfmkit.elastica.model.beam import Beam
-from cfmkit.elastica.model.drive import Control, Displacement, Loading, Rotation
-from cfmkit.elastica.model.network import (
-    CLAMPED,
-    FREE,
-    PINNED,
-    LineLoad,
-    LineSpring,
-    Link,
-    Network,
-    Node,
-    PointLoad,
-    SlideSpring,
-    Support,
-    TorsionSpring,
-    guided,
-)
-from cfmkit.elastica.model.section import Section, Taper
-from cfmkit.elastica.model.shapes import STRAIGHT, CosineArch, Polyline, Polynomial, Spline, arc
-from cfmkit.elastica.outcome.path import Event, Path, PathStatus
-from cfmkit.elastica.sensitivity.gradient import Gradient, gradient
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from cfmkit.elastica.continuation.batch import Outcome, trace_many
+    from cfmkit.elastica.continuation.tracing import trace
+    from cfmkit.elastica.model.beam import Beam
+    from cfmkit.elastica.model.drive import Control, Displacement, Loading, Rotation
+    from cfmkit.elastica.model.network import (
+        CLAMPED,
+        FREE,
+        PINNED,
+        LineLoad,
+        LineSpring,
+        Link,
+        Network,
+        Node,
+        PointLoad,
+        SlideSpring,
+        Support,
+        TorsionSpring,
+        guided,
+    )
+    from cfmkit.elastica.model.section import Section, Taper
+    from cfmkit.elastica.model.shapes import STRAIGHT, CosineArch, Polyline, Polynomial, Spline, arc
+    from cfmkit.elastica.outcome.path import Event, Path, PathStatus
+    from cfmkit.elastica.sensitivity.gradient import Gradient, gradient
+
+_HOMES = {
+    "continuation.batch": ("Outcome", "trace_many"),
+    "continuation.tracing": ("trace",),
+    "model.beam": ("Beam",),
+    "model.drive": ("Control", "Displacement", "Loading", "Rotation"),
+    "model.network": (
+        "CLAMPED",
+        "FREE",
+        "PINNED",
+        "LineLoad",
+        "LineSpring",
+        "Link",
+        "Network",
+        "Node",
+        "PointLoad",
+        "SlideSpring",
+        "Support",
+        "TorsionSpring",
+        "guided",
+    ),
+    "model.section": ("Section", "Taper"),
+    "model.shapes": ("STRAIGHT", "CosineArch", "Polyline", "Polynomial", "Spline", "arc"),
+    "outcome.path": ("Event", "Path", "PathStatus"),
+    "sensitivity.gradient": ("Gradient", "gradient"),
+}
+_HOME = {name: f"{__name__}.{module}" for module, names in _HOMES.items() for name in names}
 
 __all__ = [
     "CLAMPED",
@@ -72,3 +103,12 @@ __all__ = [
     "trace",
     "trace_many",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    """Import a name when it is first asked for: a path without its derivatives needs half of the engine."""
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(import_module(_HOME[name]), name)
+    globals()[name] = value
+    return value

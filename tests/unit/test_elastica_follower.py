@@ -81,16 +81,33 @@ def test_a_limit_point_under_a_load_that_follows_is_told_as_one(tolerance: float
 @pytest.mark.parametrize("ratio", [3.9, 6.0])
 def test_two_columns_under_tangential_loads_diverge_no_more_than_one(ratio: float) -> None:
     """The symmetric part of the tangent has two negative eigenvalues: the sign of the determinant does not show it."""
-    nodes = NODES | {"other": Node(0, LENGTH, CLAMPED), "end": Node(LENGTH, LENGTH)}
-    section = Section(2e9, 8e-3, 1e-3, axial=False)
-    beams = {"one": Beam("foot", "top", section), "two": Beam("other", "end", section)}
     tangential = tuple(PointLoad(name, fx=-ratio * EULER, follows=True) for name in ("top", "end"))
-    weak = LineSpring("top", "end", 1e-3 * RIGIDITY / LENGTH**3)
     push = Loading((PointLoad("top", fy=1e-6 * EULER),), np.array([0.5, 1.0]))
-    path = trace(Network(nodes, beams, springs=(weak,), loads=tangential), push)
+    path = trace(two_columns(tangential), push)
     assert path.status is PathStatus.COMPLETE, path.message
     assert path.events == ()
     assert path.stable.all()
+
+
+def test_two_columns_under_partly_tangential_loads_diverge_both() -> None:
+    share = 0.25
+    loads = [
+        (PointLoad(name, fx=-(1 - share) * EULER), PointLoad(name, fx=-share * EULER, follows=True))
+        for name in ("top", "end")
+    ]
+    path = trace(two_columns(()), Loading(sum(loads, ()), np.array([1.0, 3.0])), Control(branch="primary"))
+    expected = (np.arccos(-share / (1 - share)) / (np.pi / 2)) ** 2
+    assert 1.0 < expected < 3.0
+    assert path.unstable[path.at_asked].tolist() == [0, 2]
+
+
+def two_columns(loads: Any) -> Network:
+    """Return two columns side by side whose tops a weak spring joins."""
+    nodes = NODES | {"other": Node(0, LENGTH, CLAMPED), "end": Node(LENGTH, LENGTH)}
+    section = Section(2e9, 8e-3, 1e-3, axial=False)
+    beams = {"one": Beam("foot", "top", section), "two": Beam("other", "end", section)}
+    weak = LineSpring("top", "end", 1e-3 * RIGIDITY / LENGTH**3)
+    return Network(nodes, beams, springs=(weak,), loads=loads)
 
 
 @pytest.mark.parametrize("seed", range(40))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -92,21 +92,14 @@ def _room(problem: Problem, trail: Trail, place: float, sense: float) -> float:
     return 0.5 * float(min(2.0 * BEFORE_END * span, nearest))
 
 
-def ahead(
-    problem: Problem, trail: Trail, spot: Spot, asked: int
-) -> tuple[FloatArray, FloatArray | None, BranchEnd | None]:
-    """Return the values of the drive still to be reached and their numbers among those asked for.
+def up_to_ends(
+    problem: Problem, trail: Trail, spot: Spot, left: FloatArray, numbers: Any
+) -> tuple[FloatArray, Any, BranchEnd | None]:
+    """Return the values still to be reached and their numbers, on a branch up to just before an end that is known.
 
-    No numbers where these are all that were asked for. A branch is followed to just before an end that is known, which
-    comes third. The last number stands for no number.
+    That end comes third.
     """
-    targets, natural = trail.stretch.targets, trail.stretch.natural
-    if asked == 0 and not trail.ends:
-        return targets, None, None
-    first = asked if natural else trail.stretch.first_asked
-    left, numbers, toward = targets[first:], np.arange(first, len(targets)), None
-    if not natural:
-        return left, np.append(numbers, -1), None
+    toward = None
     for end in trail.ends:
         sense = np.sign(end.drive - spot.drive)
         before = min(_room(problem, trail, end.drive, -sense), _SHORT_OF * abs(end.drive - spot.drive))
@@ -115,7 +108,7 @@ def ahead(
         if len(beyond):
             left, numbers = np.append(left[: beyond[0]], last), np.append(numbers[: beyond[0]], -1)
             toward = end
-    return left, np.append(numbers, -1), toward
+    return left, numbers, toward
 
 
 def rejoined(problem: Problem, trail: Trail, spot: Spot, end: BranchEnd | None) -> Move:

@@ -3,34 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.elastica.continuation import (
-    at_bifurcation,
-    bifurcation,
-    branch_end,
-    corner,
-    critical_start,
-    ending,
-    limit_point,
-    start,
-)
+from cfmkit.elastica.continuation import ending, start
 from cfmkit.elastica.continuation.state import PRIMARY, Leg, Resume, Stop, Trail
-from cfmkit.elastica.continuation.uncondensed import uncondensed
-from cfmkit.elastica.kernels.codes import DENIED, DONE, INERTIA, LONG, NO_START, STALLED
+from cfmkit.elastica.kernels.codes import DONE, LONG, STALLED
 from cfmkit.elastica.outcome.path import PathStatus
 
 if TYPE_CHECKING:
+    from cfmkit.arrays import FloatArray
     from cfmkit.elastica.continuation.singular import Singular
-    from cfmkit.elastica.continuation.state import Move, Problem
+    from cfmkit.elastica.continuation.state import BranchEnd, Move, Problem
     from cfmkit.elastica.equilibrium.solver import Spot
 
 _HOPS = 60  # decisions on one path
 _LANDINGS = 6  # tries to land on a point asked for before a bifurcation is looked for there
 _FIRST = 0.05  # first step as a share of the drive's range, unless points asked for are nearer
-_NEARBY = 0.01  # share of the drive's range within which a march stalls at the same place again
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +68,7 @@ def _followed(problem: Problem, begun: start.Start) -> Trail:
     for _ in range(_HOPS):
         if isinstance(move, Stop) or _complete(problem, move):
             break
-        move = decided(problem, march(problem, move), move.fresh)
+        move = _next(problem, march(problem, move), move.fresh)
     trail = move.trail
     if isinstance(move, Resume) and not _complete(problem, move):
         message = f"the path turned back and forth at {trail.drive * problem.unit:.6g}"
@@ -100,6 +90,8 @@ def _named(problem: Problem, trail: Trail) -> Trail:
     """Return a path with the end of its last branch, where it was stepped over or is known from behind only."""
     if trail.closed or trail.ending.too_long or not trail.stretch.natural or set(trail.branches) <= {PRIMARY}:
         return trail
+    from cfmkit.elastica.continuation import branch_end
+
     closed = branch_end.closed_behind(problem, trail)
     if closed is not None:
         return closed
@@ -111,7 +103,7 @@ def march(problem: Problem, move: Resume) -> Leg:
     """March once: predictor and corrector, in compiled code, up to where a decision is needed."""
     trail, spot, stretch, control = move.trail, move.spot, move.trail.stretch, problem.control
     asked = int(stretch.targets[0] == 0.0) if move.fresh else trail.asked
-    left, numbers, toward = branch_end.ahead(problem, trail, spot, asked)
+    left, numbers, toward = _left(problem, trail, spot, asked)
     patient = move.patient or not stretch.natural or control.branch == "stop"
     options = problem.options(trail, spot, _first_step(problem, move, asked))._replace(
         landings=np.inf if patient else _LANDINGS,
@@ -129,6 +121,27 @@ def march(problem: Problem, move: Resume) -> Leg:
     return Leg(code, trail, spot, toward)
 
 
+def _left(
+    problem: Problem, trail: Trail, spot: Spot, asked: int
+) -> tuple[FloatArray, FloatArray | None, BranchEnd | None]:
+    """Return the values of the drive still to be reached and their numbers among those asked for, and a branch's end.
+
+    No numbers where these are all that were asked for; the last number stands for no number. A branch is followed to
+    just before an end that is known.
+    """
+    targets, natural = trail.stretch.targets, trail.stretch.natural
+    if asked == 0 and not trail.ends:
+        return targets, None, None
+    first = asked if natural else trail.stretch.first_asked
+    numbers: Any = np.arange(first, len(targets))
+    left, toward = targets[first:], None
+    if natural and trail.ends:
+        from cfmkit.elastica.continuation import branch_end
+
+        left, numbers, toward = branch_end.up_to_ends(problem, trail, spot, left, numbers)
+    return left, np.append(numbers, -1), toward
+
+
 def _first_step(problem: Problem, move: Resume, asked: int) -> float:
     """Return the first step of a march, with the sign of the way to go if it is by the drive."""
     stretch, first = move.trail.stretch, problem.control.first_step
@@ -137,62 +150,18 @@ def _first_step(problem: Problem, move: Resume, asked: int) -> float:
         step = min(first * problem.span, move.step)
         return float(np.copysign(step, along)) if stretch.natural else step
     if not stretch.natural:
+        from cfmkit.elastica.continuation import limit_point
+
         return min(limit_point.first_step(problem), move.step)
     return float(np.sign(along)) * min(abs(along), _FIRST * problem.span, move.step)
 
 
-def decided(problem: Problem, leg: Leg, fresh: bool) -> Move:
+def _next(problem: Problem, leg: Leg, fresh: bool) -> Move:
     """Return where to go on after a march, or that the path ends."""
-    trail, asked = leg.trail, leg.trail.asked
-    away = critical_start.left_again(problem, trail) if fresh else None
-    if away is not None:
-        return away
-    if leg.code == DONE and asked == len(trail.stretch.targets):
-        if asked == len(problem.values):
-            return Resume(trail, leg.spot)
-        return limit_point.by_the_drive(problem, trail, asked)
-    move = _after(problem, leg, asked)
-    return Stop(move.trail) if problem.first_only and move.trail.first is not None else move
+    trail = leg.trail
+    if leg.code == DONE and trail.asked == len(problem.values) and not (fresh and trail.events):
+        return Resume(trail, leg.spot)
+    # most paths end with their first march: what decides on the others takes a tenth of a run to load
+    from cfmkit.elastica.continuation.decisions import decided
 
-
-def _after(problem: Problem, leg: Leg, asked: int) -> Move:
-    """Return where to go on after a march that ended early, or on a branch."""
-    trail, spot, code, control = leg.trail, leg.spot, leg.code, problem.control
-    steadies = code == INERTIA and bool(trail.points.unstable[-1] < trail.points.unstable[-2])
-    if code in (NO_START, STALLED) or (steadies and control.branch == "stable"):
-        away = critical_start.left(problem, trail, spot)
-        if away is not None or code == NO_START:
-            return away or Stop(trail)
-    if code == INERTIA and control.branch == "stop":
-        message = f"stability is lost at {trail.drive * problem.unit:.6g}: the path ends there"
-        return Stop(trail.stopped(PathStatus.JUMPS, message))
-    if code == INERTIA:
-        return limit_point.back_to_the_drive(problem, bifurcation.crossed(problem, trail))
-    if code == DONE:
-        return branch_end.rejoined(problem, trail, spot, leg.toward)
-    if code == DENIED:
-        behind = at_bifurcation.passed(problem, trail, float(trail.stretch.targets[asked]))
-        return Resume(trail, spot, patient=True) if behind is None else bifurcation.crossed(problem, behind)
-    if code == STALLED and trail.stretch.natural and len(trail.points):
-        return _got_over(problem, trail, spot, asked)
-    return ending.stop(problem, trail, code)
-
-
-def _got_over(problem: Problem, trail: Trail, spot: Spot, asked: int) -> Move:
-    """Return where to go on after a march by the drive that stalled."""
-    fold = limit_point.is_near(problem, trail)
-    if fold and abs(spot.drive - trail.fold_at) <= _NEARBY * problem.span:
-        return limit_point.around(problem, trail)
-    trail = replace(trail, fold_at=spot.drive if fold else np.nan)
-    if not fold and (again := uncondensed(problem, trail)) is not None:
-        return again
-    move: Move | None = None
-    if any(name != PRIMARY for name in trail.branches):
-        move = branch_end.stepped_over(problem, trail, spot, asked)
-    if move is None:
-        trail, move = corner.past(problem, trail, spot, asked)
-    if move is not None:
-        return move
-    if problem.control.through_folds:
-        return limit_point.around(problem, trail)
-    return ending.stop(problem, trail, STALLED)
+    return decided(problem, leg, fresh)

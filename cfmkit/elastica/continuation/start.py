@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.elastica.continuation import branch_end
 from cfmkit.elastica.continuation.state import PRIMARY, Problem, Trail
 from cfmkit.elastica.equilibrium.mesh import LOADS, PRESTRESS, assemble_model
 from cfmkit.elastica.equilibrium.solver import MarchOptions, Solver, Spot
@@ -172,5 +171,7 @@ def ends_of_branch(problem: Problem, trail: Trail, follow: Follow) -> Trail:
     sense = float(np.sign(next(value for value in trail.stretch.targets if value)))
     if other is None or other.unstable == 0:
         return trail
+    from cfmkit.elastica.continuation import branch_end
+
     end, closed = branch_end.predicted_end(problem, trail, other, 0, sense, PRIMARY)
     return replace(trail, ends=(end,) if end else (), closed=closed)

@@ -14,7 +14,6 @@ from cfmkit.elastica.equilibrium.mesh import assemble_model
 from cfmkit.elastica.equilibrium.solver import Points, Solver, Spot
 
 if TYPE_CHECKING:
-
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.equilibrium.solver import MarchOptions
     from cfmkit.elastica.kernels.model import Model

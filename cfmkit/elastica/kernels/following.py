@@ -1,8 +1,11 @@
 """Unstable directions under loads that turn with their node: real eigenvalues of a small unsymmetric matrix.
 
 Such loads make the rows of the degrees of freedom that they act on unsymmetric, and those alone. All others are
-condensed symmetrically, so that their inertia is counted as ever; of the condensed matrix C the real eigenvalues count
-by which the network diverges. Pairs of complex ones may flutter: only masses decide that.
+condensed symmetrically, so that their inertia is counted as ever; of the condensed matrix C the negative real
+eigenvalues count, by which the network diverges. Pairs of complex ones may flutter: only masses decide that. Beyond
+flutter a pair may be real again, and negative: that, too, depends on masses, and so counts only if it is there with
+small rotary inertia, with large one, and with one by which a node is as soft in turning as in moving: there a pair is
+complex if it is with any.
 
 C = ((J^-1)_ss)^-1, with J the tangent and s the degrees of freedom under these loads, and likewise C' of the symmetric
 part J' of J. What is condensed is the same in both, and symmetric: by Haynsworth's theorem J' has as many positive
@@ -22,6 +25,7 @@ from cfmkit.elastica.kernels.compiler import kernel
 from cfmkit.elastica.kernels.dense import lu_solve
 
 RIGID, ROUNDING = 1e-13, 1e-14  # compliance, in units of L^2/EI and as a share of the largest, that is none
+INERTIAS = (1e-2, 1.0, 1e2)  # radii of gyration, in units of that by which a node is as soft in turning as in moving
 SWEEPS = 30  # of hqr for one eigenvalue: it takes two or three, and gives up at 30 [W]
 
 
@@ -34,26 +38,44 @@ def diverging(m, h, unstable, factors, rhs, slots, compliance):
     count = _followed(m, slots)
     if count == 0:
         return unstable
-    for whole in (False, True):
-        if not _condense(h, whole, factors, rhs, slots, compliance, count):
+    if not _condense(h, False, factors, rhs, slots, compliance, count):
+        return unstable
+    symmetric, least = positive_real(compliance, count), count
+    for inertia in INERTIAS:
+        if not _condense(h, True, factors, rhs, slots, compliance, count):
             return unstable
-        positive = positive_real(compliance, count)
-        unstable += positive if whole else -positive
-    return unstable
+        for i in range(count):
+            if slots[i] % 1.0 > 0.0:
+                scale = inertia * _balance(slots, compliance, i)
+                for j in range(count):
+                    compliance[i, j] *= scale
+                    compliance[j, i] *= scale
+        least = min(least, positive_real(compliance, count))
+    return unstable - symmetric + least
+
+
+@kernel
+def _balance(slots, compliance, i):
+    """Return the radius of gyration by which a node is as soft in turning, the unknown i, as in moving."""
+    moving, j = 0.0, i - 1
+    while j >= 0 and slots[j] % 1.0 == 0.0:
+        moving, j = max(moving, abs(compliance[j, j])), j - 1
+    turning = abs(compliance[i, i])
+    return np.sqrt(moving / turning) if moving > RIGID and turning > RIGID else 1.0
 
 
 @kernel
 def _followed(m, slots):
-    """List the unknowns that loads which turn with their node act on; return how many there are."""
+    """List the unknowns that loads which turn with their node act on, rotations plus a half; return how many."""
     count = 0
     for k in range(m.load_follows.shape[0]):
         for a in range(4):
             slot = m.slot[m.place_dof[m.load_place[k], a]]
             known = slot < 0 or not m.load_follows[k]
             for j in range(count):
-                known = known or slots[j] == slot
+                known = known or int(slots[j]) == slot
             if not known:
-                slots[count] = slot
+                slots[count] = slot + (0.5 if a > 1 else 0.0)
                 count += 1
     return count
 

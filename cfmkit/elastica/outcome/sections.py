@@ -138,7 +138,7 @@ class Sampler:
         """Return the table of `elastica.kernels.model.Model` from one parameter (k,) to another, on steps (k,)."""
         cut, name = self.cut, list(self.layout.network.beams)[beam]
         out, pieces = np.empty((len(step), ROWS, TABLE_COLUMNS)), cut.piece[step]
-        for piece in np.unique(pieces):
+        for piece in sorted(set(pieces.tolist())):
             own = pieces == piece
             first = int(step[own][0])
             where = cut.middle[first], cut.inside[first]
@@ -187,7 +187,7 @@ def sections(sampler: Sampler, beam: int, states: FloatArray, t: FloatArray, ste
     section, scales = layout.network.beams[name].section, layout.scales
     angle, thickness = np.empty(t.shape), np.empty(t.shape)
     place, pieces = sampler.place(beam, t), cut.piece[step]
-    for piece in np.unique(pieces):
+    for piece in sorted(set(pieces.tolist())):
         here = pieces == piece
         first = int(step[here][0])
         angle[here] = layout.fits[name].angle(t[here], cut.middle[first])
@@ -215,7 +215,7 @@ def stress_slopes(
     angle, thick, speed = (np.empty(t.shape, complex) for _ in range(3))
     bending, axial, shear = (np.empty(t.shape) for _ in range(3))
     pieces, length = cut.piece[step], np.real(fitted.length)
-    for piece in np.unique(pieces):
+    for piece in sorted(set(pieces.tolist())):
         here = pieces == piece
         first = int(step[here][0])
         inside, ahead = cut.inside[first], 1j * _STEP

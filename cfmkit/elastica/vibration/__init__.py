@@ -11,7 +11,20 @@ References
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any
+
 from cfmkit.elastica.vibration.masses import Masses
-from cfmkit.elastica.vibration.modes import Frequencies, frequencies
+
+if TYPE_CHECKING:
+    from cfmkit.elastica.vibration.modes import Frequencies, frequencies
 
 __all__ = ["Frequencies", "Masses", "frequencies"]
+
+
+def __getattr__(name: str) -> Any:
+    """Import the eigenproblem when it is first asked for: every network has masses, few are asked how they swing."""
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from cfmkit.elastica.vibration import modes
+
+    return getattr(modes, name)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, assert_never
 import numpy as np
 
 from cfmkit import elastica as engine
-from cfmkit.elastica.vibration import Masses
+from cfmkit.elastica.vibration.masses import Masses
 from cfmkit.families.beam.chain import chained
 from cfmkit.families.beam.layers import stacked
 from cfmkit.families.beam.parts.faults import HELD

@@ -22,9 +22,7 @@ from cfmkit.curves import Column, Curve
 from cfmkit.elastica import Path, PathStatus, trace
 from cfmkit.elastica.model.bundle import coils
 from cfmkit.elastica.model.layout import Layout
-from cfmkit.elastica.outcome.crosswise import cross_stiffness
 from cfmkit.elastica.outcome.path import most_stressed
-from cfmkit.elastica.vibration import Frequencies, frequencies
 from cfmkit.errors import InputError
 from cfmkit.families.beam.build import Assembly, assemble, mirror_axis, resolve, thickest_of
 from cfmkit.families.beam.checks import findings_of
@@ -41,6 +39,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.curves import Kind
+    from cfmkit.elastica.vibration import Frequencies
     from cfmkit.families.base import Run
     from cfmkit.families.beam.spec import BeamSpec
 
@@ -145,6 +144,8 @@ class Solution:
         count = self.spec.analysis.modes or (_FLUTTER if self.follows else 0)
         if masses is None or not count or not len(self.keep):
             return None
+        from cfmkit.elastica.vibration import frequencies
+
         return frequencies(self.path, masses, count, self.keep, self.assembly.hold())
 
     @cached_property
@@ -155,6 +156,8 @@ class Solution:
         """
         if self.spec.mechanism.drive.kind in ("rotation", "moment") or not len(self.keep):
             return read_only(np.full(len(self.keep), np.nan))
+        from cfmkit.elastica.outcome.crosswise import cross_stiffness
+
         found = cross_stiffness(self.path, self.assembly.driven, self.assembly.direction, self.keep)
         known = self.accurate & np.isfinite(found)
         return read_only(np.where(known, self.assembly.parallel * found, np.nan))
@@ -162,7 +165,7 @@ class Solution:
     @cached_property
     def gaps(self) -> tuple[Gap | None, Gap | None]:
         """The smallest gap between two beams before any load, and of some places of the curve [m]."""
-        poses = np.unique(np.linspace(0, len(self.keep) - 1, _POSES).astype(int))
+        poses = sorted(set(np.linspace(0, len(self.keep) - 1, _POSES).astype(int).tolist()))
         found = [self._gap(int(self.keep[pose])) for pose in poses]
         moving = min((gap for gap in found if gap is not None), default=None)
         return found[0], moving
@@ -319,5 +322,5 @@ def _frequencies(solution: Solution) -> dict[str, Column]:
 def _branches(solution: Solution) -> Any:
     """Return the name of the branch at every point, with units."""
     names = solution.path.branch[solution.keep]
-    told = {name: in_units(solution.assembly, name) for name in np.unique(names).tolist()}
+    told = {name: in_units(solution.assembly, name) for name in sorted(set(names.tolist()))}
     return read_only(np.array([told[name] for name in names.tolist()]), np.str_)

@@ -1,0 +1,85 @@
+"""Decisions: where a path goes on after a march that ended before all was done, or that it ends."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.elastica.continuation import (
+    at_bifurcation,
+    bifurcation,
+    branch_end,
+    corner,
+    critical_start,
+    ending,
+    limit_point,
+)
+from cfmkit.elastica.continuation.state import PRIMARY, Leg, Resume, Stop
+from cfmkit.elastica.continuation.uncondensed import uncondensed
+from cfmkit.elastica.kernels.codes import DENIED, DONE, INERTIA, NO_START, STALLED
+from cfmkit.elastica.outcome.path import PathStatus
+
+if TYPE_CHECKING:
+    from cfmkit.elastica.continuation.state import Move, Problem, Trail
+    from cfmkit.elastica.equilibrium.solver import Spot
+
+_NEARBY = 0.01  # share of the drive's range within which a march stalls at the same place again
+
+
+def decided(problem: Problem, leg: Leg, fresh: bool) -> Move:
+    """Return where to go on after a march, or that the path ends."""
+    trail, asked = leg.trail, leg.trail.asked
+    away = critical_start.left_again(problem, trail) if fresh else None
+    if away is not None:
+        return away
+    if leg.code == DONE and asked == len(trail.stretch.targets):
+        if asked == len(problem.values):
+            return Resume(trail, leg.spot)
+        return limit_point.by_the_drive(problem, trail, asked)
+    move = _after(problem, leg, asked)
+    return Stop(move.trail) if problem.first_only and move.trail.first is not None else move
+
+
+def _after(problem: Problem, leg: Leg, asked: int) -> Move:
+    """Return where to go on after a march that ended early, or on a branch."""
+    trail, spot, code, control = leg.trail, leg.spot, leg.code, problem.control
+    steadies = code == INERTIA and bool(trail.points.unstable[-1] < trail.points.unstable[-2])
+    if code in (NO_START, STALLED) or (steadies and control.branch == "stable"):
+        away = critical_start.left(problem, trail, spot)
+        if away is not None or code == NO_START:
+            return away or Stop(trail)
+    if code == INERTIA and control.branch == "stop":
+        message = f"stability is lost at {trail.drive * problem.unit:.6g}: the path ends there"
+        return Stop(trail.stopped(PathStatus.JUMPS, message))
+    if code == INERTIA:
+        return limit_point.back_to_the_drive(problem, bifurcation.crossed(problem, trail))
+    if code == DONE:
+        return branch_end.rejoined(problem, trail, spot, leg.toward)
+    if code == DENIED:
+        behind = at_bifurcation.passed(problem, trail, float(trail.stretch.targets[asked]))
+        return Resume(trail, spot, patient=True) if behind is None else bifurcation.crossed(problem, behind)
+    if code == STALLED and trail.stretch.natural and len(trail.points):
+        return _got_over(problem, trail, spot, asked)
+    return ending.stop(problem, trail, code)
+
+
+def _got_over(problem: Problem, trail: Trail, spot: Spot, asked: int) -> Move:
+    """Return where to go on after a march by the drive that stalled."""
+    fold = limit_point.is_near(problem, trail)
+    if fold and abs(spot.drive - trail.fold_at) <= _NEARBY * problem.span:
+        return limit_point.around(problem, trail)
+    trail = replace(trail, fold_at=spot.drive if fold else np.nan)
+    if not fold and (again := uncondensed(problem, trail)) is not None:
+        return again
+    move: Move | None = None
+    if any(name != PRIMARY for name in trail.branches):
+        move = branch_end.stepped_over(problem, trail, spot, asked)
+    if move is None:
+        trail, move = corner.past(problem, trail, spot, asked)
+    if move is not None:
+        return move
+    if problem.control.through_folds:
+        return limit_point.around(problem, trail)
+    return ending.stop(problem, trail, STALLED)
