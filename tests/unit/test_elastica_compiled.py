@@ -205,17 +205,61 @@ def _states_with(call: Any) -> Any:
     return out
 
 
-def test_kept_code_gives_to_the_last_bit_what_numba_gives() -> None:
-    """Two seconds: numba compiles the smallest door in its usual way. All doors: see the next test."""
+@pytest.fixture(scope="module")
+def usual_door() -> Any:
+    """The smallest door, compiled in numba's usual way: two seconds."""
     from cfmkit.elastica.kernels import build
 
-    usual = _states_with(machine.callable_at(build.called("states")))
+    return machine.callable_at(build.called("states"))
+
+
+def test_kept_code_gives_to_the_last_bit_what_numba_gives(usual_door: Any) -> None:
+    """One door; all of them: see the slow test below."""
+    usual = _states_with(usual_door)
     _states_with(entry._got("states"))
     code, path = kept.read("states"), kept.library("states")
     assert code is not None
     assert _states_with(machine.loaded(code)).tobytes() == usual.tobytes()
     if path is not None:  # there is a C compiler
         assert _states_with(machine.in_library(path)).tobytes() == usual.tobytes()
+
+
+_ONE_DOOR = """
+import sys
+from cfmkit.elastica.kernels import build
+sys.stdout.buffer.write(build.compiled("states").content)
+"""
+
+
+@pytest.mark.usefixtures("usual_door")
+def test_code_does_not_follow_from_what_its_process_compiled_before() -> None:
+    """Three seconds. Here are the same kernels already, each optimised by itself; in a new process there are none."""
+    from cfmkit.elastica.kernels import build
+
+    here = build.compiled("states").content
+    alone = subprocess.run([sys.executable, "-P", "-c", _ONE_DOOR], capture_output=True, check=True).stdout
+    assert here == alone
+
+
+_MIXED = """
+import numba
+from cfmkit.elastica.kernels import build
+code = build.compiled("states")
+from numba.core.runtime import rtsys
+assert rtsys.library.get_pointer_to_function("nrt_unresolved_abort")
+@numba.njit
+def least(a, b):
+    return min(a, b)
+assert least(1.0, 2.0) == 1.0
+from cfmkit.elastica.kernels.compiler import KERNELS
+assert not any(each.overloads for each in KERNELS)
+"""
+
+
+def test_a_process_that_compiled_the_engine_has_its_own_functions_as_before() -> None:
+    """Two seconds. The runtime of numba is not made of drafts, and none of the kernels is one."""
+    done = subprocess.run([sys.executable, "-P", "-c", _MIXED], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
 
 
 _WAY_IN = "int cfmkit_door(const long long *block, long long *out) { out[0] = 2 * block[0]; return 0; }"
@@ -294,6 +338,8 @@ def test_curves_and_gradients_are_those_of_numba_to_rounding(monkeypatch: pytest
     from cfmkit.elastica.kernels import build
 
     ours = _curve_and_gradient()
+    for name in entry._doors:
+        build.compiled(name)  # in the same process, whether or not it was kept before
     for name, door in entry._doors.items():
         monkeypatch.setattr(door, "_call", machine.callable_at(build.called(name)))
     for theirs, own in zip(_curve_and_gradient(), ours, strict=True):

@@ -8,16 +8,20 @@ door, when all the code is there: half of the time.
 from __future__ import annotations
 
 import contextlib
+from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numba
 from llvmlite import ir
 from numba import types
-from numba.core import cgutils, codegen, compiler_lock, event
+from numba.core import cgutils, codegen, compiler_lock, cpu, event
 from numba.core.registry import cpu_target
+from numba.core.runtime.nrt import rtsys
+from numba.core.typing.context import Context
 
 from cfmkit.elastica.kernels import doors
-from cfmkit.elastica.kernels.compiler import OPTIONS
+from cfmkit.elastica.kernels.compiler import KERNELS, OPTIONS
 from cfmkit.elastica.kernels.machine import SYMBOL, Code
 from cfmkit.elastica.kernels.packing import AXES, DATA, DTYPE, DTYPES, ENTRIES, FLAGS, READY, REFUSED, SHAPE, TYPE, Kind
 from cfmkit.elastica.kernels.signatures import DOORS, REAL, WHOLE
@@ -44,11 +48,6 @@ class _Draft(codegen.JITCodeLibrary):
 
     def get_pointer_to_function(self, name: str) -> int:
         return 0
-
-    def _get_module_for_linking(self) -> Any:
-        if self._shared_module is None:
-            link(self)
-        return super()._get_module_for_linking()
 
 
 class _Drafting(codegen.JITCPUCodegen):
@@ -80,14 +79,49 @@ def link(library: Any) -> Any:
     return library._final_module
 
 
+@dataclass
+class _World:
+    """What compilations have in common: the contexts of numba, and what has been made of each kernel."""
+
+    target: Any
+    typing: Any
+    kernels: list[Any]
+
+    @classmethod
+    def present(cls) -> _World:
+        """Return that of all compilations now."""
+        return cls(cpu_target.target_context, cpu_target.typing_context, [each.overloads for each in KERNELS])
+
+    def enter(self) -> None:
+        """Make it that of all compilations."""
+        cpu_target._toplevel_target_context, cpu_target._toplevel_typing_context = self.target, self.typing
+        for kernel, overloads in zip(KERNELS, self.kernels, strict=True):
+            kernel.overloads = overloads
+
+
+@lru_cache(maxsize=1)
+def _world_of_drafts() -> _World:
+    rtsys.initialize(cpu_target.target_context)  # the first context that compiles makes it for the whole process
+    types_known = Context()
+    target = cpu.CPUContext(types_known, cpu_target.target_context.target_name)
+    target._internal_codegen = _Drafting("cfmkit")
+    return _World(target, types_known, [type(each.overloads)() for each in KERNELS])
+
+
 @contextlib.contextmanager
 def _drafting() -> Iterator[Any]:
-    context = cpu_target.target_context
-    usual, context._internal_codegen = context._internal_codegen, _Drafting("cfmkit")
+    """Compile drafts, in a world of their own.
+
+    Else they would be found by other functions of the process that use the same parts of numba, `min` and `max` among
+    them, and drafts would find those that were optimised by themselves: then the last bits of a path would follow from
+    what its process had compiled before, and would stay so, because the code is kept.
+    """
+    usual = _World.present()
+    _world_of_drafts().enter()
     try:
-        yield context._internal_codegen
+        yield _world_of_drafts().target.codegen()
     finally:
-        context._internal_codegen = usual
+        usual.enter()
 
 
 def _type(what: Any) -> Any:
@@ -224,7 +258,7 @@ def compiled(name: str, report: Callable[[float], None] = lambda _share: None) -
         module = link(library)
         for own in (*module.functions, *module.global_variables):
             if not own.is_declaration and own.name != SYMBOL:
-                own.linkage = "internal"
+                own.linkage, own.name = "internal", ""  # numba's names count what the process compiled before
         module.verify()
         passes, builder = drafting._module_pass_manager()
         report(_TYPED)

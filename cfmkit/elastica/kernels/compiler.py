@@ -53,11 +53,20 @@ OPTIONS: dict[str, Any] = {
     **_uncounted(),
 }
 
-kernel: Any = numba.njit(**OPTIONS)
-"""For all functions; they make no arrays.
+KERNELS: list[Any] = []
+"""All functions that are compiled; each holds what has been made of it."""
 
-They have no way in from Python (that halves the time to compile): calling one from Python ends the process.
-"""
 
-inlined: Any = numba.njit(**OPTIONS, forceinline=True)
-"""For small functions in the innermost loops: a call with arrays costs more than they do."""
+def kernel(function: Any) -> Any:
+    """Return the function, to be compiled when it is used; for all functions, which make no arrays.
+
+    They have no way in from Python (that halves the time to compile): calling one from Python ends the process.
+    """
+    KERNELS.append(numba.njit(**OPTIONS)(function))
+    return KERNELS[-1]
+
+
+def inlined(function: Any) -> Any:
+    """As `kernel`, for small functions in the innermost loops: a call with arrays costs more than they do."""
+    KERNELS.append(numba.njit(**OPTIONS, forceinline=True)(function))
+    return KERNELS[-1]
