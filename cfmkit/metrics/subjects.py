@@ -191,10 +191,12 @@ class Branch:
         if model is None:
             return float(part.effort.max()), float(part.effort.min())
         motion, effort, (low, high) = part.motion, part.effort, self.ends
-        peaks = model.peaks[(model.peaks > low) & (model.peaks < high)]
-        if len(peaks):
+        peaks = model.peaks
+        between = (peaks > low) & (peaks < high)
+        if between.any():
+            heights = model.effort(self.name, peaks)
             motion, effort = (
-                np.concatenate(pair) for pair in ((motion, peaks), (effort, model.effort(self.name, peaks)))
+                np.concatenate([own, more[between]]) for own, more in ((motion, peaks), (effort, heights))
             )
             motion, chosen = np.unique(motion, return_index=True)
             motion, effort = motion[np.isfinite(effort[chosen])], effort[chosen][np.isfinite(effort[chosen])]

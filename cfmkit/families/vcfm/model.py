@@ -278,6 +278,16 @@ class DenseCurve:
 
     def effort(self, _branch: str, places: FloatArray, /) -> FloatArray:
         """Return the force at travels of any shape [N]."""
+        if places is self.places or (places.base is self.places and places.size == self.places.size):
+            return self._known.reshape(places.shape)
+        return self._force(places)
+
+    @cached_property
+    def _known(self) -> FloatArray:
+        """The force at all of `places`, which each metric begins with [N]."""
+        return self._force(self.places)
+
+    def _force(self, places: FloatArray) -> FloatArray:
         sampler, travel = self.solution.sampler, np.ravel(places)
         force = sampler.leaf_force(travel) + sampler.spring(travel + self.solution.nominal.preload)[0]
         return np.asarray(force.reshape(np.shape(places)))

@@ -142,14 +142,14 @@ def _longest(places: FloatArray, force: FloatArray, flatness: float) -> tuple[Fl
 
 def _extremes(levels: Levels, last: NDArray[np.intp]) -> tuple[FloatArray, FloatArray]:
     """Return the largest and smallest force from each sample to another behind it."""
-    start = np.arange(last.shape[1])
-    size = last - start + 1
-    level = np.frexp(size.astype(float))[1] - 1  # the largest power of two within
-    highs, lows = (np.stack([pair[k] for pair in levels]) for k in (0, 1))
-    rows = np.arange(len(last))[:, None]
-    tail = last + 1 - (1 << level)
-    high = np.maximum(highs[level, rows, start], highs[level, rows, tail])
-    return high, np.minimum(lows[level, rows, start], lows[level, rows, tail])
+    curves, n = last.shape
+    start, row = np.arange(n), n * np.arange(curves)[:, None]
+    level = np.frexp((last - start + 1).astype(float))[1] - 1  # the largest power of two within
+    highs, lows = (np.concatenate([pair[k].ravel() for pair in levels]) for k in (0, 1))
+    head = level * (curves * n) + row
+    tail = head + (last + 1 - (1 << level))
+    head += start
+    return np.maximum(highs.take(head), highs.take(tail)), np.minimum(lows.take(head), lows.take(tail))
 
 
 def longest_window(force: FloatArray, flatness: float) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
@@ -184,13 +184,13 @@ def _reach(levels: Levels, flatness: float) -> NDArray[np.intp]:
     curves, n = levels[0][0].shape
     reach = np.zeros((curves, n), dtype=np.intp)
     high, low = levels[0][0].copy(), levels[0][1].copy()
-    rows, start = np.arange(curves)[:, None], np.arange(n)[None, :]
+    row, start = n * np.arange(curves)[:, None], np.arange(n)[None, :]
     for level in range(len(levels) - 1, -1, -1):
         # samples start + reach + 1 ... start + reach + 2^level come in together, if the band allows
         at = start + reach + 1
         fits = at + 2**level <= n
-        at = np.minimum(at, n - 1)
-        top, bottom = np.maximum(high, levels[level][0][rows, at]), np.minimum(low, levels[level][1][rows, at])
+        at = np.minimum(at, n - 1) + row  # of the flattened table, which is read in half the time
+        top, bottom = np.maximum(high, levels[level][0].take(at)), np.minimum(low, levels[level][1].take(at))
         fits &= (bottom > 0) & (top - bottom <= flatness * top * (1 + 1e-12))
         reach = np.where(fits, reach + 2**level, reach)
         high, low = np.where(fits, top, high), np.where(fits, bottom, low)

@@ -155,9 +155,9 @@ def axial_root(shortening: Any, turn: Any, stretch: Any) -> FloatArray:
     stretch : array
         (t/L)^2/3 = 4 E I/(E A L^2).
     """
-    parts = np.broadcast_arrays(*(np.asarray(item, dtype=float) for item in (shortening, np.square(turn), stretch)))
-    shape = parts[0].shape
-    m, bend, a = (np.ravel(item) for item in parts)
+    parts = [np.asarray(item, dtype=float) for item in (shortening, np.square(turn), stretch)]
+    shape = np.broadcast_shapes(*(item.shape for item in parts))
+    m, bend, a = (np.broadcast_to(item, shape).ravel() for item in parts)
     with np.errstate(all="ignore"):
         free = m / a
         bent = POLE - np.sqrt(bend * _LEAST / np.where(m > 0, m, 1.0))
@@ -175,11 +175,16 @@ def axial_root(shortening: Any, turn: Any, stretch: Any) -> FloatArray:
 
 @dataclass(frozen=True)
 class Force:
-    """What a leaf does at a pose: force along the motion [E I/L^2], z, and largest curvature times L."""
+    """What a leaf does at a pose: force along the motion [E I/L^2], z, and the turn of its chord [rad]."""
 
     along: Any
     z: Any
-    curvature: Any
+    turn: Any
+
+    @property
+    def curvature(self) -> Any:
+        """Largest curvature times L."""
+        return np.abs(self.turn) * largest_curvature(self.z)
 
 
 def s_force(angle: Any, slimness: Any, travel: Any) -> Force:
@@ -197,4 +202,4 @@ def s_force(angle: Any, slimness: Any, travel: Any) -> Force:
     at = pose(angle, travel)
     z = axial_root(at.shortening, at.turn, np.square(slimness) / 3.0)
     along = 4.0 * z * at.sine + 2.0 * at.turn * end_curvature(z) * at.cosine / at.chord
-    return Force(along, z, np.abs(at.turn) * largest_curvature(z))
+    return Force(along, z, at.turn)

@@ -22,9 +22,13 @@ import numpy as np
 from cfmkit.families.vcfm.leaves.s_form import pose, s_force
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from cfmkit.arrays import FloatArray
     from cfmkit.families.vcfm.leaves.strip import Strip
 
+
+    Law = Callable[[Strip, FloatArray], Any]
 
 NEGATIVE_ABOVE = 1.4246
 """Rise over thickness above which a V-beam has a negative stiffness anywhere."""
@@ -162,6 +166,8 @@ class VBeam:
                 step = gap_here * (here - before) / (gap_here - gap)
             step = np.where(np.isfinite(step), step, 0.0)
             before, gap, here = here, gap_here, here - step
+            if not (np.abs(step) > 1e-15 * np.abs(here)).any():
+                break  # the last bit
         near = np.abs(here - guess) <= 2.0 * np.abs(outward)
         return np.where(near, here, guess)
 
@@ -178,7 +184,7 @@ class VBeam:
         travel : array
             Of the shuttle from the as-made pose, positive towards the flat pose [m].
         """
-        return self.state(travel)[0]
+        return self._joined(travel, (_buckled_force, _bent_force))[0]
 
     def stress(self, travel: Any) -> FloatArray:
         """Return the largest stress of the leaf, bending and axial [Pa]."""
@@ -186,26 +192,39 @@ class VBeam:
 
     def state(self, travel: Any) -> tuple[FloatArray, FloatArray]:
         """Return `force` and `stress` at once: both come of one root."""
-        buckled = self.buckled(travel)
-        fields = (self.strip.length, self.strip.angle, self.strip.thickness, self.strip.width,
-                  self.strip.youngs_modulus, self.strip.poisson_ratio, travel)  # fmt: skip
-        wide = [np.broadcast_to(np.asarray(item, dtype=float), buckled.shape) for item in fields]
-        force, stress = np.empty(buckled.shape), np.empty(buckled.shape)
-        for chosen, law in ((buckled, _buckled), (~buckled, _bent)):
-            *about, here = (item[chosen] for item in wide)
-            if chosen.any():
-                force[chosen], stress[chosen] = law(type(self.strip)(*about), here)
+        force, stress = self._joined(travel, (_buckled, _bent))
         return force, stress
+
+    def _joined(self, travel: Any, laws: tuple[Law, Law]) -> FloatArray:
+        """Return what the laws of the buckled and of the bent leaf give, (k, ...), each where it holds."""
+        buckled = self.buckled(travel)
+        strip, one = self.strip, all(np.ndim(item) == 0 for item in vars(self.strip).values())
+        wide = [] if one else [np.broadcast_to(np.asarray(item), buckled.shape) for item in vars(strip).values()]
+        place = np.broadcast_to(np.asarray(travel, dtype=float), buckled.shape)
+        found = np.empty((2, *buckled.shape))  # a law without stress fills both rows
+        for chosen, law in zip((buckled, ~buckled), laws, strict=True):
+            if chosen.any():
+                about = strip if one else type(strip)(*(item[chosen] for item in wide))
+                found[:, chosen] = law(about, place[chosen])
+        return found
+
+
+def _buckled_force(strip: Strip, travel: FloatArray) -> Any:
+    drop = strip.rise - travel
+    return critical_force(strip) * (drop / np.hypot(strip.reach, drop))
 
 
 def _buckled(strip: Strip, travel: FloatArray) -> tuple[Any, Any]:
-    drop, force = strip.rise - travel, critical_force(strip)
-    sine = drop / np.hypot(strip.reach, drop)
-    at = pose(strip.angle, travel / strip.length)
+    force, at = critical_force(strip), pose(strip.angle, travel / strip.length)
     # (2 pi/L) sqrt(alpha^2 + 4 r) with r = shortening - P/EA - alpha^2/4: the tilt drops out
     curvature = 4.0 * np.pi / strip.length * np.sqrt(np.maximum(at.shortening - force / strip.axial, 0.0))
     stress = 0.5 * strip.youngs_modulus * strip.thickness * curvature + force / strip.area
-    return force * sine, stress
+    return _buckled_force(strip, travel), stress
+
+
+def _bent_force(strip: Strip, travel: FloatArray) -> Any:
+    unit = strip.bending / strip.length**2
+    return unit * s_force(strip.angle, strip.thickness / strip.length, travel / strip.length).along
 
 
 def _bent(strip: Strip, travel: FloatArray) -> tuple[Any, Any]:
