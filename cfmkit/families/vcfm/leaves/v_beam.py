@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.families.vcfm.leaves.strip import Strip
 
-
     Law = Callable[[Strip, FloatArray], Any]
 
 NEGATIVE_ABOVE = 1.4246
