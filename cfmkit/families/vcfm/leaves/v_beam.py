@@ -183,7 +183,7 @@ class VBeam:
         travel : array
             Of the shuttle from the as-made pose, positive towards the flat pose [m].
         """
-        return self._joined(travel, (_buckled_force, _bent_force))[0]
+        return np.asarray(self._joined(travel, (_buckled_force, _bent_force))[0])
 
     def stress(self, travel: Any) -> FloatArray:
         """Return the largest stress of the leaf, bending and axial [Pa]."""
