@@ -25,7 +25,8 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.curves import Curve
     from cfmkit.experiment.comparison import Comparison, Samples
-    from cfmkit.experiment.report import MeasureReport
+    from cfmkit.experiment.measured import Measured, Measurement
+    from cfmkit.metrics import Window
 
 LITTLE_MORE = 2.0
 """Forces outside the window are shown as well if the range grows by no more than this factor."""
@@ -34,15 +35,15 @@ BINS = 1200
 """Columns of points that a picture can show: more samples are drawn as their extremes."""
 
 
-def figures(report: MeasureReport) -> dict[str, Callable[[], Figure]]:
+def figures(source: Measured, numbers: Measurement) -> dict[str, Callable[[], Figure]]:
     """Return what draws each picture of a measurement, by file stem."""
-    return {"loop": partial(loop, report)}
+    return {"loop": partial(loop, source, numbers)}
 
 
 @styled
-def loop(report: MeasureReport) -> Figure:
+def loop(source: Measured, numbers: Measurement) -> Figure:
     """Return the measured loop: whole and raw above, the window with the filtered branches below."""
-    source, window = report.source, report.numbers.window
+    window = numbers.window
     figure = new_figure()
     subject = "raw and filtered" if source.filtered else "raw"
     write_heading(figure, Heading(source.recording.name, f"measured {source.recording.kind}, {subject}"))
@@ -60,7 +61,7 @@ def loop(report: MeasureReport) -> Figure:
     motion = smooth.motion_dimension
     ends = tuple(_from_border(value, motion) for value in across)
     plot_curve(replace(smooth, label={}), lower, Look(window=((ends[0], ends[1]), limits)))
-    _note_window(report, lower)
+    _note_window(source, window, lower)
     return figure
 
 
@@ -91,17 +92,17 @@ def _range_in(curves: tuple[Curve, ...], window: tuple[float, float]) -> tuple[f
     return low - room, high + room
 
 
-def _note_window(report: MeasureReport, ax: Axes) -> None:
+def _note_window(source: Measured, window: Window, ax: Axes) -> None:
     """Mark the window in which the numbers hold."""
-    dimension = report.source.raw[0].motion_dimension
-    low, high = (float(to_border(end, dimension)) for end in (report.numbers.window.lo, report.numbers.window.hi))
+    dimension = source.raw[0].motion_dimension
+    low, high = (float(to_border(end, dimension)) for end in (window.lo, window.hi))
     floor, ceiling = ax.get_ylim()
     left, right = ax.get_xlim()
     for place in (low, high):
         if left < place < right:
             ax.axvline(place, color=GREY, linewidth=0.7, dashes=(2, 2), zorder=1.5)
     shown = np.linspace(max(low, left), min(high, right), 40)
-    text = "grey: raw" if report.source.filtered else ""
+    text = "grey: raw" if source.filtered else ""
     if text:
         points = np.column_stack([shown, np.full(40, floor + 0.04 * (ceiling - floor))])
         place_labels(ax, [Label(text, GREY, points, prefer=0.05)])

@@ -130,5 +130,5 @@ def files(report: MeasureReport, plots: bool = True) -> Iterator[tuple[str, byte
         from cfmkit.experiment.draw import figures
         from cfmkit.plots.style import png
 
-        for stem, draw in figures(report).items():
+        for stem, draw in figures(report.source, report.numbers).items():
             yield f"figures/{stem}.png", png(draw())

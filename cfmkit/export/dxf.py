@@ -19,10 +19,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.errors import OutputError
-from cfmkit.export.arcs import Outline, outlines
-from cfmkit.export.checks import flat_points
 from cfmkit.export.geometry import TOLERANCE
-from cfmkit.export.layers import Look, looks
+from cfmkit.export.layers import LayerLook, looks
+from cfmkit.export.outlines import Outline, flat_points, outlines
 from cfmkit.specs.units import to_border
 
 if TYPE_CHECKING:
@@ -69,7 +68,7 @@ def dxf_bytes(drawn: Sequence[Outline]) -> bytes:
         return _encoded(document)
 
 
-def _add_layer(document: Any, name: str, look: Look) -> None:
+def _add_layer(document: Any, name: str, look: LayerLook) -> None:
     attributes: dict[str, object] = {"color": look.index}
     if look.dashes:
         signed = [length * (-1) ** index for index, length in enumerate(look.dashes)]

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Look:
+class LayerLook:
     """Colour as AutoCAD index and as RGB, and the dashes [mm] of a line that nothing is cut along."""
 
     index: int
@@ -22,14 +22,14 @@ class Look:
 
 
 _LOOKS = {
-    "cut": Look(1, "#ff0000"),
-    "path": Look(150, "#007fff", (6.0, 1.5, 1.0, 1.5)),
-    "reference": Look(8, "#808080"),
+    "cut": LayerLook(1, "#ff0000"),
+    "path": LayerLook(150, "#007fff", (6.0, 1.5, 1.0, 1.5)),
+    "reference": LayerLook(8, "#808080"),
 }
-_OTHERS = (Look(6, "#ff00ff"), Look(4, "#00a0a0"), Look(30, "#ff8000"), Look(3, "#008000"))
+_OTHERS = (LayerLook(6, "#ff00ff"), LayerLook(4, "#00a0a0"), LayerLook(30, "#ff8000"), LayerLook(3, "#008000"))
 
 
-def looks(used: Iterable[str]) -> dict[str, Look]:
+def looks(used: Iterable[str]) -> dict[str, LayerLook]:
     """Return the look of the three usual layers and of every other one in use, in that order."""
     others = [name for name in dict.fromkeys(used) if name not in _LOOKS]
     for name in others:

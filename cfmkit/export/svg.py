@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.export.arcs import Outline, outlines
-from cfmkit.export.checks import flat_points
 from cfmkit.export.geometry import TOLERANCE
-from cfmkit.export.layers import Look, check_name, looks
+from cfmkit.export.layers import LayerLook, check_name, looks
+from cfmkit.export.outlines import Outline, flat_points, outlines
 from cfmkit.specs.units import to_border
 
 if TYPE_CHECKING:
@@ -61,7 +60,7 @@ def svg_bytes(name: str, drawn: Sequence[Outline]) -> bytes:
     return "\n".join(lines).encode()
 
 
-def _group(layer: str, look: Look, members: Sequence[Outline]) -> list[str]:
+def _group(layer: str, look: LayerLook, members: Sequence[Outline]) -> list[str]:
     dashes = f' stroke-dasharray="{" ".join(map(_text, look.dashes))}"' if look.dashes else ""
     style = f'fill="none" stroke="{look.rgb}" stroke-width="{_text(_STROKE)}" stroke-linejoin="round"{dashes}'
     return [f'<g id="{layer}" {style}>', *map(_shape, members), "</g>"] if members else []

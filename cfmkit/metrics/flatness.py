@@ -12,14 +12,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.metrics.many import UNIFORM_POINTS
 from cfmkit.metrics.traces import Trace, Undefined, Window
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.metrics.subjects import Branch, Cycle
-
-UNIFORM_POINTS = 100
-"""Points at which `rms_to_target` is taken, the start excluded: Q of [Bilancia 2019, eq. 8]."""
 
 
 def mean(branch: Branch) -> float:

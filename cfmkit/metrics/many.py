@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.metrics.ends import last_places
-from cfmkit.metrics.flatness import UNIFORM_POINTS
 from cfmkit.metrics.traces import ROUNDING
 
 if TYPE_CHECKING:
@@ -25,6 +24,10 @@ if TYPE_CHECKING:
 
     Exact = Callable[[FloatArray, NDArray[np.intp]], FloatArray]
     Pair = tuple[FloatArray, FloatArray]
+
+
+UNIFORM_POINTS = 100
+"""Points at which `rms_to_target` is taken, the start excluded: Q of [Bilancia 2019, eq. 8]."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,11 +12,13 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from cfmkit.metrics import closed
+from cfmkit.metrics import closed, many
 from cfmkit.metrics.many import ManyBranches
 from cfmkit.metrics.traces import ROUNDING, Trace, Undefined, Window, covers, restrict, traces
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from cfmkit.arrays import FloatArray
     from cfmkit.curves import Curve, Kind
     from cfmkit.results import ClosedForm
@@ -320,7 +322,6 @@ class Cycle:
     @cached_property
     def usable(self) -> tuple[float, float] | None:
         """Start and end of the largest usable interval; None where the mechanism is usable nowhere."""
-        from cfmkit.metrics.ranges import usable_interval
 
         return usable_interval(self)
 
@@ -328,3 +329,76 @@ class Cycle:
 def cycle(curve: Curve, frame: Frame, window: Window | None = None) -> Cycle:
     """Return a curve as metrics see it."""
     return Cycle(tuple(Branch(trace, curve.kind, frame, window) for trace in traces(curve)), frame)
+
+
+Interval = tuple[float, float]
+
+
+def usable_interval(cycle: Cycle) -> Interval | None:
+    """Return the largest interval in which force and stress of every branch keep their limits.
+
+    A place counts only if every state of the path at that place keeps them, so
+    that a branch that folds back needs no sorting.
+    """
+    reference = cycle.frame.target or _mean(cycle)
+    travel = (max(b.extent[0] for b in cycle.branches), min(b.extent[1] for b in cycle.branches))
+    if cycle.closed and len(cycle.frame.valid or (travel,)) == 1:
+        return _solved_interval(cycle, reference, (cycle.frame.valid or (travel,))[0][0])
+    bad = sorted(interval for branch in cycle.branches for interval in _bad(branch, reference))
+    allowed = cycle.frame.valid if cycle.frame.valid is not None else (travel,)
+    gaps = [gap for lo, hi in allowed for gap in _gaps(max(lo, travel[0]), min(hi, travel[1]), bad)]
+    longest = max((high - low for low, high in gaps), default=0.0)
+    # the first of those that are equally long but for rounding
+    return next((gap for gap in gaps if gap[1] - gap[0] >= longest * (1 - 1e-9)), None)
+
+
+def _solved_interval(cycle: Cycle, reference: float, valid: float) -> Interval | None:
+    """Return `usable_interval` of branches that are known at every place, from where the mechanism works on."""
+    start, end = many.usable_interval(cycle.closed, np.array([reference]), cycle.frame.band, np.array([valid]))
+    return None if np.isnan(start[0]) else (float(start[0]), float(end[0]))
+
+
+def _mean(cycle: Cycle) -> float:
+    """Return the mean of the branches' means, each over its points in the window, or the window where it is solved."""
+    value = sum(branch.level for branch in cycle.branches) / len(cycle.branches)
+    if value == 0:
+        raise Undefined("there is no target, and the mean is zero")
+    return value
+
+
+def _gaps(lo: float, hi: float, bad: Iterable[Interval]) -> Iterable[Interval]:
+    """Yield what the sorted bad intervals leave of [lo, hi]."""
+    for start, end in bad:
+        if start > lo and min(start, hi) > lo:
+            yield lo, min(start, hi)
+        lo = max(lo, end)
+    if hi > lo:
+        yield lo, hi
+
+
+def _bad(branch: Branch, reference: float) -> list[Interval]:
+    """Return the intervals of the motion in which a branch breaks a limit."""
+    frame, trace = branch.frame, branch.trace
+    ratio = trace.effort / reference - 1
+    band = frame.band * (1 + ROUNDING)
+    # two one-sided limits: the absolute value has a kink that linear interpolation would miss
+    broken = _excess(trace, ratio - band) + _excess(trace, -band - ratio)
+    for one in (trace, *branch.beside):
+        if frame.allowable_stress is not None and one.stress is not None:
+            broken += _excess(one, one.stress - frame.allowable_stress * (1 + ROUNDING))
+    return broken
+
+
+def _excess(trace: Trace, height: FloatArray) -> list[Interval]:
+    """Return the intervals of the motion over which a piecewise linear height is positive, or no number."""
+    bad = ~(height <= 0)
+    if not bad.any():
+        return []
+    motion, edges = trace.motion, (bad[1:] != bad[:-1]).nonzero()[0]
+    places = motion[edges] - height[edges] * (motion[edges + 1] - motion[edges]) / (height[edges + 1] - height[edges])
+    places = np.where(np.isfinite(places), places, motion[edges + bad[edges]])
+    ends = np.concatenate((motion[: int(bad[0])], places, motion[len(motion) - int(bad[-1]) :])).reshape(-1, 2).tolist()
+    if not trace.way:  # between its ends, a run of bad points may reach farther than they do
+        runs = np.split(motion, edges + 1)[int(not bad[0]) :: 2]
+        ends = [[*pair, float(run.min()), float(run.max())] for pair, run in zip(ends, runs, strict=True)]
+    return [(min(pair), max(pair)) for pair in ends]
