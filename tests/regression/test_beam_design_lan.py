@@ -8,12 +8,12 @@ import pytest
 import cfmkit
 import cfmkit.metrics
 from cfmkit.families.base import Run
+from cfmkit.families.beam.findings import percent
 from cfmkit.families.beam.shaping.audit import Spread, audited, tolerated
 from cfmkit.families.beam.shaping.design import task_of
 from cfmkit.families.beam.shaping.infeasible import missed_by
 from cfmkit.families.beam.shaping.search import Found
 from cfmkit.families.beam.shaping.variables import Variables
-from cfmkit.families.beam.words import percent
 from cfmkit.results import Status
 from cfmkit.studies.pool import Pool
 

@@ -7,8 +7,7 @@ import pytest
 from beam_support import CANTILEVER, MM, cantilever, config
 
 import cfmkit
-from cfmkit.families.beam.draw import figures
-from cfmkit.families.beam.posed import bent, rigid_parts
+from cfmkit.families.beam.draw import bent, figures, rigid_parts
 
 ARMED = CANTILEVER.replace(
     "  beams:",

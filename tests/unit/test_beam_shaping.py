@@ -13,6 +13,7 @@ from cfmkit import analyze, dumps, evaluate, load, loads
 from cfmkit.elastica import Polynomial, trace
 from cfmkit.elastica.model.beam import fit
 from cfmkit.families.base import Run
+from cfmkit.families.beam.findings import percent
 from cfmkit.families.beam.shaping.audit import Spread, audited, half_band, lines_cross, strict_share, tolerated
 from cfmkit.families.beam.shaping.closer import looked_at
 from cfmkit.families.beam.shaping.design import shaped, task_of
@@ -26,7 +27,6 @@ from cfmkit.families.beam.shaping.search import Found, Plan, confirmed, improved
 from cfmkit.families.beam.shaping.starts import candidates, sound
 from cfmkit.families.beam.shaping.task import MARGIN, Limits, Task
 from cfmkit.families.beam.shaping.variables import Variables
-from cfmkit.families.beam.words import percent
 from cfmkit.results import Status
 
 TABLE_3 = np.array([0.0, 30.5, 18.77, 12.44, 24.0, 1.3092, -1.5707, -0.7560, 1.5707, 0.3013, 1.5707, 0.226, -1.148])

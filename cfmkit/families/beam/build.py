@@ -1,31 +1,41 @@
-"""From a specification to the network, the drive and the controls of the beam engine."""
+"""From a specification to the network, the drive and the controls of the beam engine.
+
+The closure "chain": beams keep their shapes and lengths, and the nodes go where the beams end. From the nodes that are
+held in place, each beam in the given order whose one end is placed carries its other end with it; a beam between two
+nodes that are placed already is turned and scaled. A guided node is carried like a free one: its guide goes with it, as
+in the reference values of Table 3.
+
+Stages in series: each stands, with its supports, on the moving part of the one before [Lan, Fig. 15]. They carry the
+same force and add their displacements. All of them are in the network, so that a stack in which one stage snaps ahead
+of the others is found like any other bifurcation.
+
+Reference
+---------
+[Lan] C.-C. Lan, J.-H. Wang, Y.-H. Chen, A compliant constant-force mechanism (2010).
+"""
 
 from __future__ import annotations
 
+import cmath
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, assert_never
 
 import numpy as np
 
 from cfmkit import elastica as engine
+from cfmkit.elastica.model.beam import fit
+from cfmkit.elastica.model.network import FREE, Link, Network, Node
 from cfmkit.elastica.vibration.masses import Masses
-from cfmkit.families.beam.chain import chained
-from cfmkit.families.beam.layers import stacked
-from cfmkit.families.beam.parts.faults import HELD
+from cfmkit.families.beam.parts.spec import HELD
 
 if TYPE_CHECKING:
+    from cfmkit.elastica.model.beam import Beam
     from cfmkit.elastica.model.network import LoadOn, Spring
     from cfmkit.elastica.model.shapes import Shape
-    from cfmkit.families.beam.parts.spec import (
-        LoadSpec,
-        MemberSpec,
-        NodeSpec,
-        ShapeSpec,
-        SpringSpec,
-        Thickness,
-    )
+    from cfmkit.families.beam.parts.spec import LoadSpec, MemberSpec, NodeSpec, ShapeSpec, SpringSpec, Thickness
     from cfmkit.families.beam.spec import BeamSpec
+
 
 _LARGEST_TURN = 0.35  # of a rotation in one step [rad]
 _SMOOTH = 0.07  # the same where every step is a point of the curve
@@ -258,3 +268,87 @@ def resolve(spec: BeamSpec) -> BeamSpec:
     switches = {"axial": fidelity != "inextensible", "shear": fidelity in ("reissner", "solid")}
     analysis = spec.analysis.model_copy(update={"fidelity": fidelity, "stress": spec.stress})
     return spec.model_copy(update={"mechanism": spec.mechanism.model_copy(update=switches), "analysis": analysis})
+
+
+def chained(network: Network) -> Network:
+    """Return the network with its free nodes moved to where the beams end."""
+    placed = {
+        name: complex(node.x, node.y)
+        for name, node in network.nodes.items()
+        if node.support.along and node.support.across
+    }
+    waiting = dict(network.beams)
+    while ready := [name for name, beam in waiting.items() if beam.start in placed or beam.end in placed]:
+        beam = waiting.pop(ready[0])
+        chord = _own_chord(network, beam)
+        if beam.end not in placed:
+            placed[beam.end] = placed[beam.start] + complex(*beam.start_offset) + chord - complex(*beam.end_offset)
+        elif beam.start not in placed:
+            placed[beam.start] = placed[beam.end] + complex(*beam.end_offset) - chord - complex(*beam.start_offset)
+    nodes = {
+        name: replace(node, x=placed[name].real, y=placed[name].imag) if name in placed else node
+        for name, node in network.nodes.items()
+    }
+    return Network(nodes, network.beams, network.links, network.springs, network.loads)
+
+
+def _own_chord(network: Network, beam: Beam) -> complex:
+    """Return the vector between the ends of a beam as its shape is given [m]; as fitted where it has no own length."""
+    start, end = network.nodes[beam.start], network.nodes[beam.end]
+    reach = complex(end.x - start.x, end.y - start.y) + complex(*beam.end_offset) - complex(*beam.start_offset)
+    if getattr(beam.shape, "length", None) is None:
+        return reach
+    found = fit(beam, (reach.real, reach.imag))
+    return reach * cmath.exp(-1j * float(np.real(found.rotation))) / float(np.real(found.scale))
+
+
+_ROOM = 1.15  # of the pitch that is chosen, for what joins the stages
+
+
+def stacked(network: Network, driven: str, count: int, pitch: float | None = None) -> tuple[Network, str]:
+    """Return `count` equal stages in series, and the moving part of the last.
+
+    Parameters
+    ----------
+    network : Network
+        One stage, of beams and links; all supports but that of `driven` are clamped.
+    driven : str
+        Its moving part.
+    count : int
+        Number of stages; those after the first have names with ``.2``, ``.3``, ...
+    pitch : float, optional
+        Distance of the stages along the way of the moving part [m].
+    """
+    nodes, beams, links = dict(network.nodes), dict(network.beams), list(network.links)
+    dx, dy = _step(network, driven, pitch)
+    for stage in range(2, count + 1):
+        below = _named(driven, stage - 1)
+        for name, node in network.nodes.items():
+            clamped = node.support.along and name != driven
+            moved = Node(node.x + (stage - 1) * dx, node.y + (stage - 1) * dy, FREE if clamped else node.support)
+            nodes[_named(name, stage)] = moved
+            if clamped:
+                links.append(Link(below, _named(name, stage)))
+        for name, beam in network.beams.items():
+            beams[_named(name, stage)] = _moved_beam(beam, stage)
+        links += [Link(_named(link.master, stage), _named(link.node, stage)) for link in network.links]
+    return Network(nodes, beams, tuple(links)), _named(driven, count)
+
+
+def _named(name: str, stage: int) -> str:
+    return name if stage == 1 else f"{name}.{stage}"
+
+
+def _moved_beam(beam: Beam, stage: int) -> Beam:
+    return replace(beam, start=_named(beam.start, stage), end=_named(beam.end, stage))
+
+
+def _step(network: Network, driven: str, pitch: float | None) -> tuple[float, float]:
+    """Return the vector from one stage to the next: along the way of the moving part, away from the supports."""
+    top = network.nodes[driven]
+    c, s = math.cos(top.support.direction), math.sin(top.support.direction)
+    grounds = [node for name, node in network.nodes.items() if node.support.along and name != driven]
+    ahead = [(top.x - node.x) * c + (top.y - node.y) * s for node in grounds]
+    mean = sum(ahead) / len(ahead) if ahead else 0.0
+    size = math.copysign(_ROOM * max(map(abs, ahead), default=0.0) if pitch is None else pitch, mean)
+    return size * c, size * s

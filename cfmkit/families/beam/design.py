@@ -1,14 +1,37 @@
-"""From what is wanted to a specification: one way for each key of the block `design`."""
+"""From what is wanted to a specification: one way for each key of the block `design`.
+
+`optimise` searches positions and shapes (`shaping`). `rescale` keeps the form of the force curve for another force,
+size, section or material [Lan, eq. 6 and sec. 2.3]: F L^2 / EI is the same for all mechanisms of one shape whose beams
+bend without stretching, at the same displacement per size. Stretching breaks that: its share goes with
+(thickness / size)^2. The value that is free is therefore found by Eq. 6 and corrected with the model of the
+specification until the force is the one wanted.
+
+Reference
+---------
+[Lan] C.-C. Lan, J.-H. Wang, Y.-H. Chen, A compliant constant-force mechanism (2010), eq. 6 and sec. 2.3.
+"""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import math
+from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from cfmkit.families.beam.build import thickest
+from cfmkit.families.beam.findings import finding
+from cfmkit.families.beam.model import solve
+from cfmkit.families.beam.values import ranges, window_of
+from cfmkit.numerics.cubic import value_at
 from cfmkit.results import Design, Status
+from cfmkit.specs.units import Place, Share, format_short
 
 if TYPE_CHECKING:
     from cfmkit.families.base import Run
-    from cfmkit.families.beam.spec import BeamSpec
+    from cfmkit.families.beam.mechanism.spec import Mechanism
+    from cfmkit.families.beam.parts.spec import Thickness
+    from cfmkit.families.beam.spec import BeamSpec, Rescale
+    from cfmkit.results import Finding
 
 
 def design(spec: BeamSpec, run: Run) -> Design:
@@ -22,11 +45,249 @@ def design(spec: BeamSpec, run: Run) -> Design:
         Seed, progress and time budget.
     """
     if spec.design is not None and spec.design.rescale is not None:
-        from cfmkit.families.beam.rescale import rescaled
-
         return rescaled(spec, spec.design.rescale)
     if spec.design is not None and spec.design.optimise is not None:
         from cfmkit.families.beam.shaping.design import shaped
 
         return shaped(spec, spec.design.optimise, run)
     return Design(None, Status.INVALID, "this spec has no 'design' block: add 'rescale' or 'optimise'")
+
+
+EXPONENTS = {"width": 1.0, "thickness": 3.0, "size": -2.0}
+"""How the force goes with what may be free, by Eq. 6."""
+
+CLOSE = 1e-9
+ROUNDS = 12
+STEP = 1e-5
+"""Travel that follows from the stress is rounded down to whole hundredths of a millimetre [m]."""
+
+
+def rescaled(spec: BeamSpec, wanted: Rescale) -> Design:
+    """Return the specification with the changes made and the force wanted reached, or why it cannot be.
+
+    Parameters
+    ----------
+    spec : BeamSpec
+        Driven by a displacement, without springs and loads.
+    wanted : Rescale
+        What is to change.
+    """
+    changed = changed_spec(spec, wanted)
+    found = _validity(spec, wanted)
+    for _ in range(ROUNDS):
+        before = changed
+        if wanted.to_allowable_stress:
+            changed = _to_allowable_stress(changed)
+        force = _force(changed)
+        if force is None:
+            return Design(
+                None,
+                Status.NO_EQUILIBRIUM,
+                "the mechanism has no force at the end of its window (analysis.window) to scale",
+            )
+        if wanted.force is None:
+            break
+        again, reached = _corrected(changed, wanted, force)
+        if reached is None:
+            return Design(
+                None,
+                Status.INFEASIBLE,
+                f"no mechanism.{wanted.free} gives design.rescale.force = {format_short(wanted.force, 'force')}",
+            )
+        changed = again
+        if changed == before or not wanted.to_allowable_stress:
+            break
+    return Design(changed, Status.COMPLETE, _told(spec, changed), warnings=(*found, *_stress(changed)))
+
+
+def _force(spec: BeamSpec) -> float | None:
+    """Return the force at the end of the window [N]."""
+    solution = solve(spec)
+    x, end = solution.motion, window_of(solution)[1]
+    if len(x) < 2 or not (np.diff(x) > 0).all() or not x[0] <= end <= x[-1] * (1 + 1e-12):
+        return None
+    force = value_at(x, solution.effort, end)
+    return force if np.isfinite(force) and force != 0 else None
+
+
+def _corrected(spec: BeamSpec, wanted: Rescale, force: float) -> tuple[BeamSpec, float | None]:
+    """Return the specification whose free value gives the force wanted, and that force."""
+    target = math.copysign(wanted.force or 0.0, force)
+    for _ in range(ROUNDS):
+        if abs(force / target - 1) <= CLOSE:
+            return spec, force
+        if not force / target > 0:
+            break
+        spec = _scaled(spec, wanted.free, (target / force) ** (1 / EXPONENTS[wanted.free]))
+        again = _force(spec)
+        if again is None:
+            break
+        force = again
+    return spec, None
+
+
+def changed_spec(spec: BeamSpec, wanted: Rescale) -> BeamSpec:
+    """Return the specification with size, material, thickness and width as wanted."""
+    mechanism = spec.mechanism
+    if wanted.material is not None:
+        beams = {name: beam.model_copy(update={"material": None}) for name, beam in mechanism.beams.items()}
+        mechanism = mechanism.model_copy(update={"material": wanted.material, "beams": beams})
+    spec = spec.model_copy(update={"mechanism": mechanism})
+    present = {"size": size_of(mechanism), "thickness": thickest(mechanism.thickness), "width": mechanism.width}
+    for name, value in present.items():
+        asked = getattr(wanted, name)
+        if asked is not None and abs(asked / value - 1) > CLOSE:
+            spec = _scaled(spec, name, asked / value)
+    return spec
+
+
+def size_of(mechanism: Mechanism) -> float:
+    """Return L_x, the distance of the outermost nodes along x; along y where they have one x [m]."""
+    for axis in (0, 1):
+        places = [node.at[axis] for node in mechanism.nodes.values()]
+        if (size := max(places) - min(places)) > 0:
+            return size
+    raise ValueError("all nodes are at one place")
+
+
+def _scaled(spec: BeamSpec, name: str, factor: float) -> BeamSpec:
+    """Return the specification with its width, thickness or size times a factor."""
+    if name == "size":
+        return _resized(spec, factor)
+    mechanism = spec.mechanism
+    beams = {
+        key: beam.model_copy(update={name: _times(getattr(beam, name), factor)}) if getattr(beam, name) else beam
+        for key, beam in mechanism.beams.items()
+    }
+    update = {name: _times(getattr(mechanism, name), factor), "beams": beams}
+    return spec.model_copy(update={"mechanism": mechanism.model_copy(update=update)})
+
+
+def _times(thickness: Thickness, factor: float) -> Thickness:
+    if isinstance(thickness, tuple):
+        return tuple((place, value * factor) for place, value in thickness)
+    return thickness * factor
+
+
+def _resized(spec: BeamSpec, factor: float) -> BeamSpec:
+    """Return the specification with all lengths in the plane times a factor, those of the analysis included."""
+    mechanism, analysis = spec.mechanism, spec.analysis
+    nodes = {name: node.model_copy(update={"at": _point(node.at, factor)}) for name, node in mechanism.nodes.items()}
+    beams = {name: _lengths(beam, ("start_offset", "end_offset"), factor) for name, beam in mechanism.beams.items()}
+    beams = {
+        name: beam.model_copy(update={"shape": _lengths(beam.shape, ("length", "rise"), factor)})
+        for name, beam in beams.items()
+    }
+    copies = mechanism.copies and _lengths(mechanism.copies, ("mirror", "layer_pitch"), factor)
+    update = {"nodes": nodes, "beams": beams, "copies": copies}
+    return spec.model_copy(
+        update={
+            "mechanism": mechanism.model_copy(update=update),
+            "analysis": _lengths(analysis, ("travel", "window", "reference"), factor),
+            "requirements": tuple(_lengths(one, ("over",), factor) for one in spec.requirements),
+        }
+    )
+
+
+def _lengths(block: Any, names: tuple[str, ...], factor: float) -> Any:
+    """Return a block with the lengths and points of some names times a factor, where it has them."""
+    present = {name: getattr(block, name, None) for name in names}
+    update = {name: _point(value, factor) for name, value in present.items() if value is not None}
+    return block.model_copy(update=update) if update else block
+
+
+def _point(value: Any, factor: float) -> Any:
+    if isinstance(value, tuple):
+        return tuple(_point(one, factor) for one in value)
+    if isinstance(value, Share):  # of the travel, which is scaled itself
+        return value
+    return Place(value * factor, value.dimension) if isinstance(value, Place) else value * factor
+
+
+def _to_allowable_stress(spec: BeamSpec) -> BeamSpec:
+    """Return the specification with travel and window up to where the stress reaches the allowable one."""
+    place = ranges(solve(spec))["stress_limit_displacement"]
+    for _ in range(ROUNDS):
+        if place is not None:
+            break
+        travel = Place(1.25 * float(spec.analysis.travel or 0.0))
+        spec = spec.model_copy(update={"analysis": spec.analysis.model_copy(update={"travel": travel})})
+        place = ranges(solve(spec))["stress_limit_displacement"]
+    if place is None:
+        return spec
+    end = _down(place)
+    ended = _windowed(spec, 0.0, end)
+    start = ranges(solve(ended))["range_start"]
+    return ended if start is None else _windowed(ended, -_down(-start), end)
+
+
+def _down(value: float) -> float:
+    """Return a length rounded down to a hundredth of a millimetre, as a short decimal."""
+    return round(math.floor(value / STEP + 1e-6) * STEP, 9)
+
+
+def _windowed(spec: BeamSpec, start: float, end: float) -> BeamSpec:
+    update = {"travel": Place(end), "window": (Place(start), Place(end))}
+    return spec.model_copy(update={"analysis": spec.analysis.model_copy(update=update)})
+
+
+def _validity(spec: BeamSpec, wanted: Rescale) -> list[Finding]:
+    """Say how far Eq. 6 alone is off where beams stretch: at the end of the window as given, times the size."""
+    if spec.fidelity == "inextensible" or (force := _force(spec)) is None:
+        return []
+    changed = changed_spec(spec, wanted)
+    predicted = force * _force_ratio(spec.mechanism, changed.mechanism)
+    if wanted.force is not None:
+        target = math.copysign(wanted.force, predicted)
+        changed = _scaled(changed, wanted.free, (target / predicted) ** (1 / EXPONENTS[wanted.free]))
+        predicted = target
+    reached = _force(changed)
+    if reached is not None and abs(reached / predicted - 1) <= CLOSE:
+        return []
+    told = (
+        "" if reached is None else f": by it alone the force would be off by {100 * (reached / predicted - 1):+.2g} %"
+    )
+    corrected = "; corrected" if wanted.force is not None else ""
+    return [finding("rescale_approximate", f"Eq. 6 is exact only for beams that do not stretch{told}{corrected}")]
+
+
+def _force_ratio(old: Mechanism, new: Mechanism) -> float:
+    """Return the force of one mechanism over that of another by Eq. 6: E b h^3 / L_x^2."""
+    moduli = [one.material.modulus for one in (new, old)]
+    widths = (new.width / old.width) ** EXPONENTS["width"]
+    thicknesses = (thickest(new.thickness) / thickest(old.thickness)) ** EXPONENTS["thickness"]
+    return float(moduli[0] / moduli[1] * widths * thicknesses * (size_of(new) / size_of(old)) ** EXPONENTS["size"])
+
+
+def _stress(spec: BeamSpec) -> list[Finding]:
+    """Say where the travel is longer than the stress allows after the change."""
+    solution = solve(spec)
+    values, allowable = ranges(solution), solution.assembly.allowable_stress
+    stress, place = values["stress_at_end"], values["stress_limit_displacement"]
+    if stress is None or allowable is None or place is None or stress <= allowable:
+        return []
+    return [
+        finding(
+            "rescale_stress",
+            f"the stress at the end of the window is {format_short(stress, 'stress')}, allowable are "
+            f"{format_short(allowable, 'stress')}: they are reached at {format_short(place, 'length')}",
+            "design.rescale.to_allowable_stress=true",
+        )
+    ]
+
+
+def _told(old: BeamSpec, new: BeamSpec) -> str:
+    """Return what was changed, in one sentence."""
+    changes = []
+    pairs = {
+        "size": (size_of(old.mechanism), size_of(new.mechanism)),
+        "thickness": (thickest(old.mechanism.thickness), thickest(new.mechanism.thickness)),
+        "width": (old.mechanism.width, new.mechanism.width),
+    }
+    for name, (before, after) in pairs.items():
+        if abs(after / before - 1) > CLOSE:
+            changes.append(f"{name} {format_short(before, 'length')} -> {format_short(after, 'length')}")
+    before, after = (one.mechanism.material.modulus for one in (old, new))
+    if before != after:
+        changes.append(f"E {format_short(before, 'stress')} -> {format_short(after, 'stress')}")
+    return "rescaled: " + ", ".join(changes) if changes else "nothing to change"

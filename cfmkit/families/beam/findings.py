@@ -1,11 +1,30 @@
-"""Everything a beam mechanism can suffer from, by name.
+"""What a beam mechanism can suffer from, by name, and the checks that find it and put it into numbers.
 
-The names are stable; the sentences say what the name means. The message that a run reports carries the numbers.
+The names are stable; the sentences say what the name means. The message that a run reports carries the numbers. What
+the engine says is repeated with places of the drive and lengths as a user reads them: the engine knows SI numbers only.
 """
 
 from __future__ import annotations
 
+import re
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.elastica import PathStatus
+from cfmkit.families.beam.build import thickest_of, thinnest_of
+from cfmkit.families.beam.values import window_of, within
 from cfmkit.families.findings import finder
+from cfmkit.specs.units import format_short
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from cfmkit.families.beam.build import Assembly
+    from cfmkit.families.beam.solution import Solution
+    from cfmkit.results import Finding
+
 
 FINDINGS = {
     "closure_adjusted": "beams were turned and scaled to fit between rounded nodes, or nodes moved to the beams' ends",
@@ -39,3 +58,297 @@ FINDINGS = {
 
 finding = finder(FINDINGS)
 """Return a finding of this family; the name must be one that `FINDINGS` explains."""
+
+_NUMBER = r"(-?\d[\d.]*(?:e[+-]?\d+)?)"
+_PLACE = re.compile(rf"\b(at|near) {_NUMBER}(?![\d.e]| of )")  # not a share: "lost at 0.4 of the constant loads"
+_LENGTH = re.compile(rf"{_NUMBER} m\b")
+_DIMENSIONS = {"displacement": "length", "rotation": "angle", "force": "force", "moment": "torque"}
+
+
+def percent(share: float) -> str:
+    """Return a share as a reader wants it, to three digits.
+
+    Examples
+    --------
+    >>> percent(0.025512)
+    '2.55 %'
+    """
+    return format_short(share, "ratio", 3)
+
+
+def drive_text(assembly: Assembly, value: float) -> str:
+    """Return a value of the drive [SI, of one copy] as the user reads it, of all copies together."""
+    kind = assembly.spec.mechanism.drive.kind
+    if kind == "loads":
+        return f"{value:.5g} times the loads"
+    unit = assembly.parallel if kind in ("force", "moment") else 1
+    return format_short(unit * value, _DIMENSIONS[kind])
+
+
+def in_units(assembly: Assembly, text: str) -> str:
+    """Return a sentence of the engine with units."""
+    text = _LENGTH.sub(lambda found: format_short(float(found[1]), "length"), text)
+    return _PLACE.sub(lambda found: f"{found[1]} {drive_text(assembly, float(found[2]))}", text)
+
+
+STRETCH = "analysis.fidelity=extensible"
+
+_STRAIGHT = 0.995  # of the length of a taut beam lies between its ends
+_TIGHT = 50.0  # N L^2 / EI: it is pulled so hard that only its ends are bent
+
+
+@dataclass(frozen=True)
+class PathEnding:
+    """One sentence, and what would change it, as ``--set`` takes it."""
+
+    message: str
+    cures: tuple[str, ...] = ()
+
+
+def ending_of(solution: Solution) -> PathEnding:
+    """Return why a path ended; a path that is complete has nothing to say."""
+    path = solution.path
+    said = in_units(solution.assembly, path.message or path.status.value)
+    rigid = solution.spec.fidelity == "inextensible"
+    if len(solution.keep) < 2:
+        return PathEnding(f"{said}: {_in_the_way(solution)}", (STRETCH,) if rigid else ())
+    taut = list(_taut(solution)) if rigid and path.status in (PathStatus.LIMIT_POINT, PathStatus.LOST) else []
+    if not taut:
+        return PathEnding(said)
+    where = format_short(float(solution.motion[-1]), solution.motion_dimension)
+    return PathEnding(
+        f"the beams are taut at {where} ({', '.join(taut)}), and beams that do not stretch go no further: allow "
+        "stretching (mechanism.axial)",
+        (STRETCH,),
+    )
+
+
+def _taut(solution: Solution) -> Iterator[str]:
+    """Yield the beams that are pulled straight at the last point, each with its length and the way between its ends."""
+    path, last = solution.path, int(solution.keep[-1])
+    for name, beam in path.layout.network.beams.items():
+        line = path.shape(name, last)
+        chord = line[-1] - line[0]
+        way, length = float(np.hypot(*chord)), float(np.real(path.fits[name].length))
+        if way < _STRAIGHT * length:
+            continue
+        pull = float(path.end_force(name, 1)[last, :2] @ chord) / way
+        stiffness = float(np.real(beam.section.rigidities(np.array([0.5]), 0.5)[0][0]))
+        if pull * length**2 > _TIGHT * stiffness:
+            yield f"{name}: {format_short(way, 'length')} of {format_short(length, 'length')}"
+
+
+def _in_the_way(solution: Solution) -> str:
+    """Return the keys that may keep a mechanism from having a first pose."""
+    spec = solution.spec
+    mechanism = spec.mechanism
+    moved = [f"mechanism.nodes.{name}.moved" for name, node in mechanism.nodes.items() if node.moved is not None]
+    acting = [f"mechanism.{what}" for what in ("loads", "springs") if getattr(mechanism, what)]
+    keys = [*moved, *acting] or ["mechanism.drive", *(f"mechanism.nodes.{name}.support" for name in mechanism.nodes)]
+    said = f"look at {', '.join(keys)}"
+    if spec.fidelity != "inextensible":
+        return said
+    return f"{said}; beams do not stretch: mechanism.axial allows it"
+
+
+NEGLIGIBLE = 1e-9
+THICK = 10.0
+
+
+def findings_of(solution: Solution) -> tuple[Finding, ...]:
+    """Return everything that is wrong with a solved mechanism, or that the user must know about it."""
+    return tuple(
+        one
+        for source in (
+            _ending, _closure, _events, _stability, _accuracy, _imperfection, _stress, _slenderness, _gaps,
+        )
+        for one in source(solution)
+    )  # fmt: skip
+
+
+def _ending(solution: Solution) -> Iterator[Finding]:
+    path = solution.path
+    if path.status not in (PathStatus.COMPLETE, PathStatus.INACCURATE):
+        why = ending_of(solution)
+        yield finding("ends_early", why.message, *why.cures)
+
+
+def _closure(solution: Solution) -> Iterator[Finding]:
+    """Say how each beam was fitted, or what it costs to force it."""
+    if moved := _moved(solution):
+        yield finding("closure_adjusted", f"nodes were moved to where the beams end: {', '.join(moved)}")
+        nodes = solution.spec.mechanism.nodes
+        guided = [one.split(" ")[0] for one in moved if nodes[one.split(" ")[0]].support in ("guided", "roller")]
+        if guided:
+            yield finding(
+                "closure_adjusted", f"the guides of nodes that were carried along went with them: {', '.join(guided)}"
+            )
+    beams = solution.path.layout.network.beams
+    fits = {
+        name: one
+        for name, one in solution.path.fits.items()
+        if name in solution.spec.mechanism.beams
+        and getattr(beams[name].shape, "length", None)
+        and one.gap > NEGLIGIBLE * float(np.real(one.length))
+    }
+    if not fits:
+        return
+    if solution.spec.mechanism.closure == "raw":
+        if not len(solution.keep):
+            return
+        gaps = ", ".join(f"{name} by {format_short(one.gap, 'length')}" for name, one in fits.items())
+        yield finding(
+            "closure_prestress",
+            f"beams miss their nodes ({gaps}) and are forced into place: at rest the drive carries "
+            f"{format_short(float(solution.effort[0]), _effort(solution))} and the stress is "
+            f"{format_short(float(solution.stress[0]), 'stress')}; closure 'rotscale' has none of this",
+            "mechanism.closure=rotscale",
+        )
+        return
+    told = ", ".join(
+        f"{name} {format_short(float(np.real(one.rotation)), 'angle')} and x {float(np.real(one.scale)):.5f} "
+        f"(it missed by {format_short(one.gap, 'length')})"
+        for name, one in fits.items()
+    )
+    yield finding("closure_adjusted", f"beams were turned and scaled to fit between their nodes: {told}")
+
+
+def _moved(solution: Solution) -> list[str]:
+    """Return the nodes that the closure "chain" moved, each with how far."""
+    if solution.spec.mechanism.closure != "chain":
+        return []
+    layout, found = solution.path.layout, []
+    for name, node in solution.spec.mechanism.nodes.items():
+        way = float(np.hypot(*(np.real(np.array(layout.position(name))) - node.at)))
+        if way > NEGLIGIBLE * layout.scales.length:
+            found.append(f"{name} by {format_short(way, 'length')}")
+    return found
+
+
+def _effort(solution: Solution) -> str:
+    return "torque" if solution.spec.mechanism.drive.kind in ("rotation", "moment") else "force"
+
+
+def _events(solution: Solution) -> Iterator[Finding]:
+    path = solution.path
+    for kind, name in (("limit point", "limit_point"), ("bifurcation", "bifurcation")):
+        places = [drive_text(solution.assembly, event.drive) for event in path.events if event.kind == kind]
+        if places:
+            more = f" and {len(places) - 6} more" if len(places) > 6 else ""
+            tail = _after(solution) if kind == "bifurcation" else ""
+            yield finding(name, f"{kind}{'s' if len(places) > 1 else ''} at {', '.join(places[:6])}{more}{tail}")
+    for what in ("prestress", "constant loads"):
+        shares = [percent(event.drive) for event in path.events if event.kind == f"bifurcation under {what}"]
+        if shares:
+            tail = "; nothing stable was found beyond" if not path.stable[:1].all() else _after(solution)
+            yield finding("bifurcation", f"bifurcation under {', '.join(shares)} of the {what}{tail}")
+
+
+def _after(solution: Solution) -> str:
+    """Say where the curve goes at a bifurcation."""
+    if (solution.path.branch[solution.keep] == "primary").all():
+        return "; the curve stays on the path it came on"
+    side = "analysis.other_side=" + ("false" if solution.spec.analysis.other_side else "true")
+    return f"; from there the curve follows the stable branch (its mirror image: --set {side})"
+
+
+def _stability(solution: Solution) -> Iterator[Finding]:
+    bad = ~solution.path.stable[solution.keep]
+    if bad.any():
+        x = solution.motion[bad]
+        dimension = "angle" if _effort(solution) == "torque" else "length"
+        yield finding(
+            "unstable",
+            f"{int(bad.sum())} of {len(bad)} points are not stable while the drive is held, from "
+            f"{format_short(float(x.min()), dimension)} to {format_short(float(x.max()), dimension)}",
+        )
+    if not solution.follows or not len(solution.keep):
+        return
+    if solution.frequencies is None:
+        yield finding(
+            "flutter_not_judged",
+            "forces turn with their node: what is called stable does not diverge; flutter depends on masses: give "
+            "every material a density",
+        )
+    elif solution.frequencies.flutters.any():
+        first = int(solution.keep[int(solution.frequencies.flutters.argmax())])
+        yield finding(
+            "flutter",
+            f"two natural frequencies have met at {drive_text(solution.assembly, float(solution.path.drive[first]))}: "
+            "under forces that turn with their node it swings ever wider",
+        )
+
+
+def _accuracy(solution: Solution) -> Iterator[Finding]:
+    bad = int((~solution.accurate).sum())
+    if bad:
+        yield finding(
+            "inaccurate",
+            f"{bad} of {len(solution.accurate)} points miss the tolerance of {solution.spec.analysis.tolerance:g} and "
+            f"have no force (estimated error {solution.path.error:.2g})",
+        )
+
+
+def _imperfection(solution: Solution) -> Iterator[Finding]:
+    told = in_units(solution.assembly, solution.path.imperfection)
+    if told.startswith("none: "):
+        yield finding("imperfection", f"the beams were not bent: {told.removeprefix('none: ')}")
+    elif told:
+        yield finding("imperfection", f"the beams were bent by {told}")
+
+
+def _stress(solution: Solution) -> Iterator[Finding]:
+    allowable = solution.assembly.allowable_stress
+    if allowable is None or len(solution.keep) < 2:
+        return
+    inside = within(solution, *window_of(solution))
+    if not inside.any() or (worst := float(solution.stress[inside].max())) <= allowable:
+        return
+    index = int(np.flatnonzero(inside)[solution.stress[inside].argmax()])
+    beam, place = solution.stress_at[0][index], solution.stress_at[1][index]
+    yield finding(
+        "overstressed",
+        f"the largest stress in the window is {format_short(worst, 'stress')}, at {place:.3f} of beam "
+        f"{beam}; allowable are {format_short(allowable, 'stress')}",
+    )
+
+
+def _slenderness(solution: Solution) -> Iterator[Finding]:
+    beams, fits = solution.path.layout.network.beams, solution.path.fits
+    for name, beam in beams.items():
+        thickest = thickest_of(beam.section)
+        length = float(np.real(fits[name].length))
+        if length < THICK * thickest:
+            yield finding(
+                "thick_beam",
+                f"beam {name} is {format_short(length, 'length')} long and {format_short(thickest, 'length')} thick: "
+                f"below {THICK:g} times the thickness beam theory is rough",
+            )
+
+
+def _gaps(solution: Solution) -> Iterator[Finding]:
+    """Say where beams touch, and what cannot be cut."""
+    if len(solution.keep) < 2:
+        return
+    still, moving = solution.gaps
+    part = solution.spec.mechanism.part
+    if moving is not None and moving.size <= 0:
+        when = "before any load" if still is not None and still.size <= 0 else "on the way"
+        yield finding("beams_touch", f"beams {moving.one} and {moving.other} touch {when}: contact is not modelled")
+    if part is None:
+        return
+    least = max(part.min_gap, 2 * part.fillet)
+    if still is not None and still.size < least:
+        yield finding(
+            "gap_small",
+            f"the gap between beams {still.one} and {still.other} is {format_short(still.size, 'length')}: smaller "
+            f"than can be cut ({format_short(least, 'length')})",
+        )
+    for name, beam in solution.path.layout.network.beams.items():
+        thinnest = thinnest_of(beam.section)
+        if thinnest < part.min_feature:
+            yield finding(
+                "feature_small",
+                f"beam {name} is {format_short(thinnest, 'length')} thick: less than can be made "
+                f"({format_short(part.min_feature, 'length')})",
+            )

@@ -11,8 +11,6 @@ operations (2010), sec. 2.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,166 +20,21 @@ from cfmkit.curves import Column, Curve
 from cfmkit.elastica import Path, PathStatus, trace
 from cfmkit.elastica.model.bundle import coils
 from cfmkit.elastica.model.layout import Layout
-from cfmkit.elastica.outcome.path import most_stressed
 from cfmkit.errors import InputError
-from cfmkit.families.beam.build import Assembly, assemble, mirror_axis, resolve, thickest_of
-from cfmkit.families.beam.checks import findings_of
-from cfmkit.families.beam.endings import ending_of
-from cfmkit.families.beam.strips import Gap, mirrored, smallest_gap
-from cfmkit.families.beam.surface.ride import curve_of, findings_along, ride, values_along
+from cfmkit.families.beam.build import Assembly, assemble, resolve, thickest_of
+from cfmkit.families.beam.findings import ending_of, findings_of, in_units
+from cfmkit.families.beam.solution import Solution
+from cfmkit.families.beam.surface import curve_of, findings_along, ride, values_along
 from cfmkit.families.beam.values import natural, travel_of, values_of
-from cfmkit.families.beam.words import in_units
 from cfmkit.results import Result, Status
 from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from cfmkit.arrays import FloatArray
     from cfmkit.curves import Kind
-    from cfmkit.elastica.vibration import Frequencies
     from cfmkit.families.base import Run
     from cfmkit.families.beam.spec import BeamSpec
 
-_NOTHING = 1e-15
-_POSES = 7
-_FLUTTER = 4  # modes among which two may meet: it is the lowest ones that do
 _ALONG = np.linspace(0.0, 1.0, 1001)  # where a coil's radius is looked at: a polynomial of few terms
-
-
-@dataclass(frozen=True, eq=False)
-class Solution:
-    """A solved mechanism, as checks, scalar values and pictures need it.
-
-    Attributes
-    ----------
-    assembly : Assembly
-        The network and what is done to it.
-    path : Path
-        Its equilibria.
-    keep : (n,) int array
-        Which points of the path make the curve: those asked for, or all where the path is followed through folds.
-    """
-
-    assembly: Assembly
-    path: Path
-    keep: Any
-
-    @property
-    def spec(self) -> BeamSpec:
-        """The specification."""
-        return self.assembly.spec
-
-    @cached_property
-    def motion(self) -> FloatArray:
-        """Displacement or rotation of the driven node along the drive [m or rad]."""
-        kind = self.spec.mechanism.drive.kind
-        if kind in ("displacement", "rotation"):
-            return read_only(self.path.drive[self.keep])
-        moved = self.path.motion(self.assembly.driven)[self.keep]
-        if kind == "moment":
-            return read_only(moved[:, 2])
-        angle = self.assembly.direction
-        along = moved[:, 0] * np.cos(angle) + moved[:, 1] * np.sin(angle)
-        return read_only(np.where(np.abs(along) > _NOTHING * np.abs(along).max(), along, 0.0))
-
-    @property
-    def motion_dimension(self) -> str:
-        """The dimension of the motion: "length" or "angle"."""
-        return "angle" if self.spec.mechanism.drive.kind in ("rotation", "moment") else "length"
-
-    @cached_property
-    def effort(self) -> FloatArray:
-        """Force [N] or torque [N m] of all copies; none where the tolerance is not reached."""
-        by_motion = self.spec.mechanism.drive.kind in ("displacement", "rotation")
-        effort = self.path.effort if by_motion else self.path.drive
-        return read_only(np.where(self.accurate, self.assembly.effort_unit * effort[self.keep], np.nan))
-
-    @cached_property
-    def accurate(self) -> Any:
-        """Whether each point reaches the tolerance."""
-        return read_only(np.broadcast_to(self.path.accurate, (len(self.path),))[self.keep], np.bool_)
-
-    @cached_property
-    def stresses(self) -> Mapping[str, tuple[FloatArray, FloatArray]]:
-        """Of each beam, the largest stress [Pa] and its place, at every point of the curve."""
-        axial, keep = self.spec.stress == "total", self.keep
-        found = {name: self.path.beam_stress(name, axial) for name in self.path.layout.network.beams}
-        return {name: (value[keep], place[keep]) for name, (value, place) in found.items()}
-
-    @cached_property
-    def stress(self) -> FloatArray:
-        """The largest stress at every point of the curve [Pa]."""
-        largest = np.max([value for value, _ in self.stresses.values()], axis=0)
-        return read_only(np.where(self.accurate, largest, np.nan))
-
-    @cached_property
-    def stress_at(self) -> tuple[Any, FloatArray]:
-        """The beam with the largest stress at every point of the curve, and the place on it."""
-        values, places = (np.array(rows) for rows in zip(*self.stresses.values(), strict=True))
-        best, pick = most_stressed(values, places), np.arange(len(self.keep))
-        return read_only(np.array(list(self.stresses))[best], np.str_), read_only(places[best, pick])
-
-    @cached_property
-    def stable(self) -> Any:
-        """Whether each point is a stable equilibrium that reaches the tolerance.
-
-        Under loads that turn with their node all motions decide where masses are known, else the path's count.
-        """
-        found = self.frequencies if self.follows else None
-        stable = self.path.stable[self.keep] if found is None else ~(found.flutters | found.diverges)
-        return read_only(stable & self.accurate, np.bool_)
-
-    @cached_property
-    def follows(self) -> bool:
-        """Whether a load turns with its node: stability may then be lost by flutter."""
-        return bool(self.path.solver.model.load_follows.any())
-
-    @cached_property
-    def frequencies(self) -> Frequencies | None:
-        """Natural frequencies about every point of the curve; None where none are asked for and nothing can flutter."""
-        masses = self.assembly.masses()
-        count = self.spec.analysis.modes or (_FLUTTER if self.follows else 0)
-        if masses is None or not count or not len(self.keep):
-            return None
-        from cfmkit.elastica.vibration import frequencies
-
-        return frequencies(self.path, masses, count, self.keep, self.assembly.hold())
-
-    @cached_property
-    def cross_stiffness(self) -> FloatArray:
-        """Stiffness of the driven node across the drive at every point of the curve, of all copies [N/m].
-
-        nan where nothing gives way, where the tolerance is not reached, and of drives that turn.
-        """
-        if self.spec.mechanism.drive.kind in ("rotation", "moment") or not len(self.keep):
-            return read_only(np.full(len(self.keep), np.nan))
-        from cfmkit.elastica.outcome.crosswise import cross_stiffness
-
-        found = cross_stiffness(self.path, self.assembly.driven, self.assembly.direction, self.keep)
-        known = self.accurate & np.isfinite(found)
-        return read_only(np.where(known, self.assembly.parallel * found, np.nan))
-
-    @cached_property
-    def gaps(self) -> tuple[Gap | None, Gap | None]:
-        """The smallest gap between two beams before any load, and of some places of the curve [m]."""
-        poses = sorted(set(np.linspace(0, len(self.keep) - 1, _POSES).astype(int).tolist()))
-        found = [self._gap(int(self.keep[pose])) for pose in poses]
-        moving = min((gap for gap in found if gap is not None), default=None)
-        return found[0], moving
-
-    def _gap(self, point: int) -> Gap | None:
-        network = self.path.layout.network
-        lines = {name: self.path.shape(name, point) for name in network.beams}
-        halves = {name: 0.5 * thickest_of(beam.section) for name, beam in network.beams.items()}
-        axis = mirror_axis(self.assembly)
-        if axis is not None:
-            lines |= {f"{name}'": mirrored(line, *axis) for name, line in lines.items()}
-        return smallest_gap(lines, halves)
-
-    def beam_force(self, beam: str) -> FloatArray:
-        """Return force and moment that a beam exerts on its last node, (n, 3) [N, N, N m], of one copy."""
-        return read_only(-self.path.end_force(beam, 1)[self.keep])
 
 
 def analyze(spec: BeamSpec, run: Run) -> Result:

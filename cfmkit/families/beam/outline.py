@@ -18,7 +18,7 @@ from cfmkit.export.geometry import TOLERANCE, Contour, Curve2D, Drawing, Smooth
 from cfmkit.export.union import quarter_pieces
 from cfmkit.families.beam.build import assemble, mirror_axis, thickest
 from cfmkit.families.beam.parts.spec import PartSpec
-from cfmkit.families.beam.strips import Strip, mirrored, strips
+from cfmkit.families.beam.strips import BeamStrip, mirrored, strips
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
@@ -44,7 +44,7 @@ SHARE = 0.2
 
 
 @dataclass(frozen=True)
-class Region:
+class HeldPlace:
     """A place of the part that is held or driven and moves as one rigid piece.
 
     Attributes
@@ -67,7 +67,7 @@ class Region:
     seams: tuple[FloatArray, ...] = ()
 
 
-def regions(spec: BeamSpec, tolerance: float = TOLERANCE) -> tuple[Region, ...]:
+def regions(spec: BeamSpec, tolerance: float = TOLERANCE) -> tuple[HeldPlace, ...]:
     """Return where the part of `drawing` is held and driven: pads from the root plane on, the holes of eyes.
 
     Parameters
@@ -95,7 +95,7 @@ def regions(spec: BeamSpec, tolerance: float = TOLERANCE) -> tuple[Region, ...]:
         found.append(replace(region, shapes=(*region.shapes, *joined)))
         if axis is not None and not _on_axis(assembly, node):
             found.append(
-                Region(
+                HeldPlace(
                     f"{node}'",
                     node,
                     mirrored(region.at[None], *axis)[0],
@@ -106,21 +106,21 @@ def regions(spec: BeamSpec, tolerance: float = TOLERANCE) -> tuple[Region, ...]:
     return tuple(found)
 
 
-def _region(assembly: Assembly, node: str, ends: list[tuple[Strip, bool]], bulge: float) -> Region:
+def _region(assembly: Assembly, node: str, ends: list[tuple[BeamStrip, bool]], bulge: float) -> HeldPlace:
     """Return the place of the described half at which a node is held or driven."""
     about = assembly.network.nodes[node]
     at = np.array([about.x, about.y])
     if _padded(assembly, node):
         pads = [_pad(strip, last) for strip, last in ends]
-        return Region(node, node, at, tuple(pads), tuple(pad[:2] for pad in pads))
+        return HeldPlace(node, node, at, tuple(pads), tuple(pad[:2] for pad in pads))
     strip, last = ends[0]
     index = -1 if last else 0
     size = float(strip.thickness[index])
     if about.support.across and not about.support.rotation and not _on_axis(assembly, node):
-        return Region(node, node, at, (_disc(strip.points[index], HOLE * size, bulge),))
+        return HeldPlace(node, node, at, (_disc(strip.points[index], HOLE * size, bulge),))
     across = np.array([-math.sin(strip.angle[index]), math.cos(strip.angle[index])])
     line = strip.points[index] + 0.5 * size * np.array([across, -across])
-    return Region(node, node, at, (line,), (line,))
+    return HeldPlace(node, node, at, (line,), (line,))
 
 
 def drawing(spec: BeamSpec, tolerance: float = TOLERANCE) -> Drawing:
@@ -159,7 +159,7 @@ def _mirrored_line(line: Smooth, at: complex, direction: float) -> Smooth:
 
 
 def _pieces(
-    assembly: Assembly, beams: dict[str, list[Strip]], bulge: float
+    assembly: Assembly, beams: dict[str, list[BeamStrip]], bulge: float
 ) -> tuple[list[FloatArray], list[FloatArray]]:
     """Return the polygons of one half: strips, joints, pads, eyes, bars; and the holes in eyes."""
     network = assembly.network
@@ -209,7 +209,7 @@ def _on_axis(assembly: Assembly, node: str) -> bool:
     return bool(abs(away) < _ON_AXIS * thickest(assembly.spec.mechanism.thickness))
 
 
-def _anchor(assembly: Assembly, beams: dict[str, list[Strip]], node: str) -> FloatArray:
+def _anchor(assembly: Assembly, beams: dict[str, list[BeamStrip]], node: str) -> FloatArray:
     """Return where bars to a node end [m]: in the middle of a pad there, else at the node."""
     ends = _ends(assembly, beams, node)
     if ends and _padded(assembly, node):
@@ -219,7 +219,7 @@ def _anchor(assembly: Assembly, beams: dict[str, list[Strip]], node: str) -> Flo
     return np.array([found.x, found.y])
 
 
-def _ends(assembly: Assembly, beams: dict[str, list[Strip]], node: str) -> list[tuple[Strip, bool]]:
+def _ends(assembly: Assembly, beams: dict[str, list[BeamStrip]], node: str) -> list[tuple[BeamStrip, bool]]:
     """Return the strips that end at a node, and whether with their last point."""
     network = assembly.network
     firsts = [(found[0], False) for name, found in beams.items() if network.beams[name].start == node]
@@ -238,7 +238,7 @@ def _disc(center: FloatArray, radius: float, bulge: float) -> FloatArray:
     return center + radius * np.column_stack([np.cos(turn), np.sin(turn)])
 
 
-def _pad(strip: Strip, last: bool) -> FloatArray:
+def _pad(strip: BeamStrip, last: bool) -> FloatArray:
     """Return a rectangle behind the end of a beam, square to it: the beam keeps its free length."""
     index = -1 if last else 0
     at, angle, size = strip.points[index], float(strip.angle[index]), float(strip.thickness[index])
@@ -257,7 +257,7 @@ def _bar(a: FloatArray, b: FloatArray, width: float) -> FloatArray:
     return np.array([a - over - side, b + over - side, b + over + side, a - over + side])
 
 
-def _bars(assembly: Assembly, beams: dict[str, list[Strip]], at: complex, direction: float) -> list[FloatArray]:
+def _bars(assembly: Assembly, beams: dict[str, list[BeamStrip]], at: complex, direction: float) -> list[FloatArray]:
     """Return the bars that join the moving parts of two halves, behind the pads."""
     thick = max(float(strip.thickness.max()) for found in beams.values() for strip in found)
     found = []
@@ -274,11 +274,11 @@ def _bars(assembly: Assembly, beams: dict[str, list[Strip]], at: complex, direct
     return found
 
 
-def _line(strip: Strip) -> Smooth:
+def _line(strip: BeamStrip) -> Smooth:
     return Smooth(strip.points, np.column_stack([np.cos(strip.angle), np.sin(strip.angle)]))
 
 
-def _table(name: str, found: list[Strip]) -> Curve2D:
+def _table(name: str, found: list[BeamStrip]) -> Curve2D:
     """Return the exact points of a beam: centre line, angle, thickness, both edges."""
     points = np.concatenate([strip.points for strip in found])
     left, right = (np.concatenate([strip.sides[k] for strip in found]) for k in (0, 1))

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from cfmkit.export.geometry import Contour
     from cfmkit.families.base import Run
     from cfmkit.families.beam.build import Assembly
-    from cfmkit.families.beam.outline import Region
+    from cfmkit.families.beam.outline import HeldPlace
     from cfmkit.families.beam.spec import BeamSpec
     from cfmkit.results import Finding
     from cfmkit.solid.course import Course
@@ -262,7 +262,7 @@ def _stops(spec: BeamSpec) -> list[float]:
 
 
 def _groups(
-    assembly: Assembly, nodes: FloatArray, places: tuple[Region, ...]
+    assembly: Assembly, nodes: FloatArray, places: tuple[HeldPlace, ...]
 ) -> tuple[tuple[Group, ...], NDArray[np.bool_]]:
     """Return the groups of nodes that are held or driven, and which nodes are in one."""
     from cfmkit.solid.supports import Group, within
@@ -279,7 +279,7 @@ def _groups(
     return tuple(found), taken
 
 
-def _motions(assembly: Assembly, place: Region) -> tuple[FloatArray, FloatArray]:
+def _motions(assembly: Assembly, place: HeldPlace) -> tuple[FloatArray, FloatArray]:
     """Return how a region is driven, (3,), and which motions it is free in, (3, f)."""
     about = assembly.network.nodes[place.node].support
     flip = place.name != place.node

@@ -3,71 +3,77 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, field_validator, model_validator
+import numpy as np
+from pydantic import Field, ValidationInfo, field_validator, model_validator
 
-from cfmkit.families.beam.parts.faults import faults
+from cfmkit.families.beam.mechanism.spec import Mechanism
 from cfmkit.families.beam.parts.spec import (
-    Copies,
-    DriveSpec,
-    LinkSpec,
-    LoadSpec,
     MaterialField,
-    MemberSpec,
-    NodeSpec,
-    PartSpec,
     PositiveLength,
-    SpringSpec,
-    Thickness,
-    checked_thickness,
 )
 from cfmkit.families.beam.shaping.spec import Optimise, optimise_faults
-from cfmkit.families.beam.surface.spec import Surface
+from cfmkit.specs.formula import formula
 from cfmkit.specs.spec import Analysis, Displacement, Model, Spec, refuse
 from cfmkit.specs.units import DIMENSIONS, Factor, Force, Length, Ratio, Torque
-from cfmkit.stock.spec import SafetyFactor
+from cfmkit.specs.units.fields import LARGEST
+from cfmkit.tables.source import DataSource
 
 Fidelity = Literal["inextensible", "extensible", "reissner", "solid"]
 _EXTENT = {"displacement": "travel", "rotation": "travel", "force": "force", "moment": "moment", "loads": "factor"}
 
 
-class Mechanism(Model):
-    """A planar network of slender beams, and what is done to it."""
+class FileProfile(Model):
+    """Heights of a surface from a file."""
 
-    material: MaterialField = Field(description="a name from `show materials`, or {youngs_modulus, ...}")
-    safety_factor: SafetyFactor = 1.0
-    thickness: Thickness = Field(
-        description="in the plane of bending (w of Lan); or [[fraction, thickness], ...], linear between"
+    kind: Literal["file"]
+    file: str = Field(description="a CSV beside the specification: x [mm], y [mm]")
+    between: Literal["smooth", "straight"] = Field(
+        "smooth", description="how it runs between its points: a cubic spline, or straight lines with corners"
     )
-    width: PositiveLength = Field(description="out of the plane (t of Lan)")
-    axial: bool = Field(False, description="whether beams stretch; `analysis.fidelity` goes before")
-    shear: bool = Field(False, description="whether beams shear, too")
-    closure: Literal["rotscale", "chain", "raw"] = Field(
-        "rotscale",
-        description=(
-            "how beams are fitted between rounded nodes: turned and scaled, nodes that are not held moved to the "
-            "beams' ends (guides with them), or forced into place (prestressed)"
-        ),
-    )
-    nodes: dict[str, NodeSpec] = Field(min_length=2, description="by name: {n1: {at: [0 mm, 0 mm], support: clamped}}")
-    beams: dict[str, MemberSpec] = Field(min_length=1, description="by name: {b1: {start: n1, end: n2}}")
-    links: tuple[LinkSpec, ...] = Field((), description="rigid links: [{master: n1, node: n2}]")
-    springs: dict[str, SpringSpec] = Field({}, description="by name; of `kind` line, torsion or slide")
-    loads: tuple[LoadSpec, ...] = Field((), description="constant loads; of `kind` point or line")
-    drive: DriveSpec = Field(description="what is done to it; of `kind` displacement, rotation, force, moment or loads")
-    copies: Copies | None = Field(None, description="how often what is described here occurs")
-    part: PartSpec | None = Field(None, description="how it is cut: fillets, smallest gap and feature")
 
-    @field_validator("thickness")
+    @field_validator("file", mode="wrap")
     @classmethod
-    def _stations(cls, value: Thickness) -> Thickness:
-        return checked_thickness(value)
+    def _beside_the_spec(cls, value: Any, handler: Any, info: ValidationInfo) -> Any:
+        folder = getattr(value, "folder", None) or (info.context or {}).get("folder") or "."
+        return DataSource(handler(value), folder)
+
+
+class FormulaProfile(Model):
+    """Heights of a surface by a formula."""
+
+    kind: Literal["formula"]
+    height: str = Field(description="in mm, of x in mm: 1.75*(1 - cos(pi*x/12.3))")
+    length: PositiveLength = Field(description="how far the tip goes along the surface")
+    points: int = Field(201, ge=3, le=100_000, description="places at which it is taken")
+
+    @field_validator("height")
+    @classmethod
+    def _readable(cls, text: str) -> str:
+        formula(text)
+        return text
 
     @model_validator(mode="after")
-    def _names_match(self) -> Self:
-        refuse("Mechanism", dict(faults(self)))
+    def _has_a_height_everywhere(self) -> Self:
+        x = np.linspace(0.0, self.length, self.points) * 1e3
+        heights = formula(self.height)(x)
+        bad = ~(np.abs(heights) <= LARGEST * 1e3)
+        if bad.any():
+            place = x[int(bad.argmax())]
+            told = f"has no height at x = {place:.6g} mm: a finite number of mm is needed everywhere on the surface"
+            refuse("FormulaProfile", {("height",): told})
         return self
+
+
+class Surface(Model):
+    """A surface that the driven node follows while the mechanism is carried along it [Lan, Fig. 14]."""
+
+    profile: FileProfile | FormulaProfile = Field(
+        discriminator="kind", description="heights: of `kind` file or formula"
+    )
+    preload: Length = Field(description="displacement of the mechanism where the height is 0")
+    friction: Annotated[Ratio, Field(ge=0, lt=2)] = Field(0.0, description="of the tip on the surface")
 
 
 class Rescale(Model):

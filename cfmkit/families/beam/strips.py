@@ -24,7 +24,7 @@ TOGETHER = 0.25  # of the thickness: ends closer than this are one
 
 
 @dataclass(frozen=True)
-class Strip:
+class BeamStrip:
     """A smooth piece of a beam: centre line (n, 2) [m], its angle [rad] and the thickness [m] there."""
 
     points: FloatArray
@@ -52,7 +52,7 @@ class Strip:
         return np.concatenate([left, right[::-1]])
 
 
-def strips(network: Network, fits: Mapping[str, Fit], name: str, tolerance: float = np.inf) -> list[Strip]:
+def strips(network: Network, fits: Mapping[str, Fit], name: str, tolerance: float = np.inf) -> list[BeamStrip]:
     """Return a beam in smooth pieces, from its first end to its last.
 
     It is cut where its shape has a corner and where its thickness has a kink or a step. Lines between the points of
@@ -74,7 +74,7 @@ def strips(network: Network, fits: Mapping[str, Fit], name: str, tolerance: floa
     return found
 
 
-def _piece(beam: Beam, fit: Fit, at: FloatArray, t: FloatArray) -> Strip:
+def _piece(beam: Beam, fit: Fit, at: FloatArray, t: FloatArray) -> BeamStrip:
     """Return a smooth piece of a beam that starts at a place [m], at parameters of its shape."""
     inside, half = 0.5 * (t[0] + t[-1]), 0.5 * (t[1] - t[0])
     nodes = (t[:-1] + half)[:, None] + half * _GAUSS
@@ -84,7 +84,7 @@ def _piece(beam: Beam, fit: Fit, at: FloatArray, t: FloatArray) -> Strip:
     place = t if fit.course.uniform else np.array([float(np.real(fit.arc(float(one)))) for one in t])
     middle = float(place[len(place) // 2])
     thickness = np.real(beam.section.thickness_at(place, middle)) + np.zeros(len(t))
-    return Strip(read_only(points), read_only(np.real(fit.angle(t, inside))), read_only(thickness))
+    return BeamStrip(read_only(points), read_only(np.real(fit.angle(t, inside))), read_only(thickness))
 
 
 def mirrored(points: FloatArray, at: complex, direction: float) -> FloatArray:
@@ -95,7 +95,7 @@ def mirrored(points: FloatArray, at: complex, direction: float) -> FloatArray:
 
 
 @dataclass(frozen=True, order=True)
-class Gap:
+class BeamGap:
     """A distance between the surfaces of two beams [m], negative where they overlap, and which they are."""
 
     size: float
@@ -103,7 +103,7 @@ class Gap:
     other: str
 
 
-def smallest_gap(lines: Mapping[str, FloatArray], halves: Mapping[str, float]) -> Gap | None:
+def smallest_gap(lines: Mapping[str, FloatArray], halves: Mapping[str, float]) -> BeamGap | None:
     """Return the smallest gap of two beams; near an end that they have in common there is none.
 
     Pairs whose boxes are farther apart than that are not looked at.
@@ -122,7 +122,7 @@ def smallest_gap(lines: Mapping[str, FloatArray], halves: Mapping[str, float]) -
         apart = float(np.hypot(*np.maximum(np.maximum(floor - high, low - ceiling), 0.0)))
         return apart - sum(halves[name.rstrip("'")] for name in pair)
 
-    best: Gap | None = None
+    best: BeamGap | None = None
     for bound, pair in sorted((least(pair), pair) for pair in _pairs(lines)):
         if best is not None and bound > best.size:
             break
@@ -136,7 +136,7 @@ def _pairs(lines: Iterable[str]) -> Iterator[tuple[str, str]]:
     return ((one, other) for one, other in itertools.combinations(lines, 2) if not one.endswith("'"))
 
 
-def _gap(lines: Mapping[str, FloatArray], halves: Mapping[str, float], one: str, other: str) -> Gap | None:
+def _gap(lines: Mapping[str, FloatArray], halves: Mapping[str, float], one: str, other: str) -> BeamGap | None:
     """Return the gap of two beams; None where nothing is left of one beside their common ends."""
     a, b, half = lines[one], lines[other], halves[other.rstrip("'")]
     for i, j in itertools.product((0, -1), repeat=2):
@@ -144,7 +144,7 @@ def _gap(lines: Mapping[str, FloatArray], halves: Mapping[str, float], one: str,
             a, b = _away(a, i, 2 * NEAR * halves[one]), _away(b, j, 2 * NEAR * half)
     if len(a) < 2 or len(b) < 2:
         return None
-    return Gap(_distance(a, b) - halves[one] - half, one, other)
+    return BeamGap(_distance(a, b) - halves[one] - half, one, other)
 
 
 def _away(line: FloatArray, end: int, length: float) -> FloatArray:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,43 +15,10 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.beam.build import Assembly
-    from cfmkit.families.beam.model import Solution
-    from cfmkit.families.beam.spec import BeamSpec
+    from cfmkit.families.beam.solution import OnCurve, Solution
+
 
 BAND = 0.05
-
-
-class OnCurve(Protocol):
-    """What a solved mechanism of any model knows at the points of its curve."""
-
-    @property
-    def spec(self) -> BeamSpec:
-        """The specification."""
-
-    @property
-    def assembly(self) -> Assembly:
-        """The network and what is done to it."""
-
-    @property
-    def motion(self) -> FloatArray:
-        """Displacement or rotation along the drive (n,) [m or rad]."""
-
-    @property
-    def effort(self) -> FloatArray:
-        """Force or torque of all copies (n,) [N or N m]."""
-
-    @property
-    def stress(self) -> FloatArray:
-        """The largest stress (n,) [Pa]."""
-
-    @property
-    def stresses(self) -> Mapping[str, tuple[FloatArray, FloatArray]]:
-        """Of each beam, or of the part, the largest stress (n,) [Pa] and its place."""
-
-    @property
-    def accurate(self) -> Any:
-        """Whether each point reaches the tolerance, (n,)."""
 
 
 DEFINITIONS = {

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
-from cfmkit.families.beam.parts.faults import HELD
 from cfmkit.specs.spec import Model
 from cfmkit.specs.units import (
     Angle,
@@ -25,10 +24,24 @@ from cfmkit.specs.units import (
 from cfmkit.stock.materials import material
 from cfmkit.stock.spec import MaterialSpec, material_input
 
+if TYPE_CHECKING:
+    pass
+
+
 PositiveLength = Annotated[Length, Field(gt=0)]
 Point = tuple[Length, Length]
 Station = tuple[Annotated[Ratio, Field(ge=0, le=1)], PositiveLength]
 Thickness = PositiveLength | Annotated[tuple[Station, ...], Field(min_length=2)]
+
+HELD = {
+    "free": (False, False, False),
+    "clamped": (True, True, True),
+    "pinned": (True, True, False),
+    "guided": (False, True, True),
+    "roller": (False, True, False),
+    "parallel": (False, False, True),
+}
+"""Which motions a support holds: along its direction, across it, the rotation."""
 
 
 class BeamMaterial(MaterialSpec):

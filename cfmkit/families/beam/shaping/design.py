@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from cfmkit.families.beam.build import assemble
-from cfmkit.families.beam.findings import finding
+from cfmkit.families.beam.findings import finding, percent
 from cfmkit.families.beam.shaping.audit import Spread, tolerated
 from cfmkit.families.beam.shaping.infeasible import blocked, held_by
 from cfmkit.families.beam.shaping.judging import Judged, judged
@@ -15,7 +15,6 @@ from cfmkit.families.beam.shaping.report import notes_of, search_of, starts_tabl
 from cfmkit.families.beam.shaping.search import Plan, finished, widened
 from cfmkit.families.beam.shaping.task import MARGIN, Coordinate, Limits, Task
 from cfmkit.families.beam.shaping.variables import Variables
-from cfmkit.families.beam.words import percent
 from cfmkit.results import Design, Finding, Status
 from cfmkit.store import origin, stable_hash
 

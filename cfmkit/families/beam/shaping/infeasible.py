@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.families.beam.build import thickest_of
+from cfmkit.families.beam.findings import percent
 from cfmkit.families.beam.shaping.goals import Flattest
 from cfmkit.families.beam.shaping.program import Shaping
 from cfmkit.families.beam.shaping.search import VIOLATION, Found, Plan, met
 from cfmkit.families.beam.shaping.variables import Variables
-from cfmkit.families.beam.words import percent
 from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:

@@ -13,11 +13,11 @@ import numpy as np
 
 from cfmkit.elastica.model.beam import fit
 from cfmkit.families.base import Run
+from cfmkit.families.beam.findings import percent
 from cfmkit.families.beam.model import analyze
 from cfmkit.families.beam.shaping.audit import Audit, audited
 from cfmkit.families.beam.shaping.search import PLACES, Found
 from cfmkit.families.beam.shaping.variables import Variables
-from cfmkit.families.beam.words import percent
 from cfmkit.metrics import Window, evaluate
 from cfmkit.specs.units import format_short
 

@@ -1,34 +1,43 @@
-"""What can be wrong with a network as it is described: each fault with its place below `mechanism`."""
+"""What a specification may say about a network of beams as a whole, and what can be wrong with it."""
 
 from __future__ import annotations
 
 import itertools
 import math
 import re
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Literal, Self
 
 import numpy as np
+from pydantic import Field, field_validator, model_validator
+
+from cfmkit.families.beam.parts.spec import (
+    HELD,
+    Copies,
+    DriveSpec,
+    LinkSpec,
+    LoadSpec,
+    MaterialField,
+    MemberSpec,
+    NodeSpec,
+    PartSpec,
+    PositiveLength,
+    SpringSpec,
+    Thickness,
+    checked_thickness,
+)
+from cfmkit.specs.spec import Model, refuse
+from cfmkit.stock.spec import SafetyFactor
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
-    from cfmkit.families.beam.parts.spec import LoadSpec, MemberSpec
-    from cfmkit.families.beam.spec import Mechanism
 
 Fault = tuple[tuple[str | int, ...], str]
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_-]{0,39}")
 _SAME_DIRECTION = 1e-6  # rad; the support's direction is used
 _CLOSED = 1e-9  # of the length; the engine cannot fit what is shorter
 _GAUSS = 20  # places of the quadrature on each panel, of a turn below a radian on the average
-HELD = {
-    "free": (False, False, False),
-    "clamped": (True, True, True),
-    "pinned": (True, True, False),
-    "guided": (False, True, True),
-    "roller": (False, True, False),
-    "parallel": (False, False, True),
-}
-"""Which motions a support holds: along its direction, across it, the rotation."""
 
 
 def faults(mechanism: Mechanism) -> Iterator[Fault]:
@@ -199,3 +208,41 @@ def _copy_faults(mechanism: Mechanism) -> Iterator[Fault]:
     for name, node in mechanism.nodes.items():
         if name != drive.node and node.support not in ("clamped", "free"):
             yield ("nodes", name, "support"), "in stages in series, every support but the driven one is 'clamped'"
+
+
+class Mechanism(Model):
+    """A planar network of slender beams, and what is done to it."""
+
+    material: MaterialField = Field(description="a name from `show materials`, or {youngs_modulus, ...}")
+    safety_factor: SafetyFactor = 1.0
+    thickness: Thickness = Field(
+        description="in the plane of bending (w of Lan); or [[fraction, thickness], ...], linear between"
+    )
+    width: PositiveLength = Field(description="out of the plane (t of Lan)")
+    axial: bool = Field(False, description="whether beams stretch; `analysis.fidelity` goes before")
+    shear: bool = Field(False, description="whether beams shear, too")
+    closure: Literal["rotscale", "chain", "raw"] = Field(
+        "rotscale",
+        description=(
+            "how beams are fitted between rounded nodes: turned and scaled, nodes that are not held moved to the "
+            "beams' ends (guides with them), or forced into place (prestressed)"
+        ),
+    )
+    nodes: dict[str, NodeSpec] = Field(min_length=2, description="by name: {n1: {at: [0 mm, 0 mm], support: clamped}}")
+    beams: dict[str, MemberSpec] = Field(min_length=1, description="by name: {b1: {start: n1, end: n2}}")
+    links: tuple[LinkSpec, ...] = Field((), description="rigid links: [{master: n1, node: n2}]")
+    springs: dict[str, SpringSpec] = Field({}, description="by name; of `kind` line, torsion or slide")
+    loads: tuple[LoadSpec, ...] = Field((), description="constant loads; of `kind` point or line")
+    drive: DriveSpec = Field(description="what is done to it; of `kind` displacement, rotation, force, moment or loads")
+    copies: Copies | None = Field(None, description="how often what is described here occurs")
+    part: PartSpec | None = Field(None, description="how it is cut: fillets, smallest gap and feature")
+
+    @field_validator("thickness")
+    @classmethod
+    def _stations(cls, value: Thickness) -> Thickness:
+        return checked_thickness(value)
+
+    @model_validator(mode="after")
+    def _names_match(self) -> Self:
+        refuse("Mechanism", dict(faults(self)))
+        return self

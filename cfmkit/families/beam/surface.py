@@ -3,8 +3,8 @@
 The carrier moves along x; the tip is guided along the drive and follows the heights, so that the mechanism is displaced
 by the preload plus the height. With a slope angle a and friction m the axial force F of the mechanism is held by the
 normal force N: F = N (cos a - m sin a) on the way along x, and the carrier is pushed back by N (sin a + m cos a). On
-the way back the slope has the other sign. Between the points of a profile the surface runs on (`Course`); extremes are
-those of everything between its ends.
+the way back the slope has the other sign. Between the points of a profile the surface runs on (`SurfaceCourse`);
+extremes are those of everything between its ends.
 
 Assumes: slow motion, a sharp tip that stays on the surface, guides without friction.
 
@@ -22,19 +22,114 @@ import numpy as np
 
 from cfmkit.curves import Column, Curve
 from cfmkit.families.beam.findings import finding
-from cfmkit.families.beam.surface.course import LOOKED_AT, course_of, largest
 from cfmkit.numerics.cubic import bisect, values_at
 from cfmkit.results import Quantity
 from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Callable, Iterator, Mapping
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.beam.model import Solution
-    from cfmkit.families.beam.surface.course import Course
-    from cfmkit.families.beam.surface.spec import Surface
+    from cfmkit.families.beam.solution import Solution
+    from cfmkit.families.beam.spec import FileProfile, FormulaProfile, Surface
     from cfmkit.results import Finding
+
+
+LOOKED_AT = 4001
+"""Places along a surface at which extremes are looked for, before the best is refined."""
+
+_ROWS = 201  # of the curve along a surface that is given by few points
+_BESIDE = 1e-9  # of the length: both sides of a corner are looked at
+
+
+@dataclass(frozen=True)
+class SurfaceCourse:
+    """A surface between its ends.
+
+    Attributes
+    ----------
+    height, slope : callable
+        Height [m] and its derivative [1] at places [m]; at a corner the slope is that of one side.
+    rows : (n,) array
+        The places that the curve along it is written at [m].
+    corners : (k,) array
+        Where the slope jumps [m].
+    """
+
+    height: Callable[[FloatArray], FloatArray]
+    slope: Callable[[FloatArray], FloatArray]
+    rows: FloatArray
+    corners: FloatArray
+
+    def places(self, end: float) -> FloatArray:
+        """Return many places up to one [m], the rows and both sides of every corner among them."""
+        start = float(self.rows[0])
+        beside = _BESIDE * (float(self.rows[-1]) - start)
+        both = np.concatenate([self.corners - beside, self.corners + beside])
+        every = np.unique(np.concatenate([np.linspace(start, end, LOOKED_AT), self.rows, both]))
+        return every[(every >= start) & (every <= end)]
+
+
+def course_of(surface: Surface) -> SurfaceCourse:
+    """Return the course of the surface of an analysis.
+
+    Raises
+    ------
+    cfmkit.errors.DataError
+        If the file cannot be used.
+    """
+    given = surface.profile
+    return _of_file(given) if given.kind == "file" else _of_formula(given)
+
+
+def _of_formula(given: FormulaProfile) -> SurfaceCourse:
+    from cfmkit.specs.formula import formula, slope
+
+    height, rise = formula(given.height), slope(given.height)
+    rows = np.linspace(0.0, given.length, given.points)
+    return SurfaceCourse(lambda x: height(x * 1e3) * 1e-3, lambda x: rise(x * 1e3), rows, np.zeros(0))
+
+
+def _of_file(given: FileProfile) -> SurfaceCourse:
+    from pathlib import Path
+
+    from scipy.interpolate import CubicSpline
+
+    from cfmkit.tables.labpoints import read_profile
+
+    x, y = read_profile(getattr(given.file, "path", Path(given.file)))
+    rows = np.unique(np.concatenate([x, np.linspace(x[0], x[-1], _ROWS)]))
+    if given.between == "smooth":
+        spline = CubicSpline(x, y)
+        return SurfaceCourse(spline, spline.derivative(), rows, np.zeros(0))
+    steps = np.diff(y) / np.diff(x)
+
+    def slope(places: FloatArray) -> FloatArray:
+        return np.asarray(steps[np.clip(np.searchsorted(x, places, side="right") - 1, 0, len(steps) - 1)])
+
+    return SurfaceCourse(lambda places: np.interp(places, x, y), slope, rows, x[1:-1])
+
+
+def largest(function: Callable[[FloatArray], FloatArray], places: FloatArray) -> float:
+    """Return the largest value of a function near the best of some places, refined between its neighbours.
+
+    Examples
+    --------
+    >>> round(largest(lambda x: 1 - (x - 0.3) ** 2, np.linspace(0.0, 1.0, 5)), 12)
+    1.0
+    """
+    found = -np.inf
+    for _ in range(_ZOOMS):
+        values = function(places)
+        best = int(np.argmax(values))
+        found = max(found, float(values[best]))
+        low, high = places[max(best - 1, 0)], places[min(best + 1, len(places) - 1)]
+        places = np.linspace(low, high, _FINE)
+    return found
+
+
+_ZOOMS, _FINE = 5, 65  # each makes the places 32 times as dense
+
 
 DEFINITIONS = {
     "tip_force_min": ("force", "smallest axial force of the tip between the ends of the way along the surface"),
@@ -105,14 +200,14 @@ class Tip:
     ----------
     surface : Surface
         What the tip follows.
-    course : Course
+    course : SurfaceCourse
         Its height and slope.
     x, effort, stress, stable : (n,) arrays
         Displacements [m], forces [N], largest stresses [Pa], and 1 where stable.
     """
 
     surface: Surface
-    course: Course
+    course: SurfaceCourse
     x: FloatArray
     effort: FloatArray
     stress: FloatArray

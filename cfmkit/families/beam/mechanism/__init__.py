@@ -1,0 +1,1 @@
+"""A network of beams as a specification describes it."""

@@ -1,1 +1,0 @@
-"""A surface that a mechanism follows as the support of an end-effector [Lan, sec. IV]."""
