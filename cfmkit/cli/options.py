@@ -43,6 +43,7 @@ NoPlots = Annotated[bool, flag("--no-plots", text="Draw no figures.")]
 Jobs = Annotated[int | None, option("-j", "--jobs", metavar="N", min=1, text="Processes; default: all cores.")]
 Timeout = Annotated[float | None, option("--timeout-per-point", metavar="S", text="Give up a point after S seconds.")]
 Fresh = Annotated[bool, flag("--fresh", text="Compute anew what an earlier run has finished.")]
+WithReport = Annotated[bool, flag("--report", text="Write report.html, too: everything in one file to share.")]
 
 
 @dataclass(frozen=True, kw_only=True)

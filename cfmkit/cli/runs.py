@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -39,6 +40,7 @@ def execute(verb: Verb, options: Computing, terminal: Terminal) -> Answer:
     """Run a verb over the spec that the options name and write the folder."""
     out = folder_of(options, verb.name)
     wanted = Request(options.spec, out, options.changes, options.fidelity, options.seed, not options.no_plots)
+    wanted = replace(wanted, page=getattr(options, "report", False))
     with terminal.progress() as progress:
         return answer(carry_out(verb, wanted, terminal.arguments, progress), everything=terminal.verbose > 0)
 

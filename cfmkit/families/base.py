@@ -283,6 +283,8 @@ class Family:
         Every warning or failure name the family can report, with its meaning.
     references : tuple of str
         The papers, in one line each.
+    bibliography : str
+        The same in BibTeX: a file of a package, ``"package/folder/file"``.
     interface : int, optional
         The `INTERFACE` that a family of another package was written for, as a plain number.
     """
@@ -306,11 +308,17 @@ class Family:
     template: str = ""
     findings: dict[str, str] = field(default_factory=dict)
     references: tuple[str, ...] = ()
+    bibliography: str = ""
     interface: int | None = None
 
     def __post_init__(self) -> None:
         """Add the findings that every family has."""
         object.__setattr__(self, "findings", {**self.findings, **SHARED})
+
+    @property
+    def bibtex(self) -> str:
+        """The papers as BibTeX; empty where there is no file of them."""
+        return packaged(self.bibliography) if self.bibliography else ""
 
     @property
     def phrase(self) -> str:
@@ -323,3 +331,11 @@ class Family:
         model = self.models[spec.fidelity or only]
         function: Analyzer = function_named(model) if isinstance(model, str) else model
         return function(spec, run)
+
+
+def packaged(name: str) -> str:
+    """Return the text of a file that comes with a package, by ``"package/folder/file"``."""
+    from importlib.resources import files
+
+    package, _, path = name.partition("/")
+    return files(package).joinpath(path).read_text(encoding="utf-8")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 import time
 import traceback
 from collections.abc import Iterable
@@ -10,7 +11,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, Literal, Protocol
 
-from cfmkit.errors import CfmError, ExitCode, OutputError, SpecError, UsageError, code_of, lines_of, visible
+from cfmkit.errors import CfmError, ExitCode, SpecError, UsageError, code_of, lines_of, visible
 from cfmkit.results import Status
 from cfmkit.runs.report import worst
 from cfmkit.runs.run import Outcome, Request, Verb, analysed, designed, journal_of, long_run, spec_of
@@ -18,7 +19,7 @@ from cfmkit.runs.run import carry_out as carried_out
 from cfmkit.studies.batch import LEFT, Entry
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from cfmkit.runs.run import Noting
     from cfmkit.specs.spec import Spec
@@ -62,7 +63,8 @@ class BatchWork:
     def deciding(self) -> list[Any]:
         """Everything in it that decides what a run finds and writes."""
         given = self.common
-        return [list(given.changes), given.fidelity, given.seed, not given.plots, self.verb]
+        page = ["report"] if given.page else []  # without a page: as it always was, so that earlier batches are reused
+        return [list(given.changes), given.fidelity, given.seed, not given.plots, self.verb, *page]
 
     def __call__(self, job: Job) -> Entry:
         """Return what becomes of one specification; nothing is raised but what ends the process."""
@@ -257,30 +259,6 @@ def executor_for(jobs: int | None, count: int, timeout: float | None) -> Executo
     return serial if wanted <= 1 and timeout is None else Pool(max(wanted, 1), timeout)
 
 
-def prepared(path: str) -> Callable[[bytes], None]:
-    """Return what writes a file; its folder is made now, and a folder in its place is told now.
-
-    Raises
-    ------
-    cfmkit.errors.OutputError
-        If it will not be possible to write it.
-    """
-    from cfmkit.store import atomic_write
-    from cfmkit.store.disk import reporting
-
-    if not path.strip():
-        raise UsageError("--junit is empty; name a file")
-    with reporting(path):
-        os.makedirs(os.path.dirname(os.path.abspath(path)), exist_ok=True)
-    if os.path.isdir(path):
-        raise OutputError(f"cannot write {path}: it is a folder")
-
-    def write(data: bytes) -> None:
-        atomic_write(path, data)
-
-    return write
-
-
 def exit_code(entries: Sequence[Entry], interrupted: bool) -> ExitCode:
     """Return what the process is to say: the first of 70, 7, 3, 4, 6, 5 that occurs."""
     return ExitCode.INTERRUPTED if interrupted else worst([one.code for one in entries])
@@ -351,6 +329,7 @@ def batch(
     fail_fast: bool = False,
     fresh: bool = False,
     junit: str | None = None,
+    page: bool = False,
     arguments: Sequence[str] = (),
     monitor: Monitor | None = None,
     noting: Noting = journal_of,
@@ -385,6 +364,8 @@ def batch(
         Reuse nothing.
     junit : str, optional
         A file for JUnit XML, a test for each requirement.
+    page : bool
+        Whether to write a ``report.html`` for each, and one for all that links them.
     arguments : sequence of str
         What manifests say of the command line.
     monitor : Monitor, optional
@@ -411,6 +392,7 @@ def batch(
     from cfmkit.store import RunFolder
     from cfmkit.studies.batch import folders, sources
     from cfmkit.studies.junit import junit as junit_of
+    from cfmkit.studies.junit import prepared
     from cfmkit.studies.kept import KeptRuns
 
     place, given = os.fspath(out), (changes,) if isinstance(changes, str) else tuple(changes)
@@ -422,7 +404,8 @@ def batch(
         addressed(change)
     named = _named(specs)
     files = sources(named, place)
-    work = BatchWork(Request("", place, given, fidelity, seed, plots, of_many=True), verb, tuple(arguments), fresh)
+    common = Request("", place, given, fidelity, seed, plots, of_many=True, page=page)
+    work = BatchWork(common, verb, tuple(arguments), fresh)
     todo = [Job(k, *pair) for k, pair in enumerate(zip(files, folders(files), strict=True))]
     executor = executor_for(jobs, len(todo), timeout_per_point)
     report = None if junit is None else prepared(junit)
@@ -431,7 +414,7 @@ def batch(
         folder.check("results.csv", "requirements.csv", "metrics.json")
         entries = carry_out(work, todo, Crew(executor, fail_fast, watched, KeptRuns(place, work.deciding, journal)))
         code = exit_code(entries, watched.stopped)
-        written = _write(folder, entries, _about(work, named, code))
+        written = _write(folder, entries, _about(work, named, code), page)
     if report is not None:
         report(junit_of(entries))
     return BatchResult(entries, code, place, written)
@@ -472,14 +455,19 @@ def _about(work: BatchWork, named: Sequence[str], code: ExitCode) -> dict[str, A
     }
 
 
-def _write(folder: RunFolder, entries: Sequence[Entry], about: dict[str, Any]) -> tuple[str, ...]:
-    from cfmkit.studies.batch import requirements_table, results_table
+def _write(folder: RunFolder, entries: Sequence[Entry], about: dict[str, Any], page: bool) -> tuple[str, ...]:
+    from cfmkit.studies.batch import message, requirements_table, results_table
     from cfmkit.tables import to_csv
     from cfmkit.tables.jsontext import json_bytes
 
     folder.write("results.csv", to_csv(results_table(entries)))
     folder.write("requirements.csv", to_csv(requirements_table(entries)))
     folder.write("metrics.json", json_bytes(_data(entries, ExitCode(about["exit_code"]))))
+    if page:
+        from cfmkit.runs import batch_page
+
+        command = shlex.join(["cfmkit", *about["arguments"]])
+        folder.write(batch_page.NAME, batch_page.page(entries, message(entries), command))
     return (*folder.commit(about).files, "manifest.json")
 
 

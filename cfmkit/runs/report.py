@@ -18,6 +18,8 @@ from cfmkit.tables.jsontext import json_bytes
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
 
+    from matplotlib.figure import Figure
+
     from cfmkit.curves import Curve
     from cfmkit.metrics import Outcome
     from cfmkit.results import Design, Finding, Quantity
@@ -169,7 +171,7 @@ def undesigned(spec: Spec, design: Design) -> Result:
     return Result(spec, design.status, design.message)
 
 
-def files(report: Report, plots: bool = True) -> Iterator[tuple[str, bytes]]:
+def files(report: Report, plots: bool = True, page: bool = False, command: str = "") -> Iterator[tuple[str, bytes]]:
     """Yield every file of a run as (name below the folder, content), each when it is asked for.
 
     Parameters
@@ -178,6 +180,10 @@ def files(report: Report, plots: bool = True) -> Iterator[tuple[str, bytes]]:
         Of any status: without a curve only what is known is written.
     plots : bool
         Whether to draw figures.
+    page : bool
+        Whether to write ``report.html``, which has the figures as well.
+    command : str
+        What the page says about how the run was started.
     """
     result, designed = report.result, report.design.spec if report.design else None
     if designed is not None:
@@ -193,11 +199,21 @@ def files(report: Report, plots: bool = True) -> Iterator[tuple[str, bytes]]:
     yield from sources(result.spec)
     if designed is not None and result.status.usable:
         yield from geometry(result.spec)
+    drawn = {stem: draw() for stem, draw in api.figures(result).items()} if plots or page else {}
     if plots:
-        yield from pictures(result)
+        yield from pictures(drawn)
+    more: dict[str, bytes] = {}
     for name, make in report.supplement.files.items():
-        if plots or not name.startswith("figures/"):
-            yield name, make()
+        figure = name.startswith("figures/")
+        content = make() if plots or page or not figure else b""
+        if figure:
+            more |= {name.removeprefix("figures/").removesuffix(".png"): content}
+        if plots or not figure:
+            yield name, content
+    if page:
+        from cfmkit.runs import run_page
+
+        yield run_page.NAME, run_page.page(report, drawn, more, command)
 
 
 def sources(spec: Spec) -> Iterator[tuple[str, bytes]]:
@@ -223,14 +239,13 @@ def geometry(spec: Spec) -> Iterator[tuple[str, bytes]]:
             yield f"geometry/{name}", data
 
 
-def pictures(result: Result) -> Iterator[tuple[str, bytes]]:
-    """Yield the family's pictures of a result as PNG, below ``figures/``."""
-    makers = api.figures(result)
-    if makers:
+def pictures(drawn: Mapping[str, Figure]) -> Iterator[tuple[str, bytes]]:
+    """Yield the figures of a result as PNG, below ``figures/``."""
+    if drawn:
         from cfmkit.plots.style import png
 
-        for stem, draw in makers.items():
-            yield f"figures/{stem}.png", png(draw())
+        for stem, figure in drawn.items():
+            yield f"figures/{stem}.png", png(figure)
 
 
 __all__ = ["Report", "Supplement", "files", "geometry", "json_bytes", "pictures", "report_on", "undesigned", "worst"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import time
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field, replace
@@ -116,6 +117,8 @@ class Request:
         Whether to draw.
     of_many : bool
         Whether it is one of many, and changes may be for others.
+    page : bool
+        Whether to write ``report.html``.
     """
 
     spec: str
@@ -125,6 +128,7 @@ class Request:
     seed: int = 0
     plots: bool = True
     of_many: bool = False
+    page: bool = False
 
 
 def carry_out(
@@ -147,10 +151,11 @@ def carry_out(
     document = _document(wanted)
     spec = _bound(document, wanted)
     with RunFolder(wanted.out) as folder:
-        folder.check(*FIRST)
+        folder.check(*FIRST, *(["report.html"] if wanted.page else []))
         with verb.running(folder, Run(wanted.seed, progress) if progress else Run(wanted.seed)) as run:
             found = _computed(verb, spec, run, document)
-        for name, data in report.files(found, plots=wanted.plots):
+        command = shlex.join(["cfmkit", *arguments])
+        for name, data in report.files(found, wanted.plots, wanted.page, command):
             folder.write(name, data)
         origin = provenance(verb.name, spec, wanted.spec, arguments)
         manifest = folder.commit(origin | dict(verb.inputs) | {"seed": wanted.seed} | _ending(found))
@@ -197,8 +202,11 @@ def family_package(name: str) -> dict[str, Any]:
 
 def provenance(command: str, spec: Spec, source: str, arguments: Sequence[str]) -> dict[str, Any]:
     """Return what every manifest says about its run: the command line and the content of the spec."""
+    from cfmkit.families import family
+
     content = {"source": source, "sha256": stable_hash(spec.model_dump(mode="json")), **family_package(spec.family)}
-    return {"command": command, "arguments": list(arguments), "spec": content}
+    cited = {"bibtex": text} if (text := family(spec.family).bibtex) else {}
+    return {"command": command, "arguments": list(arguments), "spec": content, **cited}
 
 
 def _ending(found: Report) -> dict[str, Any]:

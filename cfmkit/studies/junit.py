@@ -7,14 +7,15 @@ to run finds it again.
 
 from __future__ import annotations
 
+import os
 import re
 from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree
 
-from cfmkit.errors import ExitCode
+from cfmkit.errors import ExitCode, OutputError, UsageError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from cfmkit.studies.batch import Entry
 
@@ -117,3 +118,27 @@ def requirement_name(one: Mapping[str, Any]) -> str:
 def clean(text: str) -> str:
     """Return text without what XML cannot hold."""
     return NOT_XML.sub("\N{REPLACEMENT CHARACTER}", text)
+
+
+def prepared(path: str) -> Callable[[bytes], None]:
+    """Return what writes a file; its folder is made now, and a folder in its place is told now.
+
+    Raises
+    ------
+    cfmkit.errors.OutputError
+        If it will not be possible to write it.
+    """
+    from cfmkit.store import atomic_write
+    from cfmkit.store.disk import reporting
+
+    if not path.strip():
+        raise UsageError("--junit is empty; name a file")
+    with reporting(path):
+        os.makedirs(os.path.dirname(os.path.abspath(path)), exist_ok=True)
+    if os.path.isdir(path):
+        raise OutputError(f"cannot write {path}: it is a folder")
+
+    def write(data: bytes) -> None:
+        atomic_write(path, data)
+
+    return write

@@ -7,7 +7,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Annotated
 
 from cfmkit.cli.measuring import Measuring, data_record, read_measured, refuse_without_data
-from cfmkit.cli.options import Computing, flag, option
+from cfmkit.cli.options import Computing, WithReport, flag, option
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -27,6 +27,7 @@ PLACE = 20
 class AnalyzeOptions(Computing, Measuring):
     """Arguments and options."""
 
+    report: WithReport = False
     data: Annotated[
         str | None, option("--data", metavar="FILE.csv", text="Measured curve to lay over, with the errors.")
     ] = None

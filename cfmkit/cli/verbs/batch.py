@@ -16,6 +16,7 @@ from cfmkit.cli.options import (
     Quiet,
     Seed,
     Timeout,
+    WithReport,
     argument,
     flag,
     option,
@@ -61,6 +62,7 @@ class BatchOptions(Changing):
     fidelity: Fidelity = None
     seed: Seed = 0
     no_plots: NoPlots = False
+    report: WithReport = False
     quiet: Quiet = False
 
 
@@ -90,6 +92,7 @@ def run(options: BatchOptions, terminal: Terminal) -> Answer:
             fail_fast=options.fail_fast,
             fresh=options.fresh,
             junit=options.junit,
+            page=options.report,
             arguments=terminal.arguments,
             monitor=progress,
             noting=studies.noting,

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING
 
-from cfmkit.cli.options import Computing, Fresh, Jobs
+from cfmkit.cli.options import Computing, Fresh, Jobs, WithReport
 
 if TYPE_CHECKING:
     from contextlib import AbstractContextManager
@@ -23,6 +23,7 @@ PLACE = 10
 class DesignOptions(Computing):
     """Arguments and options."""
 
+    report: WithReport = False
     jobs: Jobs = None
     fresh: Fresh = False
 

@@ -51,15 +51,13 @@ def template(name: str) -> str:
     cfmkit.errors.UsageError
         If there is no such family, or it comes without a template.
     """
-    from importlib.resources import files
-
     from cfmkit.families import family
+    from cfmkit.families.base import packaged
 
     record = family(name)
     if not record.template:
         raise UsageError(f"the family {name!r} has no template; `cfmkit show {name}` lists its keys")
-    package, _, path = record.template.partition("/")
-    return files(package).joinpath(path).read_text(encoding="utf-8")
+    return packaged(record.template)
 
 
 def _write(path: Path, text: str) -> None:

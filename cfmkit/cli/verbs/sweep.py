@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import shlex
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cfmkit.cli.answer import Answer
-from cfmkit.cli.options import Studying, flag, option
+from cfmkit.cli.options import Studying, WithReport, flag, option
 from cfmkit.cli.page import (
     BAD,
     BLANK,
@@ -44,6 +45,7 @@ MOST_METRICS = 6
 class SweepOptions(Studying):
     """Arguments and options."""
 
+    report: WithReport = False
     vary: Annotated[
         list[str] | None,
         option(
@@ -88,8 +90,17 @@ def run(options: SweepOptions, terminal: Terminal) -> Answer:
         records = studies.compute(work, options, place)
         studies.tracebacks(records, terminal)
         summary = summary_of(records)
+        kept: dict[str, bytes] = {}
         for name, data in files(records, summary, writes_curves(spec, asked), not options.no_plots):
+            if options.report:
+                kept[name] = data = data if isinstance(data, bytes) else b"".join(map(bytes, data))
             place.folder.write(name, data)
+        if options.report:
+            from cfmkit.runs import study_page
+
+            varied = [item.path for item in work.plan.variables]
+            command = shlex.join(["cfmkit", *terminal.arguments])
+            place.folder.write(study_page.NAME, study_page.page(spec, varied, kept, command))
         code = exit_code(records, summary)
         made = studies.Made("sweep", options.spec, work.study.spec, options.seed, len(work.plan))
         manifest = studies.commit(place, made, terminal, code)

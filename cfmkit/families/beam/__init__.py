@@ -38,6 +38,7 @@ FAMILY = Family(
     ),
     template="cfmkit/families/beam/template.yaml",
     findings=FINDINGS,
+    bibliography="cfmkit/families/beam/references.bib",
     references=(
         "C.-C. Lan, J.-H. Wang, Y.-H. Chen, A compliant constant-force mechanism for adaptive robot end-effector "
         "operations, IEEE Int. Conf. Robotics and Automation (2010) 2131-2136",

@@ -19,9 +19,10 @@ from cfmkit.plots.bands import limits_on
 from cfmkit.plots.curves import Look
 from cfmkit.plots.diagram import Diagram, Limit, Region, Scale, Series, diagram_figure
 from cfmkit.plots.loop import loop_figure
+from cfmkit.plots.moving import Moving, chosen
 from cfmkit.plots.place import place_labels
 from cfmkit.plots.rounding import vanishing
-from cfmkit.plots.style import GREY, INK, LINES, TROUBLE, VERMILLION, axes_mm, new_figure, styled
+from cfmkit.plots.style import BLUE, GREY, INK, LINES, TROUBLE, VERMILLION, axes_mm, new_figure, styled
 from cfmkit.plots.text import Heading, color_key, value_text, write_heading
 
 if TYPE_CHECKING:
@@ -368,6 +369,29 @@ def surface(result: Result) -> Figure:
         Diagram(found.place, way, Scale("tip force", "force", zero=False), [Series(found.force, "", LINES[0])], limits),
     ]
     return diagram_figure(Heading.of(result, "contact force along the surface"), diagrams)
+
+
+def moving(result: Result) -> Moving | None:
+    """Return the mechanism as it bends, above a shade of it as cut, for a film; None of a part solved as a solid."""
+    if result.spec.at("analysis.fidelity") == "solid":
+        return None
+    solution: Solution = result.state
+    points = chosen(len(solution.keep))
+    lines = [_lines(solution, int(solution.keep[point])) for point in points]
+    plates = _plates(solution)
+    box = _box([*plates, *(line for pose in lines for line in pose)])
+
+    def draw(ax: Axes, number: int) -> None:
+        for plate in plates:
+            parts.plate(ax, [_counter_clockwise(plate)])
+        for line in lines[number]:
+            parts.edge(ax, line, "beam", color=BLUE, linewidth=1.8, zorder=2.5)
+        for line in _both(solution, rigid_parts(solution.path, int(solution.keep[points[number]]))):
+            parts.edge(ax, line, "rigid", color=GREY, linewidth=2.4, zorder=2.4, solid_capstyle="round")
+        _supports(solution, ax)
+        parts.to_scale(ax, box)
+
+    return Moving(solution.motion[points], box, draw)
 
 
 _BETWEEN = 4  # points of the picture for a step of the sampling

@@ -35,6 +35,7 @@ FAMILY = Family(
     branches=("load", "unload"),
     template="cfmkit/families/cam/template.yaml",
     findings=FINDINGS,
+    bibliography="cfmkit/families/cam/references.bib",
     references=(
         "S. Sanchez-Salinas, A. Garcia-Agundez, J. Lopez-Martinez, D. Garcia-Vallejo, "
         "Mech. Mach. Theory 173 (2022) 104819, doi:10.1016/j.mechmachtheory.2022.104819",

@@ -15,6 +15,7 @@ from cfmkit.plots.bands import limits_on
 from cfmkit.plots.curves import Look, plot_curve
 from cfmkit.plots.diagram import Diagram, Limit, Region, Scale, Series, diagram_figure
 from cfmkit.plots.loop import loop_figure
+from cfmkit.plots.moving import Moving, chosen
 from cfmkit.plots.place import place_labels
 from cfmkit.plots.style import BLUE, GREY, OCHRE, PURPLE, TROUBLE, VERMILLION, new_figure, styled
 from cfmkit.plots.text import Heading, finite_range, right_axis, top_axis, value_text, write_heading
@@ -368,3 +369,13 @@ def manufacturing(result: Result) -> Figure:
     median = 100 * float(np.median(band.deviations()))
     subject = f"cams cut with errors, {median:.2g} % SD along the travel"
     return diagram_figure(Heading.of(result, subject), [diagram])
+
+
+def moving(result: Result) -> Moving | None:
+    """Return the mechanism on its way up, for a film; None where its motion is one of time or the cam is as built."""
+    solution = result.state
+    if solution is None or not hasattr(solution, "states"):
+        return None
+    view, points = scene(solution), chosen(len(solution.travel))
+    motion = solution.origin + solution.travel[points]
+    return Moving(motion, view.box, lambda ax, number: draw_mechanism(solution, int(points[number]), ax, view))

@@ -33,6 +33,7 @@ FAMILY = Family(
     headline=("stiffness_class", "band_range_05pct", "half_band", "energy_max", "crank_pin_rotation_max"),
     template="cfmkit/families/slider_crank/template.yaml",
     findings=FINDINGS,
+    bibliography="cfmkit/families/slider_crank/references.bib",
     references=(
         "B. Li, G. Hao, Chin. J. Mech. Eng. 32 (2019), doi:10.1186/s10033-019-0369-z",
         "P. Bilancia, A. Geraci, G. Berselli, ASME SMASIS 2019, SMASIS2019-5519",

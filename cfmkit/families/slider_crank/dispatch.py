@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from cfmkit.export.geometry import Drawing
     from cfmkit.families.base import Run
     from cfmkit.families.slider_crank.spec import SliderCrankSpec
+    from cfmkit.plots.moving import Moving
     from cfmkit.results import Design, Result
 
 ROOMS = {"prb": "springs", "lumped": "printed", "beam": "printed"}
@@ -41,6 +42,12 @@ def figures(result: Result) -> dict[str, Callable[[], Figure]]:
     if result.state is None or not result.curves:
         return {}
     made: dict[str, Callable[[], Figure]] = _in_room(ROOMS[str(result.spec.fidelity)], "draw:figures")(result)
+    return made
+
+
+def moving(result: Result) -> Moving:
+    """Return the linkage or the part over its motion, for a film."""
+    made: Moving = _in_room(ROOMS[str(result.spec.fidelity)], "draw:moving")(result)
     return made
 
 

@@ -35,6 +35,7 @@ FAMILY = Family(
     branches=("load",),
     template="cfmkit/families/vcfm/template.yaml",
     findings=FINDINGS,
+    bibliography="cfmkit/families/vcfm/references.bib",
     references=(
         "B. Ding, X. Li, Y. Li, Configuration design and experimental verification of a variable constant-force "
         "compliant mechanism, Robotica (2022)",

@@ -19,6 +19,7 @@ from cfmkit.plots import parts
 from cfmkit.plots.curves import Look, plot_curve
 from cfmkit.plots.diagram import Diagram, Limit, Region, Scale, Series, diagram_figure
 from cfmkit.plots.loop import loop_figure
+from cfmkit.plots.moving import Moving, chosen
 from cfmkit.plots.style import (
     BLACK,
     BLUE,
@@ -268,3 +269,23 @@ def _draw(ax: Axes, one: Scene) -> None:
     for name, outlines, color in (("leaf", one.leaves, BLUE), ("spring", one.spring, OCHRE)):
         for outline in outlines:
             ax.fill(*parts.mm(outline).T, color=color, linewidth=0.4, zorder=2.0, gid=name)
+
+
+def moving(result: Result) -> Moving:
+    """Return the mechanism over the travel of its nominal curve, for a film."""
+    solution: Solution = result.state
+    nominal = solution.nominal
+    points = chosen(len(nominal.travel))
+    scenes = [scene(solution, float(nominal.travel[point]), nominal.preload) for point in points]
+    boxes = np.array([one.box for one in scenes])
+    low, high = boxes[:, :2].min(axis=0), boxes[:, 2:].max(axis=0)
+    room = 0.06 * float((high - low).max())
+    box = (low[0] - room, low[1] - room, high[0] + room, high[1] + 2.0 * room)
+
+    def draw(ax: Axes, number: int) -> None:
+        _draw(ax, scenes[number])
+        top = scenes[number].top
+        parts.force_arrow(ax, (top[0], top[1] + room), top)
+        parts.to_scale(ax, box)
+
+    return Moving(result.curve.motion[points], box, draw)

@@ -11,6 +11,7 @@ from cfmkit.families.slider_crank.printed.chain import STRIP
 from cfmkit.plots import parts
 from cfmkit.plots.diagram import Diagram, Limit, Scale, Series, diagram_figure
 from cfmkit.plots.loop import loop_figure
+from cfmkit.plots.moving import Moving, chosen
 from cfmkit.plots.place import Label, place_labels
 from cfmkit.plots.style import BLUE, GREY, INK, OCHRE, PURPLE, VERMILLION, axes_mm, new_figure, styled
 from cfmkit.plots.text import Heading, value_text, write_heading
@@ -152,3 +153,24 @@ def _place(solution: Solution, shape: list[tuple[FloatArray, FloatArray]], along
 
 def _length(points: FloatArray) -> float:
     return float(np.hypot(*np.diff(points, axis=0).T).sum())
+
+
+def moving(result: Result) -> Moving:
+    """Return the part over its travel, for a film."""
+    solution: Solution = result.state
+    points = chosen(len(solution.travel))
+    shapes = [list(_shapes(solution, int(solution.pressed.path.at_asked[k]))) for k in points]
+    everything = np.concatenate([line for shape in shapes for line, _ in shape])
+    low, high = everything.min(axis=0), everything.max(axis=0)
+    room = 0.08 * float((high - low).max())
+    box = (low[0] - room, low[1] - room, high[0] + 2.5 * room, high[1] + 2.0 * room)
+
+    def draw(ax: Axes, number: int) -> None:
+        for line, half in shapes[number]:
+            _body(ax, line, half, True)
+        end = shapes[number][-1][0][-1]
+        ax.axhline(float(parts.mm(float(end[1]))), color=GREY, linewidth=0.6, dashes=(6, 3), zorder=1.1)
+        parts.slider(ax, tuple(end), 0.5 * room)
+        parts.to_scale(ax, box)
+
+    return Moving(solution.travel[points], box, draw)

@@ -16,6 +16,7 @@ from cfmkit.plots.bands import limits_on
 from cfmkit.plots.curves import Look, plot_curve
 from cfmkit.plots.diagram import Diagram, Limit, Scale, Series, diagram_figure
 from cfmkit.plots.loop import loop_figure
+from cfmkit.plots.moving import Moving, chosen
 from cfmkit.plots.place import Label, place_labels
 from cfmkit.plots.style import BLUE, BROWN, GREY, INK, OCHRE, PURPLE, VERMILLION, axes_mm, new_figure, styled
 from cfmkit.plots.text import Heading, value_text, write_heading
@@ -367,3 +368,11 @@ def _names(solution: Solution, key: KeyPosition, view: Scene) -> list[Label]:
         tail = np.array([key.slider_pin[0] + 1.8 * view.size * solution.assembly.linkage.branch, key.slider_pin[1]])
         found.append(parts.part_name("F", [tail], (0.0, 1.0), VERMILLION))
     return found
+
+
+def moving(result: Result) -> Moving:
+    """Return the linkage over its motion, for a film."""
+    solution: Solution = result.state
+    motion, view = solution.motion[chosen(len(solution.motion))], scene(solution)
+    poses = [key(solution, "", float(place)) for place in motion]
+    return Moving(motion, view.box, lambda ax, number: draw_linkage(solution, poses[number], ax, view))

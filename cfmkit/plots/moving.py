@@ -1,0 +1,139 @@
+"""A mechanism in motion, as one SVG: what never moves stands in it once, what moves once for every pose.
+
+The families draw a pose on axes as they do for their figures; what two poses have in common is found by comparing
+what is drawn. So a page needs no drawing code of its own, and a script has nothing to do but to show one pose.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+from xml.etree import ElementTree
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+
+from cfmkit.plots.formats import inline, svg
+from cfmkit.plots.style import axes_mm, new_figure, styled
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from matplotlib.axes import Axes
+
+    from cfmkit.arrays import FloatArray
+
+POSES = 25
+"""Poses of a film: over a travel of 100 mm one every 4 mm, and some 100 kB at most."""
+
+WIDTH, HIGHEST = 150.0, 110.0
+"""Largest width and height of the drawing [mm of print]."""
+
+_SVG = "http://www.w3.org/2000/svg"
+_LINK = "http://www.w3.org/1999/xlink"
+
+
+@dataclass(frozen=True)
+class Moving:
+    """What a family says about its mechanism in motion.
+
+    Attributes
+    ----------
+    motion : (n,) array
+        Displacement [m] or angle [rad] of each pose, as the curve has it.
+    box : (float, float, float, float)
+        Left, bottom, right and top of what all poses need [m].
+    draw : callable
+        ``draw(ax, number)`` draws one pose to scale.
+    """
+
+    motion: FloatArray
+    box: tuple[float, float, float, float]
+    draw: Callable[[Axes, int], Any]
+
+
+def chosen(count: int, poses: int = POSES) -> FloatArray:
+    """Return which of so many points of a curve are shown as poses: evenly, the ends included."""
+    return np.unique(np.linspace(0, count - 1, min(count, poses)).round().astype(int))
+
+
+@styled
+def film(moving: Moving, title: str) -> str:
+    """Return all poses as one SVG for a page: each in groups of the class ``pose`` with its number in ``data-pose``.
+
+    Parameters
+    ----------
+    moving : Moving
+        What to draw.
+    title : str
+        What a screen reader says about it.
+    """
+    drawn = [_pose(moving, number) for number in range(len(moving.motion))]
+    return _merged(drawn, title)
+
+
+def _pose(moving: Moving, number: int) -> ElementTree.Element:
+    left, bottom, right, top = moving.box
+    scale = min(WIDTH / (right - left), HIGHEST / (top - bottom))
+    figure = new_figure((right - left) * scale, (top - bottom) * scale)
+    ax = axes_mm(figure, (0.0, 0.0, (right - left) * scale, (top - bottom) * scale))
+    moving.draw(ax, number)
+    ax.set_axis_off()
+    return ElementTree.fromstring(inline(svg(figure), "film"))
+
+
+def _merged(poses: Sequence[ElementTree.Element], title: str) -> str:
+    """Return poses as one: runs of what differs between pieces that all of them have, in the order of drawing."""
+    ElementTree.register_namespace("", _SVG)
+    ElementTree.register_namespace("xlink", _LINK)
+    each = [[_plain(element) for element in _pieces(pose)] for pose in poses]
+    common = _common(each)
+    body: list[str] = []
+    at = [0] * len(each)
+    for anchor in [*common, None]:
+        runs = []
+        for number, pieces in enumerate(each):
+            end = pieces.index(anchor, at[number]) if anchor is not None else len(pieces)
+            runs.append(pieces[at[number] : end])
+            at[number] = end + 1
+        body += [f'<g class="pose" data-pose="{number}">{"".join(run)}</g>' for number, run in enumerate(runs) if run]
+        body += [] if anchor is None else [anchor]
+    shared: dict[str, str] = {}
+    for pose in poses:
+        shared |= {_named(piece): _plain(piece) for piece in pose.iter() if piece.get("id") and _is_shared(piece)}
+    box = poses[0].get("viewBox", "")
+    return (
+        f'<svg xmlns="{_SVG}" xmlns:xlink="{_LINK}" viewBox="{box}" role="img" aria-label={quoteattr(title)}>'
+        f"<defs>{''.join(shared.values())}</defs>{''.join(body)}</svg>"
+    )
+
+
+def _pieces(pose: ElementTree.Element) -> list[ElementTree.Element]:
+    """Return what is drawn, in order: paths, uses and texts that stand in no definition."""
+    hidden = {id(inner) for block in pose.iter(f"{{{_SVG}}}defs") for inner in block.iter()}
+    drawn = {f"{{{_SVG}}}{kind}" for kind in ("path", "use", "text", "image")}
+    return [element for element in pose.iter() if element.tag in drawn and id(element) not in hidden]
+
+
+def _is_shared(piece: ElementTree.Element) -> bool:
+    """Return whether a piece is a definition: a marker, or where something is cut off."""
+    return piece.tag == f"{{{_SVG}}}clipPath" or (piece.tag == f"{{{_SVG}}}path" and "m" in _named(piece)[5:6])
+
+
+def _named(piece: ElementTree.Element) -> str:
+    return piece.get("id", "")
+
+
+def _plain(piece: ElementTree.Element) -> str:
+    text = ElementTree.tostring(piece, encoding="unicode")
+    return re.sub(r"\s+", " ", re.sub(r' xmlns(:\w+)?="[^"]*"', "", text)).replace(" />", "/>").strip()
+
+
+def _common(each: Sequence[Sequence[str]]) -> list[str]:
+    """Return what every pose has once, in the one order that all have it in."""
+    once = [{piece for piece in pieces if pieces.count(piece) == 1} for pieces in each]
+    shared = set.intersection(*once)
+    first = [piece for piece in each[0] if piece in shared]
+    same = all([piece for piece in pieces if piece in shared] == first for pieces in each)
+    return first if same else []

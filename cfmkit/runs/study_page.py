@@ -1,0 +1,169 @@
+"""``report.html`` of a sweep: its points as a table that sorts and filters, a slider for each varied value, its curves.
+
+Made from the study's own files, so it says what they say. A file has at most 500 curves and 4 MB of points: a study
+with more columns keeps those that were varied and those that its page shows first, and says so.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+from base64 import b64encode
+from typing import TYPE_CHECKING, Any
+
+from cfmkit.runs.run_page import NAME, escaped_json, part, references_of, template
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from cfmkit.specs.spec import Spec
+
+MOST_CURVES = 500
+"""Curves in one file: a point further down the table shows the command that makes its curve."""
+
+MOST_POINTS = 20_000
+"""Points in one file: more take a browser seconds for every move of a slider."""
+
+MOST_BYTES = 4_000_000
+"""Of JSON for the points: beyond it a browser needs seconds to begin."""
+
+SHOWN = 50
+"""Rows that stand in the page itself, for readers without scripts."""
+
+PLAIN = ("requirements_met", "status", "warnings", "message")
+"""The columns behind the metrics."""
+
+DIGITS = 6
+"""Of a number in the page: more are in results.csv."""
+
+
+def page(spec: Spec, varied: Sequence[str], files: Mapping[str, bytes], command: str) -> bytes:
+    """Return the page of a sweep.
+
+    Parameters
+    ----------
+    spec : Spec
+        What was varied.
+    varied : sequence of str
+        Paths of what was varied.
+    files : mapping of str to bytes
+        Name -> content of the study's files: results.csv and metrics.json at least.
+    command : str
+        How the study was started.
+    """
+    summary = json.loads(files["metrics.json"])
+    head, *points = csv.reader(io.StringIO(files["results.csv"].decode()))
+    rows = points[:MOST_POINTS]
+    paths = [name for name in head if name.partition(" [")[0] in varied]
+    kept = _fitting(head, rows, paths, list(summary.get("metrics", {})))
+    columns = [[row[head.index(name)] for row in rows] for name in kept]
+    data = {
+        "source": spec.name,
+        "head": kept,
+        "varied": [kept.index(name) for name in paths],
+        "columns": [_numbers(column) for column in columns],
+        "curves": _curves(files.get("curves.csv"), paths, [[row[head.index(path)] for row in rows] for path in paths]),
+    }
+    best = summary.get("best") or {}
+    text: str = template("study.html.j2").render(
+        title=spec.name,
+        family=spec.family,
+        status=summary.get("status", ""),
+        message=summary.get("message", ""),
+        best=best.get("values", {}),
+        best_by=" ".join(str(best[key]) for key in ("sense", "by") if best.get(key)).replace("_", " "),
+        ranges={name: _range(one) for name, one in summary.get("range", {}).items()},
+        definitions={name: one.get("definition", "") for name, one in summary.get("metrics", {}).items()},
+        head=kept,
+        left_out=len(head) - len(kept),
+        rows=[[_short(column[at]) for column in columns] for at in range(min(SHOWN, len(rows)))],
+        total=len(points),
+        points_left_out=len(points) - len(rows),
+        pictures={
+            name.removeprefix("figures/").removesuffix(".png"): b64encode(content).decode()
+            for name, content in files.items()
+            if name.startswith("figures/")
+        },
+        data=escaped_json(data),
+        command=command,
+        style=part("report.css"),
+        script=part("study.js"),
+        **references_of(spec.family),
+    )
+    return text.encode()
+
+
+def _fitting(
+    head: Sequence[str], rows: Sequence[Sequence[str]], paths: Sequence[str], shown: Sequence[str]
+) -> list[str]:
+    """Return the columns that the page has room for, in the order of the file."""
+    size = {name: sum(len(_short(row[at])) + 3 for row in rows) for at, name in enumerate(head)}
+    first = [name for name in head if name in paths or name in PLAIN or name.partition(" [")[0] in shown]
+    kept, used = set(), 0
+    for name in dict.fromkeys((*paths, "status", *first, *head)):
+        if name in size and used + size[name] <= MOST_BYTES:
+            kept.add(name)
+            used += size[name]
+    return [name for name in head if name in kept]
+
+
+def _range(one: Mapping[str, Any]) -> tuple[str, str]:
+    """Return the smallest and the largest value of a metric in words."""
+    unit = f" {one['unit']}" if one.get("unit") not in (None, "", "1") else ""
+    ends = (one.get(end) for end in ("min", "max"))
+    low, high = ("" if end is None else _short(str(end)) + unit for end in ends)
+    return low, high
+
+
+def _short(text: str) -> str:
+    """Return a cell for reading: a number in a few digits."""
+    try:
+        value = float(text)
+    except ValueError:
+        return text
+    return f"{value:.{DIGITS}g}" if math.isfinite(value) else text
+
+
+def _numbers(column: Sequence[str]) -> list[Any]:
+    """Return a column for the script: numbers where there are any, else texts; None where nothing stands."""
+    found: list[Any] = []
+    for text in column:
+        try:
+            value = float(_short(text))
+        except ValueError:
+            found.append(text or None)
+        else:
+            found.append(value if math.isfinite(value) else text)
+    return found
+
+
+def _curves(content: bytes | None, paths: Sequence[str], cells: Sequence[Sequence[str]]) -> dict[str, Any]:
+    """Return the first curves of curves.csv: names of the axes, and by number of the row the branches with x and y.
+
+    A curve belongs to the row with the same varied values: both files write them alike.
+    """
+    if content is None or not cells:
+        return {}
+    head, *rows = csv.reader(io.StringIO(content.decode()))
+    numbers = {key: at for at, key in reversed(list(enumerate(zip(*cells, strict=True))))}
+    own, branch = [head.index(path) for path in paths], head.index("branch") if "branch" in head else None
+    x, y = (next((at for at, name in enumerate(head) if name.startswith(names)), None) for names in _AXES)
+    points: dict[int, dict[str, list[list[float]]]] = {}
+    for row in rows:
+        number = numbers.get(tuple(row[at] for at in own))
+        if number is None or x is None or y is None or (number not in points and len(points) >= MOST_CURVES):
+            continue
+        line = points.setdefault(number, {}).setdefault("" if branch is None else row[branch], [[], []])
+        if row[x] and row[y]:
+            line[0].append(float(f"{float(row[x]):.5g}"))
+            line[1].append(float(f"{float(row[y]):.5g}"))
+    return {"x": head[x], "y": head[y], "points": points} if points and x is not None and y is not None else {}
+
+
+_AXES = (("displacement [", "angle ["), ("force [", "torque ["))
+"""How the columns of a curve begin that are drawn: over which, and which."""
+
+
+__all__ = ["NAME", "page"]
