@@ -103,7 +103,7 @@ def march(problem: Problem, move: Resume) -> Leg:
     """March once: predictor and corrector, in compiled code, up to where a decision is needed."""
     trail, spot, stretch, control = move.trail, move.spot, move.trail.stretch, problem.control
     asked = int(stretch.targets[0] == 0.0) if move.fresh else trail.asked
-    left, numbers, toward = _left(problem, trail, spot, asked)
+    left, numbers, toward = ahead(problem, trail, spot, asked)
     patient = move.patient or not stretch.natural or control.branch == "stop"
     options = problem.options(trail, spot, _first_step(problem, move, asked))._replace(
         landings=np.inf if patient else _LANDINGS,
@@ -121,7 +121,7 @@ def march(problem: Problem, move: Resume) -> Leg:
     return Leg(code, trail, spot, toward)
 
 
-def _left(
+def ahead(
     problem: Problem, trail: Trail, spot: Spot, asked: int
 ) -> tuple[FloatArray, FloatArray | None, BranchEnd | None]:
     """Return the values of the drive still to be reached and their numbers among those asked for, and a branch's end.
