@@ -16,7 +16,8 @@ import cfmkit
 from cfmkit.families import family
 from cfmkit.families.cam.outline import flank_edge
 from cfmkit.numerics.biarcs import fit_arcs
-from cfmkit.plots.render import render
+from cfmkit.plots.figures import figures
+from cfmkit.plots.style import png
 
 CONFIG = Path(__file__).resolve().parent.parent / "configs" / "cam.yaml"
 
@@ -31,7 +32,7 @@ def main() -> None:
         "analyse a cam, 2 x 481 points": lambda: cfmkit.analyze(spec),
         "all metrics of its curve": lambda: cfmkit.evaluate(result),
         "arcs within 5 um through its flank": lambda: fit_arcs(edge.points, edge.tangents, 5e-6, 1e-3),
-        "all of its figures as PNG": lambda: render(family("cam"), result),
+        "all of its figures as PNG": lambda: [png(draw()) for draw in figures(family("cam"), result).values()],
     }
     peer = best(lambda: np.sort(numbers), 40)
     print(f"{'sort 100 000 floats (the peer)':40s} {1e3 * peer:8.2f} ms")

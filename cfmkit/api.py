@@ -371,6 +371,6 @@ def drawing(spec: Spec, tolerance: float | None = None) -> Drawing:
 
 def figures(result: Result) -> Mapping[str, Callable[[], Figure]]:
     """Return what draws each picture of a result, by name; of a family that draws none, the curve alone."""
-    from cfmkit.plots import render
+    from cfmkit.plots.figures import figures
 
-    return render.figures(family(result.spec.family), result)
+    return figures(family(result.spec.family), result)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.experiment.comparison import model_at
-from cfmkit.plots.curves import Look, plot_curve
+from cfmkit.plots.curves import CurveLook, plot_curve
 from cfmkit.plots.place import Label, place_labels
 from cfmkit.plots.style import GREY, LINES, axes_mm, new_figure, styled
 from cfmkit.plots.text import Heading, axis_label, write_heading
@@ -49,7 +49,7 @@ def loop(source: Measured, numbers: Measurement) -> Figure:
     write_heading(figure, Heading(source.recording.name, f"measured {source.recording.kind}, {subject}"))
     upper, lower = axes_mm(figure, (17, 63, 138, 27.5)), axes_mm(figure, (17, 12, 138, 46))
     thin = [thinned(curve) for curve in source.raw]
-    plain = Look(names=False, arrows=False)
+    plain = CurveLook(names=False, arrows=False)
     plot_curve([replace(curve, label={}) for curve in thin] if len(thin) > 1 else thin[0], upper, plain)
     upper.set_xlabel("")
     upper.tick_params(labelbottom=False)
@@ -60,7 +60,7 @@ def loop(source: Measured, numbers: Measurement) -> Figure:
     limits = _range_in(source.raw, (window.lo, window.hi))
     motion = smooth.motion_dimension
     ends = tuple(_from_border(value, motion) for value in across)
-    plot_curve(replace(smooth, label={}), lower, Look(window=((ends[0], ends[1]), limits)))
+    plot_curve(replace(smooth, label={}), lower, CurveLook(window=((ends[0], ends[1]), limits)))
     _note_window(source, window, lower)
     return figure
 

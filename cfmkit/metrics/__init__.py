@@ -5,13 +5,33 @@ windows, `subjects` is what a metric looks at, `evaluation` runs the table over 
 curve, `requirements` compares with bounds, `report` writes border units.
 """
 
-from cfmkit.metrics.evaluation import Survey, evaluate, frame_of, left_of, measure, survey, travel_of, window_of
-from cfmkit.metrics.known import definition_of, known_metrics, metrics_by_name, other_name
-from cfmkit.metrics.outside import gaps, windows_judged
+from cfmkit.metrics.evaluation import (
+    Survey,
+    evaluate,
+    frame_of,
+    gaps,
+    left_of,
+    measure,
+    survey,
+    travel_of,
+    window_of,
+    windows_judged,
+)
 from cfmkit.metrics.report import as_json, metrics_json, search_json
 from cfmkit.metrics.requirements import Outcome, check, requirement_problems, validate_requirements
 from cfmkit.metrics.subjects import Branch, Cycle, Frame
-from cfmkit.metrics.table import TABLE, Definition, definitions, split_name, unknown_metric, values_of_family
+from cfmkit.metrics.table import (
+    TABLE,
+    Definition,
+    definition_of,
+    definitions,
+    known_metrics,
+    metrics_by_name,
+    other_name,
+    split_name,
+    unknown_metric,
+    values_of_family,
+)
 from cfmkit.metrics.traces import Trace, Undefined, Window, restrict, traces
 
 __all__ = [

@@ -1,20 +1,19 @@
-"""Requirements of a specification: are they well put, and does a result meet them."""
+"""Requirements of a specification: are they well put, does a result meet them, and how a value stands to its bounds."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cfmkit.errors import Problem, QuantityError, SpecError
 from cfmkit.metrics.evaluation import Survey, Surveys, Value, kind_of, survey_of, window_of
-from cfmkit.metrics.known import branch_fault, known_metrics
-from cfmkit.metrics.limits import Limits, bound
 from cfmkit.metrics.report import finite_border
 from cfmkit.metrics.subjects import span_text
-from cfmkit.metrics.table import Definition, split_name, unknown_metric
-from cfmkit.specs.units import DIMENSIONS, SHARE, border_unit
+from cfmkit.metrics.table import Definition, branch_fault, known_metrics, split_name, unknown_metric
+from cfmkit.specs.units import DIMENSIONS, SHARE, border_unit, format_short, read_one_of, to_border
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -23,6 +22,71 @@ if TYPE_CHECKING:
     from cfmkit.metrics.traces import Window
     from cfmkit.results import Result
     from cfmkit.specs.spec import Requirement, Spec
+
+
+ROUNDING = 1e-9
+"""A value on its bound is within it, whatever the conversion of units does to the last bits (relative)."""
+
+
+@lru_cache(maxsize=256)
+def bound(text: str | None, dimensions: tuple[str, ...]) -> float | None:
+    """Return a bound in SI from its text, read in one of some dimensions; None where there is none."""
+    return None if text is None else read_one_of(text, dimensions)[0]
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """The bounds of one requirement, as numbers and as they were written."""
+
+    dimension: str
+    min: float | None
+    max: float | None
+    text: str
+
+    @classmethod
+    def of(cls, requirement: Requirement, dimension: str) -> Bounds:
+        """Return the bounds of a requirement that has been validated."""
+        low, high = bound(requirement.min, (dimension,)), bound(requirement.max, (dimension,))
+        if requirement.min is None:
+            text = f"allowed <= {requirement.max}"
+        elif requirement.max is None:
+            text = f"required >= {requirement.min}"
+        else:
+            text = f"required {requirement.min} ... {requirement.max}"
+        return cls(dimension, low, high, text)
+
+    def met(self, value: float | None) -> bool:
+        """Return whether a value keeps both bounds."""
+        if value is None:
+            return False
+        high = self.max is None or value <= self.max + ROUNDING * abs(self.max)
+        return high and (self.min is None or value >= self.min - ROUNDING * abs(self.min))
+
+    def margin(self, item: Value) -> float:
+        """Return how far a value is inside the bounds; least for none."""
+        if item.value is None:
+            return -float("inf")
+        gaps = [item.value - self.min] if self.min is not None else []
+        return min([*gaps, self.max - item.value] if self.max is not None else gaps)
+
+    def sentence(self, metric: str, item: Value, over: str) -> str:
+        """Return the outcome in one line."""
+        name, branch = split_name(metric)
+        words = name.replace("_", " ") + (f" on {branch}" if branch else "")
+        if item.value is None:
+            return f"{words}{over}: no value ({item.reason}), {self.text}: missed"
+        return f"{words} {self.shown(item.value)}{over}, {self.text}: {'ok' if self.met(item.value) else 'missed'}"
+
+    def shown(self, value: float) -> str:
+        """Return a value rounded for reading, but never so far that it seems to be on the other side of a bound."""
+        for digits in range(4, 18):
+            rounded = float(f"{to_border(value, self.dimension):.{digits}g}") / float(to_border(1.0, self.dimension))
+            if self.met(rounded) == self.met(value):
+                break
+        if self.dimension == "ratio" and "%" not in self.text:
+            return f"{value:.{digits}g}"
+        return format_short(value, self.dimension, digits)
+
 
 _MOTION = {"force": "length", "torque": "angle"}
 
@@ -207,7 +271,7 @@ def _outcome(
     definition = _meant(requirement, table[split_name(requirement.metric)[0]])
     window = _window(requirement, result)
     values = _values(requirement.metric, definition, survey_of(result, window, surveys), result)
-    limits = Limits.of(requirement, definition.dimension)
+    limits = Bounds.of(requirement, definition.dimension)
     value = min(values, key=limits.margin)
     kind = kind_of(result) or "force"
     measured = window if definition.scope != "value" else None

@@ -35,7 +35,7 @@ _FEET = 12
 
 
 @dataclass(frozen=True)
-class Frame:
+class CurveFrame:
     """A smooth curve at some parameters.
 
     Attributes
@@ -62,7 +62,7 @@ class SmoothCurve(Protocol):
     def ends(self) -> tuple[float, float]:
         """First and last parameter."""
 
-    def frame(self, parameter: FloatArray) -> Frame:
+    def frame(self, parameter: FloatArray) -> CurveFrame:
         """Return the curve at parameters between its ends."""
 
 

@@ -2,7 +2,7 @@
 
 `style` is the look, `place` writes names where nothing else is, `curves` and `loop`
 draw force over displacement, `bands` the requirements on it, `diagram` everything
-else over a common axis, `parts` mechanical parts to scale, `render` all of it as PNG.
+else over a common axis, `parts` mechanical parts to scale, `figures` all that there is of a result.
 """
 
 from cfmkit.plots.home import find_room

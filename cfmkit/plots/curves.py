@@ -39,7 +39,7 @@ NAME_ROOM = 0.2
 
 
 @dataclass(frozen=True)
-class Look:
+class CurveLook:
     """What `plot_curve` draws beside the lines.
 
     Attributes
@@ -74,7 +74,7 @@ class _Line:
 
 
 @styled
-def plot_curve(source: Result | Curve | Sequence[Curve], ax: Axes, look: Look | None = None) -> Axes:
+def plot_curve(source: Result | Curve | Sequence[Curve], ax: Axes, look: CurveLook | None = None) -> Axes:
     """Draw one or several curves on axes; return the axes.
 
     Parameters
@@ -83,10 +83,10 @@ def plot_curve(source: Result | Curve | Sequence[Curve], ax: Axes, look: Look | 
         A result also brings its requirements.
     ax : Axes
         To draw on.
-    look : Look, optional
+    look : CurveLook, optional
         What to draw beside the lines.
     """
-    look = look or Look()
+    look = look or CurveLook()
     curves = _curves(source)
     lines = _lines(curves)
     for line in lines:
@@ -194,7 +194,7 @@ def _motion(kind: str) -> str:
     return "length" if kind == "force" else "angle"
 
 
-def _limit(ax: Axes, drawn: tuple[list[_Line], Sequence[Band]], look: Look, kind: str) -> None:
+def _limit(ax: Axes, drawn: tuple[list[_Line], Sequence[Band]], look: CurveLook, kind: str) -> None:
     """Set limits that show everything from zero on, or what the look asks for."""
     motion, (lines, bands) = _motion(kind), drawn
     if look.window is not None:

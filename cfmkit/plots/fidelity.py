@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.plots.curves import Look, plot_curve
+from cfmkit.plots.curves import CurveLook, plot_curve
 from cfmkit.plots.diagram import padded
 from cfmkit.plots.place import Label, place_labels
 from cfmkit.plots.style import GREY, LINES, axes_mm, new_figure, styled
@@ -62,7 +62,7 @@ def fidelity_figure(heading: Heading, curves: Sequence[Curve], gaps: Sequence[Ga
     write_heading(figure, heading)
     room = 96.0 - heading.height_mm
     upper, lower = axes_mm(figure, (17, 43, 138, room - 41.0)), axes_mm(figure, (17, 12, 138, 26))
-    plot_curve(list(curves), upper, Look(arrows=False))
+    plot_curve(list(curves), upper, CurveLook(arrows=False))
     upper.set_xlabel("")
     upper.tick_params(labelbottom=False)
     lower.set_xlim(upper.get_xlim())

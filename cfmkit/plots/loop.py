@@ -13,7 +13,7 @@ import numpy as np
 
 from cfmkit.metrics.evaluation import window_of
 from cfmkit.plots.bands import bands_of
-from cfmkit.plots.curves import Look, plot_curve
+from cfmkit.plots.curves import CurveLook, plot_curve
 from cfmkit.plots.style import GREY, axes_mm, new_figure, styled
 from cfmkit.plots.text import Heading, finite_range, write_heading
 from cfmkit.specs.units import to_border
@@ -35,19 +35,19 @@ LEAST = 0.002
 
 
 @styled
-def loop_figure(result: Result, look: Look | None = None, subject: str = "") -> Figure:
+def loop_figure(result: Result, look: CurveLook | None = None, subject: str = "") -> Figure:
     """Return the force-displacement (or torque-angle) curve of a result, enlarged where it is flat.
 
     Parameters
     ----------
     result : Result
         With at least one curve.
-    look : Look, optional
+    look : CurveLook, optional
         Levels and regions to draw as well.
     subject : str
         For the heading; default: what is drawn over what.
     """
-    look = look or Look()
+    look = look or CurveLook()
     curve = result.curve
     figure = new_figure()
     heading = Heading.of(result, subject or f"{curve.kind} over {curve.motion_name}")
@@ -75,7 +75,7 @@ def _across(upper: Axes, curve: Curve) -> Interval:
     return float(from_border(low, curve.motion_dimension)), float(from_border(high, curve.motion_dimension))
 
 
-def enlarged(result: Result, look: Look) -> tuple[Interval, Interval] | None:
+def enlarged(result: Result, look: CurveLook) -> tuple[Interval, Interval] | None:
     """Return motion and effort [SI] that deserve a panel of their own; None if the whole shows them well."""
     curve = result.curve
     bands = bands_of(result)

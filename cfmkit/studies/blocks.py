@@ -9,7 +9,7 @@ import numpy as np
 from cfmkit.families import family
 from cfmkit.families.base import Block, Measure
 from cfmkit.metrics import metrics_by_name, other_name, split_name, values_of_family
-from cfmkit.metrics.limits import ROUNDING, Limits
+from cfmkit.metrics.requirements import ROUNDING, Bounds
 from cfmkit.specs.units import Share
 from cfmkit.studies.rows import Rows, gathered
 
@@ -148,8 +148,8 @@ def _one(
     return np.asarray(np.take_along_axis(stack, farthest[None], axis=0)[0])
 
 
-def _keeping(limits: Limits, values: FloatArray) -> NDArray[np.bool_]:
-    """Return which values keep the bounds, as `Limits.met` says it of one; NaN does not."""
+def _keeping(limits: Bounds, values: FloatArray) -> NDArray[np.bool_]:
+    """Return which values keep the bounds, as `Bounds.met` says it of one; NaN does not."""
     kept: NDArray[np.bool_] = ~np.isnan(values)
     if limits.max is not None:
         kept &= values <= limits.max + ROUNDING * abs(limits.max)
@@ -164,7 +164,7 @@ def _met(study: Study, answer: BlockAnswer) -> NDArray[np.bool_]:
     met = np.ones((len(answer.done), len(study.spec.requirements)), dtype=bool)
     for k, one in enumerate(study.spec.requirements):
         plain, branch = split_name(one.metric)
-        limits = Limits.of(one, known[plain].dimension)
+        limits = Bounds.of(one, known[plain].dimension)
         by_branch = answer.values[len(study.metrics) + k]
         chosen = [values for name, values in by_branch.items() if branch in (None, name)]
         for values in chosen:

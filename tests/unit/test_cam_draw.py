@@ -13,7 +13,7 @@ import cfmkit
 from cfmkit.families import family
 from cfmkit.families.cam.draw import draw_mechanism, figures, regions
 from cfmkit.families.cam.pose import scene, start_curve, surface, swallowtail
-from cfmkit.plots.render import render
+from cfmkit.plots.figures import figures as pictures
 from cfmkit.plots.style import axes_mm, new_figure, style
 
 CONFIGS = Path(__file__).parents[2] / "configs"
@@ -208,7 +208,7 @@ def test_there_is_a_picture_of_undercut_only_where_it_is():
 def test_a_cam_that_cannot_be_built_has_no_pictures():
     result = cfmkit.analyze(cfmkit.load(CAM, ["mechanism.brace_length=60 mm"]))
     assert not result.curves
-    assert render(family("cam"), result) == {}
+    assert pictures(family("cam"), result) == {}
 
 
 def texts_of(figure):

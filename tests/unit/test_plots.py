@@ -19,9 +19,9 @@ from plot_support import axes, data_lines, loop_curve, result_of
 
 from cfmkit.families.base import Family
 from cfmkit.plots.curves import plot_curve
+from cfmkit.plots.figures import figures
 from cfmkit.plots.loop import loop_figure
 from cfmkit.plots.place import Label, place_labels
-from cfmkit.plots.render import render
 from cfmkit.plots.style import BAND, GREY, INK, LINES, OCHRE, TAN, TROUBLE, new_figure, png, style
 from cfmkit.plots.text import Heading, axis_label, top_axis, value_text, write_heading
 from cfmkit.results import Result, Status
@@ -56,10 +56,11 @@ PROBE = """
 import hashlib, sys
 import cfmkit
 from cfmkit.families import family
-from cfmkit.plots.render import render
+from cfmkit.plots.figures import figures
+from cfmkit.plots.style import png
 result = cfmkit.analyze(cfmkit.load(sys.argv[1]))
-for name, data in sorted(render(family("cam"), result).items()):
-    print(name, hashlib.sha256(data).hexdigest())
+for name, draw in sorted(figures(family("cam"), result).items()):
+    print(name + ".png", hashlib.sha256(png(draw())).hexdigest())
 print("imported", sorted({"matplotlib.pyplot", "scipy", "tkinter", "pandas"} & set(sys.modules)))
 """
 
@@ -307,14 +308,14 @@ def test_what_lies_outside_the_axes_gets_no_name():
 
 def test_a_family_without_pictures_of_its_own_still_gets_its_curve():
     family = Family("any", "", Spec, lambda spec, run: result_of())
-    found = render(family, result_of())
-    assert list(found) == ["curve.png"]
-    assert found["curve.png"].startswith(b"\x89PNG")
+    found = figures(family, result_of())
+    assert list(found) == ["curve"]
+    assert png(found["curve"]()).startswith(b"\x89PNG")
 
 
 def test_nothing_solved_is_nothing_drawn():
     family = Family("any", "", Spec, lambda spec, run: result_of())
-    assert render(family, Result(result_of().spec, Status.INFEASIBLE)) == {}
+    assert figures(family, Result(result_of().spec, Status.INFEASIBLE)) == {}
 
 
 @pytest.mark.parametrize("named", [False, True])

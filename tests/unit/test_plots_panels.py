@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from cfmkit.plots.findings import Findings, Line, Scale
-from cfmkit.plots.panels import MOST_PANELS, draw_panels, fit_panels
-from cfmkit.plots.study import figures
+from cfmkit.plots.study import MOST_PANELS, draw_panels, figures, fit_panels
 
 
 def study(first, second):

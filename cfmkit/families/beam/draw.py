@@ -16,7 +16,7 @@ from cfmkit.families.beam.surface import ride
 from cfmkit.families.beam.values import natural, window_of
 from cfmkit.plots import parts
 from cfmkit.plots.bands import limits_on
-from cfmkit.plots.curves import Look
+from cfmkit.plots.curves import CurveLook
 from cfmkit.plots.diagram import Diagram, Limit, Region, Scale, Series, diagram_figure
 from cfmkit.plots.loop import loop_figure
 from cfmkit.plots.moving import Moving, chosen
@@ -87,7 +87,7 @@ def curve(result: Result) -> Figure:
     if nominal is not None and start is not None and result.spec.analysis.window is not None:  # type: ignore[attr-defined]
         levels.append(Limit(0.95 * nominal, f"0.95 F_d: from {value_text(start, 'length')}"))
         levels.append(Limit(nominal, f"F_d = {value_text(nominal, 'force')} at {value_text(end, 'length')}"))
-    look = Look(levels=tuple(levels), regions=tuple(regions))
+    look = CurveLook(levels=tuple(levels), regions=tuple(regions))
     only = replace(result, curves=result.curves[:1])
     return loop_figure(only, look, f"{result.curve.kind} over {result.curve.motion_name}")
 

@@ -12,7 +12,7 @@ from cfmkit.families.cam.pose import moment, pivoting, pose, scene, spring_count
 from cfmkit.families.cam.values import theoretical_force
 from cfmkit.plots import parts
 from cfmkit.plots.bands import limits_on
-from cfmkit.plots.curves import Look, plot_curve
+from cfmkit.plots.curves import CurveLook, plot_curve
 from cfmkit.plots.diagram import Diagram, Limit, Region, Scale, Series, diagram_figure
 from cfmkit.plots.loop import loop_figure
 from cfmkit.plots.moving import Moving, chosen
@@ -96,7 +96,7 @@ def loop(result: Result) -> Figure:
     solution: Solution = result.state
     force = theoretical_force(solution)
     name = "4KA + slider's weight" if solution.assembly.loads.slider_weight else "4KA"
-    look = Look(levels=(Limit(force, f"{name} = {value_text(force, 'force')}"),), regions=tuple(regions(solution)))
+    look = CurveLook(levels=(Limit(force, f"{name} = {value_text(force, 'force')}"),), regions=tuple(regions(solution)))
     return loop_figure(result, look, "force over travel of the slider")
 
 
@@ -246,7 +246,7 @@ def undercut(result: Result) -> Figure:
     _roller_on_corner(solution, whole, view)
     _cut_away(solution, detail, view)
     region = Region(solution.origin, solution.origin + solution.corner_travel, "on the corner")
-    look = Look(levels=(Limit(force, value_text(force, "force")),), regions=(region,))
+    look = CurveLook(levels=(Limit(force, value_text(force, "force")),), regions=(region,))
     plot_curve(start_curve(solution, 3.0 * solution.corner_travel), costs, look).set_ylabel("")
     return figure
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.families.cam.solution import Assembly
     from cfmkit.families.cam.spec import Manufacturing
-    from cfmkit.numerics.registration import Frame
+    from cfmkit.numerics.registration import CurveFrame
 
 
 WAVES = 24
@@ -44,7 +44,7 @@ class DrawnError:
         [m].
     angle : float
         About the origin, positive where the cam grows wider towards the top [rad].
-    nominal : Frame
+    nominal : CurveFrame
         The design at `arc`.
     arc : (n,) array
         [m].
@@ -55,7 +55,7 @@ class DrawnError:
     phase: FloatArray
     offset: float
     angle: float
-    nominal: Frame
+    nominal: CurveFrame
     arc: FloatArray
 
     @property
@@ -119,7 +119,9 @@ def force_band(assembly: Assembly, tolerance: Manufacturing, travel: FloatArray,
     return ForceBand(travel, forces, designed.forces(loads, 0.0, loads.rest_half_width)[0])
 
 
-def _drawn(generator: np.random.Generator, tolerance: Manufacturing, nominal: Frame, places: FloatArray) -> DrawnError:
+def _drawn(
+    generator: np.random.Generator, tolerance: Manufacturing, nominal: CurveFrame, places: FloatArray
+) -> DrawnError:
     longest = float(places[-1])
     shortest = min(tolerance.wavelength, longest)
     lengths = np.exp(generator.uniform(np.log(shortest), np.log(longest), WAVES))
@@ -134,7 +136,7 @@ def _drawn(generator: np.random.Generator, tolerance: Manufacturing, nominal: Fr
     )
 
 
-def _track(assembly: Assembly, built: Frame, slider: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _track(assembly: Assembly, built: CurveFrame, slider: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return x [m] and slope of the roller's centre, a radius away from every point of the flank; NaN outside."""
     mechanism = assembly.spec.mechanism
     x, y = (built.points + mechanism.roller_radius * built.normals).T

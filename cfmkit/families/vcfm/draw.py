@@ -16,7 +16,7 @@ from cfmkit.families.vcfm.scene import scene
 from cfmkit.families.vcfm.solution import force_of
 from cfmkit.families.vcfm.windows import flat_window
 from cfmkit.plots import parts
-from cfmkit.plots.curves import Look, plot_curve
+from cfmkit.plots.curves import CurveLook, plot_curve
 from cfmkit.plots.diagram import Diagram, Limit, Region, Scale, Series, diagram_figure
 from cfmkit.plots.loop import loop_figure
 from cfmkit.plots.moving import Moving, chosen
@@ -70,7 +70,7 @@ def force(result: Result) -> Figure:
     flat, alone = value_text(solution.parts.balance, "length"), solution.constant_force
     levels = () if alone is None else (Limit(alone, f"the spring alone, at {flat}"),)
     nominal = replace(result, curves=result.curves[:1])
-    look = Look(levels=levels, regions=_beyond(solution))
+    look = CurveLook(levels=levels, regions=_beyond(solution))
     return loop_figure(nominal, look, "force over travel of the shuttle, from the as-made pose")
 
 
@@ -141,7 +141,7 @@ def _curves(result: Result, subject: str, shifted: bool) -> Figure:
     for curve, push in zip(result.curves, solution.pushes, strict=True):
         back = (push.rest or 0.0) if shifted else 0.0
         curves.append(Curve(curve.motion - back, curve.effort, curve.branch, curve.stable, label=curve.label))
-    plot_curve(curves, ax, Look(arrows=False))
+    plot_curve(curves, ax, CurveLook(arrows=False))
     for number, (push, window) in enumerate(zip(solution.pushes, solution.windows, strict=True)):
         if window is not None:
             _mark(ax, push, window, (push.rest or 0.0) if shifted else 0.0, LINES[number % len(LINES)])

@@ -11,7 +11,7 @@ import numpy as np
 from cfmkit.errors import Problem, SolutionError, SpecError, UsageError
 from cfmkit.families import family
 from cfmkit.metrics import check, values_of_family
-from cfmkit.metrics.limits import Limits
+from cfmkit.metrics.requirements import Bounds
 from cfmkit.results import Finding
 from cfmkit.specs.units import Share, border_unit, format_short, to_border
 from cfmkit.studies.columns import metrics_of
@@ -110,10 +110,10 @@ class Setup:
         """Ranges of the parameters, (d, 2)."""
         return np.array([one.spread.ends for one in self.parameters])
 
-    def limits(self, metric: Metric) -> tuple[Limits, ...]:
+    def limits(self, metric: Metric) -> tuple[Bounds, ...]:
         """Return the requirements on a metric over its window, as bounds."""
         mine = [one for one in self.study.spec.requirements if _noted(one) == (metric.name, metric.over)]
-        return tuple(Limits.of(one, metric.dimension) for one in mine)
+        return tuple(Bounds.of(one, metric.dimension) for one in mine)
 
 
 def prepare(spec: Spec, seed: int | None = None, most: int = MOST_POINTS) -> Setup:

@@ -6,7 +6,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from cfmkit.plots import parts
-from cfmkit.plots.curves import Look
+from cfmkit.plots.curves import CurveLook
 from cfmkit.plots.diagram import Limit
 from cfmkit.plots.loop import loop_figure
 from cfmkit.plots.style import new_figure, styled
@@ -30,7 +30,7 @@ def loop(result: Result) -> Figure:
     """Return the force over the displacement, with the force of the plateau."""
     force = result.values["plateau_force"].value or 0.0
     level = Limit(force, f"oblique springs flat: {value_text(force, 'force')}")
-    return loop_figure(result, Look(levels=(level,)), "force over travel of the slider")
+    return loop_figure(result, CurveLook(levels=(level,)), "force over travel of the slider")
 
 
 @styled

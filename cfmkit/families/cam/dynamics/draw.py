@@ -9,7 +9,7 @@ import numpy as np
 
 from cfmkit.families.cam.values import constant_force
 from cfmkit.plots.bands import limits_on
-from cfmkit.plots.curves import Look
+from cfmkit.plots.curves import CurveLook
 from cfmkit.plots.diagram import Diagram, Limit, Region, Scale, Series, diagram_figure
 from cfmkit.plots.loop import loop_figure
 from cfmkit.plots.place import Label, place_labels
@@ -65,7 +65,7 @@ def motion(result: Result) -> Figure:
 def motion_force(result: Result) -> Figure:
     """Return the force over the displacement with the requirement bands, and the quasi-static one."""
     moved: Moved = result.state
-    figure = loop_figure(result, Look(), "force over displacement, in motion and at rest")
+    figure = loop_figure(result, CurveLook(), "force over displacement, in motion and at rest")
     over = to_border(moved.displacement, "length")
     points = np.column_stack([over, to_border(moved.static, "force")])
     moving = np.column_stack([over, to_border(moved.history.force, "force")])

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.families.cam.geometry.flank import BuiltFlank, DesignFlank, arc_lengths
-from cfmkit.numerics.registration import Frame, feet
+from cfmkit.numerics.registration import CurveFrame, feet
 from cfmkit.numerics.smoothing import smoothed
 
 if TYPE_CHECKING:
@@ -115,7 +115,7 @@ def _lift(
     return best, places[where]
 
 
-def _over_slider(centers: FloatArray, contact: Frame, brace: float) -> BuiltTrack:
+def _over_slider(centers: FloatArray, contact: CurveFrame, brace: float) -> BuiltTrack:
     x, y = centers.T
     slider = y + np.sqrt((brace - x) * (brace + x))
     # Where a wave makes the slider fall the roller jumps to the next place at which it rises beyond.

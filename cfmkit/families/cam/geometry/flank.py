@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.numerics.registration import Frame
+from cfmkit.numerics.registration import CurveFrame
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
@@ -35,13 +35,13 @@ class DesignFlank:
         """First and last path coordinate of the flank [m]."""
         return self.profile.start, self.profile.end
 
-    def frame(self, parameter: FloatArray) -> Frame:
+    def frame(self, parameter: FloatArray) -> CurveFrame:
         """Return the flank at path coordinates: the path's parallel at one roller radius."""
         law, radius = self.profile.path.law, self.profile.roller_radius
         slope, bend = law.slope(parameter), law.curvature_radius(parameter)
         length = np.hypot(1.0, slope)
         x, y = self.profile.flank(parameter)
-        return Frame(
+        return CurveFrame(
             np.column_stack([self.side * x, y]),
             np.column_stack([self.side / length, slope / length]),
             np.column_stack([self.side * slope / length, -1.0 / length]),
@@ -75,7 +75,7 @@ class BuiltFlank:
         """First and last arc length that was measured [m]."""
         return self.error.low, self.error.high
 
-    def frame(self, parameter: FloatArray) -> Frame:
+    def frame(self, parameter: FloatArray) -> CurveFrame:
         """Return the built flank at arc lengths of the design."""
         base = self.design.frame(np.interp(parameter, self.arc[1], self.arc[0]))
         error, slope, bend = (self.error.at(parameter, order) for order in range(3))
@@ -83,7 +83,7 @@ class BuiltFlank:
         tangents = (along[:, None] * base.tangents + slope[:, None] * base.normals) / length[:, None]
         # The change of the design's curvature along the flank is small beside the error's own bend.
         curvature = base.curvature / along - bend
-        return Frame(
+        return CurveFrame(
             base.points + error[:, None] * base.normals,
             tangents,
             np.column_stack([tangents[:, 1], -tangents[:, 0]]),

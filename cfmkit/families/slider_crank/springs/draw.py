@@ -13,7 +13,7 @@ from cfmkit.families.slider_crank.springs.stiffness import NEGATIVE
 from cfmkit.families.slider_crank.unit_springs import JOINTS
 from cfmkit.plots import parts
 from cfmkit.plots.bands import limits_on
-from cfmkit.plots.curves import Look, plot_curve
+from cfmkit.plots.curves import CurveLook, plot_curve
 from cfmkit.plots.diagram import Diagram, Limit, Scale, Series, diagram_figure
 from cfmkit.plots.loop import loop_figure
 from cfmkit.plots.moving import Moving, chosen
@@ -320,7 +320,7 @@ def _key_curve(
     """Draw the curve small, with the key positions on it."""
     solution: Solution = result.state
     ax = axes_mm(figure, box)
-    plot_curve(result, ax, Look(bands=False, arrows=False, names=False))
+    plot_curve(result, ax, CurveLook(bands=False, arrows=False, names=False))
     drive, dimension = solution.assembly.drive, motion_scale(solution).dimension
     names = []
     for key in keys:

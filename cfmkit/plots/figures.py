@@ -1,4 +1,4 @@
-"""All pictures of a result as PNG, drawn by its family or, where that draws none, by the curve alone."""
+"""All pictures of a result, drawn by its family or, where that draws none, by the curve alone."""
 
 from __future__ import annotations
 
@@ -33,13 +33,3 @@ def figures(family: Family, result: Result) -> Mapping[str, Callable[[], Figure]
         return {"curve": partial(loop_figure, result)}
     makers: Mapping[str, Callable[[], Figure]] = import_module(family.draw).figures(result)
     return makers
-
-
-def render(family: Family, result: Result) -> dict[str, bytes]:
-    """Return every picture of a result as PNG, by file name: ``loop.png`` and so on."""
-    makers = figures(family, result)
-    if not makers:
-        return {}
-    from cfmkit.plots.style import png
-
-    return {f"{stem}.png": png(draw()) for stem, draw in makers.items()}
