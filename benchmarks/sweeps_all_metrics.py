@@ -42,11 +42,11 @@ def measured(name: str, configs: Path, singly: bool) -> tuple[float, int, bool]:
     """Return processor time of a sweep [s], its rows, and whether blocks were used."""
     import cfmkit
     from cfmkit.studies import engine
-    from cfmkit.studies.sweep import Request, outputs, prepare, summary_of
+    from cfmkit.studies.sweep import SweepRequest, outputs, prepare, summary_of
     from cfmkit.studies.variation import wish
 
     file, *vary = SWEEPS[name]
-    work = prepare(cfmkit.load(configs / file), Request(vary=tuple(wish(one) for one in vary)))
+    work = prepare(cfmkit.load(configs / file), SweepRequest(vary=tuple(wish(one) for one in vary)))
     if singly:
         engine.vectorised = lambda *_: False
     start = time.process_time()

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cfmkit.cli.options import Common, option
 
 if TYPE_CHECKING:
-    from cfmkit.experiment.measured import Measured
+    from cfmkit.experiment.measured import MeasuredCurves
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,7 +63,7 @@ def data_record(name: str) -> dict[str, Any]:
     return {"data": {"source": name, "sha256": file_hash(Path(name).resolve())}}
 
 
-def read_measured(name: str, options: Measuring) -> Measured:
+def read_measured(name: str, options: Measuring) -> MeasuredCurves:
     """Return the measurement in a file, raw."""
     from cfmkit.experiment.measured import read_measured as read
 

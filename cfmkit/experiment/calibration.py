@@ -18,7 +18,7 @@ from cfmkit.experiment.parameters import DATA, ZEROS
 from cfmkit.families import family
 from cfmkit.families.base import Run
 from cfmkit.metrics import Window
-from cfmkit.numerics.fit import Fit, LeastSquares, Loss, NotFinite, lack_of_fit, solve, unidentifiable
+from cfmkit.numerics.fit import FittedValues, LeastSquares, Loss, NotFinite, lack_of_fit, solve, unidentifiable
 from cfmkit.results import Finding
 from cfmkit.specs.units import format_short
 
@@ -26,8 +26,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.experiment.measured import Measured
-    from cfmkit.experiment.parameters import Parameter
+    from cfmkit.experiment.measured import MeasuredCurves
+    from cfmkit.experiment.parameters import FitParameter
     from cfmkit.results import Result
     from cfmkit.specs.spec import Spec
 
@@ -59,9 +59,9 @@ class Calibration:
     ----------
     spec : Spec
         With the fitted values, complete.
-    parameters : tuple of Parameter
+    parameters : tuple of FitParameter
         What was fitted.
-    fit : Fit
+    fit : FittedValues
         Values and their uncertainty, in the order of the parameters.
     before, after : Comparison
         Model and measurement at the start and at the end; the latter less the fitted zeros.
@@ -74,8 +74,8 @@ class Calibration:
     """
 
     spec: Spec
-    parameters: tuple[Parameter, ...]
-    fit: Fit
+    parameters: tuple[FitParameter, ...]
+    fit: FittedValues
     before: Comparison
     after: Comparison
     result: Result
@@ -92,8 +92,8 @@ def resolved(spec: Spec) -> Spec:
 
 def calibrate(
     spec: Spec,
-    source: Measured,
-    parameters: Sequence[Parameter],
+    source: MeasuredCurves,
+    parameters: Sequence[FitParameter],
     loss: Loss = "soft_l1",
     window: Window | None = None,
 ) -> Calibration:
@@ -103,9 +103,9 @@ def calibrate(
     ----------
     spec : Spec
         Resolved; its values are the start.
-    source : Measured
+    source : MeasuredCurves
         What was measured.
-    parameters : sequence of Parameter
+    parameters : sequence of FitParameter
         What to fit.
     loss : {"linear", "soft_l1", "huber", "cauchy"}
         Robust ones give outliers less weight.
@@ -130,7 +130,9 @@ def calibrate(
     return Calibration(fitted, tuple(parameters), fit, before, after, result, zeros, warnings)
 
 
-def _compared(spec: Spec, source: Measured, parameters: Sequence[Parameter], window: Window | None) -> Comparison:
+def _compared(
+    spec: Spec, source: MeasuredCurves, parameters: Sequence[FitParameter], window: Window | None
+) -> Comparison:
     """Return the start beside the measurement, where the model exists for every zero that is tried."""
     result = _analysed(spec)
     found = compare(result, source, window)
@@ -145,11 +147,11 @@ def _compared(spec: Spec, source: Measured, parameters: Sequence[Parameter], win
     return compare(result, source, Window(low, high))
 
 
-def _is_shift(item: Parameter) -> bool:
+def _is_shift(item: FitParameter) -> bool:
     return item.path in (f"{DATA}displacement_offset", f"{DATA}angle_offset")
 
 
-def _zeros(parameters: Sequence[Parameter], values: FloatArray) -> Zeros:
+def _zeros(parameters: Sequence[FitParameter], values: FloatArray) -> Zeros:
     """Return what the parameters say of the recording."""
     found = {"effort": 0.0, "motion": 0.0, "drift": 0.0}
     for item, value in zip(parameters, values, strict=True):
@@ -166,13 +168,13 @@ def _analysed(spec: Spec) -> Result:
     return result
 
 
-def _with_values(spec: Spec, parameters: Sequence[Parameter], values: FloatArray) -> Spec:
+def _with_values(spec: Spec, parameters: Sequence[FitParameter], values: FloatArray) -> Spec:
     changes = {item.path: float(value) for item, value in zip(parameters, values, strict=True)}
     changes = {path: value for path, value in changes.items() if not path.startswith(DATA)}
     return spec.replace(changes) if changes else spec
 
 
-def _problem(spec: Spec, before: Comparison, parameters: Sequence[Parameter]) -> LeastSquares:
+def _problem(spec: Spec, before: Comparison, parameters: Sequence[FitParameter]) -> LeastSquares:
     columns = np.array([(item.start, item.low, item.high, item.size) for item in parameters]).T
     level = float(np.abs(np.concatenate([item.effort for item in before.samples])).max())
     nothing = np.full(sum(len(item.motion) for item in before.samples), np.nan)
@@ -188,7 +190,7 @@ def _problem(spec: Spec, before: Comparison, parameters: Sequence[Parameter]) ->
     return LeastSquares(residuals, columns[0], columns[1], columns[2], columns[3], level)
 
 
-def _check(problem: LeastSquares, values: FloatArray, parameters: Sequence[Parameter]) -> None:
+def _check(problem: LeastSquares, values: FloatArray, parameters: Sequence[FitParameter]) -> None:
     """Raise if the data do not determine the parameters at some values."""
     try:
         groups = unidentifiable(problem, values)
@@ -208,7 +210,7 @@ def _undetermined(paths: Sequence[str]) -> str:
     return f"the measured curve cannot tell {told} apart: one makes up for the other; fit only one of them"
 
 
-def _warnings(parameters: Sequence[Parameter], fit: Fit) -> list[Finding]:
+def _warnings(parameters: Sequence[FitParameter], fit: FittedValues) -> list[Finding]:
     """Return what is doubtful about a fit."""
     found, half = [], fit.half_widths()
     for k, item in enumerate(parameters):
@@ -229,7 +231,7 @@ def _warnings(parameters: Sequence[Parameter], fit: Fit) -> list[Finding]:
     return found
 
 
-def _misfit(parameters: Sequence[Parameter], fit: Fit, after: Comparison) -> list[Finding]:
+def _misfit(parameters: Sequence[FitParameter], fit: FittedValues, after: Comparison) -> list[Finding]:
     """Return whether the residuals are random; a value on its bound explains by itself why not."""
     if fit.at_bound.any() or not len(fit.residuals):
         return []

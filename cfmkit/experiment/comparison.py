@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.curves import Curve
-    from cfmkit.experiment.measured import Measured
+    from cfmkit.experiment.measured import MeasuredCurves
     from cfmkit.metrics.differences import Measure
     from cfmkit.results import Quantity, Result
 
@@ -134,14 +134,14 @@ _ERRORS: dict[str, Measure] = {
 """What is told about the errors: name -> (function, definition)."""
 
 
-def compare(result: Result, source: Measured, window: Window | None = None) -> Comparison:
+def compare(result: Result, source: MeasuredCurves, window: Window | None = None) -> Comparison:
     """Return a model beside a measurement.
 
     Parameters
     ----------
     result : Result
         With a curve.
-    source : Measured
+    source : MeasuredCurves
         What was measured; its raw points are compared.
     window : Window, optional
         Default: ``analysis.window``; in any case only where both exist on every branch.
@@ -196,7 +196,7 @@ def _averaged(samples: Samples, places: FloatArray) -> FloatArray:
     return averaged
 
 
-def _common(curve: Curve, source: Measured, wanted: Window | None, branches: set[str]) -> Window:
+def _common(curve: Curve, source: MeasuredCurves, wanted: Window | None, branches: set[str]) -> Window:
     """Return where every branch of model and measurement exists, inside the window that is wanted."""
     from cfmkit.experiment.measured import common_window
 
@@ -214,7 +214,7 @@ def _common(curve: Curve, source: Measured, wanted: Window | None, branches: set
     return common
 
 
-def _samples(source: Measured, branch: str, mine: str, window: Window) -> Samples:
+def _samples(source: MeasuredCurves, branch: str, mine: str, window: Window) -> Samples:
     parts = [curve.on(branch) for curve in source.raw]
     slack = 1e-9 * (window.hi - window.lo)
     keep = [(part.motion >= window.lo - slack) & (part.motion <= window.hi + slack) for part in parts]

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.curves import Curve
     from cfmkit.experiment.comparison import Comparison, Samples
-    from cfmkit.experiment.measured import Measured, Measurement
+    from cfmkit.experiment.measured import MeasuredCurves, Measurement
     from cfmkit.metrics import Window
 
 LITTLE_MORE = 2.0
@@ -35,13 +35,13 @@ BINS = 1200
 """Columns of points that a picture can show: more samples are drawn as their extremes."""
 
 
-def figures(source: Measured, numbers: Measurement) -> dict[str, Callable[[], Figure]]:
+def figures(source: MeasuredCurves, numbers: Measurement) -> dict[str, Callable[[], Figure]]:
     """Return what draws each picture of a measurement, by file stem."""
     return {"loop": partial(loop, source, numbers)}
 
 
 @styled
-def loop(source: Measured, numbers: Measurement) -> Figure:
+def loop(source: MeasuredCurves, numbers: Measurement) -> Figure:
     """Return the measured loop: whole and raw above, the window with the filtered branches below."""
     window = numbers.window
     figure = new_figure()
@@ -92,7 +92,7 @@ def _range_in(curves: tuple[Curve, ...], window: tuple[float, float]) -> tuple[f
     return low - room, high + room
 
 
-def _note_window(source: Measured, window: Window, ax: Axes) -> None:
+def _note_window(source: MeasuredCurves, window: Window, ax: Axes) -> None:
     """Mark the window in which the numbers hold."""
     dimension = source.raw[0].motion_dimension
     low, high = (float(to_border(end, dimension)) for end in (window.lo, window.hi))

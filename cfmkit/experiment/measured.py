@@ -62,7 +62,7 @@ FINDINGS = {
 
 
 @dataclass(frozen=True)
-class Measured:
+class MeasuredCurves:
     """A recording as curves.
 
     Attributes
@@ -99,7 +99,7 @@ class Measured:
 
 def measured(
     recording: Recording, low_pass: LowPass | str | None = "default", leave_out: Collection[str] = ("reversals",)
-) -> Measured:
+) -> MeasuredCurves:
     """Return a recording as raw and filtered curves.
 
     Parameters
@@ -126,7 +126,7 @@ def measured(
     if turned_loop(raw):
         told = f"the {recording.kind} on the way up is smaller than on the way back, and every cycle would give energy"
         warnings = (*warnings, Finding("negative_loop", f"{told}: is the sign of a column turned?"))
-    plain = Measured(recording, strokes, raw, reached=reached, warnings=warnings)
+    plain = MeasuredCurves(recording, strokes, raw, reached=reached, warnings=warnings)
     if chosen is None:
         return plain
     try:
@@ -145,7 +145,7 @@ def read_measured(
     tare: str | float | None = None,
     zero: str | float | None = None,
     flip: Collection[str] = (),
-) -> Measured:
+) -> MeasuredCurves:
     """Return the raw curves in a lab file, spikes and passages at reversals left out.
 
     Parameters
@@ -282,7 +282,7 @@ def _curve(recording: Recording, cycle: Sequence[Stroke], effort: FloatArray, st
     return Curve(recording.motion[points], effort[points], branch, stable, extra, recording.kind, label)
 
 
-def elapsed(source: Measured, branch: str) -> FloatArray:
+def elapsed(source: MeasuredCurves, branch: str) -> FloatArray:
     """Return which part of the recording had passed at every raw point of a branch, cycle by cycle; 0 to 1.
 
     By the time where it was recorded, else by the number of points.
@@ -341,12 +341,12 @@ class Measurement:
     warnings: tuple[Finding, ...] = ()
 
 
-def numbers_of(source: Measured, frame: Frame | None = None, window: Window | None = None) -> Measurement:
+def numbers_of(source: MeasuredCurves, frame: Frame | None = None, window: Window | None = None) -> Measurement:
     """Return the metrics of a measured mechanism, raw and filtered, and its repeatability.
 
     Parameters
     ----------
-    source : Measured
+    source : MeasuredCurves
         With at least one cycle or branch.
     frame : Frame, optional
         Target and so on.
@@ -365,7 +365,7 @@ def numbers_of(source: Measured, frame: Frame | None = None, window: Window | No
     return Measurement(raw, _mean(smooth) if smooth else {}, each, window, warnings)
 
 
-def _window(source: Measured, wanted: Window | None) -> tuple[Window, tuple[Finding, ...]]:
+def _window(source: MeasuredCurves, wanted: Window | None) -> tuple[Window, tuple[Finding, ...]]:
     """Return where the numbers hold, and what is said where that is less than what was requested."""
     name, kind = source.recording.name, source.recording.kind
     try:
@@ -406,7 +406,7 @@ def common_window(curves: Sequence[Curve]) -> Window:
     return Window(lo + 0.0, hi + 0.0)  # no -0
 
 
-def require_loop(source: Measured) -> None:
+def require_loop(source: MeasuredCurves) -> None:
     """Refuse a recording that has no way back.
 
     Raises
@@ -437,6 +437,6 @@ def _mean(each: Sequence[Mapping[str, Quantity]]) -> dict[str, Quantity]:
 
 
 __all__ = [
-    "FINDINGS", "LEFT_OUT", "LOAD", "UNLOAD", "Measured", "Measurement", "common_window", "elapsed", "measured",
+    "FINDINGS", "LEFT_OUT", "LOAD", "UNLOAD", "MeasuredCurves", "Measurement", "common_window", "elapsed", "measured",
     "numbers_of", "read_measured", "require_loop",
 ]  # fmt: skip

@@ -36,7 +36,7 @@ INSIDE = 1e-9
 
 
 @dataclass(frozen=True)
-class Parameter:
+class FitParameter:
     """A number that is fitted.
 
     Attributes
@@ -64,7 +64,7 @@ def parameters(
     paths: Iterable[str],
     bounds: Mapping[str, tuple[float, float]] | None = None,
     recording: Recording | None = None,
-) -> tuple[Parameter, ...]:
+) -> tuple[FitParameter, ...]:
     """Return the parameters at some paths of a specification.
 
     Parameters
@@ -98,7 +98,7 @@ def parameters(
     )
 
 
-def _of_data(path: str, bounds: tuple[float, float] | None, recording: Recording | None) -> Parameter:
+def _of_data(path: str, bounds: tuple[float, float] | None, recording: Recording | None) -> FitParameter:
     """Return a zero of the recording to fit; it starts from none."""
     dimension = _zero(path, "--fit", recording)
     values = recording.motion if recording and path.endswith(("displacement_offset", "angle_offset")) else None
@@ -110,7 +110,7 @@ def _of_data(path: str, bounds: tuple[float, float] | None, recording: Recording
         low, high = bounds or (-math.inf, math.inf)
     if not low <= 0.0 <= high:
         raise UsageError(f"--fit: {path} starts at 0, outside its bounds {_range(low, high, dimension)}")
-    return Parameter(path, dimension, 0.0, low, high, size)
+    return FitParameter(path, dimension, 0.0, low, high, size)
 
 
 def _zero(path: str, option: str, recording: Recording | None) -> str:
@@ -123,7 +123,7 @@ def _zero(path: str, option: str, recording: Recording | None) -> str:
     return known[name]
 
 
-def _parameter(spec: Spec, path: str, bounds: tuple[float, float] | None) -> Parameter:
+def _parameter(spec: Spec, path: str, bounds: tuple[float, float] | None) -> FitParameter:
     try:
         found = leaf(type(spec), path)
     except CannotVary as problem:
@@ -142,7 +142,7 @@ def _parameter(spec: Spec, path: str, bounds: tuple[float, float] | None) -> Par
         raise UsageError(
             f"--fit: {path} starts at {_told(value, dimension)}, outside its bounds {_range(low, high, dimension)}"
         )
-    return Parameter(path, dimension, value, low, high, size)
+    return FitParameter(path, dimension, value, low, high, size)
 
 
 def _value(spec: Spec, path: str) -> float:

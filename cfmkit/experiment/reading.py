@@ -18,7 +18,7 @@ from cfmkit.arrays import FloatArray, read_only
 from cfmkit.errors import DataError, UsageError
 from cfmkit.specs.units.numbers import shown
 from cfmkit.tables.labheaders import ROLES, ColumnInfo, column_of, describe, is_unit_row, read_units, split_header
-from cfmkit.tables.labtext import SEPARATORS, Block, block_of, decoded, header_cells, refuse_group
+from cfmkit.tables.labtext import SEPARATORS, TextBlock, block_of, decoded, header_cells, refuse_group
 
 if TYPE_CHECKING:
     import os
@@ -31,7 +31,9 @@ HEADER_LINES = 5
 """So many lines above the numbers are searched for their names."""
 
 
-def columns_of(lines: list[str], block: Block, told: dict[str, str], name: str) -> tuple[list[ColumnInfo], int | None]:
+def columns_of(
+    lines: list[str], block: TextBlock, told: dict[str, str], name: str
+) -> tuple[list[ColumnInfo], int | None]:
     """Return the columns with what the lines above the numbers say of them, and the line with the names."""
     above = [index for index in range(block.first) if lines[index].strip()][-HEADER_LINES:]
     rows = [(index, header_cells(lines[index], block)) for index in reversed(above)]
@@ -246,7 +248,7 @@ def _content(path: Path) -> bytes:
         raise UsageError(f"{path} cannot be read: {getattr(error, 'strerror', None) or error}".lower()) from None
 
 
-def _values(lines: list[str], block: Block, columns: Sequence[ColumnInfo], name: str) -> list[FloatArray]:
+def _values(lines: list[str], block: TextBlock, columns: Sequence[ColumnInfo], name: str) -> list[FloatArray]:
     """Return the numbers of some columns in SI."""
     rows = lines[block.first : block.last]
     if block.dialect.decimal == ",":
@@ -291,7 +293,7 @@ def _in_si(values: FloatArray, column: ColumnInfo) -> FloatArray:
     return values * float(unit_size(unit).factor)
 
 
-def _refuse_in(rows: list[str], block: Block, name: str, columns: Sequence[ColumnInfo]) -> None:
+def _refuse_in(rows: list[str], block: TextBlock, name: str, columns: Sequence[ColumnInfo]) -> None:
     for row in rows:
         cells = block.dialect.cells(row)
         for column in columns:
@@ -299,7 +301,7 @@ def _refuse_in(rows: list[str], block: Block, name: str, columns: Sequence[Colum
                 refuse_group(cells[column.index], name)
 
 
-def _bad_cell(lines: list[str], block: Block, columns: Sequence[ColumnInfo], name: str) -> str:
+def _bad_cell(lines: list[str], block: TextBlock, columns: Sequence[ColumnInfo], name: str) -> str:
     """Return what is wrong with the first line of the block that cannot be used."""
     for number in range(block.first, block.last):
         cells = block.dialect.cells(lines[number])

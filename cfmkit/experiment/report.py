@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.curves import Column
-from cfmkit.experiment.measured import Measured, Measurement, numbers_of
+from cfmkit.experiment.measured import MeasuredCurves, Measurement, numbers_of
 from cfmkit.metrics import metrics_json, split_name
 from cfmkit.tables import Table, TableColumn, border_column, curve_table, to_csv
 
@@ -27,13 +27,13 @@ class MeasureReport:
 
     Attributes
     ----------
-    source : Measured
+    source : MeasuredCurves
         The curves.
     numbers : Measurement
         Their metrics.
     """
 
-    source: Measured
+    source: MeasuredCurves
     numbers: Measurement
 
     @property
@@ -68,12 +68,12 @@ def _ends(report: MeasureReport) -> dict[str, Any]:
     return {"from": low, "to": high, "unit": border_unit(dimension)}
 
 
-def report_on(source: Measured, frame: Frame | None = None, window: Window | None = None) -> MeasureReport:
+def report_on(source: MeasuredCurves, frame: Frame | None = None, window: Window | None = None) -> MeasureReport:
     """Return the report on a measured mechanism."""
     return MeasureReport(source, numbers_of(source, frame, window))
 
 
-def curves_table(source: Measured) -> Table:
+def curves_table(source: MeasuredCurves) -> Table:
     """Return all cycles, raw and filtered, as one table in border units."""
     curves = [_with_filtered(raw, number, source) for number, raw in enumerate(source.raw)]
     table = curve_table([replace(curve, label={}) for curve in curves])
@@ -83,7 +83,7 @@ def curves_table(source: Measured) -> Table:
     return Table((TableColumn("cycle", cycle), *table.columns))
 
 
-def _with_filtered(raw: Curve, number: int, source: Measured) -> Curve:
+def _with_filtered(raw: Curve, number: int, source: MeasuredCurves) -> Curve:
     if not source.filtered:
         return raw
     smooth = {f"{raw.kind}_filtered": Column(source.filtered[number].effort, raw.kind)}

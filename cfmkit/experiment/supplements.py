@@ -18,11 +18,11 @@ if TYPE_CHECKING:
 
     from cfmkit.experiment.calibration import Calibration
     from cfmkit.experiment.comparison import Comparison
-    from cfmkit.experiment.measured import Measured
+    from cfmkit.experiment.measured import MeasuredCurves
     from cfmkit.results import Quantity
 
 
-def comparison_data(comparison: Comparison, source: Measured) -> dict[str, Any]:
+def comparison_data(comparison: Comparison, source: MeasuredCurves) -> dict[str, Any]:
     """Return what metrics.json says about the data besides the errors, which are metrics."""
     from cfmkit.specs.units import border_unit, to_border
 
@@ -38,7 +38,7 @@ def comparison_data(comparison: Comparison, source: Measured) -> dict[str, Any]:
     }
 
 
-def comparison_lines(comparison: Comparison, source: Measured) -> tuple[tuple[str, str], ...]:
+def comparison_lines(comparison: Comparison, source: MeasuredCurves) -> tuple[tuple[str, str], ...]:
     """Return the paragraphs that a page shows: how the file was read, and the errors."""
     metrics, kind = comparison.metrics(), comparison.curve.kind
     several = len(comparison.samples) > 1
@@ -64,7 +64,7 @@ def causes_lines(causes: Mapping[str, Quantity]) -> tuple[tuple[str, str], ...]:
 
 
 def comparison_files(
-    comparison: Comparison, source: Measured, name: str, before: Comparison | None = None
+    comparison: Comparison, source: MeasuredCurves, name: str, before: Comparison | None = None
 ) -> Mapping[str, Callable[[], bytes]]:
     """Return what makes the files of a comparison: the measured curve, and the figure."""
     return {

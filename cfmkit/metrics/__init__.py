@@ -32,17 +32,17 @@ from cfmkit.metrics.table import (
     unknown_metric,
     values_of_family,
 )
-from cfmkit.metrics.traces import Trace, Undefined, Window, restrict, traces
+from cfmkit.metrics.traces import BranchTrace, Undefined, Window, restrict, traces
 
 __all__ = [
     "TABLE",
     "Branch",
+    "BranchTrace",
     "Cycle",
     "Definition",
     "Frame",
     "Outcome",
     "Survey",
-    "Trace",
     "Undefined",
     "Window",
     "as_json",

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.metrics.many import UNIFORM_POINTS
-from cfmkit.metrics.traces import Trace, Undefined, Window
+from cfmkit.metrics.traces import BranchTrace, Undefined, Window
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
@@ -114,7 +114,7 @@ def _common(one: Branch, other: Branch) -> Window:
 def _area(branch: Branch, window: Window) -> float:
     """Return the area under a branch, whichever way it runs."""
     part = branch.inside if window == branch.window else branch.part(window)
-    if not isinstance(part, Trace):
+    if not isinstance(part, BranchTrace):
         raise Undefined(part)
     way = np.sign(branch.trace.motion[-1] - branch.trace.motion[0])
     return float(way) * part.work()
@@ -137,7 +137,7 @@ def safety_factor(branch: Branch) -> float:
     return allowable / stress
 
 
-def _stress(trace: Trace) -> FloatArray:
+def _stress(trace: BranchTrace) -> FloatArray:
     if trace.stress is None:
         raise Undefined("the curve has no column 'max_stress'")
     if unknown := int(np.isnan(trace.stress).sum()):

@@ -14,7 +14,7 @@ import numpy as np
 
 from cfmkit.metrics import closed, many
 from cfmkit.metrics.many import ManyBranches
-from cfmkit.metrics.traces import ROUNDING, Trace, Undefined, Window, covers, restrict, traces
+from cfmkit.metrics.traces import ROUNDING, BranchTrace, Undefined, Window, covers, restrict, traces
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -97,7 +97,7 @@ class Branch:
 
     Attributes
     ----------
-    trace : Trace
+    trace : BranchTrace
         The whole branch, in path order.
     kind : {"force", "torque"}
         What its effort is.
@@ -107,7 +107,7 @@ class Branch:
         Where it is measured; None: everywhere.
     """
 
-    trace: Trace
+    trace: BranchTrace
     kind: Kind
     frame: Frame
     window: Window | None = None
@@ -128,11 +128,11 @@ class Branch:
         return (self.window.lo, self.window.hi) if self.window else self.extent
 
     @cached_property
-    def _inside(self) -> Trace | str:
+    def _inside(self) -> BranchTrace | str:
         part = self.part(self.window) if self.window else self.trace
         return part if isinstance(part, str) else self._solved(part)
 
-    def _solved(self, part: Trace) -> Trace | str:
+    def _solved(self, part: BranchTrace) -> BranchTrace | str:
         """Return a part all of whose points have a finite effort."""
         if isfinite(part.effort.sum()):
             return part
@@ -140,7 +140,7 @@ class Branch:
         return f"{failed} of {len(part.effort)} points of branch {self.name!r} in the window have no equilibrium"
 
     @property
-    def inside(self) -> Trace:
+    def inside(self) -> BranchTrace:
         """The part of the branch in the window.
 
         Raises
@@ -152,13 +152,13 @@ class Branch:
             raise Undefined(self._inside)
         return self._inside
 
-    def part(self, window: Window) -> Trace | str:
+    def part(self, window: Window) -> BranchTrace | str:
         """Return the part of the branch in some window, or why there is none."""
         if covers(self.extent, window):
             return self._asked(restrict(self.trace, window))
         return f"branch {self.name!r} covers {self.span(*self.extent)} only"
 
-    def _asked(self, part: Trace) -> Trace:
+    def _asked(self, part: BranchTrace) -> BranchTrace:
         """Return a part whose ends, where they lie between two samples, have effort and stress of the model."""
         model, motion = self.frame.closed, self.trace.motion
         if model is None or part is self.trace:
@@ -174,12 +174,12 @@ class Branch:
         return replace(part, effort=effort, stress=stress)
 
     @cached_property
-    def beside(self) -> tuple[Trace, ...]:
+    def beside(self) -> tuple[BranchTrace, ...]:
         """The same branch in the other load cases."""
         return tuple(one for curve in self.frame.load_cases for one in traces(curve) if one.name == self.name)
 
     @property
-    def inside_beside(self) -> tuple[Trace, ...]:
+    def inside_beside(self) -> tuple[BranchTrace, ...]:
         """What lies in the window of the other load cases, as far as each of them goes."""
         if self.window is None:
             return self.beside
@@ -389,7 +389,7 @@ def _bad(branch: Branch, reference: float) -> list[Interval]:
     return broken
 
 
-def _excess(trace: Trace, height: FloatArray) -> list[Interval]:
+def _excess(trace: BranchTrace, height: FloatArray) -> list[Interval]:
     """Return the intervals of the motion over which a piecewise linear height is positive, or no number."""
     bad = ~(height <= 0)
     if not bad.any():

@@ -57,7 +57,7 @@ class Window:
 
 
 @dataclass(frozen=True, eq=False)
-class Trace:
+class BranchTrace:
     """One branch of a curve, or the part of it inside a window, in path order.
 
     Attributes
@@ -97,7 +97,7 @@ class Trace:
         return float(steps @ (self.effort[1:] + self.effort[:-1])) / 2
 
 
-def traces(curve: Curve) -> tuple[Trace, ...]:
+def traces(curve: Curve) -> tuple[BranchTrace, ...]:
     """Return the branches of a curve in the order in which they first occur."""
     if not len(curve):
         return ()
@@ -109,9 +109,9 @@ def traces(curve: Curve) -> tuple[Trace, ...]:
     return tuple(_trace(curve, name, np.flatnonzero(curve.branch == name)) for name in dict.fromkeys(names))
 
 
-def _trace(curve: Curve, name: str, where: slice | NDArray[np.intp]) -> Trace:
+def _trace(curve: Curve, name: str, where: slice | NDArray[np.intp]) -> BranchTrace:
     stress = curve.extra["max_stress"].values[where] if "max_stress" in curve.extra else None
-    return Trace(name, curve.motion[where], curve.effort[where], stress)
+    return BranchTrace(name, curve.motion[where], curve.effort[where], stress)
 
 
 def covers(extent: tuple[float, float], window: Window) -> bool:
@@ -120,7 +120,7 @@ def covers(extent: tuple[float, float], window: Window) -> bool:
     return extent[0] <= window.lo + slack and extent[1] >= window.hi - slack
 
 
-def restrict(trace: Trace, window: Window) -> Trace:
+def restrict(trace: BranchTrace, window: Window) -> BranchTrace:
     """Return the part of a branch inside the window, with interpolated ends; the caller checks `covers`."""
     slack = TOLERANCE * (window.hi - window.lo)
     if trace.extent[0] >= window.lo - slack and trace.extent[1] <= window.hi + slack:
@@ -128,7 +128,7 @@ def restrict(trace: Trace, window: Window) -> Trace:
     return _straight(trace, window, slack) if trace.way else _folded(trace, window, slack)
 
 
-def _straight(trace: Trace, window: Window, slack: float) -> Trace:
+def _straight(trace: BranchTrace, window: Window, slack: float) -> BranchTrace:
     """Return the part of a branch that never turns back."""
     motion = trace.motion[:: trace.way]
     first, last = int(motion.searchsorted(window.lo - slack)), int(motion.searchsorted(window.hi + slack, "right"))
@@ -141,7 +141,9 @@ def _straight(trace: Trace, window: Window, slack: float) -> Trace:
         pieces = [_along(values, head), values[first:last], _along(values, tail)]
         return np.concatenate(pieces)[:: trace.way] if head or tail else pieces[1][:: trace.way]
 
-    return Trace(trace.name, cut(trace.motion), cut(trace.effort), None if trace.stress is None else cut(trace.stress))
+    return BranchTrace(
+        trace.name, cut(trace.motion), cut(trace.effort), None if trace.stress is None else cut(trace.stress)
+    )
 
 
 def _between(motion: FloatArray, after: int, place: float) -> tuple[int, float]:
@@ -157,13 +159,13 @@ def _along(values: FloatArray, where: tuple[int, float] | None) -> FloatArray:
     return before + part * (values[after : after + 1] - before)
 
 
-def _folded(trace: Trace, window: Window, slack: float) -> Trace:
+def _folded(trace: BranchTrace, window: Window, slack: float) -> BranchTrace:
     """Return the part of a branch that turns back: several runs, perhaps."""
     inside = (trace.motion >= window.lo - slack) & (trace.motion <= window.hi + slack)
     where, level = _crossings(trace.motion, window, slack)
     after = where.astype(np.intp) + 1
     kept = np.insert(inside, after, True)
-    return Trace(
+    return BranchTrace(
         trace.name,
         np.insert(trace.motion, after, level)[kept],
         _inserted(trace.effort, where, after)[kept],

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Axis:
+class BoxAxis:
     """A variable: its bounds, and whether its size matters rather than its difference.
 
     Attributes
@@ -68,7 +68,7 @@ class Lowest:
 
 
 def lowest(
-    function: Callable[[tuple[float, ...]], float], axes: tuple[Axis, ...], grid: int = 15, fine: int = 30
+    function: Callable[[tuple[float, ...]], float], axes: tuple[BoxAxis, ...], grid: int = 15, fine: int = 30
 ) -> Lowest:
     """Return where a function of bounded variables is smallest.
 
@@ -76,7 +76,7 @@ def lowest(
     ----------
     function : callable
         Of a tuple of as many values as there are axes; infinite where it does not exist.
-    axes : tuple of Axis
+    axes : tuple of BoxAxis
         The first is the outermost.
     grid : int
         Values of each variable on the grid.
@@ -89,7 +89,7 @@ def lowest(
     >>> [round(value, 5) for value in found.place]
     [0.3, 3.33333]
     """
-    return _lowest(_Search(function, axes, grid, fine), ())
+    return _lowest(_BoxSearch(function, axes, grid, fine), ())
 
 
 HOPELESS = 10.0
@@ -97,11 +97,11 @@ HOPELESS = 10.0
 
 
 @dataclass
-class _Search:
+class _BoxSearch:
     """A search under way: what is minimised, with how much effort, and the smallest value so far."""
 
     function: Callable[[tuple[float, ...]], float]
-    axes: tuple[Axis, ...]
+    axes: tuple[BoxAxis, ...]
     grid: int
     fine: int
     best: float = math.inf
@@ -114,7 +114,7 @@ class _Search:
         return math.isfinite(height) and (not self.rough or height <= HOPELESS * self.best)
 
 
-def _lowest(search: _Search, outer: tuple[float, ...]) -> Lowest:
+def _lowest(search: _BoxSearch, outer: tuple[float, ...]) -> Lowest:
     if len(outer) == len(search.axes):
         value = search.function(outer)
         search.best = min(search.best, value)

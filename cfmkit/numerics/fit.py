@@ -84,7 +84,7 @@ class LeastSquares:
 
 
 @dataclass(frozen=True)
-class Fit:
+class FittedValues:
     """The outcome of a fit.
 
     Attributes
@@ -174,7 +174,7 @@ def dependent_columns(jacobian: FloatArray, level: float) -> tuple[tuple[int, ..
     return tuple(dict.fromkeys(groups))
 
 
-def solve(problem: LeastSquares, loss: Loss = "soft_l1") -> Fit:
+def solve(problem: LeastSquares, loss: Loss = "soft_l1") -> FittedValues:
     """Return the best values, by a trust-region method within the bounds.
 
     Parameters
@@ -225,7 +225,7 @@ def _minimum(problem: LeastSquares, start: FloatArray, loss: Loss, scale: float)
     )
 
 
-def _fit(problem: LeastSquares, best: Any, loss: Loss) -> Fit:
+def _fit(problem: LeastSquares, best: Any, loss: Loss) -> FittedValues:
     values = best.x * problem.size
     residuals = problem.residuals(values)
     count, free = len(residuals), len(residuals) - len(values)
@@ -237,7 +237,9 @@ def _fit(problem: LeastSquares, best: Any, loss: Loss) -> Fit:
     inverse = (right.T / np.maximum(singular, 1e-14 * singular[0]) ** 2) @ right
     covariance = noise**2 * inflation * inverse * np.outer(problem.size, problem.size)
     freedom = max(count / inflation - len(values), 1.0)
-    return Fit(values, covariance, residuals, noise, inflation, best.active_mask != 0, freedom, bool(best.success))
+    return FittedValues(
+        values, covariance, residuals, noise, inflation, best.active_mask != 0, freedom, bool(best.success)
+    )
 
 
 @dataclass(frozen=True)

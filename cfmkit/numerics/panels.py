@@ -30,7 +30,7 @@ _TRANSFORM = chebyshev.chebvander(_UNIT, NODES - 1).T * (np.where(np.arange(NODE
 
 
 @dataclass(frozen=True)
-class Panels:
+class ChebyshevPanels:
     """A function that is one polynomial on each panel.
 
     Attributes
@@ -82,7 +82,7 @@ def coefficients(panel: tuple[float, float], x: FloatArray, values: FloatArray) 
 
 def resolved(
     functions: Callable[[FloatArray], FloatArray], ends: FloatArray, close: Sequence[float], halvings: int
-) -> tuple[Panels, ...]:
+) -> tuple[ChebyshevPanels, ...]:
     """Return functions as panels, each halved until the polynomials of all functions have converged on it.
 
     Parameters
@@ -125,4 +125,6 @@ def resolved(
         wanted = [half for (low, high), at in middles.items() for half in ((low, at), (at, high))]
     ordered = sorted(done)
     borders, spans = np.array([low for low, _ in ordered] + [ordered[-1][1]]), np.array(ordered)
-    return tuple(Panels(borders, spans, np.array([done[panel][k] for panel in ordered])) for k in range(len(close)))
+    return tuple(
+        ChebyshevPanels(borders, spans, np.array([done[panel][k] for panel in ordered])) for k in range(len(close))
+    )

@@ -20,7 +20,7 @@ _STIFFEST, _SOFTEST = 6.0, -14.0
 
 
 @dataclass(frozen=True)
-class Smooth:
+class SmoothedFunction:
     """A smooth function through noisy points.
 
     Attributes
@@ -45,7 +45,7 @@ class Smooth:
         return values if derivative == 0 else np.where(inside == places, values, 0.0)
 
 
-def smoothed(places: FloatArray, values: FloatArray, noise: float) -> Smooth:
+def smoothed(places: FloatArray, values: FloatArray, noise: float) -> SmoothedFunction:
     """Return the smoothest cubic spline that is as near to the points as their noise.
 
     Parameters
@@ -69,7 +69,7 @@ def smoothed(places: FloatArray, values: FloatArray, noise: float) -> Smooth:
     spline = _chosen((places - low) / unit, values, noise)
     moved = _in_places(spline, low, unit)
     residual = float(np.sqrt(np.mean((moved(places) - values) ** 2)))
-    return Smooth(moved, residual, low, high)
+    return SmoothedFunction(moved, residual, low, high)
 
 
 def _chosen(x: FloatArray, values: FloatArray, noise: float) -> Any:

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 _FAR = 1e3  # what a point without an answer counts, in units of the objective and of the constraints
 
 
-class Ending(Enum):
+class SearchEnding(Enum):
     """Why a minimisation ended."""
 
     OPTIMUM = "converged to a local optimum"
@@ -89,7 +89,7 @@ class Optimum:
         Where.
     objective, constraints : float and (m,) array
         There; infinite and none where the model has no answer.
-    ending : Ending
+    ending : SearchEnding
         Why the search ended.
     evaluations : int
         How often the model was asked for values.
@@ -100,7 +100,7 @@ class Optimum:
     z: FloatArray
     objective: float
     constraints: FloatArray
-    ending: Ending
+    ending: SearchEnding
     evaluations: int
     allowed: float
 
@@ -138,11 +138,11 @@ def minimize(program: Program, start: FloatArray, bounds: FloatArray, effort: Ef
     memory = _Memory(program, effort)
     try:
         if memory.at(z) is None:
-            return memory.optimum(z, None, Ending.NO_ANSWER)
+            return memory.optimum(z, None, SearchEnding.NO_ANSWER)
         last, ending = _solved(memory, z, bounds)
         if effort.last:
             answer = memory.at(last)
-            return memory.optimum(last, answer, ending if answer is not None else Ending.STUCK)
+            return memory.optimum(last, answer, ending if answer is not None else SearchEnding.STUCK)
     except _Enough as end:
         ending = end.ending
     if memory.best is None:
@@ -151,7 +151,7 @@ def minimize(program: Program, start: FloatArray, bounds: FloatArray, effort: Ef
     return memory.optimum(z, best, ending)
 
 
-def _solved(memory: _Memory, z: FloatArray, bounds: FloatArray) -> tuple[FloatArray, Ending]:
+def _solved(memory: _Memory, z: FloatArray, bounds: FloatArray) -> tuple[FloatArray, SearchEnding]:
     """Run the solver; return where it ends and why. Its answers are in the memory."""
     from scipy.optimize import minimize as slsqp
 
@@ -164,14 +164,14 @@ def _solved(memory: _Memory, z: FloatArray, bounds: FloatArray) -> tuple[FloatAr
         constraints=[{"type": "ineq", "fun": memory.constraints, "jac": memory.constraint_slopes}],
         options={"maxiter": memory.effort.steps, "ftol": memory.effort.tolerance},
     )
-    return np.clip(found.x, *bounds.T), _ENDINGS.get(int(found.status), Ending.STUCK)
+    return np.clip(found.x, *bounds.T), _ENDINGS.get(int(found.status), SearchEnding.STUCK)
 
 
-_ENDINGS = {0: Ending.OPTIMUM, 4: Ending.INCOMPATIBLE, 9: Ending.STEPS}
+_ENDINGS = {0: SearchEnding.OPTIMUM, 4: SearchEnding.INCOMPATIBLE, 9: SearchEnding.STEPS}
 
 
 class _Enough(Exception):
-    def __init__(self, ending: Ending) -> None:
+    def __init__(self, ending: SearchEnding) -> None:
         self.ending = ending
 
 
@@ -190,13 +190,13 @@ class _Memory:
     def at(self, z: FloatArray) -> Any:
         if self.point is None or not np.array_equal(z, self.point):
             if self.effort.stop():
-                raise _Enough(Ending.OUT_OF_TIME)
+                raise _Enough(SearchEnding.OUT_OF_TIME)
             self.point, self.answer = z.copy(), self.program.values(z)
             self.evaluations += 1
             if self.answer is not None:
                 self._keep(z, *self.answer)
             if self.best is not None and self.best[0] <= (0.0, self.effort.enough):
-                raise _Enough(Ending.OPTIMUM)
+                raise _Enough(SearchEnding.OPTIMUM)
         return self.answer
 
     def _keep(self, z: FloatArray, objective: float, constraints: FloatArray) -> None:
@@ -205,7 +205,7 @@ class _Memory:
         if self.best is None or rank < self.best[0]:
             self.best = rank, z.copy(), objective, constraints
 
-    def optimum(self, z: FloatArray, answer: Any, ending: Ending) -> Optimum:
+    def optimum(self, z: FloatArray, answer: Any, ending: SearchEnding) -> Optimum:
         """Return a point with its answer, None where the model has none."""
         objective, constraints = (np.inf, np.zeros(0)) if answer is None else answer
         return Optimum(z, objective, constraints, ending, self.evaluations, self.effort.violation)
@@ -229,7 +229,7 @@ class _Memory:
         if self.sloped is None or not np.array_equal(z, self.sloped):
             found = self.program.slopes(z)
             if found is None and self.slope is None:
-                raise _Enough(Ending.STUCK)
+                raise _Enough(SearchEnding.STUCK)
             self.slope = self.slope if found is None else found
             self.sloped = z.copy()
         return self.slope

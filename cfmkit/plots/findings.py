@@ -21,7 +21,7 @@ PERCENT = "percent"
 
 
 @dataclass(frozen=True)
-class Scale:
+class DrawnScale:
     """Something that is drawn: a parameter or a metric, in border units.
 
     Attributes
@@ -86,12 +86,12 @@ def short_names(paths: Sequence[str]) -> tuple[str, ...]:
 
 
 @dataclass(frozen=True)
-class Findings:
+class StudyMarks:
     """What a study found, as its pictures need it.
 
     Attributes
     ----------
-    varied, metrics : tuple of Scale
+    varied, metrics : tuple of DrawnScale
         Parameters and the metrics to draw.
     shape : tuple of int
         Numbers of values of the parameters of a grid; empty if the points are no grid.
@@ -105,8 +105,8 @@ class Findings:
         What makes the best point the best, for the key.
     """
 
-    varied: tuple[Scale, ...]
-    metrics: tuple[Scale, ...]
+    varied: tuple[DrawnScale, ...]
+    metrics: tuple[DrawnScale, ...]
     shape: tuple[int, ...]
     meets: NDArray[np.bool_]
     best: int | None = None
@@ -115,7 +115,7 @@ class Findings:
 
 
 @dataclass(frozen=True)
-class Line:
+class StudyCurve:
     """One curve of a study: branch name -> (motion, effort) in border units, and its parameter.
 
     Of two parameters that vary, `parameter` is the second and `panel` the first.

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.plots.findings import Findings, Scale
+    from cfmkit.plots.findings import DrawnScale, StudyMarks
 
 MOST_TICKS = 8
 """Values of a parameter that have a tick each."""
@@ -28,7 +28,7 @@ FINE = 80
 
 
 @styled
-def draw_map(found: Findings, metric: Scale) -> Figure:
+def draw_map(found: StudyMarks, metric: DrawnScale) -> Figure:
     """Return one metric over two parameters: colours and level lines."""
     figure = new_figure(140, 100 + HEAD)
     axes = axes_mm(figure, (18, 14, 92, 80))
@@ -58,7 +58,7 @@ def draw_map(found: Findings, metric: Scale) -> Figure:
     return figure
 
 
-def _classes(axes: Axes, map_: tuple[FloatArray, FloatArray, FloatArray], metric: Scale, key: Axes) -> None:
+def _classes(axes: Axes, map_: tuple[FloatArray, FloatArray, FloatArray], metric: DrawnScale, key: Axes) -> None:
     """Colour a map by words; the key has those that occur, and each region its own name where it is large enough."""
     from matplotlib import colormaps
     from matplotlib.colors import ListedColormap
@@ -77,12 +77,12 @@ def _classes(axes: Axes, map_: tuple[FloatArray, FloatArray, FloatArray], metric
 
 
 @dataclass(frozen=True)
-class Places:
+class MapPlaces:
     """The values of one parameter of a grid along an axis.
 
     Attributes
     ----------
-    scale : Scale
+    scale : DrawnScale
         The parameter.
     values : (n,) array
         Increasing.
@@ -90,7 +90,7 @@ class Places:
         Which of the grid's levels they are.
     """
 
-    scale: Scale
+    scale: DrawnScale
     values: FloatArray
     order: NDArray[np.intp]
 
@@ -134,13 +134,13 @@ class Places:
             axis.set_ticks([], minor=True)
 
 
-def _places(parameter: Scale, count: int, stride: int) -> Places:
+def _places(parameter: DrawnScale, count: int, stride: int) -> MapPlaces:
     levels = parameter.values[: count * stride : stride]
     order = np.argsort(levels, kind="stable")
-    return Places(parameter, levels[order], order)
+    return MapPlaces(parameter, levels[order], order)
 
 
-def _level_lines(axes: Axes, up: Places, across: Places, values: FloatArray) -> None:
+def _level_lines(axes: Axes, up: MapPlaces, across: MapPlaces, values: FloatArray) -> None:
     """Draw lines of equal value; on a coarse grid along a smooth surface through its values."""
     known = values[np.isfinite(values)]
     if min(values.shape) < 3 or up.words or across.words or not len(known):

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.plots.findings import Findings, Scale
+    from cfmkit.plots.findings import DrawnScale, StudyMarks
 
 COLOURS = "viridis"
 EMPTY = "#EFEFEF"
@@ -32,7 +32,7 @@ HEAD = 12.0
 
 
 @styled
-def head(figure: Figure, found: Findings, subject: str, key: Sequence[Artist] = ()) -> None:
+def head(figure: Figure, found: StudyMarks, subject: str, key: Sequence[Artist] = ()) -> None:
     """Write above a picture whose study it is, what it shows, and what its marks mean."""
     write_heading(figure, Heading(found.name, subject) if found.name else Heading(subject, "all points"))
     if key:
@@ -51,7 +51,7 @@ def head(figure: Figure, found: Findings, subject: str, key: Sequence[Artist] = 
         )
 
 
-def key_of(found: Findings, starred: bool, hatched: bool, empty: bool = False) -> list[Artist]:
+def key_of(found: StudyMarks, starred: bool, hatched: bool, empty: bool = False) -> list[Artist]:
     """Return what stands in the key: those marks that occur."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
@@ -78,7 +78,7 @@ def edges(centers: FloatArray) -> FloatArray:
     return np.concatenate([[2 * centers[0] - middle[0]], middle, [2 * centers[-1] - middle[-1]]])
 
 
-def ticks(axis: Any, parameter: Scale) -> None:
+def ticks(axis: Any, parameter: DrawnScale) -> None:
     """Name the places on an axis that stand for words; between whole numbers of things there is none."""
     from matplotlib.ticker import MaxNLocator
 

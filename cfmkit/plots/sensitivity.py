@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.metrics.requirements import Bounds
-    from cfmkit.studies.sensitivity.findings import Findings, Line
+    from cfmkit.studies.sensitivity.findings import Findings, IndexLine
     from cfmkit.studies.study import Metric
 
 
@@ -181,12 +181,12 @@ def short(path: str) -> str:
     return f"{plain} ({len(several)})" if len(several) > 1 else plain
 
 
-def _lines(found: Findings, metric: str, index: str) -> list[Line]:
+def _lines(found: Findings, metric: str, index: str) -> list[IndexLine]:
     """Return one index of all parameters, in the order of the study."""
     return [line for line in found.lines if (line.metric, line.index) == (metric, index)]
 
 
-def _ranked(lines: Sequence[Line]) -> list[int]:
+def _ranked(lines: Sequence[IndexLine]) -> list[int]:
     """Return the numbers of the parameters to draw, those that do most first; unstated ones lead."""
     sizes = [np.inf if line.value is None else abs(line.value) for line in lines]
     return sorted(range(len(lines)), key=lambda k: -sizes[k])[:MOST_SHOWN]
@@ -213,7 +213,9 @@ def _unstated(axes: Axes, row: float) -> None:
     axes.annotate("not stated", (0.0, row), (3, 0), textcoords="offset points", va="center", size=SMALL)
 
 
-def _draw_bars(axes: Axes, lines: Sequence[Line], order: Sequence[int], look: tuple[str, str, float, float]) -> None:
+def _draw_bars(
+    axes: Axes, lines: Sequence[IndexLine], order: Sequence[int], look: tuple[str, str, float, float]
+) -> None:
     """Draw one index: bars with whiskers, whose colour, words, place and height `look` gives."""
     colour, words, shift, height = look
     for row, k in enumerate(order):
@@ -298,7 +300,7 @@ def draw_oat(found: Findings, number: int) -> Figure:
     return figure
 
 
-def _tornado(axes: Axes, row: int, swing: Line, ends: tuple[float, float, float]) -> None:
+def _tornado(axes: Axes, row: int, swing: IndexLine, ends: tuple[float, float, float]) -> None:
     nominal, low, high = ends
     if swing.value is None:
         axes.annotate("not stated", (nominal, row), (3, 0), textcoords="offset points", va="center", size=SMALL)
@@ -375,7 +377,7 @@ def draw_convergence(found: Findings, number: int) -> Figure:
     return figure
 
 
-def _numbers(line: Line) -> list[float]:
+def _numbers(line: IndexLine) -> list[float]:
     return [np.nan if number is None else float(number) for number in (line.samples, line.value, line.low, line.high)]
 
 

@@ -27,21 +27,21 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.plots.findings import Findings, Line, Scale
+    from cfmkit.plots.findings import DrawnScale, StudyCurve, StudyMarks
 
 
 MOST_PANELS = 8
 """More values of the first parameter than this are left to the maps."""
 
 
-def fit_panels(found: Findings, lines: Sequence[Line]) -> bool:
+def fit_panels(found: StudyMarks, lines: Sequence[StudyCurve]) -> bool:
     """Return whether the curves of a study can be told apart in panels."""
     panels, named = ({line.panel for line in lines}, {line.parameter for line in lines})
     return len(found.shape) == 2 and 0 < len(panels) <= MOST_PANELS and len(named) <= len(LINES)
 
 
 @styled
-def draw_panels(found: Findings, lines: Sequence[Line], labels: tuple[str, str]) -> Figure:
+def draw_panels(found: StudyMarks, lines: Sequence[StudyCurve], labels: tuple[str, str]) -> Figure:
     """Return the curves of a study of two parameters; each panel has its own vertical scale."""
     first, second = found.varied
     panels = sorted({line.panel for line in lines if line.panel is not None})
@@ -57,7 +57,7 @@ def draw_panels(found: Findings, lines: Sequence[Line], labels: tuple[str, str])
     return figure
 
 
-def _draw_panel(ax: Axes, lines: Sequence[Line], second: Scale) -> None:
+def _draw_panel(ax: Axes, lines: Sequence[StudyCurve], second: DrawnScale) -> None:
     order = sorted({line.parameter for line in lines})
     names = []
     for line in lines:
@@ -80,15 +80,15 @@ MISSED = "#D5D5D5"
 
 
 def figures(
-    found: Findings, lines: Sequence[Line] = (), labels: tuple[str, str] = ("", "")
+    found: StudyMarks, lines: Sequence[StudyCurve] = (), labels: tuple[str, str] = ("", "")
 ) -> dict[str, Callable[[], Figure]]:
     """Return what draws each picture, by name.
 
     Parameters
     ----------
-    found : Findings
+    found : StudyMarks
         The points.
-    lines : sequence of Line
+    lines : sequence of StudyCurve
         Curves, for a study of one or two parameters.
     labels : (str, str)
         Of the curves' axes.
@@ -109,12 +109,12 @@ def figures(
     return pictures
 
 
-def _stem(metric: Scale) -> str:
+def _stem(metric: DrawnScale) -> str:
     return metric.name.replace("[", "_").replace("]", "")
 
 
 @styled
-def draw_curves(found: Findings, lines: Sequence[Line], labels: tuple[str, str]) -> Figure:
+def draw_curves(found: StudyMarks, lines: Sequence[StudyCurve], labels: tuple[str, str]) -> Figure:
     """Return the curves of a study of one parameter, coloured by it."""
     from matplotlib import colormaps
     from matplotlib.cm import ScalarMappable
@@ -138,7 +138,7 @@ def draw_curves(found: Findings, lines: Sequence[Line], labels: tuple[str, str])
     return figure
 
 
-def _clear_of_poles(axes: Axes, lines: Sequence[Line]) -> None:
+def _clear_of_poles(axes: Axes, lines: Sequence[StudyCurve]) -> None:
     """Limit the vertical axis to what most points need: a force without bound would flatten all else."""
     efforts = np.concatenate([effort for line in lines for _, effort in line.branches.values()])
     efforts = efforts[np.isfinite(efforts)]
@@ -150,7 +150,7 @@ def _clear_of_poles(axes: Axes, lines: Sequence[Line]) -> None:
 
 
 @styled
-def draw_metric(found: Findings, metric: Scale) -> Figure:
+def draw_metric(found: StudyMarks, metric: DrawnScale) -> Figure:
     """Return one metric over the only parameter."""
     figure = new_figure(120, 75 + HEAD)
     axes = axes_mm(figure, (28, 13, 86, 56) if metric.words else (18, 13, 96, 56))
@@ -177,7 +177,7 @@ def _hatch_spans(axes: Axes, x: FloatArray, meets: NDArray[np.bool_]) -> None:
 
 
 @styled
-def draw_parallel(found: Findings) -> Figure:
+def draw_parallel(found: StudyMarks) -> Figure:
     """Return every point as a line over parallel axes, parameters then metrics, coloured by the first metric."""
     from matplotlib import colormaps
 
@@ -200,7 +200,7 @@ def draw_parallel(found: Findings) -> Figure:
     return figure
 
 
-def _parallel_key(found: Findings) -> list[Artist]:
+def _parallel_key(found: StudyMarks) -> list[Artist]:
     from matplotlib.lines import Line2D
 
     entries: list[Artist] = []
@@ -211,7 +211,7 @@ def _parallel_key(found: Findings) -> list[Artist]:
     return entries
 
 
-def _share(scale: Scale) -> FloatArray:
+def _share(scale: DrawnScale) -> FloatArray:
     """Return where the values lie between the smallest and the largest of them; in the middle if they are the same."""
     known = scale.values[np.isfinite(scale.values)]
     if is_level(scale.values):
@@ -220,7 +220,7 @@ def _share(scale: Scale) -> FloatArray:
     return share
 
 
-def _parallel_axes(axes: Axes, scales: Sequence[Scale]) -> None:
+def _parallel_axes(axes: Axes, scales: Sequence[DrawnScale]) -> None:
     for k, scale in enumerate(scales):
         axes.axvline(k, color=INK, linewidth=0.8)
         known = scale.values[np.isfinite(scale.values)]

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
     from cfmkit.api import AnySpec
     from cfmkit.experiment.calibration import Calibration
-    from cfmkit.experiment.measured import Measured
+    from cfmkit.experiment.measured import MeasuredCurves
     from cfmkit.experiment.reading import Recording
     from cfmkit.experiment.report import MeasureReport
     from cfmkit.numerics.fit import Loss
@@ -101,7 +101,7 @@ def _each(names: str | Iterable[str]) -> tuple[str, ...]:
 
 def calibrate(
     spec: AnySpec,
-    data: str | os.PathLike[str] | Recording | Measured,
+    data: str | os.PathLike[str] | Recording | MeasuredCurves,
     fit: str | Sequence[str],
     *,
     bounds: Mapping[str, str | tuple[float, float]] | None = None,
@@ -118,7 +118,7 @@ def calibrate(
     ----------
     spec : Spec or path-like
         Its values are the start; derived parts are written out first and keep their shape.
-    data : path-like, Recording or Measured
+    data : path-like, Recording or MeasuredCurves
         A lab file as for `measure`, or what was read of it.
     fit : str or sequence of str
         Dotted paths of numbers of the specification; ``data.force_offset``, ``data.displacement_offset`` and
@@ -151,7 +151,7 @@ def calibrate(
     """
     from cfmkit.experiment.calibration import calibrate as fitted
     from cfmkit.experiment.corrections import corrected
-    from cfmkit.experiment.measured import LEFT_OUT, Measured, measured, read_measured
+    from cfmkit.experiment.measured import LEFT_OUT, MeasuredCurves, measured, read_measured
     from cfmkit.experiment.parameters import parameters, read_bounds
     from cfmkit.experiment.reading import Recording
     from cfmkit.metrics import Window
@@ -163,7 +163,9 @@ def calibrate(
     if isinstance(data, Recording):
         source = measured(corrected(data, tare, zero, _each(flip)), None, LEFT_OUT)
     else:
-        source = data if isinstance(data, Measured) else read_measured(_file(data), units, tare, zero, _each(flip))
+        source = (
+            data if isinstance(data, MeasuredCurves) else read_measured(_file(data), units, tare, zero, _each(flip))
+        )
     given = bounds or {}
     texts = [f"{path}={ends}" for path, ends in given.items() if isinstance(ends, str)]
     numbers = {path: ends for path, ends in given.items() if not isinstance(ends, str)}

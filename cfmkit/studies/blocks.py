@@ -11,7 +11,7 @@ from cfmkit.families.base import Block, Measure
 from cfmkit.metrics import metrics_by_name, other_name, split_name, values_of_family
 from cfmkit.metrics.requirements import ROUNDING, Bounds
 from cfmkit.specs.units import Share
-from cfmkit.studies.rows import Rows, gathered
+from cfmkit.studies.rows import ResultRows, gathered
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -39,7 +39,7 @@ def vectorised(study: Study, plan: Plan) -> bool:
     return _answer(study, plan, 0, 1) is not None
 
 
-def evaluate_block(study: Study, plan: Plan, start: int, stop: int) -> Rows:
+def evaluate_block(study: Study, plan: Plan, start: int, stop: int) -> ResultRows:
     """Return the rows of the points from `start` up to `stop`.
 
     What the block model leaves undone is analysed point by point.
@@ -60,10 +60,10 @@ def evaluate_block(study: Study, plan: Plan, start: int, stop: int) -> Rows:
     if study.curves:
         # Rows are those of the block, whether curves are wanted or not.
         curves |= {int(k): study.evaluate(plan.point(start + int(k))).curve for k in np.flatnonzero(done)}
-    return Rows(values, met, odd, curves, bugs, _warned(answer, singly, rest))
+    return ResultRows(values, met, odd, curves, bugs, _warned(answer, singly, rest))
 
 
-def _warned(answer: BlockAnswer, singly: list[int], rest: Rows) -> dict[str, NDArray[np.bool_]]:
+def _warned(answer: BlockAnswer, singly: list[int], rest: ResultRows) -> dict[str, NDArray[np.bool_]]:
     """Return which rows have which warnings: those of the block model, of the rows analysed one by one their own."""
     warned = {}
     told = {NOT_JUDGED: answer.done} if answer.warnings is None else answer.warnings

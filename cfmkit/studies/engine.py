@@ -16,7 +16,7 @@ from cfmkit.families import family
 from cfmkit.studies.blocks import BLOCK, evaluate_block, vectorised
 from cfmkit.studies.executors import Lost, serial
 from cfmkit.studies.journal import INSIDE, MOST_TOGETHER, Memory, line_of
-from cfmkit.studies.rows import Rows, cut, gathered, joined, recalled, recalled_row, record
+from cfmkit.studies.rows import ResultRows, cut, gathered, joined, recalled, recalled_row, record
 from cfmkit.studies.study import Row
 
 if TYPE_CHECKING:
@@ -69,7 +69,7 @@ class Work:
     study: Study
     plan: Plan
 
-    def __call__(self, job: Job) -> Rows:
+    def __call__(self, job: Job) -> ResultRows:
         """Return the rows of a job."""
         if job.stop - job.start > 1 or self.vectorised:
             return evaluate_block(self.study, self.plan, job.start, job.stop)
@@ -110,11 +110,11 @@ class Work:
             digest.update(repr(column.tolist()).encode() if column.dtype == object else column.tobytes())
         return Job(start, stop, digest.hexdigest()[:32])
 
-    def gather(self, *rows: Row) -> Rows:
+    def gather(self, *rows: Row) -> ResultRows:
         """Return single rows as the rows of this study."""
         return gathered(rows, len(self.study.metrics), len(self.study.spec.requirements))
 
-    def recall(self, told: Any) -> Rows:
+    def recall(self, told: Any) -> ResultRows:
         """Return the rows that a record of the journal is."""
         return recalled(told, len(self.study.metrics), len(self.study.spec.requirements))
 
@@ -166,8 +166,8 @@ class Records:
         self.work, self._journal = work, journal
         self._places = np.full(len(work.plan), MISSING, dtype=np.int64)
         self._keys = np.zeros((len(work.plan), 16), dtype=np.uint8)
-        self._held: dict[int, Rows] = {}
-        self._line: tuple[str, Rows | None] = ("", None)
+        self._held: dict[int, ResultRows] = {}
+        self._line: tuple[str, ResultRows | None] = ("", None)
         self.reused = self.bugs = 0
         self.bug = ""
 
@@ -180,7 +180,7 @@ class Records:
         """Number of points that have a row."""
         return int((self._places != MISSING).sum())
 
-    def recall(self, job: Job) -> Rows | None:
+    def recall(self, job: Job) -> ResultRows | None:
         """Return rows that the journal had from before, and remember them; None if it had not."""
         place = self._journal.find(job.key)
         if place < 0:
@@ -192,7 +192,7 @@ class Records:
         self.reused += len(rows)
         return rows
 
-    def keep(self, job: Job, rows: Rows) -> None:
+    def keep(self, job: Job, rows: ResultRows) -> None:
         """Note rows: in the journal if they would be the same anywhere, else until the process ends."""
         if rows.keepable:
             self._lies(job, self._journal.add(job.key, record(rows)))
@@ -206,10 +206,10 @@ class Records:
         self._places[job.start : job.stop] = place
         self._keys[job.start : job.stop] = np.frombuffer(bytes.fromhex(job.key), dtype=np.uint8)
 
-    def batches(self, size: int = BLOCK) -> Iterator[tuple[NDArray[np.int64], Rows]]:
+    def batches(self, size: int = BLOCK) -> Iterator[tuple[NDArray[np.int64], ResultRows]]:
         """Yield (indices of points, their rows) in order, about `size` at a time; unfinished points are left out."""
         starts: list[NDArray[np.int64]] = []
-        parts: list[Rows | Row] = []
+        parts: list[ResultRows | Row] = []
         count = 0
         for start, part in self._pieces():
             length = 1 if isinstance(part, Row) else len(part)
@@ -222,15 +222,15 @@ class Records:
         if parts:
             yield np.concatenate(starts), self._together(parts)
 
-    def _together(self, parts: list[Rows | Row]) -> Rows:
+    def _together(self, parts: list[ResultRows | Row]) -> ResultRows:
         """Return pieces as one; single rows that follow each other are gathered at once."""
         runs = groupby(parts, key=lambda part: isinstance(part, Row))
-        whole: list[Rows] = []
+        whole: list[ResultRows] = []
         for single, run_of in runs:
             whole += [self.work.gather(*run_of)] if single else run_of  # type: ignore[arg-type]
         return joined(whole)
 
-    def _pieces(self) -> Iterator[tuple[int, Rows | Row]]:
+    def _pieces(self) -> Iterator[tuple[int, ResultRows | Row]]:
         at = 0
         while at < len(self._places):
             place = int(self._places[at])
@@ -254,7 +254,7 @@ class Records:
     def lines(self) -> Iterator[bytes]:
         """Yield the lines of a journal that holds these rows and nothing else: single ones stand together."""
         keys: list[str] = []
-        rows: list[Rows] = []
+        rows: list[ResultRows] = []
         at = 0
         while at < len(self._places):
             if self._places[at] < 0:
@@ -281,11 +281,11 @@ class Records:
     def _told(self, index: int) -> Any:
         return self._journal.read(int(self._places[index]), self._key(index))
 
-    def _read(self, index: int) -> Rows | Row:
+    def _read(self, index: int) -> ResultRows | Row:
         told = self._told(index)
         return self._rows(told) if "n" in told else recalled_row(told)
 
-    def _rows(self, told: Any) -> Rows:
+    def _rows(self, told: Any) -> ResultRows:
         """Return the rows that a record is; of one among others its own, the line being read once for all of them."""
         if "at" not in told:
             return self.work.recall(told)
@@ -295,7 +295,7 @@ class Records:
             self._line = told["keys"], whole
         return cut(whole, told["at"], told["at"] + 1)
 
-    def row(self, index: int) -> Rows:
+    def row(self, index: int) -> ResultRows:
         """Return the row of one finished point."""
         start = index - index % self.work.step if int(self._places[index]) != HELD else index
         if int(self._places[index]) == HELD:
@@ -390,7 +390,7 @@ def _singles(work: Work, block: Job) -> Iterator[Job]:
         yield work.job(start, start + 1)
 
 
-def _together(keys: list[str], rows: list[Rows]) -> bytes:
+def _together(keys: list[str], rows: list[ResultRows]) -> bytes:
     """Return the line of a journal that holds several single rows."""
     whole = joined(rows)
     return line_of(keys[0], {"keys": "".join(keys), **record(whole)} if len(keys) > 1 else record(whole))

@@ -72,7 +72,7 @@ class Variant:
 
 
 @dataclass(frozen=True)
-class Comparison:
+class FidelityComparison:
     """The outcomes of several models of one mechanism.
 
     Attributes
@@ -224,7 +224,7 @@ def choices_of(spec: Spec) -> Choices:
     return Choices(names, specs, obstacles)
 
 
-def compare(nominal: Result, choices: Choices, run: Run) -> Comparison:
+def compare(nominal: Result, choices: Choices, run: Run) -> FidelityComparison:
     """Return a result beside those of all other models that can run.
 
     Parameters
@@ -238,7 +238,7 @@ def compare(nominal: Result, choices: Choices, run: Run) -> Comparison:
     """
     own = fidelity_of(nominal)
     others = (Variant(name, _analyze(spec, run)) for name, spec in choices.specs.items() if name != own)
-    return Comparison((Variant(own, nominal), *others), list(choices.specs)[-1], choices.obstacles)
+    return FidelityComparison((Variant(own, nominal), *others), list(choices.specs)[-1], choices.obstacles)
 
 
 def _analyze(spec: Spec, run: Run) -> Result:
@@ -260,24 +260,24 @@ def fidelity_of(result: Result) -> str:
     return name
 
 
-def data_of(found: Comparison) -> dict[str, object]:
+def data_of(found: FidelityComparison) -> dict[str, object]:
     """Return what metrics.json says besides the differences, which are metrics."""
     return {"fidelity": {"reference": found.finest, "curves": list(_records(found))}}
 
 
-def _records(found: Comparison) -> Iterator[dict[str, object]]:
+def _records(found: FidelityComparison) -> Iterator[dict[str, object]]:
     for item in found.variants:
         points = sum(map(len, item.result.curves))
         about = {"fidelity": item.name, "status": item.result.status.key, "message": item.result.message}
         yield about | {"points": points}
 
 
-def lines_of(found: Comparison) -> tuple[tuple[str, str], ...]:
+def lines_of(found: FidelityComparison) -> tuple[tuple[str, str], ...]:
     """Return the paragraphs that a page shows: one for each curve and branch."""
     return tuple(("fidelity", line) for item in found.compared for line in _lines(found, item))
 
 
-def _lines(found: Comparison, item: Variant) -> Iterator[str]:
+def _lines(found: FidelityComparison, item: Variant) -> Iterator[str]:
     from cfmkit.specs.units import format_short
 
     metrics, window, differences = found.metrics(), found.windows.get(item.name), found.differences(item)

@@ -54,7 +54,7 @@ class StudyResult:
 def swept(spec: Spec, jobs: int, block: Mapping[str, Any]) -> StudyResult:
     """Return a sweep; see `cfmkit.sweep`."""
     from cfmkit.studies.engine import run
-    from cfmkit.studies.sweep import Request, outputs, prepare, summary_of
+    from cfmkit.studies.sweep import SweepRequest, outputs, prepare, summary_of
 
     asked = dict(block)
     seed = _seed(asked.pop("seed", 0))
@@ -62,7 +62,7 @@ def swept(spec: Spec, jobs: int, block: Mapping[str, Any]) -> StudyResult:
         asked["vary"] = {path: in_words(values, spec, path) for path, values in asked["vary"].items()}
     if asked:
         spec = spec.replace({"sweep": asked})
-    request = Request(seed=seed)
+    request = SweepRequest(seed=seed)
     work = prepare(spec, request)
     records = run(work, _executor(jobs))
     curves = spec.sweep is not None and spec.sweep.curves

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.plots.findings import PERCENT, Findings, Line, Scale, short_names
+from cfmkit.plots.findings import PERCENT, DrawnScale, StudyCurve, StudyMarks, short_names
 from cfmkit.plots.study import figures
 from cfmkit.plots.style import png
 from cfmkit.tables import Table, TableColumn, border_values, read_csv
@@ -31,7 +31,7 @@ def pictures(records: Records, summary: Summary) -> Iterator[tuple[str, bytes]]:
         yield f"figures/{stem}.png", png(draw())
 
 
-def findings(records: Records, summary: Summary) -> Findings:
+def findings(records: Records, summary: Summary) -> StudyMarks:
     """Return what the pictures show."""
     study, plan = records.work.study, records.work.plan
     values = np.concatenate([values for _, values, _ in summary.kept])
@@ -43,7 +43,7 @@ def findings(records: Records, summary: Summary) -> Findings:
         _scale(item, shown, name)
         for item, shown, name in zip(plan.variables, plan.shown(0, len(plan)), names, strict=True)
     ]
-    return Findings(tuple(varied), tuple(drawn), _shape(plan), meets, summary.best, study.spec.name, _best(summary))
+    return StudyMarks(tuple(varied), tuple(drawn), _shape(plan), meets, summary.best, study.spec.name, _best(summary))
 
 
 def _best(summary: Summary) -> str:
@@ -56,28 +56,28 @@ def _best(summary: Summary) -> str:
     return f"best: {sense} {name.replace('_', ' ')}{more}"
 
 
-def _drawn(metric: Metric, values: FloatArray) -> Scale:
+def _drawn(metric: Metric, values: FloatArray) -> DrawnScale:
     if metric.words:
-        return Scale(metric.name, metric.dimension, values, metric.words)
+        return DrawnScale(metric.name, metric.dimension, values, metric.words)
     if metric.dimension == "ratio":  # as the page says it
-        return Scale(metric.name, PERCENT, 100.0 * values)
-    return Scale(metric.name, metric.dimension, border_values(values, metric.dimension))
+        return DrawnScale(metric.name, PERCENT, 100.0 * values)
+    return DrawnScale(metric.name, metric.dimension, border_values(values, metric.dimension))
 
 
-def _scale(item: Variable, shown: np.ndarray, name: str) -> Scale:
+def _scale(item: Variable, shown: np.ndarray, name: str) -> DrawnScale:
     if item.dimension != "text":
-        return Scale(item.path, item.dimension, shown.astype(np.float64), short=name)
+        return DrawnScale(item.path, item.dimension, shown.astype(np.float64), short=name)
     words = tuple(dict.fromkeys(map(str, item.shown)))
-    return Scale(item.path, item.dimension, np.array([float(words.index(str(one))) for one in shown]), words, name)
+    return DrawnScale(item.path, item.dimension, np.array([float(words.index(str(one))) for one in shown]), words, name)
 
 
 def _shape(plan: Plan) -> tuple[int, ...]:
     return () if plan.joint else tuple(len(item.values) for item in plan.variables)
 
 
-def curves(records: Records, found: Findings) -> tuple[list[Line], tuple[str, str]]:
+def curves(records: Records, found: StudyMarks) -> tuple[list[StudyCurve], tuple[str, str]]:
     """Return the curves that the study kept, with the labels of their axes."""
-    lines: list[Line] = []
+    lines: list[StudyCurve] = []
     labels = ("", "")
     for indices, rows in records.batches():
         for k, text in rows.curves.items():
@@ -85,7 +85,7 @@ def curves(records: Records, found: Findings) -> tuple[list[Line], tuple[str, st
             motion, effort = table.columns[1], table.columns[2]
             labels = (motion.header.replace("_", " "), effort.header.replace("_", " "))
             *panel, parameter = (float(one.values[int(indices[k])]) for one in found.varied)
-            lines.append(Line(parameter, _branches(table), *panel))
+            lines.append(StudyCurve(parameter, _branches(table), *panel))
     return lines, labels
 
 

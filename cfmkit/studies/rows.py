@@ -28,7 +28,7 @@ _STATUS = {status.key: status for status in Status}
 
 
 @dataclass(frozen=True)
-class Rows:
+class ResultRows:
     """Consecutive rows of a study.
 
     Attributes
@@ -73,7 +73,7 @@ class Rows:
         return self.odd.get(index, (Status.COMPLETE, ""))
 
 
-def gathered(rows: Sequence[Row], metrics: int, requirements: int) -> Rows:
+def gathered(rows: Sequence[Row], metrics: int, requirements: int) -> ResultRows:
     """Return single rows as one."""
     nothing, none_met = (math.nan,) * metrics, (False,) * requirements
     values = np.array([row.values or nothing for row in rows], dtype=np.float64).reshape(len(rows), metrics)
@@ -88,10 +88,10 @@ def gathered(rows: Sequence[Row], metrics: int, requirements: int) -> Rows:
             bugs[k] = row.bug
     names = sorted({name for row in rows for name in row.warnings})
     warned = {name: np.array([name in row.warnings for row in rows], dtype=bool) for name in names}
-    return Rows(values, met, odd, curves, bugs, warned)
+    return ResultRows(values, met, odd, curves, bugs, warned)
 
 
-def record(rows: Rows) -> Any:
+def record(rows: ResultRows) -> Any:
     """Return rows as the journal keeps them: numbers packed, which takes a tenth of the time of their decimals.
 
     Many rows together take a tenth of the room: what one has in common with the one before is left out.
@@ -116,7 +116,7 @@ def record(rows: Rows) -> Any:
     return told
 
 
-def recalled(told: Any, metrics: int, requirements: int) -> Rows:
+def recalled(told: Any, metrics: int, requirements: int) -> ResultRows:
     """Return the rows that a record is."""
     if "n" not in told:
         return gathered([recalled_row(told)], metrics, requirements)
@@ -127,7 +127,7 @@ def recalled(told: Any, metrics: int, requirements: int) -> Rows:
     masks = {
         name: np.unpackbits(_unpacked(bits, np.uint8), count=told["n"]) for name, bits in told.get("w", {}).items()
     }
-    return Rows(values, met, odd, curves, warned={name: mask.astype(bool) for name, mask in masks.items()})
+    return ResultRows(values, met, odd, curves, warned={name: mask.astype(bool) for name, mask in masks.items()})
 
 
 def recalled_row(told: Any) -> Row:
@@ -138,13 +138,13 @@ def recalled_row(told: Any) -> Row:
     return Row(_STATUS[told["s"]], noted, met, told.get("m", ""), curve, warnings=tuple(told.get("w", ())))
 
 
-def joined(parts: Sequence[Rows]) -> Rows:
+def joined(parts: Sequence[ResultRows]) -> ResultRows:
     """Return several pieces as one."""
     if len(parts) == 1:
         return parts[0]
     offsets = np.cumsum([0, *map(len, parts)]).tolist()
     pairs = list(zip(offsets, parts, strict=False))
-    return Rows(
+    return ResultRows(
         np.concatenate([part.values for part in parts]),
         np.concatenate([part.met for part in parts]),
         {start + k: item for start, part in pairs for k, item in part.odd.items()},
@@ -154,7 +154,7 @@ def joined(parts: Sequence[Rows]) -> Rows:
     )
 
 
-def _joined_masks(parts: Sequence[Rows]) -> dict[str, NDArray[np.bool_]]:
+def _joined_masks(parts: Sequence[ResultRows]) -> dict[str, NDArray[np.bool_]]:
     """Return the masks of all warnings over all pieces."""
     names = sorted({name for part in parts for name in part.warned})
     return {
@@ -163,7 +163,7 @@ def _joined_masks(parts: Sequence[Rows]) -> dict[str, NDArray[np.bool_]]:
     }
 
 
-def cut(rows: Rows, start: int, stop: int) -> Rows:
+def cut(rows: ResultRows, start: int, stop: int) -> ResultRows:
     """Return some of the rows."""
     if (start, stop) == (0, len(rows)):
         return rows
@@ -173,7 +173,7 @@ def cut(rows: Rows, start: int, stop: int) -> Rows:
 
     odd, curves, bugs = kept(rows.odd), kept(rows.curves), kept(rows.bugs)
     warned = {name: mask[start:stop] for name, mask in rows.warned.items()}
-    return Rows(rows.values[start:stop], rows.met[start:stop], odd, curves, bugs, warned)
+    return ResultRows(rows.values[start:stop], rows.met[start:stop], odd, curves, bugs, warned)
 
 
 def _packed(values: NDArray[Any]) -> str:

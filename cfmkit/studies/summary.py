@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.studies.engine import Records
-    from cfmkit.studies.rows import Rows
+    from cfmkit.studies.rows import ResultRows
     from cfmkit.studies.study import Study
 
 DEFAULT_OBJECTIVES = ("force_ripple", "torque_ripple")
@@ -107,7 +107,7 @@ class Summary:
         self._low, self._high = np.full(columns, np.inf), np.full(columns, -np.inf)
         self._goal = objective(self.study)
 
-    def add(self, indices: NDArray[np.int64], rows: Rows) -> None:
+    def add(self, indices: NDArray[np.int64], rows: ResultRows) -> None:
         """Take some rows."""
         self.counts[Status.COMPLETE] += len(rows) - len(rows.odd)
         self.counts.update(status for status, _ in rows.odd.values())
@@ -126,7 +126,7 @@ class Summary:
         if self.shown:
             self.kept.append((indices, rows.values[:, list(self.shown)], meets))
 
-    def _look_for_the_best(self, indices: NDArray[np.int64], rows: Rows, meets: NDArray[np.bool_]) -> None:
+    def _look_for_the_best(self, indices: NDArray[np.int64], rows: ResultRows, meets: NDArray[np.bool_]) -> None:
         if self._goal is None:
             return
         score = rows.values[:, self._goal.column] * (-1.0 if self._goal.largest else 1.0)

@@ -33,7 +33,7 @@ NOTHING = (
 
 
 @dataclass(frozen=True)
-class Request:
+class SweepRequest:
     """What a sweep is asked to do; what is left out follows the specification's block `sweep`.
 
     Attributes
@@ -67,7 +67,7 @@ class Request:
     pictures: bool = False
 
 
-def prepare(spec: Spec, request: Request) -> Work:
+def prepare(spec: Spec, request: SweepRequest) -> Work:
     """Return what a sweep has to do, with everything checked that can be before a point is computed.
 
     Raises
@@ -92,7 +92,7 @@ def prepare(spec: Spec, request: Request) -> Work:
     return Work(Study(spec, plan.paths, metrics, design, curves, request.seed), plan)
 
 
-def writes_curves(spec: Spec, request: Request) -> bool:
+def writes_curves(spec: Spec, request: SweepRequest) -> bool:
     """Return whether curves.csv is asked for."""
     return _given(request.curves, spec.sweep.curves if spec.sweep else False)
 
@@ -101,7 +101,7 @@ def _given(option: bool | None, otherwise: bool) -> bool:
     return otherwise if option is None else option
 
 
-def _plan(spec: Spec, request: Request, asked: tuple[Wish, ...]) -> Plan:
+def _plan(spec: Spec, request: SweepRequest, asked: tuple[Wish, ...]) -> Plan:
     block = spec.sweep
     combine, samples = request.combine, request.samples
     if combine is None:

@@ -18,10 +18,10 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.studies.engine import Records
     from cfmkit.studies.plan import Plan, Variable
-    from cfmkit.studies.rows import Rows
+    from cfmkit.studies.rows import ResultRows
     from cfmkit.studies.study import Metric
 
-    Watch = Callable[[NDArray[np.int64], Rows], None]
+    Watch = Callable[[NDArray[np.int64], ResultRows], None]
 
 
 def results_csv(records: Records, watch: Watch | None = None) -> Iterator[bytes]:
@@ -44,7 +44,7 @@ def results_csv(records: Records, watch: Watch | None = None) -> Iterator[bytes]
         yield from _pieces(results_table(records, np.arange(0), records.work.gather()), first)
 
 
-def results_table(records: Records, indices: NDArray[np.int64], rows: Rows) -> Table:
+def results_table(records: Records, indices: NDArray[np.int64], rows: ResultRows) -> Table:
     """Return some rows as a table in border units."""
     study = records.work.study
     metrics = (_noted(one, rows.values[:, k]) for k, one in enumerate(study.metrics))
@@ -80,14 +80,14 @@ def _column(item: Variable, shown: Any) -> TableColumn:
     return TableColumn(item.path, shown, border_unit(item.dimension))
 
 
-def _met(rows: Rows) -> tuple[str | None, ...]:
+def _met(rows: ResultRows) -> tuple[str | None, ...]:
     """Return ``true`` or ``false`` for each row; nothing where nothing was solved."""
     words = np.where(rows.met.all(axis=1), "true", "false").tolist()
     unsolved = {k for k, (status, _) in rows.odd.items() if not status.usable}
     return tuple(None if k in unsolved else word for k, word in enumerate(words)) if unsolved else tuple(words)
 
 
-def _warnings(rows: Rows) -> tuple[str | None, ...]:
+def _warnings(rows: ResultRows) -> tuple[str | None, ...]:
     """Return the names of the warnings of each row: ``high_pressure_angle; undercut``."""
     combined = np.zeros(len(rows), dtype=np.int64)
     names = sorted(rows.warned)

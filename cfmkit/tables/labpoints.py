@@ -8,7 +8,7 @@ import numpy as np
 
 from cfmkit.errors import DataError
 from cfmkit.tables.labheaders import split_header
-from cfmkit.tables.labtext import Block, block_of, decoded, header_cells, refuse_group
+from cfmkit.tables.labtext import TextBlock, block_of, decoded, header_cells, refuse_group
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -93,7 +93,7 @@ def _points(path: Path) -> tuple[FloatArray, dict[str, tuple[int, float]], list[
     return points, columns, rows
 
 
-def _columns(lines: list[str], block: Block, name: str) -> dict[str, tuple[int, float]]:
+def _columns(lines: list[str], block: TextBlock, name: str) -> dict[str, tuple[int, float]]:
     """Return index and unit of x and y, and the index of the side."""
     from cfmkit.specs.units.registry import border_size, is_unit, unit_size
 
@@ -116,7 +116,7 @@ def _columns(lines: list[str], block: Block, name: str) -> dict[str, tuple[int, 
     return found
 
 
-def _coordinate(cells: list[str], column: tuple[int, float], block: Block, name: str, number: int) -> float:
+def _coordinate(cells: list[str], column: tuple[int, float], block: TextBlock, name: str, number: int) -> float:
     index, unit = column
     cell = cells[index] if index < len(cells) else ""
     if not block.dialect.is_number(cell):

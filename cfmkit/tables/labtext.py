@@ -62,7 +62,7 @@ class Dialect:
 
 
 @dataclass(frozen=True)
-class Block:
+class TextBlock:
     """The block of numbers in a file.
 
     Attributes
@@ -106,7 +106,7 @@ def decoded(data: bytes, name: str) -> tuple[str, str]:
     raise DataError(f"{name}: is not a text file; export the measurement as CSV")
 
 
-def block_of(lines: list[str], name: str) -> Block:
+def block_of(lines: list[str], name: str) -> TextBlock:
     """Return where the numbers are and how they are written.
 
     Raises
@@ -149,7 +149,7 @@ def _score(dialect: Dialect, sample: list[str]) -> tuple[int, int]:
     return count, width
 
 
-def _bounded(lines: list[str], dialect: Dialect, width: int, name: str) -> Block:
+def _bounded(lines: list[str], dialect: Dialect, width: int, name: str) -> TextBlock:
     """Return the block between the first and the last line of data."""
     filled = [index for index, line in enumerate(lines) if line.strip()]
 
@@ -171,10 +171,10 @@ def _bounded(lines: list[str], dialect: Dialect, width: int, name: str) -> Block
     numeric = tuple(
         column for column in range(width) if 2 * sum(dialect.is_number(row[column]) for row in rows) > len(rows)
     )
-    return Block(dialect, first, last + 1, width, numeric)
+    return TextBlock(dialect, first, last + 1, width, numeric)
 
 
-def header_cells(line: str, block: Block) -> list[str]:
+def header_cells(line: str, block: TextBlock) -> list[str]:
     """Return the cells of a header, as many as the block is wide where that can be done.
 
     Quotes are understood even where the numbers have none, and a leading ``#`` or ``%`` is dropped.

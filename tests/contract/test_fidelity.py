@@ -15,7 +15,16 @@ from cfmkit.curves import Curve
 from cfmkit.errors import SpecError, UsageError
 from cfmkit.families.base import Run, function_named
 from cfmkit.results import Finding, Result, Status
-from cfmkit.studies.fidelity import PATH, Choices, Comparison, Variant, choices_of, compare, fidelity_of, lines_of
+from cfmkit.studies.fidelity import (
+    PATH,
+    Choices,
+    FidelityComparison,
+    Variant,
+    choices_of,
+    compare,
+    fidelity_of,
+    lines_of,
+)
 from cfmkit.studies.leaves import CannotVary, leaf
 
 CONFIGS = [*sorted((Path(__file__).parents[2] / "configs").glob("*.yaml")), *plugin_support.CONFIGS]
@@ -99,7 +108,7 @@ def result(*curves, status=Status.COMPLETE, message="", warnings=()):
 
 def outcome(nominal, *others):
     variants = (nominal, *others)
-    return Comparison(tuple(Variant(name, item) for name, item in variants), "fine", {})
+    return FidelityComparison(tuple(Variant(name, item) for name, item in variants), "fine", {})
 
 
 RANGE = np.linspace(0.0, 0.1, 11)

@@ -25,7 +25,7 @@ from cfmkit.families.slider_crank.printed.search import (
     uniform_thickness,
 )
 from cfmkit.families.slider_crank.printed.solution import first_at
-from cfmkit.numerics.sqp import Ending
+from cfmkit.numerics.sqp import SearchEnding
 
 TASK = Task(corners(), np.pi, ABS, 1.5, 1 * MM, 20 * MM, 0.01, "stroke", 60 * MM)
 
@@ -58,7 +58,7 @@ def kept(found: Found) -> tuple[float, float]:
 def test_nine_thicknesses_come_up_to_the_yardstick(width: float, ripple: float, stroke: float, share: float) -> None:
     """Two rows stay 0.15 and 0.25 % below: the yardstick's strips have half a percent less force than they say."""
     found = found_for(width, ripple, 9)
-    assert found.descent.ending is Ending.OPTIMUM
+    assert found.descent.ending is SearchEnding.OPTIMUM
     assert found.program.stroke(found.descent.z) / MM >= share * stroke - 0.06
     deviation, stress = kept(found)
     assert deviation <= ripple + 5e-5
@@ -84,7 +84,7 @@ def test_nine_thicknesses_beat_the_yardstick_at_its_own_force_band_and_stress(
     task = replace(TASK, force=level, ripple=ripple, material=Elasticity(1800e6, 0.35, stress * 1e6))
     ranges = Ranges(np.tile([0.5, 2.0], (9, 1)), 60 * MM)
     found = search(task, Form(9, width=width * MM), ranges, 1, 0, lambda *_: None)
-    assert found.descent.ending is Ending.OPTIMUM
+    assert found.descent.ending is SearchEnding.OPTIMUM
     assert found.program.stroke(found.descent.z) / MM > 1.01 * stroke
 
 
@@ -152,7 +152,7 @@ def test_paper_s_variables_reach_a_longer_stroke_in_their_own_ranges(modulus: fl
     task = replace(TASK, material=Elasticity(modulus, 0.35, 42.5e6))
     program = StripProgram(task, FORM)
     found = descend(program, np.append(BOX.mean(axis=1), 1.6), np.vstack([BOX, [0.5, 6.0]]))
-    assert found.ending is Ending.OPTIMUM
+    assert found.ending is SearchEnding.OPTIMUM
     assert found.feasible
     assert 10 * found.z[-1] >= stroke
     assert 10 * found.z[-1] == pytest.approx(stroke, rel=6e-3)

@@ -5,7 +5,7 @@ import pytest
 
 import cfmkit
 from cfmkit.studies.engine import run
-from cfmkit.studies.sweep import Request, prepare, summary_of
+from cfmkit.studies.sweep import SweepRequest, prepare, summary_of
 from cfmkit.studies.tables import results_csv
 from cfmkit.tables import read_csv
 
@@ -14,7 +14,7 @@ FOLDER = "configs/studies"
 
 def swept(name, **changes):
     spec = cfmkit.load(f"{FOLDER}/{name}.yaml").replace(changes)
-    records = run(prepare(spec, Request()))
+    records = run(prepare(spec, SweepRequest()))
     summary = summary_of(records)
     table = read_csv(b"".join(results_csv(records, summary.add)))
     return records, summary, table

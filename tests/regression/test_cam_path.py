@@ -9,7 +9,7 @@ import pytest
 from cam_support import MM, at, cam
 
 from cfmkit.families.cam.geometry.cut import cut
-from cfmkit.families.cam.geometry.path import Path, reach
+from cfmkit.families.cam.geometry.path import RollerPath, reach
 from cfmkit.families.cam.geometry.profile import SlopeLaw
 
 X0, BRACE, A, ROLLER = 68 * MM, 200 * MM, 9.058 * MM, 16 * MM
@@ -63,7 +63,7 @@ def law(friction: float = 0.0, force_constant: float = A) -> SlopeLaw:
 @pytest.mark.parametrize("friction", TABLE)
 def test_the_path_has_the_heights_and_travels_of_the_table(method, friction):
     x, y, s = MM * np.array(TABLE[friction]).T
-    path = Path(law(friction), 140 * MM, method)
+    path = RollerPath(law(friction), 140 * MM, method)
     np.testing.assert_allclose(path.height(x), y, rtol=0, atol=DIGITS)
     np.testing.assert_allclose(path.travel(x), s, rtol=0, atol=DIGITS)
 
@@ -78,7 +78,7 @@ def test_the_slope_from_the_vertical_is_that_of_the_table():
 @pytest.mark.parametrize("friction", TABLE)
 def test_the_path_passes_the_tabulated_points_by_height(height, friction):
     x = X_AT_HEIGHT[height][friction] * MM
-    path = Path(law(friction), 140 * MM)
+    path = RollerPath(law(friction), 140 * MM)
     # The tabulated x is rounded: the height may be off by that rounding times the slope.
     assert path.height(x) == pytest.approx(height * MM, abs=DIGITS * law(friction).slope(x))
 
@@ -93,7 +93,7 @@ def test_the_path_passes_the_tabulated_points_by_height(height, friction):
     ],
 )
 def test_the_cam_has_the_tabulated_points_and_radii_of_curvature(x, point, radius, digits):
-    profile = cut(Path(law(), 140 * MM), ROLLER, 140 * MM)
+    profile = cut(RollerPath(law(), 140 * MM), ROLLER, 140 * MM)
     # The last x is rounded to 1e-8 mm, which the slope of 8 turns into 4e-8 mm of height.
     np.testing.assert_allclose(profile.flank(x * MM), MM * np.array(point), rtol=0, atol=8 * DIGITS)
     assert (law().curvature_radius(x * MM) - ROLLER) / MM == pytest.approx(radius, abs=0.51 * 10**-digits)

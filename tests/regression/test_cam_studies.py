@@ -9,7 +9,7 @@ import pytest
 
 import cfmkit
 from cfmkit.studies.engine import run
-from cfmkit.studies.sweep import Request, prepare, summary_of
+from cfmkit.studies.sweep import SweepRequest, prepare, summary_of
 from cfmkit.studies.tables import results_csv
 from cfmkit.tables import read_csv
 
@@ -19,7 +19,7 @@ EFFECT = "angle_error_effect"
 
 def swept(name, **changes):
     """Return the rows of a study of the cam in motion; every point is solved and meets the requirements."""
-    records = run(prepare(cfmkit.load(FOLDER / f"{name}.yaml").replace(changes), Request()))
+    records = run(prepare(cfmkit.load(FOLDER / f"{name}.yaml").replace(changes), SweepRequest()))
     summary = summary_of(records)
     table = read_csv(b"".join(results_csv(records, summary.add)))
     assert summary.exit_code(records.bugs) == 0

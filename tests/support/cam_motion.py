@@ -8,7 +8,7 @@ import numpy as np
 from cam_support import cam
 
 from cfmkit.families.cam.dynamics.build import build
-from cfmkit.families.cam.dynamics.inverse import Response, respond, statics
+from cfmkit.families.cam.dynamics.inverse import MotionResponse, respond, statics
 
 if TYPE_CHECKING:
     from cfmkit.families.cam.spec import CamSpec
@@ -31,7 +31,7 @@ def with_springs(count: int, **changes: Any) -> CamSpec:
     return moving(springs={"stiffness": STIFFNESS[count]}, **changes)
 
 
-def response(spec: CamSpec, points: int = 4001) -> Response:
+def response(spec: CamSpec, points: int = 4001) -> MotionResponse:
     """Return the direct solution at equally spaced times."""
     parts = build(spec)
     return respond(parts.machine, parts.motion.at(parts.motion.times(points)))

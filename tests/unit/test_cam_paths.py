@@ -10,7 +10,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy.integrate import quad, solve_ivp
 
-from cfmkit.families.cam.geometry.path import Path, ideal_position, reach
+from cfmkit.families.cam.geometry.path import RollerPath, ideal_position, reach
 from cfmkit.families.cam.geometry.profile import SlopeLaw, brace_tangent, drop
 
 SLOW = settings(deadline=None, max_examples=30)
@@ -41,7 +41,7 @@ def places(law, count=9, most=0.95):
 @given(laws())
 def test_quadrature_and_ode_agree_to_1e_9(law):
     x = places(law)
-    by_quadrature, by_ode = Path(law, x[-1]).height(x), Path(law, x[-1], "ode").height(x)
+    by_quadrature, by_ode = RollerPath(law, x[-1]).height(x), RollerPath(law, x[-1], "ode").height(x)
     np.testing.assert_allclose(by_ode, by_quadrature, rtol=1e-9, atol=1e-12 * law.brace_length)
 
 
@@ -50,7 +50,7 @@ def test_quadrature_and_ode_agree_to_1e_9(law):
 def test_the_path_is_what_radau_makes_of_the_papers_equation(law):
     """dx/dy = (1 - mu f)/(mu + f) over y, [SS, eq. 2], by an implicit integrator with tight tolerances."""
     x = places(law, most=0.8)
-    heights = np.maximum(Path(law, x[-1]).height(x), 0)  # the first one may be -1e-19
+    heights = np.maximum(RollerPath(law, x[-1]).height(x), 0)  # the first one may be -1e-19
 
     def rate(_y, at):
         p = law.slope_factor * (
@@ -67,7 +67,7 @@ def test_the_path_is_what_radau_makes_of_the_papers_equation(law):
 def test_the_height_is_the_integral_of_the_slope(law):
     x = places(law, 3)
     expected = [quad(law.slope, x[0], at, epsabs=0, epsrel=1e-12, limit=200)[0] for at in x[1:]]
-    np.testing.assert_allclose(Path(law, x[-1]).height(x[1:]), expected, rtol=1e-10)
+    np.testing.assert_allclose(RollerPath(law, x[-1]).height(x[1:]), expected, rtol=1e-10)
 
 
 @FAST
@@ -75,7 +75,7 @@ def test_the_height_is_the_integral_of_the_slope(law):
 def test_without_friction_the_quadrature_gives_the_closed_form(law):
     x = places(law)
     barely = SlopeLaw(law.force_constant, law.rest_half_width, law.brace_length, 1e-300, law.slope_factor)
-    closed, quadrature = Path(law, x[-1]), Path(barely, x[-1])
+    closed, quadrature = RollerPath(law, x[-1]), RollerPath(barely, x[-1])
     np.testing.assert_allclose(quadrature.height(x), closed.height(x), rtol=1e-11, atol=1e-16)
 
 
@@ -85,7 +85,7 @@ def test_without_friction_force_times_travel_is_the_energy_of_the_springs(law, s
     x = law.rest_half_width + share * 0.95 * (law.brace_length - law.rest_half_width)
     # F s = K (2D)^2 / 2 with F = 4 K A.
     travel = (x - law.rest_half_width) ** 2 / (2 * law.force_constant)
-    assert Path(law, x).travel(x) == pytest.approx(travel, rel=1e-9, abs=1e-16)
+    assert RollerPath(law, x).travel(x) == pytest.approx(travel, rel=1e-9, abs=1e-16)
     assert ideal_position(law, travel) == pytest.approx(x, rel=1e-12)
 
 
@@ -116,13 +116,13 @@ def test_longer_parts_make_a_longer_path_of_the_same_shape(law, scale):
         law.friction,
         law.slope_factor,
     )
-    heights = Path(larger, x[-1] * scale).height(x * scale)
-    np.testing.assert_allclose(heights, scale * Path(law, x[-1]).height(x), rtol=1e-10, atol=1e-15)
+    heights = RollerPath(larger, x[-1] * scale).height(x * scale)
+    np.testing.assert_allclose(heights, scale * RollerPath(law, x[-1]).height(x), rtol=1e-10, atol=1e-15)
 
 
 def test_a_number_and_an_array_give_the_same_height():
     for friction in (0.0, 0.002):
-        path = Path(SlopeLaw(0.009, 0.068, 0.2, friction), 0.14)
+        path = RollerPath(SlopeLaw(0.009, 0.068, 0.2, friction), 0.14)
         x = np.linspace(0.068, 0.14, 23)
         np.testing.assert_allclose([path.height(float(at)) for at in x], path.height(x), rtol=1e-14, atol=1e-18)
 
@@ -137,7 +137,7 @@ def test_the_height_of_a_path_that_turns_vertical_is_accurate_up_to_the_end():
         return law.slope(law.vertical_at - math.exp(u)) * math.exp(u)
 
     expected = quad(by_log, low, high, epsabs=0, epsrel=1e-11, limit=400)[0]
-    assert Path(law, end).height(end) == pytest.approx(expected, rel=1e-7)
+    assert RollerPath(law, end).height(end) == pytest.approx(expected, rel=1e-7)
 
 
 @pytest.mark.parametrize("friction", [1e-300, 1e-20, 1e-12, 1e-6])
@@ -153,7 +153,7 @@ def test_a_path_cut_for_much_friction_on_the_way_down_ends_where_the_slider_woul
     law = SlopeLaw(0.02, 0.06, 0.2, -0.2)
     path, end = reach(law, 10.0)
     x = np.linspace(0.06, 0.2 * (1 - 1e-9), 100_001)
-    assert path.travel(end) == pytest.approx(Path(law, x[-1]).travel(x).max(), rel=1e-8)
+    assert path.travel(end) == pytest.approx(RollerPath(law, x[-1]).travel(x).max(), rel=1e-8)
 
 
 def test_a_path_on_which_the_slider_never_rises_has_no_length():

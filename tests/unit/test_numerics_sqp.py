@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cfmkit.numerics.sqp import Effort, Ending, minimize
+from cfmkit.numerics.sqp import Effort, SearchEnding, minimize
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -64,14 +64,14 @@ def test_a_constrained_optimum_is_found():
     """The objective is flat along the rim: an error of 1e-10 in it leaves one of 1e-5 in the place."""
     found = minimize(on_a_disc(), np.array([1.0, 0.0]), FREE, Effort(tolerance=1e-10, violation=1e-9))
     np.testing.assert_allclose(found.z, [-1.0, -1.0], atol=5e-5)
-    assert found.ending is Ending.OPTIMUM
+    assert found.ending is SearchEnding.OPTIMUM
     assert found.objective == pytest.approx(-2.0, abs=1e-8)
     assert found.feasible
 
 
 def test_a_curved_valley_is_followed_to_its_end():
     found = minimize(rosenbrock(), np.array([-1.2, 1.0]), FREE, Effort(steps=200, tolerance=1e-14))
-    assert found.ending is Ending.OPTIMUM
+    assert found.ending is SearchEnding.OPTIMUM
     np.testing.assert_allclose(found.z, [1.0, 1.0], atol=1e-4)
 
 
@@ -94,7 +94,7 @@ def test_a_step_to_where_the_model_has_no_answer_is_shortened():
     program.answers = lambda z: z[0] < 1.5
     found = minimize(program, np.zeros(1), np.array([[-10.0, 10.0]]), Effort(tolerance=1e-12))
     assert any(z[0] >= 1.5 for z in program.asked)
-    assert found.ending is Ending.OPTIMUM
+    assert found.ending is SearchEnding.OPTIMUM
     assert found.z[0] == pytest.approx(1.4, abs=1e-5)
 
 
@@ -102,7 +102,7 @@ def test_a_start_without_an_answer_is_told():
     program = near(0.0)
     program.answers = lambda z: False
     found = minimize(program, np.ones(1), np.array([[-1.0, 1.0]]))
-    assert found.ending is Ending.NO_ANSWER
+    assert found.ending is SearchEnding.NO_ANSWER
     assert (found.objective, found.violation, found.evaluations) == (np.inf, np.inf, 1)
     assert not found.feasible
 
@@ -111,7 +111,7 @@ def test_a_start_without_slopes_is_where_it_stops():
     program = near(0.0)
     program.slopes = lambda z: None
     found = minimize(program, np.ones(1), np.array([[-1.0, 1.0]]))
-    assert found.ending is Ending.STUCK
+    assert found.ending is SearchEnding.STUCK
     assert (found.z[0], found.objective) == (1.0, 1.0)
 
 
@@ -121,7 +121,7 @@ def test_constraints_that_contradict_each_other_have_no_optimum():
     program.constraints = lambda z: np.array([z[0] - 1.0, -1.0 - z[0]])
     program.constraint_slopes = lambda z: np.array([[1.0], [-1.0]])
     found = minimize(program, np.array([0.5]), np.array([[-10.0, 10.0]]))
-    assert found.ending in (Ending.INCOMPATIBLE, Ending.STUCK)
+    assert found.ending in (SearchEnding.INCOMPATIBLE, SearchEnding.STUCK)
     assert found.violation >= 1.0
     assert not found.feasible
 
@@ -129,7 +129,7 @@ def test_constraints_that_contradict_each_other_have_no_optimum():
 def test_the_steps_allowed_are_kept_and_the_best_point_seen_is_returned():
     program = rosenbrock()
     found = minimize(program, np.array([-1.2, 1.0]), FREE, Effort(steps=3))
-    assert found.ending is Ending.STEPS
+    assert found.ending is SearchEnding.STEPS
     assert found.objective == min(program.objective(z) for z in program.asked)
     assert found.evaluations == len(program.asked)
 
@@ -138,7 +138,7 @@ def test_the_steps_allowed_are_kept_and_the_best_point_seen_is_returned():
 def test_the_time_allowed_is_kept_and_the_best_point_seen_is_returned(count):
     program = rosenbrock()
     found = minimize(program, np.array([-1.2, 1.0]), FREE, Effort(stop=lambda: len(program.asked) >= count))
-    assert found.ending is Ending.OUT_OF_TIME
+    assert found.ending is SearchEnding.OUT_OF_TIME
     assert found.evaluations == len(program.asked) == count
     assert found.objective == min(program.objective(z) for z in program.asked)
 
@@ -146,13 +146,13 @@ def test_the_time_allowed_is_kept_and_the_best_point_seen_is_returned(count):
 def test_without_any_time_there_is_no_answer():
     program = rosenbrock()
     found = minimize(program, np.array([-1.2, 1.0]), FREE, Effort(stop=lambda: True))
-    assert (found.ending, found.objective, program.asked) == (Ending.OUT_OF_TIME, np.inf, [])
+    assert (found.ending, found.objective, program.asked) == (SearchEnding.OUT_OF_TIME, np.inf, [])
 
 
 def test_a_point_that_is_good_enough_ends_the_search():
     program = rosenbrock()
     found = minimize(program, np.array([-1.2, 1.0]), FREE, Effort(enough=4.15))
-    assert found.ending is Ending.OPTIMUM
+    assert found.ending is SearchEnding.OPTIMUM
     assert found.objective <= 4.15
     np.testing.assert_array_equal(found.z, program.asked[-1])
     assert all(program.objective(z) > 4.15 for z in program.asked[:-1])

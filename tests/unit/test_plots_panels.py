@@ -3,21 +3,21 @@
 import numpy as np
 import pytest
 
-from cfmkit.plots.findings import Findings, Line, Scale
+from cfmkit.plots.findings import DrawnScale, StudyCurve, StudyMarks
 from cfmkit.plots.study import MOST_PANELS, draw_panels, figures, fit_panels
 
 
 def study(first, second):
     points = [(i, k) for i in range(first) for k in range(second)]
     x = np.arange(5.0)
-    lines = [Line(float(k), {"load": (x, (i + 1) * x + k)}, float(i)) for i, k in points]
+    lines = [StudyCurve(float(k), {"load": (x, (i + 1) * x + k)}, float(i)) for i, k in points]
     words = tuple(f"kind {k}" for k in range(second))
     varied = (
-        Scale("a.b", "length", np.array([float(i) for i, _ in points])),
-        Scale("a.c", "text", np.array([float(k) for _, k in points]), words),
+        DrawnScale("a.b", "length", np.array([float(i) for i, _ in points])),
+        DrawnScale("a.c", "text", np.array([float(k) for _, k in points]), words),
     )
-    metric = Scale("force_mean", "force", np.ones(len(points)))
-    return Findings(varied, (metric,), (first, second), np.ones(len(points), bool)), lines
+    metric = DrawnScale("force_mean", "force", np.ones(len(points)))
+    return StudyMarks(varied, (metric,), (first, second), np.ones(len(points), bool)), lines
 
 
 def test_every_value_of_the_first_parameter_has_a_panel_with_a_line_for_each_of_the_second():

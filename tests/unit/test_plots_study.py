@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 import cfmkit
-from cfmkit.plots.findings import Findings, Line, Scale
+from cfmkit.plots.findings import DrawnScale, StudyCurve, StudyMarks
 from cfmkit.plots.study import figures
 from cfmkit.plots.style import png
 from cfmkit.studies.engine import run
 from cfmkit.studies.pictures import _nominal, findings
-from cfmkit.studies.sweep import Request, prepare, summary_of
+from cfmkit.studies.sweep import SweepRequest, prepare, summary_of
 from cfmkit.studies.variation import wishes
 from cfmkit.tables import Table, TableColumn
 
@@ -22,20 +22,20 @@ Y = np.tile(np.array([4.0, 3.0, 2.0, 1.0]), 5)
 def found(count, shape=(), metric=None, words=()):
     values = X * Y if metric is None else metric
     varied = [
-        Scale("mechanism.brace_length", "length", X),
-        Scale("analysis.kind", "text" if words else "ratio", Y, words),
+        DrawnScale("mechanism.brace_length", "length", X),
+        DrawnScale("analysis.kind", "text" if words else "ratio", Y, words),
     ]
-    varied.append(Scale("mechanism.roller_radius", "length", Y[::-1]))
-    return Findings(tuple(varied[:count]), (Scale("force_ripple", "ratio", values),), shape, values < 6, 3)
+    varied.append(DrawnScale("mechanism.roller_radius", "length", Y[::-1]))
+    return StudyMarks(tuple(varied[:count]), (DrawnScale("force_ripple", "ratio", values),), shape, values < 6, 3)
 
 
 def single():
     x = np.array([3.0, 1.0, 2.0])
-    metric = Scale("force_mean[load]", "force", np.array([1.0, np.nan, 2.0]))
-    return Findings((Scale("a.b", "length", x),), (metric,), (3,), np.array([True, False, True]), 0)
+    metric = DrawnScale("force_mean[load]", "force", np.array([1.0, np.nan, 2.0]))
+    return StudyMarks((DrawnScale("a.b", "length", x),), (metric,), (3,), np.array([True, False, True]), 0)
 
 
-LINES = [Line(x, {"load": (np.arange(5.0), x + np.arange(5.0) / 5)}) for x in (3.0, 1.0, 2.0)]
+LINES = [StudyCurve(x, {"load": (np.arange(5.0), x + np.arange(5.0) / 5)}) for x in (3.0, 1.0, 2.0)]
 
 
 @pytest.mark.parametrize(
@@ -82,8 +82,11 @@ def test_a_gap_stays_a_gap():
 
 
 def test_one_value_and_nothing_but_gaps_can_be_drawn():
-    lone = Findings(
-        (Scale("a.b", "length", np.array([0.0])),), (Scale("m", "ratio", np.array([np.nan])),), (1,), np.array([False])
+    lone = StudyMarks(
+        (DrawnScale("a.b", "length", np.array([0.0])),),
+        (DrawnScale("m", "ratio", np.array([np.nan])),),
+        (1,),
+        np.array([False]),
     )
     for draw in figures(lone, LINES[:1], ("x", "y")).values():
         assert png(draw())
@@ -92,9 +95,11 @@ def test_one_value_and_nothing_but_gaps_can_be_drawn():
 def level_lines(values, across=(1.0, 2.0, 4.0, 8.0), down=(1.0, 2.0, 3.0)):
     """Return axes, the heights of the level lines of a map, and their points."""
     x, y = np.tile(across, len(down)), np.repeat(down, len(across))
-    varied = (Scale("a.down", "length", y), Scale("a.across", "time", x))
+    varied = (DrawnScale("a.down", "length", y), DrawnScale("a.across", "time", x))
     shape = (len(down), len(across))
-    case = Findings(varied, (Scale("m", "ratio", np.asarray(values, float).ravel()),), shape, np.ones(x.size, bool))
+    case = StudyMarks(
+        varied, (DrawnScale("m", "ratio", np.asarray(values, float).ravel()),), shape, np.ones(x.size, bool)
+    )
     (draw,) = figures(case).values()
     axes = draw().axes[0]
     sets = [item for item in axes.collections if hasattr(item, "levels")]
@@ -138,16 +143,16 @@ def test_words_and_gaps_have_no_lines_between_them():
 
 
 def test_what_is_constant_but_for_rounding_is_one_place_on_its_axis():
-    almost = Scale("m", "length", 0.13 * (1 + 1e-15 * np.arange(20)))
+    almost = DrawnScale("m", "length", 0.13 * (1 + 1e-15 * np.arange(20)))
     varied = found(3).varied
-    (draw,) = figures(Findings(varied, (almost,), (), np.ones(20, bool))).values()
+    (draw,) = figures(StudyMarks(varied, (almost,), (), np.ones(20, bool))).values()
     axes = draw().axes[0]
     assert {line.get_ydata()[3] for line in axes.lines if len(line.get_ydata()) == 4} == {0.5}
 
 
 def _one_metric(values, dimension):
-    x = Scale("a.b", "length", np.linspace(1.0, 2.0, len(values)))
-    (draw,) = figures(Findings((x,), (Scale("m", dimension, values),), x.values.shape, x.values > 0, 0)).values()
+    x = DrawnScale("a.b", "length", np.linspace(1.0, 2.0, len(values)))
+    (draw,) = figures(StudyMarks((x,), (DrawnScale("m", dimension, values),), x.values.shape, x.values > 0, 0)).values()
     figure = draw()
     figure.canvas.draw()
     return figure, figure.axes[0]
@@ -203,7 +208,7 @@ def test_a_key_has_only_the_marks_that_occur():
 def test_shares_are_drawn_in_per_cent_as_the_page_has_them():
     spec = cfmkit.load("configs/cam.yaml").replace({"requirements": ()})
     wish = wishes({"mechanism.rolling_friction": (0.001, 0.002)})
-    work = prepare(spec, Request(vary=wish, metrics=("force_ripple", "force_mean")))
+    work = prepare(spec, SweepRequest(vary=wish, metrics=("force_ripple", "force_mean")))
     records = run(work)
     summary = summary_of(records)
     for batch in records.batches():
@@ -216,7 +221,7 @@ def test_shares_are_drawn_in_per_cent_as_the_page_has_them():
 def test_points_that_are_as_good_as_the_best_are_counted():
     spec = cfmkit.load("configs/cam.yaml")
     wish = wishes({"mechanism.contact.width": ("8 mm", "9 mm", "10 mm")})
-    records = run(prepare(spec, Request(vary=wish, metrics=("force_ripple",))))
+    records = run(prepare(spec, SweepRequest(vary=wish, metrics=("force_ripple",))))
     summary = summary_of(records)
     for batch in records.batches(1):  # one at a time: ties are counted across batches
         summary.add(*batch)
@@ -241,7 +246,7 @@ def test_parameters_of_the_same_last_name_are_told_apart():
     """A map of two structures had 'structure' on both axes."""
     spec = cfmkit.load("configs/vcfm_ding2022.yaml").replace({"requirements": ()})
     wish = wishes({f"mechanism.{part}.width": ("5 mm", "6 mm") for part in ("bistable", "positive")})
-    records = run(prepare(spec, Request(vary=wish, metrics=("force_ripple",))))
+    records = run(prepare(spec, SweepRequest(vary=wish, metrics=("force_ripple",))))
     summary = summary_of(records)
     for batch in records.batches():
         summary.add(*batch)

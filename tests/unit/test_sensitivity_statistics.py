@@ -10,7 +10,7 @@ import pytest
 from scipy.stats import binom
 
 from cfmkit.studies.sensitivity import intervals, local, morris, oat, sobol, spreads, tolerance
-from cfmkit.studies.sensitivity.spreads import Spread
+from cfmkit.studies.sensitivity.spreads import ParameterSpread
 
 RANGE = {"kind": "uniform", "nominal": 0.0}
 
@@ -158,7 +158,7 @@ def test_a_gradient_that_does_not_exist_has_a_large_error_estimate():
 
 
 def normal(deviation, nominal=0.0, low=-np.inf, high=np.inf):
-    return Spread("normal", nominal, low, high, deviation)
+    return ParameterSpread("normal", nominal, low, high, deviation)
 
 
 def made(tolerances, matrix, count=40_000, seed=0, groups=()):
@@ -184,7 +184,7 @@ def test_the_sum_of_correlated_springs_scatters_as_theory_says(correlation):
 
 
 def test_correlation_leaves_each_distribution_as_it_is():
-    spread = Spread("uniform", 0.0, -1.0, 1.0)
+    spread = ParameterSpread("uniform", 0.0, -1.0, 1.0)
     points = made([spread, spread], spreads.correlation_matrix(2, [((0, 1), 0.9)]))[:, 0]
     # The rank correlation of a Gaussian copula is 6/pi asin(r/2); for uniform parameters it is their own.
     assert np.corrcoef(points.T)[0, 1] == pytest.approx(6 / pi * np.arcsin(0.45), abs=0.01)
@@ -205,7 +205,9 @@ def test_a_truncated_normal_distribution_keeps_its_ends_and_its_shape():
     assert points.var() == pytest.approx(1 - 2 * density / phi, rel=1e-4)
 
 
-@pytest.mark.parametrize("spread", [normal(0.1, 2.0), Spread("uniform", 2.0, 1.9, 2.3), normal(1.0, 2.0, 1.0, 3.0)])
+@pytest.mark.parametrize(
+    "spread", [normal(0.1, 2.0), ParameterSpread("uniform", 2.0, 1.9, 2.3), normal(1.0, 2.0, 1.0, 3.0)]
+)
 def test_a_tightened_tolerance_is_the_same_about_the_nominal_value(spread):
     unit = np.linspace(0.01, 0.99, 99)
     np.testing.assert_allclose(spread.tightened(0.5).at(unit) - 2.0, 0.5 * (spread.at(unit) - 2.0), atol=1e-12)

@@ -14,7 +14,7 @@ from cfmkit.families.slider_crank.linkage import Linkage
 from cfmkit.families.slider_crank.springs.assembly import assemble, reactions
 from cfmkit.families.slider_crank.springs.rates import Goal, minimax, preferred, ranges
 from cfmkit.families.slider_crank.unit_springs import along_crank, along_slider, crank_efforts
-from cfmkit.numerics.boxes import Axis, lowest
+from cfmkit.numerics.boxes import BoxAxis, lowest
 from cfmkit.numerics.extrema import monotone, sharpened
 
 rng = np.random.default_rng(20)
@@ -338,7 +338,9 @@ def test_no_rates_do_better_than_the_linear_programme():
 
 
 def test_a_box_is_searched_to_its_bounds():
-    found = lowest(lambda at: (at[0] - 2.0) ** 2 + (at[1] - 1e-4) ** 2, (Axis(0.0, 1.0), Axis(0.0, 1.0, log=True)))
+    found = lowest(
+        lambda at: (at[0] - 2.0) ** 2 + (at[1] - 1e-4) ** 2, (BoxAxis(0.0, 1.0), BoxAxis(0.0, 1.0, log=True))
+    )
     assert found.place[0] == 1.0
     assert found.place[1] == pytest.approx(1e-4, abs=1e-6)
 

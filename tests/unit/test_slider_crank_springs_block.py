@@ -10,7 +10,7 @@ import cfmkit
 from cfmkit import api
 from cfmkit.families.base import Block, Measure
 from cfmkit.families.slider_crank.springs.block import analyze_block
-from cfmkit.plots.findings import Findings, Scale
+from cfmkit.plots.findings import DrawnScale, StudyMarks
 from cfmkit.plots.study import draw_map, draw_metric
 from cfmkit.plots.style import png
 from cfmkit.studies.columns import metrics_of
@@ -120,14 +120,14 @@ def test_words_are_metrics_without_a_range():
 def test_words_are_drawn_as_regions_and_as_steps():
     x, y = np.repeat([1.0, 2.0, 3.0], 4), np.tile([1.0, 2.0, 3.0, 4.0], 3)
     words = ("positive", "zero", "bistable")
-    metric = Scale("stiffness_class", "text", (x > 1.5) * 1.0 + (y > 2.5), words)
-    scales = Scale("a.rate", "stiffness", x), Scale("b.rate", "stiffness", y)
-    found = Findings(scales, (metric,), (3, 4), np.ones(12, bool))
+    metric = DrawnScale("stiffness_class", "text", (x > 1.5) * 1.0 + (y > 2.5), words)
+    scales = DrawnScale("a.rate", "stiffness", x), DrawnScale("b.rate", "stiffness", y)
+    found = StudyMarks(scales, (metric,), (3, 4), np.ones(12, bool))
     figure = draw_map(found, metric)
     assert [text.get_text() for text in figure.axes[1].get_yticklabels()] == list(words)
     assert len(png(figure)) > 1000
-    line = Findings((Scale("a.rate", "stiffness", x[::4]),), (), (), np.ones(3, bool))
-    steps = Scale("stiffness_class", "text", np.array([0.0, 1.0, 2.0]), words)
+    line = StudyMarks((DrawnScale("a.rate", "stiffness", x[::4]),), (), (), np.ones(3, bool))
+    steps = DrawnScale("stiffness_class", "text", np.array([0.0, 1.0, 2.0]), words)
     assert [text.get_text() for text in draw_metric(line, steps).axes[0].get_yticklabels()] == list(words)
 
 

@@ -14,11 +14,11 @@ if TYPE_CHECKING:
 
     from cfmkit.cli.answer import Answer
     from cfmkit.cli.terminal import Terminal
-    from cfmkit.experiment.measured import Measured
+    from cfmkit.experiment.measured import MeasuredCurves
     from cfmkit.families.base import Run
     from cfmkit.runs.report import Report
     from cfmkit.specs.spec import Spec
-    from cfmkit.studies.fidelity import Comparison
+    from cfmkit.studies.fidelity import FidelityComparison
 
 PLACE = 20
 
@@ -52,7 +52,7 @@ def run(options: AnalyzeOptions, terminal: Terminal) -> Answer:
     return execute(Verb("analyze", "analysed", work, inputs), options, terminal)
 
 
-def compute_beside(source: Measured, spec: Spec, run: Run) -> Report:
+def compute_beside(source: MeasuredCurves, spec: Spec, run: Run) -> Report:
     """Return the report on a mechanism beside its measured curve."""
     from cfmkit.experiment.comparison import compare
     from cfmkit.experiment.supplements import causes_lines, comparison_data, comparison_files, comparison_lines
@@ -92,7 +92,7 @@ def compute_each(work: Callable[[Spec, Run], Report], spec: Spec, run: Run) -> R
     )
 
 
-def _picture(compared: Comparison) -> bytes:
+def _picture(compared: FidelityComparison) -> bytes:
     """Return the curves over each other as PNG."""
     from cfmkit.plots.fidelity import Gap, fidelity_figure
     from cfmkit.plots.style import png

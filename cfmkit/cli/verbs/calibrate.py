@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from cfmkit.cli.answer import Answer
     from cfmkit.cli.terminal import Terminal
     from cfmkit.experiment.calibration import Calibration
-    from cfmkit.experiment.measured import Measured
+    from cfmkit.experiment.measured import MeasuredCurves
     from cfmkit.families.base import Run
     from cfmkit.runs.report import Report
     from cfmkit.specs.spec import Spec
@@ -59,7 +59,7 @@ def run(options: CalibrateOptions, terminal: Terminal) -> Answer:
     return execute(verb, options, terminal)
 
 
-def compute(options: CalibrateOptions, source: Measured, spec: Spec, run: Run) -> Report:
+def compute(options: CalibrateOptions, source: MeasuredCurves, spec: Spec, run: Run) -> Report:
     """Return the report on the fitted mechanism."""
     from cfmkit.experiment.parameters import split_bounds
     from cfmkit.numerics.fit import LOSSES
@@ -70,7 +70,7 @@ def compute(options: CalibrateOptions, source: Measured, spec: Spec, run: Run) -
     return report(calibrate(spec, source, options.fit, bounds=bounds, loss=loss), source)
 
 
-def report(calibration: Calibration, source: Measured) -> Report:
+def report(calibration: Calibration, source: MeasuredCurves) -> Report:
     """Return the report on a finished calibration."""
     from dataclasses import replace
 

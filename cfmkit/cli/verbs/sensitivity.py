@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from cfmkit.cli.terminal import Terminal
     from cfmkit.specs.spec import Spec
     from cfmkit.store.disk import Data
-    from cfmkit.studies.sensitivity.findings import Findings, Line
+    from cfmkit.studies.sensitivity.findings import Findings, IndexLine
     from cfmkit.studies.sensitivity.tolerance import Yield
 
 PLACE = 24
@@ -271,22 +271,22 @@ def _share(one: Yield) -> str:
     return f"{100 * one.value:.1f} %   95 %: {low} ... {high} %"
 
 
-def _by_metric(found: Findings) -> dict[str, dict[str, dict[str, Line]]]:
+def _by_metric(found: Findings) -> dict[str, dict[str, dict[str, IndexLine]]]:
     """Return metric -> parameter -> index -> line, the parameters that do most first."""
-    tree: dict[str, dict[str, dict[str, Line]]] = defaultdict(lambda: defaultdict(dict))
+    tree: dict[str, dict[str, dict[str, IndexLine]]] = defaultdict(lambda: defaultdict(dict))
     for one in found.lines:
         tree[one.metric][one.parameter][one.index] = one
     return {metric: dict(sorted(each.items(), key=_rank)) for metric, each in tree.items()}
 
 
-def _rank(item: tuple[str, dict[str, Line]]) -> float:
+def _rank(item: tuple[str, dict[str, IndexLine]]) -> float:
     """Return how far up a parameter stands: largest first, those without a value before all."""
     names = [names[0] for names in SHOWN.values()] + ["variance_drop_when_halved"]
     line = next((item[1][name] for name in names if name in item[1]), None)
     return 0.0 if line is None else -abs(line.value) if line.value is not None else -float("inf")
 
 
-def _ranking(found: Findings, each: dict[str, dict[str, Line]], everything: bool) -> Grid:
+def _ranking(found: Findings, each: dict[str, dict[str, IndexLine]], everything: bool) -> Grid:
     indices = [name for name in SHOWN[found.setup.method] if any(name in lines for lines in each.values())]
     heads = (GridColumn(), *(GridColumn(spaced(name), wraps=False) for name in indices))
     shown = list(each.items())[: None if everything else MOST_PARAMETERS]
@@ -294,7 +294,7 @@ def _ranking(found: Findings, each: dict[str, dict[str, Line]], everything: bool
     return Grid(heads, rows)
 
 
-def _index(line: Line | None) -> str:
+def _index(line: IndexLine | None) -> str:
     if line is None or line.value is None:
         return "not stated"
     percent = line.index in PERCENT

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from cfmkit.store.disk import Data
     from cfmkit.studies.engine import Records
     from cfmkit.studies.summary import Summary
-    from cfmkit.studies.sweep import Request
+    from cfmkit.studies.sweep import SweepRequest
 
 PLACE = 22
 
@@ -112,7 +112,7 @@ def run(options: SweepOptions, terminal: Terminal) -> Answer:
     return Answer(told | about, page, code, tuple(_complaints(records, code, options)))
 
 
-def request(options: SweepOptions) -> Request:
+def request(options: SweepOptions) -> SweepRequest:
     """Return what the options ask for.
 
     Raises
@@ -121,13 +121,13 @@ def request(options: SweepOptions) -> Request:
         If one is malformed, or two contradict each other.
     """
     from cfmkit.cli.studies import names
-    from cfmkit.studies.sweep import Request
+    from cfmkit.studies.sweep import SweepRequest
     from cfmkit.studies.variation import wish
 
     if options.zip and options.sample:
         raise UsageError("--zip and --sample exclude each other")
     method, samples = _sample(options.sample) if options.sample else ("zip" if options.zip else None, None)
-    return Request(
+    return SweepRequest(
         vary=tuple(wish(option) for option in options.vary or ()),
         combine=method,  # type: ignore[arg-type]
         samples=samples,

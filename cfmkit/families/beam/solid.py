@@ -52,7 +52,7 @@ FORCE_APART, STRESS_APART = 2e-3, 0.05
 
 
 @dataclass(frozen=True, eq=False)
-class Solved:
+class MeshSolution:
     """One mesh of the part, followed over the travel.
 
     Attributes
@@ -91,15 +91,15 @@ class SolidSolution:
     ----------
     assembly : Assembly
         The network that the part is drawn from.
-    fine, coarse : Solved
+    fine, coarse : MeshSolution
         The finer mesh, whose values are reported, and the one that it is compared with.
     motion : (n,) array
         Travel of the points of the curve [m or rad].
     """
 
     assembly: Assembly
-    fine: Solved
-    coarse: Solved
+    fine: MeshSolution
+    coarse: MeshSolution
     motion: FloatArray = field(default_factory=lambda: np.zeros(0))
 
     @property
@@ -214,7 +214,7 @@ def analyze(spec: BeamSpec, run: Run) -> Result:
     )
 
 
-def _solved(spec: BeamSpec, assembly: Assembly, size: float, report: Callable[[float], None]) -> Solved:
+def _solved(spec: BeamSpec, assembly: Assembly, size: float, report: Callable[[float], None]) -> MeshSolution:
     """Return the part meshed with elements of a size [m] and followed over the travel."""
     from cfmkit.solid.boundary import Ring
     from cfmkit.solid.course import follow
@@ -235,7 +235,7 @@ def _solved(spec: BeamSpec, assembly: Assembly, size: float, report: Callable[[f
     law = LAWS[spec.analysis.solid.law](material.modulus, material.poisson)
     elements = Elements(grid, law, np.full(len(grid.triangles), width)).without(held)
     problem = Problem(elements, Supports(grid.nodes, groups))
-    return Solved(problem, follow(problem, _stops(spec), report), held)
+    return MeshSolution(problem, follow(problem, _stops(spec), report), held)
 
 
 def _vertices(contour: Contour) -> FloatArray:

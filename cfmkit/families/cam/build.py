@@ -14,7 +14,7 @@ import numpy as np
 
 from cfmkit.families.cam.findings import finding
 from cfmkit.families.cam.geometry.cut import CamProfile, WholeCamUndercut, cut
-from cfmkit.families.cam.geometry.path import Path, reach
+from cfmkit.families.cam.geometry.path import RollerPath, reach
 from cfmkit.families.cam.geometry.profile import SlopeLaw
 from cfmkit.families.cam.geometry.track import Track
 from cfmkit.families.cam.geometry.track_states import NoTrack
@@ -217,7 +217,7 @@ def _shortfall(law: SlopeLaw, stroke: float, reached: float) -> Finding | None:
     )
 
 
-def _cut(path: Path, roller_radius: float, end: float) -> CamProfile:
+def _cut(path: RollerPath, roller_radius: float, end: float) -> CamProfile:
     try:
         return cut(path, roller_radius, end)
     except WholeCamUndercut:

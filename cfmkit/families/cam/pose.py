@@ -24,7 +24,7 @@ SLENDER = 0.2
 
 
 @dataclass(frozen=True)
-class Pose:
+class PartsPose:
     """Positions of the parts, of two equal ones the right one, each (x, y) [m].
 
     Attributes
@@ -40,19 +40,19 @@ class Pose:
     contact: Point
     on_corner: bool
 
-    def mirrored(self) -> Pose:
+    def mirrored(self) -> PartsPose:
         """Return the positions of the left parts."""
         (x, y), (a, b) = self.roller, self.contact
-        return Pose((-x, y), self.slider, (-a, b), self.on_corner)
+        return PartsPose((-x, y), self.slider, (-a, b), self.on_corner)
 
 
-def pose(solution: Solution, index: int) -> Pose:
+def pose(solution: Solution, index: int) -> PartsPose:
     """Return the positions of the parts at one point of the solution."""
     states, assembly = solution.states, solution.assembly
     x, y = float(states.x[index]), float(states.y[index])
     length = assembly.track.brace_length
     slider = (0.0, y + float(np.sqrt((length - x) * (length + x))))
-    return Pose((x, y), slider, _contact(solution, index), bool(states.on_corner[index]))
+    return PartsPose((x, y), slider, _contact(solution, index), bool(states.on_corner[index]))
 
 
 def _contact(solution: Solution, index: int) -> Point:

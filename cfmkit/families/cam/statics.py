@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.families.cam.geometry.profile import Real
     from cfmkit.families.cam.geometry.track import Track
-    from cfmkit.families.cam.geometry.track_states import Stretch, TrackStates
+    from cfmkit.families.cam.geometry.track_states import TrackStates, TrackStretch
 
 GRAVITY = 9.81
 """Standard acceleration used throughout [m/s^2]."""
@@ -148,7 +148,7 @@ def jams(track: Track, friction: float, states: TrackStates | None = None) -> tu
     jammed = False
     for part in track.stretches():
 
-        def lever(u: Real, part: Stretch = part) -> Real:
+        def lever(u: Real, part: TrackStretch = part) -> Real:
             _, x, slope = part.at(u)
             # Rounding at a start without any lever is not a jam.
             margin: Real = slope - friction - brace_tangent(x, track.brace_length) * (1.0 + friction * slope) + 1e-12
@@ -168,7 +168,7 @@ def jams(track: Track, friction: float, states: TrackStates | None = None) -> tu
     return tuple(zip(edges[::2], edges[1::2], strict=True))
 
 
-def _places(part: Stretch, states: TrackStates | None) -> FloatArray:
+def _places(part: TrackStretch, states: TrackStates | None) -> FloatArray:
     """Return where to look for a jam on a stretch: its parameters in increasing order."""
     grid = part.low + (part.high - part.low) * _SHARES
     if states is not None:

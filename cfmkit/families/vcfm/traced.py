@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.numerics.panels import Panels, coefficients, nodes_of
+from cfmkit.numerics.panels import ChebyshevPanels, coefficients, nodes_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -90,7 +90,7 @@ class Traced:
     ----------
     points : PathPoints
         Travels all of one sign.
-    panels : Panels
+    panels : ChebyshevPanels
         Force [N] over the size of the travel [m].
     edges : tuple of float
         Zero, the bifurcations and the end [m].
@@ -99,7 +99,7 @@ class Traced:
     """
 
     points: PathPoints
-    panels: Panels | None
+    panels: ChebyshevPanels | None
     edges: tuple[float, ...]
     problem: str = ""
 
@@ -272,7 +272,7 @@ def _points(path: Path, places: FloatArray) -> PathPoints:
     return PathPoints(drive[kept], path.effort[kept], stress[kept], path.stable[kept].astype(bool), buckled[kept])
 
 
-def _resolved(route: Route, first: First, number: int) -> tuple[Panels, PathPoints, bool]:
+def _resolved(route: Route, first: First, number: int) -> tuple[ChebyshevPanels, PathPoints, bool]:
     """Return the force as panels that have converged, all points traced for them, and whether these keep their branch.
 
     Parameters
@@ -324,7 +324,7 @@ def _resolved(route: Route, first: First, number: int) -> tuple[Panels, PathPoin
     ordered = sorted(done)
     borders = np.array([low for low, _ in ordered] + [ordered[-1][1]])
     spans = np.array([inside(panel) for panel in ordered])
-    return Panels(borders, spans, np.array([done[panel] for panel in ordered])), points, kept
+    return ChebyshevPanels(borders, spans, np.array([done[panel] for panel in ordered])), points, kept
 
 
 def _alike(first: First, points: PathPoints) -> bool:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.studies.engine import Records
-    from cfmkit.studies.rows import Rows
+    from cfmkit.studies.rows import ResultRows
     from cfmkit.studies.sensitivity.parameters import Parameter
     from cfmkit.studies.study import Study
 
@@ -116,7 +116,7 @@ class Evaluator:
             outputs[sequence[indices]] = self._numbers(rows)
         return outputs.reshape(count, size, -1)
 
-    def _numbers(self, rows: Rows) -> FloatArray:
+    def _numbers(self, rows: ResultRows) -> FloatArray:
         numbers = np.concatenate([rows.values, rows.met.astype(np.float64)], axis=1)
         # A curve that ends early is measured over another travel: its metrics are no samples of these.
         failed = {k: item for k, item in rows.odd.items() if item[0] is not Status.COMPLETE}

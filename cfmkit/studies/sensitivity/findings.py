@@ -25,7 +25,7 @@ IN_UNITS = ("at_low_end", "at_high_end", "swing", "mu_star", "mu", "sigma")
 
 
 @dataclass(frozen=True)
-class Line:
+class IndexLine:
     """One index of one parameter, in border units; None where it cannot be stated.
 
     Attributes
@@ -64,9 +64,9 @@ class Findings:
         What was to be done.
     evaluator : Evaluator
         What was evaluated.
-    lines : tuple of Line
+    lines : tuple of IndexLine
         The indices.
-    convergence : tuple of Line
+    convergence : tuple of IndexLine
         The same from fewer samples.
     points, outputs : array
         Blocks of samples, (b, s, d) and (b, s, m + r).
@@ -84,8 +84,8 @@ class Findings:
 
     setup: Setup
     evaluator: Evaluator
-    lines: tuple[Line, ...] = ()
-    convergence: tuple[Line, ...] = ()
+    lines: tuple[IndexLine, ...] = ()
+    convergence: tuple[IndexLine, ...] = ()
     points: FloatArray | None = None
     outputs: FloatArray | None = None
     replaced: int = 0
@@ -119,7 +119,7 @@ OPTIONAL = ("normalised_slope",)
 """Indices that may be missing though all samples are there: nothing is relative to zero."""
 
 
-def lines_of(metric: Metric, names: tuple[str, ...], analysis: Analysis, samples: int) -> Iterator[Line]:
+def lines_of(metric: Metric, names: tuple[str, ...], analysis: Analysis, samples: int) -> Iterator[IndexLine]:
     """Yield the indices of one metric, parameter by parameter."""
     for k, name in enumerate(names):
         for index in analysis:
@@ -127,7 +127,7 @@ def lines_of(metric: Metric, names: tuple[str, ...], analysis: Analysis, samples
             ends = (index.value[k], index.low[k], index.high[k])
             value, low, high = (stated(float(one), metric.dimension if amount else "ratio") for one in ends)
             unit = border_unit(metric.dimension) if amount else "1"
-            yield Line(metric.label, name, index.name, value, low, high, unit, samples)
+            yield IndexLine(metric.label, name, index.name, value, low, high, unit, samples)
 
 
 def stated(value: float, dimension: str) -> float | None:

@@ -12,7 +12,7 @@ from cfmkit.specs.units import border_unit, to_border
 from cfmkit.studies.sensitivity import local, morris, oat, sobol, tolerance
 from cfmkit.studies.sensitivity.evaluation import Evaluator, Interrupted
 from cfmkit.studies.sensitivity.failures import evaluated, nothing, stated
-from cfmkit.studies.sensitivity.findings import Findings, Line, lines_of
+from cfmkit.studies.sensitivity.findings import Findings, IndexLine, lines_of
 from cfmkit.studies.sensitivity.findings import stated as told
 from cfmkit.studies.sensitivity.spreads import draw, values_across, values_at
 from cfmkit.studies.study import Metric
@@ -53,7 +53,7 @@ def carry_out(setup: Setup, compute: Callable[[Work], Records]) -> Findings:
 def _oat(setup: Setup, evaluator: Evaluator) -> Findings:
     points = oat.sample(setup.values, setup.ends, setup.samples)
     outputs = evaluator.outputs(points, [[path] * setup.samples for path in setup.paths])
-    found: list[Line] = []
+    found: list[IndexLine] = []
     for m, metric in enumerate(setup.study.metrics):
         nominal = float(setup.nominal.values[m])
         analysis = oat.analyze(setup.values, setup.ends, outputs[..., m], nominal, setup.policy)
@@ -71,7 +71,7 @@ def _local(setup: Setup, evaluator: Evaluator) -> Findings:
         sides = [side for side in ("up", "down") for _ in range(local.LEVELS)]
         roles = [[f"{path} {side}" for side in sides] for path in setup.paths]
         outputs = evaluator.outputs(points.reshape(count, -1, count), roles).reshape(outputs.shape)
-    found: list[Line] = []
+    found: list[IndexLine] = []
     for m, metric in enumerate(setup.study.metrics):
         for k, one in enumerate(setup.parameters):
             known = exact.get(metric.name, {}).get(one.path) if metric.over is None else None
@@ -98,15 +98,15 @@ def _slope(outputs: FloatArray, at_nominal: float, half: float, known: float | N
     return local.Slope(known, 0.0) if known is not None else local.slope(outputs[0], outputs[1], at_nominal, half)
 
 
-def _gradient_lines(metric: Metric, one: Parameter, slope: local.Slope, at_nominal: float) -> Iterator[Line]:
+def _gradient_lines(metric: Metric, one: Parameter, slope: local.Slope, at_nominal: float) -> Iterator[IndexLine]:
     above, below = border_unit(metric.dimension), border_unit(one.dimension)
     scale = float(to_border(1.0, metric.dimension)) / float(to_border(1.0, one.dimension))
     unit = above if below == "1" else f"{above}/{below}" if below.isalpha() else f"{above}/({below})"
     value, low, high = (told(end * scale, "ratio") for end in _around(slope.value, slope.error))
-    yield Line(metric.label, one.path, "gradient", value, low, high, unit, local.LEVELS)
+    yield IndexLine(metric.label, one.path, "gradient", value, low, high, unit, local.LEVELS)
     relative = local.normalised(1.0, one.spread.nominal, at_nominal)
     value, low, high = (told(end, "ratio") for end in _around(slope.value * relative, slope.error * abs(relative)))
-    yield Line(metric.label, one.path, oat.SLOPE, value, low, high, "1", local.LEVELS)
+    yield IndexLine(metric.label, one.path, oat.SLOPE, value, low, high, "1", local.LEVELS)
 
 
 def _around(value: float, reach: float) -> tuple[float, float, float]:
@@ -125,7 +125,7 @@ def _morris(setup: Setup, evaluator: Evaluator) -> Findings:
     blocks = evaluated(drawn, lambda points: evaluator.outputs(points, roles), setup.samples, setup.policy)
     low, high = setup.ends.T
     grid = np.rint((blocks.points - low) / (high - low) * (morris.LEVELS - 1)) / (morris.LEVELS - 1)
-    found: list[Line] = []
+    found: list[IndexLine] = []
     for m, metric in enumerate(setup.study.metrics):
         analysis = _stated(
             setup, blocks.outputs[..., m], lambda one: morris.analyze(grid, one, seed), morris.NAMES, count
@@ -151,8 +151,8 @@ def _sobol(setup: Setup, evaluator: Evaluator) -> Findings:
 
     roles = ["A", *(f"A with {path} of B" for path in setup.paths), "B"]
     blocks = evaluated(drawn, lambda points: evaluator.outputs(points, roles), setup.samples, setup.policy)
-    found: list[Line] = []
-    on_the_way: list[Line] = []
+    found: list[IndexLine] = []
+    on_the_way: list[IndexLine] = []
     for m, metric in enumerate(setup.study.metrics):
         outputs = blocks.outputs[..., m]
         for size in sobol.stages(len(outputs)):
@@ -183,7 +183,7 @@ def _tolerance(setup: Setup, evaluator: Evaluator) -> Findings:
     names = tuple(", ".join(setup.paths[k] for k in group) for group in groups)
     roles = [DRAWN, *(f"halved {name}" for name in names)]
     blocks = evaluated(drawn, lambda points: evaluator.outputs(points, roles), setup.samples, setup.policy)
-    found: list[Line] = []
+    found: list[IndexLine] = []
     for m, metric in enumerate(setup.study.metrics):
         analysis = _stated(
             setup,

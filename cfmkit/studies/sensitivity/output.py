@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from cfmkit.store.disk import Data
-    from cfmkit.studies.sensitivity.findings import Findings, Line
+    from cfmkit.studies.sensitivity.findings import Findings, IndexLine
     from cfmkit.studies.sensitivity.parameters import Parameter
     from cfmkit.studies.sensitivity.setup import Setup
     from cfmkit.studies.sensitivity.tolerance import Yield
@@ -64,7 +64,7 @@ def results_csv(found: Findings) -> Iterator[bytes]:
             yield from chunks
 
 
-def lines_table(lines: Sequence[Line]) -> Table:
+def lines_table(lines: Sequence[IndexLine]) -> Table:
     """Return indices as a tidy table."""
 
     def column(name: str) -> TableColumn:

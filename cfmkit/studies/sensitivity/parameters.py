@@ -11,7 +11,7 @@ from cfmkit.errors import Problem, QuantityError, SpecError
 from cfmkit.specs.spec import Tolerance
 from cfmkit.specs.units import read_number, read_quantity
 from cfmkit.studies.leaves import CannotVary, Leaf, leaf
-from cfmkit.studies.sensitivity.spreads import Incompatible, Spread, correlation_matrix
+from cfmkit.studies.sensitivity.spreads import Incompatible, ParameterSpread, correlation_matrix
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -35,7 +35,7 @@ class Parameter:
         Dotted.
     dimension : str
         Of `cfmkit.specs.units`.
-    spread : Spread
+    spread : ParameterSpread
         How it is distributed [SI].
     place : bool
         Whether it is a place that knows if it is a length or an angle.
@@ -43,7 +43,7 @@ class Parameter:
 
     path: str
     dimension: str
-    spread: Spread
+    spread: ParameterSpread
     place: bool = False
 
 
@@ -178,20 +178,20 @@ def _nominal(spec: Spec, found: Leaf) -> tuple[float, str]:
     return float(value), getattr(value, "dimension", found.quantity.dimensions[0] if found.quantity else "ratio")
 
 
-def _range(found: Leaf, stated: tuple[str, str], nominal: float) -> Spread:
+def _range(found: Leaf, stated: tuple[str, str], nominal: float) -> ParameterSpread:
     low, high = (_read(found, text) for text in stated)
     if not low < high:
         raise CannotVary(f"[{stated[0]}, {stated[1]}] is not a range: the first must be smaller than the second")
-    return Spread("uniform", nominal, low, high)
+    return ParameterSpread("uniform", nominal, low, high)
 
 
-def _tolerance(found: Leaf, stated: Tolerance, nominal: float) -> Spread:
+def _tolerance(found: Leaf, stated: Tolerance, nominal: float) -> ParameterSpread:
     if stated.uniform is not None:
         width = _width(found, "uniform", stated.uniform, nominal)
-        return Spread("uniform", nominal, nominal - width, nominal + width)
+        return ParameterSpread("uniform", nominal, nominal - width, nominal + width)
     deviation = _width(found, "normal", stated.normal or "", nominal)
     reach = math.inf if stated.truncate is None else _width(found, "truncate", stated.truncate, nominal)
-    return Spread("normal", nominal, nominal - reach, nominal + reach, deviation)
+    return ParameterSpread("normal", nominal, nominal - reach, nominal + reach, deviation)
 
 
 def _width(found: Leaf, key: str, text: str, nominal: float) -> float:

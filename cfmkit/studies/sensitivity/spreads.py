@@ -26,7 +26,7 @@ class Incompatible(ValueError):
 
 
 @dataclass(frozen=True)
-class Spread:
+class ParameterSpread:
     """The distribution of one parameter.
 
     Attributes
@@ -55,7 +55,7 @@ class Spread:
         reach = COVERED * self.deviation
         return max(self.low, self.nominal - reach), min(self.high, self.nominal + reach)
 
-    def tightened(self, factor: float) -> Spread:
+    def tightened(self, factor: float) -> ParameterSpread:
         """Return the same distribution narrower about the nominal value."""
         low, high = (self.nominal + factor * (end - self.nominal) for end in (self.low, self.high))
         return replace(self, low=low, high=high, deviation=factor * self.deviation)
@@ -76,12 +76,12 @@ _SMALLEST = np.finfo(np.float64).tiny
 _EPSILON = float(np.finfo(np.float64).epsneg)
 
 
-def values_at(spreads: Sequence[Spread], unit: FloatArray) -> FloatArray:
+def values_at(spreads: Sequence[ParameterSpread], unit: FloatArray) -> FloatArray:
     """Return points in the unit cube, (n, d), as values of the parameters."""
     return np.stack([one.at(unit[:, k]) for k, one in enumerate(spreads)], axis=1)
 
 
-def values_across(spreads: Sequence[Spread], unit: FloatArray) -> FloatArray:
+def values_across(spreads: Sequence[ParameterSpread], unit: FloatArray) -> FloatArray:
     """Return points in the unit cube, (n, d), spread evenly over the ranges of the parameters."""
     ends = np.array([one.ends for one in spreads])
     return np.asarray(ends[:, 0] + unit * (ends[:, 1] - ends[:, 0]))

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.studies.sensitivity.failures import Policy
     from cfmkit.studies.sensitivity.intervals import Interval
-    from cfmkit.studies.sensitivity.spreads import Spread
+    from cfmkit.studies.sensitivity.spreads import ParameterSpread
 
 YIELD_GAIN, VARIANCE_DROP = "yield_gain_when_halved", "variance_drop_when_halved"
 TIGHTER = 0.5
@@ -35,14 +35,14 @@ TIGHTER = 0.5
 Groups = tuple[tuple[int, ...], ...]
 
 
-def sample(unit: FloatArray, spreads: Sequence[Spread], groups: Groups) -> FloatArray:
+def sample(unit: FloatArray, spreads: Sequence[ParameterSpread], groups: Groups) -> FloatArray:
     """Return made mechanisms, (n, 1 + groups, d): as drawn, then with one group tightened each.
 
     Parameters
     ----------
     unit : (n, d) array
         Drawn, in the unit cube.
-    spreads : sequence of Spread
+    spreads : sequence of ParameterSpread
         The d tolerances.
     groups : tuple of tuple of int
         Tolerances that are tightened together.
@@ -57,7 +57,7 @@ def sample(unit: FloatArray, spreads: Sequence[Spread], groups: Groups) -> Float
     return np.stack(blocks, axis=1)
 
 
-def _values(unit: FloatArray, spreads: Sequence[Spread]) -> FloatArray:
+def _values(unit: FloatArray, spreads: Sequence[ParameterSpread]) -> FloatArray:
     return np.stack([one.at(unit[:, k]) for k, one in enumerate(spreads)], axis=1)
 
 

@@ -32,14 +32,14 @@ ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
-class Ending:
+class MotionEnding:
     """When a motion ends before its time [s], and why."""
 
     time: float
     finding: Finding
 
 
-def ending(parts: Build, times: FloatArray, origin: float) -> Ending | None:
+def ending(parts: Build, times: FloatArray, origin: float) -> MotionEnding | None:
     """Return where a motion becomes impossible; None where it never does.
 
     Parameters
@@ -80,7 +80,7 @@ def ending(parts: Build, times: FloatArray, origin: float) -> Ending | None:
         middle = 0.5 * (low + high)
         low, high = (middle, high) if holds(middle) else (low, middle)
     place = float(motion.at(np.array([low])).position[0]) + origin
-    return Ending(low, _said(name, known, machine, f"at {format_short(low, 'time')} ({mm(place)})"))
+    return MotionEnding(low, _said(name, known, machine, f"at {format_short(low, 'time')} ({mm(place)})"))
 
 
 def _margins(machine: Machine, moment: tuple[FloatArray, FloatArray, FloatArray]) -> Mapping[str, FloatArray]:

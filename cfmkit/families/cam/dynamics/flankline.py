@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 if TYPE_CHECKING:
-    from cfmkit.families.cam.geometry.path import Path
+    from cfmkit.families.cam.geometry.path import RollerPath
     from cfmkit.families.cam.geometry.profile import Real, SlopeLaw
 
 KNOTS = 65
@@ -54,7 +54,7 @@ class FlankLine:
 
     Attributes
     ----------
-    path : Path
+    path : RollerPath
         The roller path.
     distance : float
         From the path to the flank, negative inwards [m].
@@ -64,7 +64,7 @@ class FlankLine:
         First and last path coordinate of the flank [m].
     """
 
-    path: Path
+    path: RollerPath
     distance: float
     angle: float
     height: float

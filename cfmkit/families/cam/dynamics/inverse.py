@@ -13,7 +13,7 @@ in the plane: the roller turns by sigma / r. With all accelerations known, the b
 each brace about the slider's pin gives the contact force, that of the roller the force at
 its axis, that of the brace the force at the pin, and that of the slider the force wanted: side
 by side, without symmetry, and with nothing to integrate. The power of all forces is the
-rate of the energy (`Response.energy`), which the tests use as a check.
+rate of the energy (`MotionResponse.energy`), which the tests use as a check.
 
 Rolling resistance, which the multibody model of [SS] lacks, is that of the quasi-static
 model: a force mu N against the motion of the roller's centre.
@@ -79,7 +79,7 @@ class MovingLoads(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Response:
+class MotionResponse:
     """Forces and speeds of a motion; rows of (2, n) arrays are right and left, x outwards.
 
     Attributes
@@ -149,7 +149,7 @@ class Response:
         return total
 
 
-def respond(machine: Machine, moment: Moment) -> Response:
+def respond(machine: Machine, moment: Moment) -> MotionResponse:
     """Return the forces of a motion.
 
     Parameters
@@ -179,10 +179,10 @@ def respond(machine: Machine, moment: Moment) -> Response:
     up = slider_pin.imag
     force = machine.slider_mass * (moment.acceleration + machine.gravity) + (up[0] + up[1])
     on_corner = stances[0].on_corner | stances[1].on_corner
-    return Response(machine, moment, at, force, contact, -traction, roller_pin, slider_pin, on_corner)
+    return MotionResponse(machine, moment, at, force, contact, -traction, roller_pin, slider_pin, on_corner)
 
 
-def statics(machine: Machine, position: FloatArray, upward: bool = True) -> Response:
+def statics(machine: Machine, position: FloatArray, upward: bool = True) -> MotionResponse:
     """Return the forces at rest at positions of the slider [m]; rolling resistance as on the way up, or down."""
     still = np.zeros(position.shape)
     creep = still if upward else still - np.finfo(float).tiny

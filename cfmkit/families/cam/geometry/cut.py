@@ -23,7 +23,7 @@ from cfmkit.numerics.roots import bracketed_root
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from cfmkit.families.cam.geometry.path import Path
+    from cfmkit.families.cam.geometry.path import RollerPath
     from cfmkit.families.cam.geometry.profile import Real
 
 
@@ -50,7 +50,7 @@ class Corner:
 class CamProfile:
     """A flank cut for one roller radius along one path, up to path coordinate `end` [m]."""
 
-    path: Path
+    path: RollerPath
     roller_radius: float
     end: float
     corner: Corner | None = None
@@ -80,12 +80,12 @@ class WholeCamUndercut(ValueError):
     """The roller is so large that no part of the flank is left."""
 
 
-def cut(path: Path, roller_radius: float, end: float) -> CamProfile:
+def cut(path: RollerPath, roller_radius: float, end: float) -> CamProfile:
     """Return the cam that a roller path gives, trimmed where the roller undercuts its start.
 
     Parameters
     ----------
-    path : Path
+    path : RollerPath
         The roller-centre path.
     roller_radius : float
         Of the roller that the cam is cut for [m].

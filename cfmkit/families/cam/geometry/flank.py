@@ -12,7 +12,7 @@ from cfmkit.numerics.registration import CurveFrame
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.families.cam.geometry.cut import CamProfile
-    from cfmkit.numerics.smoothing import Smooth
+    from cfmkit.numerics.smoothing import SmoothedFunction
 
 
 @dataclass(frozen=True)
@@ -60,14 +60,14 @@ class BuiltFlank:
     ----------
     design : DesignFlank
         The right flank of the design.
-    error : Smooth
+    error : SmoothedFunction
         Distance from it over the arc length [m], positive outside.
     arc : ((m,) array, (m,) array)
         Path coordinate and arc length of the design, both increasing [m].
     """
 
     design: DesignFlank
-    error: Smooth
+    error: SmoothedFunction
     arc: tuple[FloatArray, FloatArray]
 
     @property

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 Method = Literal["quadrature", "ode"]
 
 
-class Path:
+class RollerPath:
     """The roller-centre path y(x) from (x0, 0), by the closed form, a quadrature or the paper's ODE.
 
     Parameters
@@ -143,7 +143,7 @@ def ideal_position(law: SlopeLaw, travel: Real) -> Real:
     return law.rest_half_width + (2.0 * law.force_constant * travel / law.slope_factor) ** 0.5
 
 
-def reach(law: SlopeLaw, travel: float, method: Method = "quadrature") -> tuple[Path, float]:
+def reach(law: SlopeLaw, travel: float, method: Method = "quadrature") -> tuple[RollerPath, float]:
     """Return the path up to a slider travel, and the x at its end.
 
     Parameters
@@ -157,7 +157,7 @@ def reach(law: SlopeLaw, travel: float, method: Method = "quadrature") -> tuple[
 
     Returns
     -------
-    path, end : Path, float
+    path, end : RollerPath, float
         The path reaches at least `end` [m]. If the geometry cannot give the travel
         (the brace turns horizontal, the path vertical, or the slider stops rising first),
         `end` is short of it: compare ``path.travel(end)``.
@@ -165,28 +165,28 @@ def reach(law: SlopeLaw, travel: float, method: Method = "quadrature") -> tuple[
     x0, ideal = law.rest_half_width, float(ideal_position(law, travel))
     if not law.friction and law.slope_factor == 1:
         end = min(ideal, _farthest(law))
-        return Path(law, end, method), end
+        return RollerPath(law, end, method), end
     high = x0 + 1.02 * (ideal - x0)
     if high > 0.99 * law.brace_length or law.friction * law.frictionless(high) > 0.9:
         high = min(high, _farthest(law))
-    path = Path(law, high)
+    path = RollerPath(law, high)
     if float(path.travel(high)) < travel:
         path, high = _farther(path, travel)
     end = _position(path, travel, (x0, high), x0 + 0.97 * (ideal - x0))
-    return (path if method == "quadrature" else Path(law, end, method)), end
+    return (path if method == "quadrature" else RollerPath(law, end, method)), end
 
 
-def _farther(path: Path, travel: float) -> tuple[Path, float]:
+def _farther(path: RollerPath, travel: float) -> tuple[RollerPath, float]:
     """Return a path that reaches a travel [m], or as far as any does, and its end."""
     law, limit = path.law, _farthest(path.law)
     high = min(path.end, limit)
     while high < limit and float(path.travel(high)) < travel:
         high = min(law.rest_half_width + 1.3 * (high - law.rest_half_width), limit)
-        path = Path(law, high)
+        path = RollerPath(law, high)
     return path, high
 
 
-def _position(path: Path, travel: float, bracket: tuple[float, float], below: float) -> float:
+def _position(path: RollerPath, travel: float, bracket: tuple[float, float], below: float) -> float:
     """Return x at a travel [m], or the bracket's end if that is short of it; `below` is a guess on the low side."""
     low, high = bracket
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from cfmkit.families.cam.geometry.path import ideal_position
 from cfmkit.families.cam.geometry.profile import Real, brace_tangent
-from cfmkit.families.cam.geometry.track_states import NoTrack, Stretch, TrackStates
+from cfmkit.families.cam.geometry.track_states import NoTrack, TrackStates, TrackStretch
 from cfmkit.numerics.roots import bracketed_root, invert_increasing
 
 if TYPE_CHECKING:
@@ -224,22 +224,22 @@ class Track:
         """The triangle that a brace and the corner make."""
         return Pivot(*self._corner_point, self.radius, self.brace_length, *self._pivots)
 
-    def stretches(self) -> Iterator[Stretch]:
+    def stretches(self) -> Iterator[TrackStretch]:
         """Yield the parts of the track on which the slider rises, in order, from `start` on."""
         passed = self.start - self.dead_point
         if self.corner_end > self.start:
             low = float(np.arctan(self._corner_states(np.array([self.start])).slope[0])) if passed else self._pivots[0]
-            yield Stretch(True, low, self._pivots[1], self._corner_piece)
+            yield TrackStretch(True, low, self._pivots[1], self._corner_piece)
         low, high = self.flank_range
         if passed and self.corner_end <= self.start:
             low = float(self._flank_parameter(np.array([self.start]))[0])
-        yield Stretch(False, low, high, self._flank_piece)
+        yield TrackStretch(False, low, high, self._flank_piece)
 
     def slider_at(self, x: float) -> float:
         """Return the slider position with the roller's centre at `x` [m], or at the nearer end of the track."""
         for part in self.stretches():
 
-            def past(u: float, part: Stretch = part) -> float:
+            def past(u: float, part: TrackStretch = part) -> float:
                 return float(part.at(u)[1]) - x
 
             if past(part.low) >= 0 or past(part.high) >= 0:

@@ -60,7 +60,7 @@ class TrackStates:
 
 
 @dataclass(frozen=True)
-class Stretch:
+class TrackStretch:
     """A part of the track on which the slider rises.
 
     Attributes

@@ -36,7 +36,7 @@ from cfmkit.families.slider_crank.printed.search import (
 from cfmkit.families.slider_crank.printed.sizing import design_flexures
 from cfmkit.families.slider_crank.printed.spec import StripSpec
 from cfmkit.metrics import Window, evaluate
-from cfmkit.numerics.sqp import Ending
+from cfmkit.numerics.sqp import SearchEnding
 from cfmkit.results import Design, Finding, Quantity, Searched, Status
 
 if TYPE_CHECKING:
@@ -358,7 +358,7 @@ def _message(found: Found, judged: Judged, reported: Reported) -> str:
 
 def _warnings(found: Found, judged: Judged) -> tuple[Finding, ...]:
     told = []
-    if found.descent.ending is not Ending.OPTIMUM:
+    if found.descent.ending is not SearchEnding.OPTIMUM:
         text = f"the search was {found.descent.ending.value}: a better strip may exist; try 'design.beam.seeds'"
         told.append(finding("optimizer_stopped", text))
     if not judged.opinion.stable:

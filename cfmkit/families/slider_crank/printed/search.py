@@ -11,7 +11,7 @@ from cfmkit.families.findings import mm, mpa, newton, percent
 from cfmkit.families.refusals import no_design
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.printed.program import SMALL, Form, StripProgram
-from cfmkit.numerics.sqp import Effort, Ending, Optimum, minimize
+from cfmkit.numerics.sqp import Effort, Optimum, SearchEnding, minimize
 from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
@@ -177,7 +177,7 @@ def search(
         if best is None or _rank(found.descent) < _rank(best.descent):
             best = found
     assert best is not None
-    if task.goal == "stroke" and not (best.descent.feasible and best.descent.ending is Ending.OPTIMUM):
+    if task.goal == "stroke" and not (best.descent.feasible and best.descent.ending is SearchEnding.OPTIMUM):
         found = _tightened(task, form, ranges, uniform)
         best = min(best, found, key=lambda one: _rank(one.descent))
     report(1.0, "done")
@@ -291,13 +291,13 @@ def _uniform(task: Task, form: Form, ranges: Ranges) -> Optimum | None:
     bounds = _bounds(task, Ranges(own[:1], ranges.longest), Form(1, width=width), 1)
     start = np.array([first, *last]) if program.extra else np.array([first])
     found = descend(program, start, bounds)
-    return None if found.ending is Ending.NO_ANSWER else found
+    return None if found.ending is SearchEnding.NO_ANSWER else found
 
 
 def infeasible(found: Found) -> Design:
     """Return what the nearest strip misses, and the target that it would meet."""
     descent, program, task = found.descent, found.program, found.task
-    if descent.ending is Ending.NO_ANSWER:
+    if descent.ending is SearchEnding.NO_ANSWER:
         why = "could not begin: the first strip has no equilibrium over 'design.travel'; ask for less of it, or "
         why += "for other ranges in 'design.beam'"
         return no_design(finding("target_unreachable", f"the search {why}"))

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.families.slider_crank.printed.chain import Elasticity
     from cfmkit.families.slider_crank.printed.pressing import Chain, Pressed
-    from cfmkit.numerics.panels import Panels
+    from cfmkit.numerics.panels import ChebyshevPanels
 
 
 NEAREST = 1e-6
@@ -54,13 +54,13 @@ class Course:
         Of the curve [m].
     first : (float, float)
         Force [N] and stress [Pa] where it begins.
-    laws : (Panels, Panels)
+    laws : (ChebyshevPanels, ChebyshevPanels)
         Force [N], of all legs, and stress [Pa] over the logarithm of the travel [m].
     """
 
     ends: tuple[float, float]
     first: tuple[float, float]
-    laws: tuple[Panels, Panels]
+    laws: tuple[ChebyshevPanels, ChebyshevPanels]
 
     @cached_property
     def places(self) -> FloatArray:

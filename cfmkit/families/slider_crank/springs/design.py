@@ -40,7 +40,7 @@ from cfmkit.families.slider_crank.springs.solution import EDGE
 from cfmkit.families.slider_crank.springs.targets import DENSE, FREE, task_of, with_lengths
 from cfmkit.families.slider_crank.springs.windows import widest, widest_of_all
 from cfmkit.families.slider_crank.unit_springs import JOINTS
-from cfmkit.numerics.boxes import Axis, Lowest, lowest
+from cfmkit.numerics.boxes import BoxAxis, Lowest, lowest
 from cfmkit.results import Design, Status
 from cfmkit.specs.units import Place, format_short
 
@@ -144,8 +144,8 @@ def _searched(spec: SliderCrankSpec, wanted: CrankDesign, run: Run) -> tuple[Sol
     return solve(task_of(with_lengths(spec, dict(zip(axes, place, strict=True))))), found
 
 
-def _axis(name: str, ends: tuple[float, float]) -> Axis:
-    return Axis(*ends, log=name != "offset")
+def _axis(name: str, ends: tuple[float, float]) -> BoxAxis:
+    return BoxAxis(*ends, log=name != "offset")
 
 
 def _height(spec: SliderCrankSpec, lengths: dict[str, float]) -> float:
