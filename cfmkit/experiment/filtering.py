@@ -59,8 +59,6 @@ class LowPass:
     def sections(self, step: float) -> FloatArray:
         """Return the second-order sections of one pass for samples `step` [s, m or rad] apart.
 
-        The bilinear transform of the Butterworth poles exp(i theta), K = tan(pi f step).
-
         Returns
         -------
         (m, 6) array
@@ -78,13 +76,10 @@ class LowPass:
         tangent = math.tan(math.pi * self.cutoff * step)
         if self.corrected:
             tangent /= (math.sqrt(2.0) - 1.0) ** (1.0 / (2 * self.order))
-        pairs = [
-            _pair(tangent, 2.0 * math.sin(math.pi * (2 * k + 1) / (2 * self.order))) for k in range(self.order // 2)
-        ]
-        if self.order % 2:
-            gain = tangent / (1.0 + tangent)
-            pairs.append([gain, gain, 0.0, 1.0, (tangent - 1.0) / (tangent + 1.0), 0.0])
-        return np.array(pairs)
+        from scipy.signal import butter
+
+        found: FloatArray = butter(self.order, math.atan(tangent) / math.pi, fs=1.0, output="sos")
+        return found
 
     @property
     def told(self) -> str:
@@ -103,14 +98,6 @@ class LowPass:
         """What the filter is, for reports."""
         at = "-3 dB both passes together" if self.corrected else "-3 dB each pass"
         return f"Butterworth of order {self.order} per pass, back and forth, cut-off {self.told} ({at}), each branch"
-
-
-def _pair(tangent: float, damping: float) -> list[float]:
-    """Return the section of a pair of poles with s^2 + damping s + 1."""
-    square = tangent * tangent
-    scale = 1.0 + damping * tangent + square
-    gain = square / scale
-    return [gain, 2.0 * gain, gain, 1.0, 2.0 * (square - 1.0) / scale, (1.0 - damping * tangent + square) / scale]
 
 
 def read_filter(text: str) -> LowPass | None:
@@ -149,13 +136,6 @@ def _read_cutoff(text: str) -> tuple[float, Per]:
     if value <= 0:
         raise QuantityError(f"a cut-off of {text.strip()} filters everything away")
     return value, "time" if dimension == "frequency" else "length"
-
-
-def two_pass_gain(filtered_by: LowPass, frequency: float, step: float) -> float:
-    """Return the gain of both passes at a frequency, for samples `step` apart."""
-    delay = np.exp(-2j * math.pi * frequency * step * np.arange(3))
-    sections = filtered_by.sections(step)
-    return float(np.prod(np.abs((sections[:, :3] @ delay) / (sections[:, 3:] @ delay))) ** 2)
 
 
 def low_passed(values: FloatArray, over: FloatArray, filtered_by: LowPass) -> FloatArray:
@@ -205,19 +185,10 @@ def _both_ways(values: FloatArray, step: float, filtered_by: LowPass) -> FloatAr
 def _one_way(values: FloatArray, sections: FloatArray) -> FloatArray:
     """Return values after one pass that starts at rest at the first value.
 
-    Each section is a triangular system of bandwidth two; scipy.signal would do the same, but
-    takes longer to import than to filter.
+    The level is taken off before and put back: where the cut-off is far below the sampling rate the initial state that
+    holds it, as `scipy.signal.sosfiltfilt` computes it, is known to a few digits only.
     """
-    from scipy.linalg.blas import dtbsv
+    from scipy.signal import sosfilt
 
-    rest = values[0]
-    signal = values - rest
-    for b0, b1, b2, _, a1, a2 in sections:
-        driven = b0 * signal
-        driven[1:] += b1 * signal[:-1]
-        driven[2:] += b2 * signal[:-2]
-        band = np.empty((3, len(signal)), order="F")
-        band[0], band[1], band[2] = 1.0, a1, a2
-        signal = dtbsv(2, band, driven, lower=1, diag=1)
-    filtered: FloatArray = signal + rest
+    filtered: FloatArray = sosfilt(sections, values - values[0]) + values[0]
     return filtered

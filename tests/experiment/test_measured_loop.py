@@ -5,14 +5,21 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from experiment_support import reference_case
+from scipy.signal import sosfreqz
 
 from cfmkit.experiment.branches import split
-from cfmkit.experiment.filtering import LowPass, low_passed, two_pass_gain
+from cfmkit.experiment.filtering import LowPass, low_passed
 from cfmkit.experiment.measured import Measurement, measured, numbers_of
 from cfmkit.metrics import Window
 
 WINDOW = Window(0.040, 0.210)
 TWO_HERTZ = LowPass(2.0, "time", 6)
+
+
+def two_pass_gain(filtered_by: LowPass, frequency: float, step: float) -> float:
+    """Return the gain of both passes at a frequency, for samples `step` apart."""
+    _, gain = sosfreqz(filtered_by.sections(step), [frequency], fs=1 / step)
+    return float(abs(gain[0]) ** 2)
 
 
 @pytest.fixture(scope="module")
