@@ -10,7 +10,6 @@ import io
 import json
 import shutil
 import sys
-import textwrap
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -137,6 +136,8 @@ def _renderables(block: TextLine | Paragraph | Grid, width: int) -> Iterator[Ren
     if isinstance(block, Grid):
         yield _table(block)
     elif isinstance(block, Paragraph):
+        import textwrap
+
         lines = textwrap.wrap(block.text, width - MARGIN, break_long_words=False, break_on_hyphens=False) or [""]
         yield _text(Span(f"{block.word:<{MARGIN}}", block.tone), Span(lines[0]), whole=True)
         for text in lines[1:]:
