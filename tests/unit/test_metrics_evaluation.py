@@ -9,7 +9,7 @@ from metrics_support import BARE, LOOP, SAW, curve, reason, value
 
 from cfmkit.curves import Curve
 from cfmkit.errors import UsageError
-from cfmkit.metrics import Frame, Trace, Window, as_json, evaluate, measure, restrict, traces
+from cfmkit.metrics import BranchTrace, Frame, Window, as_json, evaluate, measure, restrict, traces
 from cfmkit.results import Quantity, Result, Status
 
 
@@ -21,7 +21,7 @@ def usable(of, frame=BARE):
 
 
 def part(motion, effort, lo, hi):
-    return restrict(Trace("load", np.array(motion, float), np.array(effort, float)), Window(lo, hi))
+    return restrict(BranchTrace("load", np.array(motion, float), np.array(effort, float)), Window(lo, hi))
 
 
 def test_a_window_between_samples_gets_interpolated_ends():

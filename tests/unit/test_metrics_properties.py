@@ -8,7 +8,7 @@ from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 from cfmkit.curves import Column, Curve
-from cfmkit.metrics import Frame, Trace, Window, measure, restrict
+from cfmkit.metrics import BranchTrace, Frame, Window, measure, restrict
 from cfmkit.metrics.traces import TOLERANCE, _folded
 
 PROPERTY = settings(deadline=None, max_examples=60)
@@ -212,7 +212,7 @@ def test_the_fast_cut_of_straight_branches_agrees_with_the_general_one(points, p
         motion, effort = motion[::-1], effort[::-1]
     span = motion.max() - motion.min()
     window = Window(motion.min() + part[0] * span, motion.min() + part[1] * span)
-    trace = Trace("load", motion, effort, effort * 2)
+    trace = BranchTrace("load", motion, effort, effort * 2)
     fast, general = restrict(trace, window), _folded(trace, window, TOLERANCE * (window.hi - window.lo))
     for name in ("motion", "effort", "stress"):
         assert getattr(fast, name) == pytest.approx(getattr(general, name), rel=1e-12)
@@ -226,7 +226,7 @@ def test_the_runs_of_a_fold_are_its_path_clipped_to_the_window(points):
     lo, hi = motion.min(), motion.max()
     assume(hi > lo)
     window = Window(lo + (hi - lo) / 3, hi - (hi - lo) / 3.5)
-    cut = restrict(Trace("load", motion, effort), window)
+    cut = restrict(BranchTrace("load", motion, effort), window)
     slack = 1e-8 * (hi - lo)
     assert (cut.motion >= window.lo - slack).all()
     assert (cut.motion <= window.hi + slack).all()
