@@ -246,8 +246,10 @@ class Branch:
         Undefined
             If the branch does not reach the reference pose, is many-valued, or has no effort there.
         """
-        place = self.reference
+        place, model = self.reference, self.frame.closed
         here, (motion, effort) = self.at(place), self.function
+        if model is not None:  # an interpolated value may hide that there is no effort
+            here = float(model.effort(self.name, np.array([place]))[0])
         if abs(here) <= ZERO * float(np.nanmax(np.abs(effort))):
             raise Undefined(f"the {self.kind} at the reference pose is zero")
         index, offset = int(motion.searchsorted(place)), effort / here - 1

@@ -13,8 +13,10 @@ from cfmkit.families.slider_crank.springs.block import analyze_block
 from cfmkit.plots.findings import DrawnScale, StudyMarks
 from cfmkit.plots.study import draw_map, draw_metric
 from cfmkit.plots.style import png
+from cfmkit.studies.blocks import evaluate_block, measures
 from cfmkit.studies.columns import metrics_of
-from cfmkit.studies.plan import zipped
+from cfmkit.studies.plan import grid, zipped
+from cfmkit.studies.study import Study
 from cfmkit.studies.variation import axes, wishes
 
 NAMES = {
@@ -56,6 +58,50 @@ def test_a_block_has_the_numbers_of_single_runs(name):
 
 
 @pytest.mark.parametrize(
+    ("name", "design", "least"),
+    [
+        ("li2019", {}, 24),
+        ("li2019_bistable", {"design.torque": "0.01 N*m"}, 24),
+        ("li2019_from_singularity", {}, 24),
+        ("li2019_prototype", {}, 24),
+        ("bilancia2019", {}, 24),
+        ("bilancia2019_optimum", {"design": None}, 24),
+        # Over a full turn the mean of springs that repeat themselves is rounding: those stay with the model of one.
+        ("li2019_full_turn", {}, 3),
+    ],
+)
+def test_a_sweep_with_every_column_is_done_in_blocks_and_has_the_rows_of_single_runs(name, design, least):
+    spec = config(name).replace(design)
+    kind = RATES["bilancia2019" if name.startswith("bilancia") else "li2019"]
+    units = {2: "N*m/rad", 3: "N/m"}
+    lists = {PATHS[row]: [f"{share * kind[row]} {units[row]}" for share in (0.0, 0.5, 1.2, 3.0)] for row in units}
+    plan = grid(axes(spec, wishes(lists | {"mechanism.legs": [1, 2]})))
+    study = Study(spec, plan.paths, metrics_of(spec, (), cfmkit.analyze(spec).curves[0]))
+    assert len(study.metrics) > 50
+    rows = evaluate_block(study, plan, 0, len(plan))
+    values = dict(zip(plan.paths, plan.block(0, len(plan)), strict=True))
+    with np.errstate(all="ignore"):
+        assert analyze_block(spec, Block(values, measures(study), len(plan))).done.sum() >= least
+    for index in range(len(plan)):
+        single = study.evaluate(plan.point(index))
+        assert rows.status(index) == (single.status, single.message)
+        if single.values:
+            assert tuple(rows.met[index].tolist()) == single.met
+            for metric, got, value in zip(study.metrics, rows.values[index].tolist(), single.values, strict=True):
+                loose = 1e-5 if metric.name == "stiffness_drop" else 1e-13
+                wanted = pytest.approx(np.nan if value is None else value, rel=1e-8, abs=loose, nan_ok=True)
+                assert got == wanted, (metric.name, plan.point(index))
+
+
+def test_there_is_no_band_about_a_place_without_effort():
+    """With the slider's spring alone the torque in the stretched position is zero; interpolation would hide it."""
+    springs = {"mechanism.springs.slider_pin": 0.0, "mechanism.springs.slider": "1 N/cm"}
+    bands = api.evaluate(cfmkit.analyze(config("li2019_prototype").replace(springs)), ["band_range_5pct"])
+    assert bands["band_range_5pct"].value is None
+    assert "zero" in bands["band_range_5pct"].reason
+
+
+@pytest.mark.parametrize(
     ("name", "changes", "expected"),
     [
         ("li2019", {}, {"reference_zero"}),
@@ -93,8 +139,10 @@ def test_a_block_leaves_what_it_cannot_do():
     assert found.done.tolist() == [True, False, False]
     other = {"mechanism.crank_length": np.array([0.1])}
     assert analyze_block(spec, Block(other, (Measure("stiffness_class"),), 1)) is None
-    assert analyze_block(spec, Block(values, (Measure("usable_stroke"),), 3)) is None
-    assert analyze_block(spec, Block(values, (Measure("constant_travel"),), 3)) is None
+    assert analyze_block(spec, Block(values, (Measure("stress_max"),), 3)) is None
+    # What only a driven slider has is an empty cell, as in the row of one mechanism.
+    found = analyze_block(spec, Block(values, (Measure("constant_travel"),), 3))
+    assert np.isnan(found.values[0][""]).all()
 
 
 def test_the_map_has_the_thresholds_to_six_digits():

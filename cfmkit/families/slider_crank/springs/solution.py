@@ -58,6 +58,15 @@ class Equilibrium:
     energy: float
 
 
+def grid_over(assembly: Assembly, low: float, high: float) -> FloatArray:
+    """Return the places of the grid over a motion, (n,) [rad or m]."""
+    share = np.linspace(0.0, 1.0, GRID)
+    if assembly.drive == "force":  # the force runs like the square root of the travel from the stretched place
+        share = share**2
+    places: FloatArray = low + (high - low) * share
+    return places
+
+
 @dataclass(frozen=True)
 class Character:
     """What kind of mechanism it is over an interval of its motion.
@@ -92,10 +101,7 @@ class Character:
     @cached_property
     def grid(self) -> FloatArray:
         """Places of the motion, the last of them a little off the ends where an end is a pole."""
-        share = np.linspace(0.0, 1.0, GRID)
-        if self.assembly.drive == "force":  # the force runs like the square root of the travel from the stretched place
-            share = share**2
-        places = self.low + (self.high - self.low) * share
+        places = grid_over(self.assembly, self.low, self.high)
         effort = self.efforts(places)
         grid: FloatArray = places[np.isfinite(effort)]
         return grid
