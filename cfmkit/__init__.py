@@ -53,6 +53,7 @@ if TYPE_CHECKING:
     from cfmkit.families.base import Run
     from cfmkit.results import Design, Finding, Quantity, Result, Status
     from cfmkit.runs.batch import BatchResult, batch
+    from cfmkit.runs.examples import Example, examples
     from cfmkit.runs.recordings import calibrate, measure
     from cfmkit.specs.spec import Spec
     from cfmkit.studies.outcome import StudyResult
@@ -72,6 +73,7 @@ _HOMES = {
         "sweep",
     ),
     "cfmkit.runs.batch": ("BatchResult", "batch"),
+    "cfmkit.runs.examples": ("Example", "examples"),
     "cfmkit.curves": ("Curve",),
     "cfmkit.errors": (
         "CfmError",
@@ -103,6 +105,7 @@ __all__ = [
     "Curve",
     "DataError",
     "Design",
+    "Example",
     "ExitCode",
     "Finding",
     "FolderInUse",
@@ -131,6 +134,7 @@ __all__ = [
     "drawing",
     "dumps",
     "evaluate",
+    "examples",
     "export",
     "load",
     "loads",

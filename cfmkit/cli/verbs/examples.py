@@ -1,0 +1,92 @@
+"""``cfmkit examples``: the specs that come with the package."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cfmkit.cli.answer import Answer
+from cfmkit.cli.options import Common, Jobs, argument, option
+from cfmkit.cli.page import BAD, GOOD, Paragraph, command_line, field, listed
+from cfmkit.errors import UsageError, visible
+
+if TYPE_CHECKING:
+    from cfmkit.cli.terminal import Terminal
+    from cfmkit.studies.batch import Entry
+
+PLACE = 52
+
+ALL = "all"
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExamplesOptions(Common):
+    """Arguments and options."""
+
+    name: Annotated[str | None, argument("[NAME]", "Copy this one, with its data; default: list all.")] = None
+    out: Annotated[str | None, option("-o", "--out", metavar="DIR", text="Folder to copy to; default: this one.")] = (
+        None
+    )
+    run: Annotated[
+        str | None,
+        option("--run", metavar="NAME|all", text="Run one, or all, to check this installation; nothing is kept."),
+    ] = None
+    jobs: Jobs = None
+
+
+def run(options: ExamplesOptions, terminal: Terminal) -> Answer:
+    """List the examples that come with cfmkit, copy one, or run them to check an installation; nothing is replaced."""
+    from cfmkit.runs.examples import copy, example, examples
+
+    if options.run is not None:
+        if options.name is not None or options.out is not None:
+            raise UsageError("--run keeps nothing: it takes neither NAME nor --out")
+        return _checked(options.run, options, terminal)
+    if options.name is not None:
+        written = [str(path) for path in copy(options.name, options.out or ".")]
+        from cfmkit.families import family
+
+        verb = "design" if family(example(options.name).family).design and _designs(written[0]) else "analyze"
+        page = (
+            Paragraph("written", ", ".join(map(visible, written)), GOOD),
+            Paragraph("next", command_line("cfmkit", verb, written[0])),
+        )
+        return Answer({"files": written}, page)
+    if options.out is not None:
+        raise UsageError("--out says where a copy goes: name an example")
+    records = [{"name": one.name, "family": one.family, "about": one.about} for one in examples()]
+    fields = (field("name"), field("family"), field("about", wraps=True))
+    return Answer({"examples": records}, tuple(listed("examples", records, fields)))
+
+
+def _designs(path: str) -> bool:
+    """Return whether a specification says what is to be designed."""
+    from cfmkit.api import load
+
+    return getattr(load(path), "design", None) is not None
+
+
+def _checked(name: str, options: ExamplesOptions, terminal: Terminal) -> Answer:
+    """Return what became of examples that were run in a folder that is gone afterwards."""
+    from tempfile import TemporaryDirectory
+
+    from cfmkit.cli.progress import watching
+    from cfmkit.runs.batch import batch
+    from cfmkit.runs.examples import example, examples
+
+    chosen = [one for one in examples() if "/" not in one.name] if name == ALL else [example(name)]
+    with TemporaryDirectory(prefix="cfmkit-examples-") as place, watching(terminal, "examples") as progress:
+        files = [one.path for one in chosen]
+        found = batch(files, place, plots=False, jobs=options.jobs, arguments=terminal.arguments, monitor=progress)
+    records = [_record(one.name, entry) for one, entry in zip(chosen, found.entries, strict=True)]
+    wrong = [one for one in records if one["exit_code"] != 0]
+    told = f"{len(records) - len(wrong)} of {len(records)} examples end as they should"
+    page = (
+        *listed("examples", records, (field("name"), field("status"), field("message", wraps=True))),
+        Paragraph("verdict", told, BAD if wrong else GOOD),
+    )
+    return Answer({"message": told, "examples": records}, page, found.exit_code)
+
+
+def _record(name: str, entry: Entry) -> dict[str, Any]:
+    return {"name": name, "status": entry.status, "exit_code": int(entry.code), "message": entry.message}

@@ -1,0 +1,148 @@
+"""The examples that come with the package: published designs, starting points and studies, with their data.
+
+In the tree they are the folder `configs`; a wheel has the same files as the package `cfmkit.configs`.
+"""
+
+from __future__ import annotations
+
+import difflib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from cfmkit.errors import OutputError, UsageError, visible
+
+if TYPE_CHECKING:
+    import os
+    from collections.abc import Iterable
+
+
+@dataclass(frozen=True)
+class Example:
+    """One example.
+
+    Attributes
+    ----------
+    name : str
+        Path below the folder of all, without its ending: ``cam``, ``studies/cam_tolerance``.
+    family : str
+        As the file says.
+    about : str
+        What it is: the first sentence of the file's comment.
+    path : Path
+        The file.
+    """
+
+    name: str
+    family: str
+    about: str
+    path: Path
+
+
+def folder() -> Path:
+    """Return the folder of all examples.
+
+    Raises
+    ------
+    cfmkit.errors.UsageError
+        If this installation has none.
+    """
+    import cfmkit
+
+    package = Path(cfmkit.__file__).parent
+    for place in (package / "configs", package.parent / "configs"):
+        if (place / "cam.yaml").is_file():
+            return place
+    raise UsageError("this installation has no examples; install cfmkit from a wheel or from its source")
+
+
+def examples() -> tuple[Example, ...]:
+    """Return every example, those of the top folder first, by name.
+
+    Examples
+    --------
+    >>> import cfmkit
+    >>> cfmkit.examples()[0].name, len({example.family for example in cfmkit.examples()})
+    ('beam_cantilever', 4)
+    """
+    root = folder()
+    files = sorted(root.rglob("*.yaml"), key=lambda path: (len(path.parts), path))
+    return tuple(_example(path, root) for path in files)
+
+
+def _example(path: Path, root: Path) -> Example:
+    lines = path.read_text(encoding="utf-8").splitlines()
+    named = (line.partition(":")[2].strip() for line in lines if line.startswith("family:"))
+    comment = " ".join(line.removeprefix("#").strip() for line in lines[: _comment(lines)])
+    return Example(path.relative_to(root).with_suffix("").as_posix(), next(named, ""), _first_sentence(comment), path)
+
+
+def _comment(lines: list[str]) -> int:
+    """Return how many lines at the top are comment."""
+    return next((at for at, line in enumerate(lines) if not line.startswith("#")), len(lines))
+
+
+def _first_sentence(text: str) -> str:
+    """Return a text up to its first full stop or colon that ends a sentence; initials and "Eq." end none."""
+    words: list[str] = []
+    for word in text.split():
+        words.append(word)
+        if word[-1] == "." and len(word) > 3 and word[:-1].isalpha() and word[:-1].islower():
+            break
+    return " ".join(words)
+
+
+def example(name: str) -> Example:
+    """Return one example by its name, with or without its ending.
+
+    Raises
+    ------
+    cfmkit.errors.UsageError
+        If there is none of that name.
+    """
+    known = {one.name: one for one in examples()}
+    wanted = name.removesuffix(".yaml")
+    if wanted in known:
+        return known[wanted]
+    near = difflib.get_close_matches(wanted, known, n=1)
+    hint = f"; did you mean {near[0]!r}?" if near else "; `cfmkit examples` lists them"
+    raise UsageError(f"there is no example {visible(name)!r}{hint}")
+
+
+def copy(name: str, out: str | os.PathLike[str] = ".") -> tuple[Path, ...]:
+    """Copy an example with the data files that it names, and return what was written; nothing is replaced.
+
+    Raises
+    ------
+    cfmkit.errors.UsageError
+        If there is no example of that name.
+    cfmkit.errors.OutputError
+        If a file is there already, or cannot be written.
+    """
+    from cfmkit import api
+    from cfmkit.store.disk import discard, make_folders, reporting, write_new
+    from cfmkit.tables.source import named_in
+
+    chosen = example(name)
+    target = Path(out) / chosen.path.name
+    data = sorted({str(source): source.path for source in named_in(api.load(chosen.path).model_dump())}.items())
+    wanted = {target: chosen.path, **{target.parent / text: path for text, path in data}}
+    _refuse_taken(wanted)
+    written: list[Path] = []
+    try:
+        for place, source in wanted.items():
+            with reporting(place):
+                make_folders(place.absolute().parent)
+                write_new(place, source.read_bytes())
+            written.append(place)
+    except OutputError:
+        for place in written:
+            discard(place)
+        raise
+    return tuple(written)
+
+
+def _refuse_taken(places: Iterable[Path]) -> None:
+    for place in places:
+        if place.exists() or place.is_symlink():
+            raise OutputError(f"cannot write {visible(str(place))}: a file of that name is in the way")
