@@ -1,7 +1,7 @@
 """Settings of all tests.
 
 The families in `plugins` take part, installed or not. Property tests try the same examples in every run, unless a
-search for new ones is asked for: ``CFMKIT_TEST_SEARCH=1 pytest`` draws new examples.
+search for new ones is requested: ``CFMKIT_TEST_SEARCH=1 pytest`` draws new examples.
 """
 
 from __future__ import annotations

@@ -145,7 +145,7 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    """Import a public name when it is first asked for."""
+    """Import a public name when it is first needed."""
     if name not in _HOME:
         raise AttributeError(f"module 'cfmkit' has no attribute {name!r}")
     value = getattr(import_module(_HOME[name]), name)

@@ -189,7 +189,7 @@ def check(result: Result | AnySpec) -> tuple[Outcome, ...]:
 
 
 def sweep(spec: AnySpec, jobs: int = 1, **block: Any) -> StudyResult:
-    """Return a mechanism in many variants: one row a point, whatever becomes of it.
+    """Return a mechanism in many variants: one row per point, whether it could be solved or not.
 
     Parameters
     ----------

@@ -1,1 +1,1 @@
-"""The command line: parse, one call, print. One file a verb in `cfmkit.cli.verbs`."""
+"""The command line: parse, one call, print. One file per verb in `cfmkit.cli.verbs`."""

@@ -39,7 +39,7 @@ class Call:
 
 
 class Verbs(TyperGroup):
-    """The group of all verbs; each module is imported when its command is asked for."""
+    """The group of all verbs; each module is imported when its command is called."""
 
     def list_commands(self, ctx: Any) -> list[str]:
         """Return the names of all verbs, in the order of the help."""
@@ -89,7 +89,28 @@ def _command(name: str) -> Any:
     callback.__annotations__ = {field.name: hints[field.name] for field in fields}
     app = typer.Typer(**_STYLE)
     app.command(name, help=inspect.getdoc(module.run))(callback)
-    return typer.main.get_command(app)
+    return _plain(typer.main.get_command(app))
+
+
+def _plain(command: Any) -> Any:
+    """Return a command whose help names no types of Python: neither ``<bool>`` of a flag nor ``<str>`` of a file."""
+    helped = command.get_help_option
+
+    def help_option(ctx: Any) -> Any:
+        return _untyped(helped(ctx))
+
+    command.get_help_option = help_option
+    for item in command.params:
+        _untyped(item)
+    return command
+
+
+def _untyped(item: Any) -> Any:
+    if getattr(item, "is_flag", False) or getattr(item, "count", False):
+        item.metavar = ""
+    elif getattr(item, "param_type_name", "") == "argument":
+        item.display_type_rich = lambda ctx: None  # its name says it; older versions of typer do not call this
+    return item
 
 
 def _parameter(field: dataclasses.Field[Any], hint: Any) -> inspect.Parameter:
@@ -113,7 +134,7 @@ def parse(app: typer.Typer, arguments: list[str]) -> Call | None:
         Of typer's kind, if it is malformed.
     """
     try:
-        call = typer.main.get_command(app).main(arguments, "cfmkit", standalone_mode=False)
+        call = _plain(typer.main.get_command(app)).main(arguments, "cfmkit", standalone_mode=False)
     except SystemExit:
         # The reader of the help text has left.
         return None

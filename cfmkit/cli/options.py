@@ -17,14 +17,46 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
 
+MOST = 2**63 - 1
+"""The largest integer of an option: what a signed integer of 64 bits in files and generators holds."""
+
+
 def argument(metavar: str, text: str, completed: Callable[[str], list[str]] | None = None) -> Any:
     """Return the declaration of an argument: its name in the help, what it is, and what a shell completes it to."""
     return typer.Argument(metavar=metavar, help=text, show_default=False, autocompletion=completed)
 
 
-def option(*names: str, text: str, metavar: str | None = None, shown: bool = False, **limits: Any) -> Any:
-    """Return the declaration of an option that takes a value; `shown` says whether the help shows its default."""
-    return typer.Option(*names, metavar=metavar, help=text, show_default=shown, **limits)
+def option(
+    *names: str, text: str, metavar: str | None = None, shown: bool = False, low: int | None = None, **more: Any
+) -> Any:
+    """Return the declaration of an option that takes a value.
+
+    Parameters
+    ----------
+    *names : str
+        As the user writes it.
+    text, metavar : str
+        What the help says, and what it calls the value.
+    shown : bool
+        Whether the help shows the default.
+    low : int, optional
+        The smallest value. It is checked here and not by typer, whose help would show ``[0<=x<=...]``.
+    **more
+        What else typer takes.
+    """
+    check = None if low is None else _at_least(low)
+    return typer.Option(*names, metavar=metavar, help=text, show_default=shown, callback=check, **more)
+
+
+def _at_least(low: int) -> Callable[[int | None], int | None]:
+    """Return what lets a number pass that is neither too small nor too large for a signed integer of 64 bits."""
+
+    def check(value: int | None) -> int | None:
+        if value is None or low <= value <= MOST:
+            return value
+        raise typer.BadParameter(f"{value} is not allowed: must be {f'>= {low}' if value < low else f'<= {MOST}'}")
+
+    return check
 
 
 def flag(*names: str, text: str) -> Any:
@@ -32,15 +64,12 @@ def flag(*names: str, text: str) -> Any:
     return typer.Option(*names, help=text)
 
 
-MOST = 2**63 - 1
-"""The largest seed: what a signed 64-bit integer of files and generators holds."""
-
 Out = Annotated[str | None, option("-o", "--out", metavar="DIR", text="Output folder; default: cfm-out/SPEC-VERB/.")]
 Fidelity = Annotated[str | None, option("--fidelity", metavar="NAME", text="Short for --set analysis.fidelity=NAME.")]
-Seed = Annotated[int, option("--seed", metavar="N", shown=True, min=0, max=MOST, text="Seed of everything random.")]
+Seed = Annotated[int, option("--seed", metavar="N", shown=True, low=0, text="Seed of everything random.")]
 Quiet = Annotated[bool, flag("-q", "--quiet", text="Print only what went wrong.")]
 NoPlots = Annotated[bool, flag("--no-plots", text="Draw no figures.")]
-Jobs = Annotated[int | None, option("-j", "--jobs", metavar="N", min=1, text="Processes; default: all cores.")]
+Jobs = Annotated[int | None, option("-j", "--jobs", metavar="N", low=1, text="Processes; default: all cores.")]
 Timeout = Annotated[float | None, option("--timeout-per-point", metavar="S", text="Give up a point after S seconds.")]
 Fresh = Annotated[bool, flag("--fresh", text="Compute anew what an earlier run has finished.")]
 WithReport = Annotated[bool, flag("--report", text="Write report.html, too: everything in one file to share.")]
@@ -107,7 +136,7 @@ class Studying(Computing):
         ),
     ] = None
     max_points: Annotated[
-        int, option("--max-points", metavar="N", shown=True, min=1, text="Refuse studies with more points.")
+        int, option("--max-points", metavar="N", shown=True, low=1, text="Refuse studies with more points.")
     ] = 1_000_000
     timeout_per_point: Timeout = None
     fresh: Fresh = False

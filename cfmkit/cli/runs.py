@@ -46,7 +46,7 @@ def execute(verb: Verb, options: Computing, terminal: Terminal) -> Answer:
 
 
 def folder_of(options: OneSpec, verb: str) -> str:
-    """Return the output folder: the one asked for, or one named after the spec and the verb.
+    """Return the output folder: the one requested, or one named after the spec and the verb.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Values of a specification fitted to a measured curve, with what the data cannot tell.
+"""Values of a specification fitted to a measured curve, with what the data cannot determine.
 
 The specification is resolved first: the built part keeps its shape while the values
 around it are fitted. Parameters that the data do not determine are named and nothing
@@ -255,7 +255,7 @@ def _misfit(parameters: Sequence[FitParameter], fit: FittedValues, after: Compar
 
 
 def table(calibration: Calibration) -> list[dict[str, Any]]:
-    """Return one record a parameter in border units: value, 95 % interval, standard deviation, start."""
+    """Return one record per parameter in border units: value, 95 % interval, standard deviation, start."""
     from cfmkit.specs.units import border_unit, to_border
 
     half, spread = calibration.fit.half_widths(), calibration.fit.deviations

@@ -131,7 +131,7 @@ _ERRORS: dict[str, Measure] = {
     "data_error_max": (largest, "(model - measured) {} where it is largest in magnitude, in the window"),
     "data_offset": (mean, "mean of (model - measured) {}, at the measured points in the window"),
 }
-"""What is told about the errors: name -> (function, definition)."""
+"""What is reported of the errors: name -> (function, definition)."""
 
 
 def compare(result: Result, source: MeasuredCurves, window: Window | None = None) -> Comparison:

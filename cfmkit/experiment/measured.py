@@ -1,6 +1,6 @@
 """What a recording says about a mechanism: raw and filtered curves, metrics, repeatability.
 
-A recording becomes one curve a cycle. Within a branch the samples stand in the order of
+A recording becomes one curve per cycle. Within a branch the samples stand in the order of
 the motion, so that the flicker of an encoder makes no folds; they are filtered before, in
 the order of time. The value of a metric is its mean over the complete cycles, or over what
 there is if none is complete.

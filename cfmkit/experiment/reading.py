@@ -1,7 +1,7 @@
 """Measured curves from lab CSV files as they come, in SI; what was decided on the way can be read back.
 
 Separator, decimal sign, encoding and header are found out (`cfmkit.tables.labtext`), units and roles
-of the columns are read or told. Only the columns that are used must be
+of the columns are read or stated by the user. Only the columns that are used must be
 free of gaps.
 """
 
@@ -201,7 +201,7 @@ def read_recording(path: str | os.PathLike[str], units: str | None = None) -> Re
     path : path-like
         Text with columns: displacement and force, or angle and torque, and perhaps time.
     units : str, optional
-        Units that the header does not tell, by name or number of the column: ``"s=mm,F=N"``.
+        Units that the header does not state, by name or number of the column: ``"s=mm,F=N"``.
         Where several columns qualify, those named here are used.
 
     Raises

@@ -91,7 +91,7 @@ def _with_filtered(raw: Curve, number: int, source: MeasuredCurves) -> Curve:
 
 
 def cycles_table(report: MeasureReport) -> Table:
-    """Return the raw metrics that have a value, one row a cycle."""
+    """Return the raw metrics that have a value, one row per cycle."""
     each = report.numbers.each
     names = [name for name in each[0] if any(item[name].value is not None for item in each)]
     numbers = [int(curve.label["cycle"][0]) if curve.label else 1 for curve in report.source.raw]

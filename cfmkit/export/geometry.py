@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 TOLERANCE = 5e-6
-"""How far outlines may be from the exact ones unless told otherwise [m]."""
+"""How far outlines may be from the exact ones by default [m]."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""The exact points of a drawing as CSV, one table a file: for CAD splines and for checking a finished part."""
+"""The exact points of a drawing as CSV, one table per file: for CAD splines and for checking a finished part."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The registry of families: one line each, imported when first asked for; other packages add theirs by entry points."""
+"""The registry of families: one line each, imported when first needed; other packages add theirs by entry points."""
 
 from __future__ import annotations
 

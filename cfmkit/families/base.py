@@ -142,7 +142,7 @@ class BlockAnswer:
     target : (n,) array, optional
         Force or torque that each curve should have [N or N m].
     kind : {"force", "torque"}, optional
-        What the effort of the curves is; None: as the names of the metrics say.
+        Whether the curves are of force or of torque; None: what the names of the metrics imply.
     warnings : mapping of str to (n,) array of bool, optional
         Name of a finding -> the variants whose analysis would warn of it; None: the model does not know.
     """

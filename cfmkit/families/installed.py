@@ -5,7 +5,7 @@ A package adds a family by an entry point of the group ``cfmkit.families``, its 
 `importlib.metadata` alone takes longer than the list may. As there, the first of two folders of one package on the
 path counts. What lies in zip files is not found.
 
-A family that is asked for is imported, which runs code of that package.
+A family that is needed is imported, which runs code of that package.
 """
 
 from __future__ import annotations

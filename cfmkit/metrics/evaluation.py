@@ -35,7 +35,7 @@ class Value(NamedTuple):
 
 @dataclass(frozen=True)
 class Survey:
-    """All metrics of one curve over one window; each is computed when it is asked for."""
+    """All metrics of one curve over one window; each is computed when it is needed."""
 
     subject: Cycle
 

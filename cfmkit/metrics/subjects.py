@@ -1,6 +1,6 @@
 """What a metric looks at: one branch, or the whole cycle, in its frame of reference.
 
-Everything that several metrics need is computed once, when it is first asked for.
+Everything that several metrics need is computed once, when it is first needed.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 ZERO = 1e-9
-"""An effort at the reference pose below this share of the largest is rounding: a band of per cent of it is nothing."""
+"""An effort at the reference below this share of the largest is rounding: a band in per cent of it has no width."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Nonlinear least squares with what an honest fit must say: uncertainty, correlation, and what cannot be told.
+"""Nonlinear least squares with what an honest fit must say: uncertainty, correlation, and what cannot be determined.
 
 Parameters are scaled by their sizes. Columns of the scaled Jacobian that vanish belong to
 parameters without effect; directions with a vanishing singular value to parameters that

@@ -190,7 +190,7 @@ def register(
     Parameters
     ----------
     points : sequence of (n, 2) array
-        Measured, one array a curve.
+        Measured, one array per curve.
     curves : sequence of SmoothCurve
         Where they belong.
     robust : bool

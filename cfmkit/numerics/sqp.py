@@ -92,7 +92,7 @@ class Optimum:
     ending : SearchEnding
         Why the search ended.
     evaluations : int
-        How often the model was asked for values.
+        How often the model was evaluated.
     allowed : float
         Violation that counts as none.
     """
@@ -120,7 +120,7 @@ def _excess(constraints: FloatArray) -> float:
 
 
 def minimize(program: Program, start: FloatArray, bounds: FloatArray, effort: Effort | None = None) -> Optimum:
-    """Return the best point found from a start, or the last one where that is asked for.
+    """Return the best point found from a start, or the last one where that is requested.
 
     Parameters
     ----------

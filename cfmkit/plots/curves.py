@@ -139,7 +139,7 @@ def _line(curve: Curve, branch: str, color: str, name: str, faint: bool = False)
 
 
 def _colors(count: int) -> list[str]:
-    """Return one colour a curve: the palette, or a scale of lightness where there are more curves than colours."""
+    """Return one colour per curve: the palette, or a scale of lightness where there are more curves than colours."""
     if count <= len(LINES):
         return list(LINES[:count])
     from matplotlib import colormaps

@@ -112,7 +112,7 @@ def calibrate(
     zero: str | float | None = None,
     flip: str | Iterable[str] = (),
 ) -> Calibration:
-    """Return a specification whose model fits a measured curve: values, intervals, and what the data cannot tell.
+    """Return a specification whose model fits a measured curve: values, intervals, and what the data cannot determine.
 
     Parameters
     ----------

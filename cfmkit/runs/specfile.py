@@ -163,7 +163,7 @@ def bind(document: Document) -> Spec:
 
 
 def _known(named: str | None) -> Sequence[str]:
-    """Return the families among which one is looked for; other packages are not asked for one that is here."""
+    """Return the families among which one is looked for; other packages are not searched for one that is here."""
     from cfmkit import families
 
     if named in families.FAMILIES:

@@ -36,7 +36,7 @@ class Model(BaseModel):
 
 
 class OldWords:
-    """Words of a closed choice that are still understood, and that nobody is to be told of (an annotation)."""
+    """Words of a closed choice that are still understood, and that are not documented (an annotation)."""
 
     def __init__(self, *words: str) -> None:
         """Keep them."""
@@ -159,7 +159,9 @@ class Sensitivity(Model):
     seed: int | None = Field(None, ge=0, description="of everything random; `--seed` goes before")
     metrics: tuple[str, ...] = Field((), description="default: those of the requirements, over their windows")
     on_failure: Literal["fail", "resample", "bound"] = Field(
-        "fail", description="samples without a result: state no index, draw their block anew, or state intervals"
+        "fail",
+        description="for samples without a result: report no index (fail), draw their block again (resample) or report "
+        "intervals (bound)",
     )
     min_yield: Ratio | None = Field(None, gt=0, le=1, description="share of parts that must meet all requirements")
     design: bool = Field(False, description="design the mechanism anew at each point")

@@ -224,7 +224,7 @@ def _distinct(names: Iterable[str]) -> Iterator[str]:
 
 
 def results_table(entries: Sequence[Entry]) -> Table:
-    """Return results.csv: one row a specification."""
+    """Return results.csv: one row per specification."""
     return Table(
         (
             TableColumn("spec", tuple(one.spec for one in entries)),
@@ -243,7 +243,7 @@ def results_table(entries: Sequence[Entry]) -> Table:
 
 
 def requirements_table(entries: Sequence[Entry]) -> Table:
-    """Return requirements.csv: one row a requirement."""
+    """Return requirements.csv: one row per requirement."""
     rows = [(entry, one) for entry in entries for one in entry.requirements]
 
     def column(key: str) -> TableColumn:

@@ -1,4 +1,4 @@
-"""Which metrics a study notes: those asked for, or all that the mechanism can have."""
+"""Which metrics a study notes: those requested, or all that the mechanism can have."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ NEED_STRESS = ("stress_max", "safety_factor")
 def metrics_of(spec: Spec, names: Iterable[str], sample: Curve | None = None) -> tuple[Metric, ...]:
     """Return the metrics with these names; without names, every one that such a curve can have.
 
-    The default has one column a metric, over all branches, and then the family's own
+    The default has one column per metric, over all branches, and then the family's own
     values. A branch is had by name only: ``force_mean[load]``.
 
     Parameters
@@ -31,7 +31,7 @@ def metrics_of(spec: Spec, names: Iterable[str], sample: Curve | None = None) ->
     spec : Spec
         Its family knows more metrics.
     names : iterable of str
-        What is asked for; none for the default.
+        What is requested; none for the default.
     sample : Curve, optional
         A curve of the study, which says whether it is about forces or torques.
 

@@ -1,6 +1,6 @@
 """JUnit XML of a batch: what GitLab, Jenkins, GitHub actions and others show beside a change.
 
-One suite a specification, in it one test for the solution and one for each requirement.
+One suite per specification, in it one test for the solution and one for each requirement.
 Names never hold a value that was found, so that a system that follows a test from run
 to run finds it again.
 """

@@ -29,7 +29,7 @@ class StudyResult:
     Attributes
     ----------
     table : Table
-        As results.csv: one row a point. ``table["force_ripple"]`` is a column.
+        As results.csv: one row per point. ``table["force_ripple"]`` is a column.
     summary : mapping
         As metrics.json.
     curves : Table, optional

@@ -1,4 +1,4 @@
-"""What the columns of a lab file are: names, units and roles. Units are read or told, never guessed.
+"""What the columns of a lab file are: names, units and roles. Units are read or stated by the user, never guessed.
 
 A unit stands in the header as ``Force [N]``, ``Kraft (N)``, ``s/mm`` or ``travel in mm``,
 in a line of its own below the names, or in ``--units``. A column's role follows from the

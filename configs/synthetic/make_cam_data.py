@@ -4,7 +4,7 @@
   flank has 0.0155 mm too much material and six waves of 30 to 150 mm with 0.017 mm standard deviation together: sizes
   as Sanchez-Salinas et al., Mech. Mach. Theory 173 (2022) 104819, sec. 2.3 found them on theirs. To this comes noise of
   the measurement, 0.002 mm, and the part lies askew: 0.3 deg, 1.5 and -0.8 mm.
-- cam_loop.csv: the force on that cam, 5 to 130 mm and back at 500 mm/min, 35 values a second, with a rolling friction
+- cam_loop.csv: the force on that cam, 5 to 130 mm and back at 500 mm/min, 35 values per second, with a rolling friction
   of 0.00225, springs 0.3 mm longer than the cam was cut for (0.15 mm on each side), and 0.05 N of noise.
 
 Run: python configs/synthetic/make_cam_data.py [FOLDER]      (default: this folder; same versions, same bytes)

@@ -57,7 +57,7 @@ def column(slenderness: float, clamped: bool) -> tuple[Network, float]:
 def test_a_column_is_followed_far_beyond_its_critical_load(
     slenderness: float, clamped: bool, imperfection: float
 ) -> None:
-    """The first point asked for lies far behind the bifurcation: 20 to 300 times the critical approach."""
+    """The first requested point lies far behind the bifurcation: 20 to 300 times the critical approach."""
     network, critical = column(slenderness, clamped)
     path = trace(network, Displacement("b", np.pi, APPROACH * LENGTH), Control(imperfection=imperfection))
     assert path.status is PathStatus.COMPLETE, path.message
@@ -102,7 +102,7 @@ def approach_under(ratio: float) -> float:
 def test_a_column_is_loaded_with_its_critical_load_and_more(
     kind: str, cut: float | None, beside: float, tolerance: float
 ) -> None:
-    """A point asked for lies at the bifurcation, or next to it; half a pinned column is a critical cantilever."""
+    """A requested point lies at the bifurcation, or next to it; half a pinned column is a critical cantilever."""
     network, critical = loaded(kind, cut)
     ratios = np.array([0.5, 1.0 + beside, 1.2, 1.9])
     path = trace(network, Loading((PointLoad("b", fx=-critical),), ratios), Control(tolerance=tolerance))
@@ -117,7 +117,7 @@ def test_a_column_is_loaded_with_its_critical_load_and_more(
 
 @pytest.mark.parametrize("seed", range(200))
 def test_a_column_of_pieces_is_loaded_with_multiples_of_its_critical_load_at_random(seed: int) -> None:
-    """One of the points asked for lies at the bifurcation or near it; pieces may run either way."""
+    """One of the requested points lies at the bifurcation or near it; pieces may run either way."""
     rng = np.random.default_rng(seed)
     kind = str(rng.choice(list(ENDS)))
     cuts = np.sort(rng.choice([0.1, 0.25, 1 / 3, 0.4, 0.5, 2 / 3, 0.75], int(rng.integers(0, 3)), replace=False))

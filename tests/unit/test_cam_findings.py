@@ -426,7 +426,7 @@ def test_a_small_roller_on_a_cam_that_crosses_the_axis_is_refused():
 def test_a_travel_beyond_the_profile_ends_the_curve_at_its_end():
     result = run(analysis__travel="300 mm", **FITS)
     assert result.status is Status.PARTIAL
-    assert "the travel asked for is 300 mm, but the profile is cut for 240 mm" in message(result, "outside_profile")
+    assert "the requested travel is 300 mm, but the profile is cut for 240 mm" in message(result, "outside_profile")
     assert result.curve.motion.max() == pytest.approx(240 * MM)
     for harmless in ("240 mm", "100 mm"):
         result = run(analysis__travel=harmless, **FITS)

@@ -394,7 +394,7 @@ def test_a_motion_that_cannot_be_is_refused_with_the_cure(changes, said):
 
 
 def test_friction_that_holds_a_roller_leaves_gaps_and_says_so():
-    """Without a corner the slider has no lever on the rollers at the start; friction holds them a little longer."""
+    """Without a corner the slider has no leverage on the rollers at the start; friction holds them a little longer."""
     low = {"slider_position": brace_height() + 1e-6, "stroke": "1 mm", "time": "10 s"}
     result = analyze(
         moving(profile__roller_radius="10 mm", roller_radius="10 mm", rolling_friction=0.05, analysis__dynamics=low)

@@ -1,4 +1,4 @@
-"""Points asked for at bifurcations, on both ends of a branch; the solver with nothing eliminated."""
+"""Requested points at bifurcations, on both ends of a branch; the solver with nothing eliminated."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""V-beams asked for points next to their bifurcations, loosely and tightly, and starts on coarse meshes."""
+"""Requested points of V-beams next to their bifurcations, loosely and tightly, and starts on coarse meshes."""
 
 from __future__ import annotations
 

@@ -28,7 +28,7 @@ def problem(asked: tuple[float, ...] = ASKED, **control: Any) -> Problem:
 
 
 def trail(of: Problem, *places: tuple[float, int, int]) -> Trail:
-    """Return a path through places: the drive, the number of the point asked for or -1, the unstable directions."""
+    """Return a path through places: the drive, the number of the requested point or -1, the unstable directions."""
     made = Trail.begun(of)
     for drive, asked, unstable in places:
         made = made.with_spot(spot(of, drive, unstable), asked)

@@ -1,4 +1,4 @@
-"""However densely points are asked for, a V-beam buckles once, straightens once, and reaches the last of them."""
+"""However densely points are requested, a V-beam buckles once, straightens once, and reaches the last of them."""
 
 from __future__ import annotations
 

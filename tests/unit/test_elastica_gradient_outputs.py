@@ -99,7 +99,7 @@ def zoo(x: Any) -> Network:
 
 
 def outputs(path: Any, at: Any = slice(None)) -> dict[str, Any]:
-    """Everything that can be asked for at the points asked for."""
+    """Everything that can be requested at the requested points."""
     keep = path.at_asked[at]
     found = {"effort": path.effort[keep], "energy": path.energy[keep]}
     for node in path.layout.network.nodes:

@@ -1,4 +1,4 @@
-"""A path says where it is not what was asked for: points that miss the tolerance, branches that were stepped over."""
+"""A path says where it is not what was requested: points that miss the tolerance, branches that were stepped over."""
 
 from __future__ import annotations
 

@@ -188,7 +188,7 @@ def test_prestress_that_is_just_critical_has_a_start(tolerance: float) -> None:
 
 @pytest.mark.parametrize("tolerance", [1e-3, 1e-7, 1e-9])
 def test_a_branch_under_constant_loads_ends_where_the_drive_relieves_them(tolerance: float) -> None:
-    """A point asked for may lie just there, and a path on which none does ends its branch there as well."""
+    """A requested point may lie just there, and a path on which none does ends its branch there as well."""
     for points in ([0.25, 0.5, 0.75], [0.25, 0.75], [0.25, 0.5]):
         path = pressed(1.5, PointLoad("top", fx=EULER), points, tolerance=tolerance)
         assert path.status is PathStatus.COMPLETE, path.message

@@ -44,7 +44,7 @@ def test_written_out_derivatives_are_those_of_complex_steps(monkeypatch: pytest.
     for name in one._fields:
         a, b = getattr(one, name), getattr(other, name)
         assert a.shape == b.shape, name
-        if every and name == "touches":  # with pairs that are asked for and not needed, complex steps mark them, too
+        if every and name == "touches":  # with pairs that are requested and not needed, complex steps mark them, too
             assert not (a & ~b).any()
             continue
         np.testing.assert_allclose(a, b, rtol=1e-9, atol=1e-11 * max(1.0, np.abs(b).max(initial=0.0)), err_msg=name)

@@ -1,4 +1,4 @@
-"""Least squares: values, intervals that hold what they promise, correlation, and what cannot be told."""
+"""Least squares: values, intervals that hold what they promise, correlation, and what cannot be determined."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One module a verb; its name is the command's, with ``-`` for ``_``.
+"""One module per verb; its name is the command's, with ``-`` for ``_``.
 
 A verb module has
 

@@ -29,10 +29,11 @@ class AnalyzeOptions(Computing, Measuring):
 
     report: WithReport = False
     data: Annotated[
-        str | None, option("--data", metavar="FILE.csv", text="Measured curve to lay over, with the errors.")
+        str | None,
+        option("--data", metavar="FILE.csv", text="Measured curve to overlay; reports the errors of the model."),
     ] = None
     compare_fidelity: Annotated[
-        bool, flag("--compare-fidelity", text="Lay the curves of all models over each other, with the differences.")
+        bool, flag("--compare-fidelity", text="Overlay the curves of all models and report their differences.")
     ] = False
 
 

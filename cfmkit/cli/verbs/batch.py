@@ -41,7 +41,7 @@ class BatchOptions(Changing):
 
     specs: Annotated[
         list[str],
-        argument("SPEC...", "YAML files, folders, or quoted patterns such as 'configs/**/*.yaml'.", completion.specs),
+        argument("SPEC", "YAML files, folders, or quoted patterns such as 'configs/**/*.yaml'.", completion.specs),
     ]
     out: Annotated[str | None, option("-o", "--out", metavar="DIR", text="Output folder; default: cfm-out/batch/.")] = (
         None
@@ -123,7 +123,7 @@ def _reused(entries: Sequence[Entry]) -> int:
 
 
 def _page(entries: Sequence[Entry], written: Written, junit: str | None, everything: bool) -> Iterator[Block]:
-    """Yield one line a specification, and what is wrong below it."""
+    """Yield one line per specification, and what is wrong below it."""
     from cfmkit.studies.batch import message
 
     count = _reused(entries)

@@ -46,7 +46,7 @@ class CalibrateOptions(Computing, Measuring):
 
 
 def run(options: CalibrateOptions, terminal: Terminal) -> Answer:
-    """Fit values of a spec to a measured curve: values, intervals, correlation, and what the data cannot tell."""
+    """Fit values of a spec to a measured curve: values, intervals, correlation, and what the data cannot determine."""
     from cfmkit.cli.runs import execute
     from cfmkit.errors import UsageError
     from cfmkit.numerics.fit import LOSSES

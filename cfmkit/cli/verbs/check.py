@@ -29,7 +29,7 @@ class CheckOptions(Changing):
 
     specs: Annotated[
         list[str],
-        argument("SPEC...", "YAML files, or folders with them; - reads standard input.", completion.specs),
+        argument("SPEC", "YAML files, or folders with them; - reads standard input.", completion.specs),
     ]
     quiet: Quiet = False
 
@@ -93,7 +93,7 @@ def _record(item: Checked) -> dict[str, Any]:
 
 
 def _lines(found: list[Checked], everything: bool) -> Iterator[TextLine]:
-    """Yield one line a file, names whole whatever the width; and all of its requirements."""
+    """Yield one line per file, names whole whatever the width; and all of its requirements."""
     wide = max(len(visible(item.file)) for item in found)
     for item in found:
         name = f"{visible(item.file).ljust(wide)}  "

@@ -20,7 +20,7 @@ PLACE = 70
 class SchemaOptions(Common):
     """Arguments and options."""
 
-    family: Annotated[str | None, argument("[FAMILY]", "One family only; default: all.", completion.families)] = None
+    family: Annotated[str | None, argument("FAMILY", "One family only; default: all.", completion.families)] = None
 
 
 def run(options: SchemaOptions, terminal: Terminal) -> Answer:

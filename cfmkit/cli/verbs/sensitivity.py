@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cfmkit.cli.answer import Answer
-from cfmkit.cli.options import MOST, Studying, flag, option
+from cfmkit.cli.options import Studying, flag, option
 from cfmkit.cli.page import (
     BAD,
     BLANK,
@@ -72,13 +72,13 @@ class SensitivityOptions(Studying):
         option(
             "--samples",
             metavar="N",
-            min=2,
+            low=2,
             text="oat: points per parameter; morris: trajectories; sobol: base samples; tolerance: parts.",
         ),
     ] = None
     seed: Annotated[
         int | None,
-        option("--seed", metavar="N", min=0, max=MOST, text="Seed of everything random; default: the spec's, else 0."),
+        option("--seed", metavar="N", low=0, text="Seed of everything random; default: the spec's, else 0."),
     ] = None  # type: ignore[assignment]
     vary: Annotated[
         list[str] | None,
@@ -93,7 +93,8 @@ class SensitivityOptions(Studying):
         Literal["fail", "resample", "bound"] | None,
         option(
             "--on-failure",
-            text="Samples without a result: state no index, draw their block anew, or state intervals; default: fail.",
+            text="For samples without a result: report no index (fail), draw their block again (resample) or report "
+            "intervals (bound); default: fail.",
         ),
     ] = None
     metrics: Annotated[

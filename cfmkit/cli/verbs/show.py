@@ -22,7 +22,7 @@ class ShowOptions(Common):
     topic: Annotated[
         str | None,
         argument(
-            "[FAMILY|units|metrics|materials|references|NAME]",
+            "FAMILY|units|metrics|materials|references|NAME",
             "What to explain: a topic, or anything by its name: pla, force_ripple, MPa; default: list what there is.",
             completion.topics,
         ),

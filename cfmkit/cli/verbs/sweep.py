@@ -72,7 +72,7 @@ class SweepOptions(Studying):
 
 
 def run(options: SweepOptions, terminal: Terminal) -> Answer:
-    """Analyse a mechanism in many variants: one row a point, whatever becomes of it.
+    """Analyse a mechanism in many variants: one row per point, whether it could be solved or not.
 
     Finished points are noted in the folder: after an interruption the same command goes on.
     """

@@ -1,4 +1,4 @@
-"""Points asked for at a bifurcation, or so near to it that a march cannot tell on which side they are.
+"""Requested points at a bifurcation, or so close to it that path following cannot resolve on which side they lie.
 
 There the tangent is singular, and the error of integration moves an equilibrium by its cube root. Such points are not
 marched to: they follow from the bifurcation, which is located on the fine mesh, and from the paths that meet there. A
@@ -24,14 +24,14 @@ if TYPE_CHECKING:
 BESIDE = 1e-5  # share of the drive's range
 _AT = 3e-11  # and within which a point is at the bifurcation, whose place is known to about 1e-11
 _SIDES = 4.0  # units of the tolerance, as a share of the range, from which it is sure on which side a point lies
-_LOOSEST = 1e-4  # tolerance to which a bifurcation is located: a point asked for near it would be in doubt
+_LOOSEST = 1e-4  # tolerance to which a bifurcation is located: a requested point near it would be in doubt
 _OFF, _LEAST = 0.3, 1e-6  # how far the solution may be from where it is predicted: as a share of its change, at least
 
 
 def located(
     problem: Problem, trail: Trail, one: Spot, other: Spot, fold: bool = False, vector: bool = True
 ) -> Singular | None:
-    """Return the singular point between two equilibria: as exactly as the tolerance asks, or a point asked for.
+    """Return the singular point between two equilibria: as exactly as the tolerance asks, or a requested point.
 
     Or more modes than one, whose null vectors are to span the right space.
     """
@@ -47,7 +47,7 @@ def located(
 
 
 def count(problem: Problem, trail: Trail, place: float, start: float) -> int:
-    """Return how many of the points still asked for, one after the other, lie between a start and a bifurcation.
+    """Return how many of the points still requested, one after the other, lie between a start and a bifurcation.
 
     Or at it: a little behind it counts as well.
     """
@@ -80,7 +80,7 @@ def passed(problem: Problem, trail: Trail, goal: float) -> Trail | None:
 
 
 def opening(problem: Problem, trail: Trail, found: Singular, one: Spot, wide: Spot | None, name: str) -> Trail:
-    """Return the path with the points asked for up to a bifurcation on it, and at it, behind it, on the branch.
+    """Return the path with the requested points up to a bifurcation on it, and at it, behind it, on the branch.
 
     `one` is on the path before it, `wide` on the branch, both on the fine mesh; without a branch the path goes on.
     `name` is the branch's.
@@ -101,7 +101,7 @@ def opening(problem: Problem, trail: Trail, found: Singular, one: Spot, wide: Sp
 
 
 def closing(problem: Problem, trail: Trail, end: BranchEnd, spot: Spot) -> Trail:
-    """Return the path with the points asked for where a branch ends: on it up to there, behind it where it leads."""
+    """Return the path with the requested points where a branch ends: on it up to there, behind it where it leads."""
     for _ in range(count(problem, trail, end.drive, spot.drive)):
         value = float(trail.ahead[0])
         if (value - end.drive) * (end.beyond.drive - end.drive) > 0:
@@ -117,7 +117,7 @@ def closing(problem: Problem, trail: Trail, end: BranchEnd, spot: Spot) -> Trail
 def _with_asked(
     problem: Problem, trail: Trail, start: FloatArray, change: FloatArray, value: float, unstable: int
 ) -> Trail:
-    """Return the path with the next point asked for, solved on the fine mesh if that leads where it is predicted."""
+    """Return the path with the next requested point, solved on the fine mesh if that leads where it is predicted."""
     y, solver, fine = start + change, trail.solver, problem.fine
     wide = fine.solve(fine.expand(y), value) if change.any() else None  # at a bifurcation it is what it is
     near = None if wide is None or wide.unstable != unstable else fine.reduce(wide)

@@ -44,7 +44,7 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Asked:
-    """Drive, effort and stability at the points asked for that were reached."""
+    """Drive, effort and stability at the requested points that were reached."""
 
     drive: FloatArray
     effort: FloatArray
@@ -52,7 +52,7 @@ class Asked:
 
 
 def asked(path: Path) -> Asked:
-    """Return a path's values at the points asked for: the default of what `trace_many` collects."""
+    """Return a path's values at the requested points: the default of what `trace_many` collects."""
     keep = path.at_asked
     return Asked(path.drive[keep], path.effort[keep], path.stable[keep])
 

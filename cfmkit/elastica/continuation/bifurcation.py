@@ -100,7 +100,7 @@ def _on_one_path(problem: Problem, found: Singular, one: Spot, beyond: Spot) -> 
 
 
 def _last_step_before(trail: Trail) -> int:
-    """Return the index of the point that the last step began at: along the arc there are points asked for between."""
+    """Return the index of the point that the last step began at: along the arc there are requested points between."""
     index = -2
     while -index < len(trail.points) and trail.points.reached[index] == -1.0:
         index -= 1
@@ -211,7 +211,7 @@ def _sure(problem: Problem, trail: Trail, one: Spot, other: Spot, found: Singula
 
 
 def _not_beyond(problem: Problem, trail: Trail, found: Singular, left: Spot, forward: float) -> Spot:
-    """Return the entry of a branch, moved back before the next point asked for where it lies beyond that.
+    """Return the entry of a branch, moved back before the next requested point where it lies beyond that.
 
     Away from a bifurcation a branch opens like the square root of the distance.
     """

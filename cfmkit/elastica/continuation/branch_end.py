@@ -34,7 +34,7 @@ def predicted_end(
 ) -> tuple[BranchEnd | None, bool]:
     """Return where the path that was left becomes stable again: there the branch may rejoin it. Or None.
 
-    And, without an end, whether it is known that there is none before the last point asked for. `other` is on that
+    And, without an end, whether it is known that there is none before the last requested point. `other` is on that
     path, `before` the number of its unstable directions before it was left, `sense` that in which the drive goes on,
     `onto` its name.
     """
@@ -46,7 +46,7 @@ def predicted_end(
             return None, True
         margin = 2.0 * max(at_bifurcation.BESIDE, min(problem.control.tolerance, _CLEAR))  # it may lie behind here
         step, behind = 0.02 * sense * span, ahead[-1] + margin * sense * span
-        wide = np.abs(np.diff(ahead)) > margin * span  # points asked for, even several, may lie at the end
+        wide = np.abs(np.diff(ahead)) > margin * span  # requested points, even several, may lie at the end
         between = (0.5 * (ahead[1:] + ahead[:-1]))[wide]
         marks = np.append(between[:: 1 + len(between) // _MARKS], behind)
         options = problem.options(trail, start, step)
@@ -86,7 +86,7 @@ def _place(problem: Problem, trail: Trail, one: Spot, other: Spot) -> Singular |
 
 
 def _room(problem: Problem, trail: Trail, place: float, sense: float) -> float:
-    """Return how far from a bifurcation to go on, in one sense: not beyond the next point asked for away from it."""
+    """Return how far from a bifurcation to go on, in one sense: not beyond the next requested point away from it."""
     ahead, span = (trail.stretch.targets - place) * sense, problem.span
     nearest = ahead[ahead > at_bifurcation.BESIDE * span].min(initial=np.inf)
     return 0.5 * float(min(2.0 * BEFORE_END * span, nearest))

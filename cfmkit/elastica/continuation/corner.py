@@ -1,6 +1,6 @@
 """Corners of a path at a bifurcation that two meshes put on different sides of a point: too sharp to be followed.
 
-A column of pieces with a point asked for at its critical load is led past it, unstable, and stalls: the path is taken
+A column of pieces with a requested point at its critical load is led past it, unstable, and stalls: the path is taken
 back to well before, where both meshes agree, and led across.
 """
 
@@ -21,13 +21,13 @@ if TYPE_CHECKING:
 
 _WELL = 3e-3  # share of the drive's range that is well before a corner
 _BACK = 30  # points looked at before the place where a march stalled
-_NEAR = 1e-4  # share of the drive's range from which the next point asked for is solved for on the fine mesh
+_NEAR = 1e-4  # share of the drive's range from which the next requested point is solved for on the fine mesh
 
 
 def past(problem: Problem, trail: Trail, spot: Spot, asked: int) -> tuple[Trail, Move | None]:
     """Go past a bifurcation where the march along the primary path stalled; None where there is none.
 
-    On the fine mesh the path is followed up to a point asked for just before the bifurcation, then across it.
+    On the fine mesh the path is followed up to a requested point just before the bifurcation, then across it.
     """
     goal, span, stays = float(trail.stretch.targets[asked]), problem.span, problem.control.branch == "stop"
     trail = trail.come_by(spot.drive)

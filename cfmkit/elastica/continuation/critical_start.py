@@ -25,8 +25,8 @@ if TYPE_CHECKING:
 _JUST = 1e-10  # share of the prestress or the constant loads that the start is just critical at
 _NEAR = 1e-4  # share of the drive's range in which there is nothing but the start
 _SIZES = (0.06 * 0.25 ** np.arange(4)).tolist()  # how far from the start the path is entered [rad]
-_BEFORE = 0.9  # share of the way to the first point asked for up to which it is
-_STRAIGHT = 1e-3  # share of the way to the first point asked for after which a path that goes straight on is met
+_BEFORE = 0.9  # share of the way to the first requested point up to which it is
+_STRAIGHT = 1e-3  # share of the way to the first requested point after which a path that goes straight on is met
 
 
 def left(problem: Problem, trail: Trail, spot: Spot) -> Resume | None:
@@ -77,7 +77,7 @@ def _done_before(problem: Problem) -> bool:
 
 
 def _sides(problem: Problem, start: Spot, goal: float) -> list[Spot | None]:
-    """Return equilibria on both sides of the start, before the first point asked for, where the drive leads there.
+    """Return equilibria on both sides of the start, before the first requested point, where the drive leads there.
 
     Both are equally far from it, as far as possible. The side that the control asks for comes first.
     """

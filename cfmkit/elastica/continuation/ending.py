@@ -1,4 +1,4 @@
-"""How a path ends that does not reach all points asked for, in words."""
+"""How a path ends that does not reach all requested points, in words."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
 """Paths through limit points: by the drive as far as it leads, by the arc length around a limit point and back.
 
 Where the drive leads, a path through its limit points is the one that ends there, with the same bifurcations and
-branches. From a limit point on, where a path is unstable as it is, it stays on its curve; what it meets there is told.
-Once the drive goes on and the path is as stable as before, the drive takes over again.
+branches. From a limit point on, where a path is unstable as it is, it stays on its curve; what it meets there is
+reported. Once the drive goes on and the path is as stable as before, the drive takes over again.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ def around(problem: Problem, trail: Trail) -> Resume:
 
 
 def one_way(values: list[float], asked: int) -> tuple[int, int]:
-    """Return the numbers of the points between which a drive from zero goes one way: of the one asked for next."""
+    """Return the numbers of the points between which a drive from zero goes one way: of the one requested next."""
     start, last, before = 0, 0.0, 0.0
     for number, value in enumerate(values):
         step = value - last
@@ -67,7 +67,7 @@ def one_way(values: list[float], asked: int) -> tuple[int, int]:
 
 
 def by_the_drive(problem: Problem, trail: Trail, first: int, step: float = np.inf) -> Resume:
-    """Let the drive take over again, with a point asked for. What was found before does not hold."""
+    """Let the drive take over again, with a requested point. What was found before does not hold."""
     stretch = Stretch(problem.values, True, first, len(trail.points) - 1, trail.stretch.before_fold)
     cleared = replace(trail, stretch=stretch, visited={}, again_at=np.nan, without_branch=None, closed=True, ends=())
     return Resume(cleared, cleared.spot(-1), step)
@@ -137,7 +137,7 @@ def fine_spots(problem: Problem, trail: Trail, first: int) -> tuple[Spot | None,
 
 
 def _next(trail: Trail, place: float) -> int:
-    """Return the number of the next point asked for ahead of a place; those that were passed before are done again."""
+    """Return the number of the next requested point ahead of a place; those that were passed before are done again."""
     targets = trail.stretch.targets
     ahead = (targets - place) * (targets[-1] - place) > 0.0
     ahead[: trail.stretch.first_asked] = False
@@ -152,7 +152,7 @@ def _along(problem: Problem, trail: Trail, index: int) -> Spot:
 
 
 def _well_before(problem: Problem, trail: Trail) -> int:
-    """Return the index of a point a little before the last; nothing was asked for or happened between."""
+    """Return the index of a point a little before the last; nothing was requested or happened between."""
     points, drives = trail.points, trail.points.drive
     index = len(points) - 1
     while index > trail.stretch.begun and abs(drives[index] - drives[-1]) < _WELL * problem.span:

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from cfmkit.elastica.equilibrium.solver import Spot
 
 _HOPS = 60  # decisions on one path
-_LANDINGS = 6  # tries to land on a point asked for before a bifurcation is looked for there
-_FIRST = 0.05  # first step as a share of the drive's range, unless points asked for are nearer
+_LANDINGS = 6  # tries to land on a requested point before a bifurcation is looked for there
+_FIRST = 0.05  # first step as a share of the drive's range, unless requested points are nearer
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +42,7 @@ class Followed:
 
 
 def follow(problem: Problem) -> Followed:
-    """Follow a path from rest to the last point asked for, or to where it ends, and name the branches."""
+    """Follow a path from rest to the last requested point, or to where it ends, and name the branches."""
     begun = start.started(problem, Trail.begun(problem), _way)
     trail = _named(problem, _followed(problem, begun))
     first = begun.ramp or (None if trail.first is None else (problem, trail.first))
@@ -124,9 +124,9 @@ def march(problem: Problem, move: Resume) -> Leg:
 def ahead(
     problem: Problem, trail: Trail, spot: Spot, asked: int
 ) -> tuple[FloatArray, FloatArray | None, BranchEnd | None]:
-    """Return the values of the drive still to be reached and their numbers among those asked for, and a branch's end.
+    """Return the values of the drive still to be reached and their numbers among those requested, and a branch's end.
 
-    No numbers where these are all that were asked for; the last number stands for no number. A branch is followed to
+    No numbers where these are all that were requested; the last number stands for no number. A branch is followed to
     just before an end that is known.
     """
     targets, natural = trail.stretch.targets, trail.stretch.natural

@@ -1,8 +1,8 @@
 """The start of a path: springs are tightened, then everything constant is applied, along a stable branch if possible.
 
 Prestress and constant loads may lie beyond a bifurcation. The path to them is then followed as any other is, with a
-share of them in the place of the drive; what happens on it is told as happening "under prestress" or "under constant
-loads", with that share.
+share of them in the place of the drive; what happens on it is reported as happening "under prestress" or "under
+constant loads", with that share.
 """
 
 from __future__ import annotations

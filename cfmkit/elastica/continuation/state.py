@@ -64,7 +64,7 @@ class Problem:
     def fine(self) -> ExpandedSolver:
         """The same segments with more steps and nothing condensed: singular points are seen in full, and exactly.
 
-        Points may be asked for exactly at a bifurcation. Its place on the mesh that is marched on is only as exact as
+        Points may be requested exactly at a bifurcation. Its place on the mesh that is marched on is only as exact as
         the tolerance: located there, ten of a thousand paths through such points come to lie on the wrong side.
         """
         tolerance = 0.0 if self.first_only else self.control.tolerance
@@ -74,7 +74,7 @@ class Problem:
 
     @cached_property
     def values(self) -> FloatArray:
-        """Values of the drive that are asked for, dimensionless."""
+        """Values of the drive that are requested, dimensionless."""
         return np.ones(1) if self.ramp else self.layout.drive.points / self.layout.scales.drive
 
     @cached_property
@@ -118,7 +118,7 @@ class Problem:
         return 0.2 * float(np.sqrt(ahead / self.span)) + 1e-3
 
     def nearest_target(self, targets: FloatArray, place: float) -> float:
-        """Return the distance from a place to the nearest of some points asked for."""
+        """Return the distance from a place to the nearest of some requested points."""
         return float(np.abs(targets - place).min(initial=np.inf))
 
 
@@ -144,11 +144,11 @@ class Stretch:
     Attributes
     ----------
     targets : (n,) array
-        Values asked for up to its end, dimensionless.
+        Requested values up to its end, dimensionless.
     natural : bool
         Whether steps go by the drive.
     first_asked : int
-        Number of the point asked for from which on they are to be done from here, or along the arc.
+        Number of the requested point from which on they are to be done from here, or along the arc.
     begun : int
         Index of the point from which the drive leads again, behind a limit point.
     before_fold : int
@@ -186,9 +186,9 @@ class Trail:
     ends : tuple of BranchEnd
         Where that ends.
     closed : bool
-        No branch, or its end is known, or it is known to have none before the last point asked for.
+        No branch, or its end is known, or it is known to have none before the last requested point.
     pinned : tuple of float
-        Points asked for at bifurcations that were not marched to.
+        Requested points at bifurcations that were not marched to.
     first, without_branch : Singular or None
         The first bifurcation at which stability is lost; the last one behind which no stable branch was found yet.
     visited : mapping
@@ -221,13 +221,13 @@ class Trail:
 
     @cached_property
     def asked(self) -> int:
-        """Number of points asked for that are done."""
+        """Number of requested points that are done."""
         done = self.points.asked[self.stretch.begun :]
         return max(self.stretch.first_asked, int(done.max()) + 1) if len(done) else 0
 
     @property
     def ahead(self) -> FloatArray:
-        """Values asked for that are not done yet."""
+        """Requested values that are not done yet."""
         return self.stretch.targets[self.asked :]
 
     @property
@@ -251,7 +251,7 @@ class Trail:
         return replace(self, points=joined, branches=self.branches + (self.branch,) * len(points))
 
     def with_spot(self, spot: Spot, asked: int) -> Trail:
-        """Return the path with an equilibrium added to it; `asked`: which of the points asked for it is, or -1."""
+        """Return the path with an equilibrium added to it; `asked`: which of the requested points it is, or -1."""
         return self.with_points(Points.of(spot, asked))
 
     def up_to(self, count: int) -> Trail:
@@ -315,7 +315,7 @@ class Resume:
     step : float
         Longest first step.
     patient : bool
-        Whether a point asked for may be tried for as often as it takes.
+        Whether a requested point may be tried for as often as it takes.
     fresh : bool
         Whether the equilibrium is the start, yet to be solved for.
     """

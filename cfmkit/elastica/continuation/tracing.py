@@ -30,7 +30,7 @@ _STARTS = 4  # of them where nothing bears the constant loads, if each bears mor
 
 
 def trace(network: Network, drive: Drive, control: Control | None = None) -> Path:
-    """Return the path of equilibria of a network under a drive, from rest through all points asked for.
+    """Return the path of equilibria of a network under a drive, from rest through all requested points.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ def trace(network: Network, drive: Drive, control: Control | None = None) -> Pat
     Returns
     -------
     Path
-        Converged points only. `Path.status` says whether the path reaches all points asked for, and if not, why.
+        Converged points only. `Path.status` says whether the path reaches all requested points, and if not, why.
     """
     control = control or Control()
     if control.imperfection == 0.0:

@@ -1,4 +1,4 @@
-"""Paths on which the inside of beams cannot be condensed: when to follow them with all unknowns.
+"""Paths on which the interior of beams cannot be condensed out: when to follow them with all unknowns.
 
 Half a pinned column is a critical cantilever all along its buckled path, a quarter of a clamped one right before it
 buckles. Newton's method with condensation is at the mercy of rounding there: a pivot that is not let go to zero makes
@@ -51,7 +51,7 @@ def uncondensed(problem: Problem, trail: Trail, wrong: int = 0) -> Resume | None
 
 
 def _may_be_shorter(problem: Problem, trail: Trail) -> bool:
-    """Tell whether a path ends with a short step on its branch, in which nothing happened that was told."""
+    """Tell whether a path ends with a short step on its branch, in which nothing happened that was reported."""
     if len(trail.points) < 3 or trail.branches[-2] != trail.branch:
         return False
     if not 0.0 < trail.last_step < _SHORT * problem.span:

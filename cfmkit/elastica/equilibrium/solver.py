@@ -83,7 +83,7 @@ class Points:
 
     @classmethod
     def of(cls, spot: Spot, asked: int) -> Points:
-        """Return one equilibrium; `asked` is the number of the point asked for that it is, or -1."""
+        """Return one equilibrium; `asked` is the number of the requested point that it is, or -1."""
         info = np.zeros((1, _STORED))
         info[0, [UNSTABLE, ASKED, DRIVE_RATE, SHORTNESS]] = spot.unstable, asked, spot.tangent[-1], spot.shortness
         return cls(spot.y[None], np.array([spot.drive]), info)
@@ -95,7 +95,7 @@ class Points:
 
     @property
     def asked(self) -> FloatArray:
-        """Numbers of the points asked for; -1 for those in between."""
+        """Numbers of the requested points; -1 for those in between."""
         return self.info[:, ASKED]
 
     @property

@@ -159,7 +159,7 @@ class Fit:
 
     @cached_property
     def _parameters(self) -> dict[float, float]:
-        """Parameters that were asked for, by the fraction."""
+        """Parameters that were requested, by the fraction."""
         return {}
 
 

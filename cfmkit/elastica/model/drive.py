@@ -86,7 +86,7 @@ class Control:
     through_folds : bool
         Follow the path through limit points of the drive, where it would end otherwise: from there on by its arc
         length, until the drive leads on again. Until then it is unstable and stays on its curve, whatever `branch`
-        says; its bifurcations are told. Values asked for that are passed several times are delivered every time. It
+        says; its bifurcations are reported. Requested values that are passed several times are delivered every time. It
         ends where the last of them (the last before the points turn round) is passed first.
     branch : {"stable", "primary", "stop"}
         Where stability is lost leave for a stable branch, stay on the path and say so, or end the path there: the
@@ -100,7 +100,7 @@ class Control:
     first_step : float or None
         First step as a fraction of the drive's range; found from the points unless given.
     most_points : int
-        At most so many points besides those asked for.
+        At most so many points besides those requested.
     imperfection : float
         Bend the unloaded beams by so much [m] in the form of the buckling mode at the first bifurcation of the
         perfect path, to either side by its sign; 0: perfect. `Path.imperfection` names what was done.

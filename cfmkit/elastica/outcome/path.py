@@ -28,7 +28,7 @@ _TIE = 1e-9  # share by which stresses of two beams differ that are one but for 
 class PathStatus(Enum):
     """How a path ended."""
 
-    COMPLETE = "all points asked for were reached"
+    COMPLETE = "all requested points were reached"
     LIMIT_POINT = "the drive cannot go further: a limit point"
     JUMPS = "stability is lost and no stable equilibrium is near"
     LOST = "the path was lost: no step converged"
@@ -44,7 +44,7 @@ class Event:
 
     `drive` is where (SI); `before` and `after` count the unstable directions on both sides of the path that it lies on,
     in the sense of travel: at the end of a branch, of the path that it joins. What is passed before the drive begins is
-    told first: its kind ends in "under prestress" or "under constant loads", `drive` is the share [1].
+    reported first: its kind ends in "under prestress" or "under constant loads", `drive` is the share [1].
     """
 
     kind: str
@@ -69,7 +69,7 @@ class Path:
     Attributes
     ----------
     status, message : PathStatus, str
-        Whether all points asked for were reached, and if not, why and where.
+        Whether all requested points were reached, and if not, why and where.
     branch : (n,) array of str
         Which branch each point is on.
     events : tuple of Event
@@ -122,12 +122,12 @@ class Path:
 
     @cached_property
     def asked(self) -> Any:
-        """Index of the point asked for, -1 for points in between."""
+        """Index of the requested point, -1 for points in between."""
         return read_only(self.points.asked, np.int64)
 
     @cached_property
     def at_asked(self) -> Any:
-        """Indices of the points that were asked for, in path order."""
+        """Indices of the points that were requested, in path order."""
         return read_only(np.flatnonzero(self.asked >= 0), np.int64)
 
     @cached_property
@@ -239,7 +239,7 @@ class Path:
 
     @cached_property
     def sampler(self) -> Sampler:
-        """States along all beams (computed when first asked for)."""
+        """States along all beams (computed when first needed)."""
         return Sampler(self.solver, self.points)
 
     @cached_property

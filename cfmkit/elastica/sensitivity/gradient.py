@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Gradient(Slopes):
-    """Derivatives at p chosen points of a path by k design variables; each output is computed when first asked for."""
+    """Derivatives at p chosen points of a path by k design variables; each output is computed when first needed."""
 
     @cached_property
     def effort(self) -> FloatArray:
@@ -84,7 +84,7 @@ class Gradient(Slopes):
 
 
 class _Lookup(Mapping[str, Any]):
-    """Derivatives by node, computed when asked for."""
+    """Derivatives by node, computed when needed."""
 
     def __init__(self, gradient: Gradient, output: Callable[[Gradient, str], FloatArray]) -> None:
         self.gradient, self.output = gradient, output
@@ -112,7 +112,7 @@ def gradient(path: Path, build: Callable[[Any], Network], variables: Any, points
     variables : (k,) array
         Where to differentiate: the variables that the path was traced for.
     points : sequence of int, optional
-        Points of the path; all those asked for by default.
+        Points of the path; all those requested by default.
 
     Raises
     ------

@@ -29,12 +29,12 @@ def neighbouring(path: Path, network: Network, drive: Drive, largest_turn: float
     Parameters
     ----------
     path : Path
-        Of a network with the same nodes, beams, corners and stations; its points asked for correspond to those of
+        Of a network with the same nodes, beams, corners and stations; its requested points correspond to those of
         the drive, one by one.
     network : Network
         The other network.
     drive : Displacement, Rotation or Loading
-        As many points as the path was asked for and reached.
+        As many points as were requested and reached.
     largest_turn : float
         Largest change of a rotation, or of a position in mean beam lengths, from the known point [rad].
 
@@ -75,7 +75,7 @@ def drive_slope(path: Path, indices: Any = None) -> FloatArray:
     path : Path
         Under a displacement or rotation of a node that carries only far ends of beams.
     indices : sequence of int, optional
-        Points; all those asked for by default.
+        Points; all those requested by default.
 
     Raises
     ------

@@ -70,7 +70,7 @@ class Tilts:
         found = []
         for network, drive in self.built:
             tilted = Layout(network, drive, self.layout)
-            tilted.scales = self.layout.scales  # before its table is asked for: that is kept in these units
+            tilted.scales = self.layout.scales  # before its table is requested: that is kept in these units
             found.append(tilted)
         return found
 

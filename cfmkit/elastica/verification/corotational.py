@@ -60,7 +60,7 @@ def recheck(path: Path, points: Any = None, elements: int = 48) -> Recheck:
     path : Path
         Of a network of beams, rigid joints and rigid links under a displacement or rotation.
     points : sequence of int, optional
-        Points of the path; all those asked for by default.
+        Points of the path; all those requested by default.
     elements : int
         About so many in the coarser of two meshes; the finer has twice as many.
 

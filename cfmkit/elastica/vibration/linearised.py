@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from cfmkit.elastica.outcome.path import Path
     from cfmkit.elastica.vibration.masses import Masses
 
-_MOST = 4000  # unknowns: dense matrices of this size take 130 MB each, and half a minute a pose
+_MOST = 4000  # unknowns: dense matrices of this size take 130 MB each, and half a minute per pose
 
 
 @dataclass(frozen=True)

@@ -45,7 +45,7 @@ class Frequencies:
     flutters, diverges : (p,) bool arrays
         Whether loads that turn with their node make motions grow that swing, or that do not: two squares of
         frequencies are complex, or one is negative. As the drive has it: held if it is a motion, free if it is a load.
-        Other networks do not flutter, and whether they diverge is told by the path.
+        Other networks do not flutter, and whether they diverge is reported by the path.
     """
 
     points: Any
@@ -84,7 +84,7 @@ def frequencies(
         If a beam has no density, or the count is not positive.
     """
     if count < 1:
-        raise InputError(f"at least one frequency must be asked for, got {count}")
+        raise InputError(f"at least one frequency must be requested, got {count}")
     chosen = np.arange(len(path)) if points is None else np.asarray(points, dtype=np.int64)
     system = Linearisation(path, masses, count, hold)
     unit = float(np.sqrt(path.layout.scales.rigidity) / path.layout.scales.length**2 / (2 * np.pi))

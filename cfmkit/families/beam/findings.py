@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 FINDINGS = {
     "closure_adjusted": "beams were turned and scaled to fit between rounded nodes, or nodes moved to the beams' ends",
     "closure_prestress": "beams are forced into place between rounded nodes: the mechanism is prestressed at rest",
-    "ends_early": "the path ends before the travel or the load asked for",
+    "ends_early": "the path ends before the requested travel or load",
     "inaccurate": "at some points the tolerance is not reached: they have no force",
     "limit_point": "the load has an extreme on the path: under a given load the mechanism snaps there",
     "bifurcation": "the path splits: the mechanism leaves the symmetric or straight form",

@@ -169,7 +169,7 @@ def _travel(assembly: Assembly, tracks: tuple[BuiltTrack, BuiltTrack]) -> tuple[
         raise DataError(f"{assembly.spec.mechanism.profile.file}: the two flanks were measured at different heights")
     short = None
     if asked is not None and asked > high * (1 + 1e-9):
-        message = f"the travel asked for is {mm(asked)}, but the flanks were measured up to {mm(high)} of travel only"
+        message = f"the requested travel is {mm(asked)}, but the flanks were measured up to {mm(high)} of travel only"
         short = finding("outside_profile", message)
     travel = np.linspace(max(low, 0.0), min(asked or high, high), assembly.spec.analysis.points)
     x = tracks[0].at(start + travel)[0], tracks[1].at(start + travel)[0]

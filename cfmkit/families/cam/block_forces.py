@@ -113,7 +113,7 @@ class Forces:
 
 
 class Slab:
-    """Some sound designs at all their samples; each quantity is computed when it is first asked for.
+    """Some sound designs at all their samples; each quantity is computed when it is first needed.
 
     Parameters
     ----------

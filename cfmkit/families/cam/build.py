@@ -203,8 +203,8 @@ def _shortfall(law: SlopeLaw, stroke: float, reached: float) -> Finding | None:
         raise CannotBuild(
             finding(
                 "design_singular",
-                f"a profile cut for a friction of {law.friction:g} holds its roller: nowhere does the slider rise as "
-                "the rollers move out; use less friction or a smaller force constant ('friction' and "
+                f"a profile cut for a friction of {law.friction:g} self-locks: nowhere does the slider rise as the "
+                "rollers move out; use less friction or a smaller force constant ('friction' and "
                 "'force_constant' of "
                 "'mechanism.profile')",
             )

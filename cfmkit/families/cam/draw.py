@@ -206,7 +206,7 @@ def contact(result: Result) -> Figure:
         series.append(Series(down.contact, "contact, down", VERMILLION, prefer=0.3))
     angle = [Series(solution.pressure_angle, "between the brace's pull and the roller's motion", BLUE)]
     found = regions(solution)
-    limits = [Limit(np.pi / 2, "90 deg: no lever on the roller"), *limits_on(result, "pressure_angle_max")]
+    limits = [Limit(np.pi / 2, "90 deg: no leverage on the roller"), *limits_on(result, "pressure_angle_max")]
     unnamed = [replace(region, text="") for region in found]
     diagrams = [
         Diagram(over, TRAVEL, Scale("force", "force"), series, limits_on(result, "contact_force_max"), found),

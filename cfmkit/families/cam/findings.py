@@ -43,7 +43,7 @@ FINDINGS = {
     "slack_cable": "the force on the slider is not positive: a cable would go slack",
     "flanks_collide": "the two flanks cross the axis: no plate is left between them",
     "rollers_collide": "the two rollers touch each other",
-    "outside_profile": "the travel asked for is longer than the cut profile allows",
+    "outside_profile": "the requested travel is longer than the cut profile allows",
     "inertia_mismatch": "a moment of inertia does not fit the mass and the size of its part",
     "symmetric_model": "the quasi-static model leaves out what makes the two sides differ",
     "friction_left_out": "the nine-coordinate model has no rolling resistance",
@@ -170,7 +170,7 @@ def _dead_point(solution: Solution) -> Iterator[Finding]:
         cause = "weight" if loads.roller_weight else "spring pretension or friction"
         yield finding(
             "dead_point",
-            f"at the start the slider has no lever on the rollers: the force from {cause} has no bound there; "
+            f"at the start the slider has no leverage on the rollers: the force from {cause} is unbounded there; "
             "state a window that begins later, or avoid it with a gravity-compensated profile",
         )
 

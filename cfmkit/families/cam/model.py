@@ -52,7 +52,7 @@ def analyze(spec: CamSpec, run: Run) -> Result:
     -------
     Result
         Branches ``load`` (up) and ``unload`` (down). NO_EQUILIBRIUM if the mechanism cannot
-        be built, PARTIAL if the curve ends before the travel asked for.
+        be built, PARTIAL if the curve ends before the requested travel.
     """
     if spec.mechanism.profile.file is not None:
         from cfmkit.families.cam.as_built import analyze_built
@@ -108,7 +108,7 @@ def _requested(solution: Solution, short: bool) -> float:
 
 
 def _as_run(spec: CamSpec, solution: Solution) -> CamSpec:
-    """Return the spec with what the analysis fell back on written out."""
+    """Return the spec with the defaults of the analysis made explicit."""
     reached, stroke = float(solution.travel[-1]), spec.mechanism.profile.stroke or 0.0
     travel = spec.analysis.travel or (stroke if isclose(reached, stroke, rel_tol=CLOSE) else reached)
     analysis = spec.analysis.model_copy(update={"travel": travel, "gravity": spec.gravity, "fidelity": "quasi-static"})
@@ -129,7 +129,7 @@ def solve(assembly: Assembly) -> Solution:
 
 
 def _shortfalls(assembly: Assembly, solution: Solution) -> tuple[Finding, ...]:
-    """Return why the curve ends before what was asked for, or before the flank does."""
+    """Return why the curve ends before what was requested, or before the flank does."""
     found = [assembly.shortfall] if assembly.shortfall else []
     asked, reached = assembly.spec.analysis.travel, float(solution.travel[-1])
     short = asked is not None and reached < asked * (1 - CLOSE)
@@ -146,7 +146,7 @@ def _shortfalls(assembly: Assembly, solution: Solution) -> tuple[Finding, ...]:
         found.append(
             finding(
                 "outside_profile",
-                f"the travel asked for is {mm(asked)}, but the profile is cut for {mm(reached)} with these parts; "
+                f"the requested travel is {mm(asked)}, but the profile is cut for {mm(reached)} with these parts; "
                 "cut a longer profile ('mechanism.profile.stroke') or ask for less ('analysis.travel')",
             )
         )

@@ -127,7 +127,7 @@ def _at_dead_point(slope: FloatArray, bend: FloatArray, loads: Loads, friction: 
     """Return the limit of 0/0, the ratio of the derivatives.
 
     At the first point of an ideal profile the springs carry nothing and the slider has
-    no lever on the roller; the force has a limit there, which is the constant force.
+    no leverage on the roller; the force has a limit there, which is the constant force.
     """
     x, brace = loads.rest_half_width, loads.brace_length
     across = (brace - x) * (brace + x)

@@ -51,7 +51,7 @@ class UnitCurves:
     stiffness : (4, n) array
         (q q')'.
     bend : (4, n) array or None
-        (q q')''; None where it was not asked for.
+        (q q')''; None where it was not requested.
     """
 
     angle: FloatArray

@@ -40,7 +40,7 @@ FINDINGS = {
     "bistable": "past the peak of the leaves no outward force is left: the mechanism stays in a second stable pose",
     "overload": "the travel goes beyond the linear range, where the force rises steeply",
     "preload_out_of_range": "a preload at which no outward force is left, or nothing holds the shuttle",
-    "stroke_unreachable": "the rise is too small for the stroke asked for",
+    "stroke_unreachable": "the rise is too small for the requested stroke",
     "asymmetric_buckling": "a shuttle that can turn lets the leaves buckle at half the load",
     "out_of_plane_buckling": "the leaves are so narrow that they would rather buckle out of the plane",
     "overstressed": "the stress exceeds the allowable one",
@@ -338,9 +338,7 @@ def _imperfect(solution: Solution) -> Iterator[Finding]:
     push = solution.nominal
     if not push.leaves.stable.all():
         lost = push.travel[~push.leaves.stable]
-        told = (
-            f"from {mm(float(lost[0]))} to {mm(float(lost[-1]))} the leaves are in a form that they leave for another"
-        )
+        told = f"from {mm(float(lost[0]))} to {mm(float(lost[-1]))} the leaves are unstable and snap to another shape"
         if solution.spec.analysis.branch == "stable":
             yield finding("unstable_branch", f"{told}, which was not found")
         else:

@@ -52,7 +52,7 @@ def analyze(spec: VcfmSpec, run: Run) -> Result:
     Returns
     -------
     Result
-        One curve a preload, the nominal one first. PARTIAL if the spring closes within the travel.
+        One curve per preload, the nominal one first. PARTIAL if the spring closes within the travel.
     """
     made = parts(spec)
     return result_of(solve(spec, made, LawSampler(made)))
@@ -191,7 +191,7 @@ def _push(sampler: PartSampler, pose: tuple[float, float | None], grid: FloatArr
 
 
 def _as_run(spec: VcfmSpec) -> VcfmSpec:
-    """Return the spec with what the analysis fell back on written out."""
+    """Return the spec with the defaults of the analysis made explicit."""
     analysis = spec.analysis.model_copy(update={"travel": spec.travel})
     return spec.model_copy(update={"analysis": analysis})
 

@@ -1,4 +1,4 @@
-"""What is known of a solved mechanism: its parts, what a model gives at some travels, and one curve a preload.
+"""What is known of a solved mechanism: its parts, what a model gives at some travels, and one curve per preload.
 
 Every other file of this family may import these types.
 """
@@ -107,7 +107,7 @@ class Push:
 
 @dataclass(frozen=True)
 class Solution:
-    """A solved mechanism: its parts, the model used, what characterises it, and one curve a preload."""
+    """A solved mechanism: its parts, the model used, what characterises it, and one curve per preload."""
 
     spec: VcfmSpec
     parts: Parts

@@ -1,7 +1,7 @@
 """What pydantic found, in the words of the person who wrote the specification.
 
 One fault gives one message: of a union only the member that the user can have
-meant is heard, and a missing key is not told where a misspelt one explains it.
+meant is heard, and a missing key is not reported where a misspelt one explains it.
 """
 
 from __future__ import annotations

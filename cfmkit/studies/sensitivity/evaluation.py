@@ -134,7 +134,7 @@ class Evaluator:
 
     @property
     def missing(self) -> int:
-        """Samples that were asked for and not evaluated, since the user stopped."""
+        """Samples that were requested and not evaluated, since the user stopped."""
         return sum(len(piece.records) - piece.records.finished for piece in self.pieces)
 
     @property

@@ -88,7 +88,7 @@ def exit_code(found: Findings) -> ExitCode:
 
 
 def yield_ok(found: Findings) -> bool:
-    """Return whether the yield is what was asked for; true if nothing was."""
+    """Return whether the yield is what was requested; true if nothing was."""
     wanted = found.setup.block.min_yield
     if wanted is None or found.setup.method != "tolerance":
         return True

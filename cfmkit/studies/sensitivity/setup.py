@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 Method = Literal["oat", "local", "morris", "sobol", "tolerance"]
 SAMPLES = {"oat": 11, "local": 2, "morris": 20, "sobol": 256, "tolerance": 1000}
-"""How many samples a method takes unless told otherwise; `local` chooses its own steps."""
+"""How many samples a method takes by default; `local` chooses its own steps."""
 
 NOTHING = (
     "nothing to vary: add a block 'sensitivity: {parameters: {...}}' to the spec, "
@@ -186,7 +186,7 @@ def _noted(one: Requirement) -> tuple[str, Ends | None]:
 
 
 def _metrics(spec: Spec, block: Sensitivity, sample: Curve | None) -> tuple[Metric, ...]:
-    """Return the metrics that are asked for; else those of the requirements, over their windows; else all."""
+    """Return the metrics that are requested; else those of the requirements, over their windows; else all."""
     if block.metrics or not spec.requirements:
         return _numeric(metrics_of(spec, block.metrics, sample), block)
     wanted = dict.fromkeys(map(_noted, spec.requirements))

@@ -148,7 +148,7 @@ def _best(spec: BeamSpec, task: Task, result: Explored, plan: Plan) -> Judged | 
         flattest = min(candidates, key=lambda one: one.objective)
         said = (
             f"no shape of {len(result.found)} starts keeps the force within ± {percent(task.half_band)} over the "
-            f"window asked for (design.optimise.window); the flattest keeps it within ± {percent(flattest.objective)}"
+            f"requested window (design.optimise.window); the flattest keeps it within ± {percent(flattest.objective)}"
         )
         nearest = {"design.optimise.half_band": f"at least {percent(1.02 * flattest.objective)}"}
         return Design(None, Status.INFEASIBLE, said, nearest_feasible=nearest)

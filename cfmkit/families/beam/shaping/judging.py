@@ -107,7 +107,7 @@ def _faults(task: Task, audit: Audit, result: Result, window: tuple[float, float
     if band is None:
         yield f"the analysis ends before the window does: {result.message}"
     elif task.objective == "range" and band > task.half_band:
-        yield f"over the window asked for the force is within ± {percent(band)} only"
+        yield f"over the requested window the force is within ± {percent(band)} only"
     allowed = task.allowable_stress
     if allowed is not None and stress is not None and stress > allowed:
         yield f"the stress reaches {format_short(stress, 'stress')}, {format_short(allowed, 'stress')} are allowed"
@@ -139,14 +139,14 @@ def written(spec: BeamSpec, task: Task, found: Found) -> BeamSpec:
 
 
 def _window(spec: BeamSpec, task: Task, found: Found) -> tuple[float, float]:
-    """Return the window of a design [m]: the one asked for, or the wider one, from a whole micrometre on."""
+    """Return the window of a design [m]: the one requested, or the wider one, from a whole micrometre on."""
     asked, end = _asked(spec)
     start = float(np.ceil(found.start * task.layers * 1e6 - 1e-6)) / 1e6
     return asked if abs(start - asked) < 1e-6 else start, end
 
 
 def _asked(spec: BeamSpec) -> tuple[float, float]:
-    """Return the window that was asked for [m]."""
+    """Return the window that was requested [m]."""
     assert spec.design is not None
     assert spec.design.optimise is not None
     start, end = spec.design.optimise.window

@@ -33,7 +33,7 @@ class Poses:
     mean : (p,) array
         Weights of the mean over the window.
     compared : (2,) array
-        Indices of a and b; of the end where the paper's objective is not asked for.
+        Indices of a and b; of the end where the paper's objective is not requested.
     """
 
     at: FloatArray

@@ -206,7 +206,7 @@ def _as_seen(task: Task, found: Found, view: CloseView | None) -> Found:
         return found
     starts = [found.start]
     if task.objective == "range":
-        widest = min(view.widest(task.half_band), task.window[0])  # no less than the window that was asked for
+        widest = min(view.widest(task.half_band), task.window[0])  # no less than the window that was requested
         wider = found.start < task.window[0]  # one that was not widened yet is left as flat as it is
         starts = [widest, found.start] if wider and widest < found.start else [max(widest, found.start)]
     for start in starts:  # the mean force is over another window

@@ -95,7 +95,9 @@ def _held(moved: Moved) -> Iterator[Finding]:
     if moved.build.machine.friction and moved.build.motion.stroke > 0:
         yield finding("up_jam", f"friction holds a roller {_when(moved, lost)}: no force moves the slider there")
     else:
-        yield finding("dead_point", f"the slider has no lever on a roller {_when(moved, lost)}: the force has no bound")
+        yield finding(
+            "dead_point", f"the slider has no leverage on a roller {_when(moved, lost)}: the force is unbounded"
+        )
 
 
 def _on_corner(moved: Moved) -> Iterator[Finding]:

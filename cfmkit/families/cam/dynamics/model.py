@@ -137,7 +137,7 @@ def _history(spec: CamSpec, parts: Build, times: FloatArray) -> History:
 
 
 def _as_run(spec: CamSpec, parts: Build) -> CamSpec:
-    """Return the spec with what the analysis fell back on written out."""
+    """Return the spec with the defaults of the analysis made explicit."""
     resolved, masses = parts.right.spec, spec.mechanism.masses
     method = "inverse" if stated_motion(spec).closed else "multibody"
     dynamics = stated_motion(spec).model_copy(update={"method": method})

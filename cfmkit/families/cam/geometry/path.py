@@ -38,7 +38,7 @@ class RollerPath:
     law : SlopeLaw
         The slope.
     end : float
-        The largest x that will be asked for [m].
+        The largest x that will be needed [m].
     method : {"quadrature", "ode"}
         "quadrature" (default) integrates the slope over x by Gauss-Legendre panels;
         "ode" integrates [SS, eq. 2] over y with scipy's DOP853.

@@ -194,7 +194,7 @@ class Track:
         if on_corner.all():
             return corner
         flank = self._flank_states(slider[~on_corner])
-        place = np.argsort(~on_corner, kind="stable").argsort()  # from corner first, flank then, to the order asked for
+        place = np.argsort(~on_corner, kind="stable").argsort()  # from corner first, flank then, to the order requested
         return TrackStates(*(np.concatenate(pair)[place] for pair in zip(corner.fields(), flank.fields(), strict=True)))
 
     def _flank_states(self, slider: FloatArray) -> TrackStates:

@@ -31,7 +31,7 @@ class NoTrack(ValueError):
 
 @dataclass(frozen=True)
 class TrackStates:
-    """Where the right roller is, for each slider position asked for.
+    """Where the right roller is, for each requested slider position.
 
     Attributes
     ----------

@@ -99,7 +99,7 @@ def _making(spec: SliderCrankSpec, solution: Solution) -> Iterator[Finding]:
     if process is not None and process.thinnest is not None and solution.thinnest < process.thinnest:
         yield finding(
             "too_thin",
-            f"the thinnest place is {mm(solution.thinnest)}, the process makes {mm(process.thinnest)} at least",
+            f"the thinnest place is {mm(solution.thinnest)}, the process needs at least {mm(process.thinnest)}",
         )
     if solution.width_ratio < THINNEST_RATIO:
         yield finding(

@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 
 
 DEFAULT_SHARE = 0.35
-"""Travel where none is asked for, in lengths of the slider's way from the pivot: that of [B, sec. 2.1]."""
+"""Travel where none is requested, in lengths of the slider's way from the pivot: that of [B, sec. 2.1]."""
 
 _NAMES = {
     Ending.LIMIT_POINT: "limit_point",
@@ -70,7 +70,7 @@ def analyze(spec: SliderCrankSpec, run: Run) -> Result:
     -------
     Result
         One branch, ``load``. PARTIAL if equilibrium ends within the travel, NO_EQUILIBRIUM if
-        nothing was found that is on the branch asked for.
+        nothing was found that is on the requested branch.
     """
     try:
         spec = resolve(spec)
@@ -145,7 +145,7 @@ def slider_reach(linkage: Linkage, unloaded: float) -> float:
 
 
 def _as_run(spec: SliderCrankSpec, linkage: Linkage, unloaded: float) -> SliderCrankSpec:
-    """Return the spec with what the analysis fell back on written out."""
+    """Return the spec with the defaults of the analysis made explicit."""
     travel = spec.analysis.travel or (0.0, DEFAULT_SHARE * slider_reach(linkage, unloaded))
     written = {"travel": travel, "fidelity": spec.fidelity}
     return spec.model_copy(update={"analysis": spec.analysis.model_copy(update=written)})

@@ -4,7 +4,7 @@ A nearly straight chain yields like a column: within the first micrometres the f
 stays there. Ordinary steps from rest jump over that corner, onto a higher mode with ten times the force, so the first
 step is a hundred-thousandth of the travel and every point must be stable. Two cases cannot be reached from rest: the
 chain that is straight, or so nearly that rounding decides, and the branch to which a kinked chain does not go by
-itself. Their equilibria are solved from those of a chain that is bowed, or kinked, to the side asked for.
+itself. Their equilibria are solved from those of a chain that is bowed, or kinked, to the requested side.
 
 Beams are lines to the equations, which know nothing of contact: a slider that runs on the line of its anchor passes it.
 So it is looked at afterwards where the chain crosses itself, or is pressed through its own anchor.
@@ -50,12 +50,12 @@ BENT = 0.1
 class Ending(Enum):
     """How pressing a chain ended."""
 
-    COMPLETE = "every point asked for is a stable equilibrium on the branch asked for"
+    COMPLETE = "every requested point is a stable equilibrium on the requested branch"
     LIMIT_POINT = "the slider cannot be pressed further in equilibrium: a limit point of the travel"
     UNSTABLE = "stability is lost: the chain would jump"
     NOT_CONVERGED = "no step converged, or the tolerance was not reached"
-    WRONG_BRANCH = "the chain bends to the other side than asked for"
-    CROSSES = "the chain goes over to the other side than asked for"
+    WRONG_BRANCH = "the chain bends to the side opposite to the requested one"
+    CROSSES = "the chain crosses to the side opposite to the requested one"
     BLOCKED = "the chain meets its own anchor, or itself"
     STARTS_LATE = "this branch exists only beyond some travel"
 
@@ -83,7 +83,7 @@ class Pressed:
 
     @property
     def travel(self) -> FloatArray:
-        """Slider travel at the points asked for that were reached [m]."""
+        """Slider travel at the requested points that were reached [m]."""
         travel: FloatArray = self.path.drive[self.path.at_asked]
         return travel
 
@@ -194,7 +194,7 @@ class Chain:
         return self._judged(path, wanted)
 
     def _judged(self, path: Path, wanted: int, helped: bool = False) -> Pressed:
-        """Return the outcome with its ending: a curve that is not the one asked for is never passed on as such."""
+        """Return the outcome with its ending: a curve that is not the one requested is never passed on as such."""
         ending, message = _ENDINGS.get(path.status, Ending.NOT_CONVERGED), path.message
         if helped or not len(path.at_asked):
             ending = Ending.NOT_CONVERGED if ending is Ending.COMPLETE else ending
@@ -211,7 +211,7 @@ class Chain:
         return Pressed(path, ending, message, side)
 
     def _sides(self, path: Path, wanted: int) -> FloatArray:
-        """Return to which side the chain is bent at the points asked for: the side wanted, or the other one.
+        """Return to which side the chain is bent at the requested points: the side wanted, or the other one.
 
         It is bent to the other side where the crank pin has moved there, and is beyond the line from pivot to slider
         pin, too: far on its way a chain turns with that line, and the pin comes back past where the line had been.
@@ -234,7 +234,7 @@ class Chain:
         if first < FEWEST:
             return Pressed(path, Ending.WRONG_BRANCH, Ending.WRONG_BRANCH.value, -wanted)
         places = path.drive[path.at_asked][first - 1 : first + 1] * 1e3
-        text = f"between {places[0]:.4g} and {places[1]:.4g} mm the chain goes over to the other side than asked for"
+        text = f"between {places[0]:.4g} and {places[1]:.4g} mm {Ending.CROSSES.value}"
         kept = part_of(path, np.isin(path.asked, path.asked[path.at_asked][:first]))
         return Pressed(kept, Ending.CROSSES, text, wanted)
 

@@ -147,7 +147,7 @@ FOLLOWED = (Ending.COMPLETE, Ending.UNSTABLE)
 """Endings of a path that has all points that were requested."""
 
 CHECKED = 6
-"""Places at which the second opinion is asked for."""
+"""Places at which the second opinion is requested."""
 
 
 @dataclass(frozen=True)
@@ -179,7 +179,7 @@ class Solution:
     window : (float, float)
         Where metrics are taken [m].
     checked : bool
-        Whether a second opinion was asked for.
+        Whether a second opinion was requested.
     side : int
         To which it was to bend, as `Chain.press` takes it.
     accuracy : float

@@ -63,7 +63,7 @@ def watched(path: Path, spots: FloatArray) -> Watched:
     Parameters
     ----------
     path : Path
-        Its equilibria at the points asked for.
+        Its equilibria at the requested points.
     spots : (p,) array
         Places of these points in a variable in which the stress is smooth.
     """

@@ -182,7 +182,7 @@ def assemble(spec: SliderCrankSpec) -> Assembly:
 
 
 def default_motion(assembly: Assembly) -> tuple[float, float]:
-    """Return the motion that is run through where none is asked for: all of it, a full turn at most."""
+    """Return the motion that is run through where none is requested: all of it, a full turn at most."""
     low, high = assembly.reach
     if math.isinf(low):
         return assembly.start, assembly.start + TURN

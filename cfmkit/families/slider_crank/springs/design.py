@@ -230,7 +230,7 @@ def _written(solved: Solved) -> SliderCrankSpec:
 def _seen(solved: Solved) -> dict[str, tuple[float, float]]:
     """Return the motion of the analysis, if it has to be another one to show all of the window, and nothing forbidden.
 
-    Where none is asked for, the joints' limits are those of the motion, too.
+    Where none is requested, the joints' limits are those of the motion, too.
     """
     name = solved.task.assembly.motion_name
     asked: tuple[float, float] | None = getattr(solved.task.spec.analysis, name)

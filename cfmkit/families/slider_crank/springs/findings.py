@@ -76,7 +76,7 @@ def _of_torque(solution: Solution) -> Iterator[Finding]:
         yield finding(
             "spring_winds_up",
             f"over a full turn the spring at the {' and at the '.join(name.replace('_', ' ') for name in wound)} is "
-            "wound up: after it the torque is another one; springs at slider and slider pin alone repeat themselves",
+            "wound up: the next turn has another torque; only springs at slider and slider pin repeat",
         )
     rests = [item.motion for item in found.equilibria if item.stable]
     again = [(a, b) for a in rests for b in rests if a < b and _same_pose(a, b)]
@@ -114,9 +114,9 @@ def _of_force(spec: SliderCrankSpec, solution: Solution) -> Iterator[Finding]:
     elif math.isnan(assembly.rest) and abs(knee) < RUN_IN and solution.motion[0] <= 0.0:
         yield finding(
             "force_unbounded",
-            f"the crank is on the other side of the stretched position than where the springs are relaxed, "
-            f"{deg(abs(assembly.unloaded - link.stretched_angle))} away: the force comes down from no bound; "
-            "leave 'analysis.side' out for the side on which they are relaxed",
+            f"the springs are relaxed {deg(abs(assembly.unloaded - link.stretched_angle))} away, on the far side "
+            "of the stretched position: at the stretched position the force is unbounded; leave 'analysis.side' out to "
+            "start on the side on which they are relaxed",
         )
     elif abs(knee) < RUN_IN and solution.motion[0] <= 0.0 <= solution.motion[-1]:
         yield from _run_in(solution)
@@ -154,8 +154,8 @@ def _of_band(spec: SliderCrankSpec, solution: Solution) -> Iterator[Finding]:
     elif found.low <= reference <= found.high and solution.band is None:
         yield finding(
             "reference_zero",
-            f"at the reference {place(solution, reference)} the effort is zero, and a band of per cent of it is "
-            "nothing; choose another reference",
+            f"at the reference {place(solution, reference)} the effort is zero, and a band stated in per cent "
+            "of it has no width; choose another reference",
         )
     if window is None:
         return
@@ -167,7 +167,8 @@ def _of_band(spec: SliderCrankSpec, solution: Solution) -> Iterator[Finding]:
         yield finding(
             "stretched_outside_window",
             f"the window {deg(window[0])} to {deg(window[1])} does not contain the stretched position "
-            f"{deg(solution.assembly.stretched)}: there the slider's spring gives no negative stiffness for sure",
+            f"{deg(solution.assembly.stretched)}: only around it is the slider's spring certain to give negative "
+            "stiffness",
         )
 
 

@@ -62,7 +62,7 @@ def analyze(spec: SliderCrankSpec, run: Run) -> Result:
     -------
     Result
         One branch, ``load``. NO_EQUILIBRIUM if the mechanism cannot be built, PARTIAL if
-        the linkage does not reach all of the motion asked for.
+        the linkage does not reach all of the requested motion.
     """
     try:
         spec = resolve(spec)
@@ -100,7 +100,7 @@ def asked_motion(spec: SliderCrankSpec, assembly: Assembly) -> tuple[float, floa
 
 
 def solve(spec: SliderCrankSpec, assembly: Assembly) -> tuple[Solution, tuple[Finding, ...]]:
-    """Return the solution over what the linkage reaches of the motion asked for, and why that is less.
+    """Return the solution over what the linkage reaches of the requested motion, and why that is less.
 
     Raises
     ------
@@ -141,7 +141,7 @@ def efforts_inside(
 
 
 def _shortfalls(assembly: Assembly, asked: Ends, run: Ends) -> Iterator[Finding]:
-    """Yield why the motion that is run through is less than what is asked for."""
+    """Yield why the motion that is run through is less than what is requested."""
     reach = assembly.reach
     slack = 1e-9 * (asked[1] - asked[0])
     beyond = asked[0] < reach[0] - slack or asked[1] > reach[1] + slack
@@ -155,7 +155,7 @@ def _shortfalls(assembly: Assembly, asked: Ends, run: Ends) -> Iterator[Finding]
         yield finding(
             "out_of_reach",
             f"from the unloaded position the slider can travel {mm(reach[0])} to {mm(reach[1])}, and {mm(asked[0])} to "
-            f"{mm(asked[1])} are asked for; change 'analysis.travel'",
+            f"{mm(asked[1])} are requested; change 'analysis.travel'",
         )
     if poles:
         yield unbounded(poles)
@@ -196,7 +196,7 @@ def reference_motion(spec: SliderCrankSpec, assembly: Assembly) -> float:
 
 
 def _as_run(spec: SliderCrankSpec, assembly: Assembly) -> SliderCrankSpec:
-    """Return the spec with what the analysis fell back on written out."""
+    """Return the spec with the defaults of the analysis made explicit."""
     written = {assembly.motion_name: asked_motion(spec, assembly), "fidelity": "prb"}
     return spec.model_copy(update={"analysis": spec.analysis.model_copy(update=written)})
 

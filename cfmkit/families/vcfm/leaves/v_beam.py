@@ -3,7 +3,7 @@
 Where the axial force reaches the load of the form 1 - cos(2 pi s/L) it stays there. Both end slopes are then equal over
 one full wave, so the end moments are equal, and the force acts exactly along the chord: F = P_cr sin(beta), zero where
 the leaf is flat. For small angles that is a straight line with the slope -P_cr/X. The paper's truss law [D, eq. 18] has
-none of this, and its K_n = 33 E I/L^3 [D, eq. 17] is 17 % low: the factor is 4 pi^2/cos(theta).
+neither, and its K_n = 33 E I/L^3 [D, eq. 17] is 17 % low: the factor is 4 pi^2/cos(theta).
 
 Reference
 ---------
