@@ -29,7 +29,7 @@ WINDOW_OUTSIDE = "window_outside"
 class Status(Enum):
     """How a solve ended."""
 
-    COMPLETE = "solved over everything that was asked"
+    COMPLETE = "solved over everything that was requested"
     PARTIAL = "solved in part: the curve ends early, or some points failed"
     INFEASIBLE = "no design meets the targets within the stated limits"
     NO_EQUILIBRIUM = "no equilibrium: the mechanism cannot exist as described, or nothing holds it"
@@ -138,7 +138,7 @@ class ClosedForm(Protocol):
         ...
 
     def stress(self, branch: str, places: FloatArray, /) -> FloatArray:
-        """Return the largest stress [Pa] at places of any shape; NaN where it has no bound."""
+        """Return the largest stress [Pa] at places of any shape; NaN where it is unbounded."""
         ...
 
 

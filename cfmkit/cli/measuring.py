@@ -28,7 +28,7 @@ class Measuring(Common):
         option(
             "--tare",
             metavar="FORCE",
-            text="What the force sensor shows without load, e.g. '0.4 N': taken off. 'start': what it shows at first.",
+            text="Reading of the force sensor without load, to subtract, e.g. '0.4 N'; 'start': the first one.",
         ),
     ] = None
     zero: Annotated[
@@ -36,7 +36,7 @@ class Measuring(Common):
         option(
             "--zero",
             metavar="LENGTH",
-            text="What the displacement sensor shows at the mechanism's zero: taken off. 'start': the first point.",
+            text="Reading of the displacement sensor at the mechanism's zero, to subtract; 'start': the first one.",
         ),
     ] = None
     flip: Annotated[
@@ -44,7 +44,7 @@ class Measuring(Common):
         option(
             "--flip",
             metavar="NAMES",
-            text="What is recorded with the other sign: force, displacement (or torque, angle), or both with a comma.",
+            text="Recorded with the opposite sign: force, displacement (or torque, angle), or both, with a comma.",
         ),
     ] = None
 

@@ -124,7 +124,7 @@ def thinned(curve: Curve, bins: int = BINS) -> Curve:
 
 @styled
 def overlay(comparison: Comparison, before: Comparison | None, heading: tuple[str, str]) -> Figure:
-    """Return model and measurement over each other, and what is left between them below.
+    """Return model and measurement overlaid, and their difference below.
 
     Parameters
     ----------

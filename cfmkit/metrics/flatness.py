@@ -141,5 +141,5 @@ def _stress(trace: BranchTrace) -> FloatArray:
     if trace.stress is None:
         raise Undefined("the curve has no column 'max_stress'")
     if unknown := int(np.isnan(trace.stress).sum()):
-        raise Undefined(f"the stress has no bound at {unknown} of {len(trace.stress)} points in the window")
+        raise Undefined(f"the stress is unbounded at {unknown} of {len(trace.stress)} points in the window")
     return trace.stress

@@ -47,7 +47,7 @@ class Gap:
 
 @styled
 def fidelity_figure(heading: Heading, curves: Sequence[Curve], gaps: Sequence[Gap]) -> Figure:
-    """Return curves over each other, and the differences from the finest below.
+    """Return curves overlaid, and the differences from the finest below.
 
     Parameters
     ----------

@@ -53,7 +53,7 @@ def measure(
     as_recorded : bool
         Leave out neither spikes nor points next to reversals.
     one_branch : bool
-        Accept a recording that has no way back.
+        Accept a recording without a return stroke.
 
     Raises
     ------

@@ -107,7 +107,7 @@ class Sweep(Model):
         ),
     )
     samples: int | None = Field(None, ge=1, description="points of a Latin hypercube or a Sobol sequence")
-    design: bool = Field(False, description="design the mechanism anew at each point")
+    design: bool = Field(False, description="redesign the mechanism at each point")
     metrics: tuple[str, ...] = Field((), description="columns of results.csv; default: all metrics and values")
     curves: bool = Field(False, description="keep the curve of every point in curves.csv")
 
@@ -164,7 +164,7 @@ class Sensitivity(Model):
         "intervals (bound)",
     )
     min_yield: Ratio | None = Field(None, gt=0, le=1, description="share of parts that must meet all requirements")
-    design: bool = Field(False, description="design the mechanism anew at each point")
+    design: bool = Field(False, description="redesign the mechanism at each point")
 
 
 class Spec(Model):

@@ -48,7 +48,7 @@ def test_a_contact_that_yields_is_told_with_the_width_that_does_not():
 
 @pytest.mark.parametrize("points", [31, 301, 481])
 def test_a_window_that_begins_just_beyond_the_corner_has_a_stress_whatever_the_points(points):
-    """Its first place lies between a sample on the corner, where the pressure has no bound, and one on the flank."""
+    """Its first place lies between a sample on the corner, where the pressure is unbounded, and one on the flank."""
     spec = cam(contact={"width": "3 mm", "material": "pla"}).replace({"analysis.points": points})
     result = analyze(spec)
     corner = result.values["undercut_travel"].value
@@ -65,7 +65,7 @@ def test_a_window_that_begins_just_beyond_the_corner_has_a_stress_whatever_the_p
     assert found[1] == pytest.approx(material("pla").yield_strength / found[0], rel=1e-12)
     on_it = evaluate(result, ("safety_factor",), Window(0.5 * corner, end))["safety_factor"]
     assert on_it.value is None
-    assert "the stress has no bound at " in on_it.reason
+    assert "the stress is unbounded at " in on_it.reason
 
 
 def test_the_safety_factor_of_the_mechanism_lowers_what_is_allowed():

@@ -108,7 +108,7 @@ def test_an_absurd_mechanism_has_an_answer_with_a_reason(changes):
     half = len(curve) // 2
     assert (np.diff(curve.motion[:half]) > 0).all()
     for name, column in curve.columns():
-        if name in ("contact_pressure", "max_stress"):  # no bound on a corner, none where nothing is in equilibrium
+        if name in ("contact_pressure", "max_stress"):  # unbounded on a corner, none where nothing is in equilibrium
             assert np.isfinite(column.values).all() or (EXPLAIN_NAN | {"undercut"}) & set(names(result)), name
         elif column.dimension != "text" and not name.endswith("force"):
             assert np.isfinite(column.values).all(), name

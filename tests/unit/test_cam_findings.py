@@ -265,7 +265,7 @@ def test_nothing_jams_without_friction_or_cut_for_it_or_on_a_corner(changes):
 
 def test_weight_diverges_at_the_dead_point_of_a_cam_that_does_not_carry_it():
     result = run(analysis__gravity=True, **FITS)
-    assert "the force from weight has no bound there" in message(result, "dead_point")
+    assert "the force from weight is unbounded there" in message(result, "dead_point")
     assert np.isnan(result.curve.force[0])
     close = at(cam(analysis__gravity=True, **FITS), [1e-9, 1e-7]).force
     assert close[0] > 9 * close[1]  # like 1 / sqrt(travel)

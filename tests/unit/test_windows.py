@@ -91,7 +91,7 @@ def test_shares_are_of_the_travel_requested_where_a_curve_ends_early():
     assert result.status.key == "partial"
     (told,) = [one for one in result.warnings if one.name == WINDOW_OUTSIDE]
     assert "analysis.window and requirements.0.over: the window 150 ... 300 mm" in told.message
-    assert "ends before the travel requested does (0 ... 300 mm): metrics are those over 150 ... 240 mm" in told.message
+    assert "ends before the requested travel does (0 ... 300 mm): metrics are those over 150 ... 240 mm" in told.message
     (outcome,) = cfmkit.check(result)
     assert not outcome.ok
 

@@ -67,7 +67,7 @@ class BatchOptions(Changing):
 
 
 def run(options: BatchOptions, terminal: Terminal) -> Answer:
-    """Design or analyse many specs, check their requirements, and sum up; the exit code says the worst.
+    """Design or analyse many specs, check their requirements and summarise; the exit code is that of the worst.
 
     A spec that an earlier batch has finished is reused as long as nothing has changed: neither spec nor options, nor
     cfmkit, nor a file that was written.

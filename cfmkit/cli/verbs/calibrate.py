@@ -41,7 +41,9 @@ class CalibrateOptions(Computing, Measuring):
     ] = None
     loss: Annotated[
         str,
-        option("--loss", metavar="NAME", shown=True, text="How large errors count: linear, soft_l1, huber, cauchy."),
+        option(
+            "--loss", metavar="NAME", shown=True, text="Loss function of the residuals: linear, soft_l1, huber, cauchy."
+        ),
     ] = "soft_l1"
 
 

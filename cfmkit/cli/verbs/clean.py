@@ -25,7 +25,7 @@ PLACE = 80
 class CleanOptions(Common):
     """Arguments and options."""
 
-    folder: Annotated[str, argument("DIR", "Folder that runs have written to, or above such.")]
+    folder: Annotated[str, argument("DIR", "Folder that runs have written to, or a parent of such folders.")]
     yes: Annotated[bool, flag("-y", "--yes", text="Remove without asking.")] = False
     quiet: Quiet = False
 

@@ -32,9 +32,9 @@ class DoctorOptions(Common):
 
 
 def run(options: DoctorOptions, terminal: Terminal) -> Answer:
-    """Say which versions, packages, folders, compiled code and families there are, and what is wrong with them.
+    """Report versions, packages, folders, compiled code and families, and what is wrong with them.
 
-    Families of other packages are imported for it: installed code runs.
+    Families of other packages are imported for this, which runs installed code.
     """
     found = {
         "versions": {"cfmkit": __version__, "python": platform.python_version(), "system": platform.platform()},

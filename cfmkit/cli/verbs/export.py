@@ -20,17 +20,18 @@ class ExportOptions(OneSpec):
     """Arguments and options."""
 
     kerf: Annotated[
-        str | None, option("--kerf", metavar="LENGTH", text="Width of the cut: adds a DXF moved by half of it.")
+        str | None,
+        option("--kerf", metavar="LENGTH", text="Width of the cut; adds a DXF that is offset by half of it."),
     ] = None
     tolerance: Annotated[
         str | None,
-        option("--tolerance", metavar="LENGTH", text="Largest distance from the exact curves; default: 0.005 mm."),
+        option("--tolerance", metavar="LENGTH", text="Largest deviation from the exact curves; default: 0.005 mm."),
     ] = None
     quiet: Quiet = False
 
 
 def run(options: ExportOptions, terminal: Terminal) -> Answer:
-    """Write what is to be cut or printed, as it stands in a spec: DXF, SVG, CSV."""
+    """Write the parts of a spec as drawings to cut or print: DXF, SVG, CSV."""
     from cfmkit import api
     from cfmkit.cli.runs import folder_of
     from cfmkit.runs.run import provenance

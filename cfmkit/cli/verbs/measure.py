@@ -35,7 +35,7 @@ class MeasureOptions(Measuring):
         option(
             "--window",
             metavar="FROM:TO",
-            text="Where to measure, e.g. '40 mm:210 mm'; default: all that is measured on every branch.",
+            text="Window to evaluate, e.g. '40 mm:210 mm'; default: the travel that every branch covers.",
         ),
     ] = None
     filter: Annotated[
@@ -47,11 +47,9 @@ class MeasureOptions(Measuring):
             "default: 60 cycles over the travel, order 6 per pass.",
         ),
     ] = None
-    target: Annotated[str | None, option("--target", metavar="FORCE", text="Force or torque it should have.")] = None
-    one_branch: Annotated[bool, flag("--one-branch", text="Accept a recording that has no way back.")] = False
-    as_recorded: Annotated[
-        bool, flag("--as-recorded", text="Leave out neither spikes nor what is next to reversals.")
-    ] = False
+    target: Annotated[str | None, option("--target", metavar="FORCE", text="Target force or torque.")] = None
+    one_branch: Annotated[bool, flag("--one-branch", text="Accept a recording without a return stroke.")] = False
+    as_recorded: Annotated[bool, flag("--as-recorded", text="Keep spikes and the points next to reversals.")] = False
     no_plots: NoPlots = False
     quiet: Quiet = False
 

@@ -30,7 +30,7 @@ class NewOptions(Common):
 
 
 def run(options: NewOptions, terminal: Terminal) -> Answer:
-    """Write a commented spec to start from; no file is ever replaced."""
+    """Write a commented spec to start from; an existing file is never replaced."""
     from cfmkit.families import family
 
     text = template(options.family)

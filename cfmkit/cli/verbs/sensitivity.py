@@ -102,17 +102,17 @@ class SensitivityOptions(Studying):
         option(
             "--metrics",
             metavar="A,B",
-            text="What to look at; default: the metrics of the requirements, over their windows.",
+            text="Metrics to study; default: those of the requirements, over their windows.",
         ),
     ] = None
-    design: Annotated[bool, flag("--design", text="Design the mechanism anew at each sample.")] = False
+    design: Annotated[bool, flag("--design", text="Redesign the mechanism at each sample.")] = False
 
 
 def run(options: SensitivityOptions, terminal: Terminal) -> Answer:
-    """Find out which value matters most, and how many made parts will meet the requirements.
+    """Find out which values matter most, and what share of manufactured parts will meet the requirements.
 
-    The spec's block `sensitivity` says what is uncertain. Finished samples are noted in the folder: after an
-    interruption the same command goes on.
+    The spec's block `sensitivity` says what is uncertain. Finished samples are kept in the folder: after an
+    interruption, run the same command again to continue.
     """
     from cfmkit.cli import studies
     from cfmkit.cli.runs import folder_of

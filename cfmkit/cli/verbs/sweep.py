@@ -55,7 +55,7 @@ class SweepOptions(Studying):
             "Repeatable; replaces what the spec's block sweep varies.",
         ),
     ] = None
-    zip: Annotated[bool, flag("--zip", text="Vary values side by side instead of in every combination.")] = False
+    zip: Annotated[bool, flag("--zip", text="Vary values in step instead of in all combinations.")] = False
     sample: Annotated[
         str | None,
         option(
@@ -64,7 +64,7 @@ class SweepOptions(Studying):
             text="Draw N points from ranges start:stop: a Latin hypercube or a Sobol sequence.",
         ),
     ] = None
-    design: Annotated[bool, flag("--design", text="Design the mechanism anew at each point.")] = False
+    design: Annotated[bool, flag("--design", text="Redesign the mechanism at each point.")] = False
     curves: Annotated[bool, flag("--curves", text="Keep the curve of every point in curves.csv.")] = False
     metrics: Annotated[str | None, option("--metrics", metavar="A,B", text="Columns of results.csv; default: all.")] = (
         None
@@ -74,7 +74,7 @@ class SweepOptions(Studying):
 def run(options: SweepOptions, terminal: Terminal) -> Answer:
     """Analyse a mechanism in many variants: one row per point, whether it could be solved or not.
 
-    Finished points are noted in the folder: after an interruption the same command goes on.
+    Finished points are kept in the folder: after an interruption, run the same command again to continue.
     """
     from cfmkit.cli import studies
     from cfmkit.cli.runs import folder_of

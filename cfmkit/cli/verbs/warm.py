@@ -25,9 +25,9 @@ class WarmOptions(Common):
 
 
 def run(options: WarmOptions, terminal: Terminal) -> Answer:
-    """Compile the beam engine now, and keep it: no later run waits for that.
+    """Compile the beam engine now and keep it, so that no later run has to wait for it.
 
-    For images of containers and caches of pipelines. Code that is there already is only loaded.
+    For container images and pipeline caches. Code that is already compiled is only loaded.
     """
     from cfmkit.elastica.warming import warm
 

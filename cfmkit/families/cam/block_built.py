@@ -195,7 +195,7 @@ class BuiltSlab(Slab):
 
     @property
     def solved(self) -> NDArray[np.bool_]:
-        """Whether the slider rises all along up to the travel requested, and a force was found at every sample."""
+        """Whether the slider rises all along up to the requested travel, and a force was found at every sample."""
         reached = ((self.cut.end - self.cut.start)[:, 0] >= self.reach) & (self.stretch[:, -1] > 0)
         return self.up.moves & self.down.moves & reached & self.cut.possible(self.designs.friction)
 

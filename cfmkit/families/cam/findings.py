@@ -33,9 +33,9 @@ FINDINGS = {
     "undercut": "the roller is larger than the path's radius of curvature: the cam starts with a corner",
     "undercut_total": "the roller is so large that nothing of the flank remains",
     "contact_not_single_valued": "while the roller pivots on the corner the contact does not move with the slider",
-    "corner_pressure": "on the sharp corner the contact pressure has no bound",
+    "corner_pressure": "on the sharp corner the contact pressure is unbounded",
     "overstressed": "the contact pressure exceeds the one at which the material first yields below the surface",
-    "up_jam": "friction holds the roller: no force moves the slider up",
+    "up_jam": "the mechanism self-locks: no force moves the slider up",
     "dead_point": "the slider cannot move the roller at the start: forces other than the springs' diverge",
     "spring_slack": "the springs are shorter than their rest length and carry nothing",
     "spring_overstretched": "the springs are stretched beyond their limit",
@@ -49,10 +49,10 @@ FINDINGS = {
     "friction_left_out": "the nine-coordinate model has no rolling resistance",
     "overwritten": "a value of the profile that the design replaces by its own",
     "plate_incomplete": "there is no room for the tab of the plate, or for its fixing holes",
-    "old_word": "a word of the specification that the next version will not know any more",
-    "weight_too_large": "the force wanted does not even carry the weight of the moving parts",
+    "old_word": "a word of the specification that the next version will not accept",
+    "weight_too_large": "the target force does not even carry the weight of the moving parts",
     "force_constant_too_small": "the force constant needed is below the one that avoids undercut",
-    "registration_weak": "measured points do not say well where the cam lies",
+    "registration_weak": "the measured points determine the position of the cam poorly",
     "width_error": "the measured cam is wider or narrower than the design on both flanks",
     "profile_outliers": "measured points lie so far off that the registration gave them no weight",
     "noise_understated": "neighbouring points differ by more than the stated noise of the measurement explains",
@@ -140,7 +140,7 @@ def _undercut(solution: Solution) -> Iterator[Finding]:
     if solution.assembly.spec.mechanism.contact:
         yield finding(
             "corner_pressure",
-            f"on a sharp corner the contact pressure has no bound: it is reported from {mm(corner)} of travel on",
+            f"on a sharp corner the contact pressure is unbounded: it is reported from {mm(corner)} of travel on",
         )
 
 

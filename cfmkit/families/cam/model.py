@@ -138,7 +138,7 @@ def _shortfalls(assembly: Assembly, solution: Solution) -> tuple[Finding, ...]:
             finding(
                 "brace_too_short",
                 f"with a brace of {mm(assembly.track.brace_length)} on this cam the slider stops rising after "
-                f"{mm(reached)} of travel, before the flank ends, and the force has no bound there; use a longer "
+                f"{mm(reached)} of travel, before the flank ends, and the force is unbounded there; use a longer "
                 "brace ('mechanism.brace_length'), or a cam cut for this one ('mechanism.profile.brace_length')",
             )
         )

@@ -91,7 +91,7 @@ DEFINITIONS = {
     "dead_weight_peak": ("ratio", "largest acceleration over g: what the motion adds to the force of a dead weight"),
     "moving_mass_max": ("mass", "largest mass that, fixed to the slider, would have the same kinetic energy"),
     "force_peak_over_static": ("ratio", "largest F/F_0 - 1 of a motion, F_0 the force at rest in the same place"),
-    "force_dip_under_static": ("ratio", "largest 1 - F/F_0 of a motion; above 1 the force changes its sign"),
+    "force_dip_under_static": ("ratio", "largest 1 - F/F_0 of a motion; above 1 the force changes sign"),
     "force_peak_over_slow": ("ratio", "largest F/F_1 - 1, F_1 the force of the same motion within 1 s [SS, Fig. 14]"),
     "angle_error_effect": (
         "ratio",
@@ -168,7 +168,7 @@ def _corner_peak(solution: Solution) -> float | None:
     """Return the peak force on the corner, from samples refined by a parabola through the highest [N]."""
     assembly = solution.assembly
     corner = min(solution.corner_travel, float(solution.travel[-1]))
-    if corner <= 0 or any(low < corner for low, _ in solution.jams):  # next to a jam the force has no bound
+    if corner <= 0 or any(low < corner for low, _ in solution.jams):  # next to a jam the force is unbounded
         return None
     travel = np.linspace(0.0, corner * (1 - 1e-9), 129)
     states = assembly.track.states(assembly.track.start + travel)

@@ -93,7 +93,7 @@ def _held(moved: Moved) -> Iterator[Finding]:
     if not lost.any():
         return
     if moved.build.machine.friction and moved.build.motion.stroke > 0:
-        yield finding("up_jam", f"friction holds a roller {_when(moved, lost)}: no force moves the slider there")
+        yield finding("up_jam", f"a roller self-locks {_when(moved, lost)}: no force moves the slider there")
     else:
         yield finding(
             "dead_point", f"the slider has no leverage on a roller {_when(moved, lost)}: the force is unbounded"

@@ -2,7 +2,7 @@
 
 The curve is the force over the slider's displacement, in the order of time, with everything
 that happens at contacts, pins and springs beside it. The displacement is that of the quasi-static
-model, so that the two can be laid over each other.
+model, so that the two can be overlaid.
 
 Reference
 ---------

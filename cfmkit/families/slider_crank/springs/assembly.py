@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 TURN = 2.0 * math.pi
 
 SHORT_OF_END = 1e-3
-"""Share of an arc that a motion stays away from its ends, where efforts have no bound."""
+"""Share of an arc that a motion stays away from its ends, where efforts are unbounded."""
 
 CLOSEST = 1e-6
 """Nearer to such an end, as a share of the way to it, the last digits of the motion decide the effort's."""
