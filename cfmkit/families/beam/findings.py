@@ -201,7 +201,7 @@ def _closure(solution: Solution) -> Iterator[Finding]:
             "closure_prestress",
             f"beams miss their nodes ({gaps}) and are forced into place: at rest the drive carries "
             f"{format_short(float(solution.effort[0]), _effort(solution))} and the stress is "
-            f"{format_short(float(solution.stress[0]), 'stress')}; closure 'rotscale' has none of this",
+            f"{format_short(float(solution.stress[0]), 'stress')}; closure 'rotscale' avoids both",
             "mechanism.closure=rotscale",
         )
         return

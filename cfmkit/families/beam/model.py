@@ -106,7 +106,7 @@ def _refuse_tight_coils(assembly: Assembly) -> None:
 
 
 def _kept(spec: BeamSpec, path: Path) -> Any:
-    """Return which points make the curve: those asked for, or all where folds may make it many-valued."""
+    """Return which points make the curve: those requested, or all where folds may make it many-valued."""
     keep = np.arange(len(path)) if spec.analysis.through_folds else path.at_asked
     return read_only(keep, np.int64)
 
@@ -164,7 +164,7 @@ def _outputs(solution: Solution) -> dict[str, Column]:
 
 
 def _frequencies(solution: Solution) -> dict[str, Column]:
-    """Return the natural frequencies that were asked for: empty where a pose is not stable, or not accurate."""
+    """Return the natural frequencies that were requested: empty where a pose is not stable, or not accurate."""
     found, columns = solution.frequencies, {}
     for k in range(solution.spec.analysis.modes if found is not None else 0):
         for name, values in natural(solution).items():

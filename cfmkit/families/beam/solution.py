@@ -41,7 +41,7 @@ class Solution:
     path : Path
         Its equilibria.
     keep : (n,) int array
-        Which points of the path make the curve: those asked for, or all where the path is followed through folds.
+        Which points of the path make the curve: those requested, or all where the path is followed through folds.
     """
 
     assembly: Assembly
@@ -120,7 +120,7 @@ class Solution:
 
     @cached_property
     def frequencies(self) -> Frequencies | None:
-        """Natural frequencies about every point of the curve; None where none are asked for and nothing can flutter."""
+        """Natural frequencies about every point of the curve; None where none are requested and nothing can flutter."""
         masses = self.assembly.masses()
         count = self.spec.analysis.modes or (_FLUTTER if self.follows else 0)
         if masses is None or not count or not len(self.keep):
