@@ -1,4 +1,4 @@
-"""Studies: many variants of one specification, each evaluated once, whatever becomes of it.
+"""Studies: many variants of one specification, each evaluated once, whether it can be solved or not.
 
 A study sees a specification, dotted paths and names of metrics; it knows no family.
 

@@ -1,4 +1,4 @@
-"""What a closure did to a mechanism is told with numbers."""
+"""What a closure did to a mechanism is reported with numbers."""
 
 from __future__ import annotations
 

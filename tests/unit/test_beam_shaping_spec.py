@@ -1,4 +1,4 @@
-"""What is wrong with a block `design.optimise` is told at its place, before anything is searched."""
+"""What is wrong with a block `design.optimise` is reported at its place, before anything is searched."""
 
 from __future__ import annotations
 

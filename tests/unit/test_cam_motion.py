@@ -277,7 +277,7 @@ def test_the_nine_coordinates_go_as_far_as_the_profile_does():
 
 @pytest.mark.parametrize("method", ["inverse", "multibody"])
 def test_a_motion_that_starts_outside_the_profile_has_no_first_pose(method):
-    """Where it would come in the force has no bound: the curve began with what was left of a division by nothing."""
+    """Where it would come in the force is unbounded: the curve began with what was left of a division by nothing."""
     down = {"slider_position": "480 mm", "stroke": "-150 mm", "method": method}
     result = analyze(moving(**{f"analysis__dynamics__{name}": value for name, value in down.items()}))
     assert result.status is Status.NO_EQUILIBRIUM

@@ -1,4 +1,4 @@
-"""A fault of the program in the starts of a design is told as one, never as targets that cannot be met."""
+"""A fault of the program in the starts of a design is reported as one, never as targets that cannot be met."""
 
 from __future__ import annotations
 

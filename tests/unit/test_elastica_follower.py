@@ -1,4 +1,4 @@
-"""Loads that turn with their node: what diverges is told, where it does; whether it flutters depends on masses.
+"""Loads that turn with their node: what diverges is reported, where it does; whether it flutters depends on masses.
 
 A column, clamped at its foot, under a load P at its top of which a share a stays tangential, and a small dead force F
 across. With q^2 = P/(EI), c = cos(qL) its top turns by F/P (1 - c)/(c + a (1 - c)): it diverges where c = -a/(1 - a),

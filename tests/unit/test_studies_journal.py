@@ -1,4 +1,4 @@
-"""The journal: what was acknowledged stays, what is damaged is told and done again."""
+"""The journal: what was acknowledged stays, what is damaged is reported and done again."""
 
 import json
 import os

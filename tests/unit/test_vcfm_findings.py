@@ -105,7 +105,7 @@ def test_what_is_measured_of_hybrid_leaves_is_not_held_against_a_force_that_they
     ],
 )
 def test_the_cure_of_a_force_that_is_not_flat_works(changes):
-    """Either another width, or the part of the travel that is flat: tried before it is told."""
+    """Either another width, or the part of the travel that is flat: tried before it is reported."""
     found = analyzed(*changes)
     told = message(found, "not_flat")
     (flat,) = [one for one in found.warnings if one.name == "not_flat"]

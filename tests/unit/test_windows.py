@@ -1,4 +1,4 @@
-"""Windows of the motion: shares of the travel follow it, and what lies outside a curve is told."""
+"""Windows of the motion: shares of the travel follow it, and what lies outside a curve is reported."""
 
 from __future__ import annotations
 

@@ -62,7 +62,7 @@ class Problem:
 
     @cached_property
     def fine(self) -> ExpandedSolver:
-        """The same segments with more steps and nothing condensed: singular points are seen in full, and exactly.
+        """The same segments with more steps and nothing condensed out: singular points are seen in full, and exactly.
 
         Points may be requested exactly at a bifurcation. Its place on the mesh that is marched on is only as exact as
         the tolerance: located there, ten of a thousand paths through such points come to lie on the wrong side.

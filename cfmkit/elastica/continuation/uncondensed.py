@@ -35,7 +35,7 @@ def pulled_straight(trail: Trail) -> bool:
 
 
 def uncondensed(problem: Problem, trail: Trail, wrong: int = 0) -> Resume | None:
-    """Go on with nothing condensed; None where the path does so already, is only judged, or pulled straight.
+    """Go on with nothing condensed out; None where the path does so already, is only judged, or pulled straight.
 
     The last points that are `wrong` are taken back, and short steps before: what they led to may be a limit point, not
     to be jumped over.

@@ -248,7 +248,7 @@ class Slab:
     def jam_travel(self) -> FloatArray:
         """Travel at the start over which friction lets no force move the slider up [m].
 
-        There is no lever until s/A (1 - mu t) = mu (1 + t^2), s the stretch and t the brace's tangent.
+        There is no leverage until s/A (1 - mu t) = mu (1 + t^2), s the stretch and t the brace's tangent.
         """
         cams, mu = self.designs, self.designs.friction
         stretch = np.zeros(len(cams))
@@ -297,7 +297,7 @@ def force_at(cams: Designs, pose: Pose, way: float | FloatArray) -> FloatArray:
     if held.any():
         force[held] = np.where(spring[held] == 0, 0.0, np.nan)
     if not mu.all():
-        # A start without friction has no lever and no load: the limit is the constant force.
+        # A start without friction has no leverage and no load: the limit is the constant force.
         limit = (stretch == 0) & (mu == 0) & (np.abs(lever) < 1e-13)
         force = np.where(limit, 4.0 * cams.stiffness[:, None] * cams.constant[:, None], force)
     return force

@@ -117,7 +117,7 @@ def forces(states: TrackStates, loads: Loads, friction: float) -> Forces:
 
 
 def _over(load: FloatArray, lever: FloatArray) -> FloatArray:
-    """Return load / lever; 0 for nothing over anything, NaN where there is no lever to move the load."""
+    """Return load / lever; 0 for nothing over anything, NaN where there is no leverage to move the load."""
     moves = lever > 0
     force = load / np.where(moves, lever, 1.0)
     return np.where(moves | (load == 0), force, np.nan)

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from cfmkit.specs.yamlio.paths import Path
 
 _LOADERS: list[Any] = [*filter(None, [getattr(yaml, "CSafeLoader", None)]), yaml.SafeLoader]
-"""libyaml where PyYAML has it; its complaints vary with its version, so errors are told by the one in Python."""
+"""libyaml where PyYAML has it; its complaints vary with its version, so errors are reported by the one in Python."""
 
 DEEPEST = 32
 MOST_NODES = 100_000

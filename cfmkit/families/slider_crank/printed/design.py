@@ -137,7 +137,7 @@ def _strip(spec: SliderCrankSpec, linkage: Linkage, unloaded: float, run: Run) -
 
 @dataclass(frozen=True)
 class Reported:
-    """What the analysis of a finished strip says of it: what is told of a design are these numbers.
+    """What the analysis of a finished strip says of it: what is reported of a design are these numbers.
 
     Attributes
     ----------

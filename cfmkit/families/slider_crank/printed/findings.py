@@ -29,7 +29,7 @@ RUN_IN_SHARE = 0.1
 """Travel to 98 % of the force, as a share of all, above which the kink is called large."""
 
 CLOSE = 5e-3
-"""Difference of the second opinion, as a share, above which it is told."""
+"""Difference of the second opinion, as a share, above which it is reported."""
 
 
 def findings_of(spec: SliderCrankSpec, solution: Solution) -> tuple[Finding, ...]:

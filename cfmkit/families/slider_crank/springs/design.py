@@ -265,7 +265,7 @@ def _reference(solved: Solved) -> float:
 
 
 NEGLIGIBLE = 5e-4
-"""More deviation, as a fraction of the target, that nobody would notice: such designs are told of as equals."""
+"""More deviation, as a fraction of the target, that nobody would notice: such designs are reported as equals."""
 
 PLACES = 60
 """Places of the window for the programmes that say how far the rates may move."""
