@@ -65,13 +65,17 @@ def flag(*names: str, text: str) -> Any:
 
 
 Out = Annotated[str | None, option("-o", "--out", metavar="DIR", text="Output folder; default: cfm-out/SPEC-VERB/.")]
-Fidelity = Annotated[str | None, option("--fidelity", metavar="NAME", text="Short for --set analysis.fidelity=NAME.")]
+Fidelity = Annotated[
+    str | None, option("--fidelity", metavar="NAME", text="Shorthand for --set analysis.fidelity=NAME.")
+]
 Seed = Annotated[int, option("--seed", metavar="N", shown=True, low=0, text="Seed of everything random.")]
 Quiet = Annotated[bool, flag("-q", "--quiet", text="Print only what went wrong.")]
 NoPlots = Annotated[bool, flag("--no-plots", text="Draw no figures.")]
 Jobs = Annotated[int | None, option("-j", "--jobs", metavar="N", low=1, text="Processes; default: all cores.")]
-Timeout = Annotated[float | None, option("--timeout-per-point", metavar="S", text="Give up a point after S seconds.")]
-Fresh = Annotated[bool, flag("--fresh", text="Compute anew what an earlier run has finished.")]
+Timeout = Annotated[
+    float | None, option("--timeout-per-point", metavar="S", text="Give up on a point after S seconds.")
+]
+Fresh = Annotated[bool, flag("--fresh", text="Reuse nothing of an earlier run.")]
 WithReport = Annotated[bool, flag("--report", text="Write report.html, too: everything in one file to share.")]
 
 
@@ -79,8 +83,8 @@ WithReport = Annotated[bool, flag("--report", text="Write report.html, too: ever
 class Common:
     """What every verb takes."""
 
-    json: Annotated[bool, flag("--json", text="Print one JSON document instead, also on failure.")] = False
-    verbose: Annotated[int, option("-v", "--verbose", count=True, text="Print more; -vv also tracebacks.")] = 0
+    json: Annotated[bool, flag("--json", text="Print one JSON document instead of text, also on failure.")] = False
+    verbose: Annotated[int, option("-v", "--verbose", count=True, text="Print more; -vv: tracebacks, too.")] = 0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -92,9 +96,10 @@ class Changing(Common):
         option(
             "--set",
             metavar="A.B=VALUE",
-            text="Replace a value of the spec, with its unit, e.g. --set mechanism.roller_radius='10 mm'. A key that "
-            """has dots itself stands in quotes: 'sensitivity.parameters."mechanism.width"=[1 mm, 2 mm]'. Of many """
-            "specs those of one family only: --set cam:mechanism.roller_radius='10 mm'. Repeatable.",
+            text="Replace a value of the spec, with its unit, e.g. --set mechanism.roller_radius='10 mm'. Put a key "
+            """that itself has dots in quotes: 'sensitivity.parameters."mechanism.width"=[1 mm, 2 mm]'. With several """
+            "specs, a family in front changes those of that family only: --set cam:mechanism.roller_radius='10 mm'. "
+            "Repeatable.",
         ),
     ] = None
 

@@ -281,7 +281,7 @@ class BatchResult:
     Attributes
     ----------
     entries : tuple of Entry
-        One a specification, in their order.
+        One per specification, in their order.
     exit_code : ExitCode
         The worst of them: what the command would return.
     folder : str
@@ -302,14 +302,14 @@ class BatchResult:
 
     @property
     def table(self) -> Table:
-        """What results.csv says: one row a specification."""
+        """What results.csv says: one row per specification."""
         from cfmkit.studies.batch import results_table
 
         return results_table(self.entries)
 
     @property
     def requirements(self) -> Table:
-        """What requirements.csv says: one row a requirement."""
+        """What requirements.csv says: one row per requirement."""
         from cfmkit.studies.batch import requirements_table
 
         return requirements_table(self.entries)

@@ -172,7 +172,7 @@ def undesigned(spec: Spec, design: Design) -> Result:
 
 
 def files(report: Report, plots: bool = True, page: bool = False, command: str = "") -> Iterator[tuple[str, bytes]]:
-    """Yield every file of a run as (name below the folder, content), each when it is asked for.
+    """Yield every file of a run as (name below the folder, content), each when it is needed.
 
     Parameters
     ----------

@@ -121,7 +121,7 @@ def clean(text: str) -> str:
 
 
 def prepared(path: str) -> Callable[[bytes], None]:
-    """Return what writes a file; its folder is made now, and a folder in its place is told now.
+    """Return what writes a file; its folder is made now, and a folder in its place is reported now.
 
     Raises
     ------

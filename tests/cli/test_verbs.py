@@ -34,6 +34,23 @@ def test_every_verb_explains_itself_and_every_option(cli, verb):
     assert "Traceback" not in done.out
     for option in ("--json", "--verbose", "--help"):
         assert option in done.out
+    for internal in ("<bool>", "<int>", "<str>", "<list", "x>=", "<=x"):  # what types of Python are called, and limits
+        assert internal not in done.out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (("analyze", "cam.yaml", "--seed", "-1"), "'--seed': -1 is not allowed: must be >= 0"),
+        (("sensitivity", "cam.yaml", "--samples", "1"), "'--samples': 1 is not allowed: must be >= 2"),
+        (("sweep", "cam.yaml", "-j", "0"), "'-j' / '--jobs': 0 is not allowed: must be >= 1"),
+        (("design", "cam.yaml", "--seed", str(2**63)), f"{2**63} is not allowed: must be <= {2**63 - 1}"),
+    ],
+)
+def test_a_number_out_of_its_limits_is_refused_with_them(cli, arguments, told):
+    done = cli(*arguments)
+    assert done.code == 2
+    assert told in done.err
 
 
 @pytest.mark.parametrize(
