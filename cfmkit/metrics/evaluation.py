@@ -313,7 +313,7 @@ def _told(gap: UncoveredWindow, result: Result) -> str:
     text += span_text(low, high, kind)
     travel = travel_of(result)
     if result.status is Status.PARTIAL and travel is not None and min(travel) <= window.lo and window.hi <= max(travel):
-        text += f", which ends before the travel requested does ({span_text(min(travel), max(travel), kind)})"
+        text += f", which ends before the requested travel does ({span_text(min(travel), max(travel), kind)})"
     if (left := left_of(window, result)) != window and left is not None:
         return f"{text}: metrics are those over {span_text(left.lo, left.hi, kind)}, a requirement over it is missed"
     return (

@@ -93,7 +93,7 @@ def prepare(spec: Spec, request: SweepRequest) -> Work:
 
 
 def writes_curves(spec: Spec, request: SweepRequest) -> bool:
-    """Return whether curves.csv is asked for."""
+    """Return whether curves.csv is requested."""
     return _given(request.curves, spec.sweep.curves if spec.sweep else False)
 
 

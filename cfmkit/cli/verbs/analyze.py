@@ -38,7 +38,7 @@ class AnalyzeOptions(Computing, Measuring):
 
 
 def run(options: AnalyzeOptions, terminal: Terminal) -> Answer:
-    """Analyse a mechanism as it is: curve, metrics, requirements, figures; beside a measured curve if there is one."""
+    """Analyse a mechanism as it is: curve, metrics, requirements, figures; with --data also a measured curve."""
     from cfmkit.cli.runs import execute
     from cfmkit.runs.run import Verb, analysed
 
@@ -94,7 +94,7 @@ def compute_each(work: Callable[[Spec, Run], Report], spec: Spec, run: Run) -> R
 
 
 def _picture(compared: FidelityComparison) -> bytes:
-    """Return the curves over each other as PNG."""
+    """Return the curves overlaid as PNG."""
     from cfmkit.plots.fidelity import Gap, fidelity_figure
     from cfmkit.plots.style import png
     from cfmkit.plots.text import Heading
