@@ -34,8 +34,7 @@ from cfmkit.families.slider_crank.springs.stiffness import Classified, classify,
 from cfmkit.families.slider_crank.springs.values import DEFINITIONS
 from cfmkit.families.slider_crank.unit_springs import JOINTS
 from cfmkit.metrics.closed import extremes, mean
-from cfmkit.metrics.flatness import UNIFORM_POINTS
-from cfmkit.metrics.many import ManyBranches, range_95, range_95_fraction, usable_interval
+from cfmkit.metrics.many import UNIFORM_POINTS, ManyBranches, range_95, range_95_fraction, usable_interval
 from cfmkit.metrics.subjects import Frame
 from cfmkit.numerics.extrema import Monotone, monotone, sharpened
 
@@ -88,6 +87,14 @@ def analyze_block(spec: SliderCrankSpec, block: Block) -> BlockAnswer | None:
     for start in range(0, len(chosen), size):
         rows = chosen[start : start + size]
         slab = Slab(base, rates[rows], legs[rows])
+        for window in {one.window for one in block.measures if base.spreads(one.name)}:
+            slab.inside(window)
+        if slab.balanced.any():
+            done[rows[slab.balanced]] = False
+            rows = rows[~slab.balanced]
+            slab = Slab(base, rates[rows], legs[rows])
+        if not len(rows):
+            continue
         for measure, found in zip(block.measures, values, strict=True):
             found[""][rows] = slab.measured(measure)
         for name, warned in of_springs(slab):
@@ -185,10 +192,13 @@ class Base:
             return True
         if name in EACH:
             return self.bounded
-        kind, _, rest = name.partition("_")
-        known = (kind == self.assembly.drive and rest in CURVE) or name in PLAIN or name in BANDS or name in OF_TARGET
-        known |= name in PLACES and self.bounded
+        known = self.spreads(name) or name in BANDS or name in OF_TARGET or (name in PLACES and self.bounded)
         return known and (window is None or (self.low <= window[0] and window[1] <= self.high))
+
+    def spreads(self, name: str) -> bool:
+        """Return whether a metric is one of mean and extremes in a window."""
+        kind, _, rest = name.partition("_")
+        return (kind == self.assembly.drive and rest in CURVE) or name in PLAIN
 
     def lacks(self, name: str) -> bool:
         """Return whether a mechanism with this drive has no such value: its cells are empty."""
