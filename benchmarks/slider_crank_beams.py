@@ -19,6 +19,7 @@ import numpy as np
 
 import cfmkit
 from cfmkit.elastica.verification.corotational import recheck
+from cfmkit.families.base import Run
 from cfmkit.families.slider_crank.build import linkage_of, resolve, unloaded_angle
 from cfmkit.families.slider_crank.printed.design import form_of, task_of
 from cfmkit.families.slider_crank.printed.model import chain_of
@@ -82,10 +83,8 @@ def main() -> None:
             wanted = spec.replace(changes)
             task = task_of(wanted, linkage, unloaded)
             form, ranges = form_of(wanted, wanted.design.beam, task, linkage, unloaded)
-            found = search(replace(task, longest=60e-3), form, replace(ranges, longest=60e-3), 1, 0, lambda *_: None)
-            _, processor = best(
-                lambda t=task, f=form, r=ranges: search(t, f, r, 1, 0, lambda *_: None), max(1, count // 2)
-            )
+            found = search(replace(task, longest=60e-3), form, replace(ranges, longest=60e-3), 1, Run())
+            _, processor = best(lambda t=task, f=form, r=ranges: search(t, f, r, 1, Run()), max(1, count // 2))
             stroke = 1e3 * found.program.stroke(found.descent.z)
             row = f"{width:6.3f}{100 * ripple:7.1f}%{known:8.3f} mm{nodes:7d}{stroke:7.3f} mm"
             print(row + f"{found.descent.evaluations:8d}{processor:10.2f} s")

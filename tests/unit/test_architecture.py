@@ -14,6 +14,7 @@ LAYERS = (
     ("api", "runs"),
     ("studies", "experiment"),
     ("families",),
+    ("designing",),
     ("solid", "plots", "export"),
     ("elastica", "stock"),
     ("metrics",),

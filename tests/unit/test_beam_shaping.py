@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from cfmkit import analyze, dumps, evaluate, load, loads
+from cfmkit.designing.starts import Clock
 from cfmkit.elastica import Polynomial, trace
 from cfmkit.elastica.model.beam import fit
 from cfmkit.families.base import Run
@@ -72,7 +73,7 @@ def test_derivatives_of_objective_and_all_limits_are_those_of_differences(goal: 
     z = program.begin(table_3(task))
     assert z is not None
     objective, rows = program.slopes(z)
-    names = [name for name, many in program.limits(program.view(z[:13])) for one in many for _ in one.values]
+    names = [one.name for one in program.limits(program.view(z[:13])) for _ in one.values]
     assert {"stress", "envelope", "clearance", "min_radius", "force"} <= set(names)
     rng = np.random.default_rng(0)
     for _ in range(2):
@@ -188,7 +189,7 @@ def test_the_search_limits_the_stress_that_the_analysis_judges() -> None:
     assert task.total_stress
     program = Shaping(Variables(task, 2), 6.8e-3, Flattest())
     view = program.view(table_3(task))
-    (_, rows) = next(one for one in program.limits(view) if one[0] == "stress")
+    rows = [one for one in program.limits(view) if one.name == "stress"]
     worst = max(float((1 - one.values).max()) for one in rows) * task.limits.stress
     path = view.response.path
     assert worst == pytest.approx(float(path.peak_stress(axial=True).value.max()), rel=MARGIN)
@@ -335,7 +336,7 @@ def test_finished_starts_are_noted_and_used_again() -> None:
 
 def test_no_time_means_no_start_and_nothing_noted() -> None:
     notes = Recorder()
-    late = Plan(deadline=0.0)
+    late = Plan(clock=Clock(0.0))
     result = explored(lan(), late, (2, 1), "x", Run(notes=notes))
     assert (result.found, result.missing, notes.keys) == ({}, 2, {})
     assert searched(lan(), 0, 0, late) is None

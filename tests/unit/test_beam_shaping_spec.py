@@ -6,6 +6,7 @@ import pytest
 from beam_support import CONFIGS
 
 import cfmkit
+from cfmkit.designing.starts import Clock
 from cfmkit.errors import SpecError
 from cfmkit.families.beam.shaping.design import _nothing
 from cfmkit.families.beam.shaping.multistart import Explored
@@ -43,5 +44,5 @@ def test_nothing_that_may_vary_is_refused():
 
 def test_a_start_that_the_time_ended_is_no_reason_to_widen_the_envelope():
     nothing = Explored({0: None}, reused=0, missing=0)
-    assert "the time budget ended" in _nothing(nothing, Plan(deadline=0.0)).message
+    assert "the time budget ended" in _nothing(nothing, Plan(clock=Clock(0.0))).message
     assert "widen the envelope" in _nothing(nothing, Plan()).message

@@ -34,8 +34,11 @@ def broken(*_: Any, **__: Any) -> Any:
     raise ZeroDivisionError
 
 
-def test_a_design_all_of_whose_starts_crash_ends_as_a_bug() -> None:
-    report = compute(cfmkit.load(CONFIGS / "beam_design_arch.yaml"), Run(executor=all_lost))
+@pytest.mark.parametrize(
+    ("name", "changes"), [("beam_design_arch", []), ("slider_crank_taper_design", ["design.beam.seeds=2"])]
+)
+def test_a_design_all_of_whose_starts_crash_ends_as_a_bug(name: str, changes: list[str]) -> None:
+    report = compute(cfmkit.load(CONFIGS / f"{name}.yaml", changes), Run(executor=all_lost))
     assert report.exit_code is ExitCode.BUG
     assert report.message == f"no start came to an end: {FAULT}"
 

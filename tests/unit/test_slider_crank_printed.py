@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -25,11 +26,12 @@ from flexure_support import (
 import cfmkit
 from cfmkit import api
 from cfmkit.elastica.verification.corotational import recheck
-from cfmkit.families.slider_crank.findings import FINDINGS
-from cfmkit.families.slider_crank.findings import FINDINGS as OF_PARTS
+from cfmkit.families.base import Run
+from cfmkit.families.slider_crank.printed import search
 from cfmkit.families.slider_crank.printed.chain import Elasticity, Flexure, joints, kink, mirrored, spread
 from cfmkit.families.slider_crank.printed.pressing import Ending
 from cfmkit.families.slider_crank.printed.program import Form, StripProgram, Task
+from cfmkit.families.slider_crank.printed.search import Ranges
 from cfmkit.families.slider_crank.printed.sizing import rotations, sized
 from cfmkit.families.slider_crank.printed.solution import first_at
 from cfmkit.numerics import sqp
@@ -341,10 +343,6 @@ def test_the_run_in_is_solved_for_and_not_read_off_the_points() -> None:
     assert many.values["run_in_95"].value == pytest.approx(0.0758 * MM, rel=0.01)
 
 
-def test_findings_of_parts_are_findings_of_the_family() -> None:
-    assert set(OF_PARTS) <= set(FINDINGS)
-
-
 def test_a_part_that_is_missing_is_refused_with_its_name() -> None:
     with pytest.raises(cfmkit.SpecError, match=r"mechanism\.beam"):
         spec("lumped", "analysis.fidelity=beam")
@@ -435,7 +433,7 @@ def test_an_optimiser_that_stops_is_told() -> None:
     """The root mean square of 25 mm has a flat valley: the steps allowed do not reach its end."""
     wanted = "design={force: 1.5 N, travel: [1 mm, 25 mm], beam: {goal: rms, nodes: 5}}"
     found = api.design(spec("taper_design", wanted))
-    assert sqp.Ending.OPTIMUM.value not in found.message
+    assert sqp.SearchEnding.OPTIMUM.value not in found.message
     assert "optimizer_stopped" in {item.name for item in found.warnings}
 
 
@@ -446,11 +444,42 @@ def test_a_longest_stroke_before_the_band_is_refused() -> None:
 
 
 def test_random_starts_repeat_with_their_seed() -> None:
-    from cfmkit.families.base import Run
-
     wanted = spec("taper_design", "design.beam.seeds=2", "design.beam.nodes=5")
     one, two = (api.design(wanted, Run(seed=3)) for _ in range(2))
     assert one.spec == two.spec
+
+
+def test_finished_starts_are_noted_and_a_second_run_begins_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The noted starts give the same strip to the last digit; what is searched again is the uniform strip alone."""
+    notes: dict[str, Any] = {}
+
+    class Recorder:
+        def find(self, key: str) -> int:
+            return list(notes).index(key) if key in notes else -1
+
+        def read(self, place: int, key: str) -> Any:
+            return json.loads(notes[key])
+
+        def add(self, key: str, record: Any) -> int:
+            notes[key] = json.dumps(record)
+            return len(notes) - 1
+
+    task = Task(corners(), np.pi, ABS, 1.5, 1 * MM, 15 * MM, 0.05, "stroke", 15 * MM)
+    wanted = task, Form(2, width=WIDTH), Ranges(np.tile([0.5, 2.0], (2, 1)), 15 * MM), 2, Run(notes=Recorder()), "x"
+    first = search.search(*wanted)
+    assert len(notes) == 2
+    monkeypatch.setattr(search, "_climb", None)
+    again = search.search(*wanted)
+    assert isinstance(first, search.Found)
+    assert isinstance(again, search.Found)
+    np.testing.assert_array_equal(again.descent.z, first.descent.z)
+    assert again.descent.evaluations == first.descent.evaluations
+
+
+def test_no_time_is_told_as_such() -> None:
+    found = api.design(spec("taper_design"), Run(time_budget=0.0))
+    assert found.status is Status.INFEASIBLE
+    assert "the time budget ended before any start" in found.message
 
 
 def test_goals_without_what_they_need_are_refused() -> None:

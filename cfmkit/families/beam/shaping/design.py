@@ -5,25 +5,23 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from cfmkit.designing.starts import Clock, identity_of
 from cfmkit.families.beam.build import assemble
 from cfmkit.families.beam.findings import finding, percent
 from cfmkit.families.beam.shaping.audit import Spread, tolerated
 from cfmkit.families.beam.shaping.infeasible import blocked, held_by
 from cfmkit.families.beam.shaping.judging import Judged, judged
-from cfmkit.families.beam.shaping.multistart import Explored, deadline_of, explored, ranked
+from cfmkit.families.beam.shaping.multistart import Explored, explored, ranked
 from cfmkit.families.beam.shaping.report import notes_of, search_of, starts_table
 from cfmkit.families.beam.shaping.search import Plan, finished, widened
 from cfmkit.families.beam.shaping.task import MARGIN, Coordinate, Limits, Task
 from cfmkit.families.beam.shaping.variables import Variables
 from cfmkit.results import Design, Finding, Status
-from cfmkit.store import origin, stable_hash
 
 if TYPE_CHECKING:
     from cfmkit.families.base import Run
     from cfmkit.families.beam.shaping.spec import Optimise
     from cfmkit.families.beam.spec import BeamSpec
-
-_NOT_DECIDING = {"name", "description", "requirements", "sweep", "sensitivity"}
 
 
 def shaped(spec: BeamSpec, wanted: Optimise, run: Run) -> Design:
@@ -42,9 +40,8 @@ def shaped(spec: BeamSpec, wanted: Optimise, run: Run) -> Design:
         problem = "analysis.travel ends before design.optimise.window: let it reach the end of the window"
         return Design(None, Status.INVALID, problem)
     task = task_of(spec, wanted)
-    plan = Plan(drawn=wanted.drawn, deadline=deadline_of(wanted.time_budget, run.time_budget))
-    identity = stable_hash([spec.model_dump(mode="json", exclude=_NOT_DECIDING), run.seed, origin()])
-    result = explored(task, plan, (wanted.starts, wanted.widened), identity, run)
+    plan = Plan(drawn=wanted.drawn, clock=Clock.of(wanted.time_budget, run.time_budget))
+    result = explored(task, plan, (wanted.starts, wanted.widened), identity_of(spec, run.seed), run)
     tables = {"starts": lambda: starts_table(task, result)}
     best = _best(spec, task, result, plan)
     if isinstance(best, Design):
@@ -136,7 +133,7 @@ def _best(spec: BeamSpec, task: Task, result: Explored, plan: Plan) -> Judged | 
                 "(design.optimise.time_budget), or run again to go on"
             )
             return Design(None, Status.INFEASIBLE, said)
-        free = replace(plan, deadline=None)
+        free = replace(plan, clock=Clock())
         why = blocked(task, some, free)
         met = None if why.freed is None else widened(task, finished(task, why.freed, free), free)
         if met is None or not met.feasible:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import numpy as np
-
+from cfmkit.designing import limits
+from cfmkit.designing.variables import at_bounds
 from cfmkit.families.beam.build import thickest_of
 from cfmkit.families.beam.findings import percent
 from cfmkit.families.beam.shaping.goals import Flattest
@@ -22,6 +22,9 @@ if TYPE_CHECKING:
 
 MOST = 3
 """Designs that are looked at, the ones that miss the limits least."""
+
+AT_BOUND = 1e-4
+"""A variable so near to its bound, in units of the size and in rad, is held by it."""
 
 
 @dataclass(frozen=True)
@@ -76,13 +79,8 @@ def missed_by(task: Task, found: Found) -> dict[str, str]:
     view = program.view(found.x)
     if view is None:
         return {}
-    worst: list[tuple[float, str, str]] = []
-    for name, many in program.limits(view):
-        rows = min(many, key=lambda one: one.values.min(initial=np.inf), default=None)
-        if rows is not None and rows.values.min(initial=0.0) < -VIOLATION:
-            at = int(rows.values.argmin())
-            worst.append((float(rows.values[at]), name, rows.about()[at]))
-    return {name: f"{about}: missed by {percent(-value)}" for value, name, about in sorted(worst)}
+    rows = limits.missed(program.limits(view), VIOLATION)
+    return {one.name: f"{one.about}: missed by {percent(one.by)}" for one in rows}
 
 
 def held_by(task: Task, found: Found, close: float = 2e-3) -> tuple[str, ...]:
@@ -90,17 +88,9 @@ def held_by(task: Task, found: Found, close: float = 2e-3) -> tuple[str, ...]:
     variables = Variables(task, found.order)
     program = Shaping(variables, found.start, Flattest())
     view = program.view(found.x, sloped=True)
-    low, high = variables.bounds.T
-    at_bound = (found.x - low < 1e-4) | (high - found.x < 1e-4)
+    at_bound = at_bounds(found.x, variables.bounds, AT_BOUND)
     held = [f"{name} at its bound" for name, at in zip(variables.names, at_bound, strict=True) if at]
-    if view is None:
-        return tuple(held)
-    for name, many in program.limits(view):
-        for rows in many:
-            about = rows.about()
-            moves = abs(rows.slopes).max(axis=1, initial=0.0) > 1e-9 if rows.slopes is not None else rows.values < 1
-            held += [f"{name}: {about[k]}" for k in np.flatnonzero((rows.values < close) & moves)]
-    return tuple(held)
+    return tuple(held) if view is None else (*held, *limits.held(program.limits(view), close))
 
 
 def _stress(task: Task, slack: float) -> dict[str, str]:
@@ -112,10 +102,9 @@ def _stress(task: Task, slack: float) -> dict[str, str]:
 
 
 def _force(task: Task, slack: float) -> dict[str, str]:
-    limits = task.limits
-    if limits.force_min is not None:
-        return {"design.optimise.force.min": f"at most {format_short(limits.force_min * (1 - slack), 'force')}"}
-    return {"design.optimise.force.tolerance": f"at least {limits.force_tolerance + slack:.3g}"}
+    if task.limits.force_min is not None:
+        return {"design.optimise.force.min": f"at most {format_short(task.limits.force_min * (1 - slack), 'force')}"}
+    return {"design.optimise.force.tolerance": f"at least {task.limits.force_tolerance + slack:.3g}"}
 
 
 def _clearance(task: Task, slack: float) -> dict[str, str]:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cfmkit.designing.audit import measured
 from cfmkit.elastica.model.beam import fit
 from cfmkit.families.base import Run
 from cfmkit.families.beam.findings import percent
@@ -18,7 +19,6 @@ from cfmkit.families.beam.model import analyze
 from cfmkit.families.beam.shaping.audit import Audit, audited
 from cfmkit.families.beam.shaping.search import PLACES, Found
 from cfmkit.families.beam.shaping.variables import Variables
-from cfmkit.metrics import Window, evaluate
 from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
@@ -67,13 +67,9 @@ def judged(spec: BeamSpec, task: Task, found: Found) -> Judged:
     result = analyze(new, Run())
     window = _confirmed_window(task, result, _window(spec, task, found), _asked(spec)[0])
     new = new.replace({"analysis.window": window})
-    band = _metric(result, "half_band", window)
+    (band,) = measured(result, window, "half_band")
     audit = audited(Variables(task, found.order), found)
     return Judged(new, found, audit, band, tuple(_faults(task, audit, result, window)))
-
-
-def _metric(result: Result, name: str, window: tuple[float, float]) -> float | None:
-    return evaluate(result, [name], Window(*window))[name].value
 
 
 def _confirmed_window(task: Task, result: Result, window: tuple[float, float], asked: float) -> tuple[float, float]:
@@ -81,7 +77,7 @@ def _confirmed_window(task: Task, result: Result, window: tuple[float, float], a
     start, end = window
 
     def kept(micrometres: int) -> bool:
-        band = _metric(result, "half_band", (1e-6 * micrometres, end))
+        (band,) = measured(result, (1e-6 * micrometres, end), "half_band")
         return band is not None and band <= task.half_band
 
     if task.objective != "range" or start >= asked:
@@ -103,7 +99,7 @@ def _faults(task: Task, audit: Audit, result: Result, window: tuple[float, float
         yield "it is not stable all the way"
     if audit.crossings:
         yield f"beams cross at {audit.crossings} of the poses"
-    band, stress = _metric(result, "half_band", window), _metric(result, "stress_max", (0.0, window[1]))
+    (band,), (stress,) = measured(result, window, "half_band"), measured(result, (0.0, window[1]), "stress_max")
     if band is None:
         yield f"the analysis ends before the window does: {result.message}"
     elif task.objective == "range" and band > task.half_band:

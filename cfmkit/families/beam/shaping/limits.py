@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.designing.program import Rows
 from cfmkit.families.beam.build import thickest_of
 from cfmkit.families.beam.shaping.separation import Pair, pairs, separations
 from cfmkit.numerics.sampled import largest
@@ -29,15 +30,6 @@ SIDES = {
 }
 
 
-@dataclass(frozen=True)
-class Rows:
-    """Some rows of one limit: values (m,), derivatives (m, k) if asked, and what each row is about."""
-
-    values: FloatArray
-    slopes: FloatArray | None
-    about: Callable[[], list[str]]
-
-
 @dataclass(frozen=True, eq=False)
 class View:
     """What the limits look at: the response at the poses of a window from `start`, with derivatives or without."""
@@ -52,9 +44,11 @@ class View:
         """Lengths of all beams."""
         return self.response.lengths
 
-    def rows(self, values: FloatArray, slopes: Callable[[], FloatArray], about: Callable[[], list[str]]) -> Rows:
-        """Return rows; the derivatives are computed only if they are wanted."""
-        return Rows(values.ravel(), slopes().reshape(values.size, -1) if self.sloped else None, about)
+    def rows(
+        self, name: str, values: FloatArray, slopes: Callable[[], FloatArray], about: Callable[[], list[str]]
+    ) -> Rows:
+        """Return rows of a limit; the derivatives are computed only if they are wanted."""
+        return Rows(name, values.ravel(), slopes().reshape(values.size, -1) if self.sloped else None, about)
 
     def section(self, beam: str) -> Section:
         """Return the section of a beam."""
@@ -68,47 +62,48 @@ def stress(view: View) -> list[Rows]:
     if allowed is None:
         return []
     parts = ("left", "right") if task.total_stress else ("stress",)
-    return [_extremes(view, part, slice(1, None), (allowed, allowed), allowed) for part in parts]
+    return [_extremes(view, "stress", part, slice(1, None), (allowed, allowed), allowed) for part in parts]
 
 
 def envelope(view: View) -> list[Rows]:
     """Extremes of the centre lines before loading."""
-    return _inside(view, view.response.variables.task.limits.envelope, slice(0, 1))
+    return _inside(view, "envelope", view.response.variables.task.limits.envelope, slice(0, 1))
 
 
 def deformed_envelope(view: View) -> list[Rows]:
     """Extremes of the centre lines at every pose."""
-    return _inside(view, view.response.variables.task.limits.deformed_envelope, slice(None))
+    return _inside(view, "deformed_envelope", view.response.variables.task.limits.deformed_envelope, slice(None))
 
 
-def _inside(view: View, box: tuple[float, float, float, float] | None, which: slice) -> list[Rows]:
+def _inside(view: View, name: str, box: tuple[float, float, float, float] | None, which: slice) -> list[Rows]:
     size = view.response.variables.task.size
     if box is None:
         return []
-    return [_extremes(view, "x", which, (box[1], -box[0]), size), _extremes(view, "y", which, (box[3], -box[2]), size)]
+    ends = {"x": (box[1], -box[0]), "y": (box[3], -box[2])}
+    return [_extremes(view, name, axis, which, most, size) for axis, most in ends.items()]
 
 
-def _extremes(view: View, what: str, which: slice, most: tuple[float, float], unit: float) -> Rows:
+def _extremes(view: View, name: str, what: str, which: slice, most: tuple[float, float], unit: float) -> Rows:
     """Return (most - largest value along each beam) / unit at some poses, of the value and of its negative."""
     lines = view.response.state.lines
     found = [np.zeros(0)] * len(lines)
     by: list[FloatArray] = []
-    for number, (name, line) in enumerate(lines.items()):
+    for number, (beam, line) in enumerate(lines.items()):
         values = getattr(line, what)[which]
         top, _, weights = largest(line.place, np.stack([values, -values]))
         found[number] = (np.array(most)[:, None] - top) / unit
         if view.sloped:
             weights[1] *= -1
-            slopes = getattr(view.response.slopes.lines[name], what)[which]
+            slopes = getattr(view.response.slopes.lines[beam], what)[which]
             by.append(-np.matmul(weights.transpose(1, 0, 2), slopes).transpose(1, 0, 2) / unit)
     values = np.concatenate([one.ravel() for one in found])
     sides = SIDES[what]
 
     def about() -> list[str]:
         at = view.poses.at[which]
-        return [f"{name}, {side}, at {1e3 * pose:.4g} mm" for name in lines for side in sides for pose in at]
+        return [f"{beam}, {side}, at {1e3 * pose:.4g} mm" for beam in lines for side in sides for pose in at]
 
-    return view.rows(values, lambda: np.concatenate([one.reshape(-1, one.shape[-1]) for one in by]), about)
+    return view.rows(name, values, lambda: np.concatenate([one.reshape(-1, one.shape[-1]) for one in by]), about)
 
 
 def length_ratio(view: View) -> list[Rows]:
@@ -119,7 +114,8 @@ def length_ratio(view: View) -> list[Rows]:
     least = 1.0 / task.limits.length_ratio
     many = {name: one for name, one in view.lengths.items() if name in task.shaped}
     values = np.array([one.straightness - least for one in many.values()])
-    return [view.rows(values, lambda: np.array([one.by_straightness for one in many.values()]), lambda: list(many))]
+    slopes = np.array([one.by_straightness for one in many.values()])
+    return [view.rows("max_length_ratio", values, lambda: slopes, lambda: list(many))]
 
 
 def slenderness(view: View) -> list[Rows]:
@@ -131,7 +127,7 @@ def slenderness(view: View) -> list[Rows]:
     least = np.array([task.limits.slenderness * thickest_of(view.section(name)) for name in many])
     values = np.array([one.length for one in many.values()]) / least - 1.0
     slopes = np.array([one.by_length for one in many.values()]) / least[:, None]
-    return [view.rows(values, lambda: slopes, lambda: list(many))]
+    return [view.rows("min_slenderness", values, lambda: slopes, lambda: list(many))]
 
 
 def radius(view: View) -> list[Rows]:
@@ -152,7 +148,9 @@ def radius(view: View) -> list[Rows]:
             slopes = least * value / one.length**2 * one.by_length
             slopes[first : first + variables.order] -= sign * least / one.length * (weights @ powers)
             values = np.atleast_1d(1.0 - least * value / one.length)
-            found.append(view.rows(values, lambda slopes=slopes: slopes, lambda name=name: [name]))  # type: ignore[misc]
+            found.append(
+                view.rows("min_radius", values, lambda slopes=slopes: slopes, lambda name=name: [name])  # type: ignore[misc]
+            )
     return found
 
 
@@ -169,7 +167,7 @@ def clearance(view: View) -> list[Rows]:
             both = " and ".join(dict.fromkeys(pair.beams))
             return [f"{both}, at {1e3 * at:.4g} mm" for at in view.poses.at[view.poses.shown]]
 
-        found.append(view.rows(value, slopes, about))
+        found.append(view.rows("clearance", value, slopes, about))
     return found
 
 
@@ -190,7 +188,8 @@ def force(view: View) -> list[Rows]:
     def slopes() -> FloatArray:
         return np.outer([factor for _, factor, _ in rows], weights @ view.response.slopes.force)
 
-    return [view.rows(np.array([value for value, _, _ in rows]), slopes, lambda: [about for _, _, about in rows])]
+    values = np.array([value for value, _, _ in rows])
+    return [view.rows("force", values, slopes, lambda: [about for _, _, about in rows])]
 
 
 LIMITS: dict[str, Callable[[View], list[Rows]]] = {

@@ -1,18 +1,18 @@
-"""Many starts, in one process or several, each noted when it is finished, so that a run that was ended goes on."""
+"""All starts of a design: each searched, the best of them widened, and what orders them."""
 
 from __future__ import annotations
 
-import hashlib
 from dataclasses import asdict, dataclass, replace
-from time import time
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cfmkit.designing.starts import Stage, done
 from cfmkit.families.beam.shaping.search import VIOLATION, Found, Plan, searched, widened
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Mapping
 
     from cfmkit.families.base import Run
     from cfmkit.families.beam.shaping.task import Task
@@ -66,28 +66,6 @@ class Explored:
     lost: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True)
-class Stage:
-    """One round of jobs: what each does, which they are, and what the notes call them.
-
-    Attributes
-    ----------
-    work : OneStart or OneWidening
-        What is done.
-    jobs : tuple of int
-        Numbers of starts.
-    identity : str
-        Of everything that decides an outcome but the number.
-    share : (float, float)
-        Of the progress, from and to.
-    """
-
-    work: OneStart | OneWidening
-    jobs: tuple[int, ...]
-    identity: str
-    share: tuple[float, float] = (0.0, 1.0)
-
-
 def explored(task: Task, plan: Plan, counts: tuple[int, int], identity: str, run: Run) -> Explored:
     """Return what all starts lead to, the best of them widened if that is the objective, as far as the time allows.
 
@@ -104,44 +82,24 @@ def explored(task: Task, plan: Plan, counts: tuple[int, int], identity: str, run
     """
     starts, wide = counts
     widens = task.objective == "range"
-    share = (0.0, 0.75 if widens else 1.0)
-    records, reused, lost = _done(Stage(OneStart(task, run.seed, plan), tuple(range(starts)), identity, share), run)
-    found = {index: _found(records[index]["found"]) for index in sorted(records)}
+    share = 0.75 if widens else 1.0
+    first = Stage(OneStart(task, run.seed, plan), tuple(range(starts)), identity)
+    begun = done(first, run, plan.clock, partial(_tell, run, "starts", starts, (0.0, share)))
+    found, lost = {index: _found(begun.records[index]["found"]) for index in sorted(begun.records)}, begun.lost
     if widens:
         best = dict(list(ranked(task, found))[:wide])
-        stage = Stage(OneWidening(task, best, plan), tuple(best), f"{identity} widened", (share[1], 1.0))
-        more, _, also = _done(stage, run)
-        lost += also
-        found |= {index: _found(record["found"]) for index, record in more.items()}
-    return Explored(found, reused, starts - len(found), lost)
+        second = Stage(OneWidening(task, best, plan), tuple(best), f"{identity} widened")
+        more = done(second, run, plan.clock, partial(_tell, run, "widenings", len(best), (share, 1.0)))
+        lost += more.lost
+        found |= {index: _found(record["found"]) for index, record in more.records.items()}
+    return Explored(found, begun.reused, starts - len(found), lost)
 
 
-def _done(stage: Stage, run: Run) -> tuple[dict[int, Any], int, tuple[str, ...]]:
-    """Return the records of a stage by number, how many were noted before, and why processes died."""
-    keys = {job: hashlib.sha256(f"{stage.identity} {job}".encode()).hexdigest()[:32] for job in stage.jobs}
-    places = {job: run.notes.find(key) for job, key in keys.items()}
-    records = {job: run.notes.read(place, keys[job]) for job, place in places.items() if place >= 0}
-    reused, lost = len(records), list[str]()
-    _tell(stage, run, records)
-    left = [job for job in stage.jobs if job not in records]
-    for job, record in run.executor(stage.work, iter(left), stage.work.plan.late):
-        if not isinstance(record, dict):
-            lost.append(str(getattr(record, "message", record)))
-            continue
-        records[job] = record
-        if not record["late"]:
-            run.notes.add(keys[job], record)
-        _tell(stage, run, records)
-    return records, reused, tuple(dict.fromkeys(lost))
-
-
-def _tell(stage: Stage, run: Run, records: dict[int, Any]) -> None:
-    first, last = stage.share
+def _tell(run: Run, what: str, count: int, share: tuple[float, float], records: Mapping[int, dict[str, Any]]) -> None:
     found = [record["found"] for record in records.values() if record["found"]]
     feasible = sum(one["violation"] <= VIOLATION for one in found)
-    what = "starts" if isinstance(stage.work, OneStart) else "widenings"
-    text = f"{len(records)} of {len(stage.jobs)} {what}, {feasible} meet all limits"
-    run.progress(first + (last - first) * len(records) / max(1, len(stage.jobs)), text)
+    text = f"{len(records)} of {count} {what}, {feasible} meet all limits"
+    run.progress(share[0] + (share[1] - share[0]) * len(records) / max(1, count), text)
 
 
 def _record(found: Found | None, plan: Plan) -> dict[str, Any]:
@@ -151,12 +109,6 @@ def _record(found: Found | None, plan: Plan) -> dict[str, Any]:
 
 def _found(record: dict[str, Any]) -> Found | None:
     return Found(**{**record, "x": np.array(record["x"])}) if record else None
-
-
-def deadline_of(*budgets: float | None) -> float | None:
-    """Return the time at which the shortest of some budgets [s] is used up; None without any."""
-    given = [budget for budget in budgets if budget is not None]
-    return time() + min(given) if given else None
 
 
 def ranked(task: Task, found: dict[int, Found | None]) -> Iterator[tuple[int, Found]]:

@@ -1,8 +1,4 @@
-"""A task for one order and one window as a program of `cfmkit.numerics.sqp`: the goal's rows and those of all limits.
-
-An elastic program lets some limits give way, all by the same amount, and minimises that amount: zero where the
-limits can be met together, and where they cannot, the least by which they are missed.
-"""
+"""A task for one order and one window as a program of `cfmkit.designing`: the goal's rows and those of all limits."""
 
 from __future__ import annotations
 
@@ -11,13 +7,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.beam.shaping.limits import LIMITS, Rows, View
+from cfmkit.designing import program
+from cfmkit.designing.limits import worst
+from cfmkit.designing.program import Rows, Seen
+from cfmkit.families.beam.shaping.limits import LIMITS, View
 from cfmkit.families.beam.shaping.poses import Poses, poses_of
 from cfmkit.families.beam.shaping.response import NoAnswer, respond
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.beam.shaping.goals import Aim, Goal
+    from cfmkit.families.beam.shaping.goals import Goal
     from cfmkit.families.beam.shaping.variables import Variables
 
 
@@ -75,56 +74,31 @@ class Shaping:
         z = np.concatenate([x, self.goal.start(view)])
         if not self.elastic:
             return z
-        worst = max((-rows.values.min(initial=0.0) for name in self.elastic for rows in LIMITS[name](view)), default=0)
-        return np.append(z, worst)
-
-    def at(self, z: FloatArray, sloped: bool) -> View | None:
-        """Return what is seen at the point z."""
-        own = z[self.variables.count : self.variables.count + len(self.goal.bounds)]
-        return self.view(z[: self.variables.count], self.goal.window_start(own, self.start), sloped)
+        return np.append(z, worst(rows for name in self.elastic for rows in LIMITS[name](view)))
 
     def values(self, z: FloatArray) -> tuple[float, FloatArray] | None:
         """Return objective and constraints."""
-        view = self.at(z, False)
-        if view is None:
-            return None
-        aim, limits = self._aim(view, z), self.limits(view)
-        slack = z[-1] if self.elastic else 0.0
-        rows = [one.values + (slack if name in self.elastic else 0.0) for name, many in limits for one in many]
-        return (slack if self.elastic else aim.value), np.concatenate([aim.rows, *rows])
+        return program.values(self, z, self.elastic)
 
     def slopes(self, z: FloatArray) -> tuple[FloatArray, FloatArray] | None:
         """Return their derivatives."""
-        view = self.at(z, True)
+        return program.slopes(self, z, self.elastic)
+
+    def seen(self, z: FloatArray, sloped: bool) -> Seen | None:
+        """Return the goal, its rows and those of all limits at the design and the goal's own variables."""
+        own = z[self.variables.count :]
+        view = self.view(z[: self.variables.count], self.goal.window_start(own, self.start), sloped)
         if view is None:
             return None
         try:
-            aim, limits = self._aim(view, z), self.limits(view)
+            aim, limits = self.goal.aim(view, own), self.limits(view)
         except NoAnswer:
             return None
-        k, n = self.variables.count, len(z)
-        own = slice(k, k + len(self.goal.bounds))
-        objective, top = np.zeros(n), np.zeros((len(aim.rows), n))
-        top[:, :k], top[:, own] = aim.rows_by_x, aim.rows_by_own
-        if self.elastic:
-            objective[-1] = 1.0
-        else:
-            objective[:k], objective[own] = aim.by_x, aim.by_own
-        rows = [self._wide(one, name in self.elastic, n) for name, many in limits for one in many]
-        return objective, np.concatenate([top, *rows])
+        if aim.by_x is None or aim.rows_by_x is None:
+            return Seen(aim.value, None, [Rows("goal", aim.rows), *limits])
+        slopes = np.concatenate([aim.rows_by_x, aim.rows_by_own], axis=1)
+        return Seen(aim.value, np.concatenate([aim.by_x, aim.by_own]), [Rows("goal", aim.rows, slopes), *limits])
 
-    def limits(self, view: View) -> list[tuple[str, list[Rows]]]:
-        """Return the rows of all limits, by name."""
-        return [(name, make(view)) for name, make in LIMITS.items()]
-
-    def _aim(self, view: View, z: FloatArray) -> Aim:
-        k = self.variables.count
-        return self.goal.aim(view, z[k : k + len(self.goal.bounds)])
-
-    def _wide(self, rows: Rows, gives: bool, n: int) -> FloatArray:
-        """Return derivatives by all variables."""
-        out = np.zeros((len(rows.values), n))
-        out[:, : self.variables.count] = rows.slopes
-        if gives:
-            out[:, -1] = 1.0
-        return out
+    def limits(self, view: View) -> list[Rows]:
+        """Return the rows of all limits."""
+        return [rows for make in LIMITS.values() for rows in make(view)]

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.designing.audit import measured
 from cfmkit.families.base import Run
 from cfmkit.families.beam.model import analyze
-from cfmkit.metrics import Window, evaluate
 from cfmkit.results import Quantity, Searched
 from cfmkit.specs.units import format_short
 
@@ -77,11 +77,8 @@ def search_of(task: Task, design: Judged, drawn: Drawn, result: Explored) -> Map
 def _reissner(design: Judged) -> dict[str, float | None]:
     """Return what the analysis says of the design with beams that stretch and shear."""
     result = analyze(design.spec.replace({"analysis.fidelity": REISSNER}), Run())
-    found = evaluate(result, ["half_band", "strict_range_fraction"], Window(*design.window))
-    return {
-        "audit_half_band_reissner": found["half_band"].value,
-        "audit_strict_range_reissner": found["strict_range_fraction"].value,
-    }
+    band, share = measured(result, design.window, "half_band", "strict_range_fraction")
+    return {"audit_half_band_reissner": band, "audit_strict_range_reissner": share}
 
 
 def _counts(result: Explored) -> dict[str, float | None]:

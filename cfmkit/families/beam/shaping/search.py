@@ -10,12 +10,14 @@ what the poses say, the search goes on with more of them; what a design is ranke
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from time import time
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.designing.limits import worst
+from cfmkit.designing.starts import Clock
+from cfmkit.designing.variables import rounded as rounded_within
 from cfmkit.families.beam.shaping.closer import CloseView, looked_at
 from cfmkit.families.beam.shaping.goals import Compared, Flattest, Widest, window_force
 from cfmkit.families.beam.shaping.limits import LIMITS
@@ -60,8 +62,8 @@ class Plan:
         Random networks that are looked at, and how many of the best are made to meet the limits until one does.
     meeting, flattening, widening : int
         Steps of one round towards the limits, of one flattening, and of the widening of the window.
-    deadline : float or None
-        When the time is up, in seconds of the clock `time.time`.
+    clock : Clock
+        Whether the time is up.
     """
 
     drawn: int = 80
@@ -69,11 +71,11 @@ class Plan:
     meeting: int = 12
     flattening: int = 40
     widening: int = 50
-    deadline: float | None = None
+    clock: Clock = field(default_factory=Clock)
 
     def late(self) -> bool:
         """Tell whether the time is up."""
-        return self.deadline is not None and time() > self.deadline
+        return self.clock.late()
 
     def effort(self, steps: int, enough: float = -np.inf, violation: float = VIOLATION) -> Effort:
         """Return the effort of one minimisation."""
@@ -225,10 +227,9 @@ def _overstress(task: Task, view: CloseView) -> float:
 
 def rounded(task: Task, found: Found) -> Found:
     """Return a design with coordinates and coefficients that print short."""
-    places, x = len(task.coordinates), found.x.copy()
-    x[:places] = np.round(x[:places] * task.size, PLACES) / task.size
-    x[places:] = np.round(x[places:], TURNS)
-    return replace(found, x=np.clip(x, *Variables(task, found.order).bounds.T))
+    places, bounds = len(task.coordinates), Variables(task, found.order).bounds
+    coordinates = rounded_within(found.x[:places], bounds[:places], PLACES, task.size)
+    return replace(found, x=np.append(coordinates, rounded_within(found.x[places:], bounds[places:], TURNS)))
 
 
 def drawn(task: Task, rng: np.random.Generator, plan: Plan) -> list[Found]:
@@ -323,7 +324,7 @@ def worst_of(program: Shaping, x: FloatArray, start: float | None = None) -> flo
     view = program.view(x, start)
     if view is None:
         return np.inf
-    return max((-float(one.values.min(initial=0.0)) for _, many in program.limits(view) for one in many), default=0.0)
+    return worst(program.limits(view))
 
 
 def widened(task: Task, found: Found, plan: Plan) -> Found:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cfmkit.designing.variables import at_bounds
 from cfmkit.families.findings import mm, mpa
 from cfmkit.families.slider_crank.printed.assembly import strip_chain
 from cfmkit.families.slider_crank.printed.pressing import Ending
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 
 PLACES = 240
 
-DIGITS = 6  # of millimetres
+AT_END = 1e-6, 1e-5  # nanometres and a share: a number so near to an end of its range is held by it
 
 MESHED = 2e-4  # of the stress: by how much its peak depends on how finely the strip is sampled
 
@@ -59,11 +60,6 @@ class Judged:
     active: tuple[str, ...]
     opinion: SecondOpinion
     overstress: float
-
-
-def rounded(values: FloatArray, ranges: FloatArray) -> FloatArray:
-    """Return the numbers of a form rounded to nanometres, and kept inside their ranges."""
-    return np.clip(np.round(values, DIGITS), *ranges.T)
 
 
 def judge(
@@ -148,10 +144,9 @@ def _shares(form: Form, values: FloatArray) -> tuple[tuple[float, ...], ...] | N
 def _at_bounds(found: Found, values: FloatArray) -> list[str]:
     """Return which numbers are at an end of their range."""
     form, told = found.form, []
-    for k, (value, (low, high)) in enumerate(zip(values, found.ranges.form, strict=True)):
-        if not (np.isclose(value, low, atol=1e-6) or np.isclose(value, high, atol=1e-6)):
-            continue
-        side = "smallest" if np.isclose(value, low, atol=1e-6) else "largest"
+    ends = at_bounds(values, found.ranges.form, *AT_END)
+    for k in np.flatnonzero(ends).tolist():
+        value, side = float(values[k]), "smallest" if ends[k] < 0 else "largest"
         if k < form.count:
             told.append(f"mechanism.beam.thickness.{k} at its {side}, {mm(value * 1e-3)}")
         elif k < form.count + form.placed:

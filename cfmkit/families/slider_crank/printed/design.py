@@ -15,13 +15,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.designing.audit import measured, searched
+from cfmkit.designing.starts import Clock, identity_of
+from cfmkit.designing.variables import rounded
 from cfmkit.errors import InputError
 from cfmkit.families.findings import mm, newton, percent
 from cfmkit.families.refusals import CannotBuild, no_design
 from cfmkit.families.slider_crank.build import linkage_of, resolve, unloaded_angle
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.printed.assembly import corners, elasticity, pins_of, travel_direction
-from cfmkit.families.slider_crank.printed.audit import Judged, judge, rounded
+from cfmkit.families.slider_crank.printed.audit import Judged, judge
 from cfmkit.families.slider_crank.printed.model import analyze, slider_reach
 from cfmkit.families.slider_crank.printed.program import Form, Task
 from cfmkit.families.slider_crank.printed.search import (
@@ -35,9 +38,8 @@ from cfmkit.families.slider_crank.printed.search import (
 )
 from cfmkit.families.slider_crank.printed.sizing import design_flexures
 from cfmkit.families.slider_crank.printed.spec import StripSpec
-from cfmkit.metrics import Window, evaluate
 from cfmkit.numerics.sqp import SearchEnding
-from cfmkit.results import Design, Finding, Quantity, Searched, Status
+from cfmkit.results import Design, Finding, Searched, Status
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
@@ -56,8 +58,8 @@ ENOUGH = 0.99
 TOLD = 4
 """So many of the limits that hold a strip are named in the message; all are in the document of `--json`."""
 
-DECIMALS = 9
-"""Of lengths in metres."""
+DIGITS, DECIMALS = 6, 9
+"""Of the numbers of a form, mostly millimetres, and of lengths in metres: both nanometres."""
 
 DEFAULT_THICKNESS = (0.5e-3, 2e-3)
 
@@ -109,13 +111,17 @@ def _strip(spec: SliderCrankSpec, linkage: Linkage, unloaded: float, run: Run) -
         pins_of(spec.mechanism, linkage, unloaded),
         task.material.allowable_stress,
     )
+    identity, clock = identity_of(spec, run.seed), Clock.of(run.time_budget)
     for reserve in RESERVES:
         made_of = replace(task.material, allowable_stress=allowed)
         kept = replace(task, ripple=task.ripple - reserve, material=made_of)
-        found = search(kept, form, ranges, wanted.seeds, run.seed, run.progress)
+        outcome = search(kept, form, ranges, wanted.seeds, run, f"{identity} {reserve} {allowed}", clock)
+        if isinstance(outcome, Design):
+            return outcome
+        found = outcome
         if not found.descent.feasible:
             return infeasible(found)
-        judged = judge(rounded(found.values, ranges.form), found, _limits(spec), pins)
+        judged = judge(rounded(found.values, ranges.form, DIGITS), found, _limits(spec), pins)
         if judged is not None and allowed is not None:
             allowed /= max(1.0, judged.overstress)
         reported = None if judged is None else _reported(_written(spec, judged, wanted), judged, run)
@@ -166,15 +172,14 @@ class Reported:
 def _reported(spec: SliderCrankSpec, judged: Judged, run: Run) -> Reported:
     result = analyze(spec, run)
     names = ("deviation_from_target", "rms_to_target", "stress_max", "recheck_force", "recheck_stress")
-    found = evaluate(result, names, Window(*judged.window)) if result.curves else {}
-    deviation, rms, stress, *opinion = (found[name].value if found else None for name in names)
+    deviation, rms, stress, *opinion = measured(result, judged.window, *names)
     said = None if None in opinion else (float(opinion[0] or 0.0), float(opinion[1] or 0.0))
     return Reported(spec, deviation, rms, stress, said)
 
 
 def _search_of(found: Found, judged: Judged) -> dict[str, Searched]:
     """Return what only the search knows."""
-    numbers = {
+    numbers: dict[str, tuple[float | None, str, str]] = {
         "strips_tried": (float(found.descent.evaluations), "count", "strips that the last descent pressed"),
         "elements_force": (
             judged.opinion.force,
@@ -186,7 +191,7 @@ def _search_of(found: Found, judged: Judged) -> dict[str, Searched]:
     if _compared(found):
         text = "longest travel that a strip of one thickness reaches within the band and the stress"
         numbers["one_thickness_travel"] = (_one_thickness(found), "length", text)
-    return {name: Searched(Quantity(*about), "beam", judged.window) for name, about in numbers.items()}
+    return searched(numbers, "beam", judged.window)
 
 
 def _compared(found: Found) -> bool:
@@ -361,6 +366,8 @@ def _warnings(found: Found, judged: Judged) -> tuple[Finding, ...]:
     if found.descent.ending is not SearchEnding.OPTIMUM:
         text = f"the search was {found.descent.ending.value}: a better strip may exist; try 'design.beam.seeds'"
         told.append(finding("optimizer_stopped", text))
+    if found.lost:
+        told.append(finding("optimizer_stopped", f"some starts were lost: {'; '.join(found.lost)}"))
     if not judged.opinion.stable:
         told.append(finding("second_opinion", "corotational elements call the equilibrium unstable"))
     return tuple(told)

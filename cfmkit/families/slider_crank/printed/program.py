@@ -17,6 +17,8 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from cfmkit.designing import program
+from cfmkit.designing.program import Rows, Seen
 from cfmkit.elastica import Control, Displacement, PathStatus, gradient, trace
 from cfmkit.elastica.sensitivity.neighbour import drive_slope, neighbouring
 from cfmkit.errors import InputError
@@ -161,7 +163,7 @@ class State:
 
 @dataclass
 class StripProgram:
-    """Objective and constraints of a task over a form; a `cfmkit.numerics.sqp.Program`.
+    """Objective and constraints of a task over a form, as `cfmkit.designing.program` wants them.
 
     The variables are those of the form, then the stroke [cm] or the ripple [%] where that is the goal.
     """
@@ -233,51 +235,61 @@ class StripProgram:
 
     def values(self, z: FloatArray) -> tuple[float, FloatArray] | None:
         """Return the objective and the constraints, at least zero where they hold."""
-        state = self.state(z)
-        if state is None:
-            return None
-        ratio = state.force / self.task.force - 1.0
-        return self._objective(z, ratio), np.concatenate([self._band(z, ratio), self._strength(state)])
-
-    def _objective(self, z: FloatArray, ratio: FloatArray) -> float:
-        if self.task.goal == "rms":
-            return 1e4 * float(np.mean((self.between @ ratio) ** 2))
-        return -float(z[-1]) if self.task.goal == "stroke" else float(z[-1])
-
-    def _band(self, z: FloatArray, ratio: FloatArray) -> FloatArray:
-        if self.task.goal == "rms":
-            return np.zeros(0)
-        off = 100.0 * (self.between @ ratio)
-        return np.concatenate([100.0 * self.ripple(z) - off, 100.0 * self.ripple(z) + off])
-
-    def _strength(self, state: State) -> FloatArray:
-        limit = self.task.material.allowable_stress
-        return np.zeros(0) if limit is None else np.asarray(10.0 * (1.0 - state.stress / limit))
+        return program.values(self, z)
 
     def slopes(self, z: FloatArray) -> tuple[FloatArray, FloatArray] | None:
         """Return the derivatives of objective and constraints."""
+        return program.slopes(self, z)
+
+    def seen(self, z: FloatArray, sloped: bool) -> Seen | None:
+        """Return the objective, the rows of the band, and those of the stress."""
         state = self.state(z)
         if state is None:
             return None
-        force, stress = self._by_form(z, state)
-        if self.extra:
-            by_last = (
-                self._by_stroke(z, state) if self.task.goal == "stroke" else (0.0 * state.force, 0.0 * state.stress)
-            )
-            force, stress = np.column_stack([force, by_last[0]]), np.column_stack([stress, by_last[1]])
-        ratio, by = state.force / self.task.force - 1.0, force / self.task.force
-        off, limit = 100.0 * self.between @ by, self.task.material.allowable_stress
-        rows = [] if limit is None else [-10.0 * stress / limit]
+        force, stress = self._derivatives(z, state) if sloped else (None, None)
+        ratio = state.force / self.task.force - 1.0
+        by = None if force is None else force / self.task.force
+        objective, slope = self._objective(z, ratio, by)
+        return Seen(objective, slope, [*self._band(z, ratio, by), *self._strength(state, stress)])
+
+    def _objective(self, z: FloatArray, ratio: FloatArray, by: FloatArray | None) -> tuple[float, FloatArray | None]:
+        """Return the stroke with a minus [cm], the ripple [%], or the mean square; and its derivatives."""
         if self.task.goal == "rms":
-            objective = 2e4 / len(self.between) * (self.between @ ratio) @ (self.between @ by)
-            return objective, np.concatenate(rows) if rows else np.zeros((0, len(z)))
-        objective = np.zeros(len(z))
-        objective[-1] = -1.0 if self.task.goal == "stroke" else 1.0
+            at = self.between @ ratio
+            slope = None if by is None else 2e4 / len(self.between) * at @ (self.between @ by)
+            return 1e4 * float(np.mean(at**2)), slope
+        sign = -1.0 if self.task.goal == "stroke" else 1.0
+        slope = np.zeros(len(z))
+        slope[-1] = sign
+        return sign * float(z[-1]), slope
+
+    def _band(self, z: FloatArray, ratio: FloatArray, by: FloatArray | None) -> list[Rows]:
+        """Return by how much the force is below the upper edge of its band, and above the lower one [%]."""
+        if self.task.goal == "rms":
+            return []
+        most, off = 100.0 * self.ripple(z), 100.0 * (self.between @ ratio)
+        if by is None:
+            return [Rows("band", most - off), Rows("band", most + off)]
+        slope = 100.0 * self.between @ by
+        upper, lower = -slope, slope.copy()
         if self.task.goal == "ripple":
-            upper, lower = -off, off.copy()
             upper[:, -1], lower[:, -1] = 1.0, 1.0
-            return objective, np.concatenate([upper, lower, *rows])
-        return objective, np.concatenate([-off, off, *rows])
+        return [Rows("band", most - off, upper), Rows("band", most + off, lower)]
+
+    def _strength(self, state: State, by: FloatArray | None) -> list[Rows]:
+        """Return by which share the stress is below the allowable one, ten times: as strict as the band is."""
+        limit = self.task.material.allowable_stress
+        if limit is None:
+            return []
+        return [Rows("stress", 10.0 * (1.0 - state.stress / limit), None if by is None else -10.0 * by / limit)]
+
+    def _derivatives(self, z: FloatArray, state: State) -> tuple[FloatArray, FloatArray]:
+        """Return the derivatives of force (p, n) and stress (r, n) by all variables."""
+        force, stress = self._by_form(z, state)
+        if not self.extra:
+            return force, stress
+        last = self._by_stroke(z, state) if self.task.goal == "stroke" else (0.0 * state.force, 0.0 * state.stress)
+        return np.column_stack([force, last[0]]), np.column_stack([stress, last[1]])
 
     def _by_form(self, z: FloatArray, state: State) -> tuple[FloatArray, FloatArray]:
         """Return the derivatives of force (p, k) and stress (r, k) by the form's variables."""

@@ -3,23 +3,25 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cfmkit.designing.starts import NEVER, Clock, Stage, done
+from cfmkit.families.base import Run
 from cfmkit.families.findings import mm, mpa, newton, percent
 from cfmkit.families.refusals import no_design
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.printed.program import SMALL, Form, StripProgram
 from cfmkit.numerics.sqp import Effort, Optimum, SearchEnding, minimize
+from cfmkit.results import Design, Status
 from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Mapping
 
     from cfmkit.arrays import FloatArray
     from cfmkit.families.slider_crank.printed.program import Task
-    from cfmkit.results import Design
 
 
 VIOLATION = 5e-3
@@ -27,7 +29,12 @@ VIOLATION = 5e-3
 
 
 def descend(
-    program: StripProgram, start: FloatArray, bounds: FloatArray, steps: int = 100, tolerance: float = 1e-6
+    program: StripProgram,
+    start: FloatArray,
+    bounds: FloatArray,
+    steps: int = 100,
+    tolerance: float = 1e-6,
+    clock: Clock = NEVER,
 ) -> Optimum:
     """Return where the steps from a start end.
 
@@ -43,8 +50,10 @@ def descend(
         At most.
     tolerance : float
         Change of the objective that ends the search.
+    clock : Clock
+        When it is late, the search ends, too.
     """
-    return minimize(program, start, bounds, Effort(steps, tolerance, VIOLATION, last=True))
+    return minimize(program, start, bounds, Effort(steps, tolerance, VIOLATION, clock.late, last=True))
 
 
 COARSE = 5
@@ -87,6 +96,8 @@ class Found:
         Its outcome.
     uniform : Optimum or None
         That of one thickness, within `LOOSE` at least, for comparison; None where it has no equilibrium.
+    lost : tuple of str
+        Why processes died that searched from other starts.
     """
 
     task: Task
@@ -95,6 +106,7 @@ class Found:
     program: StripProgram
     descent: Optimum
     uniform: Optimum | None
+    lost: tuple[str, ...] = ()
 
     @property
     def values(self) -> FloatArray:
@@ -147,10 +159,44 @@ def uniform_for_stroke(task: Task, guess: float = 1e-3) -> tuple[float, float] |
     return thickness, width
 
 
+@dataclass(frozen=True)
+class OneStart:
+    """What a process does: from the number of a start to a record of the strip that it led to.
+
+    The first one climbs from the uniform strip, from few thicknesses to all; the others begin with all of them, random.
+    """
+
+    task: Task
+    form: Form
+    ranges: Ranges
+    uniform: Optimum | None
+    seed: int
+    clock: Clock
+
+    def __call__(self, number: int) -> dict[str, Any]:
+        """Return the record."""
+        steps, factors = _ladder(self.form), None
+        if number:
+            steps = (self.form.count,)
+            drawn = np.random.default_rng(self.seed).standard_normal((number, self.form.count))[-1]
+            factors = np.exp(SCATTER * drawn)
+        found = _climb(self, steps, factors).descent
+        kept = {"z": found.z.tolist(), "objective": float(found.objective), "constraints": found.constraints.tolist()}
+        kept |= {"ending": found.ending.name, "evaluations": found.evaluations, "allowed": found.allowed}
+        return {"found": kept, "late": self.clock.late()}
+
+    def read(self, record: dict[str, Any]) -> Found:
+        """Return the strip of a record."""
+        kept = record["found"]
+        arrays = {name: np.array(kept[name]) for name in ("z", "constraints")}
+        descent = Optimum(**{**kept, **arrays, "ending": SearchEnding[kept["ending"]]})
+        return Found(self.task, self.form, self.ranges, StripProgram(self.task, self.form), descent, self.uniform)
+
+
 def search(
-    task: Task, form: Form, ranges: Ranges, starts: int, seed: int, report: Callable[[float, str], None]
-) -> Found:
-    """Return the best strip found: from the uniform one coarse to fine, and from random ones where asked.
+    task: Task, form: Form, ranges: Ranges, starts: int, run: Run, identity: str = "", clock: Clock = NEVER
+) -> Found | Design:
+    """Return the best strip found, from the uniform one coarse to fine, and from random ones where asked.
 
     Parameters
     ----------
@@ -162,26 +208,42 @@ def search(
         Of its numbers.
     starts : int
         How many, the uniform strip included.
-    seed : int
-        Of the random ones.
-    report : callable
-        Takes a fraction and a text.
+    run : Run
+        Seed of the random ones, progress, processes, notes.
+    identity : str
+        Of everything that decides the outcome of a start but its number.
+    clock : Clock
+        When it is late, no more is tried.
+
+    Returns
+    -------
+    Found or Design
+        Why there is none, where no start came to an end.
     """
-    uniform = _uniform(task, form, ranges)
-    steps = _ladder(form)
-    best: Found | None = None
-    rng = np.random.default_rng(seed)
-    for number in range(starts):
-        report(number / starts, f"start {number + 1} of {starts}")
-        found = _climb(task, form, ranges, steps if number == 0 else (form.count,), uniform, rng if number else None)
-        if best is None or _rank(found.descent) < _rank(best.descent):
-            best = found
-    assert best is not None
+
+    def tell(records: Mapping[int, Any]) -> None:
+        count = len(records)
+        run.progress(count / starts, f"start {count + 1} of {starts}" if count < starts else "done")
+
+    work = OneStart(task, form, ranges, _uniform(task, form, ranges, clock), run.seed, clock)
+    means = run if starts > 1 else replace(run, executor=Run().executor)  # one alone is not worth a process
+    outcome = done(Stage(work, tuple(range(starts)), identity), means, clock, tell)
+    if not outcome.records:
+        return _nothing(outcome.lost)
+    found = [work.read(outcome.records[number]) for number in sorted(outcome.records)]
+    best = min(found, key=lambda one: _rank(one.descent))
     if task.goal == "stroke" and not (best.descent.feasible and best.descent.ending is SearchEnding.OPTIMUM):
-        found = _tightened(task, form, ranges, uniform)
-        best = min(best, found, key=lambda one: _rank(one.descent))
-    report(1.0, "done")
-    return best
+        best = min(best, _tightened(work), key=lambda one: _rank(one.descent))
+    return replace(best, lost=outcome.lost)
+
+
+def _nothing(lost: tuple[str, ...]) -> Design:
+    """Return why no start led to anything."""
+    if lost:
+        return Design(None, Status.CRASHED, f"no start came to an end: {'; '.join(lost)}")
+    return no_design(
+        finding("target_unreachable", "the time budget ended before any start led to a strip: give it more")
+    )
 
 
 def _rank(descent: Optimum) -> tuple[bool, float]:
@@ -199,18 +261,12 @@ def _ladder(form: Form) -> tuple[int, ...]:
     return (*steps, form.count)
 
 
-def _climb(
-    task: Task,
-    form: Form,
-    ranges: Ranges,
-    steps: tuple[int, ...],
-    uniform: Optimum | None,
-    rng: np.random.Generator | None,
-) -> Found:
+def _climb(start: OneStart, steps: tuple[int, ...], factors: FloatArray | None) -> Found:
     """Return the outcome of one start: every search begins where the one with fewer thicknesses ended."""
-    x, last = _begin(task, form, ranges, uniform, steps[0])
-    if rng is not None:
-        x[: steps[0]] *= np.exp(SCATTER * rng.standard_normal(steps[0]))
+    task, form, ranges = start.task, start.form, start.ranges
+    x, last = _begin(task, form, ranges, start.uniform, steps[0])
+    if factors is not None:
+        x[: steps[0]] *= factors
     for count in steps:
         now = replace(form, count=count)
         own = len(x) - (form.size - form.count)
@@ -219,25 +275,27 @@ def _climb(
         goal = replace(task, ripple=max(task.ripple, LOOSE)) if coarse else task
         program = StripProgram(goal, now)
         bounds = _bounds(task, ranges, form, count)
-        start = np.append(x, last) if program.extra else x
-        descent = descend(program, start, bounds, 20 if coarse else 100, 1e-3 if coarse else _precise(task))
+        begin = np.append(x, last) if program.extra else x
+        effort = (20, 1e-3) if coarse else (100, _precise(task))
+        descent = descend(program, begin, bounds, *effort, start.clock)
         x = descent.z[: now.size]
         last = descent.z[-1]
-    return Found(task, form, ranges, program, descent, uniform)
+    return Found(task, form, ranges, program, descent, start.uniform)
 
 
-def _tightened(task: Task, form: Form, ranges: Ranges, uniform: Optimum | None) -> Found:
+def _tightened(start: OneStart) -> Found:
     """Return the outcome of a band that begins as wide as the uniform strip needs it, and is made narrower in steps.
 
     Where a band is out of reach of the first strip, the steps towards it get stuck; those within bands do not.
     """
+    task, form, ranges, uniform = start.task, start.form, start.ranges, start.uniform
     x, last = _begin(task, form, ranges, uniform, form.count)
     missed = 0.0 if uniform is None else min(0.01 * uniform.violation, WIDEST)
     loose = max(task.ripple, LOOSE) + missed
     for ripple in np.geomspace(loose, task.ripple, NARROWING):
         program = StripProgram(replace(task, ripple=float(ripple)), form)
-        start = np.append(x, last)
-        descent = descend(program, start, _bounds(task, ranges, form, form.count))
+        begin = np.append(x, last)
+        descent = descend(program, begin, _bounds(task, ranges, form, form.count), clock=start.clock)
         x, last = descent.z[: form.size], descent.z[-1]
     return Found(task, form, ranges, program, descent, uniform)
 
@@ -281,7 +339,7 @@ def _bounds(task: Task, ranges: Ranges, form: Form, count: int) -> FloatArray:
     return np.concatenate([rows, [goal]])
 
 
-def _uniform(task: Task, form: Form, ranges: Ranges) -> Optimum | None:
+def _uniform(task: Task, form: Form, ranges: Ranges, clock: Clock) -> Optimum | None:
     """Return the best strip of one thickness."""
     own = ranges.form
     width = form.width or float(own[-1].mean()) * SMALL
@@ -290,7 +348,7 @@ def _uniform(task: Task, form: Form, ranges: Ranges) -> Optimum | None:
     last = [100.0 * task.stroke] if task.goal == "stroke" else [2.0]
     bounds = _bounds(task, Ranges(own[:1], ranges.longest), Form(1, width=width), 1)
     start = np.array([first, *last]) if program.extra else np.array([first])
-    found = descend(program, start, bounds)
+    found = descend(program, start, bounds, clock=clock)
     return None if found.ending is SearchEnding.NO_ANSWER else found
 
 
@@ -301,6 +359,9 @@ def infeasible(found: Found) -> Design:
         why = "could not begin: the first strip has no equilibrium over 'design.travel'; ask for less of it, or "
         why += "for other ranges in 'design.beam'"
         return no_design(finding("target_unreachable", f"the search {why}"))
+    if descent.ending is SearchEnding.OUT_OF_TIME:
+        text = "the time budget ended before a strip met its targets: give it more"
+        return no_design(finding("target_unreachable", text))
     state = program.state(descent.z)
     if state is None:
         return no_design(

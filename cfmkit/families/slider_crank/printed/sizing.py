@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.designing.audit import searched
 from cfmkit.errors import InputError
 from cfmkit.families.findings import mm
 from cfmkit.families.refusals import no_design
@@ -27,7 +28,7 @@ from cfmkit.families.slider_crank.printed.chain import Flexure
 from cfmkit.families.slider_crank.printed.pressing import Ending
 from cfmkit.families.slider_crank.printed.spec import Flexures, FlexureSpec
 from cfmkit.families.slider_crank.unit_springs import along_slider
-from cfmkit.results import Design, Quantity, Searched, Status
+from cfmkit.results import Design, Status
 from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
@@ -150,15 +151,15 @@ def design_flexures(spec: SliderCrankSpec, linkage: Linkage, unloaded: float) ->
         "over that of the springs, on average, of flexures by the closed forms",
         "over that of pure bending, of those",
     )
-    factors = {
-        "closed_form_force": Quantity(found.force_factor, "factor", f"force {over[0]}"),
-        "closed_form_stress": Quantity(found.stress_factor, "factor", f"largest stress {over[1]}"),
+    factors: dict[str, tuple[float | None, str, str]] = {
+        "closed_form_force": (found.force_factor, "factor", f"force {over[0]}"),
+        "closed_form_stress": (found.stress_factor, "factor", f"largest stress {over[1]}"),
     }
     return Design(
         _written(spec, found.flexures, stroke),
         Status.COMPLETE,
         _message(found, wanted.flexures.exact),
-        search={name: Searched(item, "lumped", (0.1 * stroke, stroke)) for name, item in factors.items()},
+        search=searched(factors, "lumped", (0.1 * stroke, stroke)),
     )
 
 

@@ -5,21 +5,22 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+from cfmkit.designing.audit import measured, searched
+from cfmkit.families.base import Run
 from cfmkit.families.findings import percent
 from cfmkit.families.refusals import Infeasible
 from cfmkit.families.slider_crank.findings import finding
+from cfmkit.families.slider_crank.springs.model import analyze
 from cfmkit.families.slider_crank.springs.targets import FREE
 from cfmkit.families.slider_crank.springs.windows import widest
 from cfmkit.families.slider_crank.unit_springs import JOINTS
-from cfmkit.metrics import Window, evaluate
-from cfmkit.results import Quantity, Searched
 from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.families.slider_crank.spec import CrankDesign, SliderCrankSpec
     from cfmkit.families.slider_crank.springs.targets import Task
-    from cfmkit.results import Finding
+    from cfmkit.results import Finding, Searched
 
 
 @dataclass(frozen=True)
@@ -65,16 +66,15 @@ def audited(solved: Solved, spec: SliderCrankSpec) -> Solved:
 
     Those from a line that is not level are none of its metrics: they stay what the search found at its places.
     """
-    from cfmkit.families.base import Run
-    from cfmkit.families.slider_crank.springs.model import analyze
-
     if solved.task.wanted.stiffness is not None:
         return solved
     result, target = analyze(spec, Run()), abs(solved.task.wanted.target)
     if not result.curves or not result.target:
         return solved
-    largest = evaluate(result, ["deviation_from_target"], Window(*solved.judged))["deviation_from_target"].value
-    rms = evaluate(result, ["rms_to_target"], Window(*solved.window))["rms_to_target"].value
+    (largest,), (rms,) = (
+        measured(result, solved.judged, "deviation_from_target"),
+        measured(result, solved.window, "rms_to_target"),
+    )
     if largest is None or rms is None:
         return solved
     return replace(solved, deviation=largest, rms=rms / target, exact=True)
@@ -214,18 +214,16 @@ def search_of(solved: Solved) -> dict[str, Searched]:
     """
     if solved.exact:
         return {}
-    about = {
+    about: dict[str, tuple[float | None, str, str]] = {
         "largest_miss": (
             solved.deviation,
+            "ratio",
             f"farthest from the target, over it, at the {solved.places} places searched",
         ),
         "mean_square_miss": (
             solved.rms,
+            "ratio",
             f"root mean square distance from the target, over it, at those {solved.places}",
         ),
     }
-    dimension = solved.task.assembly.dimension
-    return {
-        name: Searched(Quantity(value, "ratio", text), "prb", solved.window, dimension)
-        for name, (value, text) in about.items()
-    }
+    return searched(about, "prb", solved.window, solved.task.assembly.dimension)

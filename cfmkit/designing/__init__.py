@@ -1,0 +1,15 @@
+"""The kit that optimised designs are made with, whatever the mechanism: it knows no family.
+
+`program`
+    What a family sees at a point, an objective and limits by name, becomes a program of `cfmkit.numerics.sqp`.
+`limits`
+    Which limits a point misses, and which of them hold it.
+`variables`
+    Numbers within bounds: rounded to what is written, and those that are at a bound.
+`starts`
+    Many starts, in this process or several, each noted when it is finished, within a time budget.
+`audit`
+    What is reported of a design is what the analysis of its written specification measures.
+
+What a design is to do, the start it begins with and the words for what blocks it belong to the family.
+"""

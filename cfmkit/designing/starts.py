@@ -1,0 +1,142 @@
+"""Many starts, in one process or several, each noted when it is finished, so that a run that was ended goes on."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+from time import time
+from typing import TYPE_CHECKING, Any, Protocol
+
+from cfmkit.store import origin, stable_hash
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Mapping
+
+    from cfmkit.specs.spec import Spec
+
+NOT_DECIDING = {"name", "description", "requirements", "sweep", "sensitivity"}
+"""Blocks of a specification that no search looks at."""
+
+KEY_DIGITS = 32
+"""Hexadecimal digits of the key under which a start is noted."""
+
+
+class Notes(Protocol):
+    """Where finished starts are noted, for the run after this one."""
+
+    def find(self, key: str, /) -> int:
+        """Return where the record of a key lies; -1 if there is none."""
+
+    def read(self, place: int, key: str, /) -> Any:
+        """Return the record of a key that lies at a place."""
+
+    def add(self, key: str, record: Any, /) -> int:
+        """Keep a record of plain numbers, words, lists and mappings; return where it lies."""
+
+
+class Means(Protocol):
+    """What starts are done with: the processes, and the notes."""
+
+    @property
+    def executor(self) -> Callable[..., Iterator[tuple[Any, Any]]]:
+        """Yields (job, outcome) as jobs finish."""
+
+    @property
+    def notes(self) -> Notes:
+        """Keeps what is finished."""
+
+
+@dataclass(frozen=True)
+class Clock:
+    """When the time is up, in seconds of `time.time`, which is the same in every process; None: never."""
+
+    deadline: float | None = None
+
+    @classmethod
+    def of(cls, *budgets: float | None) -> Clock:
+        """Return the clock on which the shortest of some budgets [s] begins now."""
+        given = [budget for budget in budgets if budget is not None]
+        return cls(time() + min(given) if given else None)
+
+    def late(self) -> bool:
+        """Return whether the time is up."""
+        return self.deadline is not None and time() > self.deadline
+
+
+NEVER = Clock()
+"""The clock of a search that has all the time."""
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One round of jobs.
+
+    Attributes
+    ----------
+    work : callable
+        From the number of a job to its record, of plain numbers, words, lists and mappings: what it found, under
+        "found", and under "late" whether the time was up before it was done. Sent to other processes.
+    jobs : tuple of int
+        Their numbers.
+    identity : str
+        Of everything that decides an outcome but the number.
+    """
+
+    work: Callable[[int], dict[str, Any]]
+    jobs: tuple[int, ...]
+    identity: str
+
+
+@dataclass(frozen=True)
+class Done:
+    """What the jobs of a stage led to.
+
+    Attributes
+    ----------
+    records : mapping
+        Number of the job -> its record; those that were not done are left out.
+    reused : int
+        How many were noted by a run before.
+    lost : tuple of str
+        Why processes died.
+    """
+
+    records: Mapping[int, dict[str, Any]]
+    reused: int
+    lost: tuple[str, ...]
+
+
+def done(stage: Stage, means: Means, clock: Clock, tell: Callable[[Mapping[int, dict[str, Any]]], None]) -> Done:
+    """Return what the jobs of a stage led to, as far as the time allows.
+
+    Parameters
+    ----------
+    stage : Stage
+        The jobs.
+    means : Means
+        The processes, and where finished jobs are noted: a job that ran out of time is not.
+    clock : Clock
+        Late, no more jobs are begun.
+    tell : callable
+        Takes the records so far, at the beginning and after each job.
+    """
+    keys = {job: hashlib.sha256(f"{stage.identity} {job}".encode()).hexdigest()[:KEY_DIGITS] for job in stage.jobs}
+    places = {job: means.notes.find(key) for job, key in keys.items()}
+    records = {job: means.notes.read(place, keys[job]) for job, place in places.items() if place >= 0}
+    reused, lost = len(records), list[str]()
+    tell(records)
+    left = [job for job in stage.jobs if job not in records]
+    for job, record in means.executor(stage.work, iter(left), clock.late):
+        if not isinstance(record, dict):
+            lost.append(str(getattr(record, "message", record)))
+            continue
+        records[job] = record
+        if not record["late"]:
+            means.notes.add(keys[job], record)
+        tell(records)
+    return Done(records, reused, tuple(dict.fromkeys(lost)))
+
+
+def identity_of(spec: Spec, seed: int) -> str:
+    """Return the identity of everything that decides a search: the specification, the seed, the package's own code."""
+    return stable_hash([spec.model_dump(mode="json", exclude=NOT_DECIDING), seed, origin()])

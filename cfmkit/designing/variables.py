@@ -1,0 +1,48 @@
+"""Numbers that a design may choose within bounds: rounded to what is written, and those that are at a bound."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from cfmkit.arrays import FloatArray
+
+
+def rounded(values: FloatArray, bounds: FloatArray, digits: int, unit: float = 1.0) -> FloatArray:
+    """Return numbers with so many decimals of a unit, kept within their bounds (n, 2).
+
+    Examples
+    --------
+    >>> rounded(np.array([0.12345, 0.98765]), np.array([[0.0, 1.0], [0.0, 0.98]]), 2)
+    array([0.12, 0.98])
+    """
+    whole = np.round(values, digits) if unit == 1.0 else np.round(values * unit, digits) / unit
+    return np.clip(whole, *bounds.T)
+
+
+def at_bounds(values: FloatArray, bounds: FloatArray, close: float, share: float = 0.0) -> NDArray[np.int_]:
+    """Return at which end of its bounds each number is: -1 at the lowest, 1 at the highest, 0 between.
+
+    Parameters
+    ----------
+    values : (n,) array
+        The numbers.
+    bounds : (n, 2) array
+        Lowest and highest values.
+    close : float
+        So near to a bound a number is at it.
+    share : float
+        The same as a share of the bound, in addition.
+
+    Examples
+    --------
+    >>> at_bounds(np.array([0.5, 1.2, 2.0]), np.array([[0.5, 2.0]] * 3), 1e-6)
+    array([-1,  0,  1])
+    """
+    low, high = bounds.T
+    lowest, highest = (abs(values - end) <= close + share * abs(end) for end in (low, high))
+    return np.where(lowest, -1, np.where(highest, 1, 0))
