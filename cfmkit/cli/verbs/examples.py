@@ -23,7 +23,7 @@ ALL = "all"
 class ExamplesOptions(Common):
     """Arguments and options."""
 
-    name: Annotated[str | None, argument("[NAME]", "Copy this one, with its data; default: list all.")] = None
+    name: Annotated[str | None, argument("NAME", "Copy this one, with its data; default: list all.")] = None
     out: Annotated[str | None, option("-o", "--out", metavar="DIR", text="Folder to copy to; default: this one.")] = (
         None
     )
