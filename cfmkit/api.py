@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from cfmkit.export.geometry import Drawing
     from cfmkit.metrics import Outcome, Window
     from cfmkit.results import Design, Quantity, Result
+    from cfmkit.runs.notebook import Analysis
     from cfmkit.specs.spec import Spec
     from cfmkit.studies.outcome import StudyResult
 
@@ -116,7 +117,7 @@ def _result_of(result: Result | AnySpec) -> Result:
     return result if isinstance(result, Result) else analyze(result)
 
 
-def analyze(spec: AnySpec, run: Run | None = None) -> Result:
+def analyze(spec: AnySpec, run: Run | None = None) -> Analysis:
     """Return the curves of a mechanism, its scalar results and what is wrong with it.
 
     Parameters
@@ -132,11 +133,14 @@ def analyze(spec: AnySpec, run: Run | None = None) -> Result:
     >>> result = cfmkit.analyze("configs/cam.yaml")
     >>> result.status.key, len(result.curve.branches)
     ('complete', 2)
+    >>> round(result.metrics["theoretical_force"].value, 4)
+    50.0002
     """
     from cfmkit.metrics import windows_judged
+    from cfmkit.runs.notebook import Analysis
 
     spec = spec_of(spec)
-    return windows_judged(family(spec.family).analyze(spec, run or Run()))
+    return Analysis.of(windows_judged(family(spec.family).analyze(spec, run or Run())))
 
 
 def design(spec: AnySpec, run: Run | None = None) -> Design:

@@ -141,6 +141,12 @@ class Curve:
         yield "stable", Column(np.where(self.stable, "true", "false"), "text")
         yield from self.extra.items()
 
+    def __repr__(self) -> str:
+        """Return the curve in a line: what over what, how many points, which branches."""
+        ends = f"{float(self.motion[0]):.4g} ... {float(self.motion[-1]):.4g} SI, " if len(self.motion) else ""
+        names = ", ".join(self.branches[:10])
+        return f"<Curve of {self.kind} over {self.motion_name}: {len(self.motion)} points, {ends}branches {names}>"
+
     def take(self, keep: NDArray[Any]) -> Curve:
         """Return the curve at the points that `keep` (indices or a mask) selects."""
         extra = {name: Column(column.values[keep], column.dimension) for name, column in self.extra.items()}

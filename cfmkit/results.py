@@ -204,6 +204,14 @@ class Result:
         if not self.message:
             object.__setattr__(self, "message", self.status.value)
 
+    def __repr__(self) -> str:
+        """Return the result in a line: what of, how it ended, how much there is."""
+        about = f"{self.spec.family} {self.spec.name!r}, {self.status.key}"
+        told = [repr(curve) for curve in self.curves[:1]]
+        told += [f"{len(self.curves) - 1} more curves"] if len(self.curves) > 1 else []
+        told += [f"warnings: {', '.join(one.name for one in self.warnings[:10])}"] if self.warnings else []
+        return f"<{type(self).__name__} of {'; '.join([about, *told])}>"
+
     @property
     def curve(self) -> Curve:
         """The nominal curve.
@@ -268,6 +276,10 @@ class Design:
         """Fall back to the status's sentence."""
         if not self.message:
             object.__setattr__(self, "message", self.status.value)
+
+    def __repr__(self) -> str:
+        """Return the design in a line: how it ended, and what came of it."""
+        return f"<Design {self.status.key}: {self.message[:500]}; {self.spec!r}>"
 
     @property
     def explanation(self) -> str:

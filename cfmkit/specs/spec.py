@@ -178,6 +178,20 @@ class Spec(Model):
     sweep: Sweep | None = Field(None, description="what `cfmkit sweep` varies")
     sensitivity: Sensitivity | None = Field(None, description="what `cfmkit sensitivity` varies")
 
+    def __repr__(self) -> str:
+        """Return the specification in a line; `cfmkit.dumps` writes it out."""
+        return f"<{type(self).__name__} {self.name!r}; cfmkit.dumps(spec) writes it out>"
+
+    __str__ = __repr__
+
+    def _repr_html_(self) -> str:
+        """Return what a notebook shows: the file."""
+        from html import escape
+
+        from cfmkit.specs.yamlio import dump
+
+        return f"<pre>{escape(dump(self))}</pre>"
+
     @property
     def fidelity(self) -> str | None:
         """The model that the analysis uses; None where its family has one only."""

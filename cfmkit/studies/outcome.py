@@ -44,6 +44,18 @@ class StudyResult:
     indices: Table | None = None
     convergence: Table | None = None
 
+    def __repr__(self) -> str:
+        """Return the study in a line."""
+        return f"<StudyResult: {self.summary.get('message', '')}; {self.table!r}>"
+
+    def _repr_html_(self) -> str:
+        """Return what a notebook shows: how the study ended, and its first points."""
+        from html import escape
+
+        from cfmkit.tables.html import first_rows
+
+        return f"<div><p>{escape(str(self.summary.get('message', '')))}</p>{first_rows(self.table)}</div>"
+
     def to_pandas(self) -> Any:
         """Return the points as a `pandas.DataFrame`, columns headed ``force_mean [N]``."""
         import pandas as pd

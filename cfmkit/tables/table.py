@@ -97,6 +97,10 @@ class Table:
             lengths = ", ".join(f"{column.header}: {len(column.values)}" for column in self.columns)
             raise CfmError(f"the columns of a table need one length ({lengths})")
 
+    def __repr__(self) -> str:
+        """Return the table in a line: rows and headers."""
+        return f"<Table of {len(self)} rows: {_shortened(', '.join(self.headers))}>"
+
     def __len__(self) -> int:
         """Return the number of rows."""
         return len(self.columns[0].values) if self.columns else 0
@@ -116,6 +120,10 @@ class Table:
     def as_dict(self) -> dict[str, list[Cell]]:
         """Return header -> values as plain Python lists, None where a value is missing."""
         return {column.header: column.cells() for column in self.columns}
+
+
+def _shortened(text: str, most: int = 500) -> str:
+    return text if len(text) <= most else f"{text[:most]}..."
 
 
 def _frozen(values: Iterable[Any], *, numeric: bool) -> Values:

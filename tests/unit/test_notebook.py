@@ -1,0 +1,72 @@
+"""What a notebook shows of specifications, results and studies: little, all of it text, and a figure."""
+
+from __future__ import annotations
+
+import pickle
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import cfmkit
+from cfmkit.results import Result, Status
+
+CONFIGS = Path(__file__).parents[2] / "configs"
+HOSTILE = "<script>alert(1)</script>"
+
+
+@pytest.fixture(scope="module")
+def result():
+    return cfmkit.analyze(CONFIGS / "cam.yaml")
+
+
+@pytest.mark.parametrize("name", ["cam", "beam_lan2010", "slider_crank_bilancia2019"])
+def test_texts_of_everything_are_short(name):
+    spec = cfmkit.load(CONFIGS / f"{name}.yaml")
+    found = cfmkit.analyze(spec)
+    for one in (spec, found, found.curve, found.metrics["force_mean"]):
+        assert 10 < len(repr(one)) < 2000
+    assert spec.name in repr(found)
+
+
+def test_a_result_measures_itself_as_evaluate_and_check_do(result):
+    assert {name: one.value for name, one in result.metrics.items()} == {
+        name: one.value for name, one in cfmkit.evaluate(result).items()
+    }
+    assert result.requirements == cfmkit.check(result)
+
+
+def test_a_result_is_shown_with_metrics_requirements_and_one_figure(result):
+    shown = result._repr_html_()
+    assert shown.count("<svg") == 1
+    assert "theoretical_force" in shown
+    assert all(one.sentence.replace("<=", "&lt;=") in shown for one in result.requirements)
+
+
+def test_a_result_without_a_curve_is_shown_with_its_reason():
+    spec = cfmkit.load(CONFIGS / "cam.yaml").replace({"name": HOSTILE})
+    from cfmkit.runs.notebook import Analysis
+
+    shown = Analysis.of(Result(spec, Status.NO_EQUILIBRIUM, "nothing holds it"))._repr_html_()
+    assert "nothing holds it" in shown
+    assert HOSTILE not in shown
+
+
+def test_a_study_is_shown_with_its_first_points():
+    vary = {"mechanism.roller_radius": np.linspace(0.008, 0.012, 12)}
+    study = cfmkit.sweep(CONFIGS / "cam.yaml", vary=vary, metrics=["force_mean"])
+    assert len(repr(study)) < 2000
+    shown = study._repr_html_()
+    assert shown.count("<tr>") == 11
+    assert "2 more rows" in shown
+
+
+def test_a_spec_is_shown_as_its_file():
+    spec = cfmkit.load(CONFIGS / "cam.yaml").replace({"name": HOSTILE})
+    assert "roller_radius" in spec._repr_html_()
+    assert HOSTILE not in spec._repr_html_()
+
+
+def test_a_result_goes_through_a_pipe_between_processes(result):
+    other = pickle.loads(pickle.dumps(result))
+    np.testing.assert_array_equal(other.curve.effort, result.curve.effort)
