@@ -34,7 +34,8 @@ EPILOG = (
 
 
 _MADE_BETWEEN_COLLECTIONS = 250_000
-"""Objects; imports make so many that stay, and looking through them for garbage takes a tenth of a short run."""
+"""Objects; the imports of a run make about so many that stay, and looking through them for garbage takes a tenth of a
+short run."""
 
 
 def entry() -> int:

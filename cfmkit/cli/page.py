@@ -24,7 +24,8 @@ PLAIN, GOOD, BAD, LABEL, FAINT = "", "cyan", "bold yellow", "bold", "dim"
 """Tones. Colours only repeat what a word says, and blue stands against yellow, which everybody can tell apart."""
 
 MOST_NAMES = 2
-"""Files of one folder that are named: with two of each, the line of a design fits into 108 columns."""
+"""Files of one folder that are named: the paragraph of a cam's design has 163 characters then, two lines of the widest
+page; with four of each it has 222."""
 
 
 class Span(NamedTuple):

@@ -98,7 +98,7 @@ def _page(outcome: Outcome, written: Written, everything: bool) -> Iterator[Bloc
     yield BLANK
     if listed := rows(found, everything):
         cells = [(f"  {row.label}", row.value, row.bound, verdict(row.ok)) for row in listed]
-        yield Grid(columns(False, True, False, False), cells)
+        yield Grid(columns(True, True, False, False), cells)
         yield BLANK
     for word, text in found.supplement.lines:
         yield Paragraph(word, text)

@@ -31,8 +31,8 @@ if TYPE_CHECKING:
     Report = Callable[[float, str], None]
 
 NARROWEST, WIDEST = 40, 108
-"""Columns of a page: below the one a table has no room for a name and a value, above the other lines are hard to read
-(and 108 is what the widest page of the examples in the documentation takes)."""
+"""Columns of a page. In 40 the page of a cam still shows every number beside its name; wider than 108 a paragraph is
+hard to read, and hardly a line but commands to copy gets so long."""
 
 MARGIN = 9
 """Columns of the words that begin a paragraph: ``warning`` or ``feasible`` and a blank."""

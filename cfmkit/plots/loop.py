@@ -28,7 +28,8 @@ if TYPE_CHECKING:
 Interval = tuple[float, float]
 
 ENLARGE_BELOW = 0.45
-"""The band gets a panel of its own if it takes less than this fraction of the whole picture's height."""
+"""The band gets a panel of its own if it takes less than this fraction of the whole picture's height: above it the
+panel would enlarge it to little more than twice."""
 
 LEAST = 0.002
 """The enlarged panel shows at least this fraction of the force to each side: nobody wants to see rounding errors."""

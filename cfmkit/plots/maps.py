@@ -21,10 +21,10 @@ if TYPE_CHECKING:
     from cfmkit.plots.findings import DrawnScale, StudyMarks
 
 MOST_TICKS = 8
-"""Values of a parameter that have a tick each."""
+"""Values of a parameter that have a tick each: with more their numbers come close to each other (by eye)."""
 
 FINE = 80
-"""Places along an axis that level lines are drawn through."""
+"""Places along an axis that level lines are drawn through: about 1 mm of print apart, where no corner shows."""
 
 
 @styled

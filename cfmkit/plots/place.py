@@ -24,19 +24,21 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
 
 CELL = 1.5
-"""Size of a cell [pt]."""
+"""Size of a cell [pt]: a fifth of the size of the letters, which is as near to a line as a name may come."""
 
 GAPS = (2.5, 6.0, 11.0, 18.0, 28.0)
-"""Distances from the line that are tried [pt]."""
+"""Distances from the line that are tried [pt]: from a third of the size of the letters on, farther apart the farther
+away they are, where a place need not be found as exactly."""
 
 MARGIN = 1.5
-"""Least distance of a name from the edge of the axes [pt]."""
+"""Least distance of a name from the edge of the axes [pt]: one cell."""
 
 LEADER = 9.0
-"""From this distance on a thin line leads from the name to its line [pt]."""
+"""From this distance on a thin line leads from the name to its line [pt]: more than the height of the letters, another
+name could stand between them."""
 
 SIGHT = 12
-"""So many places between a name and its line are looked at."""
+"""So many places between a name and its line are looked at: over the farthest distance they are 2.5 pt apart."""
 
 _SIDES = np.array([[0, 1], [0, -1], [1, 0], [-1, 0], [1, 1], [-1, 1], [1, -1], [-1, -1]], dtype=float)
 

@@ -10,7 +10,8 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
 
 ROUNDING = 1e-9
-"""Share of the size of values below which a difference of them, or one of them, is rounding."""
+"""Share of the size of values below which a difference of them, or one of them, is rounding: far above what
+sums of a thousand terms lose (1e-13), and far below what a picture shows."""
 
 
 def is_level(values: FloatArray) -> bool:

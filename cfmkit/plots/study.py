@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 
 MOST_PANELS = 8
-"""More values of the first parameter than this are left to the maps."""
+"""More values of the first parameter than this are left to the maps: smaller panels have no room for their numbers."""
 
 
 def fit_panels(found: StudyMarks, lines: Sequence[StudyCurve]) -> bool:
@@ -73,7 +73,7 @@ def _draw_panel(ax: Axes, lines: Sequence[StudyCurve], second: DrawnScale) -> No
 
 
 MOST_LINES = 1500
-"""Lines of a picture with parallel axes; more are thinned out evenly."""
+"""Lines of a picture with parallel axes; more are thinned out evenly, as they cover each other."""
 
 MISSED = "#D5D5D5"
 """Colour of points that miss a requirement, where lines show them."""

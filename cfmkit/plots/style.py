@@ -42,7 +42,8 @@ MM = 1.0 / 25.4
 """Inches in a millimetre."""
 
 DPI = 200
-"""Dots per inch of every PNG: 160 x 100 mm become 1260 x 787 pixels."""
+"""Dots per inch of every PNG: 160 x 100 mm become 1260 x 787 pixels, which a screen shows whole and where a line of
+0.5 pt is more than one pixel wide."""
 
 BLUE, VERMILLION, BLACK, PURPLE, TAN, BROWN = "#0072B2", "#D55E00", "#1A1A1A", "#9933FF", "#C28570", "#663300"
 LINES = (BLUE, VERMILLION, BLACK, PURPLE, TAN, BROWN)
@@ -56,7 +57,7 @@ BAND, TROUBLE = "#00855F", "#A50F15"
 """Where the force should be, and where something is wrong."""
 
 SMALL, NORMAL = 7.0, 8.0
-"""Font sizes [pt]."""
+"""Font sizes [pt]: 7 is the smallest that Elsevier's journals print."""
 
 _SETTINGS: dict[str, Any] = {
     "font.family": ["DejaVu Sans"],  # comes with matplotlib, so every machine has the same

@@ -24,6 +24,13 @@ def test_a_page_keeps_to_the_width_of_the_terminal(cli, cam, columns):
     assert max(len(line) for line in lines if line not in commands) <= min(columns, 108)
 
 
+@pytest.mark.parametrize("columns", [40, 50])
+def test_a_narrow_page_has_the_numbers_as_well(cli, cam, columns):
+    page = cli(*RUN, COLUMNS=str(columns)).out
+    for number in ("9.058 mm", "206.5 N", "315.4 N*mm", "<= 1 %", "MISSED"):
+        assert number in page
+
+
 def test_redirected_output_has_no_colour(cli, cam):
     assert ESCAPE not in cli(*RUN).out
 

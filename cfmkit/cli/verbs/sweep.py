@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 PLACE = 22
 
 MOST_METRICS = 6
-"""Metrics of the best point that are shown without ``-v``."""
+"""Metrics of the best point that are shown without ``-v``, so that the page of a sweep fits on a screen of 24 lines."""
 
 
 @dataclass(frozen=True, kw_only=True)
