@@ -34,7 +34,7 @@ class Rows:
     values : (m,) array
         By how much it holds.
     slopes : (m, k) array or None
-        Derivatives by the first k variables, if they were asked for; by all others they are zero.
+        Derivatives by the first k variables, if they were requested; by all others they are zero.
     about : callable
         Returns what each row is about.
     """
@@ -47,7 +47,7 @@ class Rows:
 
 @dataclass(frozen=True)
 class Seen:
-    """What is known at a point: the objective with its derivatives (k,), if they were asked for, and all rows."""
+    """What is known at a point: the objective with its derivatives (k,), if they were requested, and all rows."""
 
     objective: float
     slope: FloatArray | None

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, repr=False)
 class Analysis(Result):
-    """A result with its metrics and requirements, computed when they are first asked for."""
+    """A result with its metrics and requirements, computed when they are first needed."""
 
     @classmethod
     def of(cls, result: Result) -> Analysis:
