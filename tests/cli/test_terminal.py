@@ -27,7 +27,7 @@ def test_a_page_keeps_to_the_width_of_the_terminal(cli, cam, columns):
 @pytest.mark.parametrize("columns", [40, 50])
 def test_a_narrow_page_has_the_numbers_as_well(cli, cam, columns):
     page = cli(*RUN, COLUMNS=str(columns)).out
-    for number in ("9.058 mm", "206.5 N", "315.4 N*mm", "<= 1 %", "MISSED"):
+    for number in ("9.058", "206.5", "315.4", "<= 1 %", "MISSED"):
         assert number in page
 
 
