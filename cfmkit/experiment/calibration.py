@@ -18,7 +18,15 @@ from cfmkit.experiment.parameters import DATA, ZEROS
 from cfmkit.families import family
 from cfmkit.families.base import Run
 from cfmkit.metrics import Window
-from cfmkit.numerics.fit import FittedValues, LeastSquares, Loss, NotFinite, lack_of_fit, solve, unidentifiable
+from cfmkit.numerics.least_squares import (
+    FittedValues,
+    LeastSquares,
+    Loss,
+    NotFinite,
+    lack_of_fit,
+    solve,
+    unidentifiable,
+)
 from cfmkit.results import Finding
 from cfmkit.specs.units import format_short
 

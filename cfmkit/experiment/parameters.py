@@ -10,7 +10,7 @@ import numpy as np
 
 from cfmkit.errors import QuantityError, UsageError
 from cfmkit.specs.yamlio.shape import Slot
-from cfmkit.studies.leaves import CannotVary, leaf
+from cfmkit.studies.spec_values import CannotVary, leaf
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping

@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.experiment.branches import LOAD, UNLOAD, Stroke, Strokes
-from cfmkit.numerics.fit import correlation_time
+from cfmkit.numerics.least_squares import correlation_time
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

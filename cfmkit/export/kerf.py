@@ -15,8 +15,8 @@ import numpy as np
 
 from cfmkit.errors import GeometryError
 from cfmkit.export.outlines import check_outlines, flat_points, place
-from cfmkit.numerics.arcchain import ArcChain
-from cfmkit.numerics.parallel import parallel
+from cfmkit.numerics.arc_chain import ArcChain
+from cfmkit.numerics.parallel_curve import parallel
 from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:

@@ -31,13 +31,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.errors import GeometryError
-from cfmkit.numerics.arcchain import ArcChain
+from cfmkit.numerics.arc_chain import ArcChain
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.numerics.arcchain import ComplexArray
+    from cfmkit.numerics.arc_chain import ComplexArray
 
 
 _STEP_TURN = 0.8  # of a tangent against the chord to the next sample [rad]

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from cfmkit.numerics.fit import correlation_time
+from cfmkit.numerics.least_squares import correlation_time
 from cfmkit.numerics.robust import robust_scale, tukey
 
 if TYPE_CHECKING:

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from cfmkit.specs.spec import Spec
     from cfmkit.store import RunFolder
     from cfmkit.studies.executors import Executor, Lost
-    from cfmkit.studies.kept import KeptRuns
+    from cfmkit.studies.finished_runs import KeptRuns
     from cfmkit.tables import Table
 
 
@@ -391,9 +391,9 @@ def batch(
     from cfmkit.runs.specfile import addressed
     from cfmkit.store import RunFolder
     from cfmkit.studies.batch import folders, sources
+    from cfmkit.studies.finished_runs import KeptRuns
     from cfmkit.studies.junit import junit as junit_of
     from cfmkit.studies.junit import prepared
-    from cfmkit.studies.kept import KeptRuns
 
     place, given = os.fspath(out), (changes,) if isinstance(changes, str) else tuple(changes)
     if not place.strip():

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from cfmkit.experiment.measured import MeasuredCurves
     from cfmkit.experiment.reading import Recording
     from cfmkit.experiment.report import MeasureReport
-    from cfmkit.numerics.fit import Loss
+    from cfmkit.numerics.least_squares import Loss
 
 
 def measure(
@@ -155,7 +155,7 @@ def calibrate(
     from cfmkit.experiment.parameters import parameters, read_bounds
     from cfmkit.experiment.reading import Recording
     from cfmkit.metrics import Window
-    from cfmkit.numerics.fit import LOSSES
+    from cfmkit.numerics.least_squares import LOSSES
 
     if loss not in LOSSES:
         raise UsageError(f"--loss: there is no {loss!r}; there are {', '.join(LOSSES)}")

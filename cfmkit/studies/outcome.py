@@ -11,8 +11,8 @@ import numpy as np
 from cfmkit.errors import QuantityError, UsageError
 from cfmkit.specs.units import format_quantity
 from cfmkit.studies.executors import serial
-from cfmkit.studies.leaves import CannotVary, leaf
 from cfmkit.studies.plan import MOST_POINTS
+from cfmkit.studies.spec_values import CannotVary, leaf
 from cfmkit.tables import read_csv
 
 if TYPE_CHECKING:

@@ -13,9 +13,9 @@ import cfmkit
 from cfmkit.errors import ExitCode, UsageError
 from cfmkit.store import RunFolder, file_hash, origin
 from cfmkit.studies.batch import Entry, folders, message, requirements_table, results_table, sources
+from cfmkit.studies.finished_runs import KeptRuns
 from cfmkit.studies.journal import Journal
 from cfmkit.studies.junit import junit
-from cfmkit.studies.kept import KeptRuns
 
 
 @pytest.fixture
@@ -240,7 +240,9 @@ def test_whatever_was_changed_since_is_computed_anew(finished, change):
 
 def test_other_options_and_other_code_are_computed_anew(finished, monkeypatch):
     assert recalled("--seed 1") is None
-    monkeypatch.setattr("cfmkit.studies.kept.origin", lambda libraries: origin(libraries) | {"content": "another"})
+    monkeypatch.setattr(
+        "cfmkit.studies.finished_runs.origin", lambda libraries: origin(libraries) | {"content": "another"}
+    )
     assert recalled() is None
 
 

@@ -11,7 +11,7 @@ import cfmkit
 from cfmkit.errors import SpecError
 from cfmkit.families import family
 from cfmkit.specs.keys import keys
-from cfmkit.studies.leaves import leaf, paths
+from cfmkit.studies.spec_values import leaf, paths
 
 
 def faults(*pairs, text=CANTILEVER):

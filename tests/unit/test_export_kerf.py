@@ -14,8 +14,8 @@ from cfmkit.export import files
 from cfmkit.export.geometry import Arc, Contour, Drawing, Line, Smooth, circle, polygon
 from cfmkit.export.kerf import with_kerf
 from cfmkit.export.outlines import outlines
-from cfmkit.numerics.arcchain import ArcChain
-from cfmkit.numerics.parallel import parallel
+from cfmkit.numerics.arc_chain import ArcChain
+from cfmkit.numerics.parallel_curve import parallel
 
 HALF = 1e-4
 

@@ -14,8 +14,8 @@ from cfmkit.families.slider_crank.linkage import Linkage
 from cfmkit.families.slider_crank.springs.assembly import assemble, reactions
 from cfmkit.families.slider_crank.springs.rates import Goal, minimax, preferred, ranges
 from cfmkit.families.slider_crank.unit_springs import along_crank, along_slider, crank_efforts
-from cfmkit.numerics.boxes import BoxAxis, lowest
-from cfmkit.numerics.extrema import monotone, sharpened
+from cfmkit.numerics.box_search import BoxAxis, lowest
+from cfmkit.numerics.turning_points import monotone, sharpened
 
 rng = np.random.default_rng(20)
 

@@ -6,8 +6,8 @@ import pytest
 import cfmkit
 from cfmkit.errors import SpecError, UsageError
 from cfmkit.families import family, names
-from cfmkit.studies.leaves import leaf, paths
 from cfmkit.studies.plan import Draw, grid, sampled, zipped
+from cfmkit.studies.spec_values import leaf, paths
 from cfmkit.studies.variation import axes, wish, wishes
 
 SPEC = cfmkit.load("configs/cam.yaml")

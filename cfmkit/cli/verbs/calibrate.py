@@ -51,7 +51,7 @@ def run(options: CalibrateOptions, terminal: Terminal) -> Answer:
     """Fit values of a spec to a measured curve: values, intervals, correlation, and what the data cannot determine."""
     from cfmkit.cli.runs import execute
     from cfmkit.errors import UsageError
-    from cfmkit.numerics.fit import LOSSES
+    from cfmkit.numerics.least_squares import LOSSES
     from cfmkit.runs.run import Verb
 
     if options.loss not in LOSSES:
@@ -64,7 +64,7 @@ def run(options: CalibrateOptions, terminal: Terminal) -> Answer:
 def compute(options: CalibrateOptions, source: MeasuredCurves, spec: Spec, run: Run) -> Report:
     """Return the report on the fitted mechanism."""
     from cfmkit.experiment.parameters import split_bounds
-    from cfmkit.numerics.fit import LOSSES
+    from cfmkit.numerics.least_squares import LOSSES
     from cfmkit.runs.recordings import calibrate
 
     loss = next(name for name in LOSSES if name == options.loss)

@@ -20,7 +20,7 @@ from cfmkit.families.cam.geometry.profile import SlopeLaw
 from cfmkit.families.cam.geometry.track import Pivot, Track, pivot_angle
 from cfmkit.families.cam.geometry.track_states import NoTrack
 from cfmkit.families.cam.statics import jams
-from cfmkit.numerics import sampled
+from cfmkit.numerics import sampled_extremes
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -187,7 +187,7 @@ class CornerSlab(Slab):
         x, slope = self._states("x", corner=True), self._states("slope", corner=True)
         force = self._over(x - self.designs.x0[:, None], slope, x, self.designs.friction).slider
         top, last = force.argmax(axis=1), force.shape[1] - 1
-        refined, _, _ = sampled.largest(np.arange(last + 1.0), force)
+        refined, _, _ = sampled_extremes.largest(np.arange(last + 1.0), force)
         held = np.array(
             [any(low < end for low, _ in each) for each, end in zip(self.jams, self.corner_travel, strict=True)]
         )

@@ -8,7 +8,7 @@ import numpy as np
 
 from cfmkit.families.cam.contact import flank_pressure
 from cfmkit.families.cam.statics import forces
-from cfmkit.numerics import sampled
+from cfmkit.numerics import sampled_extremes
 from cfmkit.results import Quantity
 from cfmkit.specs.units import between
 
@@ -176,7 +176,7 @@ def _corner_peak(solution: Solution) -> float | None:
     top = int(np.argmax(force))
     if not 0 < top < len(force) - 1:
         return float(force[top])
-    return float(sampled.largest(travel, force)[0])
+    return float(sampled_extremes.largest(travel, force)[0])
 
 
 def values_of_built(built: Built) -> Mapping[str, Quantity]:

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 from cfmkit.errors import Problem, QuantityError, SpecError
 from cfmkit.specs.spec import Tolerance
 from cfmkit.specs.units import read_number, read_quantity
-from cfmkit.studies.leaves import CannotVary, Leaf, leaf
 from cfmkit.studies.sensitivity.spreads import Incompatible, ParameterSpread, correlation_matrix
+from cfmkit.studies.spec_values import CannotVary, Leaf, leaf
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence

@@ -10,7 +10,7 @@ import numpy as np
 from cfmkit.designing.program import Rows
 from cfmkit.families.beam.build import thickest_of
 from cfmkit.families.beam.shaping.separation import Pair, pairs, separations
-from cfmkit.numerics.sampled import largest
+from cfmkit.numerics.sampled_extremes import largest
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -14,7 +14,7 @@ import numpy as np
 
 from cfmkit.families.beam.build import thickest_of
 from cfmkit.families.beam.shaping.response import Line
-from cfmkit.numerics.sampled import soft_least
+from cfmkit.numerics.sampled_extremes import soft_least
 
 if TYPE_CHECKING:
     from collections.abc import Callable

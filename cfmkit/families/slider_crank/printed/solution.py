@@ -18,7 +18,7 @@ from cfmkit.elastica.verification.corotational import recheck as by_elements
 from cfmkit.families.slider_crank.printed.chain import SLIDER, STRIP
 from cfmkit.families.slider_crank.printed.pressing import Ending
 from cfmkit.metrics.closed import mean
-from cfmkit.numerics.panels import nodes_of, resolved
+from cfmkit.numerics.chebyshev_panels import nodes_of, resolved
 from cfmkit.numerics.roots import bracketed_root
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.families.slider_crank.printed.chain import Elasticity
     from cfmkit.families.slider_crank.printed.pressing import Chain, Pressed
-    from cfmkit.numerics.panels import ChebyshevPanels
+    from cfmkit.numerics.chebyshev_panels import ChebyshevPanels
 
 
 NEAREST = 1e-6

@@ -36,7 +36,7 @@ from cfmkit.families.slider_crank.unit_springs import JOINTS
 from cfmkit.metrics.closed import extremes, mean
 from cfmkit.metrics.many import UNIFORM_POINTS, ManyBranches, range_95, range_95_fraction, usable_interval
 from cfmkit.metrics.subjects import Frame
-from cfmkit.numerics.extrema import Monotone, monotone, sharpened
+from cfmkit.numerics.turning_points import Monotone, monotone, sharpened
 
 if TYPE_CHECKING:
     from collections.abc import Callable

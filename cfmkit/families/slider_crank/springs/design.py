@@ -40,7 +40,7 @@ from cfmkit.families.slider_crank.springs.solution import EDGE
 from cfmkit.families.slider_crank.springs.targets import DENSE, FREE, task_of, with_lengths
 from cfmkit.families.slider_crank.springs.windows import widest, widest_of_all
 from cfmkit.families.slider_crank.unit_springs import JOINTS
-from cfmkit.numerics.boxes import BoxAxis, Lowest, lowest
+from cfmkit.numerics.box_search import BoxAxis, Lowest, lowest
 from cfmkit.results import Design, Status
 from cfmkit.specs.units import Place, format_short
 

@@ -18,8 +18,8 @@ import numpy as np
 
 from cfmkit.families.slider_crank.springs.assembly import reactions
 from cfmkit.families.slider_crank.springs.stiffness import CLASSES, Classified, classify, signs
-from cfmkit.numerics.extrema import Monotone, monotone
 from cfmkit.numerics.roots import bracketed_root
+from cfmkit.numerics.turning_points import Monotone, monotone
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

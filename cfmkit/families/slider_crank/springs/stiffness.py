@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.families.slider_crank.springs.assembly import Assembly
-    from cfmkit.numerics.extrema import Monotone
+    from cfmkit.numerics.turning_points import Monotone
 
 
 CLASSES = ("positive", "zero", "local negative", "snap-through", "bistable", "tristable")

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cfmkit.numerics.arcchain import ArcChain, points_on
+from cfmkit.numerics.arc_chain import ArcChain, points_on
 
 _SMOOTH = 1e-7  # a turn below this [rad] is no corner; a fraction of an arc below it is no piece
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from cfmkit.numerics.sampled import largest, soft_least
+from cfmkit.numerics.sampled_extremes import largest, soft_least
 
 PLACES = np.array([0.0, 0.2, 0.5, 0.6, 1.0, 1.3])
 

@@ -24,6 +24,7 @@ from cfmkit.studies.batch import Entry
 if TYPE_CHECKING:
     from cfmkit.families.base import Notes
 
+
 RECORDS = 1
 """How records are written: those of another number are not found."""
 

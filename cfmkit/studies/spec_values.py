@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
     from cfmkit.specs.spec import Spec
 
+
 Value = float | int | str | bool
 Kind = Literal["quantity", "number", "whole", "word", "switch"]
 

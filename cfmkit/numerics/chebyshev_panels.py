@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
 
+
 NODES = 16
 """Of a panel."""
 

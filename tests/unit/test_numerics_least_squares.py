@@ -5,7 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cfmkit.numerics.fit import LeastSquares, NotFinite, correlation_time, dependent_columns, solve, unidentifiable
+from cfmkit.numerics.least_squares import (
+    LeastSquares,
+    NotFinite,
+    correlation_time,
+    dependent_columns,
+    solve,
+    unidentifiable,
+)
 
 X = np.linspace(0, 1, 200)
 

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
 
+
 Loss = Literal["linear", "soft_l1", "huber", "cauchy"]
 LOSSES: tuple[Loss, ...] = ("linear", "soft_l1", "huber", "cauchy")
 
