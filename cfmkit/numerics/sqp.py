@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
 
 _FAR = 1e3  # what a point without an answer counts, in units of the objective and of the constraints
+_FALL = 1e-4  # share by which a violation falls in steps that get somewhere; where they are stuck it changes by 1e-9
 
 
 class SearchEnding(Enum):
@@ -69,6 +70,9 @@ class Effort:
     last : bool
         Whether to return the point where the steps end, though a better one was seen: of those without violation the
         best is likely to be one that just counts as such, the last one has next to none if the steps converge.
+    patience : int, optional
+        End where in so many evaluations no point without violation was seen and the worst violation has not fallen by
+        `_FALL`: the constraints contradict each other there, and the steps are the rounding of a line search.
     """
 
     steps: int = 60
@@ -77,6 +81,7 @@ class Effort:
     stop: Callable[[], bool] = _never
     enough: float = -np.inf
     last: bool = False
+    patience: int | None = None
 
 
 @dataclass(frozen=True)
@@ -186,6 +191,7 @@ class _Memory:
         self.sloped: FloatArray | None = None
         self.slope: Any = None
         self.best: tuple[tuple[float, float], FloatArray, float, FloatArray] | None = None
+        self.fell, self.since = np.inf, 0
 
     def at(self, z: FloatArray) -> Any:
         if self.point is None or not np.array_equal(z, self.point):
@@ -201,9 +207,19 @@ class _Memory:
 
     def _keep(self, z: FloatArray, objective: float, constraints: FloatArray) -> None:
         excess = _excess(constraints)
+        self._wait(excess)
         rank = (0.0, objective) if excess <= self.effort.violation else (excess, objective)
         if self.best is None or rank < self.best[0]:
             self.best = rank, z.copy(), objective, constraints
+
+    def _wait(self, excess: float) -> None:
+        patience = self.effort.patience
+        if self.fell <= self.effort.violation or patience is None:
+            return
+        if excess < (1.0 - _FALL) * self.fell:
+            self.fell, self.since = excess, self.evaluations
+        elif self.evaluations - self.since >= patience:
+            raise _Enough(SearchEnding.STUCK)
 
     def optimum(self, z: FloatArray, answer: Any, ending: SearchEnding) -> Optimum:
         """Return a point with its answer, None where the model has none."""

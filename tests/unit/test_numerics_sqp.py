@@ -172,3 +172,38 @@ def test_the_last_point_violates_less_than_the_best_of_those_whose_violation_cou
     assert best.objective < last.objective
     assert last.violation < 1e-6 < best.violation <= lax
     np.testing.assert_allclose(last.z, [-1.0, -1.0], atol=1e-5)
+
+
+def band_around(wanted: float) -> Known:
+    """Five forces between 1 and 9 N that are to be within 1 % of another one, over as long a travel as can be."""
+
+    def off(z):
+        return 100.0 * (
+            ((1.0 + z[0] + 0.1 * z[1]) ** 3 + 0.1 * np.sin(3.0 * z[2] + np.arange(5) * z[0])) / wanted - 1.0
+        )
+
+    def by(z):
+        sides = [(off(z + step) - off(z - step)) / 2e-6 for step in 1e-6 * np.eye(3)]
+        return np.column_stack(sides)
+
+    return Known(
+        lambda z: -z[2],
+        lambda z: np.array([0.0, 0.0, -1.0]),
+        lambda z: np.concatenate([1.0 - off(z), 1.0 + off(z)]),
+        lambda z: np.concatenate([-by(z), by(z)]),
+    )
+
+
+@pytest.mark.parametrize(("wanted", "reached"), [(1e-6, False), (0.1, False), (1.0, True), (2.0, True)])
+def test_a_search_with_patience_ends_where_the_constraints_cannot_be_met_and_only_there(wanted, reached):
+    bounds, start = np.array([[0.0, 1.0], [0.0, 1.0], [0.2, 3.0]]), np.full(3, 0.5)
+    hasty, patient = band_around(wanted), band_around(wanted)
+    found = minimize(hasty, start, bounds, Effort(100, violation=5e-3, last=True, patience=10))
+    usual = minimize(patient, start, bounds, Effort(100, violation=5e-3, last=True))
+    assert (found.feasible, usual.feasible) == (reached, reached)
+    assert found.violation == pytest.approx(usual.violation, rel=1e-6, abs=5e-3)
+    if reached:
+        np.testing.assert_array_equal(hasty.asked, patient.asked)
+    else:
+        assert found.ending is SearchEnding.STUCK
+        assert len(hasty.asked) < 20 < 30 < len(patient.asked)

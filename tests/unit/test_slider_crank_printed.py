@@ -414,6 +414,21 @@ def test_a_band_that_no_strip_keeps_is_infeasible() -> None:
     assert {item.name for item in found.warnings} == {"target_unreachable"}
 
 
+@pytest.mark.parametrize("force", ["1.5e-9 N", "1.1 N", "15 N"])
+def test_a_force_out_of_reach_is_refused_after_a_few_evaluations(monkeypatch: pytest.MonkeyPatch, force: str) -> None:
+    """Two to four seconds each: every derivative is one by 23 numbers."""
+    asked, states = [], StripProgram.state
+
+    def counted(program: StripProgram, z: Any) -> Any:
+        asked.append(z.copy())
+        return states(program, z)
+
+    monkeypatch.setattr(StripProgram, "state", counted)
+    found = api.design(spec("paper_ranges", f"design.force={force}"))
+    assert found.status is Status.INFEASIBLE
+    assert len(np.unique([str(z) for z in asked])) < 100
+
+
 def test_what_would_be_feasible_is_said_with_its_number() -> None:
     found = api.design(spec("taper_design", "design.force=100 N", "design.beam.nodes=3"))
     assert found.status is Status.INFEASIBLE

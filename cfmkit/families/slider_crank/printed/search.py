@@ -53,8 +53,13 @@ def descend(
     clock : Clock
         When it is late, the search ends, too.
     """
-    return minimize(program, start, bounds, Effort(steps, tolerance, VIOLATION, clock.late, last=True))
+    return minimize(
+        program, start, bounds, Effort(steps, tolerance, VIOLATION, clock.late, last=True, patience=PATIENCE)
+    )
 
+
+PATIENCE = 20
+"""Evaluations without a smaller violation after which a search is stuck: two of the solver's line searches."""
 
 COARSE = 5
 """Thicknesses of the first tapered strip; then twice as many intervals each time."""
@@ -233,7 +238,7 @@ def search(
     found = [work.read(outcome.records[number]) for number in sorted(outcome.records)]
     best = min(found, key=lambda one: _rank(one.descent))
     if task.goal == "stroke" and not (best.descent.feasible and best.descent.ending is SearchEnding.OPTIMUM):
-        best = min(best, _tightened(work), key=lambda one: _rank(one.descent))
+        best = min(filter(None, (best, _tightened(work))), key=lambda one: _rank(one.descent))
     return replace(best, lost=outcome.lost)
 
 
@@ -283,10 +288,11 @@ def _climb(start: OneStart, steps: tuple[int, ...], factors: FloatArray | None) 
     return Found(task, form, ranges, program, descent, start.uniform)
 
 
-def _tightened(start: OneStart) -> Found:
+def _tightened(start: OneStart) -> Found | None:
     """Return the outcome of a band that begins as wide as the uniform strip needs it, and is made narrower in steps.
 
-    Where a band is out of reach of the first strip, the steps towards it get stuck; those within bands do not.
+    Where a band is out of reach of the first strip, the steps towards it get stuck; those within bands do not. None
+    where a wide band is missed by more than its own width: a narrower one is not reached from there.
     """
     task, form, ranges, uniform = start.task, start.form, start.ranges, start.uniform
     x, last = _begin(task, form, ranges, uniform, form.count)
@@ -296,6 +302,8 @@ def _tightened(start: OneStart) -> Found:
         program = StripProgram(replace(task, ripple=float(ripple)), form)
         begin = np.append(x, last)
         descent = descend(program, begin, _bounds(task, ranges, form, form.count), clock=start.clock)
+        if ripple > task.ripple and 0.01 * descent.violation > ripple:
+            return None
         x, last = descent.z[: form.size], descent.z[-1]
     return Found(task, form, ranges, program, descent, uniform)
 
