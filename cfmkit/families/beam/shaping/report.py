@@ -124,7 +124,7 @@ def _held(held: tuple[str, ...]) -> tuple[str, str]:
 
 
 def starts_table(task: Task, result: Explored) -> Table:
-    """Return one row a start, in order."""
+    """Return one row per start, in order."""
     from cfmkit.tables import Table, TableColumn
 
     rows = [(index, one) for index, one in result.found.items() if one is not None]
