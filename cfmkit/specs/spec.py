@@ -76,7 +76,7 @@ class Analysis(Model):
     points: int = Field(481, ge=5, le=1_000_000, description="points per branch of the curve")
     window: Ends | None = Field(
         None,
-        description="where the metrics are taken, e.g. [2 mm, 240 mm] or, in shares of the travel, [1 %, 100 %]; "
+        description="where the metrics are evaluated, e.g. [2 mm, 240 mm] or, in shares of the travel, [1 %, 100 %]; "
         "default: the full travel",
     )
     band: Annotated[Ratio, Field(gt=0, lt=1)] = Field(
@@ -102,7 +102,7 @@ class Sweep(Model):
     combine: Literal["grid", "zip", "lhs", "sobol"] = Field(
         "grid",
         description=(
-            "every combination, values side by side, a Latin hypercube or a Sobol sequence; "
+            "all combinations, values in step, a Latin hypercube or a Sobol sequence; "
             "ranges of the last two are 'start:stop'"
         ),
     )
@@ -122,8 +122,10 @@ class Tolerance(Model):
     """How far a value may be off its nominal one; a percentage is of the nominal value."""
 
     normal: MetricValue | None = Field(None, description="standard deviation, e.g. '0.1 mm' or '2 %'")
-    uniform: MetricValue | None = Field(None, description="half width of a range in which every value is as likely")
-    truncate: MetricValue | None = Field(None, description="parts farther off than this are sorted out before assembly")
+    uniform: MetricValue | None = Field(
+        None, description="half width of a range in which all values are equally likely"
+    )
+    truncate: MetricValue | None = Field(None, description="parts that deviate by more are rejected before assembly")
 
     @model_validator(mode="after")
     def _one_distribution(self) -> Self:
@@ -138,9 +140,11 @@ class Correlated(Model):
     """Parameters that deviate together, such as all springs of one batch."""
 
     parameters: tuple[str, ...] = Field(
-        min_length=1, description="paths as under 'parameters'; `.*` takes a list whole"
+        min_length=1, description="paths as under 'parameters'; `.*` is every item of a list"
     )
-    correlation: Ratio = Field(1.0, ge=-1, le=1, description="of each two of them; 1: all are off by the same share")
+    correlation: Ratio = Field(
+        1.0, ge=-1, le=1, description="between any two of them; 1: all deviate by the same share"
+    )
 
 
 class Sensitivity(Model):
@@ -156,7 +160,7 @@ class Sensitivity(Model):
     samples: int | None = Field(
         None, ge=2, description="oat: points per parameter; morris: trajectories; sobol: base samples; tolerance: parts"
     )
-    seed: int | None = Field(None, ge=0, description="of everything random; `--seed` goes before")
+    seed: int | None = Field(None, ge=0, description="of everything random; `--seed` takes precedence")
     metrics: tuple[str, ...] = Field((), description="default: those of the requirements, over their windows")
     on_failure: Literal["fail", "resample", "bound"] = Field(
         "fail",

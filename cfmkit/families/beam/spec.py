@@ -80,9 +80,9 @@ class Rescale(Model):
     """Another size, section or material for a force curve of the same form, by Eq. 6 of Lan."""
 
     force: Annotated[Force, Field(gt=0)] | None = Field(
-        None, description="force wanted at the end of the window; default: what the changes give"
+        None, description="target force at the end of the window; default: what the changes give"
     )
-    free: Literal["width", "thickness", "size"] = Field("width", description="what follows from the force wanted")
+    free: Literal["width", "thickness", "size"] = Field("width", description="what is adapted to reach the force")
     size: PositiveLength | None = Field(None, description="distance of the outermost nodes along x (L_x of Lan)")
     material: MaterialField | None = Field(None, description="another material")
     thickness: PositiveLength | None = Field(None, description="another (largest) thickness in the plane")
@@ -124,12 +124,14 @@ class Outputs(Model):
 class SolidAnalysis(Model):
     """How the part is solved as a planar solid."""
 
-    poses: int = Field(21, ge=3, le=2000, description="poses that are solved, rest included; cubics lead between them")
+    poses: int = Field(
+        21, ge=3, le=2000, description="poses that are solved, rest included; cubics interpolate between them"
+    )
     mesh: PositiveLength | None = Field(
         None, description="side of an element; default: half the thickness of the thinnest beam"
     )
     law: Literal["st-venant-kirchhoff", "neo-hookean"] = Field(
-        "st-venant-kirchhoff", description="how the material answers to large strain"
+        "st-venant-kirchhoff", description="material law at large strain"
     )
 
 
@@ -140,7 +142,7 @@ class BeamAnalysis(Analysis):
     travel: Displacement | None = Field(None, description="displacement or angle to go to, for drives by motion")
     force: Force | None = Field(None, description="to go to, of all copies together, for a drive by a force")
     moment: Torque | None = Field(None, description="to go to, for a drive by a moment")
-    factor: Factor | None = Field(None, description="to go to, for a drive by loads: so many times what is given")
+    factor: Factor | None = Field(None, description="to go to, for a drive by loads: a multiple of what is given")
     reference: Displacement | None = Field(None, description="pose of the band ranges; default: centre of the window")
     fidelity: Fidelity | None = Field(
         None,

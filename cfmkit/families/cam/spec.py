@@ -208,8 +208,8 @@ class CatalogueSpring(Model):
 class CamDesign(Model):
     """What `cfmkit design` is to reach, and what it may choose."""
 
-    force: Annotated[Force, Field(gt=0)] = Field(description="constant force wanted, weight included if gravity is on")
-    stroke: PositiveLength = Field(description="slider travel wanted")
+    force: Annotated[Force, Field(gt=0)] = Field(description="target force, weight included if gravity is on")
+    stroke: PositiveLength = Field(description="target travel of the slider")
     choose: Literal["force-constant", "stiffness", "catalogue"] = Field(
         "force-constant",
         description="what follows from F = 4KA: A from the springs, the stiffness from A, or both from a catalogue",
@@ -248,7 +248,7 @@ class Dynamics(Model):
         "inverse",
         description=(
             "inverse dynamics with closed kinematics, or nine coordinates with Lagrange multipliers; "
-            "'direct' is an old word for 'inverse'"
+            "'direct' is a deprecated name of 'inverse'"
         ),
     )
 
@@ -272,7 +272,7 @@ class Manufacturing(Model):
     wavelength: Annotated[Length, Field(gt=0)] = Field(0.010, description="of the shortest waves")
     offset: Annotated[Length, Field(ge=0)] = Field(0.0, description="of the material left on a whole flank")
     angle: Annotated[Angle, Field(ge=0)] = Field(0.0, description="of the angle at which a flank is cut")
-    samples: int = Field(200, ge=10, le=100_000, description="cams that are drawn")
+    samples: int = Field(200, ge=10, le=100_000, description="random cams to evaluate")
 
 
 class CamAnalysis(Analysis):

@@ -22,7 +22,7 @@ class LeafMaterial(MaterialSpec):
     """A material that also takes the old word of this family for how much of its strength may be used."""
 
     allowable_stress: PositiveStress | None = Field(
-        None, description="old word: the 'yield_strength' where 'safety_factor' is 1", exclude=True
+        None, description="deprecated: the 'yield_strength' where 'safety_factor' is 1", exclude=True
     )
 
     @model_validator(mode="after")
@@ -83,7 +83,7 @@ class Bistable(Model):
         None, description="thickness of a hybrid leaf's middle over that of its flexures; default 4"
     )
     waviness: NonNegativeLength = Field(
-        0.0, description="how far a leaf as made is off its shape, in the form in which it buckles; exact model only"
+        0.0, description="deviation of a leaf as made from its shape, in its buckling mode; exact model only"
     )
 
     @property
@@ -155,14 +155,14 @@ class VcfmDesign(Model):
     force: Annotated[Force, Field(gt=0)] = Field(description="constant force without preload")
     adjustment: Annotated[Force, Field(gt=0)] = Field(description="by how much the preload raises it")
     stroke: PositiveLength = Field(description="travel over which it is constant")
-    preload: PositiveLength | None = Field(None, description="preload that raises it so far")
+    preload: PositiveLength | None = Field(None, description="preload that raises it by that much")
     rise: PositiveLength | None = Field(None, description="of the leaves, h; instead of 'preload'")
     leaf_length: PositiveLength | None = Field(None, description="L2 to take; default: the shortest within the stress")
     min_thickness: PositiveLength | None = Field(None, description="thinnest leaf that can be made")
     max_span: PositiveLength | None = Field(
-        None, description="room across the motion between the walls, 2 L cos(theta)"
+        None, description="space across the motion between the walls, 2 L cos(theta)"
     )
-    max_width: PositiveLength | None = Field(None, description="room out of the plane")
+    max_width: PositiveLength | None = Field(None, description="space out of the plane")
     refine: bool = Field(True, description="correct both widths by one pass of the exact model")
 
     @model_validator(mode="after")
@@ -207,7 +207,8 @@ class VcfmAnalysis(Analysis):
         "for hybrid leaves the default is exact",
     )
     branch: Literal["stable", "primary"] = Field(
-        "stable", description="where a leaf buckles: leave for the stable form, or stay on the S form; exact model only"
+        "stable",
+        description="where a leaf buckles: switch to the stable branch, or stay on the S shape; exact model only",
     )
     flatness: Annotated[Ratio, Field(gt=0, lt=1)] = Field(
         0.05, description="(max - min)/max of the force in what counts as the constant-force window"

@@ -219,7 +219,7 @@ class Mechanism(Model):
         description="in the plane of bending (w of Lan); or [[fraction, thickness], ...], linear between"
     )
     width: PositiveLength = Field(description="out of the plane (t of Lan)")
-    axial: bool = Field(False, description="whether beams stretch; `analysis.fidelity` goes before")
+    axial: bool = Field(False, description="whether beams stretch; `analysis.fidelity` takes precedence")
     shear: bool = Field(False, description="whether beams shear, too")
     closure: Literal["rotscale", "chain", "raw"] = Field(
         "rotscale",
@@ -234,7 +234,7 @@ class Mechanism(Model):
     springs: dict[str, SpringSpec] = Field({}, description="by name; of `kind` line, torsion or slide")
     loads: tuple[LoadSpec, ...] = Field((), description="constant loads; of `kind` point or line")
     drive: DriveSpec = Field(description="what is done to it; of `kind` displacement, rotation, force, moment or loads")
-    copies: Copies | None = Field(None, description="how often what is described here occurs")
+    copies: Copies | None = Field(None, description="how many copies there are of what is described here")
     part: PartSpec | None = Field(None, description="how it is cut: fillets, smallest gap and feature")
 
     @field_validator("thickness")

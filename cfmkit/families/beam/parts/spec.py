@@ -77,13 +77,13 @@ class NodeSpec(Model):
     support: Literal["free", "clamped", "pinned", "guided", "roller", "parallel"] = Field(
         "free",
         description=(
-            "guided slides along its direction and does not turn, a roller does turn; parallel goes anywhere, unturned"
+            "guided slides along its direction and does not turn, a roller does turn; parallel moves, but does not turn"
         ),
     )
     direction: Angle | None = Field(None, description="along which a guided node or a roller slides; from the x axis")
     moved: Moved | None = Field(None, description="a prescribed displacement of what the support holds")
     mass: Annotated[Mass, Field(ge=0)] | None = Field(
-        None, description="what is fixed to the node weighs so much, for natural frequencies; it has no weight"
+        None, description="mass of what is fixed to the node, for natural frequencies; no weight acts on it"
     )
     inertia: Annotated[Inertia, Field(ge=0)] | None = Field(None, description="its moment of inertia about the node")
 
@@ -238,7 +238,7 @@ class TorsionSpringSpec(Model):
     end: str = Field(description="node")
     start: str | None = Field(None, description="node it turns against; default: the ground")
     stiffness: Annotated[RotationalStiffness, Field(gt=0)] = Field(description="moment per angle")
-    free_angle: Angle = Field(0.0, description="rotation of end less that of start at which it is relaxed")
+    free_angle: Angle = Field(0.0, description="rotation of end minus that of start at which it is relaxed")
 
 
 class SlideSpringSpec(Model):

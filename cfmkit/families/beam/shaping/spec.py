@@ -52,8 +52,8 @@ def _check_increasing(x: Range | None, y: Range | None) -> None:
 class ForceWanted(Model):
     """The mean force over the window, of all copies together."""
 
-    min: Annotated[Force, Field(gt=0)] | None = Field(None, description="at least so much")
-    target: Annotated[Force, Field(gt=0)] | None = Field(None, description="so much, within `tolerance`")
+    min: Annotated[Force, Field(gt=0)] | None = Field(None, description="smallest value")
+    target: Annotated[Force, Field(gt=0)] | None = Field(None, description="value to reach, within `tolerance`")
     tolerance: Annotated[Ratio, Field(gt=0, lt=1)] = Field(0.01, description="share of the target")
 
     @model_validator(mode="after")
@@ -86,7 +86,7 @@ class Tolerances(Model):
 
     nodes: Annotated[Length, Field(ge=0)] = Field(1e-4, description="of the coordinates of free nodes")
     coefficients: Annotated[Angle, Field(ge=0)] = Field(0.02, description="of the shape coefficients c1, c2, ...")
-    samples: int = Field(40, ge=2, le=10_000, description="networks that are drawn")
+    samples: int = Field(40, ge=2, le=10_000, description="random networks to evaluate")
 
 
 class Optimise(Model):
@@ -112,7 +112,7 @@ class Optimise(Model):
     starts: int = Field(20, ge=1, le=10_000, description="random starts")
     drawn: int = Field(60, ge=1, le=100_000, description="random networks looked at for each start")
     widened: int = Field(8, ge=1, le=10_000, description="how many of the best are widened, for `range`")
-    time_budget: Annotated[Time, Field(gt=0)] | None = Field(None, description="end the search after so long")
+    time_budget: Annotated[Time, Field(gt=0)] | None = Field(None, description="end the search after this time")
     tolerances: Tolerances = Field(default_factory=Tolerances, description="for the audit")
 
     @model_validator(mode="after")

@@ -65,7 +65,9 @@ class StripSpec(Model):
     centreline: Annotated[tuple[Point, ...], Field(min_length=2)] | None = Field(
         None, description="corners [x, y] from the ground to the slider instead, the pivot at [0, 0]"
     )
-    offset: Length = Field(0.0, description="printed thicker than drawn by so much everywhere; negative: thinner")
+    offset: Length = Field(
+        0.0, description="by how much the printed part is thicker than drawn, everywhere; negative: thinner"
+    )
 
     @property
     def values(self) -> tuple[float, ...]:

@@ -50,12 +50,12 @@ class SpringDesign(Model):
     """What the springs are to keep constant, and what may be chosen for it."""
 
     torque: Torque | None = Field(
-        None, description="wanted at the crank, all legs together; negative: towards smaller angles"
+        None, description="target at the crank, all legs together; negative: towards smaller angles"
     )
-    force: PositiveForce | None = Field(None, description="wanted at the slider, all legs together")
-    angle: tuple[Angle, Angle] | None = Field(None, description="crank angles at which the torque is wanted")
+    force: PositiveForce | None = Field(None, description="target at the slider, all legs together")
+    angle: tuple[Angle, Angle] | None = Field(None, description="crank angles over which the torque is to be held")
     travel: tuple[Length, Length] | None = Field(
-        None, description="slider travel over which the force is wanted; without window: the widest at `tolerance`"
+        None, description="slider travel over which the force is to be held; without window: the widest at `tolerance`"
     )
     angle_within: tuple[Angle, Angle] | None = Field(
         None, description="crank angles among which the widest window is looked for; default: all that can be reached"
@@ -64,13 +64,13 @@ class SpringDesign(Model):
         None, description="slider travel in which the widest window is looked for; default: all that can be reached"
     )
     tolerance: Annotated[Ratio, Field(gt=0, lt=1)] | None = Field(
-        None, description="largest deviation allowed, as a fraction of what is wanted"
+        None, description="largest deviation allowed, as a fraction of the target"
     )
     objective: Literal["minimax", "least-squares"] = Field(
-        "minimax", description="smallest largest deviation, or smallest root mean square"
+        "minimax", description="minimise the largest deviation, or the root mean square"
     )
     stiffness: RotationalStiffness | None = Field(
-        None, description="slope wanted of the torque: it is then to follow a line through the stretched position"
+        None, description="target slope of the torque, which then follows a line through the stretched position"
     )
     hold_stiffness: bool = Field(
         False, description="the slope in the stretched position exactly; the torque itself as constant as that allows"
@@ -91,10 +91,10 @@ class SpringDesign(Model):
     )
     points: int = Field(100, ge=10, le=10_000, description="points of the window, its start left out")
     slack: Annotated[Ratio, Field(ge=0, lt=1)] = Field(
-        0.0, description="how much more deviation than the best is as good: among those designs `prefer` decides"
+        0.0, description="deviation beyond the best that counts as equally good: among those designs `prefer` decides"
     )
     prefer: Literal["small-rotation", "even-rates", "soft-springs"] = Field(
-        "small-rotation", description="which of several designs that are as good"
+        "small-rotation", description="which of several equally good designs to take"
     )
 
     @model_validator(mode="after")
