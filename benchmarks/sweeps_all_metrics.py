@@ -41,17 +41,17 @@ ROUNDS = 3
 def measured(name: str, configs: Path, singly: bool) -> tuple[float, int, bool]:
     """Return processor time of a sweep [s], its rows, and whether blocks were used."""
     import cfmkit
-    from cfmkit.studies import engine
-    from cfmkit.studies.sweep import SweepRequest, outputs, prepare, summary_of
+    from cfmkit.studies import engine, sweep
     from cfmkit.studies.variation import wish
 
     file, *vary = SWEEPS[name]
-    work = prepare(cfmkit.load(configs / file), SweepRequest(vary=tuple(wish(one) for one in vary)))
+    request = getattr(sweep, "SweepRequest", None) or sweep.Request  # as older checkouts call it
+    work = sweep.prepare(cfmkit.load(configs / file), request(vary=tuple(wish(one) for one in vary)))
     if singly:
         engine.vectorised = lambda *_: False
     start = time.process_time()
     records = engine.run(work)
-    b"".join(dict(outputs(records, summary_of(records)))["results.csv"])
+    b"".join(dict(sweep.outputs(records, sweep.summary_of(records)))["results.csv"])
     return time.process_time() - start, len(work.plan), work.vectorised
 
 
