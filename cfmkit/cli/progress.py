@@ -53,8 +53,8 @@ class StudyProgress:
         self._marks: list[tuple[float, int]] = [(self._start, 0)]
 
     def total(self, points: int) -> None:
-        """Take how many points there are."""
-        self._all = points
+        """Take how many points there are; a study that draws points again adds them to those that are done."""
+        self._all = self._done + points
 
     def done(self, points: int, failed: int, reused: bool) -> None:
         """Take that more points are finished."""

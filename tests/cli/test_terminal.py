@@ -133,6 +133,17 @@ def test_a_study_says_what_it_counts(monkeypatch, capsys, things):
     assert f"stopping after the {things} that run now" in told
 
 
+def test_points_that_are_drawn_again_are_counted_with_those_before(monkeypatch, capsys):
+    from cfmkit.cli import progress
+
+    monkeypatch.setattr(progress, "LINE_EVERY", 0.0)
+    with progress.watching(type("Screen", (), {"json": False, "quiet": False})()) as monitor:
+        for points in (4, 2):
+            monitor.total(points)
+            monitor.done(points, 0, False)
+    assert "6 of 6 points" in capsys.readouterr().err
+
+
 def test_progress_is_shown_where_somebody_watches(monkeypatch):
     assert "solving" in reported(monkeypatch, Watched(), Terminal())
 
