@@ -47,9 +47,7 @@ def folder() -> Path:
     cfmkit.errors.UsageError
         If this installation has none.
     """
-    import cfmkit
-
-    package = Path(cfmkit.__file__).parent
+    package = Path(__file__).parents[1]
     for place in (package / "configs", package.parent / "configs"):
         if (place / "cam.yaml").is_file():
             return place

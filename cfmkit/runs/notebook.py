@@ -61,10 +61,10 @@ class Analysis(Result):
 
     def _picture(self) -> str:
         """Return the first figure as SVG; nothing where there is none."""
-        from cfmkit import api
+        from cfmkit.plots.figures import figures
         from cfmkit.plots.formats import inline, svg
 
-        name, draw = next(iter(api.figures(self).items()), ("", None))
+        name, draw = next(iter(figures(family(self.spec.family), self).items()), ("", None))
         return "" if draw is None else inline(svg(draw()), name)
 
 

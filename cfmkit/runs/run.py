@@ -14,6 +14,7 @@ from cfmkit.errors import SpecError, UsageError
 from cfmkit.families.base import Run
 from cfmkit.results import Status
 from cfmkit.runs import report
+from cfmkit.runs.files import files
 from cfmkit.runs.specfile import bind, placed, read_spec, renamed
 from cfmkit.store import RunFolder, stable_hash
 
@@ -155,7 +156,7 @@ def carry_out(
         with verb.running(folder, Run(wanted.seed, progress) if progress else Run(wanted.seed)) as run:
             found = _computed(verb, spec, run, document)
         command = shlex.join(["cfmkit", *arguments])
-        for name, data in report.files(found, wanted.plots, wanted.page, command):
+        for name, data in files(found, wanted.plots, wanted.page, command):
             folder.write(name, data)
         origin = provenance(verb.name, spec, wanted.spec, arguments)
         manifest = folder.commit(origin | dict(verb.inputs) | {"seed": wanted.seed} | _ending(found))

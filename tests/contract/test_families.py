@@ -19,6 +19,7 @@ from cfmkit.cli.verbs.new import template
 from cfmkit.export.geometry import Drawing
 from cfmkit.results import Status
 from cfmkit.runs import report
+from cfmkit.runs.files import files
 from cfmkit.specs.keys import keys
 from cfmkit.specs.units import DIMENSIONS
 
@@ -222,7 +223,7 @@ def test_the_parts_of_a_config_can_be_drawn(path):
 @every_config
 def test_the_files_of_a_run_are_the_same_every_time(path):
     found = report.report_on(api.analyze(cfmkit.load(path)))
-    one, other = (dict(report.files(found, plots=False)) for _ in range(2))
+    one, other = (dict(files(found, plots=False)) for _ in range(2))
     assert {"metrics.json", "resolved.yaml", "curve.csv"} <= set(one)
     assert one == other
 

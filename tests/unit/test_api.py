@@ -14,6 +14,7 @@ from cfmkit import families
 from cfmkit.errors import ExitCode
 from cfmkit.results import Design, Finding, Result, Status
 from cfmkit.runs import report, specfile
+from cfmkit.runs.files import files
 from cfmkit.specs import keys
 from cfmkit.specs.yamlio import read_document
 
@@ -125,7 +126,7 @@ def test_a_report_without_a_curve_has_no_metrics_and_misses_its_requirements(spe
     assert len(found.missed) == len(spec.requirements)
     assert found.exit_code is ExitCode.NO_SOLUTION
     assert found.as_json()["message"] == "too much"
-    assert [name for name, _ in report.files(found)] == ["metrics.json", "resolved.yaml"]
+    assert [name for name, _ in files(found)] == ["metrics.json", "resolved.yaml"]
 
 
 def test_warnings_of_design_and_analysis_are_told_once(spec):

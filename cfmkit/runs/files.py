@@ -1,0 +1,98 @@
+"""What a run found out, as the files that it writes.
+
+`files` yields them, with curve, figures and geometry, by name below the output folder. Nothing here touches a disk, and
+nothing depends on the time: the same result gives the same bytes.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from cfmkit import api
+from cfmkit.errors import SolutionError
+from cfmkit.tables.jsontext import json_bytes
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    from matplotlib.figure import Figure
+
+    from cfmkit.runs.report import Report
+    from cfmkit.specs.spec import Spec
+
+
+def files(report: Report, plots: bool = True, page: bool = False, command: str = "") -> Iterator[tuple[str, bytes]]:
+    """Yield every file of a run as (name below the folder, content), each when it is needed.
+
+    Parameters
+    ----------
+    report : Report
+        Of any status: without a curve only what is known is written.
+    plots : bool
+        Whether to draw figures.
+    page : bool
+        Whether to write ``report.html``, which has the figures as well.
+    command : str
+        What the page says about how the run was started.
+    """
+    result, designed = report.result, report.design.spec if report.design else None
+    if designed is not None:
+        yield "design.yaml", api.dumps(designed).encode()
+    if curves := report.supplement.curves or result.curves:
+        from cfmkit.tables import curve_table, to_csv
+
+        yield "curve.csv", to_csv(curve_table(curves))
+        for stem, table in result.tables.items():
+            yield f"{stem}.csv", to_csv(table())
+    yield "metrics.json", json_bytes(report.as_json())
+    yield "resolved.yaml", api.dumps(api.resolve(result.spec), complete=True).encode()
+    yield from sources(result.spec)
+    if designed is not None and result.status.usable:
+        yield from geometry(result.spec)
+    drawn = {stem: draw() for stem, draw in api.figures(result).items()} if plots or page else {}
+    if plots:
+        yield from pictures(drawn)
+    more: dict[str, bytes] = {}
+    for name, make in report.supplement.files.items():
+        figure = name.startswith("figures/")
+        content = make() if plots or page or not figure else b""
+        if figure:
+            more |= {name.removeprefix("figures/").removesuffix(".png"): content}
+        if plots or not figure:
+            yield name, content
+    if page:
+        from cfmkit.runs import run_page
+
+        yield run_page.NAME, run_page.page(report, drawn, more, command)
+
+
+def sources(spec: Spec) -> Iterator[tuple[str, bytes]]:
+    """Yield the data files that a specification names, under the same names: resolved.yaml names them, too."""
+    from cfmkit.tables.source import named_in
+
+    for source in named_in(spec.model_dump()):
+        yield str(source), source.path.read_bytes()
+
+
+def geometry(spec: Spec) -> Iterator[tuple[str, bytes]]:
+    """Yield what is to be cut or printed, below ``geometry/``; nothing where there is no part."""
+    from cfmkit.families import family
+
+    if family(spec.family).outline:
+        from cfmkit.export import files as drawn
+
+        try:
+            drawing = api.drawing(spec)
+        except SolutionError:  # the analysis has a curve all the same, and a warning that says why
+            return
+        for name, data in drawn(drawing).items():
+            yield f"geometry/{name}", data
+
+
+def pictures(drawn: Mapping[str, Figure]) -> Iterator[tuple[str, bytes]]:
+    """Yield the figures of a result as PNG, below ``figures/``."""
+    if drawn:
+        from cfmkit.plots.style import png
+
+        for stem, figure in drawn.items():
+            yield f"figures/{stem}.png", png(figure)
