@@ -20,14 +20,12 @@ from cfmkit.families.beam.shaping.closer import looked_at
 from cfmkit.families.beam.shaping.design import shaped, task_of
 from cfmkit.families.beam.shaping.goals import Compared, Flattest, Widest
 from cfmkit.families.beam.shaping.infeasible import blocked, missed_by
-from cfmkit.families.beam.shaping.judging import judged, written
-from cfmkit.families.beam.shaping.lengths import lengths
 from cfmkit.families.beam.shaping.multistart import explored
 from cfmkit.families.beam.shaping.program import Shaping
+from cfmkit.families.beam.shaping.report import judged, written
 from cfmkit.families.beam.shaping.search import Found, Plan, confirmed, improved, searched
-from cfmkit.families.beam.shaping.starts import candidates, sound
 from cfmkit.families.beam.shaping.task import MARGIN, Limits, Task
-from cfmkit.families.beam.shaping.variables import Variables
+from cfmkit.families.beam.shaping.variables import Variables, candidates, lengths, sound
 from cfmkit.results import Status
 
 TABLE_3 = np.array([0.0, 30.5, 18.77, 12.44, 24.0, 1.3092, -1.5707, -0.7560, 1.5707, 0.3013, 1.5707, 0.226, -1.148])

@@ -10,9 +10,8 @@ from cfmkit.families.beam.build import assemble
 from cfmkit.families.beam.findings import finding, percent
 from cfmkit.families.beam.shaping.audit import Spread, tolerated
 from cfmkit.families.beam.shaping.infeasible import blocked, held_by
-from cfmkit.families.beam.shaping.judging import Judged, judged
 from cfmkit.families.beam.shaping.multistart import Explored, explored, ranked
-from cfmkit.families.beam.shaping.report import notes_of, search_of, starts_table
+from cfmkit.families.beam.shaping.report import Judged, judged, notes_of, search_of, starts_table
 from cfmkit.families.beam.shaping.search import Plan, finished, widened
 from cfmkit.families.beam.shaping.task import MARGIN, Coordinate, Limits, Task
 from cfmkit.families.beam.shaping.variables import Variables

@@ -20,7 +20,7 @@ import numpy as np
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.beam.shaping.limits import View
+    from cfmkit.families.beam.shaping.response import View
 
 LEAST_MIDDLE = 1e-3
 _FINER = 3

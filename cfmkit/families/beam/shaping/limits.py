@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.designing.program import Rows
 from cfmkit.families.beam.build import thickest_of
 from cfmkit.families.beam.shaping.separation import Pair, pairs, separations
 from cfmkit.numerics.sampled_extremes import largest
@@ -16,10 +14,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.elastica import Section
-    from cfmkit.families.beam.shaping.lengths import Length
-    from cfmkit.families.beam.shaping.poses import Poses
-    from cfmkit.families.beam.shaping.response import Response
+    from cfmkit.designing.program import Rows
+    from cfmkit.families.beam.shaping.response import View
+
 
 SIDES = {
     "stress": ("left side", "right side"),
@@ -28,31 +25,6 @@ SIDES = {
     "x": ("right", "left"),
     "y": ("top", "bottom"),
 }
-
-
-@dataclass(frozen=True, eq=False)
-class View:
-    """What the limits look at: the response at the poses of a window from `start`, with derivatives or without."""
-
-    response: Response
-    poses: Poses
-    start: float
-    sloped: bool = False
-
-    @property
-    def lengths(self) -> dict[str, Length]:
-        """Lengths of all beams."""
-        return self.response.lengths
-
-    def rows(
-        self, name: str, values: FloatArray, slopes: Callable[[], FloatArray], about: Callable[[], list[str]]
-    ) -> Rows:
-        """Return rows of a limit; the derivatives are computed only if they are wanted."""
-        return Rows(name, values.ravel(), slopes().reshape(values.size, -1) if self.sloped else None, about)
-
-    def section(self, beam: str) -> Section:
-        """Return the section of a beam."""
-        return self.response.variables.task.network.beams[beam].section
 
 
 def stress(view: View) -> list[Rows]:

@@ -10,9 +10,8 @@ import numpy as np
 from cfmkit.designing import program
 from cfmkit.designing.limits import worst
 from cfmkit.designing.program import Rows, Seen
-from cfmkit.families.beam.shaping.limits import LIMITS, View
-from cfmkit.families.beam.shaping.poses import Poses, poses_of
-from cfmkit.families.beam.shaping.response import NoAnswer, respond
+from cfmkit.families.beam.shaping.limits import LIMITS
+from cfmkit.families.beam.shaping.response import NoAnswer, Poses, View, poses_of, respond
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray

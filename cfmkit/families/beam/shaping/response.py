@@ -1,4 +1,7 @@
-"""What the engine answers for one vector of design variables: force, centre lines and stresses, with exact slopes."""
+"""What the engine answers for one vector of design variables: force, centre lines and stresses, with exact slopes.
+
+It is asked at some poses: rest, some on the way, the window, the two that the paper compares.
+"""
 
 from __future__ import annotations
 
@@ -8,14 +11,67 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cfmkit.arrays import read_only
+from cfmkit.designing.program import Rows
 from cfmkit.elastica import Control, Displacement, PathStatus, Taper, gradient, trace
 from cfmkit.errors import CfmError
-from cfmkit.families.beam.shaping.lengths import Length, lengths
+from cfmkit.families.beam.shaping.variables import Length, lengths
+from cfmkit.numerics.quadrature import clenshaw_curtis
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica import Path, Section
+    from cfmkit.families.beam.shaping.task import Task
     from cfmkit.families.beam.shaping.variables import Variables
+
+
+_EACH = 8  # poses of the window for one before it
+
+_MIDDLE = 0.7  # of the end: a pose under load that stays where it is while the window grows
+
+
+@dataclass(frozen=True)
+class Poses:
+    """Displacements, and which of them are what.
+
+    Attributes
+    ----------
+    at : (p,) array
+        From rest, increasing [m].
+    window : (j,) array
+        Indices of those in the window.
+    shown : (3,) array
+        Indices of those at which gaps are looked at: rest, on the way, and the end.
+    mean : (p,) array
+        Weights of the mean over the window.
+    compared : (2,) array
+        Indices of a and b; of the end where the paper's objective is not requested.
+    """
+
+    at: FloatArray
+    window: Any
+    shown: Any
+    mean: FloatArray
+    compared: Any
+
+
+def poses_of(task: Task, start: float) -> Poses:
+    """Return the poses for a window that begins at `start` [m]."""
+    end = task.window[1]
+    inside = start + 0.5 * (end - start) * (1 - np.cos(np.linspace(0, np.pi, task.points)))
+    inside[-1] = end
+    before = np.linspace(0.0, start, task.points // _EACH + 2)[1:-1] if start > 0 else np.zeros(0)
+    also = np.array(task.compared or (end, end))
+    middle = _MIDDLE * end
+    at = np.unique(np.concatenate([[0.0], before, inside, also, [middle]]))
+    window = np.searchsorted(at, inside)
+    mean = np.zeros(len(at))
+    mean[window] = clenshaw_curtis(task.points)
+    shown = np.array([0, np.searchsorted(at, middle), window[-1]])
+    return Poses(read_only(at), window, shown, read_only(mean), np.searchsorted(at, also))
+
 
 # A design that loses stability in the window is no answer; the audit looks at branches.
 CONTROL = Control(tolerance=1e-5, branch="stop", most_points=200)
@@ -152,3 +208,28 @@ def _stress_of_moment(section: Section, place: FloatArray) -> FloatArray:
         np.interp(place, given.stations, given.values) if isinstance(given, Taper) else np.full(len(place), given)
     )
     return np.asarray(6.0 / (section.width * thickness**2))
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """What the limits look at: the response at the poses of a window from `start`, with derivatives or without."""
+
+    response: Response
+    poses: Poses
+    start: float
+    sloped: bool = False
+
+    @property
+    def lengths(self) -> dict[str, Length]:
+        """Lengths of all beams."""
+        return self.response.lengths
+
+    def rows(
+        self, name: str, values: FloatArray, slopes: Callable[[], FloatArray], about: Callable[[], list[str]]
+    ) -> Rows:
+        """Return rows of a limit; the derivatives are computed only if they are wanted."""
+        return Rows(name, values.ravel(), slopes().reshape(values.size, -1) if self.sloped else None, about)
+
+    def section(self, beam: str) -> Section:
+        """Return the section of a beam."""
+        return self.response.variables.task.network.beams[beam].section

@@ -22,8 +22,7 @@ from cfmkit.families.beam.shaping.closer import CloseView, looked_at
 from cfmkit.families.beam.shaping.goals import Compared, Flattest, Widest, window_force
 from cfmkit.families.beam.shaping.limits import LIMITS
 from cfmkit.families.beam.shaping.program import Shaping
-from cfmkit.families.beam.shaping.starts import candidates
-from cfmkit.families.beam.shaping.variables import Variables
+from cfmkit.families.beam.shaping.variables import Variables, candidates
 from cfmkit.numerics.sqp import Effort, Optimum, minimize
 
 if TYPE_CHECKING:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica import Network
-    from cfmkit.families.beam.shaping.limits import View
+    from cfmkit.families.beam.shaping.response import View
 
 SHARPNESS = 25.0
 _PLACES = 16

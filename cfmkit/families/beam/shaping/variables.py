@@ -1,7 +1,10 @@
-"""The design variables: free node coordinates and shape coefficients, closure eliminated.
+"""The design variables: free node coordinates and shape coefficients, closure eliminated; lengths, and random ones.
 
 Angle and length of a beam follow from its chord: a shape is turned and scaled to fit between its nodes. So of
 eta = c0 + c1 u + ... only c1, c2, ... vary, and none of the closure equations of [Lan, table 1] is a constraint.
+
+Random variables put free nodes anywhere, with beams straight or bent at random, no chord crossing another, none too
+short.
 
 Reference
 ---------
@@ -12,13 +15,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cfmkit.elastica import Network, Polynomial
+from cfmkit.elastica.model.beam import fit
+from cfmkit.families.beam.build import thickest_of
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from cfmkit.arrays import FloatArray
     from cfmkit.families.beam.shaping.task import Task
 
@@ -82,3 +90,128 @@ class Variables:
         wider = np.zeros((len(self.task.shaped), order))
         wider[:, : rows.shape[1]] = rows
         return Variables(self.task, order), np.concatenate([x[:places], wider.ravel()])
+
+
+_U, _W = np.polynomial.legendre.leggauss(24)
+
+_U, _W = 0.5 * (_U + 1), 0.5 * _W
+
+_TINY = 1e-30
+
+
+@dataclass(frozen=True)
+class Length:
+    """Arc length [m] and chord over arc length [1] of one beam, and their derivatives by the variables (k,)."""
+
+    length: float
+    straightness: float
+    by_length: FloatArray
+    by_straightness: FloatArray
+
+
+def lengths(variables: Variables, x: FloatArray) -> dict[str, Length]:
+    """Return the lengths of all beams by name."""
+    network = variables.build(x)
+    shaped = variables.task.shaped
+    return {
+        name: _of_polynomial(variables, x, network, name) if name in shaped else _of_any(variables, network, name)
+        for name in network.beams
+    }
+
+
+def _of_polynomial(variables: Variables, x: FloatArray, network: Network, name: str) -> Length:
+    """Return the length of a beam whose shape varies: chord / |chi| with chi the mean of exp(i eta)."""
+    order = variables.order
+    first = len(variables.task.coordinates) + order * variables.task.shaped.index(name)
+    powers = _U[:, None] ** np.arange(1, order + 1)
+    turn = np.exp(1j * (powers @ x[first : first + order])) * _W
+    chi = turn.sum()
+    by_chi = np.zeros(variables.count, dtype=complex)
+    by_chi[first : first + order] = 1j * (turn @ powers)
+    ratio = abs(chi)
+    by_ratio = np.real(np.conj(chi) * by_chi) / ratio
+    reach = _reach(network, name)
+    chord = abs(reach)
+    by_chord = np.real(np.conj(reach) * _by_reach(variables, name)) / chord
+    return Length(chord / ratio, ratio, by_chord / ratio - chord / ratio**2 * by_ratio, by_ratio)
+
+
+def _of_any(variables: Variables, network: Network, name: str) -> Length:
+    """Return the length of any other beam; derivatives by complex steps of the places of its nodes."""
+    beam, reach = network.beams[name], _reach(network, name)
+    length = float(np.real(fit(beam, (reach.real, reach.imag)).length))
+    by_reach = _by_reach(variables, name)
+    by_length = np.zeros(variables.count)
+    for k in np.flatnonzero(by_reach):
+        moved = (reach.real + 1j * _TINY * by_reach[k].real, reach.imag + 1j * _TINY * by_reach[k].imag)
+        by_length[k] = np.imag(fit(beam, moved).length) / _TINY
+    chord = abs(reach)
+    by_chord = np.real(np.conj(reach) * by_reach) / chord
+    return Length(length, chord / length, by_length, by_chord / length - chord / length**2 * by_length)
+
+
+def _reach(network: Network, name: str) -> complex:
+    """Return the vector between the ends of a beam [m]."""
+    beam = network.beams[name]
+    start, end = network.nodes[beam.start], network.nodes[beam.end]
+    return complex(end.x - start.x, end.y - start.y) + complex(*beam.end_offset) - complex(*beam.start_offset)
+
+
+def _by_reach(variables: Variables, name: str) -> FloatArray:
+    """Return the derivatives of that vector by the variables, complex (k,)."""
+    beam = variables.task.network.beams[name]
+    out = np.zeros(variables.count, dtype=complex)
+    for k, coordinate in enumerate(variables.task.coordinates):
+        sense = (coordinate.node == beam.end) - (coordinate.node == beam.start)
+        out[k] = sense * variables.task.size * (1j if coordinate.axis else 1.0)
+    return out
+
+
+_MOST = 2000
+
+_LEAST_CHORD = 0.1  # of the mean distance of joined nodes, if no slenderness is asked
+
+
+def candidates(variables: Variables, rng: np.random.Generator) -> Iterator[FloatArray]:
+    """Yield vectors of variables, coefficients up to half their limit; at most 2000 places are tried."""
+    low, high = variables.bounds.T
+    places = len(variables.task.coordinates)
+    for _ in range(_MOST):
+        x = rng.uniform(low, high)
+        x[places:] *= 0.5
+        if sound(variables, x):
+            yield x
+
+
+def sound(variables: Variables, x: FloatArray) -> bool:
+    """Tell whether the chords of the beams do not cross and are long enough."""
+    network = variables.build(x)
+    chords = {name: _chord(network, name) for name in network.beams}
+    least = _least_chord(variables, network)
+    if any(abs(b - a) < least for a, b in chords.values()):
+        return False
+    return not any(_cross(*chords[one], *chords[other]) for one, other in combinations(chords, 2))
+
+
+def _least_chord(variables: Variables, network: Network) -> float:
+    slenderness = variables.task.limits.slenderness
+    if slenderness is not None:
+        return slenderness * max(thickest_of(beam.section) for beam in network.beams.values())
+    return _LEAST_CHORD * float(np.mean([abs(b - a) for a, b in (_chord(network, name) for name in network.beams)]))
+
+
+def _chord(network: Network, name: str) -> tuple[complex, complex]:
+    beam = network.beams[name]
+    start, end = network.nodes[beam.start], network.nodes[beam.end]
+    return complex(start.x, start.y) + complex(*beam.start_offset), complex(end.x, end.y) + complex(*beam.end_offset)
+
+
+def _cross(a: complex, b: complex, c: complex, d: complex) -> bool:
+    """Tell whether the segments a-b and c-d cross; sharing an end is no crossing."""
+    if {a, b} & {c, d}:
+        return False
+    return _side(a, b, c) * _side(a, b, d) < 0 and _side(c, d, a) * _side(c, d, b) < 0
+
+
+def _side(a: complex, b: complex, c: complex) -> float:
+    return float(((b - a).conjugate() * (c - a)).imag)
