@@ -1,53 +1,43 @@
-"""Many slider-cranks at once that differ in their springs: the unit curves are the same, and everything is a product.
+"""Many slider-cranks at once that differ in their springs: what is asked of them, and the findings that they have.
 
-Metrics are those of the curve at the analysis's points, as for one mechanism; class, drop and
-numbers of equilibria come from a grid that is sharpened at its turning points; ends of constant bands are
-found on the closed form, for all designs side by side. Metrics that are places, and equilibria, come from the grid of
-one mechanism, which is laid once for all of them.
+Of the findings only the names are known, as `findings` has them of one.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cfmkit.families.base import BlockAnswer
 from cfmkit.families.refusals import CannotBuild
 from cfmkit.families.slider_crank.build import resolve
-from cfmkit.families.slider_crank.printed.values import DEFINITIONS as OF_PARTS
-from cfmkit.families.slider_crank.springs.assembly import assemble
-from cfmkit.families.slider_crank.springs.block_bands import edges
-from cfmkit.families.slider_crank.springs.block_metrics import CURVE, PLAIN, of_curve
+from cfmkit.families.slider_crank.springs.assembly import TURN, assemble
+from cfmkit.families.slider_crank.springs.block_solution import EACH, PLACES, Base, Slab
+from cfmkit.families.slider_crank.springs.findings import findings_of
 from cfmkit.families.slider_crank.springs.model import (
     RATES,
     asked_motion,
-    efforts_inside,
-    reference_motion,
+    solve,
     target_of,
     window_of,
 )
-from cfmkit.families.slider_crank.springs.solution import GRID, Character, Solution, grid_over
-from cfmkit.families.slider_crank.springs.stiffness import Classified, classify, scale_factors, small_angle_number
-from cfmkit.families.slider_crank.springs.values import DEFINITIONS
+from cfmkit.families.slider_crank.springs.solution import GRID
+from cfmkit.families.slider_crank.springs.stiffness import (
+    BOUNDARY,
+    SNAPS,
+)
 from cfmkit.families.slider_crank.unit_springs import JOINTS
-from cfmkit.metrics.closed import extremes, mean
-from cfmkit.metrics.many import UNIFORM_POINTS, ManyBranches, range_95, range_95_fraction, usable_interval
-from cfmkit.metrics.subjects import Frame
-from cfmkit.numerics.turning_points import Monotone, monotone, sharpened
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Iterator
 
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.base import Block, Measure
+    from cfmkit.families.base import Block
     from cfmkit.families.slider_crank.spec import SliderCrankSpec
-    from cfmkit.families.slider_crank.springs.assembly import Assembly
-    from cfmkit.families.slider_crank.unit_springs import UnitCurves
 
 
 LEGS = "mechanism.legs"
@@ -55,12 +45,6 @@ LEGS = "mechanism.legs"
 
 SLAB = 400_000
 """Values that are worked on together: few enough to stay in a processor's cache."""
-
-BALANCED = 1e-12
-"""A mean so small, as a share of the largest effort, is rounding: such a design is left to the model of one."""
-
-NODES, TURN_NODES = 129, 385
-"""Places of the grid for less and for more than a quarter turn."""
 
 
 def analyze_block(spec: SliderCrankSpec, block: Block) -> BlockAnswer | None:
@@ -76,7 +60,6 @@ def analyze_block(spec: SliderCrankSpec, block: Block) -> BlockAnswer | None:
     base = _base(spec) if set(block.values) <= {*RATES, LEGS} else None
     if base is None or not all(base.knows(measure) for measure in block.measures):
         return None
-    from cfmkit.families.slider_crank.springs.block_findings import of_linkage, of_springs, undecided
 
     rates, legs, done = _rates(spec, block)
     warnings = {name: done.copy() for name in of_linkage(base)}
@@ -118,98 +101,6 @@ def _rates(spec: SliderCrankSpec, block: Block) -> tuple[FloatArray, FloatArray,
     return rates * legs[:, None], legs, done
 
 
-@dataclass(frozen=True)
-class Base:
-    """What all designs of a block share.
-
-    Attributes
-    ----------
-    spec : SliderCrankSpec
-        With the motion written out.
-    assembly : Assembly
-        Its rates do not matter.
-    low, high : float
-        The motion [rad or m].
-    """
-
-    spec: SliderCrankSpec
-    assembly: Assembly
-    low: float
-    high: float
-
-    @property
-    def points(self) -> int:
-        """Points of the curve."""
-        return self.spec.analysis.points
-
-    @cached_property
-    def motion(self) -> FloatArray:
-        """Where the curve is taken."""
-        return np.linspace(self.low, self.high, self.points)
-
-    @cached_property
-    def units(self) -> UnitCurves:
-        """What unit springs do there."""
-        return self.assembly.units(self.motion)
-
-    @cached_property
-    def nodes(self) -> tuple[FloatArray, UnitCurves]:
-        """The grid of the class, the unloaded position one of its places, and the unit springs there."""
-        wide = self.assembly.drive == "torque" and self.high - self.low > 0.5 * np.pi
-        share = np.linspace(0.0, 1.0, TURN_NODES if wide else NODES)
-        if self.assembly.drive == "force":
-            share = share**2
-        places = self.low + (self.high - self.low) * share
-        if self.low < self.assembly.start < self.high:
-            places = np.union1d(places, [self.assembly.start])
-        return places, self.assembly.units(places)
-
-    @cached_property
-    def grid(self) -> tuple[FloatArray, UnitCurves]:
-        """The grid of one mechanism, and the unit springs there."""
-        places = grid_over(self.assembly, self.low, self.high)
-        return places, self.assembly.units(places)
-
-    @cached_property
-    def bounded(self) -> bool:
-        """Whether every spring has an effort all over the grid: a mechanism alone leaves out where it has none."""
-        return bool(np.isfinite(self.grid[1].effort).all())
-
-    @cached_property
-    def reference(self) -> float:
-        """Where the constant band is taken."""
-        return reference_motion(self.spec, self.assembly)
-
-    @cached_property
-    def band(self) -> float:
-        """Half width of the band of the usable stroke, as a fraction."""
-        return float(getattr(self.spec.analysis, "band", Frame.band))
-
-    def knows(self, measure: Measure) -> bool:
-        """Return whether this model has a measure."""
-        name, window = measure.name, measure.window
-        if self.lacks(name) or name in VALUES:
-            return True
-        if name in EACH:
-            return self.bounded
-        known = self.spreads(name) or name in BANDS or name in OF_TARGET or (name in PLACES and self.bounded)
-        return known and (window is None or (self.low <= window[0] and window[1] <= self.high))
-
-    def spreads(self, name: str) -> bool:
-        """Return whether a metric is one of mean and extremes in a window."""
-        kind, _, rest = name.partition("_")
-        return (kind == self.assembly.drive and rest in CURVE) or name in PLAIN
-
-    def lacks(self, name: str) -> bool:
-        """Return whether a mechanism with this drive has no such value: its cells are empty."""
-        others = OTHER_DRIVE[self.assembly.drive]
-        return name in NO_LOOP or (name in OF_PARTS and name not in DEFINITIONS) or name.startswith(others)
-
-    def inside(self, window: tuple[float, float] | None) -> FloatArray:
-        """Return the unit efforts in a window, (4, k), its ends included."""
-        return efforts_inside(self.assembly, self.motion, self.units, window)
-
-
 def _base(spec: SliderCrankSpec) -> Base | None:
     """Return what a block shares; None where the linkage cannot be built, or does not reach all of the motion."""
     mechanism = spec.mechanism
@@ -230,321 +121,55 @@ def _base(spec: SliderCrankSpec) -> Base | None:
     return base if whole and np.isfinite(base.nodes[1].effort).all() else None
 
 
-@dataclass(frozen=True)
-class Slab:
-    """Some designs of a block.
+ROUNDING = 1e-9
+"""Share of the largest effort that counts for nothing."""
 
-    Attributes
-    ----------
-    base : Base
-        What they share.
-    rates : (m, 4) array
-        Of all legs together.
-    legs : (m,) array
-        How many legs.
-    """
-
-    base: Base
-    rates: FloatArray
-    legs: FloatArray
-
-    @cached_property
-    def effort(self) -> FloatArray:
-        """Efforts at the points of the curve, (m, n)."""
-        return self.rates @ self.base.units.effort
-
-    @cached_property
-    def sharp(self) -> FloatArray:
-        """Efforts on the grid, with their turning points."""
-        places, units = self.base.nodes
-        stiffness = units.stiffness.copy()
-        stiffness[:, 0] = np.where(np.isfinite(stiffness[:, 0]), stiffness[:, 0], stiffness[:, 1])
-        twice = self.base.assembly.drive == "torque"
-        return sharpened(places, self.rates @ units.effort, self.rates @ stiffness, twice)
-
-    @cached_property
-    def classified(self) -> Classified:
-        """Classes, drops and numbers of equilibria."""
-        spec, assembly = self.base.spec, self.base.assembly
-        curves = Monotone(np.broadcast_to(self.base.nodes[0], self.sharp.shape), self.sharp)
-        return classify(curves, assembly.start, spec.analysis.tolerance, window_of(spec, assembly), assembly.rest)
-
-    @cached_property
-    def level(self) -> FloatArray:
-        """Efforts at the reference; NaN where they are zero but for rounding."""
-        level = self.rates @ self.base.assembly.units(np.array([self.base.reference])).effort[:, 0]
-        return np.where(np.abs(level) > 1e-9 * np.abs(self.sharp).max(axis=1), level, np.nan)
-
-    @cached_property
-    def band(self) -> tuple[FloatArray, FloatArray]:
-        """Ends of the constant band around the reference; NaN where there is none."""
-        return self.within(self.base.spec.analysis.tolerance)
-
-    def within(self, tolerance: float) -> tuple[FloatArray, FloatArray]:
-        """Return the ends of a band around the reference; NaN where there is none."""
-        base = self.base
-        grid = base.nodes[0]
-        if not base.low <= base.reference <= base.high:
-            return np.full(len(self.rates), np.nan), np.full(len(self.rates), np.nan)
-        return edges(base.assembly, self.rates, (grid, self.sharp), (base.reference, self.level), tolerance)
-
-    def at(self, motion: float, rows: str = "effort") -> FloatArray:
-        """Return effort or stiffness of all designs at one place."""
-        unit: FloatArray = getattr(self.base.assembly.units(np.array([motion])), rows)[:, 0]
-        return self.rates @ np.where(np.isfinite(unit), unit, 0.0)
-
-    def measured(self, measure: Measure) -> FloatArray:
-        """Return one measure of all designs; NaN where it is undefined."""
-        name = measure.name
-        if self.base.lacks(name):
-            return np.full(len(self.rates), np.nan)
-        if name in VALUES:
-            return np.broadcast_to(VALUES[name](self), len(self.rates))
-        if name in EACH:
-            return np.array([EACH[name](one) for one in self.each], dtype=float)  # None: NaN
-        if name in PLACES:
-            return PLACES[name](self, measure.window)
-        if name in OF_TARGET:
-            return OF_TARGET[name](self, measure.window)
-        if name in BANDS:
-            low, high = self.within(BANDS[name])
-            return high - low
-        return of_curve(name, *self.inside(measure.window))
-
-    def inside(self, window: tuple[float, float] | None) -> tuple[FloatArray, tuple[FloatArray, FloatArray]]:
-        """Return the efforts in a window, (m, k), and the largest and the smallest of each design, (m,) each."""
-        if window not in self.cut:
-            base = self.base
-            motion = base.motion
-            effort = self.effort if window is None else self.rates @ base.inside(window)
-            if window is not None:
-                motion = np.concatenate([window[:1], motion[(motion > window[0]) & (motion < window[1])], window[1:]])
-            self.cut[window] = effort, extremes(self._exact, motion[None, :], effort)
-            self.balance(effort.mean(axis=1), effort)
-        return self.cut[window]
-
-    @cached_property
-    def balanced(self) -> NDArray[np.bool_]:
-        """Which designs have a mean effort of rounding in some window that was looked at: its sign decides metrics."""
-        return np.zeros(len(self.rates), dtype=bool)
-
-    def balance(self, mean: FloatArray, effort: FloatArray) -> None:
-        """Note which means, (m,), are rounding beside the efforts they are of, (m, n)."""
-        nothing = np.abs(mean) <= BALANCED * np.abs(effort).max(axis=1)
-        np.logical_or(self.balanced, nothing, out=self.balanced)
-
-    @cached_property
-    def cut(self) -> dict[tuple[float, float] | None, tuple[FloatArray, tuple[FloatArray, FloatArray]]]:
-        """What is known of windows."""
-        return {}
-
-    def _exact(self, places: FloatArray) -> FloatArray:
-        """Return the efforts at places of each design, (m, k)."""
-        return self.somewhere(places, np.arange(len(self.rates)))
-
-    def somewhere(self, places: FloatArray, rows: NDArray[np.intp]) -> FloatArray:
-        """Return the efforts at places of some designs, (r, k)."""
-        unit = self.base.assembly.forces(places.ravel()).reshape(4, *places.shape)
-        return np.asarray(np.einsum("dj,jdm->dm", self.rates[rows], unit))
-
-    @cached_property
-    def curves(self) -> Monotone:
-        """Each design's `Character.curve`: efforts on the grid and at their turning points, by the closed form."""
-        places, units = self.base.grid
-        lost = ~np.isfinite(units.stiffness)
-        slope = self.rates @ np.where(lost, 0.0, units.stiffness)
-        slope[(self.rates > 0.0) @ lost] = np.nan
-        cut = monotone(places, self.rates @ units.effort, slope)
-        step = np.diff(places)
-        for turn in (1, 2):
-            place = cut.place[:, turn::3]
-            # What a cell does not have repeats one of its ends, but for rounding.
-            inside = (place - places[:-1] > 1e-12 * step) & (places[1:] - place > 1e-12 * step)
-            row, cell = np.nonzero(inside)
-            cut.value[row, 3 * cell + turn] = self.somewhere(place[row, cell][:, None], row)[:, 0]
-        return cut
-
-    @cached_property
-    def assemblies(self) -> list[Assembly]:
-        """Each design with its own rates."""
-        return [replace(self.base.assembly, rates=rates) for rates in self.rates]
-
-    @cached_property
-    def factors(self) -> FloatArray:
-        """The limits between the classes as factors on the torsion springs, (m, 2); NaN where there is none."""
-        found = [scale_factors(one, self.base.low, self.base.high) or (np.nan, np.nan) for one in self.assemblies]
-        return np.array([[_finite(factor) for factor in pair] for pair in found])
-
-    @cached_property
-    def each(self) -> list[Solution]:
-        """Each design as one mechanism has it, with the curve and the unit springs that are known already."""
-        base, found = self.base, []
-        window = window_of(base.spec, base.assembly)
-        for row, (assembly, legs) in enumerate(zip(self.assemblies, self.legs.tolist(), strict=True)):
-            character = Character(assembly, base.low, base.high, base.spec.analysis.tolerance, window)
-            curve = Monotone(self.curves.place[row : row + 1], self.curves.value[row : row + 1])
-            vars(character)["curve"] = curve  # in place of what it would work out
-            found.append(Solution(assembly, base.motion, base.units, character, base.reference, legs))
-        return found
-
-    def everywhere(self, window: tuple[float, float] | None) -> ManyBranches:
-        """Return the curves at every place, over the ends of a window."""
-        if window not in self.known:
-            count, ends = len(self.rates), window or (self.base.low, self.base.high)
-            low, high, pose = (np.full(count, end) for end in (*ends, self.base.reference))
-            place, value = self.curves.place, self.curves.value
-            self.known[window] = ManyBranches(place, value, low, high, self.somewhere, pose=pose)
-        return self.known[window]
-
-    def usable(self, window: tuple[float, float] | None) -> tuple[FloatArray, FloatArray]:
-        """Return start and end of the usable stroke; NaN where there is none."""
-        base, target = self.base, target_of(self.base.spec)
-        if window not in self.usables:
-            many = self.everywhere(window)
-            ends = window or (base.low, base.high)
-            units = [mean(self._unit(k), base.grid[0], *ends) for k in range(4)]
-            level = np.full(len(self.rates), target) if target else self.rates @ np.array(units)
-            valid = np.full(len(self.rates), base.low)
-            start, end = usable_interval([many], level, base.band, valid)
-            self.usables[window] = start, end
-            self.balance(level, self.curves.value)
-        return self.usables[window]
-
-    def _unit(self, joint: int) -> Callable[[FloatArray], FloatArray]:
-        return lambda places: self.base.assembly.forces(places.ravel())[joint].reshape(places.shape)
-
-    @cached_property
-    def known(self) -> dict[tuple[float, float] | None, ManyBranches]:
-        """What is known of curves over windows."""
-        return {}
-
-    @cached_property
-    def usables(self) -> dict[tuple[float, float] | None, tuple[FloatArray, FloatArray]]:
-        """What is known of usable strokes."""
-        return {}
-
-    @cached_property
-    def turns(self) -> FloatArray:
-        """Largest turn of each spring, of the slider's its largest travel, (4,): the same for all designs."""
-        turns: FloatArray = np.abs(self.base.units.turn).max(axis=1)
-        return turns
-
-    @cached_property
-    def start_effort(self) -> FloatArray:
-        """Effort where the motion is zero."""
-        unit = self.base.assembly.forces(np.zeros(1))[:, 0]
-        with np.errstate(invalid="ignore"):
-            return np.asarray(np.where(self.rates > 0.0, self.rates * unit, 0.0).sum(axis=1))
+OF_SPRINGS = (
+    "second_stable_outside",
+    "class_boundary",
+    "quartic_minimum",
+    "spring_winds_up",
+    "same_position_twice",
+    "reference_zero",
+    "effort_changes_sign",
+)
+"""Findings that depend on the rates; all others are of the linkage and the motion, and of all designs or none."""
 
 
-BANDS = {"band_range_05pct": 0.005, "band_range_1pct": 0.01, "band_range_5pct": 0.05}
+def of_linkage(base: Base) -> tuple[str, ...]:
+    """Return the findings that all designs of a block share."""
+    solution, short = solve(base.spec, replace(base.assembly, rates=np.ones(4)))
+    found = (*short, *findings_of(base.spec, solution))
+    return tuple(dict.fromkeys(item.name for item in found if item.name not in OF_SPRINGS))
 
 
-def _width(slab: Slab) -> FloatArray:
-    return slab.band[1] - slab.band[0]
+def of_springs(slab: Slab) -> Iterator[tuple[str, NDArray[np.bool_]]]:
+    """Yield the findings that depend on the rates, and which designs have them; see `undecided` for one more."""
+    base, rates, found = slab.base, slab.rates, slab.classified
+    assembly, torque = base.assembly, base.assembly.drive == "torque"
+    yield "second_stable_outside", np.asarray((found.kind == SNAPS) & (found.unstable > 0))
+    yield "class_boundary", np.asarray(np.abs(found.drop - 1.0) < BOUNDARY)
+    if torque and base.low <= assembly.start <= base.high and assembly.linkage.knee(assembly.unloaded) == 0:
+        yield "quartic_minimum", np.asarray(~rates[:, :3].any(axis=1))
+    if torque and base.high - base.low >= TURN * (1 - 1e-9):
+        yield "spring_winds_up", np.asarray((rates[:, :2] > 0.0).any(axis=1))
+        yield "same_position_twice", _at_rest(slab, base.low) & _at_rest(slab, base.high)
+    if base.low <= base.reference <= base.high:
+        yield "reference_zero", np.isnan(slab.level)
+    window = window_of(base.spec, assembly)
+    if window is not None:
+        inside = slab.effort[:, (base.motion >= window[0]) & (base.motion <= window[1])]
+        if inside.shape[1]:
+            yield "effort_changes_sign", np.asarray((inside.min(axis=1) < 0.0) & (inside.max(axis=1) > 0.0))
 
 
-def _within(slab: Slab, motion: float) -> FloatArray:
-    inside = slab.base.low <= motion <= slab.base.high
-    return slab.at(motion) if inside else np.full(len(slab.rates), np.nan)
+def _at_rest(slab: Slab, motion: float) -> NDArray[np.bool_]:
+    """Return which designs have a stable equilibrium at an end of the motion."""
+    nothing = np.abs(slab.at(motion)) <= ROUNDING * np.abs(slab.sharp).max(axis=1)
+    return np.asarray(nothing & (slab.at(motion, "stiffness") > 0.0))
 
 
-def _finite(value: float | None) -> float:
-    return np.nan if value is None or not np.isfinite(value) else value
-
-
-def _largest(values: FloatArray) -> float:
-    finite = values[np.isfinite(values)]
-    return float(finite.max()) if len(finite) else np.nan
-
-
-def _nearest(stable: bool, what: str) -> Callable[[Solution], float | None]:
-    return lambda one: getattr(one.nearest(stable), what, None)
-
-
-EACH: dict[str, Callable[[Solution], float | None]] = {
-    **{f"snap_through_{place}": _nearest(False, "motion") for place in ("angle", "travel")},
-    **{f"second_stable_{place}": _nearest(True, "motion") for place in ("angle", "travel")},
-    "energy_barrier": _nearest(False, "energy"),
-    "coupler_compression_max": lambda one: _largest(-one.reactions[0]),
-    "guide_force_max": lambda one: _largest(np.abs(one.reactions[1])),
-}
-"""Values that are found design by design, on the curves that are known of all."""
-
-
-def _usable_stroke(slab: Slab, window: tuple[float, float] | None) -> FloatArray:
-    start, end = slab.usable(window)
-    return np.where(np.isnan(start), 0.0, end - start)
-
-
-PLACES: dict[str, Callable[[Slab, tuple[float, float] | None], FloatArray]] = {
-    "range_95": lambda slab, window: range_95(slab.everywhere(window)),
-    "range_95_fraction": lambda slab, window: range_95_fraction(slab.everywhere(window)),
-    "usable_stroke": _usable_stroke,
-    "usable_start": lambda slab, window: slab.usable(window)[0],
-    "usable_end": lambda slab, window: slab.usable(window)[1],
-}
-"""Metrics that are places, on curves that are known at every place."""
-
-
-def _from_target(slab: Slab, window: tuple[float, float] | None) -> FloatArray:
-    target, (top, bottom) = target_of(slab.base.spec), slab.inside(window)[1]
-    if not target:
-        return np.full(len(slab.rates), np.nan)
-    return np.maximum(np.abs(top - target), np.abs(bottom - target)) / abs(target)
-
-
-def _rms_to_target(slab: Slab, window: tuple[float, float] | None) -> FloatArray:
-    target, (low, high) = target_of(slab.base.spec), window or (slab.base.low, slab.base.high)
-    if not target:
-        return np.full(len(slab.rates), np.nan)
-    places = low + (high - low) * np.arange(1, UNIFORM_POINTS + 1) / UNIFORM_POINTS
-    offset = slab.rates @ slab.base.assembly.forces(places) - target
-    return np.asarray(np.sqrt(np.einsum("ij,ij->i", offset, offset) / UNIFORM_POINTS))
-
-
-OF_TARGET: dict[str, Callable[[Slab, tuple[float, float] | None], FloatArray]] = {
-    "deviation_from_target": _from_target,
-    "rms_to_target": _rms_to_target,
-}
-"""Metrics against the effort that the design asks for."""
-
-NO_LOOP = frozenset({"hysteresis_area"})
-"""Metrics of two branches: these curves have one."""
-
-OTHER_DRIVE: dict[str, tuple[str, ...]] = {
-    "torque": ("constant_travel", "reference_force", "snap_through_travel", "second_stable_travel", "start_force"),
-    "force": ("constant_angle", "reference_torque", "snap_through_angle", "second_stable_angle", "stretched_torque",
-              "stretched_stiffness"),
-}  # fmt: skip
-"""Beginnings of the names of values that a mechanism with a drive does not have."""
-
-VALUES: dict[str, Callable[[Slab], Any]] = {
-    "stiffness_class": lambda slab: slab.classified.kind.astype(np.float64),
-    "stiffness_drop": lambda slab: slab.classified.drop,
-    "stable_positions": lambda slab: slab.classified.stable.astype(np.float64),
-    "unstable_positions": lambda slab: slab.classified.unstable.astype(np.float64),
-    "constant_angle": _width,
-    "constant_angle_start": lambda slab: slab.band[0],
-    "constant_angle_end": lambda slab: slab.band[1],
-    "constant_travel": _width,
-    "constant_travel_start": lambda slab: slab.band[0],
-    "constant_travel_end": lambda slab: slab.band[1],
-    "reference_torque": lambda slab: _within(slab, slab.base.reference),
-    "reference_force": lambda slab: _within(slab, slab.base.reference),
-    "stretched_torque": lambda slab: slab.at(slab.base.assembly.stretched),
-    "stretched_stiffness": lambda slab: slab.at(slab.base.assembly.stretched, "stiffness"),
-    "energy_max": lambda slab: (slab.rates @ (0.5 * slab.base.units.turn**2)).max(axis=1),
-    "start_force": lambda slab: slab.start_effort,
-    "bistable_factor": lambda slab: slab.factors[:, 0],
-    "positive_factor": lambda slab: slab.factors[:, 1],
-    "small_angle_number": lambda slab: np.array([small_angle_number(one) for one in slab.assemblies], dtype=float),
-    "stretched_angle": lambda slab: slab.base.assembly.linkage.stretched_angle,
-    "folded_angle": lambda slab: _finite(slab.base.assembly.linkage.folded_angle),
-    "unloaded_angle": lambda slab: slab.base.assembly.unloaded,
-    "pivot_rotation_max": lambda slab: slab.turns[0],
-    "crank_pin_rotation_max": lambda slab: slab.turns[1],
-    "slider_pin_rotation_max": lambda slab: slab.turns[2],
-    "slider_travel_max": lambda slab: slab.turns[3],
-}
-"""The family's own values that this model has."""
+def undecided(slab: Slab) -> NDArray[np.bool_]:
+    """Return which designs may rest twice in one position inside the motion, which goes over more than a turn."""
+    turns = slab.base.assembly.drive == "torque" and slab.base.high - slab.base.low > TURN * (1 + 1e-9)
+    return np.asarray((slab.classified.stable > 1) & turns)
