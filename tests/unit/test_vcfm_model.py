@@ -22,6 +22,7 @@ from cfmkit.families.vcfm.leaves.v_beam import VBeam
 from cfmkit.families.vcfm.model import rest_of, rests_of
 from cfmkit.families.vcfm.scene import centre_line
 from cfmkit.families.vcfm.solution import force_of
+from cfmkit.families.vcfm.values import forces, spread
 from cfmkit.families.vcfm.windows import longest_window
 from cfmkit.metrics import Window, evaluate
 from cfmkit.results import Status
@@ -429,3 +430,22 @@ def test_the_map_of_preloads_shows_where_the_window_starts():
     assert len(drawn.axes) == 3
     assert lines[0] == pytest.approx(0.91, abs=0.02)
     assert lines[1][-1] - lines[1][0] == pytest.approx(0.955 - 0.571, abs=0.03)
+
+
+def test_what_the_table_of_preloads_says_of_a_window_does_not_depend_on_the_points():
+    """The curve turns a corner where the leaves buckle, inside this window: between points it is no straight line."""
+    spec = cfmkit.load("configs/vcfm_pla_adjustable.yaml").replace({"analysis.window": ["1 mm", "4.4 mm"]})
+    few, many = (cfmkit.analyze(spec.replace({"analysis.points": points})).state for points in (23, 801))
+    wanted = spread(forces(many, many.nominal))
+    assert spread(forces(few, few.nominal)) == pytest.approx(wanted, rel=1e-12)
+
+
+@pytest.mark.parametrize("points", [23, 801])
+def test_the_ends_of_a_window_have_the_force_of_the_model(points):
+    spec = cfmkit.load("configs/vcfm_ding2022.yaml").replace({"analysis.points": points})
+    solution = cfmkit.analyze(spec).state
+    low, high = 0.61e-3, 3.33e-3
+    inside = solution.inside(solution.nominal, (low, high))
+    wanted = solution.sampler.leaf_force(np.array([low, high])) + solution.sampler.spring(np.array([low, high]))[0]
+    assert inside[[0, -1]] == pytest.approx(wanted, rel=1e-14)
+    assert np.isnan(solution.force_at(solution.nominal, np.array([-1e-3, 1.0]))).all()

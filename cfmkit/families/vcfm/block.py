@@ -381,7 +381,7 @@ def _window_is_flat(spec: VcfmSpec, slab: Slab) -> NDArray[np.bool_]:
 
 
 def _extremes(slab: Slab, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the largest and smallest force in windows, with their interpolated ends, (k, 1) [N]."""
+    """Return the largest and smallest force at the samples in windows and at their ends, (k, 1) [N]."""
     inside = (slab.grid > low) & (slab.grid < high)
     ends = np.hstack([_at(slab, low), _at(slab, high)])
     force = np.hstack([np.where(inside, slab.force, np.nan), ends])
@@ -391,9 +391,6 @@ def _extremes(slab: Slab, low: FloatArray, high: FloatArray) -> tuple[FloatArray
 
 
 def _at(slab: Slab, place: FloatArray) -> FloatArray:
-    """Return the forces at one place of each design between its samples, (k, 1) [N]; NaN beyond them."""
-    grid = slab.grid
-    before = np.clip(np.searchsorted(grid, place) - 1, 0, len(grid) - 2)
-    share = (place - grid[before]) / (grid[before + 1] - grid[before])
-    low, high = (np.take_along_axis(slab.force, before + k, 1) for k in (0, 1))
-    return np.asarray(np.where((place >= grid[0]) & (place <= grid[-1]), low + share * (high - low), np.nan))
+    """Return the forces at one place of each design, (k, 1) [N]; NaN beyond the travel."""
+    reached = (place >= slab.grid[0]) & (place <= slab.grid[-1])
+    return np.asarray(np.where(reached, slab.exact(np.where(reached, place, slab.grid[0])), np.nan))

@@ -127,7 +127,7 @@ def _leaf_shape(solution: Solution) -> Iterator[Finding]:
 
 def _flatness(solution: Solution) -> Iterator[Finding]:
     push, (low, high) = solution.nominal, solution.window
-    force = push.inside((low, high))
+    force = solution.inside(push, (low, high))
     if not len(force) or force.max() <= 0:
         return
     ripple, allowed = _ripple(force), solution.spec.analysis.flatness
@@ -164,7 +164,7 @@ def _flattening(solution: Solution, ripple: float) -> tuple[str, tuple[str, ...]
         why = f"; the leaves are buckled from {mm(first)} to {mm(last)} only"
     for share in TRIED:
         flat = solution.flat_part(solution.nominal, share * allowed)
-        if flat is not None and _ripple(solution.nominal.inside(flat)) <= (1.0 - ROUNDING) * allowed:
+        if flat is not None and _ripple(solution.inside(solution.nominal, flat)) <= (1.0 - ROUNDING) * allowed:
             start, end = at_least(flat[0]), at_most(flat[1])
             cure = f"analysis.window=[{start}, {end}]"
             return f"{why}; the force is flat from {start} to {end}: state that as the window", (cure,)
@@ -234,7 +234,7 @@ def _returns(solution: Solution) -> Iterator[Finding]:
             f"{mm(float(push.travel[-1]))}): the mechanism stays there until it is pulled back; use a stiffer spring, "
             "thicker or fewer leaves, or a preload",
         )
-    inside = push.inside((low, high))
+    inside = solution.inside(push, (low, high))
     beyond = push.rest is None or push.rest > low
     if beyond or (len(inside) and inside.min() <= 0):
         told = newton(float(inside.min())) if len(inside) and not beyond else "zero and below"
@@ -260,7 +260,7 @@ def returns(least: FloatArray | float, largest: FloatArray | float) -> Any:
 def _overload(solution: Solution, push: Push) -> Iterator[Finding]:
     end = solution.character.linear[1]
     if np.isfinite(end) and push.travel[-1] > end * (1 + 1e-9):
-        at_end, last = float(np.interp(end, push.travel, push.force)), float(push.force[-1])
+        at_end, last = float(solution.force_at(push, np.array([end]))[0]), float(push.force[-1])
         if last - at_end <= solution.spec.analysis.flatness * abs(last):
             return
         yield finding(
@@ -274,7 +274,7 @@ def _preloads(solution: Solution) -> Iterator[Finding]:
     for push in solution.pushes:
         if push.preload >= 0:
             continue
-        inside = push.inside(solution.window)
+        inside = solution.inside(push, solution.window)
         if push.rest is None or push.rest > solution.window[0] or inside.min(initial=np.inf) <= 0:
             low, high = solution.window
             yield finding(

@@ -95,15 +95,6 @@ class Push:
         total: FloatArray = np.add(self.leaves.force, self.spring_force)
         return total
 
-    def inside(self, window: tuple[float, float]) -> FloatArray:
-        """Return the forces at the samples in a window, its interpolated ends included [N]."""
-        low, high = window
-        own = self.force[(self.travel > low) & (self.travel < high)]
-        ends = np.interp([low, high], self.travel, self.force, left=np.nan, right=np.nan)
-        found = np.concatenate([ends[:1], own, ends[1:]])
-        known: FloatArray = found[np.isfinite(found)]
-        return known
-
 
 @dataclass(frozen=True)
 class Solution:
@@ -175,6 +166,22 @@ class Solution:
         lowest = float(push.travel[beyond[push.force[beyond].argmin()]]) if len(beyond) else peak
         place = extreme(lambda travel: -force_of(sampler, travel, push.preload), max(lowest, peak), step, (peak, end))
         return place, float(force_of(sampler, np.array([place]), push.preload)[0])
+
+    def force_at(self, push: Push, travel: FloatArray) -> FloatArray:
+        """Return the force of a curve at some travels, by the model, (n,) [N]; NaN beyond its ends."""
+        reached = (travel >= push.travel[0]) & (travel <= push.travel[-1])
+        force = np.full(travel.shape, np.nan)
+        force[reached] = force_of(self.sampler, travel[reached], push.preload)
+        return force
+
+    def inside(self, push: Push, window: tuple[float, float]) -> FloatArray:
+        """Return the forces of a curve at its samples in a window and at the window's ends [N]."""
+        low, high = window
+        own = push.force[(push.travel > low) & (push.travel < high)]
+        ends = self.force_at(push, np.array(window))
+        found = np.concatenate([ends[:1], own, ends[1:]])
+        known: FloatArray = found[np.isfinite(found)]
+        return known
 
     def largest_stress(self, push: Push, end: float = np.inf) -> tuple[float, float]:
         """Return the largest stress of leaves and spring of a curve up to a travel [m], that one included, in Pa."""

@@ -160,8 +160,7 @@ def _at_preload(solution: Solution, number: int) -> dict[str, Any]:
 
 def forces(solution: Solution, push: Push) -> FloatArray:
     """Return the force of a curve at even places of the solution's window [N]; NaN beyond the curve."""
-    places = np.linspace(*solution.window, PLACES)
-    return np.asarray(np.interp(places, push.travel, push.force, left=np.nan, right=np.nan))
+    return solution.force_at(push, np.linspace(*solution.window, PLACES))
 
 
 def spread(force: FloatArray) -> dict[str, float]:
