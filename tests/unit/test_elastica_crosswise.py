@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import tracemalloc
+
 import numpy as np
 import pytest
 
@@ -14,6 +16,7 @@ from cfmkit.elastica import (
     Loading,
     Network,
     Node,
+    Path,
     PathStatus,
     PointLoad,
     Section,
@@ -82,13 +85,30 @@ def test_it_does_not_depend_on_whether_a_displacement_or_a_force_drives() -> Non
     assert one == pytest.approx(other, rel=1e-6)
 
 
-def test_large_networks_are_condensed_by_sparse_factors(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Eighty beams in a row are one: 3 EI/L^3; dense factors would take the cube of their number."""
+def eighty_beams() -> Path:
+    """Eighty beams in a row, hardly pulled."""
     places = np.linspace(0.0, LENGTH, 81)
     nodes = {f"n{k}": Node(float(x), 0, FREE if k else CLAMPED) for k, x in enumerate(places)}
     beams = {f"b{k}": Beam(f"n{k}", f"n{k + 1}", Section(MODULUS, WIDTH, THICKNESS)) for k in range(80)}
-    path = trace(Network(nodes, beams), Loading((PointLoad("n80", fx=1e-6),), np.array([1.0])))
-    dense = np.linalg.solve
+    return trace(Network(nodes, beams), Loading((PointLoad("n80", fx=1e-6),), np.array([1.0])))
+
+
+def test_matrices_of_large_networks_are_not_all_held_at_once() -> None:
+    path, poses = eighty_beams(), 30
+    size = 8 * path.solver.n**2
+    cross_stiffness(path, "n80", 0.0)
+    tracemalloc.start()
+    try:
+        cross_stiffness(path, "n80", 0.0, np.zeros(poses, dtype=np.int64))
+        held = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert held < 0.5 * poses * size  # a fifth; all at once took three times as much as they need
+
+
+def test_large_networks_are_condensed_by_sparse_factors(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Eighty beams in a row are one: 3 EI/L^3; dense factors would take the cube of their number."""
+    path, dense = eighty_beams(), np.linalg.solve
 
     def small(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
         assert matrix.shape[-1] < crosswise._MANY

@@ -54,10 +54,12 @@ def cross_stiffness(path: Path, node: str, direction: float, points: Any = None)
     along, across = (int(slots[loose.layout.first[node] + k]) for k in range(2))
     ys = np.concatenate([_unknowns(path, loose.layout, node), path.points.y[:, solver.n_free :]], axis=1)
     kept = np.array([k for k in range(loose.n) if k not in (along, across)])
-    stiffness = np.empty((len(chosen), loose.n, loose.n))
-    for place, k in enumerate(chosen.tolist()):
-        stiffness[place], _ = loose.tangent_at(ys[k], float(path.points.drive[k]))
-    found = _condensed(-stiffness, across, kept)
+    together = 1 if len(kept) >= _MANY else max(1, len(chosen))  # large matrices one by one: all of them fill gigabytes
+    found = np.empty(len(chosen))
+    for first in range(0, len(chosen), together):
+        some = chosen[first : first + together].tolist()
+        stiffness = np.array([loose.tangent_at(ys[k], float(path.points.drive[k]))[0] for k in some])
+        found[first : first + together] = _condensed(-stiffness, across, kept)
     scales = layout.scales
     return read_only(found * scales.force / scales.length)
 

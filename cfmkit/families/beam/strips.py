@@ -11,7 +11,7 @@ import numpy as np
 from cfmkit.arrays import read_only
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.model.beam import Beam, Fit
@@ -115,20 +115,27 @@ def smallest_gap(lines: Mapping[str, FloatArray], halves: Mapping[str, float]) -
     halves : mapping
         Half thickness by beam [m].
     """
-    boxes = {name: (line.min(axis=0), line.max(axis=0)) for name, line in lines.items()}
-
-    def least(pair: tuple[str, str]) -> float:
-        (low, high), (floor, ceiling) = boxes[pair[0]], boxes[pair[1]]
-        apart = float(np.hypot(*np.maximum(np.maximum(floor - high, low - ceiling), 0.0)))
-        return apart - sum(halves[name.rstrip("'")] for name in pair)
-
+    pairs = list(_pairs(lines))
     best: BeamGap | None = None
-    for bound, pair in sorted((least(pair), pair) for pair in _pairs(lines)):
-        if best is not None and bound > best.size:
+    bounds = _bounds(lines, halves, pairs)
+    for k in np.argsort(bounds).tolist():
+        if best is not None and bounds[k] > best.size:
             break
-        found = _gap(lines, halves, *pair)
+        found = _gap(lines, halves, *pairs[k])
         best = found if best is None or (found is not None and found < best) else best
     return best
+
+
+def _bounds(
+    lines: Mapping[str, FloatArray], halves: Mapping[str, float], pairs: Sequence[tuple[str, str]]
+) -> FloatArray:
+    """Return how far the boxes of pairs of beams are apart, less their half thicknesses, (p,) [m]."""
+    number = {name: k for k, name in enumerate(lines)}
+    low, high = (np.array([end(line, axis=0) for line in lines.values()]).reshape(-1, 2) for end in (np.min, np.max))
+    half = np.array([halves[name.rstrip("'")] for name in lines])
+    one, other = np.array([(number[a], number[b]) for a, b in pairs], dtype=np.int64).reshape(-1, 2).T
+    apart = np.maximum(np.maximum(low[other] - high[one], low[one] - high[other]), 0.0)
+    return np.asarray(np.hypot(*apart.T) - half[one] - half[other])
 
 
 def _pairs(lines: Iterable[str]) -> Iterator[tuple[str, str]]:
