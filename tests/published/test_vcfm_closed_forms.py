@@ -144,9 +144,9 @@ def test_straight_beam_stiffens_as_it_bends():
     travel = np.array([0.01, 0.25, 0.5, 1, 1.5, 2, 3, 4, 5])
     exact = [0.018813, 0.491389, 1.10849, 3.199559, 7.157727, 13.749862, 37.524081, 79.510073, 144.221255]
     strip = side(1.0, degrees=0.0)
-    force = springs.Straight(strip).force(travel)
+    force = springs.StraightSpring(strip).force(travel)
     assert force == pytest.approx(exact, rel=0.012)
-    usual = springs.Straight(strip).stiffness * travel + np.pi**4 / 8 * strip.axial * travel**3 / 50.0**3
+    usual = springs.StraightSpring(strip).stiffness * travel + np.pi**4 / 8 * strip.axial * travel**3 / 50.0**3
     assert usual[-1] / exact[-1] == pytest.approx(1.31, abs=0.01)
 
 
