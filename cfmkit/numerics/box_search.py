@@ -85,7 +85,7 @@ def lowest(
 
     Examples
     --------
-    >>> found = lowest(lambda at: (at[0] - 0.3) ** 2 + (at[1] * at[0] - 1.0) ** 2, (Axis(0, 1), Axis(1, 9)))
+    >>> found = lowest(lambda at: (at[0] - 0.3) ** 2 + (at[1] * at[0] - 1.0) ** 2, (BoxAxis(0, 1), BoxAxis(1, 9)))
     >>> [round(value, 5) for value in found.place]
     [0.3, 3.33333]
     """
