@@ -158,7 +158,7 @@ FORM = Form(12, (2,) * 5)
 PRINTED = np.concatenate([THICKNESS / MM, np.concatenate(SHARES), [WIDTH / MM]])
 
 
-@pytest.mark.parametrize(("modulus", "stroke"), [(1800e6, 27.25), (1500e6, 38.6)])
+@pytest.mark.parametrize(("modulus", "stroke"), first_and_slow([(1800e6, 27.25), (1500e6, 38.6)]))
 def test_paper_s_variables_reach_a_longer_stroke_in_their_own_ranges(modulus: float, stroke: float) -> None:
     """Within 1 % and 42.5 MPa; the paper's optimum has 16.0 mm."""
     task = replace(TASK, material=Elasticity(modulus, 0.35, 42.5e6))
@@ -170,18 +170,25 @@ def test_paper_s_variables_reach_a_longer_stroke_in_their_own_ranges(modulus: fl
     assert 10 * found.z[-1] == pytest.approx(stroke, rel=6e-3)
 
 
-@pytest.mark.parametrize(("steps", "rms"), [(25, 5e-3), pytest.param(200, 1.04e-3, marks=pytest.mark.slow)])
+E_F = replace(TASK, material=Elasticity(1800e6), start=0.0, stroke=30 * MM, goal="rms")
+
+
+def test_table_3_has_a_fifth_of_its_force_as_error() -> None:
+    """e_F of ten points over 30 mm: 0.295 N of 1.5 N."""
+    printed = StripProgram(E_F, FORM).state(PRINTED)
+    assert printed is not None
+    assert np.sqrt(np.mean((printed.force - 1.5) ** 2)) == pytest.approx(0.29468, abs=6e-6)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("steps", "rms"), [(25, 5e-3), (200, 1.04e-3)])
 def test_table_3_is_not_the_optimum_of_its_own_objective(steps: int, rms: float) -> None:
     """e_F of ten points over 30 mm without a stress limit: 1.04e-3 N is known to be possible, Table 3 has 0.295 N."""
-    task = replace(TASK, material=Elasticity(1800e6), start=0.0, stroke=30 * MM, goal="rms")
-    program = StripProgram(task, FORM)
+    program = StripProgram(E_F, FORM)
     found = descend(program, PRINTED, BOX, steps=steps, tolerance=1e-10)
     state = program.state(found.z)
     assert state is not None
     assert np.sqrt(np.mean((state.force - 1.5) ** 2)) <= rms
-    printed = program.state(PRINTED)
-    assert printed is not None
-    assert np.sqrt(np.mean((printed.force - 1.5) ** 2)) == pytest.approx(0.29468, abs=6e-6)
 
 
 def test_paper_s_optimum_violates_its_own_stress_limit() -> None:
