@@ -81,11 +81,11 @@ def best(work: Callable[[], Any], repeats: int = 15) -> float:
 
 def report(name: str, build: Callable[[], Network], drive: Any) -> None:
     exact = trace(build(), drive, Control(tolerance=1e-11))
-    truth = exact.effort[exact.at_asked]
+    truth = exact.effort[exact.at_requested]
     for tolerance in (1e-3, 1e-4, 1e-5, 1e-6, 1e-8):
         control = Control(tolerance=tolerance)
         path = trace(build(), drive, control)
-        error = np.abs(path.effort[path.at_asked] - truth).max() / np.abs(truth).max()
+        error = np.abs(path.effort[path.at_requested] - truth).max() / np.abs(truth).max()
         took = best(lambda control=control: trace(build(), drive, control).effort)
         print(f"{name:12s} tolerance {tolerance:.0e}  {took:8.2f} ms  error {error:.1e}  {len(path)} points")
 
@@ -146,7 +146,7 @@ def peer(curve: Displacement, bend: Loading, snap: Displacement) -> None:
 def compare(ops: Any, name: str, build: Any, drive: Any, section: Any, tolerances: tuple[float, ...]) -> None:
     """Print times of both, interleaved, and their ratio; the peer stays on the path that it starts on."""
     path = trace(build(), drive, Control(tolerance=1e-9, branch="primary"))
-    exact = path.effort[path.at_asked]
+    exact = path.effort[path.at_requested]
 
     def error(count: int) -> float:
         return float(np.abs(_opensees(ops, path, drive, count, section) - exact).max() / np.abs(exact).max())

@@ -70,7 +70,7 @@ def main() -> None:
     factors = np.linspace(1 / STEPS, 1, STEPS) * LARGEST * RIGIDITY / LENGTH**2
     drive = Loading((PointLoad("tip", fy=-1.0),), factors)
     path = trace(cantilever(), drive, Control(tolerance=1e-10))
-    exact = path.effort[path.at_asked]
+    exact = path.effort[path.at_requested]
     for tolerance in (1e-3, 1e-4, 1e-5):
         control = Control(tolerance=tolerance)
         for count in range(4, 41):

@@ -68,7 +68,7 @@ def main() -> None:
     for name, work in (
         ("curve of 11 points from rest", lambda: chain.press(travel)),
         ("exact slopes by 9 thicknesses and the stroke", lambda: StripProgram.slopes(program, z)),
-        ("second opinion at 10 points, 106 elements", lambda: recheck(path, path.at_asked[1:])),
+        ("second opinion at 10 points, 106 elements", lambda: recheck(path, path.at_requested[1:])),
         ("analyze, 481 points", lambda: cfmkit.analyze(spec)),
         ("design, 9 thicknesses, all in", lambda: cfmkit.design(spec)),
     ):

@@ -60,7 +60,7 @@ def test_cantilever_under_an_end_moment_rolls_into_a_circle() -> None:
     """Its curvature M/EI is the same everywhere [FF]."""
     angles = np.array([0.5, 1.0, 2.0]) * np.pi
     p = pushed(cantilever(), (RIGIDITY / LENGTH * angles).tolist(), moment=1.0)
-    moved = p.motion("tip")[p.at_asked]
+    moved = p.motion("tip")[p.at_requested]
     np.testing.assert_allclose(moved[:, 2], angles, rtol=1e-9)
     np.testing.assert_allclose(moved[:, 0] + LENGTH, LENGTH * np.sin(angles) / angles, atol=1e-9)
     np.testing.assert_allclose(moved[:, 1], LENGTH * (1 - np.cos(angles)) / angles, atol=1e-9)
@@ -80,7 +80,7 @@ def test_cantilever_under_a_transverse_end_force_of_mattiasson() -> None:
     loads = [row[0] * RIGIDITY / LENGTH**2 for row in MATTIASSON]
     table = np.array(MATTIASSON)
     p = pushed(cantilever(), loads, fy=-1.0)
-    at = p.motion("tip")[p.at_asked]
+    at = p.motion("tip")[p.at_requested]
     np.testing.assert_allclose(-at[:, 1] / LENGTH, table[:, 1], atol=5.1e-6)
     np.testing.assert_allclose(-at[:, 0] / LENGTH, table[:, 2], atol=5.1e-6)
     np.testing.assert_allclose(-at[:, 2], table[:, 3], atol=5.1e-6)
@@ -129,8 +129,8 @@ def test_column_buckles_at_euler_s_load_and_follows_the_elastica() -> None:
     p = pushed(cantilever(), (critical * ratios).tolist(), fx=-1.0)
     assert p.events[0].kind == "bifurcation"
     assert p.events[0].drive == pytest.approx(critical, rel=1e-7)
-    moved = p.motion("tip")[p.at_asked]
-    assert p.stable[p.at_asked].all()
+    moved = p.motion("tip")[p.at_requested]
+    assert p.stable[p.at_requested].all()
     assert np.abs(moved[0]).max() < 1e-9
     for ratio, (dx, dy, turn) in zip(ratios[1:], moved[1:], strict=True):
         k = brentq(lambda k, r=ratio: (2 * ellipk(k * k) / np.pi) ** 2 - r, 1e-6, 0.99999, xtol=1e-15)
@@ -152,7 +152,7 @@ def test_parallel_guiding_beam_is_two_cantilevers_of_half_its_length() -> None:
     nodes = {"root": Node(0, 0, CLAMPED), "tip": Node(LENGTH, 0, Support(rotation=True))}
     forces = table[1:, 0] * RIGIDITY / (0.5 * LENGTH) ** 2
     p = pushed(Network(nodes, {"beam": Beam("root", "tip", SLIM)}), forces.tolist(), fy=-1.0)
-    moved = p.motion("tip")[p.at_asked]
+    moved = p.motion("tip")[p.at_requested]
     np.testing.assert_allclose(-moved[:, 1] / LENGTH, table[1:, 1], atol=5.1e-6)
     np.testing.assert_allclose(-moved[:, 0] / LENGTH, table[1:, 2], atol=5.1e-6)
 
@@ -207,7 +207,7 @@ def test_cantilever_under_its_own_weight_small_and_large() -> None:
     factor = 8.0
     weight = factor * RIGIDITY / LENGTH**3
     p = trace(cantilever(), Loading((LineLoad("beam", wy=-weight),), np.array([1e-6, 1.0])), FINE)
-    moved = p.motion("tip")[p.at_asked]
+    moved = p.motion("tip")[p.at_requested]
     assert moved[0, 1] == pytest.approx(-1e-6 * weight * LENGTH**4 / (8 * RIGIDITY), rel=1e-6)
 
     def slopes(s: np.ndarray, y: np.ndarray) -> np.ndarray:

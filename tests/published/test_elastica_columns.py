@@ -61,8 +61,8 @@ def test_a_column_is_followed_far_beyond_its_critical_load(
     network, critical = column(slenderness, clamped)
     path = trace(network, Displacement("b", np.pi, APPROACH * LENGTH), Control(imperfection=imperfection))
     assert path.status is PathStatus.COMPLETE, path.message
-    assert path.stable[path.at_asked].all()
-    ratio = path.effort[path.at_asked] / critical
+    assert path.stable[path.at_requested].all()
+    ratio = path.effort[path.at_requested] / critical
     expected = [elastica(one) for one in APPROACH]  # a clamped column is four quarters of which two are a pinned one
     shortening = 20.0 / slenderness**2 * (4 if clamped else 1)  # of the axis, which the elastica has not
     np.testing.assert_allclose(ratio, expected, rtol=shortening + 20 * imperfection / LENGTH)
@@ -108,10 +108,10 @@ def test_a_column_is_loaded_with_its_critical_load_and_more(
     path = trace(network, Loading((PointLoad("b", fx=-critical),), ratios), Control(tolerance=tolerance))
     assert path.status is PathStatus.COMPLETE, path.message
     assert path.stable.all()
-    assert path.asked[path.at_asked].tolist() == [0, 1, 2, 3]
+    assert path.requested[path.at_requested].tolist() == [0, 1, 2, 3]
     assert [(event.kind, event.before, event.after) for event in path.events] == [("bifurcation", 0, 1)]
     assert path.events[0].drive == pytest.approx(1.0, rel=max(tolerance, 1e-9))
-    found = -path.motion("b")[path.at_asked, 0] / LENGTH
+    found = -path.motion("b")[path.at_requested, 0] / LENGTH
     np.testing.assert_allclose(found, [approach_under(one) for one in ratios], atol=10 * tolerance)
 
 
@@ -135,7 +135,7 @@ def test_a_column_of_pieces_is_loaded_with_multiples_of_its_critical_load_at_ran
     assert path.stable.all()
     told = [event.kind for event in path.events]
     assert told == ["bifurcation"] or (not told and ratios.max() <= 1 + 1e-5)
-    found = -path.motion("b")[path.at_asked, 0] / LENGTH
+    found = -path.motion("b")[path.at_requested, 0] / LENGTH
     sure = np.abs(ratios - 1) > 1e-5
     expected = np.array([approach_under(one) for one in ratios])
     np.testing.assert_allclose(found[sure], expected[sure], atol=20 * tolerance)
@@ -159,5 +159,5 @@ def test_a_cantilever_in_strong_tension_bends_in_a_boundary_layer(
     assert path.status is PathStatus.COMPLETE, path.message
     strain = tension / (young * width * thickness) if axial else 0.0
     expected = aside / tension * (LENGTH - LENGTH * np.tanh(slender) / slender)
-    found = path.motion("b")[path.at_asked, 1]
+    found = path.motion("b")[path.at_requested, 1]
     np.testing.assert_allclose(found, [0.5 * expected, expected], rtol=1e-6 + 2 * tolerance + 3 * strain)

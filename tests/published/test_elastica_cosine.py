@@ -85,5 +85,5 @@ def test_buckled_cosine_arch_stays_on_the_line_of_its_mode(ratio: float) -> None
     points = np.linspace(*places(ratio), 7)[1:-1]
     path = pressed(ratio, points)
     unit = 1e9 * 10e-3 * (RISE / ratio) ** 3 / 12 * RISE / SPAN**3
-    force = 2 * path.effort[path.at_asked] / unit
+    force = 2 * path.effort[path.at_requested] / unit
     np.testing.assert_allclose(force, 64 * np.pi**2 * (4 / 3 - points), atol=0.1)

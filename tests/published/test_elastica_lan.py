@@ -55,7 +55,7 @@ def path() -> Path:
 
 def test_table_3_force_at_every_half_millimetre(path: Path) -> None:
     assert path.status is PathStatus.COMPLETE
-    np.testing.assert_allclose(2 * path.effort[path.at_asked][1:], VALUES[:, 1], rtol=0, atol=1.1e-8)
+    np.testing.assert_allclose(2 * path.effort[path.at_requested][1:], VALUES[:, 1], rtol=0, atol=1.1e-8)
     assert abs(path.effort[0]) < 1e-9
 
 
@@ -66,14 +66,14 @@ def test_table_3_is_stable_under_displacement_control(path: Path) -> None:
 
 @pytest.mark.parametrize(("beam", "v", "h"), [("b1", 2, 5), ("b2", 3, 6), ("b3", 4, 7)])
 def test_table_3_forces_of_each_beam(path: Path, beam: str, v: int, h: int) -> None:
-    force = path.end_force(beam, 1)[path.at_asked][1:]
+    force = path.end_force(beam, 1)[path.at_requested][1:]
     np.testing.assert_allclose(-force[:, 1], VALUES[:, v], atol=6e-7)
     np.testing.assert_allclose(force[:, 0], VALUES[:, h], atol=6e-7)
 
 
 def test_table_3_largest_stress_and_its_place(path: Path) -> None:
     peak = path.peak_stress(axial=False)
-    keep = path.at_asked[1:]
+    keep = path.at_requested[1:]
     np.testing.assert_allclose(peak.value[keep] / 1e6, VALUES[:, 8], atol=6e-7)
     assert peak.beam[keep].tolist() == [row[9] for row in ROWS]
     np.testing.assert_allclose(peak.place[keep], VALUES[:, 9], atol=6e-6)
@@ -100,7 +100,7 @@ def test_paper_thinner_beams_with_the_same_rigidity_class() -> None:
 def test_raw_closure_is_prestressed_as_the_rounding_says() -> None:
     lengths = {"b1": 3.404 * CM, "b2": 1.987 * CM, "b3": 2.199 * CM, "b4": 1.959 * CM}
     p = trace(half(SECTION, closure="raw", lengths=lengths), Displacement("n5", DOWN, [0.0, 13.6 * MM]))
-    force = 2 * p.effort[p.at_asked]
+    force = 2 * p.effort[p.at_requested]
     assert force[0] == pytest.approx(0.0360, abs=6e-5)
     assert force[1] == pytest.approx(9.734157, abs=1e-6)
 
@@ -134,5 +134,5 @@ def test_extensible_force_of_an_independent_finite_element_program() -> None:
 
 def test_table_4_leg_force_and_stress() -> None:
     p = trace(table_4(), Displacement("n4", DOWN, LEG[:, 0] * MM), Control(tolerance=1e-8))
-    np.testing.assert_allclose(p.effort[p.at_asked], LEG[:, 1], atol=6e-7)
-    np.testing.assert_allclose(p.peak_stress(axial=False).value[p.at_asked] / 1e6, LEG[:, 2], atol=6e-5)
+    np.testing.assert_allclose(p.effort[p.at_requested], LEG[:, 1], atol=6e-7)
+    np.testing.assert_allclose(p.peak_stress(axial=False).value[p.at_requested] / 1e6, LEG[:, 2], atol=6e-5)

@@ -79,8 +79,8 @@ def test_v_beam_follows_the_stable_branch(shear: bool, column: int) -> None:
     p = pressed(v_beam(shear=shear), STABLE[:, 0] * MM, tolerance=1e-8)
     assert p.status is PathStatus.COMPLETE
     assert p.stable.all()
-    np.testing.assert_allclose(p.effort[p.at_asked], STABLE[:, column], atol=6e-7)
-    names = p.branch[p.at_asked]
+    np.testing.assert_allclose(p.effort[p.at_requested], STABLE[:, column], atol=6e-7)
+    names = p.branch[p.at_requested]
     assert all(name == "primary" for name in names[:3])
     assert all(name.startswith("bifurcated") for name in names[3:11])
     assert all(name == "primary" for name in names[11:])
@@ -109,8 +109,8 @@ def test_a_thick_v_beam_does_not_bifurcate() -> None:
 
 def test_v_beam_symmetric_branch_is_there_on_request_and_marked_unstable() -> None:
     p = pressed(v_beam(), SYMMETRIC[:, 0] * MM, branch="primary")
-    np.testing.assert_allclose(p.effort[p.at_asked], SYMMETRIC[:, 1], atol=2e-6)
-    assert not p.stable[p.at_asked].any()
+    np.testing.assert_allclose(p.effort[p.at_requested], SYMMETRIC[:, 1], atol=2e-6)
+    assert not p.stable[p.at_requested].any()
 
 
 def test_v_beam_force_vanishes_at_the_height_by_symmetry() -> None:
@@ -120,7 +120,7 @@ def test_v_beam_force_vanishes_at_the_height_by_symmetry() -> None:
 
 def test_v_beam_mirror_branches_have_the_same_force_and_mirrored_shapes() -> None:
     up, down = (pressed(v_beam(), np.array([2.0, 3.0]) * MM, sign=sign) for sign in (1, -1))
-    np.testing.assert_allclose(up.effort[up.at_asked], down.effort[down.at_asked], rtol=1e-7)
+    np.testing.assert_allclose(up.effort[up.at_requested], down.effort[down.at_requested], rtol=1e-7)
     assert np.abs(up.shape("v", -1) - down.shape("v", -1)).max() > 0.1 * MM
 
 
@@ -132,7 +132,7 @@ def test_v_beam_largest_stress(travel: float, stress: float) -> None:
 
 def test_v_beam_in_tension() -> None:
     p = pressed(v_beam(), -np.array([0.1, 0.2, 0.5, 1.0]) * MM)
-    np.testing.assert_allclose(p.effort[p.at_asked], [-0.411976, -0.855246, -2.374869, -5.559783], atol=2e-6)
+    np.testing.assert_allclose(p.effort[p.at_requested], [-0.411976, -0.855246, -2.374869, -5.559783], atol=2e-6)
 
 
 def cosine_half(ratio: float) -> tuple[Network, float, float]:
@@ -159,7 +159,7 @@ def test_cosine_arch_normalised_extremes(ratio: float, top: float, at_top: float
     network, rise, unit = cosine_half(ratio)
     p = pressed(network, np.arange(0.005, 1.9999, 0.005) * rise, tolerance=1e-5)
     assert p.status is PathStatus.COMPLETE
-    force, place = 2 * p.effort[p.at_asked] / unit, p.drive[p.at_asked] / rise
+    force, place = 2 * p.effort[p.at_requested] / unit, p.drive[p.at_requested] / rise
     assert 1.0 < force.max() / top < 1.01
     assert place[force.argmax()] == pytest.approx(at_top, abs=0.006)
     assert 1.0 < force.min() / low < 1.02
@@ -170,7 +170,7 @@ def test_cosine_arch_line_between_its_bifurcations() -> None:
     """Held in the mode 1 - cos(4 pi s), the shallow arch obeys f = 64 pi^2 (4/3 - D)."""
     network, rise, unit = cosine_half(10)
     p = pressed(network, np.array([0.6, 0.8, 1.0, 1.2]) * rise)
-    place = p.drive[p.at_asked] / rise
-    slope, level = np.polyfit(place, 2 * p.effort[p.at_asked] / unit, 1)
+    place = p.drive[p.at_requested] / rise
+    slope, level = np.polyfit(place, 2 * p.effort[p.at_requested] / unit, 1)
     assert slope == pytest.approx(-64 * np.pi**2, rel=2e-3)
     assert -level / slope == pytest.approx(4 / 3, rel=1e-3)

@@ -38,7 +38,7 @@ def force(chain: Chain, travel: list[float], side: int = 0) -> np.ndarray:
 
 def stress(chain: Chain, travel: list[float], side: int = 0) -> np.ndarray:
     path = chain.press(np.array(travel) * MM, side).path
-    return path.peak_stress().value[path.at_asked] / 1e6
+    return path.peak_stress().value[path.at_requested] / 1e6
 
 
 def stroke(chain: Chain, side: int = 0, limit: float = 42.5) -> float:
@@ -167,10 +167,10 @@ def test_table_3_as_it_stands() -> None:
     found = strip_chain().press(TABLE_3[:, 0] * MM)
     path = found.path
     np.testing.assert_allclose(found.force, TABLE_3[:, 1], atol=6e-6)
-    np.testing.assert_allclose(-path.reaction("slider")[path.at_asked, 1], TABLE_3[:, 2], atol=6e-6)
+    np.testing.assert_allclose(-path.reaction("slider")[path.at_requested, 1], TABLE_3[:, 2], atol=6e-6)
     peak = path.peak_stress()
-    np.testing.assert_allclose(peak.value[path.at_asked] / 1e6, TABLE_3[:, 3], atol=1.1e-3)
-    np.testing.assert_allclose(peak.place[path.at_asked] * 127.41903, 63.0936, atol=1e-3)  # p6, central flexure
+    np.testing.assert_allclose(peak.value[path.at_requested] / 1e6, TABLE_3[:, 3], atol=1.1e-3)
+    np.testing.assert_allclose(peak.place[path.at_requested] * 127.41903, 63.0936, atol=1e-3)  # p6, central flexure
 
 
 def test_table_3_gives_1_8_newton_and_not_1_5() -> None:

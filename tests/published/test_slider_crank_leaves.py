@@ -72,7 +72,7 @@ def pinned_beam_rates(section: Section, length: float, angles: np.ndarray) -> np
     bending = float(np.real(section.rigidities(np.array([0.5]), 0.5)[0][0]))
     force = 8.0 * bending / length**2 * np.linspace(0.01, 1.0, 200)
     path = trace(network, Loading((PointLoad("pin", fy=1.0),), force), Control(tolerance=1e-9))
-    at = path.at_asked
+    at = path.at_requested
     moved = path.motion("pin")[at]
     arm = CHARACTERISTIC * length
     angle = np.arctan2(moved[:, 1], arm + moved[:, 0])
@@ -97,7 +97,7 @@ def parallelogram_force(section: Section, length: float, travel: np.ndarray) -> 
         {"leaf": Beam("root", "stage", section)},
     )
     path = trace(network, Displacement("stage", 0.5 * np.pi, travel), Control(tolerance=1e-9))
-    force: np.ndarray = LEAVES * path.effort[path.at_asked]
+    force: np.ndarray = LEAVES * path.effort[path.at_requested]
     return force
 
 

@@ -140,7 +140,7 @@ def test_uniform_strip_of_eight_millimetres_goes_beyond_forty() -> None:
     thickness = uniform_thickness(replace(TASK, stroke=30 * MM), 8 * MM)
     assert thickness / MM == pytest.approx(0.843, abs=1.5e-3)
     pressed = strip_chain(thickness, width=8 * MM).press(np.array([40 * MM]))
-    assert pressed.path.peak_stress().value[pressed.path.at_asked[-1]] < 42.5e6
+    assert pressed.path.peak_stress().value[pressed.path.at_requested[-1]] < 42.5e6
 
 
 # --- the paper's 23 variables in its ranges ---------------------------------------------------------------------------
@@ -194,7 +194,7 @@ def test_table_3_is_not_the_optimum_of_its_own_objective(steps: int, rms: float)
 def test_paper_s_optimum_violates_its_own_stress_limit() -> None:
     """Eq. 15 asks for 42.5 MPa over 30 mm; Table 3 has 57.9 MPa there."""
     pressed = strip_chain().press(np.array([30 * MM]))
-    stress = pressed.path.peak_stress().value[pressed.path.at_asked[-1]]
+    stress = pressed.path.peak_stress().value[pressed.path.at_requested[-1]]
     assert stress / 1e6 == pytest.approx(57.865, abs=1e-3)
 
 

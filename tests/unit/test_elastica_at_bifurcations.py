@@ -63,12 +63,12 @@ def test_a_point_at_the_begin_or_the_end_of_a_branch(exact: Path, which: int, to
     path = pressed(np.append(REGULAR, place + off * RISE), tolerance)
     assert path.status is PathStatus.COMPLETE, path.message
     assert path.stable.all()
-    assert path.asked[path.at_asked].tolist() == list(range(16))
-    assert path.drive[path.at_asked] == pytest.approx(np.sort(np.append(REGULAR, place + off * RISE)), rel=1e-12)
+    assert path.requested[path.at_requested].tolist() == list(range(16))
+    assert path.drive[path.at_requested] == pytest.approx(np.sort(np.append(REGULAR, place + off * RISE)), rel=1e-12)
     assert [(e.kind, e.before, e.after) for e in path.events] == [("bifurcation", 0, 1), ("bifurcation", 1, 0)]
     assert [e.drive for e in path.events] == pytest.approx([e.drive for e in exact.events], abs=tolerance * RISE)
-    usual = np.isin(path.drive[path.at_asked].round(12), REGULAR.round(12))
-    found, expected = path.effort[path.at_asked], exact.effort[exact.at_asked]
+    usual = np.isin(path.drive[path.at_requested].round(12), REGULAR.round(12))
+    found, expected = path.effort[path.at_requested], exact.effort[exact.at_requested]
     np.testing.assert_allclose(found[usual], expected, rtol=0, atol=10 * tolerance * np.abs(expected).max())
     aside = place + (1e-3 if which else -1e-3) * RISE  # on the path without a branch
     near = pressed([aside, RISE] if which == 0 else [*REGULAR[:9], aside], 1e-8)
@@ -80,7 +80,7 @@ def test_a_point_at_the_begin_or_the_end_of_a_branch(exact: Path, which: int, to
 def test_a_point_at_a_bifurcation_of_a_path_that_goes_straight_on(exact: Path, off: float) -> None:
     path = pressed(np.append(REGULAR, exact.events[0].drive + off * RISE), 1e-6, "primary")
     assert path.status is PathStatus.COMPLETE, path.message
-    assert path.asked[path.at_asked].tolist() == list(range(16))
+    assert path.requested[path.at_requested].tolist() == list(range(16))
     assert [(e.kind, e.before, e.after) for e in path.events] == [("bifurcation", 0, 1), ("bifurcation", 1, 0)]
 
 
@@ -118,14 +118,14 @@ def test_a_drive_that_turns_back_leaves_a_branch_by_either_end(
     places = [named.get(point, point) for point in points]
     path = turned(np.array(places) * RISE, tolerance)
     assert path.status is PathStatus.COMPLETE, path.message
-    assert path.asked[path.at_asked].tolist() == list(range(len(places)))
+    assert path.requested[path.at_requested].tolist() == list(range(len(places)))
     assert path.stable.all()
     assert "".join("+" if event.after else "-" for event in path.events) == changes
     nearest = [min(abs(event.drive - place * RISE) for place in (begin, end)) for event in path.events]
     assert max(nearest) < tolerance * 2.1 * RISE
-    for p, name in zip(places, path.branch[path.at_asked], strict=True):
+    for p, name in zip(places, path.branch[path.at_requested], strict=True):
         assert p in (begin, end) or (name == "primary") == (not begin < p < end)
-    alike = [path.effort[path.at_asked[k]] for k, p in enumerate(places) if p == 1]
+    alike = [path.effort[path.at_requested[k]] for k, p in enumerate(places) if p == 1]
     zero = 1e-11 * np.abs(path.effort).max()  # there the force vanishes
     assert alike == pytest.approx([alike[0]] * len(alike), rel=100 * tolerance, abs=zero)
 
@@ -139,7 +139,7 @@ def test_points_next_to_each_other_at_the_end_of_a_branch(
     end = exact.events[1].drive / RISE
     path = pressed(np.array([1.0, *(end + off for off in offs), *behind]) * RISE, tolerance)
     assert path.status is PathStatus.COMPLETE, path.message
-    assert path.asked[path.at_asked].tolist() == list(range(1 + len(offs) + len(behind)))
+    assert path.requested[path.at_requested].tolist() == list(range(1 + len(offs) + len(behind)))
     assert path.stable.all()
     assert [(event.kind, event.after) for event in path.events] == [("bifurcation", 1), ("bifurcation", 0)]
 
@@ -192,14 +192,14 @@ def test_where_two_modes_are_critical_at_once_both_leaves_buckle(exact: Path, si
     assert path.status is PathStatus.COMPLETE
     assert path.stable.all()
     assert [(e.kind, e.before, e.after) for e in path.events] == [("bifurcation", 0, 2), ("bifurcation", 2, 0)]
-    found, half = path.effort[path.at_asked], exact.effort[exact.at_asked]
+    found, half = path.effort[path.at_requested], exact.effort[exact.at_requested]
     np.testing.assert_allclose(found, 2 * half, rtol=0, atol=10 * tolerance * np.abs(half).max())
 
 
 def test_the_sign_mirrors_the_forms_of_both_leaves() -> None:
     one, other = (whole(REGULAR[:6], tolerance=1e-6, sign=sign) for sign in (1, -1))
     for leaf in ("one", "two"):
-        moments = [path.end_force(leaf, 1)[path.at_asked[-1], 2] for path in (one, other)]
+        moments = [path.end_force(leaf, 1)[path.at_requested[-1], 2] for path in (one, other)]
         middle = 0.5 * (moments[0] + moments[1])
         assert abs(moments[0] - moments[1]) > 10 * abs(middle)
 
@@ -210,7 +210,7 @@ def test_the_sign_mirrors_the_forms_of_both_leaves() -> None:
 def test_every_point_asked_for_has_its_number_once(exact: Path, branch: Any, which: int, off: float) -> None:
     path = pressed(np.append(REGULAR, exact.events[which].drive + off * RISE), 1e-6, branch)
     assert path.status is PathStatus.COMPLETE, path.message
-    assert path.asked[path.at_asked].tolist() == list(range(16))
+    assert path.requested[path.at_requested].tolist() == list(range(16))
 
 
 @pytest.mark.parametrize("tolerance", [1e-5, 1e-7])
@@ -222,8 +222,8 @@ def test_leaves_that_are_nearly_equal_buckle_one_after_the_other(factor: float, 
     assert path.status is PathStatus.COMPLETE, path.message
     assert path.stable.all()
     halves = [pressed(REGULAR, 1e-9, section=section) for section in sections]
-    expected = sum(half.effort[half.at_asked] for half in halves)
-    np.testing.assert_allclose(path.effort[path.at_asked], expected, rtol=0, atol=10 * tolerance * expected.max())
+    expected = sum(half.effort[half.at_requested] for half in halves)
+    np.testing.assert_allclose(path.effort[path.at_requested], expected, rtol=0, atol=10 * tolerance * expected.max())
 
 
 def test_a_given_first_step_does_not_keep_a_bifurcation_from_being_found() -> None:

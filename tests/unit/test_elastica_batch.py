@@ -30,7 +30,7 @@ def test_a_batch_gives_each_network_its_own_curve_in_order() -> None:
     for sweep, outcome in zip(sweeps, found, strict=True):
         path = trace(bent(sweep), DRIVE)
         assert outcome.status == PathStatus.COMPLETE.name
-        np.testing.assert_array_equal(outcome.value.effort, path.effort[path.at_asked])
+        np.testing.assert_array_equal(outcome.value.effort, path.effort[path.at_requested])
 
 
 def test_a_network_that_cannot_exist_fails_alone() -> None:
@@ -55,7 +55,7 @@ def test_functions_are_called_for_networks_where_they_are_traced(workers: int) -
     assert [outcome.status for outcome in found] == ["COMPLETE", "INVALID", "COMPLETE"]
     assert "thickness must be positive" in found[1].message
     path = trace(standing(0.03), DRIVE)
-    np.testing.assert_array_equal(found[0].value.effort, path.effort[path.at_asked])
+    np.testing.assert_array_equal(found[0].value.effort, path.effort[path.at_requested])
 
 
 def test_what_a_function_collects_comes_from_processes_as_it_is() -> None:

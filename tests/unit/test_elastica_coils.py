@@ -29,7 +29,7 @@ def test_a_coil_has_the_length_of_its_turns_and_resists_turning_like_a_straight_
     assert path.status is PathStatus.COMPLETE
     assert path.fits["coil"].length == pytest.approx(abs(length), rel=1e-9)
     stiffness = 2e9 * 1e-2 * 1e-4**3 / 12 / abs(length)
-    assert path.effort[path.at_asked] == pytest.approx(stiffness * path.drive[path.at_asked], rel=1e-9)
+    assert path.effort[path.at_requested] == pytest.approx(stiffness * path.drive[path.at_requested], rel=1e-9)
 
 
 def test_the_derivative_of_a_coil_s_moment_by_its_chord():

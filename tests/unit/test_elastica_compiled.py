@@ -21,7 +21,7 @@ import pytest
 from cfmkit.elastica import CLAMPED, Beam, Control, Displacement, Network, Node, Section, trace
 from cfmkit.elastica.kernels import dense, entry, kept, machine, packing, predictor
 from cfmkit.elastica.kernels.packing import HEAD, objects
-from cfmkit.elastica.kernels.progress import told
+from cfmkit.elastica.kernels.progress import reported
 from cfmkit.elastica.kernels.signatures import DOORS
 from cfmkit.elastica.warming import warm
 from cfmkit.store.private import trusted
@@ -422,7 +422,7 @@ def test_who_watches_a_compilation_sees_how_far_it_is(monkeypatch: pytest.Monkey
 
     screen = Watched()
     monkeypatch.setattr(sys, "stderr", screen)
-    with told("solver") as report:
+    with reported("solver") as report:
         report(0.5)
     shown = screen.getvalue().split("\r")
     assert shown[1].endswith("equilibria and paths, about 12 s: 0 %")

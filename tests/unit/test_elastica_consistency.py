@@ -63,7 +63,7 @@ def test_an_arch_fares_alike_at_every_tolerance(seed: int) -> None:
     assert not any(event.kind == "unresolved" for path in paths for event in path.events)
     if paths[0].status is not PathStatus.COMPLETE:
         return
-    efforts = [path.effort[path.at_asked] for path in paths]
+    efforts = [path.effort[path.at_requested] for path in paths]
     largest = np.abs(efforts[-1]).max()
     for tolerance, effort in zip(TOLERANCES, efforts, strict=True):
         np.testing.assert_allclose(effort, efforts[-1], rtol=0, atol=20 * tolerance * largest + 1e-12)
@@ -99,4 +99,4 @@ def test_a_path_that_meets_no_limit_point_is_the_same_with_permission_to_pass_so
     plain, allowed = (trace(network, drive, Control(tolerance=1e-5, through_folds=folds)) for folds in (False, True))
     assert allowed.status is plain.status
     assert allowed.events == plain.events
-    np.testing.assert_allclose(allowed.effort[allowed.at_asked], plain.effort[plain.at_asked], rtol=1e-9)
+    np.testing.assert_allclose(allowed.effort[allowed.at_requested], plain.effort[plain.at_requested], rtol=1e-9)

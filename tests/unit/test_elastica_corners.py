@@ -54,7 +54,7 @@ def test_a_point_beside_a_bifurcation_does_not_end_the_path(
     path = pressed(angle, thickness, [place, end], tolerance=tolerance)
     assert path.status is PathStatus.COMPLETE
     assert path.stable.all()
-    assert path.drive[path.at_asked] == pytest.approx([place, end], rel=1e-12)
+    assert path.drive[path.at_requested] == pytest.approx([place, end], rel=1e-12)
 
 
 def test_a_path_returns_to_its_primary_path_in_one_step_to_its_only_point() -> None:
@@ -89,7 +89,7 @@ def test_a_stated_imperfection_does_not_depend_on_the_tolerance(tolerance: float
         for limit in (tolerance, 1e-9)
     )
     assert loose.imperfection == tight.imperfection
-    forces = [path.effort[path.at_asked] for path in (loose, tight)]
+    forces = [path.effort[path.at_requested] for path in (loose, tight)]
     np.testing.assert_allclose(forces[0], forces[1], rtol=0, atol=3 * tolerance * np.abs(forces[1]).max())
 
 
@@ -108,7 +108,7 @@ def test_the_mode_of_an_arch_is_sampled_finely_at_any_tolerance(tolerance: float
         trace(Network(nodes, beams), drive, Control(limit, imperfection=3e-5)) for limit in (tolerance, 1e-9)
     )
     assert "buckling mode" in loose.imperfection
-    turns = [np.abs(path.motion("t")[path.at_asked, 2]) for path in (loose, tight)]
+    turns = [np.abs(path.motion("t")[path.at_requested, 2]) for path in (loose, tight)]
     np.testing.assert_allclose(turns[0], turns[1], rtol=0, atol=tolerance)
 
 
@@ -134,9 +134,9 @@ def test_the_side_of_a_branch_does_not_depend_on_the_mesh(sign: Any) -> None:
     moments, turns = [], []
     for tolerance in (1e-3, 1e-5, 5e-6, 1e-6, 1e-8):
         leaf = pressed(angle, 1e-3, [1e-3, 2e-3], tolerance=tolerance, sign=sign)
-        moments.append(leaf.end_force("v", 1)[leaf.at_asked[-1], 2])
+        moments.append(leaf.end_force("v", 1)[leaf.at_requested[-1], 2])
         arch = trace(Network(nodes, beams), down, Control(tolerance=tolerance, sign=sign))
-        turns.append(arch.motion("t")[arch.at_asked[-1], 2])
+        turns.append(arch.motion("t")[arch.at_requested[-1], 2])
     assert moments == pytest.approx([-0.01141 * sign] * 5, rel=1e-2)
     assert abs(turns[0]) > 0.05
     assert turns == pytest.approx([turns[-1]] * 5, rel=1e-2)
@@ -162,4 +162,4 @@ def test_a_truss_of_stiff_beams_jumps_where_they_buckle_whatever_the_tolerance(t
     assert [(event.kind, event.before, event.after) for event in path.events] == [("bifurcation", 0, 1)]
     assert path.events[0].drive == pytest.approx(1.0, rel=10 * tolerance)
     assert path.drive[-1] <= 1.0 + 10 * tolerance
-    assert len(path.at_asked) in (int((drive.points < 1.0).sum()), int((drive.points <= 1.0).sum()))
+    assert len(path.at_requested) in (int((drive.points < 1.0).sum()), int((drive.points <= 1.0).sum()))

@@ -53,7 +53,7 @@ def test_thrust_takes_it_away_and_a_pull_adds_to_it() -> None:
     path = trace(straight(guided(0.0), axial=False), Loading((PointLoad("tip", fx=-1.0),), thrust))
     q = np.sqrt(thrust / RIGIDITY)
     wanted = RIGIDITY * q**3 / (2 * np.tan(q * LENGTH / 2) - q * LENGTH)
-    assert cross_stiffness(path, "tip", 0.0)[path.at_asked] == pytest.approx(wanted, rel=1e-6)
+    assert cross_stiffness(path, "tip", 0.0)[path.at_requested] == pytest.approx(wanted, rel=1e-6)
 
 
 def test_it_is_what_a_small_push_across_meets_in_any_pose() -> None:

@@ -77,7 +77,7 @@ def test_a_path_with_all_its_points_is_complete():
     move = decided(of, leg(of, DONE, path), fresh=False)
     assert isinstance(move, Resume)
     assert move.trail is path
-    assert path.asked == 3
+    assert path.requested == 3
     assert not len(path.ahead)
 
 
@@ -167,7 +167,7 @@ def test_decisions_leave_the_path_that_they_are_made_from_as_it_is():
     info, drives = path.points.info.copy(), path.points.drive.copy()
     limit_point.around(of, path)
     ending.stop(of, path, OUTSIDE)
-    path.up_to(-1).with_spot(spot(of, 0.5), 1).telling(Event("bifurcation", 0.1, 0, 1)).come_by(0.1)
+    path.up_to(-1).with_spot(spot(of, 0.5), 1).with_event(Event("bifurcation", 0.1, 0, 1)).come_by(0.1)
     assert np.array_equal(path.points.info, info)
     assert np.array_equal(path.points.drive, drives)
     assert (len(path.branches), path.events, dict(path.visited), path.stretch.natural) == (2, (), {}, True)

@@ -29,7 +29,7 @@ def test_points_next_to_a_bifurcation_are_reached_on_their_branch(count, sign):
     """Among them 4.75 mm, 0.0002 mm before the leaf straightens, and 0.9125 mm, 0.0002 mm after it buckles."""
     path = pressed(np.linspace(0, 6, count + 1)[1:], sign)
     assert path.status is PathStatus.COMPLETE
-    assert len(path.at_asked) == count
+    assert len(path.at_requested) == count
     assert path.stable.all()
     assert [event.drive / MM for event in path.events] == pytest.approx([0.912302, 4.750175], abs=1e-6)
     assert (np.diff(path.drive) > 0).all()
@@ -40,7 +40,7 @@ def test_points_next_to_a_bifurcation_are_reached_on_their_branch(count, sign):
 def test_the_force_is_continuous_across_a_bifurcation(place, off):
     path = pressed(np.array([0.5, place + off, 5.5]))
     smooth = pressed(np.array([0.5, place - 0.05, place + 0.05, 5.5]))
-    force, around = path.effort[path.at_asked][1], smooth.effort[smooth.at_asked][1:3]
+    force, around = path.effort[path.at_requested][1], smooth.effort[smooth.at_requested][1:3]
     assert path.status is PathStatus.COMPLETE
     assert around.min() - 0.05 <= force <= around.max() + 0.05
 

@@ -103,7 +103,7 @@ def test_a_path_keeps_to_its_number_of_points() -> None:
     path = trace(strip(), Displacement("t", UP, np.linspace(1e-3, 0.05, 20)), Control(most_points=2))
     assert path.status is PathStatus.FULL
     assert 1 < len(path) <= 22
-    assert len(path.at_asked) < 20
+    assert len(path.at_requested) < 20
     assert f"{path.drive[-1]:.6g}" in path.message
 
 
@@ -154,7 +154,7 @@ def test_a_batch_keeps_what_each_path_reached_and_why_it_ended(workers: int) -> 
     assert [one.status for one in found] == ["COMPLETE", "JUMPS", "INVALID", "INVALID", "COMPLETE"]
     alone = trace(arch(), PUSH)
     assert found[1].message == alone.message
-    np.testing.assert_array_equal(found[1].value.effort, alone.effort[alone.at_asked])
+    np.testing.assert_array_equal(found[1].value.effort, alone.effort[alone.at_requested])
     np.testing.assert_array_equal(found[0].value.effort, found[4].value.effort)
     assert len(found[0].value.drive) == 40
 

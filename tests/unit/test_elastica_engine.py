@@ -188,7 +188,7 @@ def test_energy_is_the_work_of_the_drive() -> None:
     nodes, weights = np.polynomial.legendre.leggauss(16)
     travel = np.append(0.5 * 9e-3 * (nodes + 1), 9e-3)
     p = driven(frame(), np.sort(travel))
-    work = 0.5 * 9e-3 * weights @ p.effort[p.at_asked][:16]
+    work = 0.5 * 9e-3 * weights @ p.effort[p.at_requested][:16]
     assert p.energy[-1] == pytest.approx(work, rel=1e-9)
 
 
@@ -197,7 +197,7 @@ def test_work_of_a_force_drive_is_its_energy_too() -> None:
     nodes, weights = np.polynomial.legendre.leggauss(24)
     factor = 0.5 * 0.6 * (nodes + 1)
     p = trace(frame(), Loading(loads, np.append(factor, 0.6)), TIGHT)
-    shift = p.effort[p.at_asked]
+    shift = p.effort[p.at_requested]
     # integral of u dP by parts: P u - W
     assert p.energy[-1] == pytest.approx(0.6 * shift[-1] - 0.3 * weights @ shift[:-1], rel=1e-9)
 
@@ -205,7 +205,7 @@ def test_work_of_a_force_drive_is_its_energy_too() -> None:
 @pytest.mark.parametrize("turn", [0.3, 2.0, -1.1])
 def test_a_turned_network_has_the_same_forces(reference: Path, turn: float) -> None:
     p = driven(frame(turn=turn), TRAVEL, turn)
-    np.testing.assert_allclose(p.effort[p.at_asked], reference.effort[reference.at_asked], rtol=1e-8)
+    np.testing.assert_allclose(p.effort[p.at_requested], reference.effort[reference.at_requested], rtol=1e-8)
     c, s = np.cos(turn), np.sin(turn)
     moved, was = p.motion("bb")[-1], reference.motion("bb")[-1]
     np.testing.assert_allclose(moved, [c * was[0] - s * was[1], s * was[0] + c * was[1], was[2]], atol=1e-10)
@@ -213,7 +213,7 @@ def test_a_turned_network_has_the_same_forces(reference: Path, turn: float) -> N
 
 def test_a_mirrored_network_has_mirrored_motions(reference: Path) -> None:
     p = trace(frame(mirrored=True), Displacement("d", UP, TRAVEL), TIGHT)
-    np.testing.assert_allclose(p.effort[p.at_asked], reference.effort[reference.at_asked], rtol=1e-8)
+    np.testing.assert_allclose(p.effort[p.at_requested], reference.effort[reference.at_requested], rtol=1e-8)
     np.testing.assert_allclose(p.motion("b")[-1], reference.motion("b")[-1] * [1, -1, -1], atol=1e-10)
 
 
@@ -221,7 +221,7 @@ def test_a_mirrored_network_has_mirrored_motions(reference: Path) -> None:
 def test_a_scaled_network_has_scaled_forces(reference: Path, size: float) -> None:
     """All lengths times k (width too): forces times k^2, torsion springs times k^3, line springs times k."""
     p = driven(frame(size=size), TRAVEL * size)
-    np.testing.assert_allclose(p.effort[p.at_asked], reference.effort[reference.at_asked] * size**2, rtol=1e-8)
+    np.testing.assert_allclose(p.effort[p.at_requested], reference.effort[reference.at_requested] * size**2, rtol=1e-8)
 
 
 def test_the_modulus_scales_the_force() -> None:
@@ -260,7 +260,9 @@ def test_splitting_a_beam_at_a_random_place_changes_nothing(seed: int) -> None:
     )
     travel = np.array([2e-3, 1e-2, 2e-2])
     forces = [driven(network, travel) for network in (one, two)]
-    np.testing.assert_allclose(forces[1].effort[forces[1].at_asked], forces[0].effort[forces[0].at_asked], rtol=2e-9)
+    np.testing.assert_allclose(
+        forces[1].effort[forces[1].at_requested], forces[0].effort[forces[0].at_requested], rtol=2e-9
+    )
 
 
 def test_the_error_falls_with_the_sixth_power_of_the_step() -> None:
@@ -280,7 +282,7 @@ def test_the_reported_error_bounds_the_true_one() -> None:
     exact = driven(frame(), TRAVEL, control=Control(tolerance=1e-11))
     for tolerance in (1e-3, 1e-5, 1e-7):
         p = driven(frame(), TRAVEL, control=Control(tolerance=tolerance))
-        true = np.abs(p.effort[p.at_asked] - exact.effort[exact.at_asked]).max() / np.abs(exact.effort).max()
+        true = np.abs(p.effort[p.at_requested] - exact.effort[exact.at_requested]).max() / np.abs(exact.effort).max()
         assert p.error <= tolerance
         assert true <= 3 * tolerance
 
@@ -319,7 +321,7 @@ def test_force_control_and_displacement_control_agree(reference: Path) -> None:
 
 def test_arc_length_passes_the_same_points(reference: Path) -> None:
     p = trace(frame(), Displacement("d", -UP, TRAVEL), Control(tolerance=1e-10, through_folds=True))
-    np.testing.assert_allclose(p.effort[p.at_asked], reference.effort[reference.at_asked], rtol=1e-8)
+    np.testing.assert_allclose(p.effort[p.at_requested], reference.effort[reference.at_requested], rtol=1e-8)
 
 
 def test_a_path_repeats_bit_by_bit(reference: Path) -> None:

@@ -30,7 +30,7 @@ def test_every_beam_and_every_body_is_in_equilibrium(seed: int, kind: int) -> No
     path = solved(net, drives(net, seed)[kind])
     scales = path.layout.scales
     forces = np.array([scales.force, scales.force, scales.moment])
-    judge = Judge(path, int(path.at_asked[-1]))
+    judge = Judge(path, int(path.at_requested[-1]))
     largest = max(1.0, *(np.abs(path.end_force(beam, 0)[-1] / forces).max() for beam in net.beams))
     for beam in net.beams:
         gap, jump = judge.gaps(beam)
@@ -63,7 +63,7 @@ def test_energy_grows_by_the_work_of_the_drive_and_of_dead_loads(seed: int, kind
     nodes, weights = np.polynomial.legendre.leggauss(20)
     end = float(drive.points[-1])
     path = solved(net, drive, np.array([0.0, *(0.5 * end * (nodes + 1)), end]))
-    at = path.at_asked
+    at = path.at_requested
     work = 0.5 * end * weights @ path.effort[at[1:-1]]
     grown = path.energy[at[-1]] - path.energy[0]
     size = 0.5 * abs(end) * weights @ np.abs(path.effort[at[1:-1]])
@@ -76,7 +76,7 @@ def test_energy_grows_by_the_work_of_dead_loads_that_are_driven() -> None:
     loads = (PointLoad("bb", 0.1, -0.15, 2e-3), PointLoad("d", 0.05, 0.1), LineLoad("cd", 3.0, 5.0))
     nodes, weights = np.polynomial.legendre.leggauss(12)
     path = solved(net, Loading(loads, np.array([0.0, *(0.5 * (nodes + 1)), 1.0])))
-    at = path.at_asked
+    at = path.at_requested
     shift = path.effort[at] - path.effort[0]
     work = shift[-1] - 0.5 * weights @ shift[1:-1]
     assert path.energy[at[-1]] - path.energy[0] == pytest.approx(work + dead_work(path, int(at[-1])), rel=1e-7)

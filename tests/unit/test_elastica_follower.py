@@ -98,7 +98,7 @@ def test_two_columns_under_partly_tangential_loads_diverge_both() -> None:
     path = trace(two_columns(()), Loading(sum(loads, ()), np.array([1.0, 3.0])), Control(branch="primary"))
     expected = (np.arccos(-share / (1 - share)) / (np.pi / 2)) ** 2
     assert 1.0 < expected < 3.0
-    assert path.unstable[path.at_asked].tolist() == [0, 2]
+    assert path.unstable[path.at_requested].tolist() == [0, 2]
 
 
 def two_columns(loads: Any) -> Network:

@@ -71,8 +71,8 @@ def test_gradients_are_those_of_differences(build: Any, x: np.ndarray, node: str
             moved = x.copy()
             moved[k] += step * h
             p = trace(build(moved), drive, FINE)
-            effort.append(p.effort[p.at_asked])
-            motion.append(p.motion(watched)[p.at_asked])
+            effort.append(p.effort[p.at_requested])
+            motion.append(p.motion(watched)[p.at_requested])
         for values, exact in ((effort, found.effort[:, k]), (motion, found.motion[watched][:, :, k])):
             slope = (values[0] - 8 * values[1] + 8 * values[2] - values[3]) / (12 * h)
             np.testing.assert_allclose(exact, slope, rtol=1e-6, atol=2e-7 * np.abs(slope).max() + 1e-11)

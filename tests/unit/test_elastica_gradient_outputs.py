@@ -100,7 +100,7 @@ def zoo(x: Any) -> Network:
 
 def outputs(path: Any, at: Any = slice(None)) -> dict[str, Any]:
     """Everything that can be requested at the requested points."""
-    keep = path.at_asked[at]
+    keep = path.at_requested[at]
     found = {"effort": path.effort[keep], "energy": path.energy[keep]}
     for node in path.layout.network.nodes:
         found[f"motion {node}"] = path.motion(node)[keep]
@@ -185,8 +185,8 @@ def test_each_of_the_rarer_variables_has_its_own_derivative(name: str) -> None:
     way[kind] = 1e-3 * X[kind]
     values = [trace(*pushed(X + step * way), FINE) for step in (-2, -1, 1, 2)]
     for slope, output in (
-        (found.effort[:, kind], lambda p: p.effort[p.at_asked]),
-        (found.reaction["c"][:, :, kind], lambda p: p.reaction("c")[p.at_asked]),
+        (found.effort[:, kind], lambda p: p.effort[p.at_requested]),
+        (found.reaction["c"][:, :, kind], lambda p: p.reaction("c")[p.at_requested]),
     ):
         a, b, c, d = (output(p) for p in values)
         want = (a - 8 * b + 8 * c - d) / (12 * way[kind])

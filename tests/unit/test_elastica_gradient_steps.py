@@ -27,7 +27,7 @@ from cfmkit.elastica import (
 from cfmkit.elastica.equilibrium.mesh import Mesh, grid, table
 from cfmkit.elastica.model.layout import Layout
 from cfmkit.elastica.model.shapes import Bent
-from cfmkit.elastica.sensitivity.tilt import Tilts, slope
+from cfmkit.elastica.sensitivity.complex_steps import ComplexSteps, slope
 from cfmkit.errors import InputError
 
 if TYPE_CHECKING:
@@ -105,7 +105,7 @@ def test_derivatives_of_tables_are_those_of_tables_on_grids_that_move(shape: str
         return table(layout, grid(layout, Mesh()))
 
     sizes = np.abs(table(known, cut)).max(axis=(0, 1))
-    for which, tilted in enumerate(Tilts(known, build, x).tilted):
+    for which, tilted in enumerate(ComplexSteps(known, build, x).stepped):
         want, found = difference(moved, x, which), slope(table(tilted, cut))
         off = np.abs(found - want).max(axis=(0, 1))
         assert (off <= 1e-9 * sizes).all(), (which, off, sizes)

@@ -56,8 +56,8 @@ def test_points_that_miss_the_tolerance_are_marked_and_the_others_are_not(monkey
     assert not path.accurate[-1]
     monkeypatch.undo()
     exact = trace(strip(), BENDING, Control(tolerance=1e-12))
-    wrong = np.abs(path.effort[path.at_asked] - exact.effort[exact.at_asked]) / np.abs(exact.effort).max()
-    assert (wrong[path.accurate[path.at_asked]] < 1e-10).all()
+    wrong = np.abs(path.effort[path.at_requested] - exact.effort[exact.at_requested]) / np.abs(exact.effort).max()
+    assert (wrong[path.accurate[path.at_requested]] < 1e-10).all()
     assert wrong[-1] > 1e-11
 
 
@@ -76,7 +76,7 @@ def test_a_branch_s_end_that_was_stepped_over_is_noticed(
     """Without a search for the end, long steps pass from the branch to the path that it joins; it is found behind."""
     monkeypatch.setattr(bifurcation, "predicted_end", lambda *given: (None, False))
     path = trace(v_beam(), Displacement("d", DOWN, np.array(travel) * 1e-3))
-    names = path.branch[path.at_asked]
+    names = path.branch[path.at_requested]
     assert all(name.startswith("bifurcated") for name in names[:on_branch])
     assert all(name == "primary" for name in names[on_branch:])
     assert path.events[-1].kind == "bifurcation"
@@ -88,6 +88,6 @@ def test_an_end_that_is_not_found_behind_either_is_told(monkeypatch: pytest.Monk
     monkeypatch.setattr(bifurcation, "predicted_end", lambda *given: (None, False))
     monkeypatch.setattr(branch_end, "closed_behind", lambda *given: None)
     path = trace(v_beam(), Displacement("d", DOWN, np.array([4.0, 4.71, 5.0, 6.0]) * 1e-3))
-    assert path.branch[path.at_asked][2:].tolist() == ["primary", "primary"]
+    assert path.branch[path.at_requested][2:].tolist() == ["primary", "primary"]
     assert path.events[-1].kind == "unresolved"
     assert 4.71e-3 < path.events[-1].drive <= 5.0e-3 * (1 + 1e-9)

@@ -146,7 +146,7 @@ def test_a_v_beam_on_its_stable_branch_agrees_with_corotational_elements() -> No
     drive = Displacement("d", -np.pi / 2, travel)
     path = trace(network, drive, Control(tolerance=1e-9))
     assert path.stable.all()
-    force = path.effort[path.at_asked]
+    force = path.effort[path.at_requested]
     other = _compare(network, drive, 20, travel)
     np.testing.assert_allclose(force, other, atol=2e-4 * np.abs(force).max())
 
@@ -160,8 +160,8 @@ def test_a_perfect_v_beam_on_its_bifurcated_branch_agrees_with_corotational_elem
     stable = trace(network, drive, Control(tolerance=1e-9))
     symmetric = trace(network, drive, Control(tolerance=1e-9, branch="primary"))
     found, other = recheck(stable, elements=60), recheck(symmetric, elements=60)
-    force = stable.effort[stable.at_asked]
+    force = stable.effort[stable.at_requested]
     np.testing.assert_allclose(found.effort, force, atol=3e-5 * np.abs(force).max())
-    np.testing.assert_allclose(other.effort, symmetric.effort[symmetric.at_asked], atol=3e-5 * np.abs(force).max())
+    np.testing.assert_allclose(other.effort, symmetric.effort[symmetric.at_requested], atol=3e-5 * np.abs(force).max())
     assert found.stable.all()
     assert other.stable.tolist() == [True, False, False, False, True]

@@ -156,9 +156,9 @@ def test_a_column_under_just_its_critical_load_bends_with_the_cube_root_of_a_pus
     path = pressed(1 + off, PointLoad("top", fy=-1e-3 * EULER), [0.0, 0.01, 0.5, 1.0], tolerance=tolerance)
     assert path.status is PathStatus.COMPLETE, path.message
     assert path.stable.all()
-    assert path.asked[path.at_asked].tolist() == [0, 1, 2, 3]
+    assert path.requested[path.at_requested].tolist() == [0, 1, 2, 3]
     expected = [turn_at_top(1 + off, 1e-3 * share) for share in (0.01, 0.5, 1.0)]
-    assert -path.motion("top")[path.at_asked[1:], 2] == pytest.approx(expected, rel=10 * tolerance)
+    assert -path.motion("top")[path.at_requested[1:], 2] == pytest.approx(expected, rel=10 * tolerance)
     assert [event.kind for event in path.events if event.drive < 1] in ([], ["bifurcation under constant loads"])
 
 
@@ -193,7 +193,7 @@ def test_a_branch_under_constant_loads_ends_where_the_drive_relieves_them(tolera
         path = pressed(1.5, PointLoad("top", fx=EULER), points, tolerance=tolerance)
         assert path.status is PathStatus.COMPLETE, path.message
         assert path.stable.all()
-        assert path.drive[path.at_asked] == pytest.approx(points)
+        assert path.drive[path.at_requested] == pytest.approx(points)
         assert [event.kind for event in path.events] == ["bifurcation under constant loads", "bifurcation"]
         assert path.events[1].drive == pytest.approx(0.5, abs=tolerance)
         assert path.branch[0].startswith("bifurcated under 66.67 %")

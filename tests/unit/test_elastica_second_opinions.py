@@ -54,7 +54,7 @@ def path() -> Path:
 
 def test_elements_agree_with_the_engine(path: Path) -> None:
     found = recheck(path, elements=60)
-    at = path.at_asked
+    at = path.at_requested
     np.testing.assert_allclose(found.effort, path.effort[at], rtol=5e-6)
     np.testing.assert_allclose(found.stress, path.peak_stress().value[at], rtol=3e-4)
     assert found.stable.all()
@@ -62,8 +62,8 @@ def test_elements_agree_with_the_engine(path: Path) -> None:
 
 def test_the_error_of_the_elements_falls_until_only_the_theories_differ(path: Path) -> None:
     """The two theories measure shear and stretch in frames that differ by the shear angle: about 1e-6 here."""
-    exact = path.effort[path.at_asked[-1]]
-    coarse, middle, fine = (abs(recheck(path, path.at_asked[-1:], n).effort[0] / exact - 1) for n in (12, 24, 48))
+    exact = path.effort[path.at_requested[-1]]
+    coarse, middle, fine = (abs(recheck(path, path.at_requested[-1:], n).effort[0] / exact - 1) for n in (12, 24, 48))
     assert coarse / middle > 4
     assert middle / fine > 4
     assert fine < 5e-6
@@ -90,9 +90,9 @@ def test_neighbours_are_the_equilibria_of_the_other_network(path: Path) -> None:
     again = trace(other, DOWN, Control(tolerance=1e-9))
     found = neighbouring(path, other, DOWN)
     assert found.status is PathStatus.COMPLETE
-    np.testing.assert_allclose(found.effort, again.effort[again.at_asked], rtol=1e-8)
-    np.testing.assert_allclose(found.motion("bb"), again.motion("bb")[again.at_asked], atol=1e-9)
-    np.testing.assert_allclose(found.peak_stress().value, again.peak_stress().value[again.at_asked], rtol=1e-7)
+    np.testing.assert_allclose(found.effort, again.effort[again.at_requested], rtol=1e-8)
+    np.testing.assert_allclose(found.motion("bb"), again.motion("bb")[again.at_requested], atol=1e-9)
+    np.testing.assert_allclose(found.peak_stress().value, again.peak_stress().value[again.at_requested], rtol=1e-7)
 
 
 def test_a_neighbour_too_far_away_is_lost_and_not_made_up(path: Path) -> None:
@@ -112,5 +112,5 @@ def test_slope_of_the_force_is_that_of_differences(path: Path) -> None:
     sides = [
         trace(frame(), Displacement("d", -np.pi / 2, DOWN.points + step), Control(tolerance=1e-11)) for step in (-h, h)
     ]
-    low, high = (side.effort[side.at_asked] for side in sides)
+    low, high = (side.effort[side.at_requested] for side in sides)
     np.testing.assert_allclose(drive_slope(path), (high - low) / (2 * h), rtol=1e-5)

@@ -51,7 +51,7 @@ def alone(count: int = 15, factor: float = 1.0, thickness: float = 7e-4, angle: 
 
 def moments(path: Path, point: int) -> Any:
     """Return the moments at the shuttle."""
-    at = path.at_asked[point]
+    at = path.at_requested[point]
     return np.array([path.end_force(name, 1)[at, 2] for name in path.layout.network.beams])
 
 
@@ -68,9 +68,9 @@ def test_equal_leaves_buckle_together_and_straighten_together(many: int, toleran
         assert path.stable.all()
         assert changes(path) == [("bifurcation", 0, many), ("bifurcation", many, 0)]
         assert [event.drive for event in path.events] == pytest.approx([event.drive for event in one.events], rel=1e-7)
-        expected = many * one.effort[one.at_asked]
+        expected = many * one.effort[one.at_requested]
         allowed = 10 * tolerance * np.abs(expected).max()
-        np.testing.assert_allclose(path.effort[path.at_asked], expected, rtol=0, atol=allowed)
+        np.testing.assert_allclose(path.effort[path.at_requested], expected, rtol=0, atol=allowed)
         sides = moments(path, 4) * sense
         assert sides == pytest.approx(np.full(many, abs(moments(one, 4)[0])), rel=1e-3)
 
@@ -84,9 +84,9 @@ def test_leaves_that_hardly_differ_buckle_together(factors: tuple[float, ...], t
     assert path.stable.all()
     assert changes(path) == [("bifurcation", 0, many), ("bifurcation", many, 0)]
     each = [alone(factor=factor) for factor in factors]
-    expected = sum(one.effort[one.at_asked] for one in each)
+    expected = sum(one.effort[one.at_requested] for one in each)
     allowed = 10 * tolerance * np.abs(expected).max()
-    np.testing.assert_allclose(path.effort[path.at_asked], expected, rtol=0, atol=allowed)
+    np.testing.assert_allclose(path.effort[path.at_requested], expected, rtol=0, atol=allowed)
 
 
 def test_leaves_that_differ_straighten_one_after_the_other() -> None:
@@ -95,9 +95,9 @@ def test_leaves_that_differ_straighten_one_after_the_other() -> None:
     path = trace(*leaves(factors, 15), Control(tolerance=1e-5))
     assert path.status is PathStatus.COMPLETE, path.message
     assert path.stable.all()
-    expected = sum(one.effort[one.at_asked] for one in (alone(factor=factor) for factor in factors))
+    expected = sum(one.effort[one.at_requested] for one in (alone(factor=factor) for factor in factors))
     allowed = 1e-4 * np.abs(expected).max()
-    np.testing.assert_allclose(path.effort[path.at_asked], expected, rtol=0, atol=allowed)
+    np.testing.assert_allclose(path.effort[path.at_requested], expected, rtol=0, atol=allowed)
 
 
 @pytest.mark.parametrize(("thickness", "tolerance"), [(1e-4, 1e-3), (2e-4, 1e-5), (5e-4, 1e-9)])
@@ -105,9 +105,9 @@ def test_two_very_slender_leaves(thickness: float, tolerance: float) -> None:
     one = alone(11, 1.0, thickness, 9.4)
     path = trace(*leaves(2, 11, thickness, 9.4), Control(tolerance=tolerance))
     assert path.status is PathStatus.COMPLETE, path.message
-    expected = 2 * one.effort[one.at_asked]
+    expected = 2 * one.effort[one.at_requested]
     allowed = 10 * tolerance * np.abs(expected).max()
-    np.testing.assert_allclose(path.effort[path.at_asked], expected, rtol=0, atol=allowed)
+    np.testing.assert_allclose(path.effort[path.at_requested], expected, rtol=0, atol=allowed)
 
 
 @pytest.mark.parametrize(("many", "count"), [(2, 11), (2, 20), (4, 51)])
@@ -143,8 +143,8 @@ def test_leaves_on_a_shuttle_that_may_turn_fare_alike_with_any_points(sign: Any,
         assert path.status is PathStatus.COMPLETE, path.message
         assert path.stable.all()
         assert changes(path) == changes(paths[0])
-        same = path.effort[path.at_asked][:: (len(path.at_asked) - 1) // 2]
-        assert same == pytest.approx(paths[0].effort[paths[0].at_asked][::2], abs=20 * tolerance)
+        same = path.effort[path.at_requested][:: (len(path.at_requested) - 1) // 2]
+        assert same == pytest.approx(paths[0].effort[paths[0].at_requested][::2], abs=20 * tolerance)
 
 
 @pytest.mark.parametrize(("many", "factor"), [(2, 1.0), (5, 1 + 1e-6), (3, 1 + 1e-3)])
@@ -168,8 +168,8 @@ def test_columns_under_one_platform_bear_its_load_together(many: int, factor: fl
     assert changes(path) == [("bifurcation", 0, many)]
     assert path.events[0].drive == pytest.approx(one.events[0].drive, rel=1e-6 + 3 * (factor - 1))
     assert (moments(path, -1) < 0).all()
-    expected = many * one.effort[one.at_asked]
-    np.testing.assert_allclose(path.effort[path.at_asked][-2:], expected[-2:], rtol=1e-4 + 30 * (factor - 1))
+    expected = many * one.effort[one.at_requested]
+    np.testing.assert_allclose(path.effort[path.at_requested][-2:], expected[-2:], rtol=1e-4 + 30 * (factor - 1))
 
 
 def test_a_mode_that_is_one_of_several_bends_all_leaves() -> None:

@@ -102,7 +102,7 @@ def test_cutting_all_beams_at_random_places_changes_nothing(seed: int) -> None:
         parts = cut(parts, name, float(rng.uniform(0.1, 0.9)))
     one, other = (trace(each, DRIVE, FINE) for each in (net, parts))
     assert one.status is other.status is PathStatus.COMPLETE
-    here, there = one.at_asked, other.at_asked
+    here, there = one.at_requested, other.at_requested
     np.testing.assert_allclose(other.effort[there], one.effort[here], rtol=2e-8)
     np.testing.assert_allclose(other.energy[there], one.energy[here], rtol=2e-8)
     np.testing.assert_allclose(other.peak_stress().value[there], one.peak_stress().value[here], rtol=2e-7)

@@ -56,7 +56,7 @@ def test_the_end_of_a_branch_is_located_though_the_path_it_left_turns_back(ratio
     end = 4 / 3 - (8 / 9 - root) / 3
     assert [event.kind for event in path.events] == ["bifurcation", "bifurcation"]
     assert path.events[1].drive / rise == pytest.approx(end, abs=1e-3)
-    names, where = path.branch[path.at_asked], path.drive[path.at_asked] / rise
+    names, where = path.branch[path.at_requested], path.drive[path.at_requested] / rise
     assert (names[where > end + 0.01] == "primary").all()
 
 

@@ -104,5 +104,5 @@ def test_of_two_humps_of_nearly_one_height_the_higher_is_found() -> None:
 def test_a_peak_beside_the_end_of_a_segment_is_found_at_a_loose_tolerance() -> None:
     """There the states of the two segments that meet differ by the tolerance."""
     loose, fine = (pressed(CosineArch(0.008), 1e-3, 0.03, tolerance) for tolerance in (1e-4, 1e-10))
-    found, exact = (path.stress_extremes("x").value[path.at_asked] for path in (loose, fine))
+    found, exact = (path.stress_extremes("x").value[path.at_requested] for path in (loose, fine))
     np.testing.assert_allclose(found, exact, atol=3e-4 * np.abs(exact).max())

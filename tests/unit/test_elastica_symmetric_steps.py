@@ -205,4 +205,4 @@ def test_a_slender_column_keeps_to_its_first_mode(slenderness: float, share: flo
     assert path.events == ()
     for point in (4, 16, 40):
         expected = shot(slenderness, share, ends, pressed.points[point] / 0.1)
-        assert path.effort[path.at_asked[point]] == pytest.approx(expected, rel=5e-4)
+        assert path.effort[path.at_requested[point]] == pytest.approx(expected, rel=5e-4)

@@ -97,7 +97,7 @@ def test_down_and_up_again_passes_the_same_bifurcations(count: int, tolerance: f
     first, second, again, last = places(path)
     alone = pressed(down, 1e-9)
     np.testing.assert_allclose([first, last, second, again], np.repeat(places(alone), 2), atol=tolerance * 2.1 * RISE)
-    forces = path.effort[path.at_asked]
+    forces = path.effort[path.at_requested]
     np.testing.assert_allclose(forces[:14], forces[15:29][::-1], rtol=0, atol=2 * tolerance * np.abs(forces).max())
     assert path.stable.all()
 
@@ -110,7 +110,7 @@ def test_on_a_branch_the_drive_may_turn_round_as_often_as_it_likes(tolerance: fl
     assert told(path) == [opened, closed] * 4
     first, last = places(pressed([2.1], 1e-9))
     np.testing.assert_allclose(places(path), [first] * 3 + [last] * 4 + [first], atol=2 * tolerance * RISE)
-    at = path.branch[path.at_asked]
+    at = path.branch[path.at_requested]
     assert [name == "primary" for name in at] == [False, True] * 4
     assert all(name.endswith(f"sign {sign:+d}") for name in at if name != "primary")
 
@@ -118,7 +118,7 @@ def test_on_a_branch_the_drive_may_turn_round_as_often_as_it_likes(tolerance: fl
 def test_a_path_that_ends_in_a_stretch_does_not_begin_the_next() -> None:
     path = trace(arch(), Loading((PointLoad("t", fy=-1.0),), np.array([0.3, 2.0, 0.3])))
     assert path.status is PathStatus.JUMPS
-    assert path.asked[path.at_asked].tolist() == [0]
+    assert path.requested[path.at_requested].tolist() == [0]
 
 
 @pytest.mark.parametrize("tolerance", TOLERANCES)
@@ -141,7 +141,7 @@ def test_a_toggle_snaps_and_snaps_back_at_the_limit_points_of_its_force(toleranc
     path = loaded(toggle(1e-3), [0.4, 0.8, 1.5, 0.8, 0.4, 0], tolerance)
     assert told(path) == [("limit point", a, b) for a, b in ((0, 1), (1, 0), (0, 1), (1, 0))]
     np.testing.assert_allclose(places(path), [top, low, low, top], atol=3e-5)  # of travel in steps
-    assert path.asked[path.at_asked].tolist() == [0, 0, 0, 1, 2, 3, 4, 4, 4, 5]
+    assert path.requested[path.at_requested].tolist() == [0, 0, 0, 1, 2, 3, 4, 4, 4, 5]
     np.testing.assert_allclose(path.motion("t")[-1], 0, atol=1e-8)
 
 

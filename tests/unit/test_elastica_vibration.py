@@ -156,7 +156,7 @@ def test_a_column_swings_ever_slower_up_to_eulers_load() -> None:
         Loading((PointLoad("tip", fx=-1.0),), shares[1:] * euler),
         Control(branch="primary"),
     )
-    found = frequencies(path, WHOLE, 1).free[path.at_asked, 0]
+    found = frequencies(path, WHOLE, 1).free[path.at_requested, 0]
     first = np.pi**2 * UNIT
     assert found == pytest.approx(first * np.sqrt(1 - shares[1:]), rel=1e-6)
     pulled = under(shares[0] * euler, beam(Support(across=True), pin=True))
@@ -253,7 +253,7 @@ def test_becks_column_flutters_at_its_load() -> None:
     loads = np.array([10.0, 20.0, 20.0505, 20.0515, 25.0]) * RIGIDITY / LENGTH**2
     path = trace(beam(), Loading((PointLoad("tip", fx=-1.0, follows=True),), loads))
     assert path.stable.all()
-    found = frequencies(path, WHOLE, 2, points=path.at_asked)
+    found = frequencies(path, WHOLE, 2, points=path.at_requested)
     assert found.flutters.tolist() == [False, False, False, True, True]
     assert np.isnan(found.free[3:]).all()
     assert np.isfinite(found.free[:3]).all()
@@ -267,7 +267,7 @@ def test_a_column_under_a_load_that_turns_in_part_diverges_where_bolotin_says(sh
     loads = (PointLoad("tip", fx=-share, follows=True), PointLoad("tip", fx=share - 1.0))
     drive = Loading(loads, np.array([0.5, 0.999, 1.001, 1.05]) * critical)
     path = trace(beam(), drive, Control(branch="primary"))
-    found = frequencies(path, WHOLE, 2, points=path.at_asked)
+    found = frequencies(path, WHOLE, 2, points=path.at_requested)
     assert found.diverges.tolist() == [False, False, True, True]
     assert not found.flutters.any()
     assert np.isnan(found.free[2:]).all()

@@ -623,7 +623,7 @@ def test_the_course_between_the_points_is_that_of_the_chain_pressed_there() -> N
     again = one.state.chain.press(travel)
     np.testing.assert_allclose(one.closed.effort("load", travel), again.force, rtol=1e-8)
     np.testing.assert_allclose(
-        one.closed.stress("load", travel), again.path.peak_stress().value[again.path.at_asked], 1e-6
+        one.closed.stress("load", travel), again.path.peak_stress().value[again.path.at_requested], 1e-6
     )
 
 
@@ -631,4 +631,4 @@ def test_the_stress_stroke_is_where_the_pressed_chain_has_the_allowable_stress()
     one = api.analyze(spec("tapered", "analysis.fidelity=lumped", "analysis.points=11", "analysis.recheck=false"))
     place = one.values["stress_stroke"].value
     path = one.state.chain.press(np.array([place])).path
-    assert path.peak_stress().value[path.at_asked[0]] == pytest.approx(42.5e6, rel=1e-6)
+    assert path.peak_stress().value[path.at_requested[0]] == pytest.approx(42.5e6, rel=1e-6)

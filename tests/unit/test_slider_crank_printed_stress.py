@@ -26,7 +26,7 @@ def test_the_stress_that_is_optimised_is_that_of_the_analysis(form: Form, seed: 
     """Even samples alone are up to 2 % below the peak between them."""
     state = StripProgram(TASK, form).state(random_strip(form, seed))
     assert state is not None
-    peak = state.path.peak_stress().value[state.path.at_asked[-1]]
+    peak = state.path.peak_stress().value[state.path.at_requested[-1]]
     assert state.stress.max() == pytest.approx(peak, rel=1e-7)
 
 

@@ -326,7 +326,7 @@ def test_exact_leaves_are_those_of_a_path_through_the_very_points(structure, sle
     onset, draw = found.edges[1], np.random.default_rng(7)
     places = np.sort(np.concatenate([draw.uniform(0, onset, 20), draw.uniform(0, top * rise, 60)]))
     path = trace(leaf_network(spec), Displacement("shuttle", DOWN, places), Control(tolerance=1e-8))
-    here = path.at_asked
+    here = path.at_requested
     force, stress, _, buckled = found.at(path.drive[here])
     peak = np.abs(path.effort[path.drive < rise]).max()
     assert force == pytest.approx(path.effort[here], abs=1e-6 * peak)

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from cfmkit.elastica.continuation.singular import Singular
     from cfmkit.elastica.continuation.state import BranchEnd, Problem, Trail
 
-BESIDE = 1e-5  # share of the drive's range
+NEAR_BIFURCATION = 1e-5  # share of the drive's range
 _AT = 3e-11  # and within which a point is at the bifurcation, whose place is known to about 1e-11
 _SIDES = 4.0  # units of the tolerance, as a share of the range, from which it is sure on which side a point lies
 _LOOSEST = 1e-4  # tolerance to which a bifurcation is located: a requested point near it would be in doubt
@@ -53,7 +53,7 @@ def count(problem: Problem, trail: Trail, place: float, start: float) -> int:
     """
     sense = 1.0 if place > start else -1.0
     left = trail.ahead
-    outside = ((left - place) * sense > BESIDE * problem.span) | ((left - start) * sense < 0)
+    outside = ((left - place) * sense > NEAR_BIFURCATION * problem.span) | ((left - start) * sense < 0)
     return int(outside.argmax()) if outside.any() else len(outside)
 
 
@@ -68,7 +68,7 @@ def passed(problem: Problem, trail: Trail, goal: float) -> Trail | None:
     if wide is None or early is None or wide.unstable != trail.unstable(-1) or wide.drive == early.drive:
         return None
     away = np.abs(targets - goal)[(targets - goal) * (goal - wide.drive) > 0]
-    gap = 0.5 * float(away[away > BESIDE * problem.span].min(initial=np.inf))
+    gap = 0.5 * float(away[away > NEAR_BIFURCATION * problem.span].min(initial=np.inf))
     place = goal + float(np.sign(goal - wide.drive)) * min(abs(goal - wide.drive), gap)
     guess = wide.y + (wide.y - early.y) * ((place - wide.drive) / (wide.drive - early.drive))
     found = fine.solve(guess, place)
@@ -96,7 +96,7 @@ def opening(problem: Problem, trail: Trail, found: Singular, one: Spot, wide: Sp
         else:
             share = 0.0 if abs(value - place) <= at else (value - place) / (one.drive - place)
             there = trail, start, share * (before - start), value, found.after if behind else found.before
-        trail = _with_asked(problem, *there)
+        trail = _with_requested(problem, *there)
     return trail
 
 
@@ -110,11 +110,11 @@ def closing(problem: Problem, trail: Trail, end: BranchEnd, spot: Spot) -> Trail
         else:
             share = np.sqrt((value - end.drive) / (spot.drive - end.drive))
             there = trail, end.y, share * (spot.y - end.y), value, spot.unstable
-        trail = _with_asked(problem, *there)
+        trail = _with_requested(problem, *there)
     return trail
 
 
-def _with_asked(
+def _with_requested(
     problem: Problem, trail: Trail, start: FloatArray, change: FloatArray, value: float, unstable: int
 ) -> Trail:
     """Return the path with the next requested point, solved on the fine mesh if that leads where it is predicted."""
@@ -124,5 +124,5 @@ def _with_asked(
     limit = _OFF * solver.pose_change(y, start) + _LEAST
     if near is None or solver.pose_change(near.y, y) > limit:
         near = Spot(y, value, solver.unit, unstable)
-    added = trail.with_spot(replace(near, tangent=solver.unit.copy()), trail.asked)
+    added = trail.with_spot(replace(near, tangent=solver.unit.copy()), trail.requested)
     return replace(added, pinned=(*trail.pinned, value))

@@ -43,7 +43,7 @@ class Outcome:
 
 
 @dataclass(frozen=True)
-class Asked:
+class Requested:
     """Drive, effort and stability at the requested points that were reached."""
 
     drive: FloatArray
@@ -51,17 +51,17 @@ class Asked:
     stable: Any
 
 
-def asked(path: Path) -> Asked:
+def requested(path: Path) -> Requested:
     """Return a path's values at the requested points: the default of what `trace_many` collects."""
-    keep = path.at_asked
-    return Asked(path.drive[keep], path.effort[keep], path.stable[keep])
+    keep = path.at_requested
+    return Requested(path.drive[keep], path.effort[keep], path.stable[keep])
 
 
 def trace_many(
     networks: Iterable[Network | Callable[[], Network]],
     drive: Drive,
     control: Control | None = None,
-    collect: Callable[[Path], Any] = asked,
+    collect: Callable[[Path], Any] = requested,
     workers: int = 1,
 ) -> Iterator[Outcome]:
     """Yield one outcome for each network, in their order; nothing but the collected values is kept.
@@ -107,7 +107,7 @@ def _chunks(networks: Iterable[Network | Callable[[], Network]]) -> Iterator[lis
 
 @dataclass(frozen=True)
 class _Packed:
-    """Outcomes on their way from a process: `Asked` as rows of three arrays for all, which are quicker to send."""
+    """Outcomes on their way from a process: `Requested` as rows of three arrays for all, which are quicker to send."""
 
     said: list[tuple[str, str]]
     values: list[Any]
@@ -119,7 +119,7 @@ class _Packed:
         for (status, message), value in zip(self.said, self.values, strict=True):
             if self.arrays is not None and value is not None:
                 begin, end = end, end + value
-                value = Asked(*(array[begin:end] for array in self.arrays))
+                value = Requested(*(array[begin:end] for array in self.arrays))
             yield Outcome(status, message, value)
 
 
@@ -127,7 +127,7 @@ def _outcomes(networks: list[Any], one: Callable[[Any], Outcome]) -> _Packed:
     found = [one(network) for network in networks]
     said, values = [(each.status, each.message) for each in found], [each.value for each in found]
     rows = [value for value in values if value is not None]
-    if not rows or not all(type(row) is Asked for row in rows):
+    if not rows or not all(type(row) is Requested for row in rows):
         return _Packed(said, values, None)
     all_rows = zip(*((row.drive, row.effort, row.stable) for row in rows), strict=True)
     drive, effort, stable = (np.concatenate(same) for same in all_rows)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.elastica.continuation import at_bifurcation, limit_point
-from cfmkit.elastica.continuation.at_bifurcation import BESIDE
+from cfmkit.elastica.continuation.at_bifurcation import NEAR_BIFURCATION
 from cfmkit.elastica.continuation.branch_end import end_at, predicted_end
 from cfmkit.elastica.continuation.state import Resume, Stop, fine_spot
 from cfmkit.elastica.continuation.switching import first_of_several, switched, well_before
@@ -63,11 +63,11 @@ def crossed(problem: Problem, trail: Trail) -> Move:
         trail, found = first_of_several(problem, trail, found, one)
         other = trail.spot(-1)
     kind = "limit point" if found.fold else "bifurcation"
-    untold = trail
-    trail = trail.telling(Event(kind, found.spot.drive * problem.unit, found.before, found.after))
+    unreported = trail
+    trail = trail.with_event(Event(kind, found.spot.drive * problem.unit, found.before, found.after))
     if trail.first is None and not found.fold and found.after > found.before:
         trail = replace(trail, first=found)
-    return _parted(problem, trail, found, one, other, untold) if natural else Resume(trail, other)
+    return _parted(problem, trail, found, one, other, unreported) if natural else Resume(trail, other)
 
 
 def _unresolved(problem: Problem, trail: Trail, other: Spot) -> Move:
@@ -76,9 +76,9 @@ def _unresolved(problem: Problem, trail: Trail, other: Spot) -> Move:
     if after > before and _may_be_shorter(problem, trail) and not trail.stuck(problem):
         return _again(trail)
     event = Event("unresolved", other.drive * problem.unit, before, after)
-    told = before == after or event in trail.events
-    if min(before, after) >= 0 and not told:  # a count below zero is that of rounding
-        trail = trail.telling(event)
+    known = before == after or event in trail.events
+    if min(before, after) >= 0 and not known:  # a count below zero is that of rounding
+        trail = trail.with_event(event)
     return Resume(trail, other)
 
 
@@ -116,12 +116,12 @@ def _at_it(problem: Problem, trail: Trail, index: int, spot: Spot | None, other:
         return True
     if other is None:
         return False
-    share = min(0.5 * BESIDE * problem.span / abs(other.drive - spot.drive), _SLIGHT)
+    share = min(0.5 * NEAR_BIFURCATION * problem.span / abs(other.drive - spot.drive), _SLIGHT)
     return not spot.log_size - other.log_size > np.log(share)
 
 
 def _without_last_but_one(trail: Trail) -> Trail | None:
-    """Take back a point beside a bifurcation, where meshes differ in what is stable.
+    """Take back a point near a bifurcation, where meshes differ in what is stable.
 
     None where that was done several times before, or where anything happened before it.
     """
@@ -132,15 +132,15 @@ def _without_last_but_one(trail: Trail) -> Trail | None:
     if times > _TIMES:
         return None
     last, name, back = trail.points.take([-1]), trail.branches[-1], trail.up_to(-2)
-    if last.asked[0] > back.asked:
-        last.asked[0] = -1.0  # the point taken back is to be done first
+    if last.requested[0] > back.requested:
+        last.requested[0] = -1.0  # the point taken back is to be done first
     return replace(back.with_last(last, name), visited={**trail.visited, place: times})
 
 
-def _parted(problem: Problem, trail: Trail, found: Singular, one: Spot, other: Spot, untold: Trail) -> Move:
+def _parted(problem: Problem, trail: Trail, found: Singular, one: Spot, other: Spot, unreported: Trail) -> Move:
     """Go on behind a bifurcation between `one` and the last point `other`, where the control says.
 
-    `untold` is the path without the word of it, for where it is to be looked at again.
+    `unreported` is the path without the word of it, for where it is to be looked at again.
     """
     control = problem.control
     unstable_anyway = control.through_folds and found.before > 0
@@ -150,7 +150,7 @@ def _parted(problem: Problem, trail: Trail, found: Singular, one: Spot, other: S
     found, wide = switched(problem, trail, found, one, forward)
     left = None if wide is None else trail.settled(problem.fine.reduce(wide))
     if left is None and _may_be_shorter(problem, trail) and not _sure(problem, trail, one, other, found):
-        return _again(replace(untold, without_branch=found))
+        return _again(replace(unreported, without_branch=found))
     if left is None:
         if control.through_folds:
             return _past(problem, trail, found, one, _clear_of(problem, trail, found, one, other))
@@ -172,8 +172,8 @@ def _past(problem: Problem, trail: Trail, found: Singular, one: Spot, clear: Spo
     """Stay on the path behind a bifurcation between `one` and the last point; go on from `clear`, there or beyond."""
     last = trail.points.take([-1])
     trail = at_bifurcation.opening(problem, trail.up_to(-1), found, one, None, trail.branch)
-    if last.asked[0] < trail.asked:
-        last.asked[0] = -1.0  # it has just been added
+    if last.requested[0] < trail.requested:
+        last.requested[0] = -1.0  # it has just been added
     trail = trail.with_points(last)
     if clear.drive != last.drive[0]:
         trail = trail.with_spot(clear, -1)
@@ -183,7 +183,7 @@ def _past(problem: Problem, trail: Trail, found: Singular, one: Spot, clear: Spo
 def _clear_of(problem: Problem, trail: Trail, found: Singular, one: Spot, other: Spot) -> Spot:
     """Return a point behind a bifurcation from which the path can be followed on: `other` if it is far enough.
 
-    Beside a bifurcation the error of integration may lead to the path that crosses; on the fine mesh it does not.
+    Near a bifurcation the error of integration may lead to the path that crosses; on the fine mesh it does not.
     """
     place = found.spot.drive
     room = min(_CLEAR * problem.span, 0.5 * problem.nearest_target(trail.ahead, other.drive))

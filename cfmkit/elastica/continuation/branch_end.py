@@ -44,7 +44,9 @@ def predicted_end(
         ahead = ahead[(ahead - start.drive) * sense > 1e-9 * span]
         if not len(ahead):
             return None, True
-        margin = 2.0 * max(at_bifurcation.BESIDE, min(problem.control.tolerance, _CLEAR))  # it may lie behind here
+        margin = 2.0 * max(
+            at_bifurcation.NEAR_BIFURCATION, min(problem.control.tolerance, _CLEAR)
+        )  # it may lie behind here
         step, behind = 0.02 * sense * span, ahead[-1] + margin * sense * span
         wide = np.abs(np.diff(ahead)) > margin * span  # requested points, even several, may lie at the end
         between = (0.5 * (ahead[1:] + ahead[:-1]))[wide]
@@ -71,7 +73,7 @@ def end_at(problem: Problem, place: Singular, beyond: Spot, onto: str) -> Branch
 
 
 def _fine_before(problem: Problem, points: Points) -> Spot | None:
-    """Return the last of some points that is as stable on the fine mesh: beside a bifurcation it may not be."""
+    """Return the last of some points that is as stable on the fine mesh: near a bifurcation it may not be."""
     fine = problem.fine
     for k in reversed(range(len(points))):
         wide = fine.solve(fine.expand(points.y[k]), float(points.drive[k]))
@@ -88,7 +90,7 @@ def _place(problem: Problem, trail: Trail, one: Spot, other: Spot) -> Singular |
 def _room(problem: Problem, trail: Trail, place: float, sense: float) -> float:
     """Return how far from a bifurcation to go on, in one sense: not beyond the next requested point away from it."""
     ahead, span = (trail.stretch.targets - place) * sense, problem.span
-    nearest = ahead[ahead > at_bifurcation.BESIDE * span].min(initial=np.inf)
+    nearest = ahead[ahead > at_bifurcation.NEAR_BIFURCATION * span].min(initial=np.inf)
     return 0.5 * float(min(2.0 * BEFORE_END * span, nearest))
 
 
@@ -131,18 +133,18 @@ def rejoined(problem: Problem, trail: Trail, spot: Spot, end: BranchEnd | None) 
     start = solver.solve(end.beyond.y, end.drive + sense * _room(problem, trail, end.drive, sense))
     if start is None or start.unstable > end.after:
         start = trail.settled_or_given(end.beyond)
-    trail = trail.telling(Event("bifurcation", end.drive * problem.unit, end.before, end.after))
+    trail = trail.with_event(Event("bifurcation", end.drive * problem.unit, end.before, end.after))
     trail = replace(at_bifurcation.closing(problem, trail, end, spot), branch=end.onto)
     return Resume(trail.with_spot(start, -1), start)
 
 
-def stepped_over(problem: Problem, trail: Trail, spot: Spot, asked: int) -> Move | None:
+def stepped_over(problem: Problem, trail: Trail, spot: Spot, requested: int) -> Move | None:
     """Step over the end of a branch onto the path that it joins there: a small change for a small advance; or None."""
     span, fine = problem.span, problem.fine
     end = next((end for end in trail.ends if abs(end.drive - spot.drive) <= BEFORE_END * span), None)
     if end is not None:
         return rejoined(problem, trail, spot, end)
-    forward = float(np.sign(trail.stretch.targets[asked] - spot.drive))
+    forward = float(np.sign(trail.stretch.targets[requested] - spot.drive))
     for power in range(-6, -1):
         advance = 10.0**power * span
         wide = fine.solve(fine.expand(spot.y), spot.drive + forward * advance)
@@ -155,7 +157,7 @@ def stepped_over(problem: Problem, trail: Trail, spot: Spot, asked: int) -> Move
         found = None if back is None or back.unstable == wide.unstable else _place(problem, trail, wide, back)
         place, before = (spot.drive, near.unstable) if found is None else (found.spot.drive, found.after)
         kind = "unresolved" if found is None else "bifurcation"
-        trail = trail.telling(Event(kind, place * problem.unit, before, near.unstable))
+        trail = trail.with_event(Event(kind, place * problem.unit, before, near.unstable))
         trail = replace(trail, branch=PRIMARY)
         near = _clear(problem, trail, wide, forward * advance) or near
         return Resume(trail.with_spot(near, -1), near)
@@ -163,7 +165,7 @@ def stepped_over(problem: Problem, trail: Trail, spot: Spot, asked: int) -> Move
 
 
 def _clear(problem: Problem, trail: Trail, wide: Spot, advance: float) -> Spot | None:
-    """Return a point further along the path of the fine mesh: beside the end of a branch steps lead back onto it."""
+    """Return a point further along the path of the fine mesh: near the end of a branch steps lead back onto it."""
     fine, room = problem.fine, 0.5 * problem.nearest_target(trail.ahead, wide.drive)
     away = float(np.sign(advance)) * min(_CLEAR * problem.span, room)
     second = fine.solve(wide.y, wide.drive + advance)
@@ -200,10 +202,10 @@ def closed_behind(problem: Problem, trail: Trail) -> Trail | None:
         return None
     closing = Event("bifurcation", found.spot.drive * problem.unit, found.after, found.before)
     events = trail.events
-    for told in events[-1:]:  # by `stepped_over`
-        same = abs(told.drive - closing.drive) < BEFORE_END * problem.span * problem.unit
-        same = same and told.after == closing.after
-        if told.kind == "unresolved" or (same and told.before == closing.before):
+    for last in events[-1:]:  # by `stepped_over`
+        same = abs(last.drive - closing.drive) < BEFORE_END * problem.span * problem.unit
+        same = same and last.after == closing.after
+        if last.kind == "unresolved" or (same and last.before == closing.before):
             events = events[:-1]
     branches = list(trail.branches)
     for index in range(first, len(branches)):
@@ -220,11 +222,11 @@ def relabelled(problem: Problem, trail: Trail, primary: Trail) -> Trail:
     `primary` is the same network followed without leaving the primary path. Where exactly the branch ended is not
     known then: the event says so.
     """
-    places = {int(number): k for k, number in enumerate(primary.points.asked) if number >= 0}
+    places = {int(number): k for k, number in enumerate(primary.points.requested) if number >= 0}
     last = max(k for k, name in enumerate(trail.branches) if name != PRIMARY)
     first = last + 1
     for index in range(last, trail.stretch.begun, -1):
-        number = int(trail.points.asked[index])
+        number = int(trail.points.requested[index])
         if number < 0:
             continue
         if number not in places or trail.branches[index] == PRIMARY:
@@ -234,7 +236,7 @@ def relabelled(problem: Problem, trail: Trail, primary: Trail) -> Trail:
         first = index
     if first > last:
         return trail
-    until = places[int(trail.points.asked[first])]
+    until = places[int(trail.points.requested[first])]
     if not primary.points.unstable[:until].any():  # it was led onto the branch, which does not end
         return trail
     before, after = trail.unstable(first - 1), trail.unstable(first)

@@ -24,17 +24,17 @@ _BACK = 30  # points looked at before the place where a march stalled
 _NEAR = 1e-4  # share of the drive's range from which the next requested point is solved for on the fine mesh
 
 
-def past(problem: Problem, trail: Trail, spot: Spot, asked: int) -> tuple[Trail, Move | None]:
+def past(problem: Problem, trail: Trail, spot: Spot, requested: int) -> tuple[Trail, Move | None]:
     """Go past a bifurcation where the march along the primary path stalled; None where there is none.
 
     On the fine mesh the path is followed up to a requested point just before the bifurcation, then across it.
     """
-    goal, span, stays = float(trail.stretch.targets[asked]), problem.span, problem.control.branch == "stop"
+    goal, span, stays = float(trail.stretch.targets[requested]), problem.span, problem.control.branch == "stop"
     trail = trail.come_by(spot.drive)
     if abs(goal - spot.drive) <= _NEAR * span:
         there = _on_fine(problem, trail, spot, goal)
         if there is not None and there.unstable == spot.unstable:
-            return trail, Resume(trail.with_spot(there, asked), there)
+            return trail, Resume(trail.with_spot(there, requested), there)
     before = None if stays else _before(problem, trail)
     if before is not None:
         trail, start = before
@@ -79,7 +79,7 @@ def _before(problem: Problem, trail: Trail) -> tuple[Trail, Spot] | None:
         if wide is not None and wide.unstable == trail.unstable(-back):
             kept = trail.up_to(len(trail.points) - back + 1)
             return kept, kept.spot(-1)
-        if trail.points.asked[-back] >= 0:
+        if trail.points.requested[-back] >= 0:
             return None
     return None
 

@@ -30,23 +30,23 @@ _NEARBY = 0.01  # share of the drive's range within which a march stalls at the 
 
 def decided(problem: Problem, leg: Leg, fresh: bool) -> Move:
     """Return where to go on after a march, or that the path ends."""
-    trail, asked = leg.trail, leg.trail.asked
+    trail, requested = leg.trail, leg.trail.requested
     away = critical_start.left_again(problem, trail) if fresh else None
     if away is not None:
         return away
-    if leg.code == DONE and asked == len(trail.stretch.targets):
-        if asked == len(problem.values):
+    if leg.code == DONE and requested == len(trail.stretch.targets):
+        if requested == len(problem.values):
             return Resume(trail, leg.spot)
-        return limit_point.by_the_drive(problem, trail, asked)
-    move = _after(problem, leg, asked)
+        return limit_point.by_the_drive(problem, trail, requested)
+    move = _after(problem, leg, requested)
     return Stop(move.trail) if problem.first_only and move.trail.first is not None else move
 
 
-def _after(problem: Problem, leg: Leg, asked: int) -> Move:
+def _after(problem: Problem, leg: Leg, requested: int) -> Move:
     """Return where to go on after a march that ended early, or on a branch."""
     trail, spot, code, control = leg.trail, leg.spot, leg.code, problem.control
-    steadies = code == INERTIA and bool(trail.points.unstable[-1] < trail.points.unstable[-2])
-    if code in (NO_START, STALLED) or (steadies and control.branch == "stable"):
+    regained = code == INERTIA and bool(trail.points.unstable[-1] < trail.points.unstable[-2])
+    if code in (NO_START, STALLED) or (regained and control.branch == "stable"):
         away = critical_start.left(problem, trail, spot)
         if away is not None or code == NO_START:
             return away or Stop(trail)
@@ -58,14 +58,14 @@ def _after(problem: Problem, leg: Leg, asked: int) -> Move:
     if code == DONE:
         return branch_end.rejoined(problem, trail, spot, leg.toward)
     if code == DENIED:
-        behind = at_bifurcation.passed(problem, trail, float(trail.stretch.targets[asked]))
+        behind = at_bifurcation.passed(problem, trail, float(trail.stretch.targets[requested]))
         return Resume(trail, spot, patient=True) if behind is None else bifurcation.crossed(problem, behind)
     if code == STALLED and trail.stretch.natural and len(trail.points):
-        return _got_over(problem, trail, spot, asked)
+        return _got_over(problem, trail, spot, requested)
     return ending.stop(problem, trail, code)
 
 
-def _got_over(problem: Problem, trail: Trail, spot: Spot, asked: int) -> Move:
+def _got_over(problem: Problem, trail: Trail, spot: Spot, requested: int) -> Move:
     """Return where to go on after a march by the drive that stalled."""
     fold = limit_point.is_near(problem, trail)
     if fold and abs(spot.drive - trail.fold_at) <= _NEARBY * problem.span:
@@ -75,9 +75,9 @@ def _got_over(problem: Problem, trail: Trail, spot: Spot, asked: int) -> Move:
         return again
     move: Move | None = None
     if any(name != PRIMARY for name in trail.branches):
-        move = branch_end.stepped_over(problem, trail, spot, asked)
+        move = branch_end.stepped_over(problem, trail, spot, requested)
     if move is None:
-        trail, move = corner.past(problem, trail, spot, asked)
+        trail, move = corner.past(problem, trail, spot, requested)
     if move is not None:
         return move
     if problem.control.through_folds:

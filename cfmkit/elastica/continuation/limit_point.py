@@ -41,25 +41,25 @@ def is_near(problem: Problem, trail: Trail) -> bool:
 def around(problem: Problem, trail: Trail) -> Resume:
     """Go on by the arc length, from a little before the last point."""
     trail = trail.up_to(_well_before(problem, trail) + 1)
-    start, stop = one_way(problem.values.tolist(), trail.asked)
+    start, stop = one_way(problem.values.tolist(), trail.requested)
     stretch = replace(
         trail.stretch,
         natural=False,
         before_fold=trail.unstable(-1),
         targets=problem.values[:stop],
-        first_asked=max(trail.stretch.first_asked, start),
+        first_requested=max(trail.stretch.first_requested, start),
     )
     trail = replace(trail, stretch=stretch)
     return Resume(trail, _along(problem, trail, -1))
 
 
-def one_way(values: list[float], asked: int) -> tuple[int, int]:
+def one_way(values: list[float], requested: int) -> tuple[int, int]:
     """Return the numbers of the points between which a drive from zero goes one way: of the one requested next."""
     start, last, before = 0, 0.0, 0.0
     for number, value in enumerate(values):
         step = value - last
         if step * before < 0.0:
-            if number > asked:
+            if number > requested:
                 return start, number
             start = number
         last, before = value, step
@@ -140,14 +140,14 @@ def _next(trail: Trail, place: float) -> int:
     """Return the number of the next requested point ahead of a place; those that were passed before are done again."""
     targets = trail.stretch.targets
     ahead = (targets - place) * (targets[-1] - place) > 0.0
-    ahead[: trail.stretch.first_asked] = False
+    ahead[: trail.stretch.first_requested] = False
     return int(ahead.argmax())
 
 
 def _along(problem: Problem, trail: Trail, index: int) -> Spot:
     """Return a point with its tangent in the sense of the drive."""
     spot = trail.spot(index)
-    _, stop = one_way(problem.values.tolist(), trail.asked)
+    _, stop = one_way(problem.values.tolist(), trail.requested)
     return replace(spot, tangent=spot.tangent * np.sign(problem.values[stop - 1] - spot.drive))
 
 
@@ -157,7 +157,7 @@ def _well_before(problem: Problem, trail: Trail) -> int:
     index = len(points) - 1
     while index > trail.stretch.begun and abs(drives[index] - drives[-1]) < _WELL * problem.span:
         same = trail.branches[index - 1] == trail.branch and points.unstable[index - 1] == points.unstable[-1]
-        if points.asked[index] >= 0 or not same:
+        if points.requested[index] >= 0 or not same:
             break
         index -= 1
     return index

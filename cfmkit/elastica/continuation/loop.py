@@ -76,14 +76,14 @@ def _followed(problem: Problem, begun: start.Start) -> Trail:
     if not len(trail.points):
         return ending.without_start(problem, trail, begun.share)
     if isinstance(move, Resume):
-        while trail.stretch.natural and trail.points.asked[-1] < 0.0:
+        while trail.stretch.natural and trail.points.requested[-1] < 0.0:
             trail = trail.up_to(-1)
     return trail
 
 
 def _complete(problem: Problem, move: Resume) -> bool:
     """Tell whether all points of the stretch are done that is being followed."""
-    return not move.fresh and move.trail.asked >= len(move.trail.stretch.targets)
+    return not move.fresh and move.trail.requested >= len(move.trail.stretch.targets)
 
 
 def _named(problem: Problem, trail: Trail) -> Trail:
@@ -102,19 +102,19 @@ def _named(problem: Problem, trail: Trail) -> Trail:
 def march(problem: Problem, move: Resume) -> Leg:
     """March once: predictor and corrector, in compiled code, up to where a decision is needed."""
     trail, spot, stretch, control = move.trail, move.spot, move.trail.stretch, problem.control
-    asked = int(stretch.targets[0] == 0.0) if move.fresh else trail.asked
-    left, numbers, toward = ahead(problem, trail, spot, asked)
+    requested = int(stretch.targets[0] == 0.0) if move.fresh else trail.requested
+    left, numbers, toward = ahead(problem, trail, spot, requested)
     patient = move.patient or not stretch.natural or control.branch == "stop"
-    options = problem.options(trail, spot, _first_step(problem, move, asked))._replace(
+    options = problem.options(trail, spot, _first_step(problem, move, requested))._replace(
         landings=np.inf if patient else _LANDINGS,
         sense=float(np.sign(next(value for value in stretch.targets if value))) if move.fresh else 0.0,
     )
     room = max(len(left) + 3, control.most_points + len(stretch.targets) - len(trail.points))
     code, points = trail.solver.march(spot, left, options, room)
     if numbers is not None:
-        points.asked[:] = numbers[points.asked.astype(int)]
-    if move.fresh and asked:
-        points.asked[:1] = 0
+        points.requested[:] = numbers[points.requested.astype(int)]
+    if move.fresh and requested:
+        points.requested[:1] = 0
     trail = trail.with_points(points)
     if len(points):
         spot = trail.spot(-1) if code == STALLED else trail.last_of(points)
@@ -122,7 +122,7 @@ def march(problem: Problem, move: Resume) -> Leg:
 
 
 def ahead(
-    problem: Problem, trail: Trail, spot: Spot, asked: int
+    problem: Problem, trail: Trail, spot: Spot, requested: int
 ) -> tuple[FloatArray, FloatArray | None, BranchEnd | None]:
     """Return the values of the drive still to be reached and their numbers among those requested, and a branch's end.
 
@@ -130,9 +130,9 @@ def ahead(
     just before an end that is known.
     """
     targets, natural = trail.stretch.targets, trail.stretch.natural
-    if asked == 0 and not trail.ends:
+    if requested == 0 and not trail.ends:
         return targets, None, None
-    first = asked if natural else trail.stretch.first_asked
+    first = requested if natural else trail.stretch.first_requested
     numbers: Any = np.arange(first, len(targets))
     left, toward = targets[first:], None
     if natural and trail.ends:
@@ -142,10 +142,10 @@ def ahead(
     return left, np.append(numbers, -1), toward
 
 
-def _first_step(problem: Problem, move: Resume, asked: int) -> float:
+def _first_step(problem: Problem, move: Resume, requested: int) -> float:
     """Return the first step of a march, with the sign of the way to go if it is by the drive."""
     stretch, first = move.trail.stretch, problem.control.first_step
-    along = float(stretch.targets[asked] - move.spot.drive)
+    along = float(stretch.targets[requested] - move.spot.drive)
     if first is not None:
         step = min(first * problem.span, move.step)
         return float(np.copysign(step, along)) if stretch.natural else step
@@ -159,7 +159,7 @@ def _first_step(problem: Problem, move: Resume, asked: int) -> float:
 def _next(problem: Problem, leg: Leg, fresh: bool) -> Move:
     """Return where to go on after a march, or that the path ends."""
     trail = leg.trail
-    if leg.code == DONE and trail.asked == len(problem.values) and not (fresh and trail.events):
+    if leg.code == DONE and trail.requested == len(problem.values) and not (fresh and trail.events):
         return Resume(trail, leg.spot)
     # most paths end with their first march: what decides on the others takes a tenth of a run to load
     from cfmkit.elastica.continuation.decisions import decided

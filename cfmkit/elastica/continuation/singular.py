@@ -27,7 +27,7 @@ _LOOSE = 10.0  # and in units of the tolerance
 _HUGE = 700.0  # logarithm of a number that is not too large
 _OUTSIDE = 0.1  # of a bracket: one end may lie at the singular point, on either side
 _ASIDE = 0.03  # share of a bracket's part by which to stay off a singular point of several modes,
-_BESIDE = 1e-4  # and share of the eigenvalue at the ends: nearer, solutions may be those of branches
+_NEAREST = 1e-4  # and share of the eigenvalue at the ends: nearer, solutions may be those of branches
 _NEAR = 0.05  # share of what it is at the ends that is near zero
 _SIZES = (0.06, 0.015, 0.0036)  # how far from a bifurcation its branch is entered [rad]: some are short
 _FIRST_KICK, _KICKS = 1e-3, 16  # change of the unknowns that is tried first, and how often
@@ -55,7 +55,7 @@ def locate(
 ) -> Singular | None:
     """Return the singular point between two neighbouring equilibria with different inertia; its null vector if wanted.
 
-    `tolerance` is that of the path. Without the vector the inertia is that right beside the point, else of both ends.
+    `tolerance` is that of the path. Without the vector the inertia is that right next to the point, else of both ends.
 
     The determinant of the tangent, with the sign that the inertia gives it, is brought near zero by the Illinois
     variant of the rule of false position, or faster where inverse interpolation stays inside the bracket. The last bit
@@ -87,13 +87,13 @@ class _Search:
         self.border = solver.unit if natural else chord
         self.start, self.stop = self._level(one), self._level(other)
         self.several = other.unstable - one.unstable > 1
-        self.close = max(close, _BESIDE) if self.several else close
+        self.close = max(close, _NEAREST) if self.several else close
         self.known = close > _CLOSE  # Newton's method knows the determinant before its last step
         largest = 0.0 if self.several else max(self._log_size(one), self._log_size(other))
         self.log_unit = largest if math.isfinite(largest) else 0.0  # sizes in this unit: of many beams they overflow
         self.samples = [(0.0, self._measure(one), one), (1.0, self._measure(other), other)]
         self.low, self.high = (sample[:2] for sample in self.samples)
-        self.foretold = False  # whether the samples foretell where it is hardly anything
+        self.predicted = False  # whether the samples foretell where it is hardly anything
         less, self.scale = sorted((abs(self.low[1]), abs(self.high[1])))
         self.goal = self.close * max(math.sqrt(less * self.scale), _CLOSE * self.scale)
 
@@ -139,7 +139,7 @@ class _Search:
         y, drive = self._guess(share)
         loose = self.close > _CLOSE and len(self.samples) > 2
         if loose and self._size(Spot(y, drive, self.border)) < self.goal:
-            self.foretold = True  # near enough: solving there, where no system is regular, would take long
+            self.predicted = True  # near enough: solving there, where no system is regular, would take long
             return False
         near = self._solved(share, y, drive)
         if near is None and self.several and not self.near_enough():
@@ -160,7 +160,7 @@ class _Search:
         return self.solver.solve(y, drive, self.border, self.start + share * (self.stop - self.start))
 
     def nearest_unstable(self) -> int:
-        """Return the number of unstable directions right beside the singular point."""
+        """Return the number of unstable directions right next to the singular point."""
         return min((sample for sample in self.samples if sample[1] <= 0), key=lambda sample: -sample[1])[2].unstable
 
     def _guess(self, share: float) -> tuple[FloatArray, float]:
@@ -183,7 +183,7 @@ class _Search:
 
     def near_enough(self) -> bool:
         """Tell whether what is brought near zero is a small share of what it is at the ends."""
-        return self.foretold or min(abs(sample[1]) for sample in self.samples) < _NEAR * self.scale
+        return self.predicted or min(abs(sample[1]) for sample in self.samples) < _NEAR * self.scale
 
     def interpolated(self) -> Spot:
         """Return the point where it vanishes, from the samples nearest to it."""

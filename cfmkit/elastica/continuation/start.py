@@ -142,8 +142,8 @@ def _along(problem: Problem, trail: Trail, what: str, begin: Spot, follow: Follo
     ending = way.ending
     if ending.too_long:
         return Start(trail, None, 0.0, LONG)
-    told = (Event(f"{one.kind} under {what}", one.drive, one.before, one.after) for one in way.events)
-    trail = replace(trail, events=(*trail.events, *told))
+    reported = (Event(f"{one.kind} under {what}", one.drive, one.before, one.after) for one in way.events)
+    trail = replace(trail, events=(*trail.events, *reported))
     if problem.first_only and way.first is not None:
         return Start(trail, None, 1.0, DONE, (ramp, way.first))
     through_folds, sign = problem.control.through_folds, problem.control.sign

@@ -114,7 +114,7 @@ class Problem:
         )
 
     def reach(self, ahead: float) -> float:
-        """Return how far poses may change beside a bifurcation as the drive goes on: branches open like its root."""
+        """Return how far poses may change near a bifurcation as the drive goes on: branches open like its root."""
         return 0.2 * float(np.sqrt(ahead / self.span)) + 1e-3
 
     def nearest_target(self, targets: FloatArray, place: float) -> float:
@@ -147,7 +147,7 @@ class Stretch:
         Requested values up to its end, dimensionless.
     natural : bool
         Whether steps go by the drive.
-    first_asked : int
+    first_requested : int
         Number of the requested point from which on they are to be done from here, or along the arc.
     begun : int
         Index of the point from which the drive leads again, behind a limit point.
@@ -157,7 +157,7 @@ class Stretch:
 
     targets: FloatArray
     natural: bool = True
-    first_asked: int = 0
+    first_requested: int = 0
     begun: int = 0
     before_fold: int = 0
 
@@ -220,15 +220,15 @@ class Trail:
         return cls(problem.solver, Stretch(problem.values), none, branch=branch, closed=branch == PRIMARY)
 
     @cached_property
-    def asked(self) -> int:
+    def requested(self) -> int:
         """Number of requested points that are done."""
-        done = self.points.asked[self.stretch.begun :]
-        return max(self.stretch.first_asked, int(done.max()) + 1) if len(done) else 0
+        done = self.points.requested[self.stretch.begun :]
+        return max(self.stretch.first_requested, int(done.max()) + 1) if len(done) else 0
 
     @property
     def ahead(self) -> FloatArray:
         """Requested values that are not done yet."""
-        return self.stretch.targets[self.asked :]
+        return self.stretch.targets[self.requested :]
 
     @property
     def drive(self) -> float:
@@ -250,9 +250,9 @@ class Trail:
         joined = self.points.joined(points) if len(self.points) else points.copied()
         return replace(self, points=joined, branches=self.branches + (self.branch,) * len(points))
 
-    def with_spot(self, spot: Spot, asked: int) -> Trail:
-        """Return the path with an equilibrium added to it; `asked`: which of the requested points it is, or -1."""
-        return self.with_points(Points.of(spot, asked))
+    def with_spot(self, spot: Spot, requested: int) -> Trail:
+        """Return the path with an equilibrium added to it; `requested`: which of the requested points it is, or -1."""
+        return self.with_points(Points.of(spot, requested))
 
     def up_to(self, count: int) -> Trail:
         """Return the path with its first points only; a negative number counts those that are taken back."""
@@ -262,7 +262,7 @@ class Trail:
         """Return the path with a point of a named branch added to it."""
         return replace(self.with_points(point), branches=(*self.branches, name))
 
-    def telling(self, event: Event) -> Trail:
+    def with_event(self, event: Event) -> Trail:
         """Return the path with something that happened on it."""
         return replace(self, events=(*self.events, event))
 

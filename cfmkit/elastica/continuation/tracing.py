@@ -139,7 +139,7 @@ def _further(problem: Problem, trail: Trail, before: Trail) -> bool:
     """Tell whether shorter segments lead any further: a path pulled straight is only followed nearer to its end."""
     from cfmkit.elastica.continuation.uncondensed import pulled_straight
 
-    if not pulled_straight(trail) or not len(before.points) or trail.asked != before.asked:
+    if not pulled_straight(trail) or not len(before.points) or trail.requested != before.requested:
         return True
     return abs(trail.drive - before.drive) > _GAIN * problem.span
 

@@ -19,7 +19,7 @@ from cfmkit.elastica.equilibrium.expanded import UncondensedSolver
 if TYPE_CHECKING:
     from cfmkit.elastica.continuation.state import Problem, Trail
 
-_TAUT = 1e3  # largest dimensionless force of beams that are not pulled straight
+_STRAIGHT = 1e3  # largest dimensionless force of beams that are not pulled straight
 _SHORT = 1e-4  # share of the drive's range that is a short step
 
 
@@ -31,7 +31,7 @@ def pulled_straight(trail: Trail) -> bool:
     if all(beam.section.axial for beam in trail.solver.layout.network.beams.values()):
         return False
     forces = trail.points.y[-1:, trail.solver.n_free : trail.solver.n]
-    return bool(np.abs(forces).max(initial=0.0) > _TAUT)
+    return bool(np.abs(forces).max(initial=0.0) > _STRAIGHT)
 
 
 def uncondensed(problem: Problem, trail: Trail, wrong: int = 0) -> Resume | None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from cfmkit.elastica.equilibrium.mesh import PRESTRESS, Mesh, assemble_model, grid, table
 from cfmkit.elastica.kernels import entry
-from cfmkit.elastica.kernels.codes import ASKED, DRIVE_RATE, REACHED, SHORTNESS, SOLVED, UNSTABLE
+from cfmkit.elastica.kernels.codes import DRIVE_RATE, REACHED, REQUESTED, SHORTNESS, SOLVED, UNSTABLE
 from cfmkit.elastica.kernels.workspace import work_space
 
 if TYPE_CHECKING:
@@ -82,10 +82,15 @@ class Points:
         return cls(np.empty((0, size)), np.empty(0), np.empty((0, _STORED)))
 
     @classmethod
-    def of(cls, spot: Spot, asked: int) -> Points:
-        """Return one equilibrium; `asked` is the number of the requested point that it is, or -1."""
+    def of(cls, spot: Spot, requested: int) -> Points:
+        """Return one equilibrium; `requested` is the number of the requested point that it is, or -1."""
         info = np.zeros((1, _STORED))
-        info[0, [UNSTABLE, ASKED, DRIVE_RATE, SHORTNESS]] = spot.unstable, asked, spot.tangent[-1], spot.shortness
+        info[0, [UNSTABLE, REQUESTED, DRIVE_RATE, SHORTNESS]] = (
+            spot.unstable,
+            requested,
+            spot.tangent[-1],
+            spot.shortness,
+        )
         return cls(spot.y[None], np.array([spot.drive]), info)
 
     @property
@@ -94,9 +99,9 @@ class Points:
         return self.info[:, UNSTABLE]
 
     @property
-    def asked(self) -> FloatArray:
+    def requested(self) -> FloatArray:
         """Numbers of the requested points; -1 for those in between."""
-        return self.info[:, ASKED]
+        return self.info[:, REQUESTED]
 
     @property
     def reached(self) -> FloatArray:

@@ -218,7 +218,7 @@ def _optimising() -> Iterator[None]:
 
     Loops over the variables are what derivatives spend their time in. Putting the four components of a state side by
     side as well would spare the solver a tenth of its time, but it changes last bits, and two of the networks in the
-    tests that are asked for points exactly at a bifurcation were then told an event that is unresolved.
+    tests that are requested points exactly at a bifurcation were then told an event that is unresolved.
     """
     settings: Any = numba.config
     before = settings.LOOP_VECTORIZE, settings.SLP_VECTORIZE

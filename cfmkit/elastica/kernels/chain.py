@@ -19,7 +19,7 @@ from cfmkit.elastica.kernels.flow import FORCE, flow, plain_flow
 E, F, E2, G, C_D, SMALL = 0, 1, 2, 3, 4, 5  # blocks of a relation; C_D: c in columns 0, 1
 LARGEST, LIMIT = 3.0, 50.0  # values of a, see `sweep`, that larger ones count as: under thrust, in tension
 LEAST = 1e-8  # share of its terms that a pivot is at least: see `_append`
-TAUT = 5.0  # cosh of a, see `sweep`, from which a segment in tension is long: Newton's method grows unsure like that
+TENSION = 5.0  # cosh of a, see `sweep`, from which a segment in tension is long: Newton's method grows unsure like that
 BEFORE = 6  # of what is kept of a segment: E2 before it; its SMALL[2, 0] and E2[:, 2] hold the segment's own turns
 
 
@@ -52,9 +52,9 @@ def _drive_column(m, e, steps, start, load, dp, states):
     states (1, 7): complex room for the segment's end.
     """
     h = 1e-30
-    tilted = (load[0] + 1j * h * m.line_load[e, 1, 0], load[1] + 1j * h * m.line_load[e, 1, 1])
+    stepped = (load[0] + 1j * h * m.line_load[e, 1, 0], load[1] + 1j * h * m.line_load[e, 1, 1])
     begin = (start[0] + 0j, start[1] + 0j, start[2] + 0j, start[3] + 0j)
-    plain_flow(m.table, steps, begin, tilted, states)
+    plain_flow(m.table, steps, begin, stepped, states)
     last = states[0]
     dp[0], dp[1], dp[2] = last[2].imag / h, last[3].imag / h, last[0].imag / h
     dp[3], dp[4], dp[5] = last[4].imag / h, last[5].imag / h, last[1].imag / h
@@ -93,7 +93,7 @@ def sweep(m, e, y, first_slot, drive, ends, rel, store, work):
 
     ends: poses of the two ends; first_slot: index in y of the beam's last force followed by that of its segments.
     Returns the change of the inertia by the eliminated unknowns and how short the segments are for their load. With
-    a^2 the thrust of a segment times its length over its bending rigidity that is the smallest cos a, or TAUT / cosh a
+    a^2 the thrust of a segment times its length over its bending rigidity that is the smallest cos a, or TENSION/cosh a
     in tension. The equations of a straight segment have dM1/dM0 = cos a; a step that is too long for its load has not.
     """
     drv, outs = work[0][2, 4], work[3]
@@ -130,7 +130,7 @@ def sweep(m, e, y, first_slot, drive, ends, rel, store, work):
         if pulled < 0.0:
             least = min(least, np.cos(min(np.sqrt(-pulled), LARGEST)))
         elif pulled > 1.0:
-            least = min(least, TAUT / np.cosh(min(np.sqrt(pulled), LIMIT)))
+            least = min(least, TENSION / np.cosh(min(np.sqrt(pulled), LIMIT)))
         if j > begin and own != 0.0 and pivot / own < 0.0:
             index += 1 if out[6] / own < 0.0 else -1
         if pivot == 0.0:

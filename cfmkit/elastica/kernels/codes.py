@@ -6,17 +6,17 @@ SOLVED, SINGULAR, DIVERGED, SLOW = 0, 1, 2, 3
 """How Newton's method ended."""
 
 DONE, STALLED, INERTIA, LONG, FULL, OUTSIDE, NO_START, DENIED = range(8)
-"""Why a march ended: all asked points reached; the smallest step failed; the number of unstable directions changed;
+"""Why a march ended: all requested points reached; the smallest step failed; the number of unstable directions changed;
 a segment is too long for its load; no room for more points; the drive left its range; no equilibrium to start from;
-an asked value was tried for so often in vain that it may lie at a bifurcation."""
+a requested value was tried for so often in vain that it may lie at a bifurcation."""
 
 TOLERANCE, ITERATIONS, BY_DRIVE, STEP, SMALLEST, LONGEST, CHANGE, WEIGHT, LOWEST, HIGHEST = range(10)
 WATCHED, INERTIA_BEFORE, SENSE, LANDINGS = range(10, 14)
 """Columns of the options of a march: see `cfmkit.elastica.kernels.march.march`."""
 
-UNSTABLE, ASKED, REACHED, SPENT, DRIVE_RATE, SHORTNESS = range(6)
-"""What is stored with a point: number of unstable directions, index of the asked value or -1, parameter (drive, or arc
-length since the march began, -1 between two of its steps), iterations, d(drive)/d(parameter), shortness."""
+UNSTABLE, REQUESTED, REACHED, SPENT, DRIVE_RATE, SHORTNESS = range(6)
+"""What is stored with a point: number of unstable directions, index of the requested value or -1, parameter (drive, or
+arc length since the march began, -1 between two of its steps), iterations, d(drive)/d(parameter), shortness."""
 
 SHORT = 0.25  # dM1/dM0 of a segment below which it must be split
 KEPT, KEPT_WITH_SLOPES = 6, 3  # points that the extrapolation uses

@@ -1,6 +1,6 @@
 """Derivatives of equilibria by design variables: the exact derivative of everything the solver integrates and sums.
 
-A `cfmkit.elastica.kernels.model.Tilt` holds how the arrays of a model change with each variable. At an equilibrium the
+`cfmkit.elastica.kernels.model.DesignSlopes` holds how a model changes with each variable. At equilibria the
 residual stays zero, so the unknowns change by the solution of a linear system with the tangent that Newton's method
 uses; its right sides are the changes of the residual at unchanged unknowns. Along a beam those come from the
 drifts and kicks of the state, differentiated: one sweep for all the variables that a beam depends on.
@@ -26,37 +26,37 @@ from cfmkit.elastica.kernels.splitting import ROWS
 
 
 @kernel
-def _segment_slopes(m, tilt, e, y, n, drive, ends, none):
+def _segment_slopes(m, design, e, y, n, drive, ends, none):
     """Set the derivatives of the end states of a beam's segments at unchanged starts: ends (segments, 9 count)."""
-    begin, count = m.beam_segment[e], tilt.first[e + 1] - tilt.first[e]
+    begin, count = m.beam_segment[e], design.first[e + 1] - design.first[e]
     load = (m.line_load[e, 0, 0] + drive * m.line_load[e, 1, 0], m.line_load[e, 0, 1] + drive * m.line_load[e, 1, 1])
     for j in range(begin, m.beam_segment[e + 1]):
         first = m.segment_step[j]
         state = ends[j - begin]
         for q in range(count):
-            k = tilt.variable[tilt.first[e] + q]
+            k = design.variable[design.first[e] + q]
             for r in range(7):
                 state[r * count + q] = 0.0
             for r in range(2):
-                state[(7 + r) * count + q] = tilt.line[k, e, 0, r] + drive * tilt.line[k, e, 1, r]
+                state[(7 + r) * count + q] = design.line[k, e, 0, r] + drive * design.line[k, e, 1, r]
         o = n + 6 * j
         start = (y[o + 2], y[o + 3], y[o + 4], y[o + 5])
-        at = tilt.begin[e] + (first - m.segment_step[begin]) * ROWS * TABLE_COLUMNS * count
-        flow_slopes(m.table, (first, m.segment_step[j + 1]), start, load, tilt.table, at, state, none)
+        at = design.begin[e] + (first - m.segment_step[begin]) * ROWS * TABLE_COLUMNS * count
+        flow_slopes(m.table, (first, m.segment_step[j + 1]), start, load, design.table, at, state, none)
 
 
 @kernel
-def _chain_slopes(m, tilt, e, ends, store, c, d, parts):
+def _chain_slopes(m, design, e, ends, store, c, d, parts):
     """Carry the changes of the segments through the chain of beam e: c (k, 3) closure, d (k, 3) start force.
 
     parts (segments, k, 6) keeps the closure before each segment and what `_unfold_slopes` needs.
     """
-    begin, first = m.beam_segment[e], tilt.first[e]
-    n = tilt.first[e + 1] - first
+    begin, first = m.beam_segment[e], design.first[e]
+    n = design.first[e + 1] - first
     for j in range(begin, m.beam_segment[e + 1]):
         t = j - begin
         for q in range(n):
-            k = tilt.variable[first + q]
+            k = design.variable[first + q]
             for r in range(3):
                 parts[j, k, r] = c[k, r]
             turn, b0, b1 = c[k, 2], -ends[t, 5 * n + q], -ends[t, 6 * n + q]
@@ -101,7 +101,7 @@ def _frames(m, values, pose, frames):
 
 
 @kernel
-def _beam_sides(m, tilt, y, drive, n_free, values, frames, rel, c, d, rhs, push, work):
+def _beam_sides(m, design, y, drive, n_free, values, frames, rel, c, d, rhs, push, work):
     """Set the right sides as far as beams make them: minus the changes of the residual at unchanged unknowns.
 
     push (k) collects the change of the force that the drive works against.
@@ -110,29 +110,29 @@ def _beam_sides(m, tilt, y, drive, n_free, values, frames, rel, c, d, rhs, push,
     n = n_free + 3 * m.beam_end.shape[0]
     for e in range(m.beam_end.shape[0]):
         ia, ib, last, own = m.beam_end[e, 0], m.beam_end[e, 1], n_free + 3 * e, n + 6 * m.beam_segment[e] + 3
-        for k in range(tilt.moves.shape[0]):
-            if not tilt.touches[e, k]:
+        for k in range(design.moves.shape[0]):
+            if not design.touches[e, k]:
                 continue
             for r in range(3):
                 rhs[last + r, k] = -c[e, k, r]
-            if tilt.shifts[k, ia] or tilt.shifts[k, ib]:
-                value_changes(m, tilt, k, drive, dvalues)
-            if tilt.shifts[k, ia]:
-                pose_slope(m, tilt, k, ia, values, dvalues, pose)
+            if design.shifts[k, ia] or design.shifts[k, ib]:
+                value_changes(m, design, k, drive, dvalues)
+            if design.shifts[k, ia]:
+                pose_slope(m, design, k, ia, values, dvalues, pose)
                 for r in range(3):
                     for s in range(3):
                         d[e, k, r] += rel[e, G, r, s] * pose[s]
                         rhs[last + r, k] -= rel[e, E, r, s] * pose[s]
-                turned_force(m, tilt, k, ia, pose, y[own], y[own + 1], force)
+                turned_force(m, design, k, ia, pose, y[own], y[own + 1], force)
                 _lower(m, ia, k, force[0], force[1], force[2], 0.0, rhs, push)
             fc, fs, ox, oy = frames[e, 0, 0], frames[e, 0, 1], frames[e, 0, 2], frames[e, 0, 3]
             fx, fy = d[e, k, 0], d[e, k, 1]
             _lower(m, ia, k, fc * fx + fs * fy, fc * fy - fs * fx, ox * fy - oy * fx, d[e, k, 2], rhs, push)
-            if tilt.shifts[k, ib]:
-                pose_slope(m, tilt, k, ib, values, dvalues, pose)
+            if design.shifts[k, ib]:
+                pose_slope(m, design, k, ib, values, dvalues, pose)
                 for r in range(3):
                     rhs[last + r, k] += pose[r]
-                turned_force(m, tilt, k, ib, pose, -y[last], -y[last + 1], force)
+                turned_force(m, design, k, ib, pose, -y[last], -y[last + 1], force)
                 _lower(m, ib, k, force[0], force[1], force[2], 0.0, rhs, push)
 
 
@@ -148,14 +148,14 @@ def _lower(m, i, k, along, across, arm, turn, rhs, push):
 
 
 @kernel
-def _other_sides(m, tilt, k, drive, values, rhs, push, work):
+def _other_sides(m, design, k, drive, values, rhs, push, work):
     """Add to the right side of variable k what loads and springs make."""
     dvalues, force, w, _ = work
-    value_changes(m, tilt, k, drive, dvalues)
+    value_changes(m, design, k, drive, dvalues)
     for i in range(force.shape[0]):
         force[i] = 0.0
-    load_slopes(m, tilt, k, values, dvalues, drive, w, force)
-    spring_slopes(m, tilt, k, values, dvalues, w, force)
+    load_slopes(m, design, k, values, dvalues, drive, w, force)
+    spring_slopes(m, design, k, values, dvalues, w, force)
     for i in range(force.shape[0]):
         if m.slot[i] >= 0:
             rhs[m.slot[i], k] -= force[i]
@@ -163,11 +163,11 @@ def _other_sides(m, tilt, k, drive, values, rhs, push, work):
 
 
 @inlined
-def _start_slope(m, tilt, e, k, frames, values, dvalues, pose):
+def _start_slope(m, design, e, k, frames, values, dvalues, pose):
     """Set the derivative of the pose of the start of a beam."""
     i = m.beam_end[e, 0]
-    if tilt.shifts[k, i]:
-        pose_slope(m, tilt, k, i, values, dvalues, pose)
+    if design.shifts[k, i]:
+        pose_slope(m, design, k, i, values, dvalues, pose)
         return
     fc, fs, ox, oy = frames[e, 0, 0], frames[e, 0, 1], frames[e, 0, 2], frames[e, 0, 3]
     a, b, turn = dvalues[m.place_dof[i, 0]], dvalues[m.place_dof[i, 1]], dvalues[m.place_dof[i, 2]]
@@ -176,7 +176,7 @@ def _start_slope(m, tilt, e, k, frames, values, dvalues, pose):
 
 
 @kernel
-def slopes(m, tilt, n_free, ys, drives, out, pushes, scratch, spaces):
+def slopes(m, design, n_free, ys, drives, out, pushes, scratch, spaces):
     """Set the derivatives of the unknowns at points by all variables; tell whether every tangent is regular.
 
     out (points, unknowns, k); pushes (points, k): derivatives of the force on what the drive moves, in the drive's
@@ -185,7 +185,7 @@ def slopes(m, tilt, n_free, ys, drives, out, pushes, scratch, spaces):
     `cfmkit.elastica.kernels.workspace`.
     """
     h, _, _, residual, values, ends, rel, store, work, _ = scratch
-    n, count, beams = h.shape[0] - 1, tilt.moves.shape[0], m.beam_end.shape[0]
+    n, count, beams = h.shape[0] - 1, design.moves.shape[0], m.beam_end.shape[0]
     (c, d, parts, frames), (moved, none, matrix, rhs, adjoint), room, dpb = spaces
     pose, others = room[3], m.load_place.shape[0] + m.spring_kind.shape[0] > 0
     whole = out.shape[0] > 0
@@ -199,15 +199,15 @@ def slopes(m, tilt, n_free, ys, drives, out, pushes, scratch, spaces):
         for e in range(beams):
             clear(c[e])
             clear(d[e])
-            own = tilt.first[e + 1] - tilt.first[e]
+            own = design.first[e + 1] - design.first[e]
             if own > 0:
                 block = moved[:, : 9 * own]
-                _segment_slopes(m, tilt, e, y, n, drive, block, none)
-                _chain_slopes(m, tilt, e, block, store, c[e], d[e], parts)
-        _beam_sides(m, tilt, y, drive, n_free, values, frames, rel, c, d, rhs, push, room)
+                _segment_slopes(m, design, e, y, n, drive, block, none)
+                _chain_slopes(m, design, e, block, store, c[e], d[e], parts)
+        _beam_sides(m, design, y, drive, n_free, values, frames, rel, c, d, rhs, push, room)
         for k in range(count):
-            if others and tilt.moves[k]:
-                _other_sides(m, tilt, k, drive, values, rhs, push, room)
+            if others and design.moves[k]:
+                _other_sides(m, design, k, drive, values, rhs, push, room)
         for i in range(n):
             adjoint[i, 0] = h[i, n]
             for j in range(n):
@@ -216,7 +216,7 @@ def slopes(m, tilt, n_free, ys, drives, out, pushes, scratch, spaces):
             return False
         if whole:
             inside = (room[0], pose, dpb)
-            _spread_out(m, tilt, drive, n_free, (values, frames, h), (store, parts), rhs, out[p], push, inside)
+            _spread_out(m, design, drive, n_free, (values, frames, h), (store, parts), rhs, out[p], push, inside)
             continue
         for i in range(n):
             for k in range(count):
@@ -225,7 +225,7 @@ def slopes(m, tilt, n_free, ys, drives, out, pushes, scratch, spaces):
 
 
 @kernel
-def _spread_out(m, tilt, drive, n_free, state, chains, dz, dy, push, work):
+def _spread_out(m, design, drive, n_free, state, chains, dz, dy, push, work):
     """Set the derivatives of all unknowns from those of z."""
     (values, frames, h), (store, parts), (dvalues, pose, dpb) = state, chains, work
     n = dz.shape[0]
@@ -233,9 +233,9 @@ def _spread_out(m, tilt, drive, n_free, state, chains, dz, dy, push, work):
         for i in range(n):
             dy[i, k] = dz[i, k]
             push[k] += h[i, n] * dz[i, k]
-        value_slopes(m, tilt, k, drive, dz, dvalues)
+        value_slopes(m, design, k, drive, dz, dvalues)
         for e in range(m.beam_end.shape[0]):
-            _start_slope(m, tilt, e, k, frames, values, dvalues, pose)
+            _start_slope(m, design, e, k, frames, values, dvalues, pose)
             for r in range(3):
                 dpb[r] = dz[n_free + 3 * e + r, k]
             _unfold_slopes(m, e, k, n, store, parts, pose, dpb, dy)

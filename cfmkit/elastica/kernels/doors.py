@@ -43,20 +43,20 @@ def states(n_free, m, ys, drives, out):
 complex_states = states
 
 
-def slopes(n_free, m, tilt, ys, drives, outs, scratch, room):
+def slopes(n_free, m, design, ys, drives, outs, scratch, room):
     """Set the derivatives of solutions; tell whether there are any."""
-    regular = _slopes(m, tilt, n_free, ys, drives, outs[0], outs[1], scratch, room)
+    regular = _slopes(m, design, n_free, ys, drives, outs[0], outs[1], scratch, room)
     return (1 if regular else 0), 0
 
 
-def row_slopes(n_free, m, tilt, ys, drives, dys, out, room):
+def row_slopes(n_free, m, design, ys, drives, dys, out, room):
     """Set the derivatives of the states along all beams at points."""
     for p in range(ys.shape[0]):
-        _row_slopes(m, tilt, n_free, ys[p], drives[p], dys[p], out[p], room)
+        _row_slopes(m, design, n_free, ys[p], drives[p], dys[p], out[p], room)
     return 0, 0
 
 
-def held_slopes(n_free, m, tilt, ys, drives, dys, out, room):
+def held_slopes(n_free, m, design, ys, drives, dys, out, room):
     """Set the derivatives of the forces on all degrees of freedom at points."""
-    _held_slopes(m, tilt, n_free, ys, drives, dys, out, room)
+    _held_slopes(m, design, n_free, ys, drives, dys, out, room)
     return 0, 0

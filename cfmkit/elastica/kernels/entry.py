@@ -13,14 +13,14 @@ import numpy as np
 
 from cfmkit.elastica.kernels import kept, machine
 from cfmkit.elastica.kernels.packing import HEAD, REFUSED, Kind, flat, objects
-from cfmkit.elastica.kernels.progress import told
+from cfmkit.elastica.kernels.progress import reported
 from cfmkit.elastica.kernels.signatures import DOORS, EACH, FORCES, MARCH, SOLVE, TANGENT
 from cfmkit.elastica.kernels.workspace import held_slope_space, slope_space
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from cfmkit.elastica.kernels.model import Model, Tilt
+    from cfmkit.elastica.kernels.model import DesignSlopes, Model
     from cfmkit.elastica.kernels.workspace import WorkSpace
 
 _Pair = ctypes.c_int64 * 2
@@ -70,7 +70,7 @@ def _got(name: str) -> Callable[[bytes, Any], int]:
     with contextlib.suppress(machine.Strange):
         if found := kept.read(name):
             return machine.loaded(found)
-    with told(name) as report:
+    with reported(name) as report:
         from cfmkit.elastica.kernels import build
 
         try:
@@ -147,24 +147,26 @@ def states(m: Model, n_free: int, ys: Any, drives: Any, out: Any) -> None:
     door(_whole(n_free), m.block, objects((ys, drives, out)))
 
 
-def slopes(m: Model, tilt: Tilt, n_free: int, ys: Any, drives: Any, outs: tuple[Any, Any], scratch: WorkSpace) -> bool:
+def slopes(
+    m: Model, design: DesignSlopes, n_free: int, ys: Any, drives: Any, outs: tuple[Any, Any], scratch: WorkSpace
+) -> bool:
     """Set the derivatives of solutions; see `cfmkit.elastica.kernels.columns.slopes`."""
-    room = slope_space(m, tilt, len(scratch[0]) - 1)
+    room = slope_space(m, design, len(scratch[0]) - 1)
     given = objects((ys, drives, *outs))
-    return _doors["slopes"](_whole(n_free), m.block, tilt.block, given, scratch.block, objects(flat(room)))[0] == 1
+    return _doors["slopes"](_whole(n_free), m.block, design.block, given, scratch.block, objects(flat(room)))[0] == 1
 
 
-def row_slopes(m: Model, tilt: Tilt, n_free: int, ys: Any, drives: Any, dys: Any, out: Any) -> None:
+def row_slopes(m: Model, design: DesignSlopes, n_free: int, ys: Any, drives: Any, dys: Any, out: Any) -> None:
     """Set the derivatives of states along beams; see `cfmkit.elastica.kernels.output_slopes.row_slopes`."""
     room = np.zeros(9 * dys.shape[2])
-    _doors["row_slopes"](_whole(n_free), m.block, tilt.block, objects((ys, drives, dys, out, room)))
+    _doors["row_slopes"](_whole(n_free), m.block, design.block, objects((ys, drives, dys, out, room)))
 
 
-def held_slopes(m: Model, tilt: Tilt, n_free: int, ys: Any, drives: Any, dys: Any, out: Any) -> None:
+def held_slopes(m: Model, design: DesignSlopes, n_free: int, ys: Any, drives: Any, dys: Any, out: Any) -> None:
     """Set the derivatives of forces; see `cfmkit.elastica.kernels.output_slopes.held_slopes`."""
     room = held_slope_space(m)
     given = objects((ys, drives, dys, out, *flat(room)))
-    _doors["held_slopes"](_whole(n_free), m.block, tilt.block, given)
+    _doors["held_slopes"](_whole(n_free), m.block, design.block, given)
 
 
 _NONE = np.zeros((0, 0))

@@ -10,50 +10,50 @@ from cfmkit.elastica.kernels.springs import LINE, TURN, spring_law
 
 
 @inlined
-def value_slopes(m, tilt, k, drive, dz, values):
+def value_slopes(m, design, k, drive, dz, values):
     """Set the derivatives of all degrees of freedom: dz of the free ones, the held ones as prescribed."""
     for i in range(values.shape[0]):
         slot = m.slot[i]
-        values[i] = dz[slot, k] if slot >= 0 else tilt.base[k, i] + drive * tilt.rate[k, i]
+        values[i] = dz[slot, k] if slot >= 0 else design.base[k, i] + drive * design.rate[k, i]
 
 
 @inlined
-def value_changes(m, tilt, k, drive, values):
+def value_changes(m, design, k, drive, values):
     """Set the derivatives of all degrees of freedom at unchanged unknowns."""
     for i in range(values.shape[0]):
-        values[i] = 0.0 if m.slot[i] >= 0 else tilt.base[k, i] + drive * tilt.rate[k, i]
+        values[i] = 0.0 if m.slot[i] >= 0 else design.base[k, i] + drive * design.rate[k, i]
 
 
 @inlined
-def turned_force(m, tilt, k, i, pose, fx, fy, out):
+def turned_force(m, design, k, i, pose, fx, fy, out):
     """Set the changes that an unchanged force at a place makes as its frame and arm turn; pose: see `pose_slope`."""
-    dc, ds = tilt.frame[k, i, 0], tilt.frame[k, i, 1]
+    dc, ds = design.frame[k, i, 0], design.frame[k, i, 1]
     out[0], out[1], out[2] = dc * fx + ds * fy, dc * fy - ds * fx, pose[5] * fy - pose[6] * fx
 
 
 @inlined
-def pose_slope(m, tilt, k, i, values, dvalues, out):
+def pose_slope(m, design, k, i, values, dvalues, out):
     """Set the derivative of a place's pose (out[:3]), its turned arm (out[3:5]) and that arm's derivative (out[5:])."""
     d = m.place_dof[i]
     fc, fs = m.place_frame[i, 0], m.place_frame[i, 1]
-    dc, ds = tilt.frame[k, i, 0], tilt.frame[k, i, 1]
+    dc, ds = design.frame[k, i, 0], design.frame[k, i, 1]
     a, b, da, db, turn = values[d[0]], values[d[1]], dvalues[d[0]], dvalues[d[1]], dvalues[d[2]]
     ct, st = np.cos(values[d[2]]), np.sin(values[d[2]])
-    ax, ay, px, py = m.place_arm[i, 0], m.place_arm[i, 1], tilt.arm[k, i, 0], tilt.arm[k, i, 1]
+    ax, ay, px, py = m.place_arm[i, 0], m.place_arm[i, 1], design.arm[k, i, 0], design.arm[k, i, 1]
     ox, oy = ct * ax - st * ay, st * ax + ct * ay
     sx, sy = ct * px - st * py - oy * turn, st * px + ct * py + ox * turn
-    out[0] = tilt.origin[k, i, 0] + fc * da - fs * db + dc * a - ds * b + sx
-    out[1] = tilt.origin[k, i, 1] + fs * da + fc * db + ds * a + dc * b + sy
+    out[0] = design.origin[k, i, 0] + fc * da - fs * db + dc * a - ds * b + sx
+    out[1] = design.origin[k, i, 1] + fs * da + fc * db + ds * a + dc * b + sy
     out[2] = dvalues[d[3]]
     out[3], out[4], out[5], out[6] = ox, oy, sx, sy
 
 
 @kernel
-def _spread(m, tilt, k, i, pose, force, dforce, sign, out):
+def _spread(m, design, k, i, pose, force, dforce, sign, out):
     """Add the derivative of the forces that a force at a place makes on its degrees of freedom; pose: as set above."""
     d = m.place_dof[i]
     fc, fs = m.place_frame[i, 0], m.place_frame[i, 1]
-    dc, ds = tilt.frame[k, i, 0], tilt.frame[k, i, 1]
+    dc, ds = design.frame[k, i, 0], design.frame[k, i, 1]
     out[d[0]] += sign * (fc * dforce[0] + fs * dforce[1] + dc * force[0] + ds * force[1])
     out[d[1]] += sign * (fc * dforce[1] - fs * dforce[0] + dc * force[1] - ds * force[0])
     out[d[2]] += sign * (pose[3] * dforce[1] - pose[4] * dforce[0] + pose[5] * force[1] - pose[6] * force[0])
@@ -61,22 +61,22 @@ def _spread(m, tilt, k, i, pose, force, dforce, sign, out):
 
 
 @kernel
-def load_slopes(m, tilt, k, values, dvalues, drive, w, out):
+def load_slopes(m, design, k, values, dvalues, drive, w, out):
     """Add the derivatives of the point loads."""
     pose, force, dforce = w[0], w[1], w[2]
     for q in range(m.load_place.shape[0]):
         i = m.load_place[q]
-        pose_slope(m, tilt, k, i, values, dvalues, pose)
+        pose_slope(m, design, k, i, values, dvalues, pose)
         for r in range(3):
             force[r] = m.load_value[q, 0, r] + drive * m.load_value[q, 1, r]
-            dforce[r] = tilt.load[k, q, 0, r] + drive * tilt.load[k, q, 1, r]
+            dforce[r] = design.load[k, q, 0, r] + drive * design.load[k, q, 1, r]
         if m.load_follows[q]:
             turn, by = values[m.place_dof[i, 3]], dvalues[m.place_dof[i, 3]]
             c, s = np.cos(turn), np.sin(turn)
             fx, fy = c * force[0] - s * force[1], s * force[0] + c * force[1]
             dx, dy = c * dforce[0] - s * dforce[1], s * dforce[0] + c * dforce[1]
             force[0], force[1], dforce[0], dforce[1] = fx, fy, dx - by * fy, dy + by * fx
-        _spread(m, tilt, k, i, pose, force, dforce, 1.0, out)
+        _spread(m, design, k, i, pose, force, dforce, 1.0, out)
 
 
 @kernel
@@ -105,7 +105,7 @@ def _law_slope(kind, value, change, gap, force, dforce):
 
 
 @kernel
-def spring_slopes(m, tilt, k, values, dvalues, w, out):
+def spring_slopes(m, design, k, values, dvalues, w, out):
     """Add the derivatives of the springs' forces; return that of their energy."""
     pa, pb, force, dforce, block, gap = w[0], w[1], w[2], w[3], w[4:7, :3], w[7]
     sa, sb = w[8], w[9]
@@ -114,8 +114,8 @@ def spring_slopes(m, tilt, k, values, dvalues, w, out):
         i, j = m.spring_place[q, 0], m.spring_place[q, 1]
         pose_of(places, values, i, pa)
         pose_of(places, values, j, pb)
-        pose_slope(m, tilt, k, i, values, dvalues, sa)
-        pose_slope(m, tilt, k, j, values, dvalues, sb)
+        pose_slope(m, design, k, i, values, dvalues, sa)
+        pose_slope(m, design, k, j, values, dvalues, sb)
         spring_law(m.spring_kind[q], m.spring_value[q], 0.0, pa, pb, force, block)
         for r in range(3):
             gap[r] = pb[r] - pa[r]
@@ -123,11 +123,11 @@ def spring_slopes(m, tilt, k, values, dvalues, w, out):
             for s in range(3):
                 dforce[r] += block[r, s] * (sb[s] - sa[s])
             energy -= force[r] * (sb[r] - sa[r])
-        value, change = m.spring_value[q], tilt.spring[k, q]
+        value, change = m.spring_value[q], design.spring[k, q]
         _law_slope(m.spring_kind[q], value, change, gap, force, dforce)
         energy += _energy_slope(m.spring_kind[q], value, change, gap)
-        _spread(m, tilt, k, i, sa, force, dforce, -1.0, out)
-        _spread(m, tilt, k, j, sb, force, dforce, 1.0, out)
+        _spread(m, design, k, i, sa, force, dforce, -1.0, out)
+        _spread(m, design, k, j, sb, force, dforce, 1.0, out)
     return energy
 
 
@@ -145,7 +145,7 @@ def _energy_slope(kind, value, change, gap):
 
 
 @kernel
-def beam_slopes(m, tilt, k, y, n_free, values, dvalues, dstart, dend, w, out):
+def beam_slopes(m, design, k, y, n_free, values, dvalues, dstart, dend, w, out):
     """Add the derivatives of the forces at the ends of all beams; dstart, dend (beams, 3): those of the forces."""
     n = n_free + 3 * m.beam_end.shape[0]
     pose, force = w[0], w[1]
@@ -153,9 +153,9 @@ def beam_slopes(m, tilt, k, y, n_free, values, dvalues, dstart, dend, w, out):
         own, last = n + 6 * m.beam_segment[e] + 3, n_free + 3 * e
         for r in range(3):
             force[r] = y[own + r]
-        pose_slope(m, tilt, k, m.beam_end[e, 0], values, dvalues, pose)
-        _spread(m, tilt, k, m.beam_end[e, 0], pose, force, dstart[e], 1.0, out)
+        pose_slope(m, design, k, m.beam_end[e, 0], values, dvalues, pose)
+        _spread(m, design, k, m.beam_end[e, 0], pose, force, dstart[e], 1.0, out)
         for r in range(3):
             force[r] = y[last + r]
-        pose_slope(m, tilt, k, m.beam_end[e, 1], values, dvalues, pose)
-        _spread(m, tilt, k, m.beam_end[e, 1], pose, force, dend[e], -1.0, out)
+        pose_slope(m, design, k, m.beam_end[e, 1], values, dvalues, pose)
+        _spread(m, design, k, m.beam_end[e, 1], pose, force, dend[e], -1.0, out)

@@ -166,10 +166,10 @@ def _written(code: Code) -> bytes:
 
 def _parsed(data: bytes) -> Code:
     head, about, content = data.split(b"\n", 2)
-    told = json.loads(about)
-    if head + b"\n" != _HEAD or told["origin"] != origin() or told["content"] != hashlib.sha256(content).hexdigest():
+    given = json.loads(about)
+    if head + b"\n" != _HEAD or given["origin"] != origin() or given["content"] != hashlib.sha256(content).hexdigest():
         raise ValueError("of another origin, or not whole")
-    return Code(tuple(told["needs"]), content)
+    return Code(tuple(given["needs"]), content)
 
 
 def _replace(path: Path, data: bytes) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from cfmkit.elastica.kernels.codes import (
-    ASKED,
     BY_DRIVE,
     CHANGE,
     DENIED,
@@ -25,6 +24,7 @@ from cfmkit.elastica.kernels.codes import (
     NO_START,
     OUTSIDE,
     REACHED,
+    REQUESTED,
     SENSE,
     SHORT,
     SHORTNESS,
@@ -46,32 +46,35 @@ from cfmkit.elastica.kernels.predictor import MISSED, aim, changes, misses, pull
 VEER = 0.5  # cosine of the largest angle between the changes of poses at both ends of a step along the arc
 LOOKED_INTO = 0.01  # share of the longest step along the arc that is short enough to meet several things in
 SECANT = 0.25  # of the last step: shorter ones go along the tangent, from which the secants of long ones differ
-STRETCH = 1.3  # factor on a step that lands on an asked value: rather than a short one after it
+STRETCH = 1.3  # factor on a step that lands on a requested value: rather than a short one after it
 CREEPING = 5e-5  # share of the drive's bounds that is a short step
-CREEPS, TAUT = 400, 100.0  # short steps in a row that are enough; change of forces for one of poses that counts for ten
+CREEPS, STRAIGHT = (
+    400,
+    100.0,
+)  # short steps in a row that are enough; change of forces for one of poses that counts for ten
 NOISE = 30.0  # how far off a guess may be where points are solved to a tolerance of one
 AGAIN = 1e-5  # change of a pose between two solutions of one point
 SHORTER, APART = 4.0, 1e4  # lengths of steps that may yet be shorter; between bifurcations that are met one by one
 
 
 @kernel
-def _store(k, y, state, asked, t, iterations, along, outs):
-    """Store point k; asked: index of its value, -1 for none; t: parameter; along: d(drive)/ds."""
+def _store(k, y, state, number, t, iterations, along, outs):
+    """Store point k; number: index of its value, -1 for none; t: parameter; along: d(drive)/ds."""
     out_y, out_drive, out_info = outs
     copy(out_y[k], y)
     out_drive[k] = state[0]
-    out_info[k, UNSTABLE], out_info[k, ASKED], out_info[k, REACHED] = state[1], asked, t
+    out_info[k, UNSTABLE], out_info[k, REQUESTED], out_info[k, REACHED] = state[1], number, t
     out_info[k, SPENT], out_info[k, DRIVE_RATE], out_info[k, SHORTNESS] = iterations, along, state[2]
 
 
 @kernel
-def _next_step(natural, step, old, targets, asked):
-    """Return the advance to the next point, whether it lands on an asked value, and that value of the drive."""
+def _next_step(natural, step, old, targets, number):
+    """Return the advance to the next point, whether it lands on a requested value, and that value of the drive."""
     if not natural:
         return abs(step), False, 0.0
-    left = targets[asked] - old
+    left = targets[number] - old
     if abs(left) <= STRETCH * abs(step):
-        return left, True, targets[asked]
+        return left, True, targets[number]
     ahead = step if left * step > 0.0 else -step
     return ahead, False, old + ahead
 
@@ -123,10 +126,10 @@ def _longer(moved, missed, turn, count, landing, tolerance):
 
 @kernel
 def _creeps(slow, ahead, moved, new, old, options, n_free, n):
-    """Count the short steps in a row, those tenfold in which only forces grow: a path drawn taut gets no further."""
+    """Count the short steps in a row, those tenfold in which only forces grow: beams pulled straight get no further."""
     if abs(ahead) >= CREEPING * (options[HIGHEST] - options[LOWEST]):
         return 0
-    return slow + (10 if pulls(new, old, n_free, n) > TAUT * moved else 1)
+    return slow + (10 if pulls(new, old, n_free, n) > STRAIGHT * moved else 1)
 
 
 @kernel
@@ -206,15 +209,15 @@ def march(m, n_free, y, drive, tangent, targets, options, outs, scratch, room):
     stored, known = _begin(m, n_free, y, drive, natural, (state, unit, new, tangent, slope), options, outs, scratch)
     if stored < 0:
         return NO_START, 0
-    t, asked, index = (drive if natural else 0.0), 0, (state[1] if stored == 1 else options[INERTIA_BEFORE])
+    t, number, index = (drive if natural else 0.0), 0, (state[1] if stored == 1 else options[INERTIA_BEFORE])
     most = KEPT_WITH_SLOPES if natural else KEPT
     count, slow, denied = remember(kept, 0, t, y, drive, slope, most), 0, 0
-    while asked < targets.shape[0]:
-        if stored + targets.shape[0] - asked + 1 >= outs[0].shape[0]:
+    while number < targets.shape[0]:
+        if stored + targets.shape[0] - number + 1 >= outs[0].shape[0]:
             return FULL, stored
         old = past[0]
         set_border(natural, tangent, options[WEIGHT], n_free, border)
-        ahead, landing, goal = _next_step(natural, step, old[size], targets, asked)
+        ahead, landing, goal = _next_step(natural, step, old[size], targets, number)
         goal = aim(new, state, border, tangent, (kept, count, t, guess), natural, goal, ahead)
         code, iterations = solve(
             m, n_free, new, state, border, goal, (options[TOLERANCE], options[ITERATIONS]), new_tangent, scratch
@@ -239,12 +242,12 @@ def march(m, n_free, y, drive, tangent, targets, options, outs, scratch, room):
             return STALLED, stored
         if not natural:
             spaces = (scratch, between)
-            asked, stored = _between(m, n_free, old, new, state, targets, asked, stored, options, outs, unit, spaces)
-            if asked >= targets.shape[0]:
+            number, stored = _between(m, n_free, old, new, state, targets, number, stored, options, outs, unit, spaces)
+            if number >= targets.shape[0]:
                 return DONE, stored
         t += ahead
-        _store(stored, new, state, asked if landing else -1, t, iterations, new_tangent[n], outs)
-        stored, asked, denied = stored + 1, asked + (1 if landing else 0), (0 if landing else denied)
+        _store(stored, new, state, number if landing else -1, t, iterations, new_tangent[n], outs)
+        stored, number, denied = stored + 1, number + (1 if landing else 0), (0 if landing else denied)
         count = remember(kept, count if known or not natural else 0, t, new, state[0], slope, most)
         known = True
         copy(tangent, new_tangent)
@@ -259,10 +262,10 @@ def march(m, n_free, y, drive, tangent, targets, options, outs, scratch, room):
 
 
 @kernel
-def _between(m, n_free, old, new, state, targets, asked, stored, options, outs, unit, spaces):
-    """Solve at the asked values of the drive that a step of arc length has passed; return (asked, stored).
+def _between(m, n_free, old, new, state, targets, number, stored, options, outs, unit, spaces):
+    """Solve at the requested values of the drive that a step of arc length has passed; return (number, stored).
 
-    Values in the direction of the first target count as asked once each; a value passed again on the way back
+    Values in the direction of the first target count as requested once each; a value passed again on the way back
     after a fold is stored again.
     """
     size = new.shape[0]
@@ -291,7 +294,7 @@ def _between(m, n_free, old, new, state, targets, asked, stored, options, outs, 
             stored += 1
             if k == n_all - 1:
                 return n_all, stored
-            asked = max(asked, k + 1) if asked < n_all - 1 else asked
+            number = max(number, k + 1) if number < n_all - 1 else number
         elif k == n_all - 1:
             return n_all, stored
-    return asked, stored
+    return number, stored

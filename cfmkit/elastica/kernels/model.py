@@ -103,7 +103,7 @@ class Model(Packed, _ModelArrays):
     )
 
 
-class _TiltArrays(NamedTuple):
+class _DesignSlopesArrays(NamedTuple):
     variable: Any
     first: Any
     table: Any
@@ -121,7 +121,7 @@ class _TiltArrays(NamedTuple):
     line: Any
 
 
-class Tilt(Packed, _TiltArrays):
+class DesignSlopes(Packed, _DesignSlopesArrays):
     """Derivatives of a model's arrays by k design variables.
 
     Attributes
@@ -147,7 +147,7 @@ class Tilt(Packed, _TiltArrays):
     line : (k, beams, 2, 2) array
     """
 
-    kinds = _TiltArrays(
+    kinds = _DesignSlopesArrays(
         variable=integers(1),
         first=integers(1),
         table=floats(1),
@@ -166,7 +166,7 @@ class Tilt(Packed, _TiltArrays):
     )
 
 
-Arrays = TypeVar("Arrays", Model, Tilt)
+Arrays = TypeVar("Arrays", Model, DesignSlopes)
 
 
 def in_order(arrays: Arrays) -> Arrays:

@@ -1,4 +1,4 @@
-"""The next point of a path foretold from the last ones, and how far from that it may come to lie."""
+"""The next point of a path predicted from the last ones, and how far from that it may come to lie."""
 
 from __future__ import annotations
 

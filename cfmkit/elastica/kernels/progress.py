@@ -23,7 +23,7 @@ _TELLER = logging.getLogger("cfmkit.elastica")
 
 
 @contextmanager
-def told(name: str) -> Iterator[Callable[[float], None]]:
+def reported(name: str) -> Iterator[Callable[[float], None]]:
     """Say that a door is compiled; yield what shows, on a terminal, the share that is done."""
     text = f"compiling the beam engine, once: {_PARTS[name]}, {_LASTS.get(name, 'a moment')}"
     if sys.stderr is None or not sys.stderr.isatty():

@@ -11,7 +11,7 @@ from cfmkit.elastica.kernels.codes import KEPT
 from cfmkit.elastica.kernels.packing import Packed, complexes, floats, objects
 
 if TYPE_CHECKING:
-    from cfmkit.elastica.kernels.model import Model, Tilt
+    from cfmkit.elastica.kernels.model import DesignSlopes, Model
 
 SOLVING = (
     floats(2),  # system, with the drive's column and the bordering row
@@ -100,10 +100,10 @@ def work_space(n: int, beams: int, dofs: int, segments: int) -> WorkSpace:
     )
 
 
-def slope_space(m: Model, tilt: Tilt, n: int) -> Any:
+def slope_space(m: Model, design: DesignSlopes, n: int) -> Any:
     """Return room for the derivatives of solutions with n unknowns z by all variables, in the order of `SLOPES`."""
-    count, beams, dofs = len(tilt.moves), len(m.beam_end), len(m.slot)
-    most, wide = int(np.diff(tilt.first).max(initial=0)), int(np.diff(m.beam_segment).max(initial=0))
+    count, beams, dofs = len(design.moves), len(m.beam_end), len(m.slot)
+    most, wide = int(np.diff(design.first).max(initial=0)), int(np.diff(m.beam_segment).max(initial=0))
     return (
         (
             np.zeros((beams, count, 3)),

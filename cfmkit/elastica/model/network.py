@@ -61,7 +61,7 @@ PINNED = Support(True, True, False)
 
 
 def guided(direction: float, rotates: bool = False) -> Support:
-    """Return the support of a node that slides along `direction` [rad] and, if asked, rotates."""
+    """Return the support of a node that slides along `direction` [rad] and, if requested, rotates."""
     return Support(along=False, across=True, rotation=not rotates, direction=direction)
 
 

@@ -1,4 +1,4 @@
-"""The outcome of a trace: converged equilibria in the order of the path, and what can be asked about them."""
+"""The outcome of a trace: converged equilibria in the order of the path, and what can be requested about them."""
 
 from __future__ import annotations
 
@@ -121,14 +121,14 @@ class Path:
         return read_only(self.unstable == 0, np.bool_)
 
     @cached_property
-    def asked(self) -> Any:
+    def requested(self) -> Any:
         """Index of the requested point, -1 for points in between."""
-        return read_only(self.points.asked, np.int64)
+        return read_only(self.points.requested, np.int64)
 
     @cached_property
-    def at_asked(self) -> Any:
+    def at_requested(self) -> Any:
         """Indices of the points that were requested, in path order."""
-        return read_only(np.flatnonzero(self.asked >= 0), np.int64)
+        return read_only(np.flatnonzero(self.requested >= 0), np.int64)
 
     @cached_property
     def fits(self) -> dict[str, Fit]:

@@ -81,7 +81,7 @@ class Sampler:
         return total
 
     def rest(self, m: Any) -> Any:
-        """Return the rows' places before any load, (rows, 2), dimensionless; for tilted models too."""
+        """Return the rows' places before any load, (rows, 2), dimensionless; for stepped models too."""
         turn, length = m.table[:, :, 0], m.table[:, :, 1]
         runs = np.stack([(f(turn) * length).sum(axis=1) for f in (np.cos, np.sin)], axis=1)
         whole = np.result_type(runs, m.place_origin)
@@ -175,7 +175,7 @@ class Sections:
     axial_stress: FloatArray
 
     def stress(self, axial: bool = True) -> FloatArray:
-        """Return the largest magnitude over the section [Pa], without the axial part if so asked."""
+        """Return the largest magnitude over the section [Pa], without the axial part if so requested."""
         bending = np.abs(self.bending_stress)
         return bending + np.abs(self.axial_stress) if axial else bending
 

@@ -1,7 +1,7 @@
 """Exact derivatives of a path's outputs by design variables: implicit differentiation, complex steps of the geometry.
 
 At an equilibrium R(z, x) = 0, so dz/dx = -(dR/dz)^-1 dR/dx, in compiled code (`cfmkit.elastica.kernels.columns`); how
-the network changes with x comes from complex steps of the function that builds it (`cfmkit.elastica.sensitivity.tilt`).
+the network changes with x comes from complex steps of the function that builds it (`complex_steps`).
 Variables may change positions, shapes, sections, materials, offsets, links' arms, springs, loads, support displacements
 and directions; not the number of anything. The drive keeps its values; a support that turns takes its drive with it.
 """
@@ -120,10 +120,10 @@ def gradient(path: Path, build: Callable[[Any], Network], variables: Any, points
         If a variable changes how the network is made up, moves a corner of a beam and a step of its thickness past
         each other, or moves one side of a step only. Outputs raise it where the tangent is singular at a point.
     """
-    from cfmkit.elastica.sensitivity.tilt import Tilts
+    from cfmkit.elastica.sensitivity.complex_steps import ComplexSteps
 
     solver = path.solver
-    tilts = Tilts(path.layout, build, variables)
-    tilt = tilts.arrays(solver.model, solver.cut)
-    chosen = np.asarray(path.at_asked if points is None else points, dtype=np.int64)
-    return Gradient(path, read_only(chosen, np.int64), tilts, tilt)
+    complex_steps = ComplexSteps(path.layout, build, variables)
+    design = complex_steps.arrays(solver.model, solver.cut)
+    chosen = np.asarray(path.at_requested if points is None else points, dtype=np.int64)
+    return Gradient(path, read_only(chosen, np.int64), complex_steps, design)

@@ -49,7 +49,7 @@ def neighbouring(path: Path, network: Network, drive: Drive, largest_turn: float
         If the two networks are not of one kind, or the numbers of points differ.
     """
     solver = Solver(Layout(network, drive), path.solver.mesh, path.solver.tolerance)
-    known, wanted = path.at_asked, drive.points
+    known, wanted = path.at_requested, drive.points
     if solver.size != path.solver.size or len(known) != len(wanted):
         raise InputError("neighbouring equilibria need networks of the same kind and as many points as were reached")
     factors = _factors(path.solver, path.layout.scales, solver.layout.scales)
@@ -91,7 +91,7 @@ def drive_slope(path: Path, indices: Any = None) -> FloatArray:
     c, s = np.cos(frame), np.sin(frame)
     pick = np.array([(c, s, 0.0), (-s, c, 0.0), (0.0, 0.0, 1.0)][local])
     unit = (layout.scales.moment if local == 2 else layout.scales.force) / layout.scales.drive
-    chosen = path.at_asked if indices is None else np.asarray(indices)
+    chosen = path.at_requested if indices is None else np.asarray(indices)
     slopes = []
     for index in chosen.tolist():
         spot = solver.solve(path.points.y[index], float(path.points.drive[index]))

@@ -9,13 +9,13 @@ import numpy as np
 
 from cfmkit.elastica.outcome.sections import ENERGY, MOMENT, TURN, H, V, X, Y
 from cfmkit.elastica.outcome.stress import STENCIL
-from cfmkit.elastica.sensitivity.tilt import slope
+from cfmkit.elastica.sensitivity.complex_steps import slope
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.model.drive import Loading
     from cfmkit.elastica.model.network import LineLoad
-    from cfmkit.elastica.sensitivity.plain_tilt import PlainTilt
+    from cfmkit.elastica.sensitivity.plain_slopes import PlainSlopes
     from cfmkit.elastica.sensitivity.slopes import Slopes
 
 
@@ -24,7 +24,7 @@ def _values(g: Slopes, dof: int) -> tuple[FloatArray, FloatArray]:
     slot, known = int(g.path.solver.model.slot[dof]), g.path.value(dof)[g.points]
     if slot >= 0:
         return known, g.unknowns[:, slot]
-    return known, g.tilt.base[:, dof] + g.path.points.drive[g.points][:, None] * g.tilt.rate[:, dof]
+    return known, g.design.base[:, dof] + g.path.points.drive[g.points][:, None] * g.design.rate[:, dof]
 
 
 def _turned(frame: float, by: FloatArray, a: Any, b: Any) -> tuple[FloatArray, FloatArray]:
@@ -38,9 +38,9 @@ def _turned(frame: float, by: FloatArray, a: Any, b: Any) -> tuple[FloatArray, F
 def _frame(g: Slopes, node: str) -> tuple[float, FloatArray]:
     """Return the direction of a node's frame and its derivatives (k,)."""
     direction = float(np.real(g.path.layout.direction[node]))
-    if g.tilts.plain is not None:
-        return direction, np.zeros(len(g.tilts))
-    return direction, np.array([slope(layout.direction[node]) for layout in g.tilts.tilted], dtype=float)
+    if g.complex_steps.plain is not None:
+        return direction, np.zeros(len(g.complex_steps))
+    return direction, np.array([slope(layout.direction[node]) for layout in g.complex_steps.stepped], dtype=float)
 
 
 def motion(g: Slopes, node: str) -> FloatArray:
@@ -51,7 +51,7 @@ def motion(g: Slopes, node: str) -> FloatArray:
     turn, dturn = _values(g, layout.plan.swing[node])
     dx, dy = _turned(*_frame(g, master), along, across)
     ax, ay = np.real(np.subtract(layout.position(node), layout.position(master)))
-    pairs = [(network.nodes[node], network.nodes[master]) for network, _ in g.tilts.built]
+    pairs = [(network.nodes[node], network.nodes[master]) for network, _ in g.complex_steps.built]
     px, py = slope(np.array([(one.x - other.x, one.y - other.y) for one, other in pairs])).T
     c, s = np.cos(turn)[:, None], np.sin(turn)[:, None]
     dx = dx * length + (c - 1) * px - s * py - (s * ax + c * ay) * dturn
@@ -118,11 +118,11 @@ def sections(g: Slopes, beam: str) -> SectionSlopes:
 
 def _geometry(g: Slopes, beam: str, at: Any) -> tuple[FloatArray, float, FloatArray, tuple[Any, Any, Any]]:
     """Return angle (n,), width and thickness (n,) at the rows of a beam, and their derivatives (n, k), (k,), (n, k)."""
-    cut, count = g.path.sampler.cut, len(g.tilts)
-    if g.tilts.plain is not None:
-        return _plain_geometry(g, g.tilts.plain, beam, at)
+    cut, count = g.path.sampler.cut, len(g.complex_steps)
+    if g.complex_steps.plain is not None:
+        return _plain_geometry(g, g.complex_steps.plain, beam, at)
     angles, thicks, widths = [], [], []
-    for layout in (g.path.layout, *g.tilts.tilted):
+    for layout in (g.path.layout, *g.complex_steps.stepped):
         fitted, section = layout.fits[beam], layout.network.beams[beam].section
         angle, thick = np.empty(len(at.t), complex), np.empty(len(at.t), complex)
         pieces, place = cut.piece[at.step], fitted.arc(at.t)
@@ -142,11 +142,11 @@ def _geometry(g: Slopes, beam: str, at: Any) -> tuple[FloatArray, float, FloatAr
     return angles[0].real, float(np.real(widths[0])), thicks[0].real, by
 
 
-def _plain_geometry(g: Slopes, tilt: PlainTilt, beam: str, at: Any) -> tuple[Any, float, Any, tuple[Any, Any, Any]]:
+def _plain_geometry(g: Slopes, design: PlainSlopes, beam: str, at: Any) -> tuple[Any, float, Any, tuple[Any, Any, Any]]:
     """Return the same for a network of plain beams."""
     fitted, section = g.path.layout.fits[beam], g.path.layout.network.beams[beam].section
     number, ones = list(g.path.layout.network.beams).index(beam), np.ones(len(at.t))
-    by = (tilt.angle(number, at.t), tilt.sections[:, number, 1], ones[:, None] * tilt.sections[:, number, 2])
+    by = (design.angle(number, at.t), design.sections[:, number, 1], ones[:, None] * design.sections[:, number, 2])
     return fitted.angle(at.t, 0.5), float(section.width), section.thickness_at(at.t, 0.5), by
 
 
@@ -178,9 +178,9 @@ def load_displacement(g: Slopes, drive: Loading) -> FloatArray:
     """Return the derivatives of the work-conjugate displacement of a load drive, (p, k) [J]."""
     from cfmkit.elastica.model.network import PointLoad
 
-    total = np.zeros((len(g.points), len(g.tilts)))
+    total = np.zeros((len(g.points), len(g.complex_steps)))
     for number, load in enumerate(drive.loads):
-        others = [drive.loads[number] for _, drive in g.tilts.built]
+        others = [drive.loads[number] for _, drive in g.complex_steps.built]
         total += _point_work(g, load, others) if isinstance(load, PointLoad) else _line_work(g, load, others)
     return total
 
@@ -205,10 +205,10 @@ def _line_work(g: Slopes, load: LineLoad, others: list[Any]) -> FloatArray:
     beam = list(path.layout.network.beams).index(load.beam)
     index, weights = sampler.rows(beam).index, sampler.weights(path.layout, beam)
     moved = path.line_motion(load.beam)[g.points]
-    still = np.stack([_rest_slope(g, k, index) for k in range(len(g.tilts))], axis=-1)
+    still = np.stack([_rest_slope(g, k, index) for k in range(len(g.complex_steps))], axis=-1)
     change = (g.rows[:, index][:, :, [X, Y]] - still) * path.layout.scales.length
     force, by = np.array([load.wx, load.wy], dtype=float), slope(np.array([[o.wx, o.wy] for o in others])).T
-    grows = np.array([slope(sampler.weights(layout, beam)) for layout in g.tilts.tilted]).T
+    grows = np.array([slope(sampler.weights(layout, beam)) for layout in g.complex_steps.stepped]).T
     density = np.einsum("r,pnrk->pnk", force, change) + moved @ by
     return np.asarray(np.einsum("n,pnk->pk", weights, density) + (moved @ force) @ grows)
 
@@ -218,7 +218,7 @@ def _rest_slope(g: Slopes, k: int, index: Any) -> FloatArray:
     from cfmkit.elastica.equilibrium.mesh import assemble_model, table
 
     sampler = g.path.sampler
-    layout = g.tilts.tilted[k]
+    layout = g.complex_steps.stepped[k]
     model = assemble_model(layout, sampler.cut, table(layout, sampler.cut, sampler.model.table))
     return np.asarray(slope(sampler.rest(model)[index]))
 

@@ -12,9 +12,9 @@ from cfmkit.errors import InputError
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.elastica.kernels.model import Tilt
+    from cfmkit.elastica.kernels.model import DesignSlopes
     from cfmkit.elastica.outcome.path import Path
-    from cfmkit.elastica.sensitivity.tilt import Tilts
+    from cfmkit.elastica.sensitivity.complex_steps import ComplexSteps
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,14 +27,14 @@ class Slopes:
         What was differentiated.
     points : (p,) int array
         Indices of the points.
-    tilts, tilt : Tilts, Tilt
+    complex_steps, design : ComplexSteps, DesignSlopes
         How the network and its arrays change.
     """
 
     path: Path
     points: Any
-    tilts: Tilts
-    tilt: Tilt
+    complex_steps: ComplexSteps
+    design: DesignSlopes
 
     @property
     def unknowns(self) -> FloatArray:
@@ -57,11 +57,11 @@ class Slopes:
         """Return derivatives of the unknowns, (p, size, k), none if the size is zero, and of the force, (p, k)."""
         from cfmkit.elastica.kernels import entry
 
-        s, count = self.path.solver, len(self.tilts)
+        s, count = self.path.solver, len(self.complex_steps)
         unknowns = np.empty((len(self.points) if size else 0, size, count))
         push = np.empty((len(self.points), count))
         ys, drives = self.path.points.y[self.points], self.path.points.drive[self.points]
-        if not entry.slopes(s.model, self.tilt, s.n_free, ys, drives, (unknowns, push), s.scratch):
+        if not entry.slopes(s.model, self.design, s.n_free, ys, drives, (unknowns, push), s.scratch):
             raise InputError("the tangent is singular at a point of the path: no derivative there")
         return unknowns, push
 
@@ -71,9 +71,9 @@ class Slopes:
         from cfmkit.elastica.kernels import entry
 
         s = self.path.solver
-        out = np.empty((len(self.points), s.n_dofs + 1, len(self.tilts)))
+        out = np.empty((len(self.points), s.n_dofs + 1, len(self.complex_steps)))
         ys, drives = self.path.points.y[self.points], self.path.points.drive[self.points]
-        entry.held_slopes(s.model, self.tilt, s.n_free, ys, drives, self.unknowns, out)
+        entry.held_slopes(s.model, self.design, s.n_free, ys, drives, self.unknowns, out)
         return out
 
     @cached_property
@@ -82,8 +82,8 @@ class Slopes:
         from cfmkit.elastica.kernels import entry
 
         sampler, solver = self.path.sampler, self.path.solver
-        tilt = self.tilts.arrays(sampler.model, sampler.cut, every=True)
-        out = np.empty((len(self.points), sampler.states.shape[1], 7 * len(self.tilts)))
+        design = self.complex_steps.arrays(sampler.model, sampler.cut, every=True)
+        out = np.empty((len(self.points), sampler.states.shape[1], 7 * len(self.complex_steps)))
         ys, drives = self.path.points.y[self.points], self.path.points.drive[self.points]
-        entry.row_slopes(sampler.model, tilt, solver.n_free, ys, drives, self.unknowns, out)
+        entry.row_slopes(sampler.model, design, solver.n_free, ys, drives, self.unknowns, out)
         return out.reshape(*out.shape[:2], 7, -1)[:, :, [2, 3, 0, 1, 5, 6, 4]]

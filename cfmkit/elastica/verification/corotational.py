@@ -72,7 +72,7 @@ def recheck(path: Path, points: Any = None, elements: int = 48) -> Recheck:
     layout = path.layout
     if layout.driven is None or layout.pin_dof or layout.spring_rows or layout.load_rows or layout.line_load.any():
         raise InputError("the check by elements is for beams, links and supports under a displacement or rotation only")
-    chosen = path.at_asked if points is None else np.asarray(points)
+    chosen = path.at_requested if points is None else np.asarray(points)
     meshes = [_Elements(path, elements, split) for split in (1, 2)]
     effort, stress, stable = [], [], []
     for index in chosen.tolist():
@@ -212,9 +212,9 @@ class _Elements:
         own = u[index]
         columns = []
         for k in range(6):
-            tilted = own.astype(complex)
-            tilted[:, k] += 1j * _STEP
-            columns.append(self.forces(tilted).imag / _STEP)
+            stepped = own.astype(complex)
+            stepped[:, k] += 1j * _STEP
+            columns.append(self.forces(stepped).imag / _STEP)
         values = np.stack(columns, axis=2)
         rows = np.repeat(index[:, :, None], 6, axis=2)
         return coo_array((values.ravel(), (rows.ravel(), rows.transpose(0, 2, 1).ravel())), (self.size, self.size))

@@ -107,7 +107,7 @@ def _refuse_tight_coils(assembly: Assembly) -> None:
 
 def _kept(spec: BeamSpec, path: Path) -> Any:
     """Return which points make the curve: those requested, or all where folds may make it many-valued."""
-    keep = np.arange(len(path)) if spec.analysis.through_folds else path.at_asked
+    keep = np.arange(len(path)) if spec.analysis.through_folds else path.at_requested
     return read_only(keep, np.int64)
 
 

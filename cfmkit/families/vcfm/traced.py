@@ -260,8 +260,8 @@ def _begun(route: Route, end: float, count: int) -> First:
 def _points(path: Path, places: FloatArray) -> PathPoints:
     """Return the accurate points of a path at which the drive is farther than ever before."""
     drive = np.array(path.drive)
-    asked = path.asked >= 0
-    drive[asked] = places[path.asked[asked]]  # to the last digit, so that nodes are found again
+    asked = path.requested >= 0
+    drive[asked] = places[path.requested[asked]]  # to the last digit, so that nodes are found again
     size = np.sign(places[-1]) * drive
     farthest = np.maximum.accumulate(np.concatenate([[-1e-30], size[:-1]])) if len(size) else size
     kept = np.flatnonzero(np.asarray(path.accurate) & (size > farthest + 1e-15))

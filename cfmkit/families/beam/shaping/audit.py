@@ -90,7 +90,7 @@ def audited(variables: Variables, found: Found) -> Audit:
     return Audit(
         path.status is PathStatus.COMPLETE,
         bool(path.stable.all()),
-        sum(crossing(task, path, int(k)) for k in path.at_asked),
+        sum(crossing(task, path, int(k)) for k in path.at_requested),
         _least_gap(task, path),
     )
 
@@ -172,7 +172,7 @@ def _gap(task: Task, path: Path, pair: Pair) -> float:
     thickness = 0.5 * sum(thickest_of(section) for section in sections)
     wanted = thickness + (task.limits.clearance or 0.0)
     least = np.inf
-    for pose in path.at_asked:
+    for pose in path.at_requested:
         p, q = (path.shape(name, int(pose)) @ [1, 1j] for name in pair.beams)
         distance = abs(p[:, None] - q[None, :])
         away = np.full(distance.shape, np.inf)

@@ -70,6 +70,6 @@ def looked_at(task: Task, network: Network) -> CloseView | None:
         return None
     if path.status is not PathStatus.COMPLETE:
         return None
-    keep = path.at_asked
+    keep = path.at_requested
     stress = path.peak_stress(axial=task.total_stress).value[keep]
     return CloseView(at, path.effort[keep] * task.copies, stress)

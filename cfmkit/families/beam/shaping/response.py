@@ -135,7 +135,7 @@ class Response:
     @cached_property
     def keep(self) -> Any:
         """Indices of the poses on the path."""
-        return self.path.at_asked
+        return self.path.at_requested
 
     @cached_property
     def lengths(self) -> dict[str, Length]:

@@ -78,7 +78,7 @@ def part(result: Result) -> Figure:
     """Return the part to scale at some travels, with the place of the largest stress at the end."""
     solution: Solution = result.state
     chosen = np.unique(np.linspace(0, len(solution.travel) - 1, POSES).astype(int))
-    shapes = [list(_shapes(solution, int(solution.pressed.path.at_asked[k]))) for k in chosen]
+    shapes = [list(_shapes(solution, int(solution.pressed.path.at_requested[k]))) for k in chosen]
     figure = new_figure(160.0, 120.0)
     heading = Heading.of(result, "the part to scale while it is pressed")
     write_heading(figure, heading)
@@ -159,7 +159,7 @@ def moving(result: Result) -> Moving:
     """Return the part over its travel, for a film."""
     solution: Solution = result.state
     points = chosen(len(solution.travel))
-    shapes = [list(_shapes(solution, int(solution.pressed.path.at_asked[k]))) for k in points]
+    shapes = [list(_shapes(solution, int(solution.pressed.path.at_requested[k]))) for k in points]
     everything = np.concatenate([line for shape in shapes for line, _ in shape])
     low, high = everything.min(axis=0), everything.max(axis=0)
     room = 0.08 * float((high - low).max())

@@ -84,13 +84,13 @@ class Pressed:
     @property
     def travel(self) -> FloatArray:
         """Slider travel at the requested points that were reached [m]."""
-        travel: FloatArray = self.path.drive[self.path.at_asked]
+        travel: FloatArray = self.path.drive[self.path.at_requested]
         return travel
 
     @property
     def force(self) -> FloatArray:
         """Force against the travel there [N]."""
-        force: FloatArray = self.path.effort[self.path.at_asked]
+        force: FloatArray = self.path.effort[self.path.at_requested]
         return force
 
 
@@ -196,14 +196,14 @@ class Chain:
     def _judged(self, path: Path, wanted: int, helped: bool = False) -> Pressed:
         """Return the outcome with its ending: a curve that is not the one requested is never passed on as such."""
         ending, message = _ENDINGS.get(path.status, Ending.NOT_CONVERGED), path.message
-        if helped or not len(path.at_asked):
+        if helped or not len(path.at_requested):
             ending = Ending.NOT_CONVERGED if ending is Ending.COMPLETE else ending
             return Pressed(path, ending, message)
         sides = self._sides(path, wanted)
         side = int(sides[-1])
-        stable = path.stable[path.at_asked]
+        stable = path.stable[path.at_requested]
         if ending is Ending.COMPLETE and not stable.all():
-            first = path.drive[path.at_asked][~stable][0]
+            first = path.drive[path.at_requested][~stable][0]
             ending, message = Ending.UNSTABLE, f"unstable from {first * 1e3:.4g} mm on"
         chain_like = abs(kink(self.pins)) <= BENT * self.length
         if ending is Ending.COMPLETE and side != wanted and (chain_like or wanted != self.side):
@@ -217,13 +217,13 @@ class Chain:
         pin, too: far on its way a chain turns with that line, and the pin comes back past where the line had been.
         """
         way = np.array([np.cos(self.direction), np.sin(self.direction)])
-        last = path.at_asked.tolist()
+        last = path.at_requested.tolist()
         pins = np.array([self.knee(path, at) for at in last])
         moved = np.array([kink(np.array([self.pins[0], pin, self.pins[2]])) for pin in pins]) - kink(self.pins)
-        ends = self.pins[2] + np.outer(path.drive[path.at_asked], way)
+        ends = self.pins[2] + np.outer(path.drive[path.at_requested], way)
         off = np.array([kink(np.array([self.pins[0], *pose])) for pose in zip(pins, ends, strict=True)])
         sides: FloatArray = np.where((np.sign(moved) == wanted) | (np.sign(off) == wanted), wanted, np.sign(moved))
-        begins = np.flatnonzero(path.drive[path.at_asked] > 0.0)
+        begins = np.flatnonzero(path.drive[path.at_requested] > 0.0)
         if len(begins) and sides[-1] != wanted and np.sign(moved[begins[0]]) != wanted:
             sides[:] = -wanted  # it went there at once, whatever its kink says
         return sides
@@ -233,9 +233,9 @@ class Chain:
         first = int(np.flatnonzero(sides == wanted)[-1]) + 1 if (sides == wanted).any() else 0
         if first < FEWEST:
             return Pressed(path, Ending.WRONG_BRANCH, Ending.WRONG_BRANCH.value, -wanted)
-        places = path.drive[path.at_asked][first - 1 : first + 1] * 1e3
+        places = path.drive[path.at_requested][first - 1 : first + 1] * 1e3
         text = f"between {places[0]:.4g} and {places[1]:.4g} mm {Ending.CROSSES.value}"
-        kept = part_of(path, np.isin(path.asked, path.asked[path.at_asked][:first]))
+        kept = part_of(path, np.isin(path.requested, path.requested[path.at_requested][:first]))
         return Pressed(kept, Ending.CROSSES, text, wanted)
 
 
@@ -249,14 +249,14 @@ _ENDINGS = {
 def _beginning(path: Path, drive: Displacement) -> int:
     """Return the number of the first point from which on nothing is missing, rest not counted."""
     found = np.zeros(len(drive.points), dtype=bool)
-    found[path.asked] = True
+    found[path.requested] = True
     found &= drive.points != 0.0
     return int(np.flatnonzero(~found)[-1]) + 1 if not found.all() else 0
 
 
 def _since(path: Path, first: int) -> Path:
     """Return a path from the point with a number on."""
-    return part_of(path, path.asked >= first)
+    return part_of(path, path.requested >= first)
 
 
 def part_of(path: Path, keep: NDArray[np.bool_]) -> Path:
@@ -276,8 +276,8 @@ def _trace(network: Network, drive: Displacement, tolerance: float) -> Path:
     if path.status is PathStatus.COMPLETE:
         return path
     arc = trace(network, drive, Control(tolerance=tolerance, through_folds=True))
-    good = arc.status is PathStatus.COMPLETE and bool(arc.stable[arc.at_asked].all())
-    return arc if good and len(arc.at_asked) == len(drive.points) else path
+    good = arc.status is PathStatus.COMPLETE and bool(arc.stable[arc.at_requested].all())
+    return arc if good and len(arc.at_requested) == len(drive.points) else path
 
 
 COARSE = 60
@@ -294,7 +294,7 @@ def kept_clear(pressed: Pressed, thickness: float) -> Pressed:
     thickness : float
         At the ends of the chain [m]: nearer than this the slider's end touches the anchor.
     """
-    places = pressed.path.at_asked.tolist()
+    places = pressed.path.at_requested.tolist()
     if not places:
         return pressed
     lines = [_line(pressed.path, at) for at in places]

@@ -157,7 +157,7 @@ class State:
     @cached_property
     def stress(self) -> FloatArray:
         """Stress at the tops of the strip's pieces near the end of the travel, (r,) [Pa]."""
-        sections, last = self.path.sections(STRIP), self.path.at_asked[-LAST:]
+        sections, last = self.path.sections(STRIP), self.path.at_requested[-LAST:]
         return self.watched.stress(sections.bending_stress[last], sections.axial_stress[last])
 
 
@@ -216,7 +216,7 @@ class StripProgram:
         path = self._path(self.network(z[: self.form.size]), self.travel(z))
         if path is None:
             return None
-        at = path.at_asked
+        at = path.at_requested
         found = State(path, path.effort[at], watched(path, self.spots))
         self.known, self._last = path, (z.copy(), found)
         return found
@@ -230,7 +230,7 @@ class StripProgram:
                 if near.status is PathStatus.COMPLETE:
                     return near
         path = trace(network, drive, Control(first_step=FIRST_STEP, tolerance=TOLERANCE))
-        good = path.status is PathStatus.COMPLETE and bool(path.stable[path.at_asked].all())
+        good = path.status is PathStatus.COMPLETE and bool(path.stable[path.at_requested].all())
         return path if good else None
 
     def values(self, z: FloatArray) -> tuple[float, FloatArray] | None:
@@ -300,7 +300,7 @@ class StripProgram:
 
         inner = x[: form.count]
         force = [gradient(path, build, inner).effort]
-        last = gradient(path, build, inner, points=path.at_asked[-LAST:]).sections(STRIP)
+        last = gradient(path, build, inner, points=path.at_requested[-LAST:]).sections(STRIP)
         stress = [state.watched.stress(last.bending_stress, last.axial_stress)]
         for k in range(form.count, form.count + form.placed):
             by = self._by_difference(z, k, state)
@@ -328,7 +328,7 @@ class StripProgram:
 
     def _by_stroke(self, z: FloatArray, state: State) -> tuple[FloatArray, FloatArray]:
         """Return the derivatives by the stroke in cm: all points move with it, and the stress with its point."""
-        travel, at = self.travel(z), state.path.at_asked
+        travel, at = self.travel(z), state.path.at_requested
         first, last = np.sqrt(self.task.start), np.sqrt(self.stroke(z))
         moves = np.sqrt(travel) / last * self.spots
         by_travel = self.slope[-LAST:] * (self.spots / (2.0 * last * (last - first)))[-LAST:, None]

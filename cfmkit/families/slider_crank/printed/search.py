@@ -153,7 +153,7 @@ def uniform_for_stroke(task: Task, guess: float = 1e-3) -> tuple[float, float] |
         state = program.state(np.array([thickness / SMALL, 1.0]))
         if state is None:
             return None
-        worst = float(state.path.peak_stress().value[state.path.at_asked[-1]])
+        worst = float(state.path.peak_stress().value[state.path.at_requested[-1]])
         level = 0.5 * (state.force.max() + state.force.min())
         width *= task.force / level
         factor = limit / worst

@@ -198,7 +198,7 @@ class Solution:
 
     @cached_property
     def _at(self) -> Any:
-        return self.pressed.path.at_asked
+        return self.pressed.path.at_requested
 
     @property
     def travel(self) -> FloatArray:

@@ -67,7 +67,7 @@ def watched(path: Path, spots: FloatArray) -> Watched:
     spots : (p,) array
         Places of these points in a variable in which the stress is smooth.
     """
-    sections, last = path.sections(STRIP), path.at_asked[-LAST:]
+    sections, last = path.sections(STRIP), path.at_requested[-LAST:]
     beam = path.layout.network.beams[STRIP]
     breaks = np.unique(np.concatenate([beam.shape.course(1.0).breaks, beam.section.stations]))
     breaks = breaks[np.append(True, np.diff(breaks) > 1e-12)]

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.elastica.equilibrium.mesh import assemble_model, table
-from cfmkit.elastica.kernels.model import Tilt, in_order
+from cfmkit.elastica.kernels.model import DesignSlopes, in_order
 from cfmkit.elastica.model.layout import Layout
-from cfmkit.elastica.sensitivity.plain_tilt import plain_tilt
+from cfmkit.elastica.sensitivity.plain_slopes import plain_slopes
 from cfmkit.errors import InputError
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ def slope(value: Any) -> Any:
     return np.imag(value) / STEP
 
 
-class Tilts:
+class ComplexSteps:
     """A layout and what it becomes with each design variable."""
 
     def __init__(self, layout: Layout, build: Callable[[Any], Any], variables: Any) -> None:
@@ -58,23 +58,23 @@ class Tilts:
             moved[k] += 1j * STEP
             built = build(moved)
             self.built.append(built if isinstance(built, tuple) else (built, layout.drive))
-        self.plain = plain_tilt(layout, self.built, STEP)
+        self.plain = plain_slopes(layout, self.built, STEP)
 
     def __len__(self) -> int:
         """Return the number of variables."""
         return len(self.built)
 
     @cached_property
-    def tilted(self) -> list[Layout]:
+    def stepped(self) -> list[Layout]:
         """The layouts with each variable in turn moved by an imaginary step."""
         found = []
         for network, drive in self.built:
-            tilted = Layout(network, drive, self.layout)
-            tilted.scales = self.layout.scales  # before its table is requested: that is kept in these units
-            found.append(tilted)
+            stepped = Layout(network, drive, self.layout)
+            stepped.scales = self.layout.scales  # before its table is requested: that is kept in these units
+            found.append(stepped)
         return found
 
-    def arrays(self, model: Model, cut: Grid, every: bool = False) -> Tilt:
+    def arrays(self, model: Model, cut: Grid, every: bool = False) -> DesignSlopes:
         """Return the derivatives of a model's arrays; with `every` each beam is paired with every variable.
 
         Raises
@@ -84,13 +84,13 @@ class Tilts:
         """
         if self.plain is not None:
             return in_order(self.plain.arrays(cut, every))
-        tilted = [self._model(k, layout, model, cut) for k, layout in enumerate(self.tilted)]
-        tables = np.stack([slope(table(layout, cut, model.table)) for layout in self.tilted], axis=-1)
+        stepped = [self._model(k, layout, model, cut) for k, layout in enumerate(self.stepped)]
+        tables = np.stack([slope(table(layout, cut, model.table)) for layout in self.stepped], axis=-1)
         variable, first, begin, blocks = [], [0], [], []
         size = 0
         for number in range(len(self.layout.network.beams)):
             changes = tables[cut.beam_of_step == number]
-            touched = changes.any(axis=(0, 1, 2)) | [bool(np.any(np.imag(one.line_load[number]))) for one in tilted]
+            touched = changes.any(axis=(0, 1, 2)) | [bool(np.any(np.imag(one.line_load[number]))) for one in stepped]
             own = list(range(len(self))) if every else np.flatnonzero(touched).tolist()
             block = changes[..., own]
             variable += own
@@ -98,7 +98,7 @@ class Tilts:
             begin.append(size)
             size += block.size
             blocks.append(block.ravel())
-        parts = {short: _stack(tilted, long, model) for short, long in _MOVING.items()}
+        parts = {short: _stack(stepped, long, model) for short, long in _MOVING.items()}
         moves = np.zeros(len(self), dtype=np.bool_)
         for values in parts.values():
             moves |= values.reshape(len(self), -1).any(axis=1)
@@ -109,7 +109,7 @@ class Tilts:
         touches = shifts[:, model.beam_end].any(axis=2).T
         for number in range(len(touches)):
             touches[number, variable[first[number] : first[number + 1]]] = True
-        tilt = Tilt(
+        design = DesignSlopes(
             variable=np.array(variable, dtype=np.int64),
             first=np.array(first, dtype=np.int64),
             table=np.concatenate(blocks),
@@ -119,21 +119,21 @@ class Tilts:
             touches=touches,
             **parts,
         )
-        return in_order(tilt)
+        return in_order(design)
 
     def _model(self, k: int, layout: Layout, model: Model, cut: Grid) -> Model:
         """Return the arrays for variable k, except the table."""
-        tilted = assemble_model(layout, cut, model.table)
+        stepped = assemble_model(layout, cut, model.table)
         for name in _WHOLE:
-            now, was = getattr(tilted, name), getattr(model, name)
+            now, was = getattr(stepped, name), getattr(model, name)
             if now.shape != was.shape or np.any(now != was):
                 raise InputError(f"design variable {k} changes how the network is made up: no derivative by it")
-        return tilted
+        return stepped
 
 
-def _stack(tilted: list[Model], name: str, model: Model) -> FloatArray:
+def _stack(stepped: list[Model], name: str, model: Model) -> FloatArray:
     """Return the derivatives of one array by all variables."""
     own = np.asarray(getattr(model, name))
     return np.ascontiguousarray(
-        np.array([slope(getattr(one, name)) for one in tilted]).reshape(len(tilted), *own.shape)
+        np.array([slope(getattr(one, name)) for one in stepped]).reshape(len(stepped), *own.shape)
     )

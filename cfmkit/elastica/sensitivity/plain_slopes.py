@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.elastica.kernels.model import TABLE_COLUMNS, Tilt
+from cfmkit.elastica.kernels.model import TABLE_COLUMNS, DesignSlopes
 from cfmkit.elastica.model.beam import GAUSS
 from cfmkit.elastica.model.bundle import is_plain, powers
 from cfmkit.elastica.model.numbering import NOWHERE
@@ -31,7 +31,7 @@ _SAME = attrgetter("start", "end", "start_joint", "end_joint", "closure", "secti
 
 
 @dataclass(frozen=True, eq=False)
-class PlainTilt:
+class PlainSlopes:
     """Derivatives by k variables for b plain beams.
 
     Attributes
@@ -60,7 +60,7 @@ class PlainTilt:
         slopes: FloatArray = np.vander(t, self.coefficients.shape[2], increasing=True) @ self.coefficients[:, beam].T
         return slopes + self.rotation[:, beam]
 
-    def arrays(self, cut: Grid, every: bool) -> Tilt:
+    def arrays(self, cut: Grid, every: bool) -> DesignSlopes:
         """Return the derivatives of the model's arrays; with `every` each beam is paired with every variable."""
         layout, count = self.layout, len(self.origin)
         beams = self.coefficients.shape[1]
@@ -79,7 +79,7 @@ class PlainTilt:
         model, length = layout.plan, layout.scales.length
         dofs, loads, springs = layout.dof_count, len(model.load_place), len(model.spring_kind)
         none = np.zeros((count, dofs))
-        return Tilt(
+        return DesignSlopes(
             variable=np.concatenate(own),
             first=first,
             table=np.concatenate(blocks),
@@ -115,7 +115,7 @@ class PlainTilt:
         return out
 
 
-def plain_tilt(layout: Layout, built: list[tuple[Network, Drive]], step: float) -> PlainTilt | None:
+def plain_slopes(layout: Layout, built: list[tuple[Network, Drive]], step: float) -> PlainSlopes | None:
     """Return the derivatives for networks with one variable each moved by an imaginary step; None if not that plain."""
     if layout.bundle.others or layout.network.springs or not built:
         return None
@@ -139,11 +139,11 @@ def plain_tilt(layout: Layout, built: list[tuple[Network, Drive]], step: float) 
     ends = origin + arm
     reach = ends[:, plan.beam_end[:, 1]] - ends[:, plan.beam_end[:, 0]]
     rotation, length = _fits(layout, coefficients, reach)
-    return PlainTilt(layout, origin, arm, coefficients, sections.imag / step, rotation, length)
+    return PlainSlopes(layout, origin, arm, coefficients, sections.imag / step, rotation, length)
 
 
 def _sections(network: Network) -> list[tuple[Any, ...]]:
-    """Return what `PlainTilt.sections` has, of one network."""
+    """Return what `PlainSlopes.sections` has, of one network."""
     given = [beam.section for beam in network.beams.values()]
     known = {id(s): (s.youngs_modulus, s.width, s.thickness, 0.0, 0.0, s.poisson_ratio, s.shear_factor) for s in given}
     return [known[id(s)] for s in given]
