@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.elastica.continuation.modes import Curvature
-from cfmkit.elastica.continuation.singular import Singular, entered
+from cfmkit.elastica.continuation.singular import Curvature, Singular, entered
 from cfmkit.elastica.continuation.state import PRIMARY, Resume
 from cfmkit.elastica.equilibrium.mesh import LOADS
 from cfmkit.elastica.equilibrium.solver import Spot

@@ -11,7 +11,6 @@ from cfmkit.elastica.continuation import (
     at_bifurcation,
     bifurcation,
     branch_end,
-    corner,
     critical_start,
     ending,
     limit_point,
@@ -77,7 +76,7 @@ def _got_over(problem: Problem, trail: Trail, spot: Spot, requested: int) -> Mov
     if any(name != PRIMARY for name in trail.branches):
         move = branch_end.stepped_over(problem, trail, spot, requested)
     if move is None:
-        trail, move = corner.past(problem, trail, spot, requested)
+        trail, move = bifurcation.past_corner(problem, trail, spot, requested)
     if move is not None:
         return move
     if problem.control.through_folds:

@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.elastica.continuation.modes import Curvature
-from cfmkit.elastica.continuation.singular import leave
+from cfmkit.elastica.continuation.singular import Curvature, leave
 from cfmkit.elastica.continuation.state import fine_spot
 
 if TYPE_CHECKING:

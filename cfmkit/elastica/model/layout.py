@@ -13,8 +13,7 @@ from cfmkit.elastica.model.beam import Fit, fit, same_value
 from cfmkit.elastica.model.bundle import Bundle, coils
 from cfmkit.elastica.model.drive import Displacement, Drive, Rotation
 from cfmkit.elastica.model.network import LineSpring, Network, PointLoad, SlideSpring, Spring, TorsionSpring
-from cfmkit.elastica.model.numbering import NOWHERE
-from cfmkit.elastica.model.plan import driven, plan_of
+from cfmkit.elastica.model.numbering import NOWHERE, driven, plan_of
 from cfmkit.errors import InputError
 
 if TYPE_CHECKING:
