@@ -15,8 +15,10 @@ import numpy as np
 
 from cfmkit.elastica.kernels.model import TABLE_COLUMNS, DesignSlopes
 from cfmkit.elastica.model.beam import GAUSS
-from cfmkit.elastica.model.bundle import is_plain, powers
+from cfmkit.elastica.model.bundle import powers
 from cfmkit.elastica.model.numbering import NOWHERE
+from cfmkit.elastica.model.section import Taper
+from cfmkit.elastica.model.shapes import Polynomial
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
@@ -132,9 +134,11 @@ def plain_slopes(layout: Layout, built: list[tuple[Network, Drive]], step: float
         for place in np.flatnonzero(plan.place_offset != NOWHERE).tolist():
             arm[:, place] += _offsets(networks, *divmod(int(plan.place_offset[place]), 2)) / step
     most = bundle.coefficients.shape[1]
-    shapes: list[list[Any]] = [[beam.shape for beam in network.beams.values()] for network in networks]
-    given = [[shape.coefficients for shape in row] for row in shapes]
-    coefficients = np.array([[(*c, *(0.0,) * (most - len(c))) for c in row] for row in given]).imag / step
+    shapes: list[Any] = [beam.shape for network in networks for beam in network.beams.values()]
+    given = [shape.coefficients for shape in shapes]
+    if any(len(c) < most for c in given):
+        given = [(*c, *(0.0,) * (most - len(c))) for c in given]
+    coefficients = np.array(given).reshape(len(networks), -1, most).imag / step
     sections = np.array([_sections(network) for network in networks])
     ends = origin + arm
     reach = ends[:, plan.beam_end[:, 1]] - ends[:, plan.beam_end[:, 0]]
@@ -168,7 +172,8 @@ def _alike(layout: Layout, usual: list[Any], network: Network, drive: Drive) -> 
 
 def _make_up(beam: Beam) -> tuple[Any, ...]:
     """Return what no variable may change of a beam."""
-    return (*_SAME(beam), is_plain(beam), beam.start_offset != NO_OFFSET, beam.end_offset != NO_OFFSET)
+    polynomial, taper = isinstance(beam.shape, Polynomial), isinstance(beam.section.thickness, Taper)
+    return (*_SAME(beam), polynomial, taper, beam.start_offset != NO_OFFSET, beam.end_offset != NO_OFFSET)
 
 
 def _offsets(networks: list[Network], beam: int, side: int) -> FloatArray:
