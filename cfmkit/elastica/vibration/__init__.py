@@ -22,7 +22,7 @@ __all__ = ["Frequencies", "Masses", "frequencies"]
 
 
 def __getattr__(name: str) -> Any:
-    """Import the eigenproblem when it is first needed: every network has masses, few are requested how they swing."""
+    """Import the eigenproblem when it is first needed: every network has masses, few are asked how they swing."""
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     from cfmkit.elastica.vibration import modes
