@@ -89,7 +89,7 @@ def test_the_drive_takes_over_where_it_turns_behind_limit_points():
     move = decided(of, leg(of, DONE, path), fresh=False)
     assert isinstance(move, Resume)
     after = move.trail.stretch
-    assert (after.natural, after.first_asked, after.begun) == (True, 2, 1)
+    assert (after.natural, after.first_requested, after.begun) == (True, 2, 1)
     assert after.targets.tolist() == of.values.tolist()
     assert not move.trail.visited
     assert limit_point.one_way(of.values.tolist(), 1) == (0, 2)
