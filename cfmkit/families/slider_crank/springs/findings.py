@@ -162,7 +162,11 @@ def _of_band(spec: SliderCrankSpec, solution: Solution) -> Iterator[Finding]:
     inside = (solution.motion >= window[0]) & (solution.motion <= window[1])
     effort = solution.effort[inside]
     if inside.any() and effort.min() < 0.0 < effort.max():
-        yield finding("effort_changes_sign", f"in the window the {solution.assembly.drive} changes sign")
+        low, high = (format_short(float(end), solution.assembly.drive) for end in (effort.min(), effort.max()))
+        yield finding(
+            "effort_changes_sign",
+            f"in the window the {solution.assembly.drive} changes sign: it goes from {low} to {high}",
+        )
     if solution.assembly.drive == "torque" and not window[0] <= solution.assembly.stretched <= window[1]:
         yield finding(
             "stretched_outside_window",
