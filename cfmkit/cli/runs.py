@@ -36,11 +36,11 @@ if TYPE_CHECKING:
     from cfmkit.runs.run import Outcome, Verb
 
 
-def execute(verb: Verb, options: Computing, terminal: Terminal) -> Answer:
+def execute(verb: Verb, options: Computing, terminal: Terminal, page: bool = False) -> Answer:
     """Run a verb over the spec that the options name and write the folder."""
     out = folder_of(options, verb.name)
     wanted = Request(options.spec, out, options.changes, options.fidelity, options.seed, not options.no_plots)
-    wanted = replace(wanted, page=getattr(options, "report", False))
+    wanted = replace(wanted, page=page)
     with terminal.progress() as progress:
         return answer(carry_out(verb, wanted, terminal.arguments, progress), everything=terminal.verbose > 0)
 

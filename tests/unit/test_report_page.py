@@ -177,11 +177,18 @@ def test_a_page_of_a_large_sweep_keeps_what_was_varied_and_says_what_is_left_out
 def test_a_batch_links_the_page_of_each_and_escapes_what_it_says():
     entries = (
         Entry("a/<b>.yaml", "b c", "analyze", "cam", HOSTILE, "complete", written=True),
+        Entry(
+            "missed.yaml", "missed", "design", "cam", "m", "complete", code=ExitCode.REQUIREMENT_MISSED, written=True
+        ),
         Entry("bad.yaml", "bad", status="invalid", code=ExitCode.INVALID, message=HOSTILE),
     )
     text = batch_page.page(entries, "two", "cfmkit batch .").decode()
     outline = Outline(text)
-    assert [attributes["href"] for tag, attributes in outline.tags if tag == "a"] == ["b%20c/report.html"]
+    assert [attributes["href"] for tag, attributes in outline.tags if tag == "a"] == [
+        "b%20c/report.html",
+        "missed/report.html",
+    ]
     assert outline.unbalanced == []
     assert HOSTILE in outline.text
+    assert "requirement missed" in outline.text
     assert "not all is well" in outline.text

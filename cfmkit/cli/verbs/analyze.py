@@ -50,7 +50,7 @@ def run(options: AnalyzeOptions, terminal: Terminal) -> Answer:
         refuse_without_data(options)
     if options.compare_fidelity:
         work = partial(compute_each, work)
-    return execute(Verb("analyze", "analysed", work, inputs), options, terminal)
+    return execute(Verb("analyze", "analysed", work, inputs), options, terminal, options.report)
 
 
 def compute_beside(source: MeasuredCurves, spec: Spec, run: Run) -> Report:

@@ -35,7 +35,9 @@ def run(options: DesignOptions, terminal: Terminal) -> Answer:
     from cfmkit.studies.executors import cores
 
     running = partial(long_run, options.jobs or cores(), options.fresh)
-    return execute(Verb("design", "designed and analysed", designed, running=running), options, terminal)
+    return execute(
+        Verb("design", "designed and analysed", designed, running=running), options, terminal, options.report
+    )
 
 
 def long_run(jobs: int, fresh: bool, folder: RunFolder, plain: Run) -> AbstractContextManager[Run]:
