@@ -10,7 +10,7 @@ from cfmkit.errors import ExitCode
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
-    from cfmkit.cli.page import Block
+    from cfmkit.cli.page_blocks import Block
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cfmkit.cli.options import Common, option
 
 if TYPE_CHECKING:
-    from cfmkit.experiment.measured import MeasuredCurves
+    from cfmkit.experiment.evaluation import MeasuredCurves
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,7 +65,7 @@ def data_record(name: str) -> dict[str, Any]:
 
 def read_measured(name: str, options: Measuring) -> MeasuredCurves:
     """Return the measurement in a file, raw."""
-    from cfmkit.experiment.measured import read_measured as read
+    from cfmkit.experiment.evaluation import read_measured as read
 
     return read(name, options.units, options.tare, options.zero, options.flips)
 

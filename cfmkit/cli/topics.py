@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Any
 
 from cfmkit import families
 from cfmkit.cli.answer import Answer
-from cfmkit.cli.page import LABEL, Field, Span, TextLine, field, listed
+from cfmkit.cli.page_blocks import LABEL, Field, Span, TextLine, field, listed
 from cfmkit.errors import UsageError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
-    from cfmkit.cli.page import Block
+    from cfmkit.cli.page_blocks import Block
 
     Record = Mapping[str, Any]
     Section = tuple[str, Sequence[Record], tuple[Field, ...]]

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.experiment.measured import MeasuredCurves
+    from cfmkit.experiment.evaluation import MeasuredCurves
     from cfmkit.experiment.parameters import FitParameter
     from cfmkit.results import Result
     from cfmkit.specs.spec import Spec

@@ -10,19 +10,19 @@ import numpy as np
 
 from cfmkit.errors import DataError
 from cfmkit.experiment.branches import LOAD, UNLOAD
-from cfmkit.experiment.measured import elapsed
+from cfmkit.experiment.evaluation import elapsed
 from cfmkit.families import family
 from cfmkit.families.base import MeasuredLoop
 from cfmkit.metrics import Undefined, Window, window_of
+from cfmkit.metrics.branch_views import span_text
 from cfmkit.metrics.differences import Difference, counterpart, effort_at, largest, mean, overlap, rms, summarize
-from cfmkit.metrics.subjects import span_text
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from cfmkit.arrays import FloatArray
     from cfmkit.curves import Curve
-    from cfmkit.experiment.measured import MeasuredCurves
+    from cfmkit.experiment.evaluation import MeasuredCurves
     from cfmkit.metrics.differences import Measure
     from cfmkit.results import Quantity, Result
 
@@ -198,7 +198,7 @@ def _averaged(samples: Samples, places: FloatArray) -> FloatArray:
 
 def _common(curve: Curve, source: MeasuredCurves, wanted: Window | None, branches: set[str]) -> Window:
     """Return where every branch of model and measurement exists, inside the window that is wanted."""
-    from cfmkit.experiment.measured import common_window
+    from cfmkit.experiment.evaluation import common_window
 
     measured, kind = common_window(source.raw), curve.kind
     ends = [(float(part.motion.min()), float(part.motion.max())) for part in map(curve.on, branches)]

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.curves import Curve
     from cfmkit.experiment.comparison import Comparison, Samples
-    from cfmkit.experiment.measured import MeasuredCurves, Measurement
+    from cfmkit.experiment.evaluation import MeasuredCurves, Measurement
     from cfmkit.metrics import Window
 
 LITTLE_MORE = 2.0

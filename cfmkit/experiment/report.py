@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.curves import Column
-from cfmkit.experiment.measured import MeasuredCurves, Measurement, numbers_of
+from cfmkit.experiment.evaluation import MeasuredCurves, Measurement, numbers_of
 from cfmkit.metrics import metrics_json, split_name
 from cfmkit.tables import Table, TableColumn, border_column, curve_table, to_csv
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from cfmkit.experiment.calibration import table
 from cfmkit.experiment.report import curves_table
-from cfmkit.metrics.subjects import span_text
+from cfmkit.metrics.branch_views import span_text
 from cfmkit.specs.units import format_short
 from cfmkit.tables import Table, TableColumn, border_column, to_csv
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from cfmkit.experiment.calibration import Calibration
     from cfmkit.experiment.comparison import Comparison
-    from cfmkit.experiment.measured import MeasuredCurves
+    from cfmkit.experiment.evaluation import MeasuredCurves
     from cfmkit.results import Quantity
 
 

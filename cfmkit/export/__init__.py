@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from cfmkit.export.arc_outlines import outlines
 from cfmkit.export.dxf import dxf_bytes, write_dxf
 from cfmkit.export.geometry import TOLERANCE
 from cfmkit.export.kerf import with_kerf
 from cfmkit.export.layers import check_name
-from cfmkit.export.outlines import outlines
 from cfmkit.export.points import write_points
 from cfmkit.export.svg import svg_bytes, write_svg
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.errors import GeometryError
-from cfmkit.export.outlines import check_outlines, flat_points, place
+from cfmkit.export.arc_outlines import check_outlines, flat_points, place
 from cfmkit.numerics.arc_chain import ArcChain
 from cfmkit.numerics.parallel_curve import parallel
 from cfmkit.specs.units import format_short
@@ -22,7 +22,7 @@ from cfmkit.specs.units import format_short
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from cfmkit.export.outlines import Outline
+    from cfmkit.export.arc_outlines import Outline
 
 _ARC_ERROR = 1e-6  # of the distance between contour and cut where arcs stay arcs [m]: that of the flattening
 _POLYLINE_ERROR = 4e-6  # of the same where the cut becomes a polyline [m]
@@ -35,7 +35,7 @@ def with_kerf(outlines: Sequence[Outline], kerf: float) -> tuple[Outline, ...]:
     Parameters
     ----------
     outlines : sequence of Outline
-        A drawing as `cfmkit.export.outlines.outlines` gives it.
+        A drawing as `cfmkit.export.arc_outlines.outlines` gives it.
     kerf : float
         Width of the cut [m].
 

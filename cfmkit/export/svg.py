@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.export.arc_outlines import Outline, flat_points, outlines
 from cfmkit.export.geometry import TOLERANCE
 from cfmkit.export.layers import LayerLook, check_name, looks
-from cfmkit.export.outlines import Outline, flat_points, outlines
 from cfmkit.specs.units import to_border
 
 if TYPE_CHECKING:

@@ -1,10 +1,11 @@
 """Constant-force metrics by name, over a stated window, per branch; and requirements on them.
 
 `table` lists what there is, `known` what a name may mean, `flatness` and `ranges` compute it, `traces` cuts
-windows, `subjects` is what a metric looks at, `evaluation` runs the table over a
+windows, `branch_views` is what a metric looks at, `evaluation` runs the table over a
 curve, `requirements` compares with bounds, `report` writes border units.
 """
 
+from cfmkit.metrics.branch_views import Branch, Cycle, Frame
 from cfmkit.metrics.evaluation import (
     Survey,
     evaluate,
@@ -19,7 +20,6 @@ from cfmkit.metrics.evaluation import (
 )
 from cfmkit.metrics.report import as_json, metrics_json, search_json
 from cfmkit.metrics.requirements import Outcome, check, requirement_problems, validate_requirements
-from cfmkit.metrics.subjects import Branch, Cycle, Frame
 from cfmkit.metrics.table import (
     TABLE,
     Definition,

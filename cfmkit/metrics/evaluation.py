@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from cfmkit.errors import UsageError
-from cfmkit.metrics.subjects import Cycle, Frame, cycle, span_text
+from cfmkit.metrics.branch_views import Cycle, Frame, cycle, span_text
 from cfmkit.metrics.table import Definition, definitions, metrics_by_name, split_name, unknown_metric
 from cfmkit.metrics.traces import Undefined, Window, covers, traces
 from cfmkit.results import WINDOW_OUTSIDE, Finding, Quantity, Status

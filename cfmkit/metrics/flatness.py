@@ -17,7 +17,7 @@ from cfmkit.metrics.traces import BranchTrace, Undefined, Window
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.metrics.subjects import Branch, Cycle
+    from cfmkit.metrics.branch_views import Branch, Cycle
 
 
 def mean(branch: Branch) -> float:

@@ -19,7 +19,7 @@ from cfmkit.metrics.traces import ROUNDING, Undefined
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.metrics.subjects import Branch, Cycle, Interval
+    from cfmkit.metrics.branch_views import Branch, Cycle, Interval
 
 
 def range_95(branch: Branch) -> float:

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.errors import Problem, QuantityError, SpecError
+from cfmkit.metrics.branch_views import span_text
 from cfmkit.metrics.evaluation import Survey, Surveys, Value, kind_of, survey_of, window_of
 from cfmkit.metrics.report import finite_border
-from cfmkit.metrics.subjects import span_text
 from cfmkit.metrics.table import Definition, branch_fault, known_metrics, split_name, unknown_metric
 from cfmkit.specs.units import DIMENSIONS, SHARE, border_unit, format_short, read_one_of, to_border
 

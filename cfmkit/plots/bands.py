@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from cfmkit.metrics import Undefined, Window, check, frame_of, split_name
-from cfmkit.metrics.subjects import Branch, cycle
+from cfmkit.metrics.branch_views import Branch, cycle
 from cfmkit.plots.diagram import Limit
 from cfmkit.plots.text import value_text
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from cfmkit.metrics import Outcome
-    from cfmkit.metrics.subjects import Spread
+    from cfmkit.metrics.branch_views import Spread
     from cfmkit.results import Result
 
 Bounds = tuple[float | None, float | None]

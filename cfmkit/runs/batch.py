@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 from cfmkit.errors import CfmError, ExitCode, SpecError, UsageError, code_of, lines_of, visible
 from cfmkit.results import Status
-from cfmkit.runs.report import worst
 from cfmkit.runs.run import Outcome, Request, Verb, analysed, designed, journal_of, long_run, spec_of
 from cfmkit.runs.run import carry_out as carried_out
+from cfmkit.runs.run_findings import worst
 from cfmkit.studies.batch import LEFT, Entry
 
 if TYPE_CHECKING:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from matplotlib.figure import Figure
 
-    from cfmkit.runs.report import Report
+    from cfmkit.runs.run_findings import Report
     from cfmkit.specs.spec import Spec
 
 

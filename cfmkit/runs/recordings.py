@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
     from cfmkit.api import AnySpec
     from cfmkit.experiment.calibration import Calibration
-    from cfmkit.experiment.measured import MeasuredCurves
+    from cfmkit.experiment.evaluation import MeasuredCurves
     from cfmkit.experiment.reading import Recording
     from cfmkit.experiment.report import MeasureReport
     from cfmkit.numerics.least_squares import Loss
@@ -70,8 +70,8 @@ def measure(
     50.46
     """
     from cfmkit.experiment.corrections import corrected
-    from cfmkit.experiment.filtering import read_filter
-    from cfmkit.experiment.measured import LEFT_OUT, measured, require_loop
+    from cfmkit.experiment.evaluation import LEFT_OUT, measured, require_loop
+    from cfmkit.experiment.low_pass import read_filter
     from cfmkit.experiment.options import read_target, read_window
     from cfmkit.experiment.reading import Recording, read_recording
     from cfmkit.experiment.report import report_on
@@ -151,7 +151,7 @@ def calibrate(
     """
     from cfmkit.experiment.calibration import calibrate as fitted
     from cfmkit.experiment.corrections import corrected
-    from cfmkit.experiment.measured import LEFT_OUT, MeasuredCurves, measured, read_measured
+    from cfmkit.experiment.evaluation import LEFT_OUT, MeasuredCurves, measured, read_measured
     from cfmkit.experiment.parameters import parameters, read_bounds
     from cfmkit.experiment.reading import Recording
     from cfmkit.metrics import Window

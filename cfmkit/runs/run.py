@@ -13,7 +13,7 @@ from cfmkit import api
 from cfmkit.errors import SpecError, UsageError
 from cfmkit.families.base import Run
 from cfmkit.results import Status
-from cfmkit.runs import report
+from cfmkit.runs import run_findings
 from cfmkit.runs.files import files
 from cfmkit.runs.specfile import bind, placed, read_spec, renamed
 from cfmkit.store import RunFolder, stable_hash
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
     from contextlib import AbstractContextManager
 
-    from cfmkit.runs.report import Report
+    from cfmkit.runs.run_findings import Report
     from cfmkit.specs.spec import Spec
     from cfmkit.specs.yamlio import Document
     from cfmkit.store import Manifest
@@ -216,15 +216,15 @@ def _ending(found: Report) -> dict[str, Any]:
 
 def analysed(spec: Spec, run: Run) -> Report:
     """Return the report on a mechanism as it is."""
-    return report.report_on(api.analyze(spec, run))
+    return run_findings.report_on(api.analyze(spec, run))
 
 
 def designed(spec: Spec, run: Run) -> Report:
     """Return the report on the designed mechanism, or on why there is none."""
     design = api.design(spec, run)
-    result = api.analyze(design.spec, run) if design.spec is not None else report.undesigned(spec, design)
+    result = api.analyze(design.spec, run) if design.spec is not None else run_findings.undesigned(spec, design)
     tables = {f"{stem}.csv": partial(_csv, table) for stem, table in design.tables.items()}
-    return report.report_on(result, design).beside({}, report.Supplement(files=tables, lines=design.notes))
+    return run_findings.report_on(result, design).beside({}, run_findings.Supplement(files=tables, lines=design.notes))
 
 
 def _csv(table: Callable[[], Table]) -> bytes:

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     from cfmkit.plots.moving import Moving
     from cfmkit.results import Quantity, Result
-    from cfmkit.runs.report import Report
+    from cfmkit.runs.run_findings import Report
 
 NAME = "report.html"
 

@@ -16,8 +16,8 @@ import numpy as np
 from cfmkit.errors import CfmError, Problem, SpecError, UsageError
 from cfmkit.families import family
 from cfmkit.metrics import Undefined, Window, window_of, windows_judged
+from cfmkit.metrics.branch_views import span_text
 from cfmkit.metrics.differences import Difference, counterpart, effort_at, largest, mean, overlap, rms, summarize
-from cfmkit.metrics.subjects import span_text
 from cfmkit.results import Finding, Status
 
 if TYPE_CHECKING:

@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING, Any
 
 from cfmkit.errors import CfmError, UsageError
 from cfmkit.results import Status
-from cfmkit.studies import worker
+from cfmkit.studies import worker_process
 from cfmkit.studies.executors import ONE_THREAD, Lost, never
 
 if TYPE_CHECKING:
@@ -163,16 +163,16 @@ class _Crew:
 
     def _heard(self, one: _Worker, message: bytes) -> Iterator[tuple[Any, Any]]:
         kind, rest = message[:1], message[1:]
-        if kind == worker.READY:
+        if kind == worker_process.READY:
             one.ready = True
-        elif kind == worker.STARTED:
+        elif kind == worker_process.STARTED:
             one.started, self.stillborn = time.monotonic(), 0
         else:
             took = time.monotonic() - (one.started or 0.0)
             self.pace = took if self.pace is None else 0.9 * self.pace + 0.1 * took
             one.started = None
             job, outcome = one.given.popleft(), pickle.loads(rest)
-            if kind == worker.BROKEN:
+            if kind == worker_process.BROKEN:
                 outcome = Lost(Status.CRASHED, f"a bug in cfmkit: {outcome[0]}", outcome[1])
             yield job, outcome
 
@@ -234,7 +234,7 @@ def _started(what: BinaryIO) -> _Worker:
     given = json.dumps({"path": sys.path, "pipes": theirs, "parent": parent})
     try:
         process = subprocess.Popen(
-            [sys.executable, "-P", "-c", worker.START, given],
+            [sys.executable, "-P", "-c", worker_process.START, given],
             stdin=subprocess.DEVNULL,
             pass_fds=theirs,
             env=os.environ | ONE_THREAD,

@@ -79,7 +79,7 @@ def wish(option: str) -> Wish:
         If its list holds what no specification may.
     """
     from cfmkit.specs.units.numbers import shown
-    from cfmkit.specs.yamlio.reader import read
+    from cfmkit.specs.yamlio.tree_builder import read
 
     path, equals, content = (part.strip() for part in option.partition("="))
     if not equals or not content:

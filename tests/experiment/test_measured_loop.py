@@ -8,8 +8,8 @@ from experiment_support import reference_case
 from scipy.signal import sosfreqz
 
 from cfmkit.experiment.branches import split
-from cfmkit.experiment.filtering import LowPass, low_passed
-from cfmkit.experiment.measured import Measurement, measured, numbers_of
+from cfmkit.experiment.evaluation import Measurement, measured, numbers_of
+from cfmkit.experiment.low_pass import LowPass, low_passed
 from cfmkit.metrics import Window
 
 WINDOW = Window(0.040, 0.210)

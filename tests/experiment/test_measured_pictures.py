@@ -7,7 +7,7 @@ import pytest
 from experiment_support import triangle
 
 from cfmkit.experiment.draw import figures
-from cfmkit.experiment.measured import measured
+from cfmkit.experiment.evaluation import measured
 from cfmkit.experiment.reading import Recording
 from cfmkit.experiment.report import report_on
 from cfmkit.metrics import Window

@@ -10,7 +10,7 @@ import pytest
 
 import cfmkit
 from cfmkit.experiment.calibration import calibrate, resolved
-from cfmkit.experiment.measured import measured
+from cfmkit.experiment.evaluation import measured
 from cfmkit.experiment.parameters import parameters
 from cfmkit.experiment.reading import read_recording
 

@@ -13,7 +13,7 @@ import cfmkit
 from cfmkit import families
 from cfmkit.errors import ExitCode
 from cfmkit.results import Design, Finding, Result, Status
-from cfmkit.runs import report, specfile
+from cfmkit.runs import run_findings, specfile
 from cfmkit.runs.files import files
 from cfmkit.specs import keys
 from cfmkit.specs.yamlio import read_document
@@ -116,12 +116,12 @@ def test_progress_and_seed_reach_the_family(monkeypatch, spec):
     ],
 )
 def test_of_several_exit_codes_the_gravest_counts(codes, first):
-    assert report.worst(codes) is first
-    assert report.worst(codes[::-1]) is first
+    assert run_findings.worst(codes) is first
+    assert run_findings.worst(codes[::-1]) is first
 
 
 def test_a_report_without_a_curve_has_no_metrics_and_misses_its_requirements(spec):
-    found = report.report_on(Result(spec, Status.INFEASIBLE, "too much"))
+    found = run_findings.report_on(Result(spec, Status.INFEASIBLE, "too much"))
     assert found.metrics == {}
     assert len(found.missed) == len(spec.requirements)
     assert found.exit_code is ExitCode.NO_SOLUTION
@@ -132,14 +132,14 @@ def test_a_report_without_a_curve_has_no_metrics_and_misses_its_requirements(spe
 def test_warnings_of_design_and_analysis_are_told_once(spec):
     one, other = Finding("a", "first"), Finding("b", "second")
     result = Result(spec, Status.COMPLETE, warnings=(other, one))
-    found = report.Report(result, {}, (), Design(spec, Status.COMPLETE, warnings=(one,)))
+    found = run_findings.Report(result, {}, (), Design(spec, Status.COMPLETE, warnings=(one,)))
     assert found.warnings == (one, other)
     assert found.as_json()["warnings"] == [{"name": "a", "message": "first"}, {"name": "b", "message": "second"}]
 
 
 def test_not_a_number_never_reaches_a_file():
     with pytest.raises(ValueError, match="Out of range float values"):
-        report.json_bytes({"value": np.nan})
+        run_findings.json_bytes({"value": np.nan})
 
 
 def test_the_schema_of_several_families_keeps_their_blocks_apart():

@@ -136,7 +136,7 @@ def test_the_command_line_starts_without_numpy_and_pydantic():
     light = [path for path in (ROOT / "cli").rglob("*.py") if path.parent.name == "verbs"]
     light += [
         ROOT / "cli" / f"{name}.py"
-        for name in ("main", "commands", "options", "measuring", "answer", "failures", "page", "terminal")
+        for name in ("main", "commands", "options", "measuring", "answer", "failures", "page_blocks", "terminal")
     ]
     heavy = (
         "numpy",

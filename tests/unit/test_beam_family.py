@@ -12,7 +12,7 @@ import cfmkit
 from cfmkit.elastica import Section, Taper
 from cfmkit.errors import DataError, SpecError
 from cfmkit.families.beam.build import thickest_of, thinnest_of
-from cfmkit.families.beam.surface import DEFINITIONS as SURFACE
+from cfmkit.families.beam.surface_following import DEFINITIONS as SURFACE
 from cfmkit.results import Status
 
 GUIDED = ("tip: {at: [400 mm, 0 mm]}", "tip: {at: [400 mm, 0 mm], support: parallel}")

@@ -9,10 +9,10 @@ from cfmkit.families.cam.block import VARIED, analyze_block
 from cfmkit.families.cam.block_measures import CYCLES, KNOWN, WINDOWED
 from cfmkit.results import Status
 from cfmkit.studies.blocks import evaluate_block, vectorised
-from cfmkit.studies.columns import metrics_of
 from cfmkit.studies.engine import Work, run
 from cfmkit.studies.executors import Lost
 from cfmkit.studies.journal import Journal
+from cfmkit.studies.noted_metrics import metrics_of
 from cfmkit.studies.plan import Draw, sampled
 from cfmkit.studies.rows import joined
 from cfmkit.studies.study import Study

@@ -16,7 +16,7 @@ from cfmkit.families.cam.geometry.cut import WholeCamUndercut, cut
 from cfmkit.families.cam.geometry.path import reach
 from cfmkit.families.cam.geometry.profile import SlopeLaw, brace_tangent
 from cfmkit.families.cam.geometry.track import Track
-from cfmkit.families.cam.geometry.track_states import NoTrack
+from cfmkit.families.cam.geometry.track_records import NoTrack
 from cfmkit.families.refusals import CannotBuild
 
 SLOW = settings(deadline=None, max_examples=25)

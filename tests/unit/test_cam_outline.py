@@ -8,8 +8,8 @@ from cam_support import cam, fixed
 
 import cfmkit
 from cfmkit.errors import SpecError
+from cfmkit.export.arc_outlines import outlines
 from cfmkit.export.geometry import Smooth
-from cfmkit.export.outlines import outlines
 from cfmkit.families import family
 from cfmkit.families.refusals import CannotBuild
 

@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from cfmkit.cli.page import (
+from cfmkit.cli.page_blocks import (
     BLANK,
     Grid,
     GridColumn,

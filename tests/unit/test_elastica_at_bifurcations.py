@@ -23,7 +23,7 @@ from cfmkit.elastica import (
 )
 from cfmkit.elastica.equilibrium.expanded import UncondensedSolver
 from cfmkit.elastica.equilibrium.mesh import Mesh
-from cfmkit.elastica.equilibrium.solver import MarchOptions, Solver
+from cfmkit.elastica.equilibrium.meshed_network import MarchOptions, Solver
 from cfmkit.elastica.model.layout import Layout
 from cfmkit.errors import InputError
 

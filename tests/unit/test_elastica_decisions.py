@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from cfmkit.elastica import CLAMPED, Beam, Control, Displacement, Event, Network, Node, PathStatus, Section, guided
-from cfmkit.elastica.continuation import at_bifurcation, bifurcation, branch_end, ending, limit_point, loop
+from cfmkit.elastica.continuation import at_bifurcation, bifurcation, branch_end, ending, joined_marches, limit_point
 from cfmkit.elastica.continuation.decisions import decided
 from cfmkit.elastica.continuation.state import BranchEnd, Leg, Problem, Resume, Stop, Stretch, Trail
 from cfmkit.elastica.equilibrium.mesh import Mesh
-from cfmkit.elastica.equilibrium.solver import Spot
+from cfmkit.elastica.equilibrium.meshed_network import Spot
 from cfmkit.elastica.kernels.codes import DONE, FULL, INERTIA, LONG, OUTSIDE, STALLED
 from cfmkit.elastica.model.layout import Layout
 
@@ -108,7 +108,7 @@ def test_a_branch_is_followed_to_just_before_its_end_and_counts_its_points_as_th
     of = problem()
     end = BranchEnd(0.025, spot(of, 0.025).y, spot(of, 0.026), 1, 0, "primary")
     path = replace(trail(of, (0.01, 0, 0)), branch="bifurcated", ends=(end,), closed=False)
-    values, numbers, toward = loop.ahead(of, path, spot(of, 0.01), 1)
+    values, numbers, toward = joined_marches.ahead(of, path, spot(of, 0.01), 1)
     assert numbers is not None
     assert numbers.tolist() == [1, -1, -1]
     assert values[0] == of.values[1]

@@ -38,7 +38,7 @@ from cfmkit.elastica import (
     trace,
 )
 from cfmkit.elastica.equilibrium.mesh import Mesh
-from cfmkit.elastica.equilibrium.solver import Solver
+from cfmkit.elastica.equilibrium.meshed_network import Solver
 from cfmkit.elastica.model.layout import Layout
 from cfmkit.errors import InputError
 

@@ -14,7 +14,7 @@ import pytest
 from beam_networks import drives, network
 
 from cfmkit.elastica.equilibrium.mesh import LOADS, PRESTRESS, Mesh
-from cfmkit.elastica.equilibrium.solver import Solver
+from cfmkit.elastica.equilibrium.meshed_network import Solver
 from cfmkit.elastica.kernels import entry
 from cfmkit.elastica.model.layout import Layout
 

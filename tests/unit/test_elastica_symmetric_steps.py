@@ -35,7 +35,7 @@ from cfmkit.elastica import (
 )
 from cfmkit.elastica.equilibrium.expanded import ExpandedSolver
 from cfmkit.elastica.equilibrium.mesh import Mesh
-from cfmkit.elastica.equilibrium.solver import Solver
+from cfmkit.elastica.equilibrium.meshed_network import Solver
 from cfmkit.elastica.kernels import entry
 from cfmkit.elastica.kernels.splitting import DRIFTS, KICKS, NODES
 from cfmkit.elastica.model.layout import Layout

@@ -148,7 +148,7 @@ BAD = {
 
 @pytest.mark.parametrize(("data", "complaint"), BAD.values(), ids=BAD)
 def test_bad_data_is_refused_in_one_clear_line(tmp_path, data, complaint):
-    from cfmkit.experiment.measured import measured
+    from cfmkit.experiment.evaluation import measured
 
     with pytest.raises(DataError) as caught:
         measured(read(tmp_path, data))

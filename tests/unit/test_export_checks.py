@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from cfmkit.errors import GeometryError, InputError
+from cfmkit.export.arc_outlines import outlines
 from cfmkit.export.geometry import Arc, Contour, Drawing, Line, Smooth, circle, polygon
-from cfmkit.export.outlines import outlines
 
 SQUARE = polygon([(0, 0), (0.1, 0), (0.1, 0.1), (0, 0.1)], "cut")
 

@@ -8,8 +8,8 @@ import pytest
 
 from cfmkit.errors import GeometryError
 from cfmkit.export import files, write_points, write_svg
+from cfmkit.export.arc_outlines import outlines
 from cfmkit.export.geometry import Arc, Contour, Curve2D, Drawing, Line, Smooth, circle, polygon
-from cfmkit.export.outlines import outlines
 
 SVG = "{http://www.w3.org/2000/svg}"
 

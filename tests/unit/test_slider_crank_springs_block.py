@@ -14,7 +14,7 @@ from cfmkit.plots.findings import DrawnScale, StudyMarks
 from cfmkit.plots.study import draw_map, draw_metric
 from cfmkit.plots.style import png
 from cfmkit.studies.blocks import evaluate_block, measures
-from cfmkit.studies.columns import metrics_of
+from cfmkit.studies.noted_metrics import metrics_of
 from cfmkit.studies.plan import grid, zipped
 from cfmkit.studies.study import Study
 from cfmkit.studies.variation import axes, wishes

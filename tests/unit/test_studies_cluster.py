@@ -13,8 +13,8 @@ import pytest
 import cfmkit
 from cfmkit.errors import UsageError
 from cfmkit.studies.cluster import Cluster
-from cfmkit.studies.columns import metrics_of
 from cfmkit.studies.engine import Work, run
+from cfmkit.studies.noted_metrics import metrics_of
 from cfmkit.studies.plan import grid
 from cfmkit.studies.pool import Pool
 from cfmkit.studies.study import Study

@@ -26,8 +26,8 @@ from cfmkit.families.vcfm.values import forces, spread
 from cfmkit.families.vcfm.windows import longest_window
 from cfmkit.metrics import Window, evaluate
 from cfmkit.results import Status
-from cfmkit.studies.columns import metrics_of
 from cfmkit.studies.engine import Work, run
+from cfmkit.studies.noted_metrics import metrics_of
 from cfmkit.studies.plan import Draw, sampled
 from cfmkit.studies.study import Study
 from cfmkit.studies.variation import axes, wishes

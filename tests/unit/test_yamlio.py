@@ -183,11 +183,11 @@ def test_a_problem_can_be_put_at_any_path() -> None:
 
 
 def test_the_two_parsers_see_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
-    from cfmkit.specs.yamlio import reader
+    from cfmkit.specs.yamlio import tree_builder
 
-    fast = reader.read(GOOD)
-    monkeypatch.setattr(reader, "_LOADERS", reader._LOADERS[-1:])
-    assert reader.read(GOOD) == fast
+    fast = tree_builder.read(GOOD)
+    monkeypatch.setattr(tree_builder, "_LOADERS", tree_builder._LOADERS[-1:])
+    assert tree_builder.read(GOOD) == fast
 
 
 # Families

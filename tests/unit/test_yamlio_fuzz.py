@@ -12,7 +12,7 @@ from pydantic import Field
 from cfmkit.errors import SpecError, UsageError
 from cfmkit.specs.spec import Analysis, Model, Spec
 from cfmkit.specs.units import Angle, Force, Length, Ratio, Stiffness
-from cfmkit.specs.yamlio import dump, read_document, reader
+from cfmkit.specs.yamlio import dump, read_document, tree_builder
 
 GOOD = (Path(__file__).parent / "bad_specs" / "good.yaml").read_text()
 LINES = GOOD.splitlines(keepends=True)
@@ -148,12 +148,12 @@ def test_any_option_is_read_or_refused(option: str) -> None:
 @settings(max_examples=200, deadline=None)
 @given(mutated())
 def test_the_fast_parser_and_the_one_in_python_never_read_one_text_differently(text: str) -> None:
-    fast = reader.read(text)
-    both, reader._LOADERS[:] = list(reader._LOADERS), reader._LOADERS[-1:]
+    fast = tree_builder.read(text)
+    both, tree_builder._LOADERS[:] = list(tree_builder._LOADERS), tree_builder._LOADERS[-1:]
     try:
-        slow = reader.read(text)
+        slow = tree_builder.read(text)
     finally:
-        reader._LOADERS[:] = both
+        tree_builder._LOADERS[:] = both
     if not fast.faults and not slow.faults:
         assert (fast.tree, fast.keys) == (slow.tree, slow.keys)
 

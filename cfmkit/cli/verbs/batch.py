@@ -21,13 +21,13 @@ from cfmkit.cli.options import (
     flag,
     option,
 )
-from cfmkit.cli.page import BAD, BLANK, FAINT, GOOD, LABEL, Grid, Paragraph, Span, TextLine, Written, columns
+from cfmkit.cli.page_blocks import BAD, BLANK, FAINT, GOOD, LABEL, Grid, Paragraph, Span, TextLine, Written, columns
 from cfmkit.errors import ExitCode, visible
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from cfmkit.cli.page import Block
+    from cfmkit.cli.page_blocks import Block
     from cfmkit.cli.terminal import Terminal
     from cfmkit.runs.batch import BatchResult
     from cfmkit.studies.batch import Entry

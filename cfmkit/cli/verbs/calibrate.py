@@ -14,9 +14,9 @@ if TYPE_CHECKING:
     from cfmkit.cli.answer import Answer
     from cfmkit.cli.terminal import Terminal
     from cfmkit.experiment.calibration import Calibration
-    from cfmkit.experiment.measured import MeasuredCurves
+    from cfmkit.experiment.evaluation import MeasuredCurves
     from cfmkit.families.base import Run
-    from cfmkit.runs.report import Report
+    from cfmkit.runs.run_findings import Report
     from cfmkit.specs.spec import Spec
 
 PLACE = 34
@@ -49,7 +49,7 @@ class CalibrateOptions(Computing, Measuring):
 
 def run(options: CalibrateOptions, terminal: Terminal) -> Answer:
     """Fit values of a spec to a measured curve: values, intervals, correlation, and what the data cannot determine."""
-    from cfmkit.cli.runs import execute
+    from cfmkit.cli.run_answer import execute
     from cfmkit.errors import UsageError
     from cfmkit.numerics.least_squares import LOSSES
     from cfmkit.runs.run import Verb
@@ -78,7 +78,7 @@ def report(calibration: Calibration, source: MeasuredCurves) -> Report:
 
     from cfmkit import api
     from cfmkit.experiment import supplements as add
-    from cfmkit.runs.report import Supplement, report_on
+    from cfmkit.runs.run_findings import Supplement, report_on
     from cfmkit.tables import to_csv
 
     found, after, name = report_on(calibration.result), calibration.after, calibration.spec.name

@@ -10,13 +10,13 @@ from cfmkit.cli import completion
 from cfmkit.cli.answer import Answer
 from cfmkit.cli.failures import answer_to
 from cfmkit.cli.options import Changing, Quiet, argument
-from cfmkit.cli.page import BAD, GOOD, Span, whole_line, within
+from cfmkit.cli.page_blocks import BAD, GOOD, Span, whole_line, within
 from cfmkit.errors import CfmError, ExitCode, visible
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from cfmkit.cli.page import TextLine
+    from cfmkit.cli.page_blocks import TextLine
     from cfmkit.cli.terminal import Terminal
     from cfmkit.specs.spec import Spec
 

@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cfmkit.cli.answer import Answer
 from cfmkit.cli.options import Common, Quiet, argument, flag
-from cfmkit.cli.page import Verbatim, whole_line
+from cfmkit.cli.page_blocks import Verbatim, whole_line
 from cfmkit.errors import ExitCode, FolderInUse, UsageError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from cfmkit.cli.page import TextLine
+    from cfmkit.cli.page_blocks import TextLine
     from cfmkit.cli.terminal import Terminal
-    from cfmkit.studies.cleaning import Remains
+    from cfmkit.runs.remains import Remains
 
 PLACE = 80
 
@@ -35,7 +35,7 @@ def run(options: CleanOptions, terminal: Terminal) -> Answer:
 
     Only what a manifest or a journal proves to be theirs goes: files that were edited, and all others, stay.
     """
-    from cfmkit.studies.cleaning import remains_below
+    from cfmkit.runs.remains import remains_below
 
     _refuse_what_is_no_folder(options.folder)
     found = list(remains_below(options.folder))
@@ -83,7 +83,7 @@ def _agreed(found: Sequence[Remains], terminal: Terminal) -> bool:
 
 def _removed(found: Sequence[Remains], top: str) -> tuple[list[Remains], list[FolderInUse]]:
     """Remove what was found, innermost folders first; return what has gone, and where live runs are at work."""
-    from cfmkit.studies.cleaning import remove
+    from cfmkit.runs.remains import remove
 
     gone, busy = [], []
     for one in sorted(found, key=lambda one: len(one.folder.parts), reverse=True):
@@ -107,8 +107,8 @@ def _message(found: Sequence[Remains], removed: Sequence[Remains]) -> str:
 
 
 def _lines(found: Sequence[Remains], everything: bool) -> Iterator[TextLine]:
+    from cfmkit.runs.remains import EDITED
     from cfmkit.store.disk import shown
-    from cfmkit.studies.cleaning import EDITED
 
     for one in found:
         yield whole_line(f"{shown(one.folder)}/  {_count([one])}")

@@ -30,7 +30,7 @@ class DesignOptions(Computing):
 
 def run(options: DesignOptions, terminal: Terminal) -> Answer:
     """Design a mechanism for the targets of its spec, analyse it, and draw the parts to cut or print."""
-    from cfmkit.cli.runs import execute
+    from cfmkit.cli.run_answer import execute
     from cfmkit.runs.run import Verb, designed
     from cfmkit.studies.executors import cores
 

@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING, Any
 from cfmkit._version import __version__
 from cfmkit.cli.answer import Answer
 from cfmkit.cli.options import Common
-from cfmkit.cli.page import LABEL, Field, Span, TextLine, Verbatim, field, listed
+from cfmkit.cli.page_blocks import LABEL, Field, Span, TextLine, Verbatim, field, listed
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
-    from cfmkit.cli.page import Block
+    from cfmkit.cli.page_blocks import Block
     from cfmkit.cli.terminal import Terminal
 
     Record = dict[str, Any]

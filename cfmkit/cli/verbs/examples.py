@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cfmkit.cli.answer import Answer
 from cfmkit.cli.options import Common, Jobs, argument, option
-from cfmkit.cli.page import BAD, GOOD, Paragraph, command_line, field, listed
+from cfmkit.cli.page_blocks import BAD, GOOD, Paragraph, command_line, field, listed
 from cfmkit.errors import UsageError, visible
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cfmkit.cli.answer import Answer
 from cfmkit.cli.options import OneSpec, Quiet, option
-from cfmkit.cli.page import Paragraph, Written
+from cfmkit.cli.page_blocks import Paragraph, Written
 
 if TYPE_CHECKING:
     from cfmkit.cli.terminal import Terminal
@@ -33,7 +33,7 @@ class ExportOptions(OneSpec):
 def run(options: ExportOptions, terminal: Terminal) -> Answer:
     """Write the parts of a spec as drawings to cut or print: DXF, SVG, CSV."""
     from cfmkit import api
-    from cfmkit.cli.runs import folder_of
+    from cfmkit.cli.run_answer import folder_of
     from cfmkit.runs.run import provenance
     from cfmkit.runs.specfile import bind, read_spec
     from cfmkit.store import RunFolder

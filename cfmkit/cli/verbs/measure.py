@@ -10,12 +10,12 @@ from cfmkit.cli import completion
 from cfmkit.cli.answer import Answer
 from cfmkit.cli.measuring import Measuring, data_record
 from cfmkit.cli.options import NoPlots, Quiet, argument, flag, option
-from cfmkit.cli.page import BAD, BLANK, LABEL, Grid, GridColumn, Paragraph, Span, TextLine, Written
+from cfmkit.cli.page_blocks import BAD, BLANK, LABEL, Grid, GridColumn, Paragraph, Span, TextLine, Written
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from cfmkit.cli.page import Block
+    from cfmkit.cli.page_blocks import Block
     from cfmkit.cli.terminal import Terminal
     from cfmkit.experiment.report import MeasureReport
 
@@ -123,7 +123,7 @@ def _page(report: MeasureReport, written: Written, everything: bool) -> Iterator
 
 def _numbers(report: MeasureReport) -> Grid:
     """Return the table of what matters most: per branch, raw and filtered."""
-    from cfmkit.cli.rows import words
+    from cfmkit.cli.run_numbers import words
 
     heads = ("", "raw", "filtered" if report.source.filtered else "")
     rows = []

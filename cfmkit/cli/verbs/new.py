@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 from cfmkit.cli import completion
 from cfmkit.cli.answer import Answer
 from cfmkit.cli.options import Common, argument, option
-from cfmkit.cli.page import GOOD, Paragraph, Verbatim, command_line
+from cfmkit.cli.page_blocks import GOOD, Paragraph, Verbatim, command_line
 from cfmkit.errors import UsageError, visible
 
 if TYPE_CHECKING:

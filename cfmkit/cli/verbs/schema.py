@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cfmkit.cli import completion
 from cfmkit.cli.answer import Answer, told_of
 from cfmkit.cli.options import Common, argument
-from cfmkit.cli.page import JsonText
+from cfmkit.cli.page_blocks import JsonText
 
 if TYPE_CHECKING:
     from cfmkit.cli.terminal import Terminal

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cfmkit.cli.answer import Answer
 from cfmkit.cli.options import Studying, flag, option
-from cfmkit.cli.page import (
+from cfmkit.cli.page_blocks import (
     BAD,
     BLANK,
     FAINT,
@@ -29,7 +29,7 @@ from cfmkit.errors import ExitCode, UsageError
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
-    from cfmkit.cli.page import Block
+    from cfmkit.cli.page_blocks import Block
     from cfmkit.cli.terminal import Terminal
     from cfmkit.specs.spec import Spec
     from cfmkit.store.disk import Data
@@ -115,7 +115,7 @@ def run(options: SensitivityOptions, terminal: Terminal) -> Answer:
     interruption, run the same command again to continue.
     """
     from cfmkit.cli import studies
-    from cfmkit.cli.runs import folder_of
+    from cfmkit.cli.run_answer import folder_of
     from cfmkit.studies.sensitivity.methods import carry_out
     from cfmkit.studies.sensitivity.output import exit_code
     from cfmkit.studies.sensitivity.setup import prepare

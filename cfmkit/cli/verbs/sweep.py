@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cfmkit.cli.answer import Answer
 from cfmkit.cli.options import Studying, WithReport, flag, option
-from cfmkit.cli.page import (
+from cfmkit.cli.page_blocks import (
     BAD,
     BLANK,
     FAINT,
@@ -28,7 +28,7 @@ from cfmkit.errors import ExitCode, UsageError
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
-    from cfmkit.cli.page import Block
+    from cfmkit.cli.page_blocks import Block
     from cfmkit.cli.terminal import Terminal
     from cfmkit.store.disk import Data
     from cfmkit.studies.engine import Records
@@ -77,7 +77,7 @@ def run(options: SweepOptions, terminal: Terminal) -> Answer:
     Finished points are kept in the folder: after an interruption, run the same command again to continue.
     """
     from cfmkit.cli import studies
-    from cfmkit.cli.runs import folder_of
+    from cfmkit.cli.run_answer import folder_of
     from cfmkit.runs.run import spec_of
     from cfmkit.studies.sweep import prepare, summary_of, writes_curves
 

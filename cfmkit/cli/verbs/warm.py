@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from cfmkit.cli.answer import Answer
 from cfmkit.cli.options import Common, Quiet
-from cfmkit.cli.page import Verbatim
+from cfmkit.cli.page_blocks import Verbatim
 
 if TYPE_CHECKING:
     from cfmkit.cli.terminal import Terminal

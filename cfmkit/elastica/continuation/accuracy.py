@@ -9,7 +9,7 @@ import numpy as np
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.continuation.state import Problem, Trail
-    from cfmkit.elastica.equilibrium.solver import Solver
+    from cfmkit.elastica.equilibrium.meshed_network import Solver
 
 
 def largest_force(trail: Trail) -> FloatArray:

@@ -14,7 +14,7 @@ import numpy as np
 
 from cfmkit.elastica.continuation.singular import locate
 from cfmkit.elastica.continuation.state import fine_spot
-from cfmkit.elastica.equilibrium.solver import Spot
+from cfmkit.elastica.equilibrium.meshed_network import Spot
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray

@@ -18,13 +18,13 @@ from cfmkit.elastica.continuation.branch_end import end_at, predicted_end
 from cfmkit.elastica.continuation.state import Resume, Stop, fine_spot
 from cfmkit.elastica.continuation.switching import first_of_several, switched, well_before
 from cfmkit.elastica.continuation.uncondensed import uncondensed
-from cfmkit.elastica.equilibrium.solver import FORCE_WEIGHT
+from cfmkit.elastica.equilibrium.meshed_network import FORCE_WEIGHT
 from cfmkit.elastica.outcome.path import Event, PathStatus
 
 if TYPE_CHECKING:
     from cfmkit.elastica.continuation.singular import Singular
     from cfmkit.elastica.continuation.state import Move, Problem, Trail
-    from cfmkit.elastica.equilibrium.solver import Spot
+    from cfmkit.elastica.equilibrium.meshed_network import Spot
 
 _CLEAR = 0.01  # share of the drive's range from a bifurcation at which the paths there are told apart
 _SAME_PLACE = 1e-4  # share of the drive's range within which two searches found one bifurcation

@@ -9,7 +9,7 @@ import numpy as np
 
 from cfmkit.elastica.continuation import at_bifurcation
 from cfmkit.elastica.continuation.state import PRIMARY, BranchEnd, Resume, Stop
-from cfmkit.elastica.equilibrium.solver import Points
+from cfmkit.elastica.equilibrium.meshed_network import Points
 from cfmkit.elastica.kernels.codes import DONE, INERTIA
 from cfmkit.elastica.outcome.path import Event, PathStatus
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.continuation.singular import Singular
     from cfmkit.elastica.continuation.state import Move, Problem, Trail
-    from cfmkit.elastica.equilibrium.solver import Spot
+    from cfmkit.elastica.equilibrium.meshed_network import Spot
 
 BEFORE_END = 1e-4  # share of the drive's range by which the end of a branch is passed over
 _LEGS = 60  # changes of stability ahead that are looked through, as many as decisions on a path

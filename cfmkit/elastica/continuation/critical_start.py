@@ -15,7 +15,7 @@ import numpy as np
 from cfmkit.elastica.continuation.singular import Curvature, Singular, entered
 from cfmkit.elastica.continuation.state import PRIMARY, Resume
 from cfmkit.elastica.equilibrium.mesh import LOADS
-from cfmkit.elastica.equilibrium.solver import Spot
+from cfmkit.elastica.equilibrium.meshed_network import Spot
 from cfmkit.elastica.outcome.path import Event
 
 if TYPE_CHECKING:

@@ -22,7 +22,7 @@ from cfmkit.elastica.outcome.path import PathStatus
 
 if TYPE_CHECKING:
     from cfmkit.elastica.continuation.state import Move, Problem, Trail
-    from cfmkit.elastica.equilibrium.solver import Spot
+    from cfmkit.elastica.equilibrium.meshed_network import Spot
 
 _NEARBY = 0.01  # share of the drive's range within which a march stalls at the same place again
 

@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.elastica.continuation.state import Resume, Stretch
-from cfmkit.elastica.equilibrium.solver import FORCE_WEIGHT
+from cfmkit.elastica.equilibrium.meshed_network import FORCE_WEIGHT
 from cfmkit.elastica.kernels.codes import INERTIA
 
 if TYPE_CHECKING:
     from cfmkit.elastica.continuation.state import Move, Problem, Trail
-    from cfmkit.elastica.equilibrium.solver import Spot
+    from cfmkit.elastica.equilibrium.meshed_network import Spot
 
 _WELL = 1e-3  # share of the drive's range before a limit point at which the arc length takes over
 _ROOM = 60  # points in which a limit point is found

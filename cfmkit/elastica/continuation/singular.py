@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.elastica.equilibrium.solver import FORCE_WEIGHT, Spot
+from cfmkit.elastica.equilibrium.meshed_network import FORCE_WEIGHT, Spot
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

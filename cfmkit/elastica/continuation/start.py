@@ -15,7 +15,7 @@ import numpy as np
 
 from cfmkit.elastica.continuation.state import PRIMARY, Problem, Trail
 from cfmkit.elastica.equilibrium.mesh import LOADS, PRESTRESS, assemble_model
-from cfmkit.elastica.equilibrium.solver import MarchOptions, Solver, Spot
+from cfmkit.elastica.equilibrium.meshed_network import MarchOptions, Solver, Spot
 from cfmkit.elastica.kernels.codes import DONE, LONG, SHORT, STALLED
 from cfmkit.elastica.model.layout import Layout
 from cfmkit.elastica.model.network import Network
@@ -31,7 +31,7 @@ _ENOUGH = 16  # segments of a beam with which such a way is found
 _STEP, _TURN = 0.25, 0.35  # first step, as a share of them; largest change of a pose in a step
 
 Follow = Callable[[Problem, str], Trail]
-"""Follows a problem from rest, on a branch: `cfmkit.elastica.continuation.loop.follow`."""
+"""Follows a problem from rest, on a branch: `cfmkit.elastica.continuation.joined_marches.follow`."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -61,7 +61,7 @@ def trace(network: Network, drive: Drive, control: Control | None = None) -> Pat
 
 @dataclass(frozen=True, eq=False)
 class Attempt:
-    """A path on one mesh, with its estimated error; `first`: see `cfmkit.elastica.continuation.loop.Followed`."""
+    """A path on one mesh, with its estimated error; `first`: see `joined_marches.Followed`."""
 
     problem: Problem
     trail: Trail
@@ -100,7 +100,7 @@ def _solved(network: Network, drive: Drive, control: Control, first_only: bool =
     """
     from cfmkit.elastica.continuation import ending  # loads the compiler, as do the next ones
     from cfmkit.elastica.continuation.accuracy import estimate
-    from cfmkit.elastica.continuation.loop import follow
+    from cfmkit.elastica.continuation.joined_marches import follow
     from cfmkit.elastica.continuation.state import Problem
     from cfmkit.elastica.kernels.codes import STALLED
     from cfmkit.elastica.outcome.path import PathStatus

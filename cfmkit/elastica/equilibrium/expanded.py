@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.elastica.equilibrium.mesh import assemble_model
-from cfmkit.elastica.equilibrium.solver import Points, Solver, Spot
+from cfmkit.elastica.equilibrium.meshed_network import Points, Solver, Spot
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.elastica.equilibrium.solver import MarchOptions
+    from cfmkit.elastica.equilibrium.meshed_network import MarchOptions
     from cfmkit.elastica.kernels.model import Model
 
 

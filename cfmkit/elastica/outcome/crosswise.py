@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.arrays import read_only
-from cfmkit.elastica.equilibrium.solver import Solver
+from cfmkit.elastica.equilibrium.meshed_network import Solver
 from cfmkit.elastica.model.drive import Displacement
 from cfmkit.elastica.model.layout import Layout
 from cfmkit.elastica.model.network import Network, Support

@@ -18,7 +18,7 @@ from cfmkit.elastica.outcome.stress import StressExtremes, extremes, signed_extr
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.elastica.equilibrium.solver import Points, Solver
+    from cfmkit.elastica.equilibrium.meshed_network import Points, Solver
     from cfmkit.elastica.model.beam import Fit
     from cfmkit.elastica.model.layout import Layout
 

@@ -16,7 +16,7 @@ from cfmkit.elastica.kernels.splitting import ROWS
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.elastica.equilibrium.solver import Points, Solver
+    from cfmkit.elastica.equilibrium.meshed_network import Points, Solver
     from cfmkit.elastica.model.layout import Layout
 
 _ROWS = 8  # samples of a segment,

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.arrays import read_only
-from cfmkit.elastica.equilibrium.solver import Points, Solver
+from cfmkit.elastica.equilibrium.meshed_network import Points, Solver
 from cfmkit.elastica.model.layout import Layout
 from cfmkit.elastica.outcome.path import Path, PathStatus
 from cfmkit.errors import InputError

@@ -8,7 +8,7 @@ from cfmkit.families.beam.design import design
 from cfmkit.families.beam.findings import FINDINGS
 from cfmkit.families.beam.model import analyze
 from cfmkit.families.beam.spec import BeamSpec
-from cfmkit.families.beam.surface import DEFINITIONS as SURFACE
+from cfmkit.families.beam.surface_following import DEFINITIONS as SURFACE
 from cfmkit.families.beam.values import DEFINITIONS
 
 FAMILY = Family(

@@ -18,7 +18,7 @@ from cfmkit.families.cam.geometry.cut import WholeCamUndercut, cut
 from cfmkit.families.cam.geometry.path import reach
 from cfmkit.families.cam.geometry.profile import SlopeLaw
 from cfmkit.families.cam.geometry.track import Pivot, Track, pivot_angle
-from cfmkit.families.cam.geometry.track_states import NoTrack
+from cfmkit.families.cam.geometry.track_records import NoTrack
 from cfmkit.families.cam.statics import jams
 from cfmkit.numerics import sampled_extremes
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.families.cam.block_forces import Designs
-    from cfmkit.families.cam.geometry.track_states import TrackStates
+    from cfmkit.families.cam.geometry.track_records import TrackStates
 
 PEAK = 129
 """Samples on the corner among which the largest force is looked for."""

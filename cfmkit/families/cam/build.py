@@ -17,7 +17,7 @@ from cfmkit.families.cam.geometry.cut import CamProfile, WholeCamUndercut, cut
 from cfmkit.families.cam.geometry.path import RollerPath, reach
 from cfmkit.families.cam.geometry.profile import SlopeLaw
 from cfmkit.families.cam.geometry.track import Track
-from cfmkit.families.cam.geometry.track_states import NoTrack
+from cfmkit.families.cam.geometry.track_records import NoTrack
 from cfmkit.families.cam.solution import Assembly
 from cfmkit.families.cam.statics import GRAVITY, Loads
 from cfmkit.families.findings import mm

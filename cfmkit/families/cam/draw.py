@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.cam.pose import moment, pivoting, pose, scene, spring_count, start_curve, swallowtail
+from cfmkit.families.cam.picture_parts import moment, pivoting, pose, scene, spring_count, start_curve, swallowtail
 from cfmkit.families.cam.values import theoretical_force
 from cfmkit.plots import parts
 from cfmkit.plots.bands import limits_on
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.cam.pose import Scene
+    from cfmkit.families.cam.picture_parts import Scene
     from cfmkit.families.cam.solution import Built, Solution
     from cfmkit.plots.place import Label
     from cfmkit.results import Result

@@ -33,7 +33,7 @@ from cfmkit.results import Result, Status
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.families.base import Run
-    from cfmkit.families.cam.geometry.track_states import TrackStates
+    from cfmkit.families.cam.geometry.track_records import TrackStates
     from cfmkit.families.cam.spec import CamSpec
     from cfmkit.results import Finding
 

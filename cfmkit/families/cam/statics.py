@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.families.cam.geometry.profile import Real
     from cfmkit.families.cam.geometry.track import Track
-    from cfmkit.families.cam.geometry.track_states import TrackStates, TrackStretch
+    from cfmkit.families.cam.geometry.track_records import TrackStates, TrackStretch
 
 GRAVITY = 9.81
 """Standard acceleration used throughout [m/s^2]."""

@@ -13,8 +13,8 @@ from cfmkit.specs.units.fields import BareFloat, BareInt
 from cfmkit.specs.yamlio.explain import explain, not_among
 from cfmkit.specs.yamlio.options import NoSuchPlace, Option, parse_option, with_value
 from cfmkit.specs.yamlio.paths import Path, dotted, typed
-from cfmkit.specs.yamlio.reader import Reading, read
 from cfmkit.specs.yamlio.source import Fault
+from cfmkit.specs.yamlio.tree_builder import Reading, read
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.families.slider_crank.printed.values import DEFINITIONS as OF_PARTS
-from cfmkit.families.slider_crank.springs.block_bands import edges
+from cfmkit.families.slider_crank.springs.bands_of_designs import edges
 from cfmkit.families.slider_crank.springs.block_metrics import CURVE, PLAIN, of_curve
 from cfmkit.families.slider_crank.springs.model import (
     efforts_inside,
@@ -26,9 +26,9 @@ from cfmkit.families.slider_crank.springs.model import (
 from cfmkit.families.slider_crank.springs.solution import Character, Solution, grid_over
 from cfmkit.families.slider_crank.springs.stiffness import Classified, classify, scale_factors, small_angle_number
 from cfmkit.families.slider_crank.springs.values import DEFINITIONS
+from cfmkit.metrics.branch_views import Frame
 from cfmkit.metrics.closed import extremes, mean
 from cfmkit.metrics.many import UNIFORM_POINTS, ManyBranches, range_95, range_95_fraction, usable_interval
-from cfmkit.metrics.subjects import Frame
 from cfmkit.numerics.turning_points import Monotone, monotone, sharpened
 
 if TYPE_CHECKING:

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.continuation.singular import Singular
     from cfmkit.elastica.continuation.state import BranchEnd, Move, Problem
-    from cfmkit.elastica.equilibrium.solver import Spot
+    from cfmkit.elastica.equilibrium.meshed_network import Spot
 
 _HOPS = 60  # decisions on one path
 _LANDINGS = 6  # tries to land on a requested point before a bifurcation is looked for there

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from cfmkit.metrics import Outcome
     from cfmkit.results import Quantity, Searched
-    from cfmkit.runs.report import Report
+    from cfmkit.runs.run_findings import Report
     from cfmkit.specs.spec import Requirement, Spec
 
 HEADLINE = (

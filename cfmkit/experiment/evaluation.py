@@ -22,12 +22,12 @@ from cfmkit.curves import Column, Curve
 from cfmkit.errors import DataError
 from cfmkit.experiment.branches import LOAD, UNLOAD, WHOLE, Stroke, Strokes, covered, split
 from cfmkit.experiment.corrections import corrected
-from cfmkit.experiment.filtering import DEFAULT_ORDER, LowPass, low_passed
 from cfmkit.experiment.hysteresis import repeatability, turned_loop
+from cfmkit.experiment.low_pass import DEFAULT_ORDER, LowPass, low_passed
 from cfmkit.experiment.reading import read_recording
 from cfmkit.experiment.reversals import settled
 from cfmkit.metrics import Frame, Window, measure
-from cfmkit.metrics.subjects import span_text
+from cfmkit.metrics.branch_views import span_text
 from cfmkit.numerics.robust import spikes
 from cfmkit.results import Finding, Quantity
 from cfmkit.specs.units import format_short

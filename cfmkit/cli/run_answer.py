@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cfmkit.cli.answer import Answer
-from cfmkit.cli.page import (
+from cfmkit.cli.page_blocks import (
     BAD,
     BLANK,
     Grid,
@@ -30,10 +30,10 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from cfmkit.cli.options import Computing, OneSpec
-    from cfmkit.cli.page import Block
+    from cfmkit.cli.page_blocks import Block
     from cfmkit.cli.terminal import Terminal
-    from cfmkit.runs.report import Report
     from cfmkit.runs.run import Outcome, Verb
+    from cfmkit.runs.run_findings import Report
 
 
 def execute(verb: Verb, options: Computing, terminal: Terminal, page: bool = False) -> Answer:
@@ -90,7 +90,7 @@ def _complaints(found: Report) -> list[str]:
 
 def _page(outcome: Outcome, written: Written, everything: bool) -> Iterator[Block]:
     """Yield a header, the numbers that matter, how the run ended, warnings, files."""
-    from cfmkit.cli.rows import rows, searched
+    from cfmkit.cli.run_numbers import rows, searched
 
     found = outcome.report
     done = outcome.verb.done if found.result.status.usable else "tried"

@@ -20,7 +20,7 @@ from typing import Any
 
 START = (
     "import json, sys; given = json.loads(sys.argv[1]); sys.path[:] = given['path']; "
-    "from cfmkit.studies.worker import main; main(given['pipes'], given['parent'])"
+    "from cfmkit.studies.worker_process import main; main(given['pipes'], given['parent'])"
 )
 """The program of a worker; its only argument says where to find modules and which pipes to use."""
 
