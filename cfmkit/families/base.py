@@ -219,6 +219,26 @@ SHARED = {WINDOW_OUTSIDE: "a window is not within the curve: what is measured ov
 
 
 @dataclass(frozen=True)
+class Room:
+    """The box that a mechanism stays in over all of its travel, with everything that is drawn of it.
+
+    Attributes
+    ----------
+    across, along : float
+        In the plane, across and along the direction of travel [m].
+    depth : float or None
+        Out of the plane [m]; None where nothing is known of it.
+    assumed : str
+        What of it no value of the specification says, in one clause; empty if all of it does.
+    """
+
+    across: float
+    along: float
+    depth: float | None = None
+    assumed: str = ""
+
+
+@dataclass(frozen=True)
 class Search:
     """What a family's design may say that no analysis of the specification it writes can: what only the search knows.
 
@@ -273,6 +293,8 @@ class Family:
     outline : str, optional
         ``"module"`` with ``drawing(spec, tolerance)``, imported when exporting. Edges that are not
         `Smooth` lie within the tolerance [m] of the exact ones; smooth ones are fitted by whoever writes them.
+    room : str, optional
+        ``"module:function"``, ``room(result) -> Room``: the box that a solved mechanism stays in.
     headline : tuple of str
         Values and metrics that are shown first after a run, in this order.
     branches : tuple of str
@@ -303,6 +325,7 @@ class Family:
     attribution: str | None = None
     draw: str | None = None
     outline: str | None = None
+    room: str | None = None
     headline: tuple[str, ...] = ()
     branches: tuple[str, ...] = ()
     template: str = ""

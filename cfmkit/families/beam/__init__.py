@@ -25,6 +25,7 @@ FAMILY = Family(
     resolve=resolve,
     draw="cfmkit.families.beam.draw",
     outline="cfmkit.families.beam.outline",
+    room="cfmkit.families.beam.room:room",
     headline=(
         "nominal_force",
         "range_start",

@@ -24,6 +24,7 @@ FAMILY = Family(
     draw="cfmkit.families.cam.draw",
     analyze_block=analyze_block,
     outline="cfmkit.families.cam.outline",
+    room="cfmkit.families.cam.room:room",
     headline=(
         "force_constant",
         "theoretical_force",

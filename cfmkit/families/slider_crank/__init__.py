@@ -30,6 +30,7 @@ FAMILY = Family(
     gradient=gradient,
     draw="cfmkit.families.slider_crank.dispatch",
     outline="cfmkit.families.slider_crank.dispatch",
+    room="cfmkit.families.slider_crank.room:room",
     headline=("stiffness_class", "band_range_05pct", "half_band", "energy_max", "crank_pin_rotation_max"),
     template="cfmkit/families/slider_crank/template.yaml",
     findings=FINDINGS,

@@ -19,6 +19,7 @@ FAMILY = Family(
     values=DEFINITIONS,
     draw="cfmkit.families.vcfm.draw",
     outline="cfmkit.families.vcfm.outline",
+    room="cfmkit.families.vcfm.room:room",
     analyze_block=analyze_block,
     headline=(
         "constant_force",

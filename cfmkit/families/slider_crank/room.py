@@ -1,0 +1,72 @@
+"""The box that a slider-crank stays in: a printed part with its pads, or links and pins with their springs."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.families.base import Room
+from cfmkit.families.slider_crank.dispatch import drawing
+
+if TYPE_CHECKING:
+    from cfmkit.families.slider_crank.spec import SliderCrankSpec
+    from cfmkit.results import Result
+
+POSES = 13
+"""Places of the motion at which a printed part is looked at."""
+
+PIN = 0.05
+"""Half the width of a link around its pins, over the crank's length: taken, since none is known."""
+
+
+def room(result: Result) -> Room | None:
+    """Return the box of a solved mechanism, along the slider's way and across it; None where nothing was solved."""
+    if result.state is None:
+        return None
+    return _linkage(result) if result.spec.fidelity == "prb" else _part(result)
+
+
+def _part(result: Result) -> Room:
+    """Return the box of a printed part: as it is cut, and as its centre line moves; legs lie above each other."""
+    spec: Any = result.spec
+    solution = result.state
+    path = solution.pressed.path
+    boxes = np.array([contour.extents for contour in drawing(spec).contours if contour.layer == "cut"])
+    low, high = boxes[:, :2].min(axis=0), boxes[:, 2:].max(axis=0)
+    chosen = np.unique(np.linspace(0, len(solution.travel) - 1, POSES).astype(int))
+    names = list(path.layout.network.beams)
+    poses = [np.concatenate([path.shape(name, int(path.at_requested[k])) for name in names]) for k in chosen]
+    points, half = np.concatenate(poses), 0.5 * _thickest(spec)
+    # the slider's pad moves with the end of the part
+    ends, rest = np.array([pose[-1] for pose in poses]), poses[0][-1]
+    pad = np.array([high[0] - rest[0] if rest[0] > 0.0 else low[0] - rest[0], 0.0])
+    moved = np.concatenate([points - half, points + half, ends + pad])
+    low, high = np.minimum(low, moved.min(axis=0)), np.maximum(high, moved.max(axis=0))
+    return Room(float(high[1] - low[1]), float(high[0] - low[0]), spec.mechanism.legs * _widest(spec))
+
+
+def _thickest(spec: SliderCrankSpec) -> float:
+    parts = spec.mechanism
+    if spec.fidelity == "beam" and parts.beam is not None:
+        return float(np.max(parts.beam.thickness))
+    return max(one.thickness for one in parts.flexures.all) if parts.flexures else 0.0
+
+
+def _widest(spec: SliderCrankSpec) -> float:
+    parts = spec.mechanism
+    if spec.fidelity == "beam" and parts.beam is not None:
+        return parts.beam.width
+    return max(one.width for one in parts.flexures.all) if parts.flexures else 0.0
+
+
+def _linkage(result: Result) -> Room:
+    """Return the box of links and pins over the motion of the curve."""
+    solution = result.state
+    link, units = solution.assembly.linkage, solution.units
+    x = np.concatenate([[0.0], link.crank * np.cos(units.angle), units.position])
+    y = np.concatenate([[0.0, link.offset], link.crank * np.sin(units.angle)])
+    rim = 2.0 * PIN * link.crank
+    told = f"links {2e3 * PIN * link.crank:.3g} mm wide; springs at pins have no size, and no depth"
+    across, along = float(np.ptp(y)) + rim, float(np.ptp(x)) + rim
+    return Room(across, along, None, told)

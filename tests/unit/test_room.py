@@ -1,0 +1,63 @@
+"""The box that a mechanism stays in, by family, against what its parts say by themselves."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+import cfmkit
+from cfmkit.families import family
+from cfmkit.families.base import function_named
+
+
+def room_of(name, **changes):
+    result = cfmkit.analyze(cfmkit.load(f"configs/{name}.yaml").replace(changes))
+    return function_named(family(result.spec.family).room)(result), result
+
+
+def test_a_cam_is_as_wide_as_its_rollers_at_the_end_of_the_stroke():
+    room, result = room_of("cam")
+    end = 68e-3 + 0.5 * result.values["spring_elongation_max"].value
+    assert room.across == pytest.approx(2 * (end + 16e-3), rel=1e-9)
+
+
+def test_a_cam_is_as_high_as_from_its_tab_to_the_slider_with_its_pin():
+    room, _ = room_of("cam_no_undercut")
+    longer, _ = room_of("cam_no_undercut", **{"mechanism.plate.base_height": "50 mm"})
+    assert longer.along - room.along == pytest.approx(10e-3, abs=1e-9)
+
+
+def test_a_mechanism_of_v_beams_has_room_for_its_walls_and_its_preload():
+    room, result = room_of("vcfm_pla")
+    leaf, frame = result.spec.mechanism.bistable, result.spec.mechanism.frame
+    walls = 2 * (leaf.length * math.cos(leaf.angle) + frame.block) + frame.shuttle_width
+    assert room.across == pytest.approx(walls, rel=1e-6)
+    assert room.depth == pytest.approx(10.47e-3)
+    pulled, _ = room_of("vcfm_pla", **{"analysis.preloads": ("0 mm", "-2 mm")})
+    assert pulled.along - room.along == pytest.approx(2e-3, rel=1e-6)
+
+
+def test_a_mirrored_network_is_twice_as_wide_as_its_half_with_its_pads():
+    room, result = room_of("beam_lan2010")
+    assert room.across > 2 * 34.5e-3
+    assert room.across < 2 * 34.5e-3 + 8 * result.spec.mechanism.thickness
+    assert room.along > 40e-3
+    assert room.depth == pytest.approx(10e-3)
+
+
+def test_legs_side_by_side_take_the_depth():
+    room, _ = room_of("beam_lan2010_subcfm")
+    assert room.depth == pytest.approx(8 * 6e-3)
+
+
+def test_a_strip_counts_the_way_of_its_slider_and_its_pads():
+    room, result = room_of("slider_crank_strip")
+    assert room.along >= 100e-3
+    assert room.depth == pytest.approx(result.spec.mechanism.beam.width)
+
+
+def test_links_and_pins_have_no_known_depth():
+    room, _ = room_of("slider_crank_bilancia2019")
+    assert room.depth is None
+    assert "springs" in room.assumed
