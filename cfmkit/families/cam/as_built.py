@@ -21,7 +21,7 @@ from cfmkit.curves import Column, Curve
 from cfmkit.errors import DataError
 from cfmkit.families.cam.build import assemble, check_first_pose, check_springs, displacement_origin, until_overlap
 from cfmkit.families.cam.contact import allowable_stress, stress
-from cfmkit.families.cam.findings import finding, findings_of_built, left_out
+from cfmkit.families.cam.findings import finding, findings_of_built, left_out, rubbing_left_out
 from cfmkit.families.cam.geometry.built_track import BuiltTrack, built_flank, built_track
 from cfmkit.families.cam.geometry.flank import DesignFlank
 from cfmkit.families.cam.solution import Assembly, Built, Sides
@@ -86,7 +86,12 @@ def analyze_built(spec: CamSpec) -> Result:
         message=short,
         curves=(_curve(built),),
         values=_values(built),
-        warnings=(*found, *left_out(spec), *findings_of_built(built)),
+        warnings=(
+            *found,
+            *left_out(spec),
+            *rubbing_left_out(spec, "the model of a measured cam"),
+            *findings_of_built(built),
+        ),
         travel=requested_travel(built),
         valid=((float(travel[0]) + built.origin, float(travel[-1]) + built.origin),),
         target=spec.design.force if spec.design else float(built.shares["design"][-1]),

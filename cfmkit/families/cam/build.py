@@ -8,7 +8,8 @@ slack at the start and tighten later can be built: the force is zero until they 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from math import cos, sin
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -19,13 +20,13 @@ from cfmkit.families.cam.geometry.profile import SlopeLaw
 from cfmkit.families.cam.geometry.track import Track
 from cfmkit.families.cam.geometry.track_records import NoTrack
 from cfmkit.families.cam.solution import Assembly
-from cfmkit.families.cam.statics import GRAVITY, Loads
+from cfmkit.families.cam.statics import GRAVITY, Loads, Losses
 from cfmkit.families.findings import mm
 from cfmkit.families.refusals import CannotBuild
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.cam.spec import CamSpec, Left, Masses, Mechanism
+    from cfmkit.families.cam.spec import CamSpec, Left, Masses, Mechanism, Mounting
     from cfmkit.results import Finding
 
 
@@ -98,6 +99,55 @@ def hanging_weights(masses: Masses | None) -> tuple[float, float]:
     return GRAVITY * (masses.roller + 0.5 * masses.brace), GRAVITY * (masses.slider + masses.brace)
 
 
+class Weights(NamedTuple):
+    """Weight on one roller and on the slider, against the slider's way out and across it; and what the guide carries.
+
+    All in newtons, `off_plane` that of all parts.
+    """
+
+    along: tuple[float, float] = (0.0, 0.0)
+    sideways: tuple[float, float] = (0.0, 0.0)
+    off_plane: float = 0.0
+
+
+def directions(mounting: Mounting | None) -> tuple[float, float, float]:
+    """Return the shares of gravity against the slider's way out, to the right of it and out of the cam's plane."""
+    if mounting is None:
+        return 1.0, 0.0, 0.0
+    across = _exact(cos(mounting.elevation))
+    return _exact(sin(mounting.elevation)), across * _exact(cos(mounting.roll)), across * _exact(sin(mounting.roll))
+
+
+def _exact(share: float) -> float:
+    """Return a share without the rounding that is left of a right angle."""
+    return 0.0 if abs(share) < 1e-15 else share
+
+
+def weights_of(mechanism: Mechanism) -> Weights:
+    """Return what the parts weigh, in the directions that the mounting gives."""
+    roller, slider = hanging_weights(mechanism.masses)
+    along, right, off = directions(mechanism.mounting)
+    return Weights((along * roller, along * slider), (right * roller, right * slider), off * (2.0 * roller + slider))
+
+
+def losses_of(mechanism: Mechanism) -> Losses | None:
+    """Return the friction of bearings, pins and guide; None where nothing rubs but the rollers."""
+    bearings, pins, guide = mechanism.bearings, mechanism.pins, mechanism.guide
+    bearing = 0.5 * bearings.bore * bearings.friction if bearings else 0.0
+    pin = 0.5 * pins.diameter * pins.friction if pins else 0.0
+    if not bearing and not pin and not (guide and (guide.friction or guide.drag)):
+        return None
+    return Losses(
+        rolling=mechanism.rolling_friction,
+        roller_radius=mechanism.roller_radius,
+        bearing=bearing,
+        pin=pin,
+        guide=guide.friction if guide else 0.0,
+        drag=guide.drag if guide else 0.0,
+        tilt=2.0 * guide.offset / guide.length if guide and guide.length else 0.0,
+    )
+
+
 def assemble(spec: CamSpec) -> Assembly:
     """Return the mechanism put together.
 
@@ -117,8 +167,16 @@ def assemble(spec: CamSpec) -> Assembly:
     profile = _cut(path, radius, end)
     # A flank with material missing is the flank for a larger roller, trimmed where that one undercuts it.
     track = _track(_cut(path, radius + missing, end) if missing else profile, mechanism)
-    weights = hanging_weights(mechanism.masses) if spec.gravity else (0.0, 0.0)
-    loads = Loads(mechanism.springs.total, mechanism.rest_half_width, mechanism.brace_length, *weights)
+    weights = weights_of(mechanism) if spec.gravity else Weights()
+    loads = Loads(
+        mechanism.springs.total,
+        mechanism.rest_half_width,
+        mechanism.brace_length,
+        *weights.along,
+        sideways=weights.sideways,
+        off_plane=weights.off_plane,
+        losses=losses_of(mechanism),
+    )
     return Assembly(spec, profile, track, loads, reached, shortfall)
 
 
@@ -219,7 +277,9 @@ def _shortfall(law: SlopeLaw, stroke: float, reached: float) -> Finding | None:
 
 def _cut(path: RollerPath, roller_radius: float, end: float) -> CamProfile:
     try:
-        return cut(path, roller_radius, end)
+        profile = cut(path, roller_radius, end)
+        _check_bend(profile)
+        return profile
     except WholeCamUndercut:
         smallest = float(path.law.curvature_radius(path.law.rest_half_width))
         raise CannotBuild(
@@ -231,6 +291,25 @@ def _cut(path: RollerPath, roller_radius: float, end: float) -> CamProfile:
                 "('force_constant' and 'stroke' of 'mechanism.profile')",
             )
         ) from None
+
+
+def _check_bend(profile: CamProfile) -> None:
+    """Raise where a path for hanging weights, which may be bent most behind its start, is bent too tightly there."""
+    law = profile.path.law
+    if law.slope_factor >= 1.0:
+        return
+    x = np.linspace(profile.start, profile.end, 1001)
+    radius = law.curvature_radius(x)
+    tightest = int(np.argmin(radius))
+    if tightest and radius[tightest] < profile.roller_radius:
+        raise CannotBuild(
+            finding(
+                "undercut_total",
+                f"the path that lets the weights help is bent to a radius of {mm(float(radius[tightest]))} at "
+                f"x = {mm(float(x[tightest]))}, inside a roller of {mm(profile.roller_radius)}; use a smaller roller "
+                "('mechanism.roller_radius') or leave the weight uncompensated ('design.gravity: false')",
+            )
+        )
 
 
 def _track(profile: CamProfile, mechanism: Mechanism) -> Track:

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.cam.build import CLOSE, assemble_sides, check_start, hanging_weights, rollers_overlap
+from cfmkit.families.cam.build import CLOSE, assemble_sides, check_start, rollers_overlap, weights_of
 from cfmkit.families.cam.findings import finding
 from cfmkit.families.cam.geometry.path import reach
 from cfmkit.families.cam.geometry.profile import SlopeLaw, brace_tangent
@@ -87,7 +87,7 @@ def shaping(spec: CamSpec, target: CamDesign) -> tuple[float, float]:
     """Return the force F' that the springs provide [N] and the slope factor c of the profile."""
     if not target.gravity:
         return target.force, 1.0
-    roller, slider = hanging_weights(spec.mechanism.masses)
+    roller, slider = weights_of(spec.mechanism).along
     least = slider + 2.0 * roller
     if target.force <= least:
         raise Infeasible(

@@ -11,8 +11,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.families.cam.contact import YIELD_PRESSURE, allowable_stress, worst
-from cfmkit.families.cam.values import contact_pressure, errors_used, half_extent, pressure_of, root_mean_square
-from cfmkit.families.findings import finder, mm, mpa
+from cfmkit.families.cam.statics import spring_force
+from cfmkit.families.cam.values import (
+    contact_pressure,
+    errors_used,
+    half_extent,
+    largest,
+    pressure_of,
+    root_mean_square,
+)
+from cfmkit.families.findings import finder, mm, mpa, newton
 from cfmkit.numerics.robust import neighbour_noise
 
 if TYPE_CHECKING:
@@ -46,7 +54,8 @@ FINDINGS = {
     "outside_profile": "the requested travel is longer than the cut profile allows",
     "inertia_mismatch": "a moment of inertia does not fit the mass and the size of its part",
     "symmetric_model": "the quasi-static model leaves out what makes the two sides differ",
-    "friction_left_out": "the nine-coordinate model has no rolling resistance",
+    "friction_left_out": "a model that has not the friction, or the weight across the way, that is specified",
+    "bearing_overloaded": "the load of a roller's bearing exceeds its static rating",
     "overwritten": "a value of the profile that the design replaces by its own",
     "plate_incomplete": "there is no room for the tab of the plate, or for its fixing holes",
     "old_word": "a word of the specification that the next version will not accept",
@@ -93,7 +102,7 @@ def overstressed(mechanism: Mechanism, largest: float | None, place: str) -> Fin
 
 def findings_of(solution: Solution) -> tuple[Finding, ...]:
     """Return every finding about a solved mechanism, the gravest first."""
-    checks = (_undercut, _jam, _dead_point, _springs, _contact, _pressure)
+    checks = (_undercut, _jam, _dead_point, _springs, _contact, _lift_off, _bearings, _pressure)
     return tuple(found for check in checks for found in check(solution))
 
 
@@ -112,6 +121,16 @@ def left_out(spec: CamSpec) -> tuple[Finding, ...]:
         "give 'analysis.dynamics' a slow motion to see the effect"
     )
     return (finding("symmetric_model", message),)
+
+
+def rubbing_left_out(spec: CamSpec, model: str) -> tuple[Finding, ...]:
+    """Return what to say where a model has rolling friction only."""
+    mechanism = spec.mechanism
+    said = [name for name in ("bearings", "pins", "guide") if (part := getattr(mechanism, name)) and part.friction]
+    if not said:
+        return ()
+    keys = ", ".join(f"'mechanism.{name}.friction'" for name in said)
+    return (finding("friction_left_out", f"{model} has the friction of rolling only: {keys} is left out"),)
 
 
 def _undercut(solution: Solution) -> Iterator[Finding]:
@@ -210,6 +229,31 @@ def _contact(solution: Solution) -> Iterator[Finding]:
                 f"on the way {way} the force on the slider is not positive from {_where(solution.travel, slack)} "
                 "of travel: a cable would go slack",
             )
+
+
+def _lift_off(solution: Solution) -> Iterator[Finding]:
+    """Yield where weight across the slider's way pulls the lower roller off the cam."""
+    loads = solution.assembly.loads
+    beside = abs(loads.sideways[0])
+    if beside and beside > float(spring_force(solution.states, loads)[0]):
+        released = _travel_at(solution, beside / loads.stiffness)
+        yield finding(
+            "lift_off",
+            f"at the start a roller weighs {newton(beside)} across the slider's way, more than the springs hold: the "
+            f"lower one hangs off the cam for the first {mm(released)} of travel; use preloaded springs, lighter "
+            "rollers, or turn the cam's plane flat ('mechanism.mounting: {roll: 90 deg}')",
+        )
+
+
+def _bearings(solution: Solution) -> Iterator[Finding]:
+    bearings = solution.assembly.spec.mechanism.bearings
+    most = largest(solution.up.contact, solution.down.contact)
+    if bearings and bearings.static_rating and most and most > bearings.static_rating * bearings.per_roller:
+        yield finding(
+            "bearing_overloaded",
+            f"a roller presses with {newton(most)} on {bearings.per_roller} bearing(s) with a static rating of "
+            f"{newton(bearings.static_rating)} each ('mechanism.bearings.static_rating')",
+        )
 
 
 def _pressure(solution: Solution) -> Iterator[Finding]:

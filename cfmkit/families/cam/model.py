@@ -124,7 +124,7 @@ def solve(assembly: Assembly) -> Solution:
     states = track.states(track.start + travel)
     friction = spec.mechanism.rolling_friction
     up = forces(states, assembly.loads, friction)
-    down = forces(states, assembly.loads, -friction) if friction else up
+    down = forces(states, assembly.loads, -friction, -1.0) if friction or assembly.loads.losses else up
     return Solution(assembly, travel, states, up, down, displacement_origin(assembly))
 
 
@@ -173,6 +173,10 @@ def _curve(solution: Solution) -> Curve:
         "roller_y": Column(loop(states.y), "length"),
         "contact": Column(loop(np.where(states.on_corner, "corner", "flank")), "text"),
     }
+    if up.least_contact is not None and down.least_contact is not None:
+        extra["contact_force_least"] = Column(loop(up.least_contact, down.least_contact), "force")
+    if solution.assembly.loads.losses and up.lost and down.lost:
+        extra |= {f"lost_to_{kind}": Column(loop(up.lost[kind], down.lost[kind]), "force") for kind in up.lost}
     if solution.assembly.spec.mechanism.contact:
         pressed = loop(contact_pressure(solution), contact_pressure(solution, down))
         extra |= {"contact_pressure": Column(pressed, "stress"), "max_stress": Column(stress(pressed), "stress")}
@@ -243,4 +247,5 @@ class DenseLoop:
         track, friction = solution.assembly.track, solution.assembly.spec.mechanism.rolling_friction
         travel = np.clip(np.ravel(places) - solution.origin, 0.0, solution.travel[-1])
         states = track.states(track.start + travel)
-        return states, forces(states, solution.assembly.loads, friction if branch == "load" else -friction)
+        way = 1.0 if branch == "load" else -1.0
+        return states, forces(states, solution.assembly.loads, way * friction, way)

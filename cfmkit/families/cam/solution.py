@@ -134,12 +134,13 @@ class Solution:
     def jams(self) -> tuple[tuple[float, float], ...]:
         """Intervals of travel in which no force moves the slider up [m]."""
         track, friction = self.assembly.track, self.assembly.spec.mechanism.rolling_friction
-        if not friction:
+        losses = self.assembly.loads.losses
+        if not friction and losses is None:
             return ()
         total = float(self.travel[-1])
         missing = bool(np.isnan(self.up.slider).any())
         states = self.states if missing or len(self.travel) < 100 else None
-        found = ((low - track.start, high - track.start) for low, high in jams(track, friction, states))
+        found = ((low - track.start, high - track.start) for low, high in jams(track, friction, states, losses))
         return tuple((max(low, 0.0), min(high, total)) for low, high in found if low < total)
 
 

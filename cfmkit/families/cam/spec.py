@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from math import radians
+from math import pi, radians
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, ValidationInfo, field_validator, model_validator
+from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
 
 from cfmkit.specs.spec import Analysis, Model, OldWords, Spec, refuse
 from cfmkit.specs.units import Angle, Force, Inertia, Length, Mass, Ratio, Stiffness, Time, format_short
@@ -87,8 +87,9 @@ class Profile(Model):
     friction: DesignFriction = Field(
         0.0, description="rolling friction it is cut for; positive: exact on the way up, negative: on the way down"
     )
-    slope_factor: Annotated[Ratio, Field(ge=1)] = Field(
-        1.0, description="1, or more where the profile carries the weight of the moving parts"
+    slope_factor: Annotated[Ratio, Field(gt=0)] = Field(
+        1.0,
+        description="1, or more where the profile carries the weight of the moving parts; less where they hang down",
     )
     stroke: PositiveLength | None = Field(None, description="slider travel that the flank is cut for")
     brace_length: PositiveLength | None = Field(None, description="brace it is cut for")
@@ -137,6 +138,71 @@ class Contact(Model):
     )
 
 
+class Pins(Model):
+    """Slider pin and spring hooks: plain pins that rub as the braces swing."""
+
+    diameter: PositiveLength = Field(description="of the pin")
+    friction: Friction = Field(0.0, description="Coulomb friction in it")
+
+
+class Bearings(Model):
+    """What a roller turns on: its friction, and how long it lasts."""
+
+    bore: PositiveLength = Field(description="diameter of its shaft, at which the friction acts")
+    friction: Friction = Field(
+        0.0, description="friction couple over load and half the bore; 0.001 to 0.002 if rolling"
+    )
+    dynamic_rating: Annotated[Force, Field(gt=0)] | None = Field(
+        None, description="C of one bearing, from its maker: gives the life by ISO 281"
+    )
+    static_rating: Annotated[Force, Field(gt=0)] | None = Field(None, description="C0 of one bearing, from its maker")
+    kind: Literal["ball", "roller"] = Field("ball", description="exponent of the life: 3, or 10/3")
+    per_roller: int = Field(1, ge=1, le=16, description="bearings side by side in one roller; they share its load")
+    name: str | None = Field(None, min_length=1, description="its maker's name, for the list of bought parts")
+
+
+class Guide(Model):
+    """The slider's way: what it takes from the force."""
+
+    friction: Friction = Field(0.0, description="Coulomb friction on what the slider presses across its way")
+    drag: Annotated[Force, Field(ge=0)] = Field(0.0, description="friction without load: seals, preload")
+    length: PositiveLength | None = Field(None, description="of the guide, between its ends; needed for 'offset'")
+    offset: NonNegativeLength = Field(0.0, description="distance of the force's line from the guide's middle")
+
+    @model_validator(mode="after")
+    def _offset_has_a_length(self) -> Self:
+        if self.offset and self.length is None:
+            raise ValueError("'offset' presses the guide's ends apart: it needs the guide's 'length'")
+        if self.length and 2.0 * self.friction * self.offset >= self.length:
+            jam = format_short(2.0 * self.friction * self.offset, "length")
+            raise ValueError(f"a guide shorter than {jam} (twice friction times offset) jams like a drawer")
+        return self
+
+
+MOUNTINGS = {"up": 0.5 * pi, "horizontal": 0.0, "down": -0.5 * pi}
+
+
+class Mounting(Model):
+    """How the mechanism stands in the field of gravity."""
+
+    elevation: Annotated[Angle, Field(ge=-0.5 * pi, le=0.5 * pi)] = Field(
+        0.5 * pi, description="of the slider's way out above the horizontal: 90 deg is up, 0 horizontal, -90 deg down"
+    )
+    roll: Annotated[Angle, Field(ge=-pi, le=pi)] = Field(
+        0.0,
+        description="of the cam's plane about that way: 0 upright, weight across the way pulls to the right; "
+        "90 deg flat, the guide carries it",
+    )
+
+
+def _mounting(value: Any) -> Any:
+    """Return a word or an angle as the block that it is short for."""
+    if isinstance(value, str):
+        word = str(value).strip()
+        return {"elevation": MOUNTINGS.get(word, value)}
+    return value
+
+
 class Left(Model):
     """Parts of the left side that differ from those of the right; what is left out is as on the right."""
 
@@ -171,6 +237,14 @@ class Mechanism(Model):
     errors: Errors | None = Field(None, description="flanks at a wrong angle; for the dynamic model")
     plate: Plate = Field(default_factory=Plate, description="what closes the contour of the part")
     contact: Contact | None = Field(None, description="for the contact pressure")
+    pins: Pins | None = Field(None, description="slider pin and spring hooks: their friction")
+    bearings: Bearings | None = Field(None, description="of the rollers: their friction and life")
+    guide: Guide | None = Field(None, description="of the slider: its friction")
+    mounting: Annotated[Mounting, BeforeValidator(_mounting, json_schema_input_type=str | Mounting)] | None = Field(
+        None,
+        description="up | horizontal | down, the slider's elevation (30 deg), or {elevation, roll}; weight acts where "
+        "this is given, and upwards where only gravity is asked for",
+    )
     safety_factor: SafetyFactor = 1.0
 
     @model_validator(mode="after")
@@ -279,7 +353,9 @@ class CamAnalysis(Analysis):
     """How a cam mechanism is run."""
 
     travel: PositiveLength | None = Field(None, description="slider travel; default: the profile's stroke")
-    gravity: bool | None = Field(None, description="whether weight acts; default: as in design.gravity, else false")
+    gravity: bool | None = Field(
+        None, description="whether weight acts; default: where design.gravity or a mounting says so"
+    )
     fidelity: Literal["quasi-static", "dynamic"] | None = Field(
         None, description="model; default: dynamic where `dynamics` is given, else quasi-static"
     )
@@ -337,4 +413,4 @@ class CamSpec(Spec):
         """Whether weight acts in the analysis."""
         if self.analysis.gravity is not None:
             return self.analysis.gravity
-        return self.design is not None and self.design.gravity
+        return self.mechanism.mounting is not None or (self.design is not None and self.design.gravity)

@@ -12,7 +12,14 @@ F = 4 K D / (p - t): friction is a rotation of the contact normal. The code mult
 by 1 +- mu f, which on the way down passes through zero where the normal turns past
 horizontal: beyond, the springs no longer bring the rollers back and F is negative.
 
-Assumes: the brace's centre of mass at mid-length, so that half of it hangs at each end.
+Friction beside rolling turns the same formula, not its kind. A roller's bearing takes kappa r N sqrt(1 + m^2), with
+kappa = mu_b d_b / 2r, so that the normal is turned by m = mu + kappa sqrt(1 + m^2) instead of mu. The couples of
+bearing, slider pin and spring hooks bend the brace out of its line by a transverse force V, which acts like a change
+V / cos a of the spring force. The guide drags on the slider alone. All friction is that of Coulomb: the equations are
+linear in the loads, and solved as such.
+
+Assumes: the brace's centre of mass at mid-length, so that half of it hangs at each end; pins feel the axial force of
+their brace (V is some thousandth of it).
 
 Reference
 ---------
@@ -21,8 +28,8 @@ Reference
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -43,6 +50,35 @@ _SHARES = np.sort(np.concatenate([[0.0], np.geomspace(1e-6, 1.0, 40), 1.0 - np.g
 
 
 @dataclass(frozen=True)
+class Losses:
+    """Friction beside that of rolling; couples are per newton of load, so lengths.
+
+    Attributes
+    ----------
+    rolling : float
+        Rolling friction mu, resistance over roller radius.
+    roller_radius : float
+        [m].
+    bearing, pin : float
+        Friction couple per load of a roller's bearing, and of a pin (slider pin, spring hook): mu d/2 [m].
+    guide : float
+        Coulomb friction of the slider's guide.
+    drag : float
+        What the guide takes without load [N].
+    tilt : float
+        Distance of the force from the guide's middle line over half the guide's length.
+    """
+
+    rolling: float = 0.0
+    roller_radius: float = 1.0
+    bearing: float = 0.0
+    pin: float = 0.0
+    guide: float = 0.0
+    drag: float = 0.0
+    tilt: float = 0.0
+
+
+@dataclass(frozen=True)
 class Loads:
     """What acts on the rollers and the slider.
 
@@ -55,7 +91,13 @@ class Loads:
     brace_length : float
         [m].
     roller_weight, slider_weight : float
-        Weight that hangs on one roller, and on the slider [N].
+        Weight that hangs on one roller, and on the slider, against the slider's way out [N].
+    sideways : (float, float)
+        Weight on one roller and on the slider across that way in the plane of the cam, to the right [N].
+    off_plane : float
+        Weight of slider, braces and rollers out of that plane, which the guide carries [N].
+    losses : Losses or None
+        Friction of bearings, pins and guide; None: the rollers roll, nothing else rubs.
     """
 
     stiffness: float
@@ -63,18 +105,30 @@ class Loads:
     brace_length: float
     roller_weight: float = 0.0
     slider_weight: float = 0.0
+    sideways: tuple[float, float] = (0.0, 0.0)
+    off_plane: float = 0.0
+    losses: Losses | None = None
+
+    @property
+    def plain(self) -> bool:
+        """Whether both sides are loaded alike, and nothing rubs but the rollers."""
+        return self.losses is None and not any(self.sideways)
 
 
 @dataclass(frozen=True)
 class Forces:
     """Forces on one branch, each (n,): on the slider, at a contact, in a brace [N].
 
-    NaN where no finite force holds the mechanism (a jam, or a dead point under load).
+    NaN where no finite force holds the mechanism (a jam, or a dead point under load). Where the sides are loaded
+    differently `contact` and `brace` are the larger of both and `least_contact` is the smaller; `lost` is what each
+    kind of friction takes from the force on the slider: rolling, bearings, pins, guide.
     """
 
     slider: FloatArray
     contact: FloatArray
     brace: FloatArray
+    least_contact: FloatArray | None = None
+    lost: dict[str, FloatArray] | None = None
 
 
 def spring_force(states: TrackStates, loads: Loads) -> FloatArray:
@@ -83,7 +137,7 @@ def spring_force(states: TrackStates, loads: Loads) -> FloatArray:
     return stretch
 
 
-def forces(states: TrackStates, loads: Loads, friction: float) -> Forces:
+def forces(states: TrackStates, loads: Loads, friction: float, way: float = 1.0) -> Forces:
     """Return the forces for one direction of travel [SS, eq. 1].
 
     Parameters
@@ -94,12 +148,16 @@ def forces(states: TrackStates, loads: Loads, friction: float) -> Forces:
         Springs and weights.
     friction : float
         Rolling friction mu: positive on the way up, negative on the way down.
+    way : float
+        1 on the way up, -1 on the way down: the sign of all other friction, and of mu where that is zero.
 
     Returns
     -------
     Forces
         On the slider, at each contact and in each brace.
     """
+    if not loads.plain:
+        return _forces_with_losses(states, loads, abs(friction), way if friction == 0.0 else float(np.sign(friction)))
     slope, weight = states.slope, loads.roller_weight
     tangent = brace_tangent(states.x, loads.brace_length)
     turn = 1.0 + friction * slope
@@ -137,12 +195,147 @@ def _at_dead_point(slope: FloatArray, bend: FloatArray, loads: Loads, friction: 
     return limit
 
 
-def jams(track: Track, friction: float, states: TrackStates | None = None) -> tuple[tuple[float, float], ...]:
+@dataclass(frozen=True)
+class _Side:
+    """One roller and its brace, each (n,): pull on the slider along and across its way, contact, axial force [N]."""
+
+    along: FloatArray
+    across: FloatArray
+    contact: FloatArray
+    axial: FloatArray
+
+
+def normal_turn(losses: Losses, rolling: float) -> float:
+    """Return m, the traction on a roller over its contact force: m = mu + kappa sqrt(1 + m^2), solved for m."""
+    kappa = losses.bearing / losses.roller_radius
+    return float((rolling + kappa * np.sqrt(1.0 + rolling**2 - kappa**2)) / (1.0 - kappa**2))
+
+
+def leverage(x: FloatArray, slope: FloatArray, brace_length: float, losses: Losses, friction: float) -> FloatArray:
+    """Return the slider's lever on a roller with all friction: no force moves it where this is not positive.
+
+    Parameters
+    ----------
+    x, slope : (n,) array
+        Of the roller's track [m, 1].
+    brace_length : float
+        [m].
+    losses : Losses
+        What rubs.
+    friction : float
+        Rolling friction: positive on the way up, negative on the way down.
+    """
+    way = -1.0 if friction < 0 else 1.0
+    turn = way * normal_turn(losses, abs(friction))
+    tangent = brace_tangent(x, brace_length)
+    cos, sin = 1.0 / np.sqrt(1.0 + tangent**2), tangent / np.sqrt(1.0 + tangent**2)
+    along = np.sqrt(1.0 + slope * slope)
+    one = 1.0 + turn * slope
+    lever = slope - turn - tangent * one
+    rubbed = losses.pin * (one / cos + sin * lever) - losses.bearing * float(np.sqrt(1.0 + turn**2)) * along
+    found: FloatArray = lever - way * rubbed / (cos * brace_length)
+    return found
+
+
+def _side(states: TrackStates, loads: Loads, losses: Losses, way: float, outward: float) -> _Side:
+    """Return the forces of one side whose roller's weight pulls `outward` [N]; NaN where nothing moves it.
+
+    With n and t along the contact normal and the track, u along the brace and V across it, the roller's axis is in
+    balance under N n - m N t - S - w + T u + V u', and the brace about the slider's pin if
+    V l = pin (T + S) - bearing N sqrt(1 + m^2) on the way up. Eliminating T, N and V leaves one division.
+    """
+    slope, length, weight = states.slope, loads.brace_length, loads.roller_weight
+    tangent = brace_tangent(states.x, length)
+    cos, sin = 1.0 / np.sqrt(1.0 + tangent**2), tangent / np.sqrt(1.0 + tangent**2)
+    turn = way * normal_turn(losses, losses.rolling)
+    one, along = 1.0 + turn * slope, np.sqrt(1.0 + slope * slope)
+    lever = slope - turn - tangent * one
+    spring = spring_force(states, loads)
+    pulled, hooks = spring - outward, losses.pin * spring
+    bearing = losses.bearing * float(np.sqrt(1.0 + turn**2))
+    load = pulled * one + weight * (slope - turn)
+    # A pin rubs whichever way its brace is loaded: the sign is that of the axial force.
+    for sign in (1.0, -1.0):
+        pin = sign * losses.pin
+        scale = cos * length * lever - way * (pin * (one / cos + sin * lever) - bearing * along)
+        held = (scale <= 0) & (load != 0) if sign > 0 else (scale <= 0)
+        scale = np.where(scale > 0, scale, np.nan)
+        pull = (load * (cos * length - way * pin * sin) + way * one * hooks + way * bearing * along * weight) / scale
+        bend = way * (pin * load / cos + hooks * lever - bearing * along * (pulled + weight * tangent)) / scale
+        pull, bend = np.where(held, np.nan, pull), np.where(held, np.nan, bend)
+        if sign > 0:
+            found = pull, bend
+            continue
+        pushed = (found[0] + found[1] * cos * sin) < 0
+        found = np.where(pushed, pull, found[0]), np.where(pushed, bend, found[1])
+    pull, bend = found
+    idle = (load == 0) & (hooks == 0) & (weight == 0)
+    pull, bend = np.where(idle, 0.0, pull), np.where(idle, 0.0, bend)
+    if not turn and not losses.pin and not weight and not outward:
+        dead = (np.abs(states.x - loads.rest_half_width) <= 1e-15 * loads.rest_half_width) & (np.abs(lever) < 1e-13)
+        pull = np.where(dead, 0.5 * _at_dead_point(slope, states.bend, loads, 0.0), pull)
+    contact = ((slope - turn) * (pulled + bend + pull * tangent) + one * (pull - weight)) / ((1.0 + turn**2) * along)
+    return _Side(pull, pull * tangent + bend, contact, (pull + bend * cos * sin) / cos)
+
+
+def _forces_with_losses(states: TrackStates, loads: Loads, rolling: float, way: float) -> Forces:
+    losses = replace(loads.losses or Losses(), rolling=rolling)
+    right = _side(states, loads, losses, way, loads.sideways[0])
+    left = _side(states, loads, losses, way, -loads.sideways[0]) if loads.sideways[0] else right
+    free = right.along + left.along + loads.slider_weight
+    guided = _guided(free, right.across - left.across + loads.sideways[1], loads, losses, way)
+    return Forces(
+        guided,
+        np.maximum(right.contact, left.contact),
+        np.maximum(np.abs(right.axial), np.abs(left.axial)),
+        np.minimum(right.contact, left.contact),
+        _lost(states, loads, losses, (right, left)) | {"guide": np.abs(guided - free)},
+    )
+
+
+def _guided(free: FloatArray, across: FloatArray, loads: Loads, losses: Losses, way: float) -> FloatArray:
+    """Return the force on the slider with the friction of its guide [N]; NaN where the guide jams like a drawer.
+
+    The two ends of the guide carry half of what acts across the way each, in the plane of the cam and out of it, and
+    the couple of a force beside the guide's middle line: their friction depends on the force that it adds to.
+    """
+    force = free + way * losses.drag
+    if not losses.guide:
+        return force
+    for _ in range(100):
+        before = force
+        couple = 0.5 * losses.tilt * force
+        ends = (np.hypot(0.5 * across + sign * couple, 0.5 * loads.off_plane) for sign in (1.0, -1.0))
+        force = free + way * (losses.drag + losses.guide * sum(ends))
+        if np.nanmax(np.abs(force - before), initial=0.0) <= 1e-15 * np.nanmax(np.abs(force), initial=0.0):
+            break
+    return force
+
+
+def _lost(states: TrackStates, loads: Loads, losses: Losses, sides: tuple[_Side, _Side]) -> dict[str, FloatArray]:
+    """Return the power that each kind of friction takes, over the slider's speed [N]."""
+    tangent = brace_tangent(states.x, loads.brace_length)
+    axial, contact = (sum(np.abs(getattr(side, name)) for side in sides) for name in ("axial", "contact"))
+    worn = losses.bearing * np.sqrt(1.0 + normal_turn(losses, losses.rolling) ** 2)
+    with np.errstate(divide="ignore", invalid="ignore"):  # at a dead point the rollers move, the slider does not
+        outward = 1.0 / (states.slope - tangent)  # of the roller, over the slider's speed
+        swing = outward * np.sqrt(1.0 + tangent**2) / loads.brace_length
+        spin = outward * np.sqrt(1.0 + states.slope**2) / losses.roller_radius
+        return {
+            "rolling": losses.rolling * losses.roller_radius * contact * spin,
+            "bearings": worn * contact * (spin - swing),
+            "pins": losses.pin * (axial + 2.0 * spring_force(states, loads)) * swing,
+        }
+
+
+def jams(
+    track: Track, friction: float, states: TrackStates | None = None, losses: Losses | None = None
+) -> tuple[tuple[float, float], ...]:
     """Return the intervals of the slider's position in which no force moves it up [m].
 
     There the lever of the slider on a roller, f - mu - tan(alpha) (1 + mu f), is not positive.
     It is looked at in the `states` that are given, if force is known to be missing in one of
-    them; else where a stretch of the track begins or ends without it.
+    them; else where a stretch of the track begins or ends without it. With `losses` it is `leverage`.
     """
     edges: list[float] = []
     jammed = False
@@ -150,6 +343,10 @@ def jams(track: Track, friction: float, states: TrackStates | None = None) -> tu
 
         def lever(u: Real, part: TrackStretch = part) -> Real:
             _, x, slope = part.at(u)
+            if losses is not None:
+                with_all: Any = leverage(np.asarray(x), np.asarray(slope), track.brace_length, losses, friction)
+                moves: Real = with_all + 1e-12
+                return moves
             # Rounding at a start without any lever is not a jam.
             margin: Real = slope - friction - brace_tangent(x, track.brace_length) * (1.0 + friction * slope) + 1e-12
             return margin

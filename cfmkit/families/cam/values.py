@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.families.cam.contact import flank_pressure
-from cfmkit.families.cam.statics import forces
+from cfmkit.families.cam.statics import Losses, forces, normal_turn
 from cfmkit.numerics import sampled_extremes
 from cfmkit.results import Quantity
 from cfmkit.specs.units import between
@@ -79,6 +79,34 @@ DEFINITIONS = {
         "ratio",
         "largest (up - down)/(up + down) on the flank: set by friction and geometry, no choice of profile removes it",
     ),
+    **{
+        f"loop_{what}_{kind}": (
+            "energy" if what == "energy" else "ratio",
+            (
+                f"energy that {words} over the window, up and down; the four kinds add up to the loop's area"
+                if what == "energy"
+                else f"the share of the loop's area that {words}"
+            ),
+        )
+        for kind, words in {
+            "rolling": "rolling on the cam takes",
+            "bearings": "the rollers' bearings take",
+            "pins": "slider pin and spring hooks take",
+            "guide": "the slider's guide takes",
+        }.items()
+        for what in ("energy", "share")
+    },
+    "contact_force_least": (
+        "force",
+        "smallest contact force beyond the first point; not positive where a roller leaves the cam",
+    ),
+    "bearing_load_max": ("force", "largest radial load of one roller bearing"),
+    "bearing_life": (
+        "count",
+        "strokes up and down that 90 % of single bearings outlast, L10 = (C/P)^3, for roller bearings (C/P)^(10/3), in "
+        "million turns, with the mean of P^3 over the turns of a stroke [ISO 281]",
+    ),
+    "bearing_static_safety": ("factor", "static rating C0 of a bearing over its largest load [ISO 76]"),
     "contact_pressure_max": (
         "stress",
         "largest Hertzian pressure of the line contact on the flank, on the way up; in motion, of both sides",
@@ -120,6 +148,14 @@ def values_of(solution: Solution) -> Mapping[str, Quantity]:
     }
     if assembly.spec.mechanism.contact:
         numbers["contact_pressure_max"] = largest(contact_pressure(solution)[flank])
+    if assembly.loads.losses is not None:
+        numbers |= loop_shares(solution)
+    if assembly.spec.mechanism.bearings:
+        numbers |= _bearing(solution)
+    if solution.up.least_contact is not None and solution.down.least_contact is not None:
+        numbers["contact_force_least"] = -(
+            largest(-solution.up.least_contact[1:], -solution.down.least_contact[1:]) or 0.0
+        )
     if solution.band is not None:
         shares = solution.band.deviations()
         numbers["manufacturing_force_share"] = float(np.median(shares))
@@ -158,6 +194,43 @@ def largest(*arrays: FloatArray) -> float | None:
     return max((float(array.max()) for array in finite if array.size), default=None)
 
 
+def loop_shares(solution: Solution) -> dict[str, float | None]:
+    """Return the energy that each kind of friction takes over the window [J], and its share of the loop's area."""
+    up, down = solution.up.lost or {}, solution.down.lost or {}
+    places, window = solution.travel + solution.origin, solution.assembly.spec.analysis.window
+    low, high = between(window, (float(places[0]), float(places[-1]))) if window else (places[0], places[-1])
+    low, high = max(float(low), float(places[0])), min(float(high), float(places[-1]))
+    at = np.unique(np.concatenate([[low, high], places[(places > low) & (places < high)]]))
+    taken = {kind: float(np.trapezoid(np.interp(at, places, up[kind] + down[kind]), at)) for kind in up}
+    area = sum(taken.values())
+    finite = np.isfinite(area) and area > 0
+    return {f"loop_energy_{kind}": value if finite else None for kind, value in taken.items()} | {
+        f"loop_share_{kind}": value / area if finite else None for kind, value in taken.items()
+    }
+
+
+def _bearing(solution: Solution) -> dict[str, float | None]:
+    """Return largest load [N], life [strokes up and down] and static safety of the rollers' bearings."""
+    mechanism, loads = solution.assembly.spec.mechanism, solution.assembly.loads
+    bearings, states = mechanism.bearings, solution.states
+    assert bearings is not None
+    turn = normal_turn(loads.losses or Losses(roller_radius=mechanism.roller_radius), mechanism.rolling_friction)
+    load = [state.contact * np.sqrt(1.0 + turn**2) / bearings.per_roller for state in (solution.up, solution.down)]
+    most = largest(*load)
+    found: dict[str, float | None] = {"bearing_load_max": most}
+    if bearings.static_rating and most:
+        found["bearing_static_safety"] = bearings.static_rating / most
+    if bearings.dynamic_rating:
+        exponent = 3.0 if bearings.kind == "ball" else 10.0 / 3.0
+        turns = np.hypot(np.diff(states.x), np.diff(states.y)) / (2.0 * np.pi * mechanism.roller_radius)
+        used = 0.0
+        for one in load:
+            worn = np.nan_to_num(np.maximum(one, 0.0) / bearings.dynamic_rating) ** exponent
+            used += float(turns @ (0.5 * (worn[1:] + worn[:-1])))
+        found["bearing_life"] = 1e6 / used if used > 0 else None
+    return found
+
+
 def _half_gap(solution: Solution, flank: NDArray[np.bool_]) -> float | None:
     up, down = solution.up.slider, solution.down.slider
     usable = flank & np.isfinite(up) & np.isfinite(down) & (up + down > 0)
@@ -172,7 +245,7 @@ def _corner_peak(solution: Solution) -> float | None:
         return None
     travel = np.linspace(0.0, corner * (1 - 1e-9), 129)
     states = assembly.track.states(assembly.track.start + travel)
-    force = forces(states, assembly.loads, assembly.spec.mechanism.rolling_friction).slider
+    force = forces(states, assembly.loads, assembly.spec.mechanism.rolling_friction, 1.0).slider
     top = int(np.argmax(force))
     if not 0 < top < len(force) - 1:
         return float(force[top])

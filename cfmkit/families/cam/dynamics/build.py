@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from cfmkit.families.cam.build import assemble_sides, cam_start_height
+from cfmkit.families.cam.build import assemble_sides, cam_start_height, directions
 from cfmkit.families.cam.dynamics.machine import Cycloid, Machine
 from cfmkit.families.cam.dynamics.side import NoRise, Side, SideParts, pieces_of
 from cfmkit.families.cam.dynamics.solution import Build
@@ -52,6 +52,7 @@ def _machine(spec: CamSpec, sides: tuple[Assembly, Assembly], lift: float) -> Ma
     right, left = sides
     pieces = pieces_of(right.track)
     errors = _angles(mechanism.errors)
+    along, right_share, _ = directions(mechanism.mounting)
     return Machine(
         right=Side(parts_of(right.spec.mechanism, masses), pieces, errors[0], lift),
         left=Side(
@@ -63,8 +64,9 @@ def _machine(spec: CamSpec, sides: tuple[Assembly, Assembly], lift: float) -> Ma
         slider_mass=masses.slider if masses else 0.0,
         stiffness=mechanism.springs.total,
         rest_length=2.0 * mechanism.rest_half_width,
-        gravity=GRAVITY if spec.gravity else 0.0,
+        gravity=GRAVITY * along if spec.gravity else 0.0,
         friction=mechanism.rolling_friction if stated_motion(spec).closed else 0.0,
+        sideways=GRAVITY * right_share if spec.gravity and stated_motion(spec).closed else 0.0,
     )
 
 

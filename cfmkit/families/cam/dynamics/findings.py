@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.families.cam.build import directions
 from cfmkit.families.cam.contact import worst
 from cfmkit.families.cam.dynamics.build import slender_rod, solid_cylinder
 from cfmkit.families.cam.dynamics.values import contact_pressure
@@ -32,7 +33,7 @@ BRACE_SHARE = (0.1, 3.0)
 
 def findings_of(moved: Moved) -> tuple[Finding, ...]:
     """Return every finding about a motion, the gravest first."""
-    checks = (_pressure, _slack_cable, _held, _on_corner, _springs, _inertias, _friction)
+    checks = (_pressure, _slack_cable, _held, _on_corner, _springs, _inertias, _friction, _sideways)
     return tuple(found for check in checks for found in check(moved))
 
 
@@ -161,6 +162,16 @@ def _friction(moved: Moved) -> Iterator[Finding]:
             "friction_left_out",
             "the nine-coordinate model has no rolling resistance: 'mechanism.rolling_friction' = "
             f"{moved.spec.mechanism.rolling_friction:g} is left out; 'analysis.dynamics.method: inverse' has it",
+        )
+
+
+def _sideways(moved: Moved) -> Iterator[Finding]:
+    dynamics, spec = moved.spec.analysis.dynamics, moved.spec
+    if dynamics and dynamics.method == "multibody" and spec.gravity and directions(spec.mechanism.mounting)[1]:
+        yield finding(
+            "friction_left_out",
+            "the nine-coordinate model has no weight across the slider's way, which 'mechanism.mounting' asks for; "
+            "'analysis.dynamics.method: inverse' has it",
         )
 
 

@@ -27,7 +27,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -118,7 +118,7 @@ class MotionResponse:
     def guide(self) -> FloatArray:
         """Force of the slider's guide on it, to the right, (n,) [N]: zero where both sides are alike."""
         side = self.slider_pin.real
-        guide: FloatArray = side[0] - side[1]
+        guide: FloatArray = side[0] - side[1] - self.machine.slider_mass * self.machine.sideways
         return guide
 
     @cached_property
@@ -145,6 +145,9 @@ class MotionResponse:
         height = machine.slider_mass * position + lifted.sum(axis=0)
         stretch = np.maximum(self.elongation, 0.0)
         potential = machine.gravity * height + machine.stiffness * stretch**2 / 2.0
+        if machine.sideways:
+            outward = (parts.roller_mass + 0.5 * parts.brace_mass) * self.at.center.real
+            potential = potential - machine.sideways * (outward[0] - outward[1])
         total: FloatArray = potential + self.mass * self.moment.speed**2 / 2.0
         return total
 
@@ -210,7 +213,9 @@ def kinematics(stances: tuple[Stance, Stance], position: FloatArray, length: Flo
 
 def _loads(machine: Machine, parts: Constants, at: Kinematics, moment: Moment) -> MovingLoads:
     push, square = moment.acceleration, moment.speed * moment.speed
-    lift = 1j * machine.gravity
+    lift: Any = 1j * machine.gravity
+    if machine.sideways:  # to the right is outwards on the right, inwards on the left
+        lift = lift - machine.sideways * np.array([[1.0], [-1.0]])
     roller = at.first * push + at.second * square + lift
     middle: ComplexArray = 0.5 * (roller + (1j * push + lift))
     along = at.way * push + at.bend * square

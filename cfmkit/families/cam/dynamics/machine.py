@@ -40,6 +40,8 @@ class Machine:
         Acceleration against the slider's way up; 0 switches weight off [m/s^2].
     friction : float
         Rolling resistance over roller radius.
+    sideways : float
+        Acceleration across the slider's way, to the right, with which weight acts [m/s^2].
     """
 
     right: Side
@@ -49,6 +51,7 @@ class Machine:
     rest_length: float
     gravity: float
     friction: float = 0.0
+    sideways: float = 0.0
 
     @cached_property
     def constants(self) -> Constants:

@@ -25,6 +25,7 @@ from cfmkit.families.cam.dynamics.inverse import respond, statics
 from cfmkit.families.cam.dynamics.multibody import CornerContact, NineCoordinates, reactions
 from cfmkit.families.cam.dynamics.solution import Build, History, Moved
 from cfmkit.families.cam.dynamics.values import contact_pressure, slow_force, values_of
+from cfmkit.families.cam.findings import rubbing_left_out
 from cfmkit.families.cam.values import constant_force
 from cfmkit.families.refusals import CannotBuild, no_result
 from cfmkit.results import Result, Status
@@ -76,7 +77,7 @@ def analyze(spec: CamSpec, run: Run) -> Result:
         message=message,
         curves=(_curve(moved),),
         values=values_of(moved),
-        warnings=(*missing, *findings_of(moved), *old_word(spec)),
+        warnings=(*missing, *findings_of(moved), *rubbing_left_out(spec, "the dynamic model"), *old_word(spec)),
         travel=_requested(parts),
         target=spec.design.force if spec.design else constant_force(parts.right),
         allowable_stress=allowable_stress(spec.mechanism),

@@ -1,0 +1,154 @@
+"""Friction of pins, bearings and guide, and weight in any direction, against free bodies and energy."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from cam_support import analyze, cam, design
+from scipy.optimize import root
+
+PINS = {"diameter": "6 mm", "friction": 0.15}
+BEARINGS = {"bore": "8 mm", "friction": 0.004}
+GUIDE = {"friction": 0.1, "drag": "0.3 N", "length": "40 mm", "offset": "5 mm"}
+
+
+def rubbing(**changes):
+    parts = {"pins": PINS, "bearings": BEARINGS, "guide": GUIDE, "rolling_friction": 0.002}
+    return cam(**(parts | changes))
+
+
+def free_bodies(x, slope, spec, way, weights):
+    """Return the forces of both sides from the balance of rollers, braces and slider, solved as they stand."""
+    length, radius = spec.mechanism.brace_length, spec.mechanism.roller_radius
+    bearing = 0.5 * spec.mechanism.bearings.bore * spec.mechanism.bearings.friction
+    pin = 0.5 * spec.mechanism.pins.diameter * spec.mechanism.pins.friction
+    mu, guide = spec.mechanism.rolling_friction, spec.mechanism.guide
+    (roller, slider), (beside, slider_beside), off = weights
+    spring = 2.0 * spec.mechanism.springs.total * (x - spec.mechanism.rest_half_width)
+    sin = x / length
+    cos = np.sqrt(1.0 - sin * sin)
+    along = np.hypot(1.0, slope)
+    normal, tangent = np.array([slope, -1.0]) / along, np.array([1.0, slope]) / along
+    brace, across = np.array([-sin, cos]), np.array([-cos, -sin])
+
+    def side(outward):
+        def balance(unknown):
+            contact, traction, pull, bend = unknown
+            on_shaft = np.hypot(contact, traction)
+            force = contact * normal - way * traction * tangent + pull * brace + bend * across
+            force = force + np.array([outward - spring, -roller])
+            spin = traction * radius - mu * radius * contact - bearing * on_shaft
+            swing = bend * length - way * (pin * abs(pull) + pin * spring - bearing * on_shaft)
+            return [*force, spin / radius, swing / length]
+
+        found = root(balance, [spring, 0.0, spring, 0.0], tol=1e-14)
+        assert np.abs(balance(found.x)).max() < 1e-9
+        contact, _, pull, bend = found.x
+        return contact, pull * brace + bend * across
+
+    (one, right), (other, left) = side(beside), side(-beside)
+    free = right[1] + left[1] + slider
+    sideways = left[0] - right[0] + slider_beside
+
+    def with_guide(force):
+        couple = 2.0 * force * guide.offset / guide.length
+        ends = [np.hypot(0.5 * sideways + sign * 0.5 * couple, 0.5 * off) for sign in (1.0, -1.0)]
+        return free + way * (guide.drag + guide.friction * sum(ends)) - force
+
+    return root(with_guide, free, tol=1e-15).x.item(), max(one, other), min(one, other)
+
+
+@pytest.mark.parametrize("mounting", ["up", "down", "30 deg", {"elevation": "-20 deg", "roll": "25 deg"}])
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_forces_are_those_of_rollers_braces_and_slider_in_balance(mounting, way):
+    solution = analyze(rubbing(mounting=mounting)).state
+    loads = solution.assembly.loads
+    forces = solution.up if way > 0 else solution.down
+    weights = (loads.roller_weight, loads.slider_weight), loads.sideways, loads.off_plane
+    for index in (40, 200, 480):
+        expected = free_bodies(
+            solution.states.x[index], solution.states.slope[index], solution.assembly.spec, way, weights
+        )
+        got = forces.slider[index], forces.contact[index], forces.least_contact[index]
+        np.testing.assert_allclose(got, expected, rtol=1e-9)
+
+
+@pytest.mark.parametrize("mounting", [None, "down", "30 deg"])
+@pytest.mark.parametrize(
+    "parts",
+    [
+        {"pins": PINS, "bearings": None, "guide": None},
+        {"pins": None, "bearings": BEARINGS, "guide": None},
+        {"pins": None, "bearings": None, "guide": GUIDE, "rolling_friction": 0},
+        {},
+    ],
+)
+def test_what_each_friction_takes_adds_up_to_the_area_of_the_loop(mounting, parts):
+    found = analyze(rubbing(mounting=mounting, analysis__window=("20 mm", "231.3 mm"), **parts))
+    solution = found.state
+    gap = solution.up.slider - solution.down.slider
+    taken = sum(solution.up.lost.values()) + sum(solution.down.lost.values())
+    np.testing.assert_allclose(taken[10:], gap[10:], rtol=1e-11)
+    inside = solution.travel[(solution.travel > 0.02) & (solution.travel < 0.2313)]
+    places = np.concatenate([[0.02], inside, [0.2313]])
+    area = np.trapezoid(np.interp(places, solution.travel, gap), places)
+    kinds = ("rolling", "bearings", "pins", "guide")
+    assert sum(found.values[f"loop_energy_{kind}"].value for kind in kinds) == pytest.approx(area, rel=1e-9)
+    assert sum(found.values[f"loop_share_{kind}"].value for kind in kinds) == pytest.approx(1.0, abs=1e-12)
+
+
+def test_weight_across_the_way_acts_as_in_the_model_of_a_motion():
+    lifted = {"slider_position": "220 mm", "stroke": "180 mm", "time": "1000 s", "points": 41}
+    spec = cam(mounting="30 deg", rolling_friction=0.002)
+    slow = analyze(spec.replace({"analysis.dynamics": lifted})).state
+    still = analyze(spec).state
+    low = slow.history.contact.min(axis=0)
+    at = slow.history.moment.position - still.assembly.track.start
+    np.testing.assert_allclose(np.interp(at, still.travel, still.up.least_contact), low, rtol=2e-4)
+    np.testing.assert_allclose(np.interp(at, still.travel, still.up.slider), slow.history.force, rtol=2e-5)
+
+
+def test_a_cam_that_lies_flat_weighs_on_its_guide_only():
+    flat = {"elevation": "0 deg", "roll": "90 deg"}
+    plain = analyze(cam(rolling_friction=0.002)).state
+    lying = analyze(cam(rolling_friction=0.002, mounting=flat)).state
+    np.testing.assert_allclose(lying.up.slider, plain.up.slider, rtol=1e-12)
+    rubs = analyze(cam(rolling_friction=0.002, mounting=flat, guide={"friction": 0.1})).state
+    weight = 9.81 * (0.068 + 2 * 0.077 + 2 * 0.38)
+    np.testing.assert_allclose((rubs.up.slider - plain.up.slider)[1:], 0.1 * weight, rtol=1e-9)
+
+
+def test_hanging_down_the_weight_helps_by_what_it_hinders_standing_up():
+    up, down, off = (
+        analyze(cam(mounting=word, analysis__gravity=weight)).state.up.slider
+        for word, weight in (("up", True), ("down", True), ("up", False))
+    )
+    np.testing.assert_allclose((up + down)[1:], 2.0 * off[1:], rtol=1e-12)
+    assert (up[1:] > off[1:]).all()
+
+
+def test_a_profile_that_hangs_down_is_cut_for_the_help_of_the_weight():
+    wanted = cam(mounting="down", roller_radius="8 mm").replace(
+        {"design": {"force": "40 N", "stroke": "200 mm", "gravity": True}}
+    )
+    found = design(wanted)
+    assert found.spec.mechanism.profile.slope_factor < 1
+    force = analyze(found.spec).state.up.slider[2:]
+    np.testing.assert_allclose(force, 40.0, rtol=1e-9)
+
+
+def test_the_life_of_a_bearing_under_a_constant_load_is_that_of_iso_281():
+    rated = {"bore": "8 mm", "dynamic_rating": "3300 N", "static_rating": "1370 N", "per_roller": 2}
+    found = analyze(cam(bearings=rated, roller_radius="10 mm"))
+    states, contact = found.state.states, found.state.up.contact
+    turns = np.hypot(np.diff(states.x), np.diff(states.y)) / (2 * np.pi * 0.010)
+    mean = 0.5 * (contact[1:] + contact[:-1])
+    load = (np.sum(turns * mean**3) / turns.sum()) ** (1 / 3) / 2
+    expected = 1e6 * (3300 / load) ** 3 / (2 * turns.sum())
+    assert found.values["bearing_life"].value == pytest.approx(expected, rel=1e-4)
+    assert found.values["bearing_static_safety"].value == pytest.approx(2 * 1370 / contact.max(), rel=1e-12)
+
+
+def test_a_guide_too_short_for_its_offset_is_refused():
+    with pytest.raises(Exception, match="jams like a drawer"):
+        cam(guide={"friction": 0.5, "length": "10 mm", "offset": "10 mm"})
