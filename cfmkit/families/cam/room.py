@@ -8,7 +8,7 @@ import numpy as np
 
 from cfmkit.families.base import Room
 from cfmkit.families.cam.outline import plate_contours
-from cfmkit.families.cam.pose import pose, roller_path
+from cfmkit.families.cam.picture_parts import pose, roller_path
 
 if TYPE_CHECKING:
     from cfmkit.results import Result
