@@ -14,7 +14,7 @@ from cfmkit.families import family, origin
 from cfmkit.families.base import Run
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping
+    from collections.abc import Callable, Iterable, Mapping, Sequence
     from typing import TypeAlias
 
     from matplotlib.figure import Figure
@@ -268,8 +268,9 @@ def export(
     *,
     kerf: str | float | None = None,
     tolerance: str | float | None = None,
+    format: str | Sequence[str] | None = None,
 ) -> dict[str, bytes]:
-    """Return what is to be cut or printed as files, by name: DXF, SVG and CSV.
+    """Return what is to be cut or printed as files, by name: DXF, SVG and CSV, and bodies where they are asked for.
 
     Parameters
     ----------
@@ -281,13 +282,17 @@ def export(
         Width of the cut: a text with its unit, or a number [m]; adds a DXF moved by half of it.
     tolerance : str or float, optional
         Largest distance from the exact curves, likewise; default: 0.005 mm.
+    format : str or sequence of str, optional
+        What to write, of dxf, svg, csv, stl, 3mf, step and inp: ``"stl,step"``; default: dxf, svg, csv.
 
     Raises
     ------
     cfmkit.errors.UsageError
-        If the family has nothing to cut, or a length is not above zero.
+        If the family has nothing to cut, a length is not above zero, a format is unknown or needs a missing library.
     cfmkit.errors.SolutionError
         If the mechanism cannot exist as described.
+    cfmkit.errors.GeometryError
+        If nothing says how thick the part is, and a format needs that.
     cfmkit.errors.OutputError
         If the folder cannot be written.
 
@@ -298,7 +303,7 @@ def export(
     ['cam-left.csv', 'cam-right.csv', 'cam.dxf']
     """
     spec = spec_of(spec)
-    drawn, _ = drawn_files(spec, kerf, tolerance)
+    drawn, _ = drawn_files(spec, kerf, tolerance, format)
     if out is not None:
         from cfmkit.store import RunFolder, stable_hash
 
@@ -337,14 +342,32 @@ def resolve(spec: AnySpec) -> Spec:
 
 
 def drawn_files(
-    spec: Spec, kerf: str | float | None = None, tolerance: str | float | None = None
+    spec: Spec,
+    kerf: str | float | None = None,
+    tolerance: str | float | None = None,
+    formats: str | Sequence[str] | None = None,
 ) -> tuple[dict[str, bytes], tuple[str, ...]]:
     """Return the files of `export`, and what they do not show: how often a part is to be made."""
-    from cfmkit.export import files
+    from cfmkit.export import TOLERANCE, USUAL, files
 
-    wishes = {"kerf": _length(kerf, "--kerf"), "tolerance": _length(tolerance, "--tolerance")}
-    drawn = drawing(spec, wishes["tolerance"])
-    return files(drawn, **{key: value for key, value in wishes.items() if value is not None}), drawn.notes
+    wanted = _formats(formats, USUAL)
+    if kerf is not None and "dxf" not in wanted:
+        raise UsageError("--kerf makes a second DXF: add dxf to --format")
+    width, near = _length(kerf, "--kerf"), _length(tolerance, "--tolerance")
+    drawn = drawing(spec, near)
+    return files(drawn, width, near or TOLERANCE, wanted), drawn.notes
+
+
+def _formats(given: str | Sequence[str] | None, usual: Sequence[str]) -> tuple[str, ...]:
+    """Return the formats that are asked for; of a text those between commas."""
+    from cfmkit.export import FORMATS
+
+    words = usual if given is None else given.split(",") if isinstance(given, str) else given
+    names = tuple(dict.fromkeys(word.strip().lower() for word in words))
+    for name in names:
+        if name not in FORMATS:
+            raise UsageError(f"--format: {name!r} is not known; there are {', '.join(FORMATS)}")
+    return names
 
 
 def drawing(spec: Spec, tolerance: float | None = None) -> Drawing:

@@ -1,4 +1,7 @@
-"""Drawings as files: DXF and SVG of what is to be cut, CSV of the exact points. Nothing here touches a disk."""
+"""Drawings as files: DXF and SVG of what is to be cut, CSV of the exact points, bodies as STL, 3MF and STEP.
+
+Nothing here touches a disk, but for a temporary folder where a library needs one.
+"""
 
 from __future__ import annotations
 
@@ -13,13 +16,23 @@ from cfmkit.export.points import write_points
 from cfmkit.export.svg import svg_bytes, write_svg
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from cfmkit.export.geometry import Drawing
+    from cfmkit.export.outlines import Outline
 
-__all__ = ["TOLERANCE", "files", "write_dxf", "write_points", "write_svg"]
+__all__ = ["FORMATS", "TOLERANCE", "USUAL", "files", "write_dxf", "write_points", "write_svg"]
+
+FORMATS = ("dxf", "svg", "csv", "stl", "3mf", "step")
+"""What `files` can write."""
+USUAL = FORMATS[:3]
+"""What it writes unless told: what a cutter needs."""
 
 
-def files(drawing: Drawing, kerf: float | None = None, tolerance: float = TOLERANCE) -> dict[str, bytes]:
-    """Return every file of a drawing, by name: DXF, SVG and one CSV per table.
+def files(
+    drawing: Drawing, kerf: float | None = None, tolerance: float = TOLERANCE, formats: Sequence[str] = USUAL
+) -> dict[str, bytes]:
+    """Return the files of a drawing, by name: DXF, SVG and one CSV per table, and bodies where they are asked for.
 
     A drawing without anything on layer `reference` gets a reference square beside it.
 
@@ -31,16 +44,44 @@ def files(drawing: Drawing, kerf: float | None = None, tolerance: float = TOLERA
         Width of the cut [m]. Adds ``<name>-kerf.dxf``, where all cut contours are moved
         into the waste by half of it; the other files always have the true size.
     tolerance : float
-        Largest distance of the arcs from the exact smooth curves [m].
+        Largest distance of the arcs from the exact smooth curves [m], and of the triangles of bodies from the arcs.
+    formats : sequence of str
+        Of `FORMATS`.
 
     Raises
     ------
     cfmkit.errors.GeometryError
-        If the drawing cannot be cut as it is, or not with that kerf.
+        If the drawing cannot be cut as it is, or not with that kerf; if it has no thickness for a body.
+    cfmkit.errors.UsageError
+        If the library for a format is not installed.
     """
     stem = check_name(drawing.name, "drawing")
     drawn = outlines(drawing.with_reference_square(), tolerance)
-    found = {f"{stem}.dxf": dxf_bytes(drawn), f"{stem}.svg": svg_bytes(stem, drawn)}
-    if kerf is not None:
-        found[f"{stem}-kerf.dxf"] = dxf_bytes(with_kerf(drawn, kerf))
-    return found | write_points(drawing)
+    found: dict[str, bytes] = {}
+    if "dxf" in formats:
+        found[f"{stem}.dxf"] = dxf_bytes(drawn)
+        if kerf is not None:
+            found[f"{stem}-kerf.dxf"] = dxf_bytes(with_kerf(drawn, kerf))
+    if "svg" in formats:
+        found[f"{stem}.svg"] = svg_bytes(stem, drawn)
+    if "csv" in formats:
+        found |= write_points(drawing)
+    return found | _bodies(drawing, drawn, tolerance, formats)
+
+
+def _bodies(drawing: Drawing, drawn: Sequence[Outline], tolerance: float, formats: Sequence[str]) -> dict[str, bytes]:
+    """Return the files that have a third dimension."""
+    found: dict[str, bytes] = {}
+    if {"stl", "3mf"} & set(formats):
+        from cfmkit.export.extrusion import bodies, plates
+        from cfmkit.export.stl import stl_bytes
+        from cfmkit.export.threemf import threemf_bytes
+
+        extruded = bodies(plates(drawn, drawing.sheet, tolerance))
+        writers = {"stl": stl_bytes, "3mf": threemf_bytes}
+        found |= {f"{drawing.name}.{one}": writers[one](drawing.name, extruded) for one in writers if one in formats}
+    if "step" in formats:
+        from cfmkit.export.step import step_bytes
+
+        found[f"{drawing.name}.step"] = step_bytes(drawing.name, drawn, drawing.sheet)
+    return found

@@ -172,8 +172,35 @@ class Curve2D:
 
 
 @dataclass(frozen=True)
+class Region:
+    """Where a part is thicker or thinner than elsewhere: within a closed `polygon` (n, 2) [m], `thickness` [m]."""
+
+    polygon: FloatArray
+    thickness: float
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """How thick parts are across the plane of the drawing.
+
+    Attributes
+    ----------
+    thickness : float, optional
+        Wherever no region says otherwise [m]; None where the specification does not tell.
+    regions : tuple of Region
+        Where two overlap, the thicker one holds.
+    key : str
+        What in a specification says it, for messages.
+    """
+
+    thickness: float | None = None
+    regions: tuple[Region, ...] = ()
+    key: str = ""
+
+
+@dataclass(frozen=True)
 class Drawing:
-    """Everything about a part that can be cut: contours for DXF and SVG, tables for CSV.
+    """Everything about a part that can be cut: contours for DXF and SVG, tables for CSV, thickness for STL.
 
     `name` is the file stem; `cut`, `path` and `reference` are the usual layers. `notes` say what the contours do not
     show: how often a part is to be made.
@@ -183,6 +210,7 @@ class Drawing:
     contours: tuple[Contour, ...]
     tables: tuple[Curve2D, ...] = ()
     notes: tuple[str, ...] = ()
+    sheet: Sheet = Sheet()
 
     def with_reference_square(self, size: float = 0.05) -> Drawing:
         """Return the drawing with a reference square [m] to its right, unless it has a reference already."""

@@ -95,3 +95,48 @@ def points_on(start: ComplexArray, chord: ComplexArray, turn: FloatArray, fracti
     """
     share = fraction * np.sinc(fraction * turn / (2 * np.pi)) / np.sinc(turn / (2 * np.pi))
     return np.asarray(start + chord * share * np.exp(0.5j * (fraction - 1) * turn))
+
+
+def arcs_through(points: ComplexArray, tolerance: float) -> ArcChain:
+    """Return a chain of lines as fewer arcs: each through as many of its points as one circle fits.
+
+    Parameters
+    ----------
+    points : (n,) array
+        Corners of the chain, in order; a closed one begins where it ends, best at a corner.
+    tolerance : float
+        Largest distance of a corner, and of the middle of a line between two, from the arc.
+
+    Examples
+    --------
+    >>> half = np.exp(1j * np.linspace(0.0, np.pi, 20))
+    >>> found = arcs_through(np.append(half, -2.0 + 0j), 0.01)
+    >>> len(found.bulges), bool(abs(found.turns[0] - np.pi) < 1e-9)
+    (2, True)
+    """
+    nodes, bulges, first = [points[0]], [], 0
+    while first < len(points) - 1:
+        last, bulge = first + 1, 0.0
+        while last + 1 < len(points) and (more := _bulge(points[first : last + 2], tolerance)) is not None:
+            last, bulge = last + 1, more
+        nodes.append(points[last])
+        bulges.append(bulge)
+        first = last
+    return ArcChain(np.array(nodes), np.array(bulges))
+
+
+def _bulge(points: ComplexArray, tolerance: float) -> float | None:
+    """Return the bulge of the arc through the first, a middle and the last point; None if it does not fit."""
+    chord, way = points[-1] - points[0], points[len(points) // 2] - points[0]
+    if chord == 0:
+        return None
+    # seen from the middle one, the chord's angle is half of what is left of the circle
+    seen = float(np.angle((points[-1] - points[0] - way) / -way)) if way != 0 else 0.0
+    turn = 2.0 * (np.pi - abs(seen)) * (-1.0 if seen > 0 else 1.0)
+    bulge = float(np.tan(0.25 * turn))
+    if abs(bulge) > 1.0 or bulge == 0.0:
+        return None
+    center = points[0] + 0.5 * chord * (1 + 1j * (1 / bulge - bulge) / 2)
+    radius = abs(points[0] - center)
+    probes = np.concatenate([points, 0.5 * (points[1:] + points[:-1])])
+    return bulge if np.abs(np.abs(probes - center) - radius).max() <= tolerance else None

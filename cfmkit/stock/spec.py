@@ -1,6 +1,7 @@
 """How every family's specification says what a part is made of, and how much of its strength may be used.
 
-One grammar: a name from the library, a block of values, or a name with some of its values changed.
+One grammar: a name from the library, a block of values, or a name with some of its values changed; and one for how
+a part is cut.
 One rule: the allowable stress is the yield strength over `safety_factor`, which is 1 unless given.
 """
 
@@ -11,7 +12,7 @@ from typing import Annotated, Any, Self
 from pydantic import BeforeValidator, Field, model_validator
 
 from cfmkit.specs.spec import Model, refuse
-from cfmkit.specs.units import Ratio, Stress
+from cfmkit.specs.units import Length, Ratio, Stress
 from cfmkit.specs.units.fields import described
 from cfmkit.stock.materials import UnknownMaterial, material
 
@@ -89,3 +90,12 @@ def material_input(kind: type[MaterialSpec]) -> BeforeValidator:
 
 MaterialField = Annotated[MaterialSpec, material_input(MaterialSpec)]
 """The type of a key that says what something is made of."""
+
+
+class CutPart(Model):
+    """How a part is cut: what every family that is cut from a sheet can say."""
+
+    fillet: Annotated[Length, Field(ge=0)] = Field(0.0005, description="radius of inside corners: that of the cutter")
+    sheet: Annotated[Length, Field(gt=0)] | None = Field(
+        None, description="thickness of the sheet that everything is cut from: every width must be equal to it"
+    )

@@ -27,11 +27,15 @@ class ExportOptions(OneSpec):
         str | None,
         option("--tolerance", metavar="LENGTH", text="Largest deviation from the exact curves; default: 0.005 mm."),
     ] = None
+    format: Annotated[
+        str | None,
+        option("--format", metavar="LIST", text="Of dxf,svg,csv,stl,3mf,step; default: dxf,svg,csv."),
+    ] = None
     quiet: Quiet = False
 
 
 def run(options: ExportOptions, terminal: Terminal) -> Answer:
-    """Write the parts of a spec as drawings to cut or print: DXF, SVG, CSV."""
+    """Write the parts of a spec as drawings to cut or print: DXF, SVG, CSV, STL, 3MF, STEP."""
     from cfmkit import api
     from cfmkit.cli.run_answer import folder_of
     from cfmkit.runs.run import provenance
@@ -41,7 +45,7 @@ def run(options: ExportOptions, terminal: Terminal) -> Answer:
     out = folder_of(options, "export")
     spec = bind(read_spec(options.spec, options.changes))
     with RunFolder(out) as folder:
-        drawn, notes = api.drawn_files(spec, options.kerf, options.tolerance)
+        drawn, notes = api.drawn_files(spec, options.kerf, options.tolerance, options.format)
         for name, data in drawn.items():
             folder.write(name, data)
         origin = provenance("export", spec, options.spec, terminal.arguments)

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.elastica.model.layout import Layout
-from cfmkit.export.geometry import TOLERANCE, Contour, Curve2D, Drawing, Smooth
+from cfmkit.export.geometry import TOLERANCE, Contour, Curve2D, Drawing, Region, Sheet, Smooth
 from cfmkit.export.union import quarter_pieces
 from cfmkit.families.beam.build import assemble, mirror_axis, thickest
 from cfmkit.families.beam.parts.spec import PartSpec
@@ -151,7 +151,21 @@ def drawing(spec: BeamSpec, tolerance: float = TOLERANCE) -> Drawing:
     tables = tuple(_table(f"beam-{name}", found) for name, found in beams.items())
     legs = spec.mechanism.copies.legs if spec.mechanism.copies else 1
     notes = (f"one of {legs} equal parts side by side is drawn: make it {legs} times",) if legs > 1 else ()
-    return Drawing("beams", (*contours, *paths), tables, notes)
+    return Drawing("beams", (*contours, *paths), tables, notes, _sheet(assembly, beams))
+
+
+def _sheet(assembly: Assembly, beams: dict[str, list[BeamStrip]]) -> Sheet:
+    """Return the mechanism's width, and where beams have another one."""
+    mechanism, axis = assembly.spec.mechanism, mirror_axis(assembly)
+    own = [
+        Region(strip.polygon, width)
+        for name, found in beams.items()
+        for width in {mechanism.beams[name.split(".")[0]].width or mechanism.width} - {mechanism.width}
+        for strip in found
+    ]
+    if axis is not None:
+        own += [Region(mirrored(one.polygon, *axis), one.thickness) for one in own]
+    return Sheet(mechanism.width, tuple(own))
 
 
 def _mirrored_line(line: Smooth, at: complex, direction: float) -> Smooth:

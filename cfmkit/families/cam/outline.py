@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.export.geometry import TOLERANCE, Arc, Contour, Curve2D, Drawing, Edge, Line, Smooth
+from cfmkit.export.geometry import TOLERANCE, Arc, Contour, Curve2D, Drawing, Edge, Line, Sheet, Smooth
 from cfmkit.families.cam.build import assemble_sides, flanks_crossing
 from cfmkit.families.findings import mm
 from cfmkit.families.refusals import CannotBuild
@@ -48,7 +48,9 @@ def drawing(spec: CamSpec, tolerance: float = TOLERANCE) -> Drawing:
     paths = Contour((path_edge(profiles[0]),), "path"), Contour((path_edge(profiles[1]).mirrored(),), "path")
     plate = sides[0].spec.mechanism.plate
     contours = (*plate_contours(profiles, plate), *paths)
-    return Drawing("cam", contours, tuple(_tables(profiles)), plate_notes(profiles, plate))
+    contact = sides[0].spec.mechanism.contact
+    sheet = Sheet(plate.thickness or (contact.width if contact else None), key="mechanism.plate.thickness")
+    return Drawing("cam", contours, tuple(_tables(profiles)), plate_notes(profiles, plate), sheet)
 
 
 def plate_contours(profiles: Profiles, plate: Plate) -> tuple[Contour, ...]:

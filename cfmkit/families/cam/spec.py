@@ -126,6 +126,9 @@ class Plate(Model):
     base_height: NonNegativeLength = Field(0.040, description="tab below the cam that carries it; 0 for none")
     base_width: PositiveLength | None = Field(None, description="width of the tab; default: what the rollers leave")
     hole_diameter: NonNegativeLength = Field(0.0066, description="fixing holes; 0 for none")
+    thickness: PositiveLength | None = Field(
+        None, description="of the sheet, for bodies (STL, 3MF, STEP); default: width of the contact, if that is given"
+    )
 
 
 class Contact(Model):

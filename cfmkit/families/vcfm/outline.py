@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.export.geometry import TOLERANCE, Arc, Contour, Curve2D, Drawing, Edge, Line, Smooth
+from cfmkit.export.geometry import TOLERANCE, Arc, Contour, Curve2D, Drawing, Edge, Line, Region, Sheet, Smooth
 from cfmkit.families.vcfm.build import RIM, strip_of
 
 if TYPE_CHECKING:
@@ -36,7 +36,17 @@ def drawing(spec: VcfmSpec, tolerance: float = TOLERANCE) -> Drawing:
     leaves, low = leaves_contours(spec)
     places, heights, _ = _centre_line(spec)
     table = Curve2D("leaf", {"x": (places, "length"), "y": (heights, "length")})
-    return Drawing("vcfm", (*leaves, *spring_contours(spec, low - GAP)), (table,), tuple(_notes(spec)))
+    spring = spring_contours(spec, low - GAP)
+    return Drawing("vcfm", (*leaves, *spring), (table,), tuple(_notes(spec)), _sheet(spec, spring))
+
+
+def _sheet(spec: VcfmSpec, spring: Sequence[Contour]) -> Sheet:
+    """Return the widths of both parts: that of the leaves, and that of the spring around its outline."""
+    x0, y0, x1, y1 = spring[0].extents
+    around = np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]]) + GAP / 4 * np.array(
+        [[-1, -1], [1, -1], [1, 1], [-1, 1]]
+    )
+    return Sheet(spec.mechanism.bistable.width, (Region(around, spec.mechanism.positive.width),))
 
 
 def _notes(spec: VcfmSpec) -> Iterator[str]:

@@ -7,12 +7,12 @@ end and at the slider, links wider than any flexure.
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.export.geometry import Contour, Curve2D, Drawing, Line, polygon
+from cfmkit.export.geometry import Contour, Curve2D, Drawing, Line, Region, Sheet, polygon
 from cfmkit.families.slider_crank.build import linkage_of, unloaded_angle
 from cfmkit.families.slider_crank.printed.assembly import corners, flexures_of, strip_of
 
@@ -37,9 +37,9 @@ def drawing(spec: SliderCrankSpec) -> Drawing:
     linkage = linkage_of(spec.mechanism)
     unloaded = unloaded_angle(spec.mechanism, linkage)
     if spec.fidelity == "beam":
-        return _strip(
-            strip_of(spec.mechanism, linkage, unloaded), spec.mechanism.beam.offset if spec.mechanism.beam else 0
-        )
+        beam = spec.mechanism.beam
+        drawn = _strip(strip_of(spec.mechanism, linkage, unloaded), beam.offset if beam else 0)
+        return replace(drawn, sheet=Sheet(beam.width if beam else None))
     parts = flexures_of(spec.mechanism)
     points = corners(spec.mechanism, None, linkage, unloaded)
     thick = [0.5 * one.thickness for one in parts]
@@ -53,7 +53,21 @@ def drawing(spec: SliderCrankSpec) -> Drawing:
         "thickness": (np.repeat([one.thickness for one in parts], 2), "length"),
         "width": (np.repeat([one.width for one in parts], 2), "length"),
     }
-    return Drawing("slider-crank", _piece(points[order], half), (Curve2D("flexures", table),))
+    widest = max(one.width for one in parts)
+    regions = tuple(
+        Region(_around(points[2 * k], points[2 * k + 1], bar), one.width)
+        for k, one in enumerate(parts)
+        if one.width < widest
+    )
+    sheet = Sheet(widest, regions)
+    return Drawing("slider-crank", _piece(points[order], half), (Curve2D("flexures", table),), sheet=sheet)
+
+
+def _around(start: FloatArray, end: FloatArray, half: float) -> FloatArray:
+    """Return the rectangle with a straight line as its middle and a half height [m]."""
+    along = (end - start) / np.hypot(*(end - start))
+    side = half * np.array([-along[1], along[0]])
+    return np.array([start - side, end - side, end + side, start + side])
 
 
 def _strip(strip: Strip, offset: float) -> Drawing:

@@ -6,12 +6,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.export.geometry import Arc, Contour, Drawing, Line, circle
+from cfmkit.export.geometry import Arc, Contour, Drawing, Line, Sheet, circle
 from cfmkit.families.slider_crank.build import linkage_of
 
 if TYPE_CHECKING:
     from cfmkit.families.slider_crank.spec import SliderCrankSpec
 
+
+KEY = "mechanism.part.sheet"
+"""Says how thick the links are: without springs that are part of them, they have no width."""
 
 EYE_SHARE, HOLE_SHARE = 0.08, 0.04
 """Radii of eyes and pin holes in lengths of the shorter link."""
@@ -33,4 +36,5 @@ def drawing(spec: SliderCrankSpec) -> Drawing:
         )
         contours.append(Contour(edges, "cut", closed=True))
         contours += [circle((x, y), hole, "cut", hole=True) for x in (0.0, length)]
-    return Drawing("slider-crank", tuple(contours))
+    part = spec.mechanism.part
+    return Drawing("slider-crank", tuple(contours), sheet=Sheet(part.sheet if part else None, (), KEY))

@@ -1,0 +1,212 @@
+"""Drawings as bodies: outlines extruded by the thickness of the sheet, closed surfaces of triangles.
+
+A body of one thickness is a prism. Where regions are thinner or thicker, it has steps, symmetric about its middle
+plane: flexures of another width than their links. Every body stands on z = 0.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.arrays import FloatArray, read_only
+from cfmkit.errors import GeometryError
+from cfmkit.specs.units import to_border
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from numpy.typing import NDArray
+
+    from cfmkit.export.geometry import Sheet
+    from cfmkit.export.outlines import Outline
+
+SPECK = 1e-13
+"""Faces smaller than this are rounding, where the edge of a region runs along the edge of the part [m2]."""
+GRID = 1e-9
+"""Points of outlines and regions that are nearer to each other are one [m]."""
+
+
+@dataclass(frozen=True)
+class Body:
+    """A closed surface of triangles.
+
+    Attributes
+    ----------
+    points : (n, 3) array
+        [m]
+    triangles : (m, 3) array of int
+        Counter-clockwise seen from outside.
+    """
+
+    points: FloatArray
+    triangles: NDArray[np.int64]
+
+    @property
+    def corners(self) -> FloatArray:
+        """Corners of the triangles, (m, 3, 3) [mm]."""
+        return np.asarray(to_border(self.points, "length"))[self.triangles]
+
+    @property
+    def volume(self) -> float:
+        """Of what is inside [m3]."""
+        a, b, c = self.points[self.triangles].swapaxes(0, 1)
+        return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6)
+
+
+@dataclass(frozen=True)
+class Plate:
+    """One part seen from above: a polygon of shapely, cut into faces of one thickness each [m]."""
+
+    faces: tuple[tuple[Any, float], ...]
+
+
+def plates(drawn: Sequence[Outline], sheet: Sheet, tolerance: float) -> tuple[Plate, ...]:
+    """Return what a drawing cuts, with the thickness of every face.
+
+    Parameters
+    ----------
+    drawn : sequence of Outline
+        Of the drawing.
+    sheet : Sheet
+        How thick it is.
+    tolerance : float
+        Largest distance of the polygons from the arcs of the outlines [m].
+
+    Raises
+    ------
+    cfmkit.errors.GeometryError
+        If nothing says how thick the parts are, or nothing is to be cut.
+    """
+    from shapely import Polygon, set_precision
+
+    if sheet.thickness is None:
+        where = f"give {sheet.key!r}, such as 5 mm" if sheet.key else "its family has no such key"
+        raise GeometryError(f"nothing says how thick the part is: {where}")
+    cut = [one for one in drawn if one.layer == "cut" and one.closed]
+    chains = [(one, one.chain.flattened(tolerance)) for one in cut]
+    rings = [(one, Polygon(np.column_stack([points.real, points.imag]))) for one, points in chains]
+    solids = [ring for one, ring in rings if not one.hole]
+    if not solids:
+        raise GeometryError("nothing is to be cut: there is no body")
+    found = []
+    for solid in solids:
+        holes = [ring.exterior for one, ring in rings if one.hole and solid.contains(ring)]
+        found.append(_faces(set_precision(Polygon(solid.exterior, holes), GRID), sheet))
+    return tuple(found)
+
+
+def _faces(part: Any, sheet: Sheet) -> Plate:
+    """Return a part cut along the edges of the regions that lie in it."""
+    from shapely import Polygon, prepare, set_precision, union_all
+    from shapely.ops import polygonize
+
+    usual = float(sheet.thickness or 0.0)
+    other = [one for one in sheet.regions if one.thickness != usual]
+    areas = [(set_precision(Polygon(one.polygon), GRID), one.thickness) for one in other]
+    areas = [(area, thickness) for area, thickness in areas if area.intersection(part).area > SPECK]
+    if not areas:
+        return Plate(((part, usual),))
+    lines = union_all([part.boundary, *(area.boundary.intersection(part) for area, _ in areas)], grid_size=GRID)
+    prepare(part)
+    faces = []
+    for face in polygonize(lines):
+        inside = face.representative_point()
+        if part.contains(inside):
+            faces.append((face, max((t for area, t in areas if area.contains(inside)), default=usual)))
+    return Plate(tuple(faces))
+
+
+def bodies(found: Sequence[Plate]) -> tuple[Body, ...]:
+    """Return parts as closed surfaces.
+
+    Raises
+    ------
+    cfmkit.errors.GeometryError
+        If a surface is not closed.
+    """
+    return tuple(_body(plate) for plate in found)
+
+
+def _body(plate: Plate) -> Body:
+    flat, corners, halves = _triangles(plate)
+    levels = sorted({level for half in set(halves.tolist()) for level in (-half, half)})
+    shell = _Shell(flat, np.array(levels))
+    for triangle, half in zip(corners.tolist(), halves.tolist(), strict=True):
+        shell.add_lid(triangle, half)
+    for start, end, below, above in _steps(corners, halves):
+        shell.add_wall(start, end, below, above)
+    return shell.closed()
+
+
+def _triangles(plate: Plate) -> tuple[FloatArray, NDArray[np.int64], FloatArray]:
+    """Return points (n, 2) [m], triangles (m, 3) counter-clockwise and half the thickness of each (m,) [m]."""
+    from shapely import constrained_delaunay_triangles, get_coordinates
+
+    places, halves = [], []
+    for face, thickness in plate.faces:
+        found = constrained_delaunay_triangles(face).geoms
+        places.append(get_coordinates(list(found)).reshape(-1, 4, 2)[:, :3])
+        halves.append(np.full(len(found), 0.5 * thickness))
+    points, which = np.unique(np.concatenate(places).reshape(-1, 2), axis=0, return_inverse=True)
+    corners = which.reshape(-1, 3)
+    a, b, c = points[corners].swapaxes(0, 1)
+    clockwise = (b - a)[:, 0] * (c - a)[:, 1] < (b - a)[:, 1] * (c - a)[:, 0]
+    corners[clockwise] = corners[clockwise][:, ::-1]
+    return points, corners, np.concatenate(halves)
+
+
+def _steps(corners: NDArray[np.int64], halves: FloatArray) -> Iterator[tuple[int, int, float, float]]:
+    """Yield the edges at which the body steps down to their right: start, end, height there and to the left [m]."""
+    height: dict[tuple[int, int], float] = {}
+    for (a, b, c), half in zip(corners.tolist(), halves.tolist(), strict=True):
+        for edge in ((a, b), (b, c), (c, a)):
+            if edge in height:
+                raise GeometryError("the outline overlaps itself: its body has no closed surface")
+            height[edge] = half
+    for (a, b), half in height.items():
+        beyond = height.get((b, a), 0.0)
+        if beyond < half:
+            yield a, b, beyond, half
+
+
+class _Shell:
+    """Collects the triangles of a body; points are those of the plane at every level, those that are used."""
+
+    def __init__(self, flat: FloatArray, levels: FloatArray) -> None:
+        self._flat, self._levels = flat, levels
+        self._level = {float(level): k for k, level in enumerate(levels)}
+        self._triangles: list[tuple[int, int, int]] = []
+
+    def _at(self, point: int, level: int) -> int:
+        return point * len(self._levels) + level
+
+    def add_lid(self, triangle: list[int], half: float) -> None:
+        """Add a triangle of the upper and of the lower side."""
+        a, b, c = triangle
+        top, bottom = self._level[half], self._level[-half]
+        self._triangles.append((self._at(a, top), self._at(b, top), self._at(c, top)))
+        self._triangles.append((self._at(a, bottom), self._at(c, bottom), self._at(b, bottom)))
+
+    def add_wall(self, start: int, end: int, below: float, above: float) -> None:
+        """Add what stands on an edge: one wall around the part, two where it steps."""
+        spans = ((-above, -below), (below, above)) if below else ((-above, above),)
+        for low, high in spans:
+            for k in range(self._level[low], self._level[high]):
+                a, b = self._at(start, k), self._at(end, k)
+                self._triangles += [(a, b, b + 1), (a, b + 1, a + 1)]
+
+    def closed(self) -> Body:
+        """Return the body, on z = 0; GeometryError where an edge has no second triangle."""
+        triangles = np.array(self._triangles)
+        edges = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+        size = len(self._flat) * len(self._levels)
+        keys, back = np.sort(edges @ [size, 1]), np.sort(edges @ [1, size])
+        if len(np.unique(keys)) != len(keys) or not np.array_equal(keys, back):
+            raise GeometryError("the outline has no closed body: it touches itself")
+        used, which = np.unique(triangles, return_inverse=True)
+        flat, height = self._flat[used // len(self._levels)], self._levels[used % len(self._levels)]
+        points = np.column_stack([flat, height - self._levels[0]])
+        return Body(read_only(points), which.reshape(-1, 3))
