@@ -18,8 +18,8 @@ from cfmkit.export.svg import svg_bytes, write_svg
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from cfmkit.export.arc_outlines import Outline
     from cfmkit.export.geometry import Drawing
-    from cfmkit.export.outlines import Outline
 
 __all__ = ["FORMATS", "TOLERANCE", "USUAL", "files", "write_dxf", "write_points", "write_svg"]
 

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from types import ModuleType
 
+    from cfmkit.export.arc_outlines import Outline
     from cfmkit.export.geometry import Region, Sheet
-    from cfmkit.export.outlines import Outline
 
 STRAIGHT = 1e-6
 """Arcs that rise less over their chord are lines: less than a CAD kernel can tell [mm]."""
