@@ -189,7 +189,7 @@ def check(result: Result | AnySpec) -> tuple[Outcome, ...]:
 
     result = _result_of(result)
     values = values_of_family(family(result.spec.family).values)
-    return checked(result.spec.requirements, result, values)
+    return checked(result.spec.part_requirements, result, values)
 
 
 def sweep(spec: AnySpec, jobs: int = 1, **block: Any) -> StudyResult:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from cfmkit import api
 from cfmkit.families import family
 from cfmkit.metrics import Window, known_metrics, left_of, split_name, window_of
+from cfmkit.specs.many_parts import OF_MANY_PARTS
 from cfmkit.specs.units import border_unit, format_short, to_border
 
 if TYPE_CHECKING:
@@ -58,7 +59,9 @@ def rows(report: Report, everything: bool = False) -> list[NumberRow]:
     wanted = report.metrics if everything else (*family(report.result.spec.family).headline, *HEADLINE)
     plain = [name for name in dict.fromkeys(wanted) if name not in asked and "[" not in name]
     found = [_number(report, name) for name in plain if _has_value(report, name)]
-    required = zip(report.result.spec.requirements, report.requirements, strict=True)
+    spec = report.result.spec
+    judged = spec.requirements if len(report.requirements) == len(spec.requirements) else spec.part_requirements
+    required = zip(judged, report.requirements, strict=True)
     return [*found, *(_requirement(report, *pair) for pair in required)]
 
 
@@ -166,6 +169,8 @@ def _requirement(report: Report, requirement: Requirement, outcome: Outcome) -> 
 
 def _kept(report: Report, outcome: Outcome) -> str:
     """Return the value of a metric that keeps its bound, branch by branch, over the window it was measured in."""
+    if outcome.metric in OF_MANY_PARTS:
+        return _short(report.metrics[outcome.metric], 3)
     window = Window(*outcome.over) if outcome.over else None
     measured = api.evaluate(report.result, window=window)
     return _branches(report, outcome.metric, measured) + _over(report, outcome.metric, window)

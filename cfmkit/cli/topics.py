@@ -107,6 +107,7 @@ def units_page() -> Answer:
 def metrics_page() -> Answer:
     """Return the metrics that every family has."""
     from cfmkit.metrics import definitions
+    from cfmkit.specs.many_parts import OF_MANY_PARTS
     from cfmkit.specs.units import border_unit
 
     records = [
@@ -117,6 +118,9 @@ def metrics_page() -> Answer:
             "per_branch": item.per_branch,
         }
         for item in definitions("force")
+    ]
+    records += [
+        {"name": name, "unit": "1", "definition": about, "per_branch": False} for name, about in OF_MANY_PARTS.items()
     ]
     text = (
         "Over the requirement's `over`, else analysis.window, else the full travel. Without a branch the worst one "
@@ -272,12 +276,12 @@ def _materials() -> Records:
 
 def _metrics() -> Records:
     from cfmkit.metrics import definitions
+    from cfmkit.specs.many_parts import OF_MANY_PARTS
     from cfmkit.specs.units import border_unit
 
-    return _gathered(
-        (one.name, {"name": one.name, "unit": border_unit(one.dimension), "definition": one.definition})
-        for one in definitions(None)
-    )
+    known = [(one.name, border_unit(one.dimension), one.definition) for one in definitions(None)]
+    known += [(name, "1", about) for name, about in OF_MANY_PARTS.items()]
+    return _gathered((name, {"name": name, "unit": unit, "definition": definition}) for name, unit, definition in known)
 
 
 def _values() -> Records:

@@ -13,6 +13,7 @@ from cfmkit.metrics.branch_views import span_text
 from cfmkit.metrics.evaluation import Survey, Surveys, Value, kind_of, survey_of, window_of
 from cfmkit.metrics.report import finite_border
 from cfmkit.metrics.table import Definition, branch_fault, known_metrics, split_name, unknown_metric
+from cfmkit.specs.many_parts import OF_MANY_PARTS
 from cfmkit.specs.units import DIMENSIONS, SHARE, border_unit, format_short, read_one_of, to_border
 
 if TYPE_CHECKING:
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 
     from cfmkit.curves import Kind
     from cfmkit.metrics.traces import Window
-    from cfmkit.results import Result
+    from cfmkit.results import Quantity, Result
     from cfmkit.specs.spec import Requirement, Spec
 
 
@@ -193,6 +194,11 @@ def _faults(
 ) -> Iterator[tuple[str, str]]:
     """Yield (key, what is wrong) for one requirement."""
     name, branch = split_name(requirement.metric)
+    if requirement.metric in OF_MANY_PARTS:
+        yield from _bound_faults(requirement, ("ratio",))
+        if requirement.over is not None:
+            yield "over", f"{name!r} is a share of parts, which has no window; remove 'over'"
+        return
     if name not in table:
         yield "metric", unknown_metric(name, table)
         return
@@ -254,6 +260,17 @@ def check(
     table = _by_name(known)
     surveys = {} if surveys is None else surveys
     return tuple(_outcome(requirement, result, table, surveys) for requirement in requirements)
+
+
+def of_many(requirement: Requirement, found: Quantity) -> Outcome:
+    """Return the outcome of a requirement on a metric of many parts, such as their yield."""
+    limits = Bounds.of(requirement, found.dimension)
+    value = Value(found.value, found.reason)
+    told = limits.sentence(requirement.metric, value, "")
+    ends = limits.min, limits.max
+    return Outcome(
+        requirement.metric, found.dimension, found.value, *ends, None, "force", limits.met(found.value), told
+    )
 
 
 def _own(result: Result) -> Iterator[Definition]:

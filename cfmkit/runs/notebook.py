@@ -43,7 +43,7 @@ class Analysis(Result):
         """What became of each requirement of the specification."""
         from cfmkit.metrics import check, values_of_family
 
-        return check(self.spec.requirements, self, values_of_family(family(self.spec.family).values))
+        return check(self.spec.part_requirements, self, values_of_family(family(self.spec.family).values))
 
     def _repr_html_(self) -> str:
         """Return what a notebook shows."""

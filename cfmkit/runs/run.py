@@ -220,11 +220,26 @@ def analysed(spec: Spec, run: Run) -> Report:
 
 
 def designed(spec: Spec, run: Run) -> Report:
-    """Return the report on the designed mechanism, or on why there is none."""
+    """Return the report on the designed mechanism, with the yield of its parts, or on why there is none."""
     design = api.design(spec, run)
     result = api.analyze(design.spec, run) if design.spec is not None else run_findings.undesigned(spec, design)
     tables = {f"{stem}.csv": partial(_csv, table) for stem, table in design.tables.items()}
-    return run_findings.report_on(result, design).beside({}, run_findings.Supplement(files=tables, lines=design.notes))
+    found = run_findings.report_on(result, design)
+    found = found.beside({}, run_findings.Supplement(files=tables, lines=design.notes))
+    return _of_many_parts(found, spec, run)
+
+
+def _of_many_parts(found: Report, given: Spec, run: Run) -> Report:
+    """Return a report with what is known of many parts of its design, where their tolerances are given."""
+    if found.result.status is not Status.COMPLETE:
+        return found
+    from cfmkit.studies.made_parts import yields_of
+
+    yields = yields_of(found.result, given, run)
+    if yields is None:
+        return found
+    more = run_findings.Supplement(data={"yield": yields.as_json()}, lines=(("yield", yields.sentence()),))
+    return found.beside(yields.quantities(), more).of_many_parts()
 
 
 def _csv(table: Callable[[], Table]) -> bytes:

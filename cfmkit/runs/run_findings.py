@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 from cfmkit import api
 from cfmkit.errors import ExitCode
+from cfmkit.metrics.requirements import of_many
 from cfmkit.results import Result, Status
+from cfmkit.specs.many_parts import OF_MANY_PARTS
 from cfmkit.tables.jsontext import json_bytes
 
 if TYPE_CHECKING:
@@ -125,6 +127,19 @@ class Report:
         """Return the report with more to say."""
         both = self.supplement.plus(supplement)
         return replace(self, metrics={**self.metrics, **metrics}, supplement=both)
+
+    def of_many_parts(self) -> Report:
+        """Return the report with the outcome of requirements on a yield, which its metrics have, in their places."""
+        single = iter(self.requirements)
+        spec = self.result.spec
+        judged = tuple(
+            of_many(one, self.metrics[one.metric])
+            if one.metric in self.metrics and one.metric in OF_MANY_PARTS
+            else next(single)
+            for one in spec.requirements
+            if one.metric not in OF_MANY_PARTS or one.metric in self.metrics
+        )
+        return replace(self, requirements=judged)
 
     def as_json(self) -> dict[str, Any]:
         """Return what metrics.json says; what only a design search knows is a block of its own, no metric."""

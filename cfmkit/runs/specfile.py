@@ -156,7 +156,7 @@ def bind(document: Document) -> Spec:
         more = [found for found in _requirement_faults(document, family, raw) if not _below(found.path, told)]
         raise SpecError(_in_order([*error.problems, *more])) from None
     found = [*_requirement_faults(document, family, enumerate(spec.requirements)), *_sweep_faults(document, spec)]
-    found += _sensitivity_faults(document, spec)
+    found += [*_sensitivity_faults(document, spec), *_design_faults(document, spec)]
     if found:
         raise SpecError(found)
     return spec
@@ -213,6 +213,23 @@ def _sensitivity_faults(document: Document, spec: Spec) -> Iterator[Problem]:
 
     for path, message in faults(spec, spec.sensitivity):
         yield document.problem(path, message)
+
+
+def _design_faults(document: Document, spec: Spec) -> Iterator[Problem]:
+    """Yield what is wrong with the tolerances of the block `design`, each with its place in the file."""
+    from cfmkit.specs.many_parts import OF_MANY_PARTS
+    from cfmkit.specs.spec import DesignKeys
+
+    design = getattr(spec, "design", None)  # a family need not have this block, nor another package's these keys
+    if isinstance(design, DesignKeys):
+        from cfmkit.studies.made_parts import faults
+
+        for path, message in faults(spec, design):
+            yield document.problem(path, message)
+    asked = (one for one in enumerate(spec.requirements) if one[1].metric in OF_MANY_PARTS)
+    for index, one in asked if not getattr(design, "tolerances", None) else ():
+        message = f"{one.metric!r} is a share of made parts: say with 'design.tolerances' how they are made"
+        yield document.problem(("requirements", index, "metric"), message)
 
 
 def placed(document: Document, path: str, message: str) -> Problem:

@@ -9,10 +9,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
-from typing import Annotated, Any, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model, field_validator, model_validator
 
+from cfmkit.specs.many_parts import OF_MANY_PARTS
 from cfmkit.specs.units import (
     DIMENSIONS,
     SHARE,
@@ -171,6 +172,45 @@ class Sensitivity(Model):
     design: bool = Field(False, description="redesign the mechanism at each point")
 
 
+class DesignKeys(Model):
+    """What every family's `design` block may say about parts as they are made."""
+
+    tolerances: dict[str, tuple[MetricValue, MetricValue] | Tolerance] | None = Field(
+        None,
+        min_length=1,
+        description="how far values of made parts are off, as in `sensitivity.parameters`: {path: {normal: 0.02 mm}}",
+    )
+    correlated: tuple[Correlated, ...] = Field((), description="tolerances that deviate together, as in `sensitivity`")
+    samples: int = Field(
+        400, ge=20, le=1_000_000, description="parts that are drawn from the tolerances to judge the design"
+    )
+    seed: int | None = Field(None, ge=0, description="of the parts that are drawn; default: `--seed`")
+
+
+if TYPE_CHECKING:
+    DesignBlock = DesignKeys
+else:
+    # 'yield' is a word of Python's own: a field of that name cannot be written down in a class
+    DesignBlock = create_model(
+        "DesignBlock",
+        __base__=DesignKeys,
+        __doc__="What every family's `design` block has; families add their own keys.",
+        __module__=__name__,
+        **{
+            "yield": (
+                Ratio | None,
+                Field(None, gt=0, lt=1, description="share of made parts that is to meet all requirements: 95 %"),
+            )
+        },
+    )
+
+
+def yield_wanted(design: Any) -> float | None:
+    """Return the share of good parts that a `design` block asks for; None where it asks for none."""
+    found: float | None = getattr(design, "yield", None)
+    return found
+
+
 class Spec(Model):
     """A complete specification of one mechanism; families narrow the blocks."""
 
@@ -201,6 +241,11 @@ class Spec(Model):
         """The model that the analysis uses; None where its family has one only."""
         found: str | None = getattr(getattr(self, "analysis", None), "fidelity", None)
         return found
+
+    @property
+    def part_requirements(self) -> tuple[Requirement, ...]:
+        """The requirements that a single part meets or misses: all but those on a yield."""
+        return tuple(one for one in self.requirements if one.metric not in OF_MANY_PARTS)
 
     @property
     def motion(self) -> Literal["length", "angle"] | None:

@@ -48,7 +48,7 @@ def evaluate_block(study: Study, plan: Plan, start: int, stop: int) -> ResultRow
     done = np.zeros(stop - start, dtype=bool) if answer is None else answer.done
     singly = np.flatnonzero(~done).tolist()
     rest = gathered(
-        [study.evaluate(plan.point(start + k)) for k in singly], len(study.metrics), len(study.spec.requirements)
+        [study.evaluate(plan.point(start + k)) for k in singly], len(study.metrics), len(study.spec.part_requirements)
     )
     if answer is None:
         return rest
@@ -104,7 +104,7 @@ def measures(study: Study) -> tuple[Measure, ...]:
 
 def map_requirements(study: Study) -> tuple[Measure, ...]:
     """Return what the requirements ask for."""
-    return tuple(Measure(split_name(one.metric)[0], _over(study, one)) for one in study.spec.requirements)
+    return tuple(Measure(split_name(one.metric)[0], _over(study, one)) for one in study.spec.part_requirements)
 
 
 def _window(study: Study) -> tuple[float, float] | None:
@@ -161,8 +161,8 @@ def _keeping(limits: Bounds, values: FloatArray) -> NDArray[np.bool_]:
 def _met(study: Study, answer: BlockAnswer) -> NDArray[np.bool_]:
     """Return whether each requirement is met, (n, r): by the branch that is named, or by all."""
     known = _known(study, answer)
-    met = np.ones((len(answer.done), len(study.spec.requirements)), dtype=bool)
-    for k, one in enumerate(study.spec.requirements):
+    met = np.ones((len(answer.done), len(study.spec.part_requirements)), dtype=bool)
+    for k, one in enumerate(study.spec.part_requirements):
         plain, branch = split_name(one.metric)
         limits = Bounds.of(one, known[plain].dimension)
         by_branch = answer.values[len(study.metrics) + k]

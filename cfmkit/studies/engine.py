@@ -112,11 +112,11 @@ class Work:
 
     def gather(self, *rows: Row) -> ResultRows:
         """Return single rows as the rows of this study."""
-        return gathered(rows, len(self.study.metrics), len(self.study.spec.requirements))
+        return gathered(rows, len(self.study.metrics), len(self.study.spec.part_requirements))
 
     def recall(self, told: Any) -> ResultRows:
         """Return the rows that a record of the journal is."""
-        return recalled(told, len(self.study.metrics), len(self.study.spec.requirements))
+        return recalled(told, len(self.study.metrics), len(self.study.spec.part_requirements))
 
 
 class Monitor(Protocol):

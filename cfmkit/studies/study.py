@@ -204,7 +204,7 @@ class Study:
         extra = values_of_family(family(result.spec.family).values)
         surveys: Surveys = {}
         values = tuple(_finite(item.value) for item in self.quantities(result, surveys))
-        met = tuple(outcome.ok for outcome in check(result.spec.requirements, result, extra, surveys))
+        met = tuple(outcome.ok for outcome in check(result.spec.part_requirements, result, extra, surveys))
         message = _gaps(result) if result.status is Status.COMPLETE else result.message
         curve = _curve(result) if self.curves else b""
         return Row(result.status, values, met, message, curve, warnings=warnings)

@@ -47,7 +47,7 @@ class Objective:
 
 def objective(study: Study) -> Objective | None:
     """Return by what the best point is chosen; None where the study notes nothing of the kind."""
-    for one in study.spec.requirements:
+    for one in study.spec.part_requirements:
         for name in (one.metric, other_name(one.metric)):
             if name in study.names:
                 return Objective(study.names.index(name), one.max is None)
@@ -59,7 +59,7 @@ def objective(study: Study) -> Objective | None:
 
 def main_columns(study: Study, headline: tuple[str, ...]) -> tuple[int, ...]:
     """Return the columns that are looked at first: the objective, the requirements, the family's headline."""
-    required = [name for one in study.spec.requirements for name in (one.metric, other_name(one.metric))]
+    required = [name for one in study.spec.part_requirements for name in (one.metric, other_name(one.metric))]
     wanted = [*required, *DEFAULT_OBJECTIVES, *headline, *study.names]
     chosen = objective(study)
     first = [] if chosen is None else [chosen.column]
@@ -102,7 +102,7 @@ class Summary:
 
     def __post_init__(self) -> None:
         """Start at zero."""
-        self.met = np.zeros(len(self.study.spec.requirements), dtype=np.int64)
+        self.met = np.zeros(len(self.study.spec.part_requirements), dtype=np.int64)
         columns = len(self.study.metrics)
         self._low, self._high = np.full(columns, np.inf), np.full(columns, -np.inf)
         self._goal = objective(self.study)
@@ -251,7 +251,7 @@ class Summary:
         return [{"name": WINDOW_OUTSIDE, "message": f"{told} ({self.first_gap}); {cure}"}]
 
     def _requirements(self) -> list[dict[str, Any]]:
-        listed = zip(self.study.spec.requirements, self.met.tolist(), strict=True)
+        listed = zip(self.study.spec.part_requirements, self.met.tolist(), strict=True)
         return [
             {"metric": one.metric, "min": one.min, "max": one.max, "met": count, "of": self.usable, "ok": count > 0}
             for one, count in listed

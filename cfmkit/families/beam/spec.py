@@ -15,7 +15,7 @@ from cfmkit.families.beam.parts.spec import (
 )
 from cfmkit.families.beam.shaping.spec import Optimise, optimise_faults
 from cfmkit.specs.formula import formula
-from cfmkit.specs.spec import Analysis, Displacement, Model, Spec, refuse
+from cfmkit.specs.spec import Analysis, DesignBlock, Displacement, Model, Spec, refuse
 from cfmkit.specs.units import DIMENSIONS, Factor, Force, Length, Ratio, Torque
 from cfmkit.specs.units.fields import LARGEST
 from cfmkit.tables.source import DataSource
@@ -98,7 +98,7 @@ class Rescale(Model):
         return self
 
 
-class BeamDesign(Model):
+class BeamDesign(DesignBlock):
     """What `cfmkit design` is to do."""
 
     rescale: Rescale | None = Field(None, description="another size, section or material for the same curve")

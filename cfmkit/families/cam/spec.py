@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
 
-from cfmkit.specs.spec import Analysis, Model, OldWords, Spec, refuse
+from cfmkit.specs.spec import Analysis, DesignBlock, Model, OldWords, Spec, refuse
 from cfmkit.specs.units import Angle, Force, Inertia, Length, Mass, Ratio, Stiffness, Time, format_short
 from cfmkit.stock.spec import MaterialField, MaterialSpec, SafetyFactor
 from cfmkit.tables.source import DataSource
@@ -282,7 +282,7 @@ class CatalogueSpring(Model):
     counts: tuple[Annotated[int, Field(ge=1, le=1000)], ...] = Field((2,), description="numbers in parallel to try")
 
 
-class CamDesign(Model):
+class CamDesign(DesignBlock):
     """What `cfmkit design` is to reach, and what it may choose."""
 
     force: Annotated[Force, Field(gt=0)] = Field(description="target force, weight included if gravity is on")

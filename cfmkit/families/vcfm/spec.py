@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
-from cfmkit.specs.spec import Analysis, Model, Spec, refuse
+from cfmkit.specs.spec import Analysis, DesignBlock, Model, Spec, refuse
 from cfmkit.specs.units import Angle, Force, Length, Ratio, Stiffness
 from cfmkit.stock.spec import MaterialSpec, PositiveStress, SafetyFactor, material_input
 
@@ -149,7 +149,7 @@ class Mechanism(Model):
         return self.material.allowable(self.safety_factor)
 
 
-class VcfmDesign(Model):
+class VcfmDesign(DesignBlock):
     """What `cfmkit design` is to reach. Angle and thickness of the spring, and the number of leaves, stay."""
 
     force: Annotated[Force, Field(gt=0)] = Field(description="constant force without preload")

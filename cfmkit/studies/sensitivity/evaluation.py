@@ -111,7 +111,7 @@ class Evaluator:
             for _, rows in piece.records.batches():
                 self._numbers(rows)
             raise Interrupted
-        outputs = np.empty((count * size, len(self.study.metrics) + len(self.study.spec.requirements)))
+        outputs = np.empty((count * size, len(self.study.metrics) + len(self.study.spec.part_requirements)))
         for indices, rows in piece.records.batches():
             outputs[sequence[indices]] = self._numbers(rows)
         return outputs.reshape(count, size, -1)

@@ -196,7 +196,7 @@ def _tolerance(setup: Setup, evaluator: Evaluator) -> Findings:
     plain = Findings(
         setup, evaluator, tuple(found), points=blocks.points, outputs=blocks.outputs, replaced=blocks.replaced
     )
-    return _with_yield(plain, names) if setup.study.spec.requirements else plain
+    return _with_yield(plain, names) if setup.study.spec.part_requirements else plain
 
 
 def _with_yield(found: Findings, names: tuple[str, ...]) -> Findings:
@@ -225,7 +225,7 @@ def _stated(
 
 
 def _width(setup: Setup) -> int:
-    return len(setup.study.metrics) + len(setup.study.spec.requirements)
+    return len(setup.study.metrics) + len(setup.study.spec.part_requirements)
 
 
 METHODS: dict[str, Callable[[Setup, Evaluator], Findings]] = {

@@ -112,7 +112,7 @@ class Setup:
 
     def limits(self, metric: Metric) -> tuple[Bounds, ...]:
         """Return the requirements on a metric over its window, as bounds."""
-        mine = [one for one in self.study.spec.requirements if _noted(one) == (metric.name, metric.over)]
+        mine = [one for one in self.study.spec.part_requirements if _noted(one) == (metric.name, metric.over)]
         return tuple(Bounds.of(one, metric.dimension) for one in mine)
 
 
@@ -187,9 +187,9 @@ def _noted(one: Requirement) -> tuple[str, Ends | None]:
 
 def _metrics(spec: Spec, block: Sensitivity, sample: Curve | None) -> tuple[Metric, ...]:
     """Return the metrics that are requested; else those of the requirements, over their windows; else all."""
-    if block.metrics or not spec.requirements:
+    if block.metrics or not spec.part_requirements:
         return _numeric(metrics_of(spec, block.metrics, sample), block)
-    wanted = dict.fromkeys(map(_noted, spec.requirements))
+    wanted = dict.fromkeys(map(_noted, spec.part_requirements))
     plain = {one.name: one for one in metrics_of(spec, [name for name, _ in wanted], sample)}
     motion = sample.motion_dimension if sample is not None else "length"
     labels = {one: _label(plain[one[0]].label, one[1], motion) for one in wanted}
@@ -236,7 +236,7 @@ def _with_nominal(study: Study, result: Result) -> tuple[Study, Nominal, tuple[F
         Finding("no_value", f"{label} has no value for the specification itself ({reason}): left out")
         for label, reason in told.items()
     )
-    outcomes = check(study.spec.requirements, result, values_of_family(family(study.spec.family).values))
+    outcomes = check(study.spec.part_requirements, result, values_of_family(family(study.spec.family).values))
     values = np.array([row.values[k] for k in valued], dtype=np.float64)
     kept = replace(study, metrics=tuple(study.metrics[k] for k in valued))
     return kept, Nominal(result, outcomes, values), without
@@ -255,7 +255,7 @@ def _cautions(spec: Spec, block: Sensitivity, parameters: tuple[Parameter, ...],
         yield Finding("correlation_not_used", told)
     if block.method == "sobol" and samples & (samples - 1):
         yield Finding("unbalanced", f"{samples} is no power of two: a Sobol sequence is balanced at 64, 128, 256, ...")
-    if block.method == "tolerance" and not spec.requirements:
+    if block.method == "tolerance" and not spec.part_requirements:
         yield Finding("no_requirements", "without requirements there is no yield, only distributions")
     yield from _followers(spec, parameters)
 

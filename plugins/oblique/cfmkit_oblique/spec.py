@@ -6,7 +6,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from cfmkit.specs.spec import Analysis, Model, Spec
+from cfmkit.specs.spec import Analysis, DesignBlock, Model, Spec
 from cfmkit.specs.units import Force, Length, Ratio, Stiffness
 
 PositiveLength = Annotated[Length, Field(gt=0)]
@@ -40,7 +40,7 @@ class Mechanism(Model):
         return self
 
 
-class ObliqueDesign(Model):
+class ObliqueDesign(DesignBlock):
     """A force that stays constant over a range."""
 
     force: Annotated[Force, Field(gt=0)] = Field(description="where the oblique springs lie flat")

@@ -6,7 +6,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from cfmkit.specs.spec import Model
+from cfmkit.specs.spec import DesignBlock, Model
 from cfmkit.specs.units import Angle, Force, Length, Ratio, RotationalStiffness, Stiffness, Torque
 
 PositiveLength = Annotated[Length, Field(gt=0)]
@@ -46,7 +46,7 @@ class MaxRates(Model):
     slider: ExtensionRate | None = Field(None, description="extension at the slider")
 
 
-class SpringDesign(Model):
+class SpringDesign(DesignBlock):
     """What the springs are to keep constant, and what may be chosen for it."""
 
     torque: Torque | None = Field(

@@ -1,0 +1,494 @@
+"""Parts of a design as they are made: drawn from `design.tolerances` and judged by the requirements of the design.
+
+Parts are drawn as `cfmkit sensitivity --method tolerance` draws them, with the same grammar, and each is analysed in
+full. A part without a result is a bad part: whoever made it has nothing to sell.
+
+Errors that scale the force of a whole part, as that of the modulus does, are no matter of its shape. The yield is
+therefore told a second time with those frozen, and a third time after a trim that brings the mean force of each part to
+that of the design. Which errors those are is not guessed from their names: each is moved by its standard deviation, and
+common is what changes the force by the same share everywhere in the window.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.errors import CfmError, Problem, SpecError
+from cfmkit.families import family
+from cfmkit.metrics import split_name
+from cfmkit.metrics.requirements import Bounds
+from cfmkit.results import Quantity, Result
+from cfmkit.specs.many_parts import OF_MANY_PARTS
+from cfmkit.specs.spec import Sensitivity
+from cfmkit.studies.engine import Silent, Work
+from cfmkit.studies.engine import run as computed
+from cfmkit.studies.journal import Journal
+from cfmkit.studies.noted_metrics import metrics_of
+from cfmkit.studies.sensitivity.evaluation import plan_of
+from cfmkit.studies.sensitivity.intervals import LEVEL, clopper_pearson, wilson
+from cfmkit.studies.sensitivity.parameters import correlations, groups, parameters_of
+from cfmkit.studies.sensitivity.spreads import draw, values_at
+from cfmkit.studies.study import Study
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from numpy.typing import NDArray
+
+    from cfmkit.arrays import FloatArray
+    from cfmkit.curves import Curve
+    from cfmkit.families.base import Run
+    from cfmkit.specs.spec import DesignBlock, Spec
+    from cfmkit.studies.sensitivity.parameters import Parameter
+    from cfmkit.studies.study import Metric
+
+ALIKE = 0.1
+"""An error is common where it changes the force by the same share everywhere but for this share of that share."""
+
+FAINT = 0.05
+"""Where the force is below this share of its largest value, a share of it says nothing."""
+
+SCALED = ("force", "torque", "energy")
+"""Dimensions of metrics that go with the force when it is trimmed."""
+
+
+@dataclass(frozen=True)
+class Tolerances:
+    """The tolerances of a `design` block on one specification.
+
+    Attributes
+    ----------
+    spec : Spec
+        What is made.
+    block : Sensitivity
+        The tolerances in the block that studies know.
+    parameters : tuple of Parameter
+        What varies, lists taken apart.
+    samples, seed : int
+        How many parts are drawn, and from where.
+    """
+
+    spec: Spec
+    block: Sensitivity
+    parameters: tuple[Parameter, ...]
+    samples: int
+    seed: int
+
+    @property
+    def paths(self) -> tuple[str, ...]:
+        """What varies."""
+        return tuple(one.path for one in self.parameters)
+
+    @property
+    def nominal(self) -> FloatArray:
+        """The values of a perfect part [SI]."""
+        return np.array([one.spread.nominal for one in self.parameters])
+
+    def drawn(self, samples: int | None = None, seed: int | None = None) -> FloatArray:
+        """Return the values of made parts, (n, d) [SI]; of another seed those that no search has seen."""
+        generator = np.random.default_rng(self.seed if seed is None else seed)
+        unit = draw(correlations(self.block, self.paths), samples or self.samples, generator)
+        return values_at([one.spread for one in self.parameters], unit)
+
+    def joined(self) -> list[tuple[int, ...]]:
+        """Return the parameters that deviate as one: those correlated by 1 together, each other one alone."""
+        many = [members for members, correlation in groups(self.block, self.paths) if correlation == 1.0]
+        taken = {k for members in many for k in members}
+        return [*many, *((k,) for k in range(len(self.parameters)) if k not in taken)]
+
+
+def tolerances_of(spec: Spec, design: DesignBlock, seed: int) -> Tolerances | None:
+    """Return the tolerances of a `design` block on a specification; None where it has none.
+
+    Raises
+    ------
+    cfmkit.errors.SpecError
+        If a path is not in the specification, at ``design.tolerances`` and the path.
+    """
+    if not design.tolerances:
+        return None
+    block = Sensitivity.model_construct(
+        method="tolerance", parameters=design.tolerances, correlated=design.correlated, metrics=()
+    )
+    try:
+        parameters = parameters_of(spec, block)
+    except SpecError as error:
+        raise SpecError([replace(one, path=_renamed(one.path)) for one in error.problems]) from None
+    chosen = seed if design.seed is None else design.seed
+    return Tolerances(spec, block, parameters, design.samples, chosen)
+
+
+def _renamed(path: str) -> str:
+    """Return where a fault of a block `sensitivity` stands in a block `design`."""
+    head, _, rest = path.partition(".parameters.")
+    return f"design.tolerances.{rest}" if rest else head.replace("sensitivity", "design", 1)
+
+
+def faults(spec: Spec, design: DesignBlock) -> Iterator[tuple[tuple[str | int, ...], str]]:
+    """Yield what is wrong with a block's keys on made parts as far as that can be seen before anything is designed."""
+    from cfmkit.studies.spec_values import CannotVary, leaf
+
+    for path in design.tolerances or ():
+        try:
+            found = leaf(type(spec), path.replace(".*", ".0"))
+        except CannotVary as problem:
+            yield ("design", "tolerances", path), str(problem)
+            continue
+        if found.kind not in ("quantity", "number"):
+            yield ("design", "tolerances", path), f"{path!r} does not vary continuously"
+    if getattr(design, "yield") is not None and not design.tolerances:
+        yield ("design", "yield"), "a yield is a share of made parts: say with 'design.tolerances' how they are made"
+    if design.tolerances and not spec.part_requirements:
+        told = "whether a part is good is what 'requirements' decide: give at least one beside that on the yield"
+        yield ("design", "tolerances"), told
+
+
+@dataclass(frozen=True)
+class Share:
+    """How many of some parts are good.
+
+    Attributes
+    ----------
+    good, failed, count : int
+        Parts that meet everything, that have no complete result, and all.
+    why : str
+        What became of the first without a complete result.
+    """
+
+    good: int
+    failed: int
+    count: int
+    why: str = ""
+
+    @property
+    def value(self) -> float:
+        """The share of good ones."""
+        return self.good / self.count
+
+    def as_json(self) -> dict[str, Any]:
+        """Return what metrics.json says, with both intervals."""
+        return {
+            "value": self.value,
+            "wilson": list(wilson(self.good, self.count)),
+            "clopper_pearson": list(clopper_pearson(self.good, self.count)),
+            "level": LEVEL,
+            "good": self.good,
+            "failed": self.failed,
+            "parts": self.count,
+        }
+
+
+@dataclass(frozen=True)
+class Judged:
+    """Parts with what their analyses say.
+
+    Attributes
+    ----------
+    met : (n, r) array of bool
+        Which requirement each part meets; false where it has no result.
+    trimmed : (n, r) array of bool
+        The same after the trim.
+    failed : (n,) array of bool
+        Which parts have no result, or one that ends early.
+    why : str
+        What became of the first of those.
+    """
+
+    met: NDArray[np.bool_]
+    trimmed: NDArray[np.bool_]
+    failed: NDArray[np.bool_]
+    why: str = ""
+
+    def share(self, met: NDArray[np.bool_] | None = None) -> Share:
+        """Return the share of parts that meet every requirement."""
+        good = (self.met if met is None else met).all(axis=1)
+        return Share(int(good.sum()), int(self.failed.sum()), len(good), self.why)
+
+
+class _Told(Silent):
+    """Passes on how many parts are judged."""
+
+    def __init__(self, run: Run, what: str, count: int) -> None:
+        self._run, self._what, self._count, self._done = run, what, count, 0
+
+    def done(self, points: int, failed: int, reused: bool) -> None:
+        """Take that more parts are judged."""
+        self._done += points
+        self._run.progress(self._done / self._count, f"{self._done} of {self._count} {self._what}")
+
+
+def judge(made: Tolerances, values: FloatArray, nominal: Result, run: Run, what: str = "parts") -> Judged:
+    """Return what becomes of parts.
+
+    Parameters
+    ----------
+    made : Tolerances
+        Of the specification that is made.
+    values : (n, d) array
+        Of its parameters in each part [SI].
+    nominal : Result
+        Of the perfect part.
+    run : Run
+        Processes, notes and progress.
+    what : str
+        What progress calls them.
+    """
+    metrics, spec = _noted(made.spec, nominal), made.spec
+    work = Work(Study(spec, made.paths, metrics, seed=run.seed), plan_of(made.parameters, values))
+    journal = run.notes if isinstance(run.notes, Journal) else None
+    records = computed(work, run.executor, journal, _Told(run, what, len(values)))  # type: ignore[arg-type]
+    count = len(spec.part_requirements)
+    met, failed = np.zeros((len(values), count), dtype=bool), np.ones(len(values), dtype=bool)
+    found, why = np.full((len(values), len(metrics)), np.nan), ""
+    for indices, rows in records.batches():
+        why = why or next((text for status, text in rows.odd.values() if status.key != "complete"), "")
+        complete = np.ones(len(indices), dtype=bool)
+        complete[[k for k, (status, _) in rows.odd.items() if status.key != "complete"]] = False
+        failed[indices] = ~complete
+        met[indices] = rows.met & complete[:, None]
+        found[indices] = rows.values
+    return Judged(met, _trimmed(spec, nominal, metrics, found, met), failed, why)
+
+
+def _noted(spec: Spec, nominal: Result) -> tuple[Metric, ...]:
+    """Return what a trim needs to know of each part: the mean force, then each requirement's metric and its ends."""
+    curve = nominal.curve
+    prefix = "torque" if curve.kind == "torque" else "force"
+    # of one branch, always the same: the worse of two changes from part to part
+    wanted: list[tuple[str, Any]] = [(f"{prefix}_mean{_first_branch(curve)}", None)]
+    for one in spec.part_requirements:
+        wanted.append((one.metric, one.over))
+        if split_name(one.metric)[0] == "deviation_from_target":
+            wanted += [(f"{prefix}_{end}", one.over) for end in ("max", "min")]
+    return tuple(
+        replace(metrics_of(spec, [name], curve)[0], over=over, label=f"{k}") for k, (name, over) in enumerate(wanted)
+    )
+
+
+def _first_branch(curve: Curve) -> str:
+    return f"[{curve.branches[0]}]" if any(curve.branches) else ""
+
+
+def _trimmed(
+    spec: Spec, nominal: Result, metrics: Sequence[Metric], found: FloatArray, met: NDArray[np.bool_]
+) -> NDArray[np.bool_]:
+    """Return which requirements parts meet once their mean force is that of the design.
+
+    Metrics of forces go with the trim and shares of the force stay; a departure from a target follows from the ends of
+    the force. Whatever else follows the force in a way of its own is left as it was.
+    """
+    level = _value(nominal, metrics[0])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        factor = level / found[:, 0] if level is not None else np.full(len(found), np.nan)
+    column, out = 1, met.copy()
+    for k, one in enumerate(spec.part_requirements):
+        metric, values = metrics[column], found[:, column]
+        column += 1
+        if split_name(one.metric)[0] == "deviation_from_target":
+            ends = found[:, column : column + 2]
+            column += 2
+            if nominal.target:
+                values = np.abs(factor[:, None] * ends / nominal.target - 1.0).max(axis=1)
+        elif metric.dimension in SCALED:
+            values = factor * values
+        else:
+            continue
+        limits = Bounds.of(one, metric.dimension)
+        out[:, k] = [limits.met(value) for value in np.where(np.isfinite(values), values, np.inf).tolist()]
+        out[~np.isfinite(values), k] = False
+    return out
+
+
+def _value(nominal: Result, metric: Metric) -> float | None:
+    study = Study(nominal.spec, (), (metric,))
+    return study.quantities(nominal)[0].value
+
+
+def common(made: Tolerances, nominal: Result, run: Run) -> tuple[int, ...]:
+    """Return the parameters whose errors change the force by the same share everywhere in the window."""
+    found: list[int] = []
+    for members in made.joined():
+        share = _force_share(made, members, nominal, run)
+        if share is not None and np.ptp(share) <= ALIKE * abs(share.mean()) and abs(share.mean()) > 0:
+            found += members
+    return tuple(sorted(found))
+
+
+def _force_share(made: Tolerances, members: tuple[int, ...], nominal: Result, run: Run) -> FloatArray | None:
+    """Return by which share a standard deviation of some parameters changes the force; None where it cannot be said."""
+    changes = {made.paths[k]: _one_sigma(made.parameters[k]) for k in members}
+    try:
+        moved = family(made.spec.family).analyze(made.spec.replace(changes), run)
+    except CfmError:
+        return None
+    if not moved.curves:
+        return None
+    before, after = nominal.curve, moved.curve
+    same = before.motion.shape == after.motion.shape and np.allclose(before.motion, after.motion, rtol=1e-9, atol=1e-12)
+    if not same:
+        return None
+    low, high = _window(nominal)
+    with np.errstate(invalid="ignore"):
+        loud = np.abs(before.effort) > FAINT * np.nanmax(np.abs(before.effort))
+        inside = (before.motion >= low) & (before.motion <= high) & loud & np.isfinite(after.effort)
+    return np.asarray(after.effort[inside] / before.effort[inside] - 1.0) if inside.sum() > 1 else None
+
+
+def _one_sigma(one: Parameter) -> float:
+    spread = one.spread
+    step = spread.deviation if spread.kind == "normal" else (spread.high - spread.low) / 12.0**0.5
+    return spread.nominal + step
+
+
+def _window(result: Result) -> tuple[float, float]:
+    from cfmkit.metrics import window_of
+
+    found = window_of(result)
+    return (found.lo, found.hi) if found else (float(result.curve.motion.min()), float(result.curve.motion.max()))
+
+
+@dataclass(frozen=True)
+class Yields:
+    """What is known of many parts of a design.
+
+    Attributes
+    ----------
+    made : Tolerances
+        On the design.
+    after, trimmed : Share
+        Of its parts, as they are and after the trim.
+    frozen : Share or None
+        Without common errors; None where there are none.
+    common : tuple of str
+        The paths of those.
+    each : tuple of Share
+        Of parts that meet one requirement.
+    before : Share or None
+        Of the specification that the design began with.
+    why : str
+        Why there is no yield of that.
+    """
+
+    made: Tolerances
+    after: Share
+    trimmed: Share
+    frozen: Share | None
+    common: tuple[str, ...]
+    each: tuple[Share, ...]
+    before: Share | None
+    why: str = ""
+
+    def quantities(self) -> dict[str, Quantity]:
+        """Return the metrics of many parts."""
+        low, high = clopper_pearson(self.after.good, self.after.count)
+        numbers = {
+            "yield": self.after.value,
+            "yield_low": low,
+            "yield_high": high,
+            "yield_before": self.before.value if self.before else None,
+            "yield_with_common_frozen": (self.frozen or self.after).value,
+            "yield_after_trim": self.trimmed.value,
+        }
+        reasons = {"yield_before": self.why}
+        return {
+            name: Quantity(numbers[name], "ratio", about, reasons.get(name, ""))
+            for name, about in OF_MANY_PARTS.items()
+        }
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the block `yield` of metrics.json."""
+        requirements = self.made.spec.part_requirements
+        each = [{"metric": one.metric} | share.as_json() for one, share in zip(requirements, self.each, strict=True)]
+        return self.after.as_json() | {
+            "seed": self.made.seed,
+            "before": self.before.as_json() if self.before else None,
+            "with_common_frozen": (self.frozen or self.after).as_json(),
+            "after_trim": self.trimmed.as_json(),
+            "common": list(self.common),
+            "requirements": each,
+        }
+
+    def sentence(self) -> str:
+        """Return the yield in a sentence, and what would raise it."""
+        low, high = clopper_pearson(self.after.good, self.after.count)
+        told = f"{_percent(self.after.value)} of {self.after.count} parts drawn from design.tolerances are good "
+        told += f"({_percent(low)} to {_percent(high)} with 95 % confidence)"
+        if self.before is not None:
+            told += f"; {_percent(self.before.value)} of the specification as given"
+        if self.after.failed:
+            told += f"; {self.after.failed} have no complete result and count as bad (the first: {self.after.why})"
+        if self.frozen is not None:
+            told += f"; {_percent(self.frozen.value)} without the errors of the whole part ({', '.join(self.common)})"
+        told += f"; {_percent(self.trimmed.value)} after a trim of the force"
+        worst = min(range(len(self.each)), key=lambda k: self.each[k].value)
+        if self.each[worst].value < 1.0:
+            metric = self.made.spec.part_requirements[worst].metric
+            told += f"; most are lost by {metric}, which {_percent(1.0 - self.each[worst].value)} miss"
+        return told
+
+
+def _percent(value: float) -> str:
+    return f"{100.0 * value:.3g} %"
+
+
+def yields_of(design: Result, given: Spec | None, run: Run) -> Yields | None:
+    """Return the yield of a design and of the specification that it began with; None without tolerances.
+
+    Parameters
+    ----------
+    design : Result
+        The analysis of the design.
+    given : Spec, optional
+        What it began with.
+    run : Run
+        Seed, processes, notes and progress.
+
+    Raises
+    ------
+    cfmkit.errors.SpecError
+        If a tolerance is on a value that the design does not have.
+    """
+    block = getattr(design.spec, "design", None) or getattr(given, "design", None)
+    if block is None or not block.tolerances:
+        return None
+    made = tolerances_of(design.spec, block, run.seed)
+    if made is None:
+        return None
+    values = made.drawn()
+    judged = judge(made, values, design, run)
+    shared = common(made, design, run)
+    frozen = None
+    if shared:
+        still = values.copy()
+        still[:, shared] = made.nominal[list(shared)]
+        frozen = judge(made, still, design, run, "parts without common errors").share()
+    before, why = _before(given, block, run)
+    each = tuple(judged.share(judged.met[:, [k]]) for k in range(judged.met.shape[1]))
+    paths = tuple(made.paths[k] for k in shared)
+    return Yields(made, judged.share(), judged.share(judged.trimmed), frozen, paths, each, before, why)
+
+
+def _before(given: Spec | None, block: DesignBlock, run: Run) -> tuple[Share | None, str]:
+    """Return the yield of the specification as given, or why there is none."""
+    if given is None:
+        return None, "nothing was given to begin with"
+    try:
+        made = tolerances_of(given, block, run.seed)
+        result = family(given.family).analyze(given, run)
+        if made is None or not result.curves:
+            return None, f"the specification as given has no curve: {result.message}"
+        return judge(made, made.drawn(), result, run, "parts as given").share(), ""
+    except SpecError as error:
+        return None, "; ".join(_told(one) for one in error.problems)
+    except CfmError as error:
+        return None, str(error)
+
+
+def _told(problem: Problem) -> str:
+    return f"{problem.path}: {problem.message}"
+
+
+__all__ = ["Tolerances", "Yields", "common", "judge", "tolerances_of", "yields_of"]

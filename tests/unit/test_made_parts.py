@@ -1,0 +1,97 @@
+"""Parts drawn from `design.tolerances`: the yield of a design, before and after, and requirements on it."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+import cfmkit
+from cfmkit.cli.main import main
+from cfmkit.errors import SpecError
+from cfmkit.families.base import Run
+from cfmkit.runs.run import analysed, designed
+from cfmkit.studies.made_parts import common, judge, tolerances_of
+
+TOLERANCES = {"mechanism.springs.stiffness": {"normal": "1.2 %"}, "mechanism.rolling_friction": {"normal": "10 %"}}
+
+
+def cam(**keys):
+    spec = cfmkit.load("configs/cam.yaml")
+    spec = spec.replace({f"design.{key}": value for key, value in ({"tolerances": TOLERANCES} | keys).items()})
+    return spec
+
+
+def with_yield(spec, least):
+    return spec.replace({"requirements": (*spec.requirements, {"metric": "yield", "min": least})})
+
+
+def test_the_yield_is_that_of_the_tolerance_study_of_the_design():
+    found = designed(cam(samples=120), Run(3))
+    design = found.design.spec
+    study = cfmkit.sensitivity(design, method="tolerance", parameters=TOLERANCES, samples=120, seed=3)
+    assert 0.05 < found.metrics["yield"].value < 0.95
+    assert found.metrics["yield"].value == study.summary["yield"]["value"]
+    assert found.supplement.data["yield"]["clopper_pearson"] == study.summary["yield"]["clopper_pearson"]
+
+
+def test_a_requirement_on_the_yield_decides_the_exit_code_and_keeps_its_place():
+    missed = designed(with_yield(cam(samples=60), "99 %"), Run())
+    assert [one.metric for one in missed.requirements][-1] == "yield"
+    assert int(missed.exit_code) == 5
+    assert int(designed(with_yield(cam(samples=60), "5 %"), Run()).exit_code) == 0
+
+
+def test_an_analysis_does_not_judge_a_yield():
+    spec = with_yield(cam(), "99 %")
+    found = analysed(spec, Run())
+    assert len(found.requirements) == len(spec.requirements) - 1
+    assert int(found.exit_code) == 0
+
+
+def test_an_error_of_all_springs_is_common_and_a_trim_takes_it_away():
+    spec = cam(samples=100)
+    result = cfmkit.analyze(spec)
+    made = tolerances_of(spec, spec.design, 0)
+    assert common(made, result, Run()) == (0,)
+    values = made.drawn()
+    judged = judge(made, values, result, Run())
+    values[:, 0] = made.nominal[0]
+    still = judge(made, values, result, Run())
+    # without a weight the force is proportional to the stiffness: the trim is the same as no error
+    assert judged.share(judged.trimmed).good == still.share().good > judged.share().good
+
+
+def test_parts_without_a_result_are_bad_and_counted():
+    spec = cam(samples=20, tolerances={"mechanism.rest_half_width": {"normal": "100 mm"}})
+    result = cfmkit.analyze(spec)
+    made = tolerances_of(spec, spec.design, 0)
+    values = np.array([[made.nominal[0]], [-0.01]])
+    judged = judge(made, values, result, Run())
+    assert judged.failed.tolist() == [False, True]
+    assert (judged.share().good, judged.share().failed, judged.share().count) == (1, 1, 2)
+    assert "rest_half_width" in judged.why
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ({"design.tolerances": {"mechanism.no_length": {"normal": "1 mm"}}}, "design.tolerances.'mechanism.no_length'"),
+        ({"design.yield": "90 %"}, "design.yield"),
+        ({"requirements": ({"metric": "yield", "min": "90 %"},)}, "requirements.0.metric"),
+        ({"requirements": ({"metric": "yield", "min": "9 mm"},)}, "requirements.0.min"),
+    ],
+)
+def test_bad_input_is_said_with_its_place(changes, told):
+    spec = cfmkit.load("configs/cam.yaml").replace(changes)
+    with pytest.raises(SpecError) as error:
+        cfmkit.loads(cfmkit.dumps(spec))
+    assert told in {one.path for one in error.value.problems}
+
+
+def test_a_tolerance_on_what_the_design_lacks_ends_with_3(tmp_path, capsys):
+    text = cfmkit.dumps(cam(tolerances={"mechanism.springs.stiffness.*": {"normal": "1 %"}}, samples=20))
+    (tmp_path / "cam.yaml").write_text(text)
+    assert main(["design", str(tmp_path / "cam.yaml"), "-o", str(tmp_path / "out"), "--no-plots", "--json"]) == 3
+    assert "design.tolerances" in json.loads(capsys.readouterr().out)["errors"][0]["path"]
