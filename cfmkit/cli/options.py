@@ -16,6 +16,7 @@ from cfmkit.cli import completion
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from cfmkit.plots.form import FigureForm
 
 MOST = 2**63 - 1
 """The largest integer of an option: what a signed integer of 64 bits in files and generators holds."""
@@ -110,6 +111,43 @@ class Changing(Common):
 
 
 @dataclass(frozen=True, kw_only=True)
+class Drawing(Common):
+    """What a verb takes that draws."""
+
+    no_plots: NoPlots = False
+    figures: Annotated[
+        str | None, option("--figures", metavar="png,svg,pdf", text="Formats of the figures; default: png.")
+    ] = None
+    figure_width: Annotated[
+        str | None,
+        option("--figure-width", metavar="84mm", text="Width of the figures in print; letters keep their size."),
+    ] = None
+    no_titles: Annotated[bool, flag("--no-titles", text="Draw no headings above the figures.")] = False
+    figure_style: Annotated[
+        str | None,
+        option("--figure-style", metavar="FILE", text="Style file of matplotlib (.mplstyle), on top of cfmkit's own."),
+    ] = None
+
+    @property
+    def form(self) -> FigureForm:
+        """How figures are to be written.
+
+        Raises
+        ------
+        cfmkit.errors.UsageError
+            If an option is malformed, or figures are both described and refused.
+        """
+        from cfmkit.errors import UsageError
+        from cfmkit.plots.form import form_of
+
+        said = {"--figures": self.figures, "--figure-width": self.figure_width, "--figure-style": self.figure_style}
+        given = [name for name, value in said.items() if value is not None] + ["--no-titles"] * self.no_titles
+        if self.no_plots and given and not getattr(self, "report", False):
+            raise UsageError(f"--no-plots draws no figures: it does not go with {given[0]}")
+        return form_of(self.figures, self.figure_width, not self.no_titles, self.figure_style)
+
+
+@dataclass(frozen=True, kw_only=True)
 class OneSpec(Changing):
     """What a verb takes that reads one specification and writes a folder."""
 
@@ -118,12 +156,11 @@ class OneSpec(Changing):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Computing(OneSpec):
+class Computing(OneSpec, Drawing):
     """What a verb takes that computes."""
 
     fidelity: Fidelity = None
     seed: Seed = 0
-    no_plots: NoPlots = False
     quiet: Quiet = False
 
 

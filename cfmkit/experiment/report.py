@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
     from cfmkit.curves import Curve
     from cfmkit.metrics import Frame, Window
+    from cfmkit.plots.form import FigureForm
     from cfmkit.results import Finding
 
 
@@ -111,7 +112,7 @@ def _column_name(name: str) -> str:
     return f"{metric} {branch}" if branch else metric
 
 
-def files(report: MeasureReport, plots: bool = True) -> Iterator[tuple[str, bytes]]:
+def files(report: MeasureReport, plots: bool = True, form: FigureForm | None = None) -> Iterator[tuple[str, bytes]]:
     """Yield every file of a measurement as (name below the folder, content).
 
     Parameters
@@ -120,6 +121,8 @@ def files(report: MeasureReport, plots: bool = True) -> Iterator[tuple[str, byte
         Of one recording.
     plots : bool
         Whether to draw.
+    form : FigureForm, optional
+        How figures are written; default: as PNG, as they are drawn.
     """
     from cfmkit.tables.jsontext import json_bytes
 
@@ -128,7 +131,6 @@ def files(report: MeasureReport, plots: bool = True) -> Iterator[tuple[str, byte
     yield "metrics.json", json_bytes(report.data)
     if plots:
         from cfmkit.experiment.draw import figures
-        from cfmkit.plots.style import png
+        from cfmkit.plots.form import PLAIN
 
-        for stem, draw in figures(report.source, report.numbers).items():
-            yield f"figures/{stem}.png", png(draw())
+        yield from (form or PLAIN).files(figures(report.source, report.numbers))

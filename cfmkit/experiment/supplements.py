@@ -16,6 +16,8 @@ from cfmkit.tables import Table, TableColumn, border_column, to_csv
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
+    from matplotlib.figure import Figure
+
     from cfmkit.experiment.calibration import Calibration
     from cfmkit.experiment.comparison import Comparison
     from cfmkit.experiment.evaluation import MeasuredCurves
@@ -63,22 +65,23 @@ def causes_lines(causes: Mapping[str, Quantity]) -> tuple[tuple[str, str], ...]:
     return (("causes", ", ".join(told)),) if told else ()
 
 
-def comparison_files(
-    comparison: Comparison, source: MeasuredCurves, name: str, before: Comparison | None = None
-) -> Mapping[str, Callable[[], bytes]]:
-    """Return what makes the files of a comparison: the measured curve, and the figure."""
-    return {
-        "data.csv": lambda: to_csv(curves_table(source)),
-        "figures/data.png": partial(_overlay, comparison, before, name),
-    }
+def comparison_files(source: MeasuredCurves) -> Mapping[str, Callable[[], bytes]]:
+    """Return what makes the file of a comparison: the measured curve."""
+    return {"data.csv": lambda: to_csv(curves_table(source))}
 
 
-def _overlay(comparison: Comparison, before: Comparison | None, name: str) -> bytes:
+def comparison_figures(
+    comparison: Comparison, name: str, before: Comparison | None = None
+) -> Mapping[str, Callable[[], Figure]]:
+    """Return what draws the figure of a comparison: the curves overlaid."""
+    return {"data": partial(_overlay, comparison, before, name)}
+
+
+def _overlay(comparison: Comparison, before: Comparison | None, name: str) -> Figure:
     from cfmkit.experiment.draw import overlay
-    from cfmkit.plots.style import png
 
     subject = "fitted model and measurement" if before else "model and measurement"
-    return png(overlay(comparison, before, (name, subject)))
+    return overlay(comparison, before, (name, subject))
 
 
 def calibration_data(calibration: Calibration) -> dict[str, Any]:

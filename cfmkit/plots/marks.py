@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.plots.style import GREY, MM, SMALL, VERMILLION, styled
+from cfmkit.plots.style import GREY, SMALL, VERMILLION, has_titles, size_mm, styled
 from cfmkit.plots.text import LEFT, Heading, write_heading
 
 if TYPE_CHECKING:
@@ -36,11 +36,11 @@ def head(figure: Figure, found: StudyMarks, subject: str, key: Sequence[Artist] 
     """Write above a picture whose study it is, what it shows, and what its marks mean."""
     write_heading(figure, Heading(found.name, subject) if found.name else Heading(subject, "all points"))
     if key:
-        width, height = figure.get_size_inches() / MM
+        width, height = size_mm(figure)
         figure.legend(
             handles=list(key),
             loc="upper left",
-            bbox_to_anchor=((LEFT - 1.0) / width, 1.0 - 6.0 / height),
+            bbox_to_anchor=((LEFT - 1.0) / width, 1.0 - (6.0 if has_titles() else 1.0) / height),
             ncols=len(key),
             frameon=False,
             fontsize=SMALL,

@@ -14,8 +14,22 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.plots.rounding import is_level, levelled
-from cfmkit.plots.style import BAND, BLUE, GREY, INK, LINES, SMALL, TROUBLE, VERMILLION, axes_mm, new_figure, styled
-from cfmkit.plots.text import metric_label, metric_values
+from cfmkit.plots.style import (
+    BAND,
+    BLUE,
+    GREY,
+    INK,
+    LINES,
+    SMALL,
+    TROUBLE,
+    VERMILLION,
+    axes_mm,
+    has_titles,
+    new_figure,
+    size_mm,
+    styled,
+)
+from cfmkit.plots.text import LEFT, Heading, metric_label, metric_values, write_heading
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -33,6 +47,12 @@ MOST_BINS = 40
 """Of a histogram: 1600 samples by the rule of the square root; with more bins a bar gets thinner than 2 mm of print."""
 
 
+def _head(figure: Figure, title: str) -> None:
+    """Write whose study it is and what the picture shows."""
+    name, _, subject = title.rpartition(": ")
+    write_heading(figure, Heading(name, subject) if name else Heading(subject, "all parameters"))
+
+
 @styled
 def draw_histogram(found: Findings, number: int) -> Figure:
     """Return how one metric scatters over the parts that were drawn."""
@@ -43,8 +63,10 @@ def draw_histogram(found: Findings, number: int) -> Figure:
     figure = new_figure(140, 84)
     axes = axes_mm(figure, (18, 14, 116, 56))
     title = f"{setup.study.spec.name}: {metric.label.replace('_', ' ')}"
-    figure.text(0.02, 0.98, title, va="top", weight="bold")
-    figure.text(0.02, 0.91, _summary(drawn, known, setup.limits(metric)), va="top", size=SMALL, color=INK)
+    _head(figure, title)
+    width, height = size_mm(figure)
+    place = (LEFT / width, 1.0 - (7.6 if has_titles() else 1.6) / height)
+    figure.text(*place, _summary(drawn, known, setup.limits(metric)), va="top", size=SMALL, color=INK)
     if len(known):
         axes.hist(known, _edges(known).tolist(), color=BLUE, alpha=0.85)
     axes.set_ylim(0, 1.22 * max(1.0, axes.get_ylim()[1]))
@@ -197,7 +219,7 @@ def _bar_axes(count: int, heading: str, legend: bool = False) -> tuple[Figure, A
     below, above = 14.0, 9.0 + 6.0 * legend
     figure = new_figure(150, below + above + _ROW * count + 4.0)
     axes = axes_mm(figure, (_LEFT, below, 150 - _LEFT - 6, _ROW * count + 4.0))
-    figure.text(0.02, 1.0 - 2.0 / (below + above + _ROW * count + 4.0), heading, va="top", weight="bold")
+    _head(figure, heading)
     axes.grid(visible=False, axis="y")
     axes.axvline(0.0, color=GREY, linewidth=0.8)
     return figure, axes
@@ -278,7 +300,7 @@ def draw_oat(found: Findings, number: int) -> Figure:
     room = max(60.0, _ROW * len(order) + 10.0)
     figure = new_figure(190, room + 24)
     curves, bars = (axes_mm(figure, (left, 14, width, room)) for left, width in ((18, 72), (132, 52)))
-    figure.text(0.02, 1.0 - 2.0 / (room + 24), _title(found, metric), va="top", weight="bold")
+    _head(figure, _title(found, metric))
     every_output = np.empty((len(swings), 0)) if found.outputs is None else found.outputs[:, :, number]
     shown = levelled(metric_values(np.append(setup.nominal.values[number], every_output), metric.dimension))
     nominal, outputs = float(shown[0]), shown[1:].reshape(every_output.shape)
@@ -325,7 +347,7 @@ def draw_morris(found: Findings, number: int) -> Figure:
     sizes, scatters = (_lines(found, metric.label, name) for name in ("mu_star", "sigma"))
     figure = new_figure(160, 90)
     axes = axes_mm(figure, (20, 14, 84, 66))
-    figure.text(0.02, 0.98, _title(found, metric), va="top", weight="bold")
+    _head(figure, _title(found, metric))
     top, factor = 0.0, 100.0 if metric.dimension == "ratio" else 1.0
     for row, k in enumerate(_ranked(sizes)):
         size, scatter = sizes[k], scatters[k]
@@ -355,7 +377,7 @@ def draw_convergence(found: Findings, number: int) -> Figure:
     mine = [line for line in found.convergence if (line.metric, line.index) == (metric.label, "total_order")]
     figure = new_figure(160, 90)
     axes = axes_mm(figure, (18, 14, 86, 66))
-    figure.text(0.02, 0.98, f"{_title(found, metric)}, convergence", va="top", weight="bold")
+    _head(figure, f"{_title(found, metric)}, convergence")
     order = [found.setup.paths[k] for k in _ranked(_lines(found, metric.label, "total_order"))]
     for row, path in enumerate(order):
         own = np.array([_numbers(line) for line in mine if line.parameter == path and line.value is not None])

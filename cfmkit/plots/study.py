@@ -182,8 +182,8 @@ def draw_parallel(found: StudyMarks) -> Figure:
     from matplotlib import colormaps
 
     scales = (*found.varied, *found.metrics)
-    figure = new_figure(max(120.0, 26.0 * len(scales) + 30), 100 + HEAD)
-    width = figure.get_size_inches()[0] * 25.4
+    width = max(120.0, 26.0 * len(scales) + 30)
+    figure = new_figure(width, 100 + HEAD)
     axes = axes_mm(figure, (14, 22, width - 28, 66))
     heights = np.column_stack([_share(scale) for scale in scales])
     chosen = np.flatnonzero(np.isfinite(heights[:, len(found.varied)]))

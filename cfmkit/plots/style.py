@@ -29,11 +29,15 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from cfmkit.plots.layout import current, laid_out, noted
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
+
+    from cfmkit.plots.form import FigureForm
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -105,6 +109,8 @@ def _parameters() -> Any:
 
 
 _INSIDE: ContextVar[bool] = ContextVar("inside", default=False)
+_SETTINGS_OF_USER: ContextVar[tuple[tuple[str, Any], ...]] = ContextVar("settings", default=())
+_TITLES: ContextVar[bool] = ContextVar("titles", default=True)
 
 
 @contextmanager
@@ -115,7 +121,7 @@ def style() -> Iterator[None]:
         return
     mark = _INSIDE.set(True)
     try:
-        with matplotlib.rc_context(_parameters()), warnings.catch_warnings():
+        with matplotlib.rc_context(_parameters() | dict(_SETTINGS_OF_USER.get())), warnings.catch_warnings():
             # a name in letters that the font lacks is drawn as boxes; that is no reason to alarm anyone
             warnings.filterwarnings("ignore", message="Glyph .* missing from font")
             yield
@@ -136,15 +142,55 @@ def styled(function: Callable[P, T]) -> Callable[P, T]:
 
 @styled
 def new_figure(width_mm: float = 160.0, height_mm: float = 100.0) -> Figure:
-    """Return an empty figure of a print size in millimetres, on the Agg canvas."""
+    """Return an empty figure of a print size in millimetres, on the Agg canvas; in a layout, the one that it has."""
+    layout = current()
+    if layout is not None:
+        if layout.host is not None:
+            found: Figure = layout.host
+            return found
+        width_mm, height_mm = layout.sized(width_mm, height_mm)
     figure = Figure(figsize=(width_mm * MM, height_mm * MM))
     FigureCanvasAgg(figure)
     return figure
 
 
+def size_mm(figure: Figure) -> tuple[float, float]:
+    """Return width and height of a figure, or of a part of one [mm of print]."""
+    dots = figure.dpi * MM
+    return float(figure.bbox.width) / dots, float(figure.bbox.height) / dots
+
+
+def has_titles() -> bool:
+    """Return whether headings are to be written."""
+    return _TITLES.get()
+
+
+@contextmanager
+def in_form(form: FigureForm) -> Iterator[None]:
+    """Apply the settings of a form, and whether headings are written, inside a ``with`` block."""
+    settings, titles = _SETTINGS_OF_USER.set(form.settings), _TITLES.set(form.titles)
+    try:
+        yield
+    finally:
+        _SETTINGS_OF_USER.reset(settings)
+        _TITLES.reset(titles)
+
+
+def formed(form: FigureForm, make: Callable[[], Figure]) -> Figure:
+    """Return a figure in the form that is asked for."""
+    with in_form(form):
+        if form.width is None and form.titles:
+            return make()
+        figure, layout = noted(make)
+        width = layout.size[0] if form.width is None else form.width * 1e3
+        to_scale = any(ax.get_aspect() != "auto" for ax in figure.axes)
+        return laid_out(make, layout.stretched(width, form.titles, to_scale)) if layout.asked else figure
+
+
 @styled
-def png(figure: Figure, dpi: float = DPI) -> bytes:
+def png(figure: Figure, dpi: float | None = None) -> bytes:
     """Return the figure as PNG: the same bytes for the same content and library versions."""
+    dpi = float(matplotlib.rcParams["savefig.dpi"]) if dpi is None else dpi
     canvas = figure.canvas if isinstance(figure.canvas, FigureCanvasAgg) else FigureCanvasAgg(figure)
     before = figure.dpi
     figure.dpi = dpi
@@ -178,6 +224,7 @@ def _chunk(name: bytes, data: bytes) -> bytes:
 @styled
 def axes_mm(figure: Figure, box: tuple[float, float, float, float], **options: Any) -> Axes:
     """Return new axes in a box (left, bottom, width, height) [mm of print]."""
-    width, height = figure.get_size_inches() / MM
-    left, bottom, across, up = box
+    width, height = size_mm(figure)
+    layout = current()
+    left, bottom, across, up = box if layout is None else layout.placed(box)
     return figure.add_axes((left / width, bottom / height, across / width, up / height), **options)

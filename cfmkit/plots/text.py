@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.plots.style import GREY, MM, NORMAL, SMALL, TROUBLE, styled
+from cfmkit.plots.style import GREY, MM, NORMAL, SMALL, TROUBLE, has_titles, size_mm, styled
 from cfmkit.specs.units import border_unit, format_short
 from cfmkit.tables import border_values
 
@@ -99,14 +99,16 @@ class Heading:
 @styled
 def write_heading(figure: Figure, heading: Heading) -> None:
     """Write a heading at the top left, each part on one line: names that are too long are cut, the subject is not."""
-    _write_line(figure, 1.8, (heading.name, f": {heading.subject}"), {"size": NORMAL + 0.5, "weight": "bold"})
-    if heading.note:
-        _write_line(figure, 6.4, (heading.note, ""), {"size": SMALL, "color": TROUBLE})
+    titles = has_titles()
+    if titles:
+        _write_line(figure, 1.8, (heading.name, f": {heading.subject}"), {"size": NORMAL + 0.5, "weight": "bold"})
+    if heading.note:  # what is wrong is said in any case
+        _write_line(figure, 6.4 if titles else 1.8, (heading.note, ""), {"size": SMALL, "color": TROUBLE})
 
 
 def _write_line(figure: Figure, down_mm: float, parts: tuple[str, str], look: dict[str, Any]) -> None:
     """Write two parts on one line, the first cut with an ellipsis as far as the width demands."""
-    width, height = figure.get_size_inches() / MM
+    width, height = size_mm(figure)
     room = (width - 2.0 * LEFT) * MM * figure.dpi
     text = figure.text(LEFT / width, 1.0 - down_mm / height, "", ha="left", va="top", **look)
     first, last = (" ".join(part.split(" ")) for part in (" ".join(parts[0].split()), parts[1]))
@@ -121,7 +123,7 @@ def _write_line(figure: Figure, down_mm: float, parts: tuple[str, str], look: di
 @styled
 def color_key(figure: Figure, corner_mm: tuple[float, float], entries: Sequence[tuple[str, str]]) -> None:
     """Write texts in their colours side by side from the lower left corner [mm], no farther than the print reaches."""
-    width, height = figure.get_size_inches() / MM
+    width, height = size_mm(figure)
     left, bottom = corner_mm
     for text, color in entries:
         written = figure.text(left / width, bottom / height, text, size=SMALL, color=color, ha="left", va="bottom")

@@ -12,6 +12,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 from cfmkit.errors import CfmError, ExitCode, SpecError, UsageError, code_of, lines_of, visible
+from cfmkit.plots.form import PLAIN, FigureForm
 from cfmkit.results import Status
 from cfmkit.runs.run import Outcome, Request, Verb, analysed, designed, journal_of, long_run, spec_of
 from cfmkit.runs.run import carry_out as carried_out
@@ -64,7 +65,8 @@ class BatchWork:
         """Everything in it that decides what a run finds and writes."""
         given = self.common
         page = ["report"] if given.page else []  # without a page: as it always was, so that earlier batches are reused
-        return [list(given.changes), given.fidelity, given.seed, not given.plots, self.verb, *page]
+        form = [] if given.form.plain else [repr(given.form), repr(given.form.settings)]
+        return [list(given.changes), given.fidelity, given.seed, not given.plots, self.verb, *page, *form]
 
     def __call__(self, job: Job) -> Entry:
         """Return what becomes of one specification; nothing is raised but what ends the process."""
@@ -330,6 +332,7 @@ def batch(
     fresh: bool = False,
     junit: str | None = None,
     page: bool = False,
+    form: FigureForm | None = None,
     arguments: Sequence[str] = (),
     monitor: Monitor | None = None,
     noting: Noting = journal_of,
@@ -366,6 +369,8 @@ def batch(
         A file for JUnit XML, a test for each requirement.
     page : bool
         Whether to write a ``report.html`` for each, and one for all that links them.
+    form : FigureForm, optional
+        How figures are written.
     arguments : sequence of str
         What manifests say of the command line.
     monitor : Monitor, optional
@@ -404,7 +409,7 @@ def batch(
         addressed(change)
     named = _named(specs)
     files = sources(named, place)
-    common = Request("", place, given, fidelity, seed, plots, of_many=True, page=page)
+    common = Request("", place, given, fidelity, seed, plots, of_many=True, page=page, form=form or PLAIN)
     work = BatchWork(common, verb, tuple(arguments), fresh)
     todo = [Job(k, *pair) for k, pair in enumerate(zip(files, folders(files), strict=True))]
     executor = executor_for(jobs, len(todo), timeout_per_point)

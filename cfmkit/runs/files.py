@@ -10,18 +10,19 @@ from typing import TYPE_CHECKING
 
 from cfmkit import api
 from cfmkit.errors import SolutionError
+from cfmkit.plots.form import PLAIN, FigureForm
 from cfmkit.tables.jsontext import json_bytes
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
-
-    from matplotlib.figure import Figure
+    from collections.abc import Iterator
 
     from cfmkit.runs.run_findings import Report
     from cfmkit.specs.spec import Spec
 
 
-def files(report: Report, plots: bool = True, page: bool = False, command: str = "") -> Iterator[tuple[str, bytes]]:
+def files(
+    report: Report, plots: bool = True, page: bool = False, command: str = "", form: FigureForm = PLAIN
+) -> Iterator[tuple[str, bytes]]:
     """Yield every file of a run as (name below the folder, content), each when it is needed.
 
     Parameters
@@ -34,6 +35,8 @@ def files(report: Report, plots: bool = True, page: bool = False, command: str =
         Whether to write ``report.html``, which has the figures as well.
     command : str
         What the page says about how the run was started.
+    form : FigureForm, optional
+        How figures are written; default: as PNG, as they are drawn. The page has them as SVG.
     """
     result, designed = report.result, report.design.spec if report.design else None
     if designed is not None:
@@ -49,21 +52,18 @@ def files(report: Report, plots: bool = True, page: bool = False, command: str =
     yield from sources(result.spec)
     if designed is not None and result.status.usable:
         yield from geometry(result.spec)
-    drawn = {stem: draw() for stem, draw in api.figures(result).items()} if plots or page else {}
-    if plots:
-        yield from pictures(drawn)
-    more: dict[str, bytes] = {}
     for name, make in report.supplement.files.items():
-        figure = name.startswith("figures/")
-        content = make() if plots or page or not figure else b""
-        if figure:
-            more |= {name.removeprefix("figures/").removesuffix(".png"): content}
-        if plots or not figure:
-            yield name, content
+        yield name, make()
+    makers = {**api.figures(result), **report.supplement.figures} if plots or page else {}
+    drawn = {stem: form.draw(make) for stem, make in makers.items()}
+    for stem, figure in drawn.items() if plots else ():
+        yield from form.write(figure, stem)
     if page:
         from cfmkit.runs import run_page
 
-        yield run_page.NAME, run_page.page(report, drawn, more, command)
+        # the page has its own headings and its own width, and a style file is for print
+        shown = drawn if form.on_screen else {stem: make() for stem, make in makers.items()}
+        yield run_page.NAME, run_page.page(report, shown, command)
 
 
 def sources(spec: Spec) -> Iterator[tuple[str, bytes]]:
@@ -87,12 +87,3 @@ def geometry(spec: Spec) -> Iterator[tuple[str, bytes]]:
             return
         for name, data in drawn(drawing).items():
             yield f"geometry/{name}", data
-
-
-def pictures(drawn: Mapping[str, Figure]) -> Iterator[tuple[str, bytes]]:
-    """Yield the figures of a result as PNG, below ``figures/``."""
-    if drawn:
-        from cfmkit.plots.style import png
-
-        for stem, figure in drawn.items():
-            yield f"figures/{stem}.png", png(figure)

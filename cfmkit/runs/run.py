@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 from cfmkit import api
 from cfmkit.errors import SpecError, UsageError
 from cfmkit.families.base import Run
+from cfmkit.plots.form import PLAIN, FigureForm
 from cfmkit.results import Status
 from cfmkit.runs import run_findings
 from cfmkit.runs.files import files
@@ -120,6 +121,8 @@ class Request:
         Whether it is one of many, and changes may be for others.
     page : bool
         Whether to write ``report.html``.
+    form : FigureForm
+        How figures are written.
     """
 
     spec: str
@@ -130,6 +133,7 @@ class Request:
     plots: bool = True
     of_many: bool = False
     page: bool = False
+    form: FigureForm = PLAIN
 
 
 def carry_out(
@@ -156,7 +160,7 @@ def carry_out(
         with verb.running(folder, Run(wanted.seed, progress) if progress else Run(wanted.seed)) as run:
             found = _computed(verb, spec, run, document)
         command = shlex.join(["cfmkit", *arguments])
-        for name, data in files(found, wanted.plots, wanted.page, command):
+        for name, data in files(found, wanted.plots, wanted.page, command, wanted.form):
             folder.write(name, data)
         origin = provenance(verb.name, spec, wanted.spec, arguments)
         manifest = folder.commit(origin | dict(verb.inputs) | {"seed": wanted.seed} | _ending(found))

@@ -15,6 +15,8 @@ from cfmkit.tables.jsontext import json_bytes
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
+    from matplotlib.figure import Figure
+
     from cfmkit.curves import Curve
     from cfmkit.metrics import Outcome
     from cfmkit.results import Design, Finding, Quantity
@@ -42,6 +44,8 @@ class Supplement:
         More keys of metrics.json.
     files : mapping of str to callable
         More files: what makes the content of each.
+    figures : mapping of str to callable
+        More figures: what draws each, by name.
     lines : tuple of (str, str)
         More paragraphs of the page: the word that begins each, and the text.
     warnings : tuple of Finding
@@ -58,6 +62,7 @@ class Supplement:
     warnings: tuple[Finding, ...] = ()
     curves: tuple[Curve, ...] = ()
     shortfall: str = ""
+    figures: Mapping[str, Callable[[], Figure]] = field(default_factory=dict)
 
     def plus(self, more: Supplement) -> Supplement:
         """Return both, this one first."""
@@ -68,6 +73,7 @@ class Supplement:
             (*self.warnings, *more.warnings),
             (*self.curves, *more.curves),
             "; ".join(text for text in (self.shortfall, more.shortfall) if text),
+            {**self.figures, **more.figures},
         )
 
 

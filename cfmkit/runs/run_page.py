@@ -7,7 +7,6 @@ script reads is JSON in which no tag can end the script, and without scripts all
 from __future__ import annotations
 
 import json
-from base64 import b64encode
 from dataclasses import dataclass
 from importlib import import_module
 from importlib.resources import files
@@ -50,7 +49,7 @@ class Line:
     definition: str
 
 
-def page(report: Report, drawn: Mapping[str, Figure], pictures: Mapping[str, bytes], command: str = "") -> bytes:
+def page(report: Report, drawn: Mapping[str, Figure], command: str = "") -> bytes:
     """Return the page of a run; the same report gives the same bytes.
 
     Parameters
@@ -59,8 +58,6 @@ def page(report: Report, drawn: Mapping[str, Figure], pictures: Mapping[str, byt
         Of any status.
     drawn : mapping of str to Figure
         The figures of the result, by their names: the first is the curve.
-    pictures : mapping of str to bytes
-        More figures as PNG, by their names.
     command : str
         How the run was started, for whoever wants to repeat it.
     """
@@ -86,7 +83,6 @@ def page(report: Report, drawn: Mapping[str, Figure], pictures: Mapping[str, byt
         notes=report.supplement.lines,
         film=_film(result, drawn, figures),
         figures=figures,
-        pictures={name: b64encode(content).decode() for name, content in pictures.items()},
         asked=api.dumps(result.spec),
         designed=bool(report.design and report.design.spec),
         resolved=api.dumps(api.resolve(result.spec), complete=True),
@@ -192,7 +188,7 @@ def _moving(result: Result) -> Moving | None:
 
 def _cursors(figure: Figure, motion: Any) -> Iterator[tuple[list[float], float, float]]:
     """Yield, for each panel over the motion: x of the cursor at every pose, and its lower and upper end [pt]."""
-    height = figure.get_size_inches()[1] * 72.0
+    height = figure.bbox.height / figure.dpi * 72.0
     for ax in figure.axes:
         box = ax.get_window_extent()
         scale = 72.0 / figure.dpi

@@ -8,11 +8,12 @@ import numpy as np
 
 from cfmkit.plots.findings import PERCENT, DrawnScale, StudyCurve, StudyMarks, short_names
 from cfmkit.plots.study import figures
-from cfmkit.plots.style import png
 from cfmkit.tables import Table, TableColumn, border_values, read_csv
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable
+
+    from matplotlib.figure import Figure
 
     from cfmkit.arrays import FloatArray
     from cfmkit.studies.engine import Records
@@ -21,14 +22,13 @@ if TYPE_CHECKING:
     from cfmkit.studies.summary import Summary
 
 
-def pictures(records: Records, summary: Summary) -> Iterator[tuple[str, bytes]]:
-    """Yield the pictures of a study as PNG, below ``figures/``; none of one that was not finished."""
+def makers(records: Records, summary: Summary) -> dict[str, Callable[[], Figure]]:
+    """Return what draws each picture of a study, by name; nothing for one that was not finished."""
     if records.finished < len(records) or not summary.usable:
-        return
+        return {}
     found = findings(records, summary)
     lines, labels = curves(records, found) if len(found.varied) <= 2 else ([], ("", ""))
-    for stem, draw in figures(found, lines, labels).items():
-        yield f"figures/{stem}.png", png(draw())
+    return figures(found, lines, labels)
 
 
 def findings(records: Records, summary: Summary) -> StudyMarks:

@@ -68,10 +68,10 @@ def reports():
     return {name: run_findings.report_on(cfmkit.analyze(spec)) for name, spec in specs.items()}
 
 
-def made(found, pictures=(), command="cfmkit analyze x.yaml"):
+def made(found, command="cfmkit analyze x.yaml"):
     """Return the page of a report as text."""
     drawn = {name: draw() for name, draw in api.figures(found.result).items()}
-    return run_page.page(found, drawn, dict(pictures), command).decode()
+    return run_page.page(found, drawn, command).decode()
 
 
 @pytest.mark.parametrize("name", EXAMPLES)

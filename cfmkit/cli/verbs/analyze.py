@@ -12,6 +12,8 @@ from cfmkit.cli.options import Computing, WithReport, flag, option
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from matplotlib.figure import Figure
+
     from cfmkit.cli.answer import Answer
     from cfmkit.cli.terminal import Terminal
     from cfmkit.experiment.evaluation import MeasuredCurves
@@ -56,7 +58,13 @@ def run(options: AnalyzeOptions, terminal: Terminal) -> Answer:
 def compute_beside(source: MeasuredCurves, spec: Spec, run: Run) -> Report:
     """Return the report on a mechanism beside its measured curve."""
     from cfmkit.experiment.comparison import compare
-    from cfmkit.experiment.supplements import causes_lines, comparison_data, comparison_files, comparison_lines
+    from cfmkit.experiment.supplements import (
+        causes_lines,
+        comparison_data,
+        comparison_figures,
+        comparison_files,
+        comparison_lines,
+    )
     from cfmkit.runs.run import analysed
     from cfmkit.runs.run_findings import Supplement
 
@@ -69,9 +77,10 @@ def compute_beside(source: MeasuredCurves, spec: Spec, run: Run) -> Report:
         comparison.metrics() | dict(causes),
         Supplement(
             comparison_data(comparison, source),
-            comparison_files(comparison, source, spec.name),
+            comparison_files(source),
             comparison_lines(comparison, source) + causes_lines(causes),
             source.warnings,
+            figures=comparison_figures(comparison, spec.name),
         ),
     )
 
@@ -84,19 +93,18 @@ def compute_each(work: Callable[[Spec, Run], Report], spec: Spec, run: Run) -> R
     choices = choices_of(spec)
     found = work(spec, run)
     compared = compare(found.result, choices, run)
-    drawn = {"figures/fidelity.png": partial(_picture, compared)} if compared.curves else {}
+    drawn = {"fidelity": partial(_picture, compared)} if compared.curves else {}
     return found.beside(
         compared.metrics(),
         Supplement(
-            data_of(compared), drawn, lines_of(compared), compared.warnings, compared.curves, compared.shortfall
+            data_of(compared), {}, lines_of(compared), compared.warnings, compared.curves, compared.shortfall, drawn
         ),
     )
 
 
-def _picture(compared: FidelityComparison) -> bytes:
-    """Return the curves overlaid as PNG."""
+def _picture(compared: FidelityComparison) -> Figure:
+    """Return the curves overlaid."""
     from cfmkit.plots.fidelity import Gap, fidelity_figure
-    from cfmkit.plots.style import png
     from cfmkit.plots.text import Heading
 
     solved = [item for item in compared.variants if item.result.curves]
@@ -114,4 +122,4 @@ def _picture(compared: FidelityComparison) -> bytes:
     ]
     spec = compared.variants[0].result.spec
     heading = Heading(spec.name, "one mechanism by several models", compared.shortfall)
-    return png(fidelity_figure(heading, [item.curves[0] for item in solved], gaps))
+    return fidelity_figure(heading, [item.curves[0] for item in solved], gaps)

@@ -9,10 +9,10 @@ from cfmkit.cli import completion
 from cfmkit.cli.answer import Answer
 from cfmkit.cli.options import (
     Changing,
+    Drawing,
     Fidelity,
     Fresh,
     Jobs,
-    NoPlots,
     Quiet,
     Seed,
     Timeout,
@@ -36,7 +36,7 @@ PLACE = 26
 
 
 @dataclass(frozen=True, kw_only=True)
-class BatchOptions(Changing):
+class BatchOptions(Changing, Drawing):
     """Arguments and options."""
 
     specs: Annotated[
@@ -61,7 +61,6 @@ class BatchOptions(Changing):
     fresh: Fresh = False
     fidelity: Fidelity = None
     seed: Seed = 0
-    no_plots: NoPlots = False
     report: WithReport = False
     quiet: Quiet = False
 
@@ -93,6 +92,7 @@ def run(options: BatchOptions, terminal: Terminal) -> Answer:
             fresh=options.fresh,
             junit=options.junit,
             page=options.report,
+            form=options.form,
             arguments=terminal.arguments,
             monitor=progress,
             noting=studies.noting,

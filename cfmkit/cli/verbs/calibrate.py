@@ -86,7 +86,7 @@ def report(calibration: Calibration, source: MeasuredCurves) -> Report:
         "calibrated.yaml": lambda: api.dumps(calibration.spec).encode(),
         "parameters.csv": lambda: to_csv(add.parameters_table(calibration)),
         "residuals.csv": lambda: to_csv(add.residuals_table(calibration)),
-        **add.comparison_files(after, source, name, calibration.before),
+        **add.comparison_files(source),
     }
     return replace(
         found,
@@ -96,5 +96,6 @@ def report(calibration: Calibration, source: MeasuredCurves) -> Report:
             files,
             (*add.comparison_lines(after, source), *add.calibration_lines(calibration)),
             (*source.warnings, *calibration.warnings),
+            figures=add.comparison_figures(after, name, calibration.before),
         ),
     )

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cfmkit.cli import completion
 from cfmkit.cli.answer import Answer
 from cfmkit.cli.measuring import Measuring, data_record
-from cfmkit.cli.options import NoPlots, Quiet, argument, flag, option
+from cfmkit.cli.options import Drawing, Quiet, argument, flag, option
 from cfmkit.cli.page_blocks import BAD, BLANK, LABEL, Grid, GridColumn, Paragraph, Span, TextLine, Written
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ PLACE = 32
 
 
 @dataclass(frozen=True, kw_only=True)
-class MeasureOptions(Measuring):
+class MeasureOptions(Measuring, Drawing):
     """Arguments and options."""
 
     data: Annotated[str, argument("DATA.csv", "Columns with displacement and force, perhaps time.", completion.tables)]
@@ -50,7 +50,6 @@ class MeasureOptions(Measuring):
     target: Annotated[str | None, option("--target", metavar="FORCE", text="Target force or torque.")] = None
     one_branch: Annotated[bool, flag("--one-branch", text="Accept a recording without a return stroke.")] = False
     as_recorded: Annotated[bool, flag("--as-recorded", text="Keep spikes and the points next to reversals.")] = False
-    no_plots: NoPlots = False
     quiet: Quiet = False
 
 
@@ -59,11 +58,11 @@ def run(options: MeasureOptions, terminal: Terminal) -> Answer:
     from cfmkit.experiment.report import files
     from cfmkit.store import RunFolder
 
-    out = _folder(options)
+    out, form = _folder(options), options.form
     report = _report(options)
     with RunFolder(out) as folder:
         folder.check("metrics.json", "curve.csv", "cycles.csv")
-        for name, data in files(report, plots=not options.no_plots):
+        for name, data in files(report, not options.no_plots, form):
             folder.write(name, data)
         manifest = folder.commit(
             {

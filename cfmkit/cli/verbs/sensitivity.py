@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 
     from cfmkit.cli.page_blocks import Block
     from cfmkit.cli.terminal import Terminal
+    from cfmkit.plots.form import FigureForm
     from cfmkit.specs.spec import Spec
     from cfmkit.store.disk import Data
     from cfmkit.studies.sensitivity.findings import Findings, IndexLine
@@ -121,14 +122,14 @@ def run(options: SensitivityOptions, terminal: Terminal) -> Answer:
     from cfmkit.studies.sensitivity.setup import prepare
 
     start = studies.now()
-    out = folder_of(options, "sensitivity")
+    out, form = folder_of(options, "sensitivity"), options.form
     setup = prepare(spec_of(options), options.seed, options.max_points)
     with studies.desk(out, terminal, options.fresh) as place:
         place.folder.check("results.csv", "indices.csv", "metrics.json", "resolved.yaml")
         found = replace(carry_out(setup, lambda work: studies.compute(work, options, place)), fresh=options.fresh)
         for piece in found.evaluator.pieces:
             studies.tracebacks(piece.records, terminal)
-        for name, data in files(found, not options.no_plots):
+        for name, data in files(found, not options.no_plots, form):
             place.folder.write(name, data)
         made = studies.Made("sensitivity", options.spec, setup.study.spec, setup.seed, found.evaluator.count)
         manifest = studies.commit(place, made, terminal, exit_code(found))
@@ -137,17 +138,15 @@ def run(options: SensitivityOptions, terminal: Terminal) -> Answer:
     return _answer(found, written, terminal.verbose > 0)
 
 
-def files(found: Findings, plots: bool) -> Iterator[tuple[str, Data]]:
+def files(found: Findings, plots: bool, form: FigureForm) -> Iterator[tuple[str, Data]]:
     """Yield every file of the study; the pictures last."""
     from cfmkit.studies.sensitivity.output import outputs
 
     yield from outputs(found)
     if plots and not found.interrupted:
         from cfmkit.plots.sensitivity import figures
-        from cfmkit.plots.style import png
 
-        for stem, draw in figures(found).items():
-            yield f"figures/{stem}.png", png(draw())
+        yield from form.files(figures(found))
 
 
 def spec_of(options: SensitivityOptions) -> Spec:

@@ -30,7 +30,6 @@ if TYPE_CHECKING:
 
     from cfmkit.cli.page_blocks import Block
     from cfmkit.cli.terminal import Terminal
-    from cfmkit.store.disk import Data
     from cfmkit.studies.engine import Records
     from cfmkit.studies.summary import Summary
     from cfmkit.studies.sweep import SweepRequest
@@ -78,11 +77,13 @@ def run(options: SweepOptions, terminal: Terminal) -> Answer:
     """
     from cfmkit.cli import studies
     from cfmkit.cli.run_answer import folder_of
+    from cfmkit.plots.form import PLAIN
     from cfmkit.runs.run import spec_of
-    from cfmkit.studies.sweep import prepare, summary_of, writes_curves
+    from cfmkit.studies.pictures import makers
+    from cfmkit.studies.sweep import outputs, prepare, summary_of, writes_curves
 
     start = studies.now()
-    out = folder_of(options, "sweep")
+    out, form = folder_of(options, "sweep"), options.form
     spec, asked = spec_of(options), request(options)
     work = prepare(spec, asked)
     with studies.desk(out, terminal, options.fresh) as place:
@@ -91,10 +92,17 @@ def run(options: SweepOptions, terminal: Terminal) -> Answer:
         studies.tracebacks(records, terminal)
         summary = summary_of(records)
         kept: dict[str, bytes] = {}
-        for name, data in files(records, summary, writes_curves(spec, asked), not options.no_plots):
+        for name, data in outputs(records, summary, writes_curves(spec, asked)):
             if options.report:
                 kept[name] = data = data if isinstance(data, bytes) else b"".join(map(bytes, data))
             place.folder.write(name, data)
+        drawn = makers(records, summary) if not options.no_plots else {}
+        for name, content in form.files(drawn):
+            place.folder.write(name, content)
+            kept[name] = content
+        if options.report and not (form.on_screen and "png" in form.formats):
+            kept = {name: data for name, data in kept.items() if not name.startswith("figures/")}
+            kept |= PLAIN.files(drawn)
         if options.report:
             from cfmkit.runs import study_page
 
@@ -147,17 +155,6 @@ def _sample(text: str) -> tuple[str, int]:
     if int(count) < 1:
         raise UsageError("--sample: there must be at least one point")
     return method, int(count)
-
-
-def files(records: Records, summary: Summary, curves: bool, plots: bool) -> Iterator[tuple[str, Data]]:
-    """Yield every file of the sweep; the pictures last."""
-    from cfmkit.studies.sweep import outputs
-
-    yield from outputs(records, summary, curves)
-    if plots:
-        from cfmkit.studies.pictures import pictures
-
-        yield from pictures(records, summary)
 
 
 def exit_code(records: Records, summary: Summary) -> ExitCode:

@@ -1,0 +1,175 @@
+"""How figures are to be written: formats, width of print, headings, and a style file of one's own.
+
+A drawing says its sizes in millimetres of print (`cfmkit.plots.style.new_figure`, `axes_mm`). For another width it is
+drawn twice: once to hear which boxes it asks for, and once with the boxes stretched, while the room between them, which
+holds labels in letters of a fixed size, stays as it is. So no drawing needs to know of other widths.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+from cfmkit.errors import UsageError, visible
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Mapping
+
+    from matplotlib.figure import Figure
+
+FORMATS = ("png", "svg", "pdf")
+
+NARROWEST, WIDEST = 0.06, 0.6
+"""Widths of print that are allowed [m]: below, axes have no room beside their labels; above, no page is as wide."""
+
+
+@dataclass(frozen=True)
+class FigureForm:
+    """How figures are to be written.
+
+    Attributes
+    ----------
+    formats : tuple of {"png", "svg", "pdf"}
+        One file for each.
+    width : float, optional
+        Of the print [m]; default: each figure as it is drawn.
+    titles : bool
+        Whether headings stand above figures; in print the caption says what they say.
+    settings : tuple of (str, Any)
+        Of matplotlib, on top of ours.
+    """
+
+    formats: tuple[str, ...] = ("png",)
+    width: float | None = None
+    titles: bool = True
+    settings: tuple[tuple[str, Any], ...] = field(default=(), repr=False)
+
+    @property
+    def plain(self) -> bool:
+        """Whether nothing but the default is asked for."""
+        return self == PLAIN
+
+    @property
+    def on_screen(self) -> bool:
+        """Whether figures are drawn as a page shows them, whatever files they become."""
+        return replace(self, formats=("png",)).plain
+
+    def draw(self, make: Callable[[], Figure]) -> Figure:
+        """Return a figure in this form."""
+        from cfmkit.plots.style import formed
+
+        return formed(self, make)
+
+    def write(self, figure: Figure, stem: str) -> Iterator[tuple[str, bytes]]:
+        """Yield a figure's files as (name, content), below ``figures/``."""
+        from cfmkit.plots.formats import written
+
+        for kind in self.formats:
+            yield f"figures/{stem}.{kind}", written(figure, kind, self)
+
+    def files(self, makers: Mapping[str, Callable[[], Figure]]) -> Iterator[tuple[str, bytes]]:
+        """Yield the files of figures as (name, content), each when it is needed."""
+        for stem, make in makers.items():
+            yield from self.write(self.draw(make), stem)
+
+
+PLAIN = FigureForm()
+"""PNG, as each figure is drawn."""
+
+
+def form_of(
+    formats: str | None = None, width: str | None = None, titles: bool = True, style: str | None = None
+) -> FigureForm:
+    """Return the form that options ask for.
+
+    Parameters
+    ----------
+    formats : str, optional
+        Names with commas between them.
+    width : str, optional
+        A length with its unit.
+    titles : bool
+        Whether figures have headings.
+    style : str, optional
+        Path of a style file of matplotlib.
+
+    Raises
+    ------
+    cfmkit.errors.UsageError
+        If one of them is malformed.
+
+    Examples
+    --------
+    >>> form_of("svg, pdf", "84 mm").formats
+    ('svg', 'pdf')
+    """
+    names = tuple(dict.fromkeys(name.strip().lower() for name in (formats or "png").split(",") if name.strip()))
+    if unknown := [name for name in names if name not in FORMATS] or ([""] if not names else []):
+        raise UsageError(f"--figures: there is no format {visible(unknown[0])!r}; there are {', '.join(FORMATS)}")
+    return FigureForm(names, None if width is None else _width(width), titles, () if style is None else settings(style))
+
+
+def _width(text: str) -> float:
+    from cfmkit.errors import QuantityError
+    from cfmkit.specs.units import read_quantity
+
+    try:
+        value = float(read_quantity(text, "length"))
+    except QuantityError as error:
+        raise UsageError(f"--figure-width: {error}") from None
+    if not NARROWEST <= value <= WIDEST:
+        raise UsageError(f"--figure-width: {visible(text)} is not allowed: must be 60 mm ... 600 mm")
+    return value
+
+
+FIXED = ("backend", "svg.", "pdf.", "ps.", "savefig.format", "savefig.bbox", "text.usetex", "figure.figsize")
+"""How the settings begin that a style file cannot change: they would undo what makes files whole and repeatable."""
+
+
+def settings(path: str) -> tuple[tuple[str, Any], ...]:
+    """Return the settings in a style file of matplotlib, in the order of their names.
+
+    Raises
+    ------
+    cfmkit.errors.UsageError
+        If it cannot be read, or says something that matplotlib does not know or that is not a file's to change.
+    """
+    found = _read(path)
+    for name in found:
+        if name.startswith(FIXED):
+            raise UsageError(f"--figure-style: {visible(path)}: {name} is not a style file's to change")
+    return tuple(sorted(found.items()))
+
+
+def _read(path: str) -> dict[str, Any]:
+    """Return what a style file says; matplotlib tells of its faults in its log."""
+    import logging
+    import warnings
+
+    import matplotlib
+
+    told: list[str] = []
+    teller = logging.Handler()
+    teller.emit = lambda record: told.append(record.getMessage())  # type: ignore[method-assign]
+    log = logging.getLogger("matplotlib")
+    log.addHandler(teller)
+    before, log.propagate = log.propagate, False
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            read: Any = matplotlib.rc_params_from_file(path, fail_on_error=False, use_default_template=False)
+    except (OSError, UnicodeDecodeError) as error:
+        raise UsageError(f"--figure-style: {visible(path)} cannot be read: {_reason(error)}") from None
+    except Exception as error:
+        raise UsageError(f"--figure-style: {visible(path)}: {' '.join(str(error).split())}") from None
+    finally:
+        log.removeHandler(teller)
+        log.propagate = before
+    if told:
+        first = " ".join(told[0].split()).partition(" You probably need")[0]  # then come addresses of the library's own
+        raise UsageError(f"--figure-style: {visible(path)}: {visible(first)}")
+    return dict(read)
+
+
+def _reason(error: Exception) -> str:
+    return str(getattr(error, "strerror", None) or error).lower()

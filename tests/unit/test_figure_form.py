@@ -1,0 +1,138 @@
+"""Figures for print: another width, formats, no headings, a style file; text stays text, bytes repeat."""
+
+import re
+
+import numpy as np
+import pytest
+
+import cfmkit
+from cfmkit import api
+from cfmkit.errors import UsageError
+from cfmkit.plots import style
+from cfmkit.plots.form import PLAIN, FigureForm, form_of
+from cfmkit.plots.parts import to_scale
+from cfmkit.plots.text import Heading, write_heading
+
+SIZE = style.MM
+
+
+def made(scaled=False):
+    figure = style.new_figure(160, 100)
+    write_heading(figure, Heading("name", "subject"))
+    for left, wide in ((16, 112), (133, 4)):
+        ax = style.axes_mm(figure, (left, 14, wide, 76))
+    if scaled:
+        to_scale(figure.axes[0], (0.0, 0.0, 0.2, 0.1))
+    ax.set_xlabel("x")
+    return figure
+
+
+def boxes(figure):
+    """Return left, bottom, width and height of every axes [mm]."""
+    size = figure.get_size_inches() / SIZE
+    return [
+        np.array([*(box.p0 * size), *(box.size * size)])
+        for box in (ax.get_position(original=True) for ax in figure.axes)
+    ]
+
+
+def test_another_width_stretches_the_axes_and_leaves_the_room_for_their_labels():
+    narrow = form_of(width="84 mm").draw(made)
+    assert np.allclose(style.size_mm(narrow)[0], 84)
+    wide, bar = boxes(narrow)
+    assert np.allclose(wide[:2], (16, 14))
+    assert np.allclose(wide[2], 112 - (160 - 84))
+    assert np.allclose(bar[2], 4)
+    assert np.allclose(bar[0] - wide[0] - wide[2], 133 - 16 - 112)
+    assert 60 < style.size_mm(narrow)[1] < 100
+
+
+def test_what_is_to_scale_is_stretched_by_one_factor_in_both_directions():
+    axes, _ = boxes(form_of(width="84 mm").draw(lambda: made(scaled=True)))
+    assert np.isclose(axes[2] / 112, axes[3] / 76)
+
+
+def test_without_titles_the_heading_and_its_room_are_gone():
+    with_heading, without = (FigureForm(titles=titles).draw(made) for titles in (True, False))
+    assert [text.get_text() for text in with_heading.texts] == ["name: subject"]
+    assert without.texts == []
+    assert np.isclose(style.size_mm(with_heading)[1] - style.size_mm(without)[1], style_heading())
+
+
+def style_heading():
+    from cfmkit.plots.layout import HEADING
+
+    return HEADING
+
+
+def test_what_is_wrong_is_said_without_titles_too():
+    def failed():
+        figure = style.new_figure()
+        style.axes_mm(figure, (16, 14, 120, 70))
+        write_heading(figure, Heading("name", "subject", "partial: it ended early"))
+        return figure
+
+    assert [text.get_text() for text in FigureForm(titles=False).draw(failed).texts] == ["partial: it ended early"]
+
+
+@pytest.fixture(scope="module")
+def cam():
+    return cfmkit.analyze("configs/cam.yaml")
+
+
+def test_the_same_figure_has_the_same_bytes_in_every_format(cam):
+    form = form_of("png,svg,pdf", "84 mm", titles=False)
+    loop = {"loop": api.figures(cam)["loop"]}
+    first, second = dict(form.files(loop)), dict(form.files(loop))
+    assert list(first) == ["figures/loop.png", "figures/loop.svg", "figures/loop.pdf"]
+    assert first == second
+    assert "displacement [mm]" in first["figures/loop.svg"].decode()
+    assert b"/FontFile2" in first["figures/loop.pdf"]
+    assert b"/Type3" not in first["figures/loop.pdf"]
+    width = re.search(rb'width="([\d.]+)pt"', first["figures/loop.svg"])[1]
+    assert np.isclose(float(width), 84 / 25.4 * 72, atol=0.01)
+
+
+def test_every_figure_can_be_drawn_for_one_column(cam):
+    for name, draw in api.figures(cam).items():
+        figure = form_of(width="84 mm").draw(draw)
+        assert np.isclose(style.size_mm(figure)[0], 84), name
+        for box in boxes(figure):
+            assert box[2] > 3, name
+
+
+def test_a_style_file_changes_the_look_and_only_inside(cam, tmp_path):
+    file = tmp_path / "own.mplstyle"
+    file.write_text("axes.grid: False\nsavefig.dpi: 100\n")
+    form = form_of(style=str(file))
+    loop = {"loop": api.figures(cam)["loop"]}
+    ours, theirs = dict(PLAIN.files(loop)), dict(form.files(loop))
+    assert ours != theirs
+    assert dict(PLAIN.files(loop)) == ours
+
+
+@pytest.mark.parametrize(
+    ("given", "told"),
+    [
+        ({"formats": "png,jpg"}, "there is no format 'jpg'"),
+        ({"formats": " , "}, "there are png, svg, pdf"),
+        ({"width": "84"}, "write '84 mm'"),
+        ({"width": "5 mm"}, "must be 60 mm"),
+        ({"style": "nowhere.mplstyle"}, "cannot be read"),
+    ],
+)
+def test_a_malformed_wish_is_refused_in_one_line(given, told):
+    with pytest.raises(UsageError, match=re.escape(told)):
+        form_of(**given)
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [("font.siz: 4", "font.siz"), ("pdf.fonttype: 3", "not a style file's"), ("font.size: large-ish", "font.size")],
+)
+def test_a_style_file_that_says_something_wrong_is_refused(text, told, tmp_path):
+    file = tmp_path / "own.mplstyle"
+    file.write_text(text)
+    with pytest.raises(UsageError, match=re.escape(told)) as caught:
+        form_of(style=str(file))
+    assert "\n" not in str(caught.value)
