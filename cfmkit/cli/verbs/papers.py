@@ -1,0 +1,115 @@
+"""``cfmkit papers``: the numbers that the papers print, computed again."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cfmkit.cli.answer import Answer
+from cfmkit.cli.options import Common, argument, flag
+from cfmkit.cli.page_blocks import BAD, BLANK, FAINT, GOOD, LABEL, Field, Paragraph, Span, TextLine, field, line, listed
+from cfmkit.errors import ExitCode
+from cfmkit.runs.papers import VERDICTS
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping, Sequence
+
+    from cfmkit.cli.page_blocks import Block
+    from cfmkit.cli.terminal import Terminal
+
+    Record = Mapping[str, Any]
+
+PLACE = 64
+
+
+@dataclass(frozen=True, kw_only=True)
+class PapersOptions(Common):
+    """Arguments and options."""
+
+    name: Annotated[
+        str | None, argument("PAPER|FAMILY", "Only this paper, or those of this family: lan-2010, cam; default: all.")
+    ] = None
+    everything: Annotated[bool, flag("--all", text="Compute what takes a minute, too.")] = False
+    quiet: Annotated[bool, flag("-q", "--quiet", text="Print only what went wrong.")] = False
+
+
+def run(options: PapersOptions, terminal: Terminal) -> Answer:
+    """Compute the numbers that the papers print again, and say which agree; exit 5 if a verdict does not hold."""
+    from cfmkit.cli.progress import watching
+    from cfmkit.runs.papers import check, chosen
+
+    asked = chosen(options.name)
+    records: list[dict[str, Any]] = []
+    with watching(terminal, "rows") as progress:
+        progress.total(len(asked))
+        for done in check(asked, options.everything):
+            records.append(asdict(done.row) | {"command": done.row.command} | _outcome(done))
+            progress.done(1, 0, False)
+    counts = {verdict: sum(len(one["printed"]) for one in records if one["verdict"] == verdict) for verdict in VERDICTS}
+    wrong = [one for one in records if one["trouble"]]
+    told = f"{sum(counts.values())} printed numbers; " + (
+        f"{len(wrong)} verdicts do not hold" if wrong else "every verdict that was computed holds"
+    )
+    data = {"message": told, "papers": records, "counts": counts}
+    errors = tuple({"message": _complaint(one)} for one in wrong)
+    return Answer(
+        data,
+        _page(records, counts, told, bool(terminal.verbose)),
+        ExitCode.REQUIREMENT_MISSED if wrong else ExitCode.OK,
+        complaints=tuple(f"error    {one['message']}" for one in errors),
+        errors=errors,
+    )
+
+
+def _outcome(done: Any) -> dict[str, Any]:
+    return {"computed": done.computed, "trouble": done.trouble, "skipped": done.skipped}
+
+
+def _complaint(record: Record) -> str:
+    return f"{record['paper']}, {record['place']}, {record['what']}: {record['trouble']}"
+
+
+def _page(records: Sequence[Record], counts: Mapping[str, int], told: str, verbose: bool) -> Iterator[Block]:
+    from cfmkit.cli.topics import references
+
+    titles = {one["name"]: one["reference"] for one in references()}
+    yield TextLine((Span("cfmkit papers", LABEL), Span("  what the papers print, and what comes out here")))
+    for paper in dict.fromkeys(one["paper"] for one in records):
+        mine = [one for one in records if one["paper"] == paper]
+        yield from _of_paper(f"{paper}: {titles.get(paper, '')}", mine, verbose)
+    yield BLANK
+    yield Paragraph("verdict", told, BAD if "do not hold" in told else GOOD)
+    named = [{"count": str(n), "verdict": verdict, "meaning": VERDICTS[verdict]} for verdict, n in counts.items()]
+    yield from listed("", named, (field("count"), field("verdict"), field("meaning", wraps=True)))
+
+
+def _of_paper(title: str, records: Sequence[Record], verbose: bool) -> Iterator[Block]:
+    """Yield the rows of one paper, with the reasons below them; inputs only where everything is wanted."""
+    shown = [one for one in records if verbose or one["trouble"] or one["verdict"] != "given"]
+    fields = (
+        field("place", wraps=True),
+        field("what", wraps=True),
+        Field("printed", lambda one: ", ".join(one["printed"]), wraps=True),
+        Field("here", _here, wraps=True),
+        Field("verdict", lambda one: "DOES NOT HOLD" if one["trouble"] else one["verdict"]),
+    )
+    yield from listed(title, shown, fields)
+    silent = sum(len(one["printed"]) for one in records) - sum(len(one["printed"]) for one in shown)
+    if silent:
+        yield line(f"  and {silent} inputs, which are as printed (-v lists them)", FAINT)
+    reasons = [one for one in shown if one["why"] and (verbose or one["verdict"] in ("misprint", "disagrees"))]
+    yield from listed(
+        "reasons", reasons, (field("place", ""), field("what", "", wraps=True), field("why", "", wraps=True))
+    )
+    if verbose:
+        commands = [one for one in shown if one["command"]]
+        yield from listed(
+            "commands", commands, (field("place", ""), field("what", "", wraps=True), field("command", "", wraps=True))
+        )
+
+
+def _here(record: Record) -> str:
+    if record["skipped"]:
+        return "with --all"
+    same = record["verdict"] == "given" and not record["trouble"]
+    return "the same" if same else ", ".join(record["computed"])

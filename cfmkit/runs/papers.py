@@ -1,0 +1,397 @@
+"""The numbers that the papers print, beside what cfmkit makes of them.
+
+`printed_numbers.yaml` has a row for each number, or each few that belong together: where it stands, what it is, the
+verdict, and how to compute the same. `check` computes it again and says whether the verdict holds.
+
+A row asks in a closed grammar, in SI: names of metrics (``force_mean[load]``), dotted paths of the specification
+(``mechanism.springs.stiffness[0]``), columns of the first curve at a place (``force("13.6 mm")``, a branch second),
+quantities in quotes, numbers, ``+ - * / **``, a few functions, and ``changed("path=value", ...)``: the rest of the
+question with one value changed.
+"""
+
+from __future__ import annotations
+
+import ast
+import math
+import operator
+from dataclasses import dataclass
+from decimal import Decimal
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from cfmkit.errors import CfmError, UsageError, visible
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Mapping, Sequence
+
+    from cfmkit.curves import Curve
+    from cfmkit.runs.notebook import Analysis
+    from cfmkit.specs.spec import Spec
+
+VERDICTS: Mapping[str, str] = {
+    "agrees": "computed here, the same to its last digit, or to the tolerance that the row gives a reason for",
+    "given": "an input: the example holds it as printed",
+    "misprint": "wrong as printed: the row says why, and what is right",
+    "disagrees": "computed here with another result; the row says what is known of the reason",
+    "measured there": "an experiment of the authors; where the model has the same quantity, its value stands beside it",
+    "not modelled": "cfmkit has no such model or part",
+}
+"""Every verdict with its meaning, in the order in which they are counted."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """What a paper prints at one place.
+
+    Attributes
+    ----------
+    paper : str
+        First author and year, as `cfmkit show references` has it.
+    family : str
+        Of the mechanism.
+    place, what : str
+        Section, table, figure or equation; the quantity.
+    printed : tuple of str
+        As printed, with units; ``>``, ``<`` and ``~`` (about) may lead.
+    verdict : str
+        One of `VERDICTS`.
+    why : str
+        The reason, of every verdict that needs one.
+    spec : str
+        Name of the example; empty where nothing is computed from one.
+    changes : tuple of str
+        As ``--set`` takes them.
+    verb : {"analyze", "design"}
+        `design` asks the specification that it finds, and the analysis of that.
+    ask : tuple of str
+        As many as `printed`, or one that has as many values; empty where nothing is computed.
+    here : tuple of str
+        What comes out where that is not what is printed.
+    tolerance : str
+        How far off an agreeing number may be; empty: half a unit of its last digit.
+    heavy : bool
+        Whether it takes long.
+    """
+
+    paper: str
+    family: str
+    place: str
+    what: str
+    printed: tuple[str, ...]
+    verdict: str
+    why: str = ""
+    spec: str = ""
+    changes: tuple[str, ...] = ()
+    verb: Literal["analyze", "design"] = "analyze"
+    ask: tuple[str, ...] = ()
+    here: tuple[str, ...] = ()
+    tolerance: str = ""
+    heavy: bool = False
+
+    @property
+    def command(self) -> str:
+        """The command that repeats it; empty where there is none."""
+        import shlex
+
+        if not self.spec:
+            return ""
+        changes = [word for change in self.changes for word in ("--set", shlex.quote(change))]
+        return " ".join(["cfmkit", self.verb, f"configs/{self.spec}.yaml", *changes])
+
+
+@dataclass(frozen=True)
+class Checked:
+    """A row with what was computed.
+
+    Attributes
+    ----------
+    row : Row
+        What the paper prints.
+    computed : tuple of str
+        In the units of the paper, with two digits more; empty where nothing was computed.
+    trouble : str
+        Why the verdict does not hold; empty: it does.
+    skipped : bool
+        Whether the row was left out because it takes long.
+    """
+
+    row: Row
+    computed: tuple[str, ...] = ()
+    trouble: str = ""
+    skipped: bool = False
+
+
+def rows() -> tuple[Row, ...]:
+    """Return every row, paper by paper as they are in the file."""
+    from cfmkit.specs.yamlio.plain import read_plain
+
+    text = Path(__file__).with_name("printed_numbers.yaml").read_text(encoding="utf-8")
+    papers: Mapping[str, Mapping[str, Any]] = read_plain(text)
+    return tuple(_row(paper, item["family"], entry) for paper, item in papers.items() for entry in item["rows"])
+
+
+def _row(paper: str, family: str, entry: Mapping[str, Any]) -> Row:
+    given: dict[str, Any] = dict(entry)
+    for name in ("printed", "ask", "here"):
+        given[name] = _texts(given.get(name, ()))
+    return Row(paper=paper, family=family, changes=_texts(given.pop("set", ())), **given)
+
+
+def _texts(value: Any) -> tuple[str, ...]:
+    return tuple(map(str, value)) if isinstance(value, list | tuple) else (str(value),)
+
+
+def chosen(name: str | None) -> tuple[Row, ...]:
+    """Return the rows of one paper, or of a family's papers, or all.
+
+    Raises
+    ------
+    cfmkit.errors.UsageError
+        If there is no such paper or family.
+    """
+    from difflib import get_close_matches
+
+    every = rows()
+    if name is None:
+        return every
+    if wanted := tuple(row for row in every if name.lower() in (row.paper, row.family)):
+        return wanted
+    known = dict.fromkeys([*(row.paper for row in every), *(row.family for row in every)])
+    near = get_close_matches(name.lower(), known, n=1)
+    hint = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(known)}"
+    raise UsageError(f"there is no paper {visible(name)!r}; {hint}")
+
+
+def check(some: Sequence[Row], everything: bool = False) -> Iterator[Checked]:
+    """Compute rows again, one after the other.
+
+    Parameters
+    ----------
+    some : sequence of Row
+        What to compute.
+    everything : bool
+        Those that take long, too.
+    """
+    for row in some:
+        if not row.ask:
+            yield Checked(row)
+        elif row.heavy and not everything:
+            yield Checked(row, skipped=True)
+        else:
+            yield _checked(row)
+
+
+def _checked(row: Row) -> Checked:
+    try:
+        values = _values(row)
+    except (CfmError, ValueError, KeyError) as error:
+        return Checked(row, trouble=f"cannot be computed: {error.args[0] if error.args else error}")
+    shown = tuple(_told(value, text) for value, text in zip(values, row.here or row.printed, strict=True))
+    return Checked(row, shown, "; ".join(_faults(row, values)))
+
+
+def _values(row: Row) -> tuple[float, ...]:
+    scope = _Scope(row.spec, row.changes, row.verb)
+    found = [_evaluated(text, scope) for text in row.ask]
+    values = tuple(float(one) for value in found for one in (value if isinstance(value, tuple | list) else (value,)))
+    if len(values) != len(row.printed):
+        raise ValueError(f"{len(values)} values for {len(row.printed)} numbers")
+    return values
+
+
+def _faults(row: Row, values: Sequence[float]) -> Iterator[str]:
+    """Yield what speaks against the verdict of a row."""
+    for value, printed in zip(values, row.printed, strict=True):
+        if row.verdict in ("agrees", "given") and not _matches(value, printed, row.tolerance):
+            yield f"{_told(value, printed)} is not {printed}"
+        if row.verdict in ("misprint", "disagrees") and _is_quantity(printed) and _matches(value, printed):
+            yield f"{_told(value, printed)} is what is printed"
+    for value, here in zip(values, row.here, strict=bool(row.here)):
+        if not _matches(value, here):
+            yield f"{_told(value, here)} is not {here}"
+
+
+@dataclass(frozen=True)
+class Number:
+    """A printed number: what leads it, its digits, its unit and the size of that in SI."""
+
+    sign: str
+    digits: Decimal
+    unit: str
+    size: float
+
+    @property
+    def value(self) -> float:
+        """In SI."""
+        return float(self.digits) * self.size
+
+    @property
+    def last(self) -> float:
+        """One unit of the last digit, in SI."""
+        return 10.0 ** int(self.digits.as_tuple().exponent) * self.size
+
+
+def number(text: str) -> Number:
+    """Return a printed number.
+
+    Raises
+    ------
+    cfmkit.errors.QuantityError
+        If it is none.
+
+    Examples
+    --------
+    >>> found = number("> 53 %")
+    >>> found.sign, found.value, found.last
+    ('>', 0.53, 0.01)
+    """
+    from cfmkit.errors import QuantityError
+    from cfmkit.specs.units.numbers import read_number
+    from cfmkit.specs.units.registry import unit_size
+
+    sign, rest = (text[0], text[1:].strip()) if text[:1] in "<>~" else ("", text)
+    digits, _, unit = rest.partition(" ")
+    if not digits:
+        raise QuantityError(f"{visible(text)!r} is no number")
+    read_number(digits)
+    return Number(sign, Decimal(digits), unit, float(unit_size(unit).factor) if unit else 1.0)
+
+
+def _is_quantity(text: str) -> bool:
+    try:
+        number(text)
+    except CfmError:
+        return False
+    return True
+
+
+def _matches(value: float, text: str, tolerance: str = "") -> bool:
+    """Return whether a value is what a text says, to its last digit or within a tolerance."""
+    wanted = number(text)
+    if wanted.sign in ("<", ">"):
+        return value < wanted.value if wanted.sign == "<" else value > wanted.value
+    room = number(tolerance).value if tolerance else 0.5 * wanted.last
+    return abs(value - wanted.value) <= room * (1 + 1e-9) + 1e-12 * abs(wanted.value)
+
+
+def _told(value: float, text: str) -> str:
+    """Return a value in the unit of a printed text, with two digits more."""
+    if not _is_quantity(text):
+        return f"{value:.6g}"
+    like = number(text)
+    places = max(0, 2 - int(like.digits.as_tuple().exponent))
+    scaled = value / like.size
+    small = scaled != 0 and abs(scaled) < 10.0 ** (2 - places)
+    digits = f"{scaled:.4g}" if small else f"{scaled:.{min(places, 12)}f}"
+    return f"{digits} {like.unit}".rstrip()
+
+
+# --- what a row asks ---------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Scope:
+    """Where the names of a question have their values."""
+
+    spec: str
+    changes: tuple[str, ...] = ()
+    verb: str = "analyze"
+
+    def changed(self, change: str) -> _Scope:
+        return _Scope(self.spec, (*self.changes, change), self.verb)
+
+    def specification(self) -> Spec:
+        return _specification(self.spec, self.changes, self.verb)
+
+    def result(self) -> Analysis:
+        return _result(self.spec, self.changes, self.verb)
+
+
+@cache
+def _specification(name: str, changes: tuple[str, ...], verb: str) -> Spec:
+    from cfmkit import api
+    from cfmkit.runs.examples import example
+
+    if not name:
+        raise ValueError("no example is named")
+    spec = api.load(example(name).path, changes)
+    if verb == "analyze":
+        return spec
+    found = api.design(spec).spec
+    if found is None:
+        raise ValueError("the design has no solution")
+    return found
+
+
+@cache
+def _result(name: str, changes: tuple[str, ...], verb: str) -> Analysis:
+    from cfmkit import api
+
+    return api.analyze(_specification(name, changes, verb))
+
+
+_TWO: Mapping[type[ast.operator], Callable[[Any, Any], Any]] = {
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.Div: operator.truediv,
+    ast.Pow: operator.pow,
+}
+_FUNCTIONS: Mapping[str, Callable[..., Any]] = {
+    name: getattr(math, name) for name in ("sin", "cos", "tan", "asin", "acos", "atan", "sqrt")
+} | {"abs": abs, "min": min, "max": max}
+_BLOCKS = ("mechanism", "analysis", "design")
+
+
+def _evaluated(text: str, scope: _Scope) -> Any:
+    """Return what a question is answered with, in SI."""
+    try:
+        tree = ast.parse(text.strip(), mode="eval").body
+    except SyntaxError:
+        raise ValueError(f"{text!r} is no question") from None
+    return _value(tree, scope)
+
+
+def _value(node: ast.expr, scope: _Scope) -> Any:
+    match node:
+        case ast.Constant(value=str(text)):
+            return number(text).value
+        case ast.Constant(value=int() | float() as value):
+            return value
+        case ast.UnaryOp(op=ast.USub(), operand=inner):
+            return -_value(inner, scope)
+        case ast.BinOp(left=left, op=op, right=right) if type(op) in _TWO:
+            return _TWO[type(op)](_value(left, scope), _value(right, scope))
+        case ast.Call(func=ast.Name(id="changed"), args=[ast.Constant(value=str(change)), inner]):
+            return _value(inner, scope.changed(change))
+        case ast.Call(func=ast.Name(id=name), args=args) if name in _FUNCTIONS:
+            return _FUNCTIONS[name](*(_value(one, scope) for one in args))
+        case ast.Call(func=ast.Name(id=column), args=[place, *branch]):
+            return _on_curve(scope.result().curves[0], column, _value(place, scope), *map(ast.literal_eval, branch))
+        case ast.Name() | ast.Attribute() | ast.Subscript():
+            return _named(ast.unparse(node), scope)
+    raise ValueError(f"{ast.unparse(node)!r} is no question")
+
+
+def _named(name: str, scope: _Scope) -> Any:
+    """Return a value of the specification, or a metric."""
+    if name.startswith(tuple(f"{block}." for block in _BLOCKS)):
+        return scope.specification().at(name.replace("[", ".").replace("]", ""))
+    metric = scope.result().metrics.get(name)
+    if metric is None or metric.value is None:
+        raise ValueError(f"{name} has no value")
+    return metric.value
+
+
+def _on_curve(curve: Curve, column: str, place: float, branch: str | None = None) -> float:
+    """Return a column at a place, linear between the points."""
+    import numpy as np
+
+    on = curve if branch is None else curve.on(branch)
+    values = on.effort if column in ("force", "torque") else on.extra[column].values if column in on.extra else None
+    if values is None:
+        raise ValueError(f"the curve has no column {column!r}")
+    if not on.motion.min() <= place <= on.motion.max():
+        raise ValueError("the place is not on the curve")
+    return float(np.interp(place, on.motion, np.asarray(values, dtype=float)))

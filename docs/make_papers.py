@@ -1,0 +1,82 @@
+"""Write docs/papers.md: the numbers that the papers print, from the rows that `cfmkit papers` computes.
+
+``python docs/make_papers.py`` after a row or a result has changed; a test compares the page with what is computed.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from cfmkit.families import records
+from cfmkit.runs.papers import VERDICTS, check, rows
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Sequence
+
+    from cfmkit.runs.papers import Checked
+
+PAGE = Path(__file__).with_name("papers.md")
+HEAD = """\
+# Compared with the papers
+
+Every number that the five papers print in a table, an abstract or a conclusion, and what their text says of each
+figure; numbers of equations and of the text where a result hangs on them. None is left out because it disagrees.
+`cfmkit papers` computes all of it again and ends with 5 where a verdict does not hold; `--all` computes what takes a
+minute, too, and `cfmkit papers lan-2010 -v` shows the command behind each row. This page is made from the same rows
+(`docs/make_papers.py`, from `cfmkit/runs/printed_numbers.yaml`). The texts at hand have no page breaks: a place is a
+section, table, figure or equation.
+
+```console
+$ cfmkit papers cam -q
+```
+"""
+
+
+def page(done: Sequence[Checked]) -> str:
+    """Return the page for rows that were computed."""
+    return (
+        "\n".join([HEAD, *_counts(done), *(line for paper in _papers(done) for line in _section(paper, done))]) + "\n"
+    )
+
+
+def _papers(done: Iterable[Checked]) -> list[str]:
+    return list(dict.fromkeys(one.row.paper for one in done))
+
+
+def _counts(done: Sequence[Checked]) -> Iterator[str]:
+    yield "| verdict | numbers | meaning |\n|---|---|---|"
+    for verdict, meaning in VERDICTS.items():
+        yield f"| {verdict} | {sum(len(one.row.printed) for one in done if one.row.verdict == verdict)} | {meaning} |"
+    yield ""
+
+
+def _section(paper: str, done: Sequence[Checked]) -> Iterator[str]:
+    mine = [one for one in done if one.row.paper == paper]
+    (reference,) = [text for record in records() for text in record.references if _names(text, paper)][:1]
+    yield f"## {paper}\n\n{reference}\n"
+    yield "| place | what | printed | `cfmkit` | verdict | why |\n|---|---|---|---|---|---|"
+    for one in mine:
+        cells = (one.row.place, one.row.what, ", ".join(one.row.printed), _here(one), one.row.verdict, one.row.why)
+        yield f"| {' | '.join(_cell(cell) for cell in cells)} |"
+    yield ""
+
+
+def _names(reference: str, paper: str) -> bool:
+    author, _, year = paper.rpartition("-")
+    first = reference.partition(",")[0].split()[-1].lower()
+    return first == author and year in reference
+
+
+def _here(one: Checked) -> str:
+    if one.row.verdict == "given":
+        return "the same"
+    return ", ".join(one.row.here if one.skipped else one.computed)
+
+
+def _cell(text: str) -> str:
+    return text.replace("|", "\\|").replace("*", "\\*").replace("<", "&lt;").replace(">", "&gt;")
+
+
+if __name__ == "__main__":
+    PAGE.write_text(page(list(check(rows()))), encoding="utf-8")
