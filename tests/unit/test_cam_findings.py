@@ -129,7 +129,7 @@ def test_the_published_cam_is_undercut_and_says_by_how_much_and_what_cures_it():
     assert "the 16 mm roller" in found
     assert "(10.33 mm, at the start)" in found
     assert "the first 1.14 mm run on a corner" in found
-    assert "Use a roller <= 10.3" in found
+    assert "Use springs stretched by 6.436 mm at the start ('mechanism.springs.preload'), a roller <= 10.3" in found
     assert "or A >= 14.4" in found
     assert "x = 61.9 mm, y = 14.79 mm" in message(result, "contact_not_single_valued")
     assert result.valid is not None

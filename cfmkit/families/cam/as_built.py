@@ -211,7 +211,7 @@ def across(assembly: Assembly, registration: Registration) -> tuple[FloatArray, 
 def shares_of(assembly: Assembly, designed: Sides, sides: Sides) -> dict[str, FloatArray]:
     """Return the parts of the force: what the design gives, and what each deviation adds to it [N]."""
     loads, mechanism = assembly.loads, assembly.spec.mechanism
-    rest, drawn = loads.rest_half_width, float(mechanism.profile.rest_half_width or loads.rest_half_width)
+    rest, drawn = loads.rest_half_width, mechanism.springs_rest_as_cut
     ideal = designed.forces(loads, 0.0, drawn)[0]
     longer = designed.forces(loads, 0.0, rest)[0]
     smooth = sides.forces(loads, 0.0, rest)[0]

@@ -63,7 +63,7 @@ def attribute(result: Result, loop: MeasuredLoop) -> Mapping[str, Quantity]:
         return {}
     sides, designed = _sides(state, loop.places - state.origin)
     loads, mechanism = state.assembly.loads, state.assembly.spec.mechanism
-    drawn = float(mechanism.profile.rest_half_width or loads.rest_half_width)
+    drawn = mechanism.springs_rest_as_cut
     friction, rest = _explained(sides, loads, loop)
     design = designed.forces(loads, 0.0, drawn)[0]
     on_track = sides.forces(loads, 0.0, drawn)[0]

@@ -116,6 +116,7 @@ def _symmetric_closed(spec: CamSpec) -> bool:
         and not spec.gravity
         and not (mechanism.pins or mechanism.bearings or mechanism.guide)
         and not (mechanism.contact or mechanism.left or mechanism.errors or profile.file)
+        and not (mechanism.preload or profile.preload)
         and profile.friction == 0
         and profile.slope_factor == 1
         and profile.offset == 0

@@ -45,6 +45,7 @@ def resolve(spec: CamSpec) -> CamSpec:
         "brace_length": profile.brace_length or mechanism.brace_length,
         "rest_half_width": profile.rest_half_width or mechanism.rest_half_width,
         "roller_radius": profile.roller_radius or mechanism.roller_radius,
+        "preload": (mechanism.preload if profile.preload is None else profile.preload) or None,
         "stroke": stroke,
     }
     changes: dict[str, object] = {"profile": profile.model_copy(update=written)}
@@ -62,6 +63,7 @@ def _resolved_left(mechanism: Mechanism, left: Left, stroke: float) -> Left:
         "brace_length": profile.brace_length or left.brace_length or mechanism.brace_length,
         "rest_half_width": profile.rest_half_width or mechanism.rest_half_width,
         "roller_radius": profile.roller_radius or left.roller_radius or mechanism.roller_radius,
+        "preload": (mechanism.preload if profile.preload is None else profile.preload) or None,
         "stroke": profile.stroke or stroke,
     }
     return left.model_copy(update={"profile": profile.model_copy(update=written)})
@@ -89,6 +91,7 @@ def slope_law(spec: CamSpec) -> SlopeLaw:
         brace_length=float(profile.brace_length or 0.0),
         friction=profile.friction,
         slope_factor=profile.slope_factor,
+        preload=0.5 * (profile.preload or 0.0),
     )
 
 
@@ -170,7 +173,7 @@ def assemble(spec: CamSpec) -> Assembly:
     weights = weights_of(mechanism) if spec.gravity else Weights()
     loads = Loads(
         mechanism.springs.total,
-        mechanism.rest_half_width,
+        mechanism.springs_rest,
         mechanism.brace_length,
         *weights.along,
         sideways=weights.sideways,

@@ -1,8 +1,9 @@
 """From targets to a cam: the force constant, the springs and the profile to cut.
 
 The force is F = 4 K A [SS, eq. 1]: of K and A one is given and the other follows, or
-both come from a catalogue. A profile that also carries weight is designed for the
-force that is left after the slider's own weight; its slope is steeper by
+both come from a catalogue. Springs that are tight at the start give the path a slope there that a larger roller
+can follow: the smallest such preload is chosen where that is asked for. A profile that
+also carries weight is designed for the force that is left after the slider's own weight; its slope is steeper by
 c = F' / (F' - 2 w), w the weight that hangs on one roller.
 
 Reference
@@ -31,7 +32,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from cfmkit.families.base import Run
-    from cfmkit.families.cam.spec import CamDesign, CamSpec, CatalogueSpring, Springs
+    from cfmkit.families.cam.spec import CamDesign, CamSpec, CatalogueSpring, Mechanism, Springs
     from cfmkit.results import Finding
 
 
@@ -43,6 +44,8 @@ class Choice:
     springs: Springs
     active: tuple[str, ...] = ()
     note: str = ""
+    preload: float = 0.0
+    """Elongation of the springs at the start [m]."""
 
 
 def design(spec: CamSpec, run: Run) -> Design:
@@ -72,11 +75,16 @@ def design(spec: CamSpec, run: Run) -> Design:
 def _design(spec: CamSpec, target: CamDesign) -> Design:
     pull, factor = shaping(spec, target)
     _check_beginning(spec, target, factor)
-    smallest = _smallest_constant(spec, target, factor)
+    smallest = None if target.choose == "preload" else _smallest_constant(spec, target, factor)
     _check_room(spec)
-    ways = {"force-constant": _from_springs, "stiffness": _from_constant, "catalogue": _from_catalogue}
+    ways = {
+        "force-constant": _from_springs,
+        "stiffness": _from_constant,
+        "catalogue": _from_catalogue,
+        "preload": _with_preload,
+    }
     choice = ways[target.choose](spec, target, pull, factor, smallest)
-    law = _law(spec, target, choice.force_constant, factor)
+    law = _law(spec, target, choice.force_constant, factor, choice.preload)
     _check_stroke(law, target, choice.springs)
     written = _written(spec, target, choice, factor)
     told = (*_overwritten(spec, written), *_plate_lacks(written))
@@ -103,9 +111,20 @@ def shaping(spec: CamSpec, target: CamDesign) -> tuple[float, float]:
     return pull, pull / (pull - 2.0 * roller)
 
 
-def _law(spec: CamSpec, target: CamDesign, force_constant: float, factor: float) -> SlopeLaw:
+def _law(
+    spec: CamSpec, target: CamDesign, force_constant: float, factor: float, preload: float | None = None
+) -> SlopeLaw:
+    """Return the slope law of a designed profile; the elongation `preload` [m] is the mechanism's unless given."""
     mechanism = spec.mechanism
-    return SlopeLaw(force_constant, mechanism.rest_half_width, mechanism.brace_length, target.friction, factor)
+    half = 0.5 * (mechanism.preload if preload is None else preload)
+    return SlopeLaw(force_constant, mechanism.rest_half_width, mechanism.brace_length, target.friction, factor, half)
+
+
+def _undercuts(spec: CamSpec, law: SlopeLaw, smallest: float | None) -> bool:
+    """Return whether a force constant below `smallest` [m] undercuts: with a preload some small ones do not."""
+    if smallest is None or law.force_constant >= smallest:
+        return False
+    return not law.preload or float(law.curvature_radius(law.rest_half_width)) < spec.mechanism.roller_radius
 
 
 def _check_beginning(spec: CamSpec, target: CamDesign, factor: float) -> None:
@@ -153,20 +172,48 @@ def _from_springs(spec: CamSpec, target: CamDesign, pull: float, factor: float, 
     """Choose A from the springs; where that would undercut, the smallest A that does not, and softer springs."""
     springs = spec.mechanism.springs
     constant = pull / (4.0 * springs.total)
-    if smallest is None or constant >= smallest:
-        return Choice(constant, springs)
+    if smallest is None or not _undercuts(spec, _law(spec, target, constant, factor), smallest):
+        return Choice(constant, springs, preload=spec.mechanism.preload)
     softer = springs.scaled_to(pull / (4.0 * smallest))
     note = (
         f"to avoid undercut A is raised from {mm(constant)} to {mm(smallest)}; the springs must then add up to "
         f"{rate(softer.total)} instead of {rate(springs.total)}"
     )
-    return Choice(smallest, softer, ("design.avoid_undercut",), note)
+    return Choice(smallest, softer, ("design.avoid_undercut",), note, spec.mechanism.preload)
+
+
+def _with_preload(spec: CamSpec, target: CamDesign, pull: float, factor: float, _smallest: float | None) -> Choice:
+    """Choose A from the springs, and the smallest preload with which the roller can follow the path."""
+    mechanism, constant = spec.mechanism, pull / (4.0 * spec.mechanism.springs.total)
+    law = _law(spec, target, constant, factor, 0.0)
+    half = law.smallest_preload(mechanism.roller_radius)
+    if half is None:
+        raise Infeasible(
+            finding(
+                "undercut",
+                f"no preload avoids undercut: cut for a friction of {target.friction:g} the path turns vertical before "
+                f"its start is wide enough for the {mm(mechanism.roller_radius)} roller; use a smaller roller "
+                "('mechanism.roller_radius') or less friction ('design.friction')",
+            )
+        )
+    preload = 2.0 * half * (1 + 1e-12)
+    return Choice(constant, mechanism.springs, note=_preload_note(mechanism, preload), preload=preload)
+
+
+def _preload_note(mechanism: Mechanism, preload: float) -> str:
+    """Return what the chosen preload means for who buys the springs."""
+    if not preload:
+        return "no preload is needed: the roller can follow the path with the springs at rest at the start"
+    return (
+        f"to avoid undercut the springs are stretched by {mm(preload)} at the start: with the same roller positions "
+        f"they are at rest at {mm(2.0 * mechanism.rest_half_width - preload)} between the roller axes"
+    )
 
 
 def _from_constant(spec: CamSpec, target: CamDesign, pull: float, factor: float, smallest: float | None) -> Choice:
     """Choose the stiffness from a given A."""
     constant = target.force_constant or spec.mechanism.profile.force_constant
-    if smallest is not None and constant < smallest:
+    if smallest is not None and _undercuts(spec, _law(spec, target, constant, factor), smallest):
         raise Infeasible(
             finding(
                 "force_constant_too_small",
@@ -175,7 +222,8 @@ def _from_constant(spec: CamSpec, target: CamDesign, pull: float, factor: float,
             ),
             {"design.force_constant": at_least(smallest)},
         )
-    return Choice(constant, spec.mechanism.springs.scaled_to(pull / (4.0 * constant)))
+    springs = spec.mechanism.springs.scaled_to(pull / (4.0 * constant))
+    return Choice(constant, springs, preload=spec.mechanism.preload)
 
 
 def _from_catalogue(spec: CamSpec, target: CamDesign, pull: float, factor: float, smallest: float | None) -> Choice:
@@ -187,7 +235,7 @@ def _from_catalogue(spec: CamSpec, target: CamDesign, pull: float, factor: float
         constant = pull / (4.0 * springs.total)
         label = f"{count} x {item.name}"
         law = _law(spec, target, constant, factor)
-        reason = _why_not(law, target, springs, smallest)
+        reason = _why_not(spec, law, target, springs, smallest)
         if reason:
             rejected.append(f"{label}: {reason}")
             continue
@@ -195,7 +243,8 @@ def _from_catalogue(spec: CamSpec, target: CamDesign, pull: float, factor: float
         if gap == float("inf"):
             rejected.append(f"{label}: friction holds the roller")
             continue
-        fitting.append((gap, Choice(constant, springs, note=f"{label} of the catalogue: A = {mm(constant)}")))
+        note = f"{label} of the catalogue: A = {mm(constant)}"
+        fitting.append((gap, Choice(constant, springs, note=note, preload=spec.mechanism.preload)))
     if not fitting:
         told = f"no spring of the catalogue fits: {'; '.join(rejected)}; add others to 'design.catalogue'"
         raise Infeasible(finding("no_spring_fits", f"{told}, or change {_in_the_way(rejected)}"))
@@ -229,9 +278,9 @@ def _bought(item: CatalogueSpring, count: int) -> Springs:
     return Springs(stiffness=item.stiffness, count=count, max_elongation=item.max_elongation)
 
 
-def _why_not(law: SlopeLaw, target: CamDesign, springs: Springs, smallest: float | None) -> str:
+def _why_not(spec: CamSpec, law: SlopeLaw, target: CamDesign, springs: Springs, smallest: float | None) -> str:
     """Return why a catalogue choice is refused; empty if it is not."""
-    if smallest is not None and law.force_constant < smallest:
+    if smallest is not None and _undercuts(spec, law, smallest):
         return f"undercut (A = {mm(law.force_constant)} < {mm(smallest)})"
     try:
         _check_stroke(law, target, springs)
@@ -248,7 +297,7 @@ def two_way_gap(law: SlopeLaw, target: CamDesign, friction: float) -> float:
     path, end = reach(law, target.stroke)
     x = np.linspace(law.rest_half_width, end, 801)
     x = x[path.travel(x) >= 0.02 * target.stroke]
-    stretch, slope = (x - law.rest_half_width) / law.force_constant, law.slope(x)
+    stretch, slope = (x - law.rest_half_width + law.preload) / law.force_constant, law.slope(x)
     turned = np.stack([(slope - mu) / (1 + mu * slope) for mu in (friction, -friction)])
     # F'/(4KA) = (D/A + (1 - 1/c) p)/(p - tan a): springs, and the weight that the profile carries.
     carried = (1.0 - 1.0 / law.slope_factor) * turned
@@ -275,9 +324,9 @@ def _check_stroke(law: SlopeLaw, target: CamDesign, springs: Springs) -> None:
             ),
             {"design.stroke": at_most(reached)},
         )
-    elongation, limit = 2.0 * (end - law.rest_half_width), springs.max_elongation
+    elongation, limit = 2.0 * (end - law.rest_half_width + law.preload), springs.max_elongation
     if limit and elongation > limit:
-        shorter = float(path.travel(law.rest_half_width + 0.5 * limit))
+        shorter = max(float(path.travel(law.rest_half_width + 0.5 * limit - law.preload)), 0.0)
         raise Infeasible(
             finding(
                 "spring_overstretched",
@@ -288,7 +337,14 @@ def _check_stroke(law: SlopeLaw, target: CamDesign, springs: Springs) -> None:
         )
 
 
-_SOURCES = {"friction": "design.friction", "slope_factor": "design.gravity", "offset": "", "file": "", "noise": ""}
+_SOURCES = {
+    "friction": "design.friction",
+    "preload": "mechanism.springs.preload",
+    "slope_factor": "design.gravity",
+    "offset": "",
+    "file": "",
+    "noise": "",
+}
 """What decides a value of a designed profile that does not follow the mechanism's of the same name."""
 
 
@@ -335,4 +391,8 @@ def _written(spec: CamSpec, target: CamDesign, choice: Choice, factor: float) ->
         "roller_radius": mechanism.roller_radius,
     }
     springs = choice.springs.model_dump(exclude_none=True)
+    if choice.preload:
+        profile["preload"] = choice.preload
+        springs.pop("rest_length", None)
+        springs["preload"] = choice.preload
     return spec.replace({"mechanism.profile": profile, "mechanism.springs": springs})

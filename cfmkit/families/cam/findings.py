@@ -143,13 +143,17 @@ def _undercut(solution: Solution) -> Iterator[Finding]:
     roller += f", with {mm(missing)} of the flank missing," if missing else ""
     cure = law.smallest_force_constant(profile.roller_radius)
     larger = f" or A >= {mm(cure)}" if cure else ""
+    tight, designed = _preload_cure(solution), solution.assembly.spec.design
+    tighter = f"springs stretched by {mm(tight)} at the start ('mechanism.springs.preload'), " if tight else ""
+    cures = ["design.choose=preload"] if designed and tight else []
+    cures += ["design.avoid_undercut=true"] if cure and designed else []
     fits = f"a roller <= {mm(radius - missing)}" if radius > missing else "less missing material"
     yield finding(
         "undercut",
         f"{roller} is larger than the path's smallest radius of curvature "
         f"({mm(radius)}, at the start); the first {mm(corner)} run on a corner, without the constant force. "
-        f"Use {fits}{larger}",
-        *(["design.avoid_undercut=true"] if cure and solution.assembly.spec.design else []),
+        f"Use {tighter}{fits}{larger}",
+        *cures,
     )
     yield finding(
         "contact_not_single_valued",
@@ -161,6 +165,16 @@ def _undercut(solution: Solution) -> Iterator[Finding]:
             "corner_pressure",
             f"on a sharp corner the contact pressure is unbounded: it is reported from {mm(corner)} of travel on",
         )
+
+
+def _preload_cure(solution: Solution) -> float | None:
+    """Return the least elongation at the start with which the roller can follow the path [m]; None if none helps."""
+    profile, spec = solution.assembly.track.profile, solution.assembly.spec
+    law = profile.path.law
+    half = law.smallest_preload(profile.roller_radius)
+    if half is None or half >= spec.mechanism.rest_half_width or _offset(solution) < 0:
+        return None
+    return 2.0 * half
 
 
 def _offset(solution: Solution) -> float:

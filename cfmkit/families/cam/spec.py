@@ -31,7 +31,19 @@ class Springs(Model):
     count: int | None = Field(
         None, ge=1, le=1000, description="number of equal springs; default 1, or the list's length"
     )
+    preload: NonNegativeLength | None = Field(
+        None, description="elongation of the springs at the start, with the rollers at `rest_half_width`; default 0"
+    )
+    rest_length: PositiveLength | None = Field(
+        None, description="instead of `preload`: distance of the roller axes at which the springs are at rest"
+    )
     max_elongation: PositiveLength | None = Field(None, description="largest elongation that a spring may see")
+
+    @model_validator(mode="after")
+    def _one_way_to_say_preload(self) -> Self:
+        if self.preload is not None and self.rest_length is not None:
+            raise ValueError("'preload' and 'rest_length' say the same: give one of them")
+        return self
 
     @model_validator(mode="after")
     def _count_fits_the_list(self) -> Self:
@@ -95,6 +107,7 @@ class Profile(Model):
     brace_length: PositiveLength | None = Field(None, description="brace it is cut for")
     rest_half_width: PositiveLength | None = Field(None, description="half width at which the path starts, x0")
     roller_radius: PositiveLength | None = Field(None, description="roller it is cut for")
+    preload: NonNegativeLength | None = Field(None, description="elongation of the springs at the start, cut for")
     offset: Length = Field(0.0, description="material left on the flank beyond the profile, outward (a cutting error)")
     file: str | None = Field(None, description="measured points of both flanks, a CSV beside the spec: x [mm], y [mm]")
     noise: PositiveLength | None = Field(None, description="standard deviation of the points in `file`")
@@ -230,7 +243,10 @@ class Mechanism(Model):
     """A cam between two rollers, springs between the rollers, braces to a slider; symmetric but for `left`."""
 
     brace_length: PositiveLength = Field(description="l, between slider pin and roller axis")
-    rest_half_width: PositiveLength = Field(description="half the distance of the roller axes with the springs at rest")
+    rest_half_width: PositiveLength = Field(
+        description="half the distance of the roller axes at the start; the springs are at rest there, or stretched by "
+        "their `preload`"
+    )
     roller_radius: PositiveLength = Field(description="r")
     springs: Springs = Field(description="{stiffness, count}, or a list of measured stiffnesses")
     rolling_friction: Friction = Field(0.0, description="mu = d/r, rolling resistance over roller radius")
@@ -267,6 +283,35 @@ class Mechanism(Model):
             refuse("Mechanism", {("plate", "base_width"): told})
         return self
 
+    @model_validator(mode="after")
+    def _rest_length_leaves_no_slack(self) -> Self:
+        longest = 2.0 * self.rest_half_width
+        if (length := self.springs.rest_length) is not None and length > longest * (1 + 1e-12):
+            told = f"{format_short(length, 'length')} is longer than the {format_short(longest, 'length')} at the start"
+            refuse("Mechanism", {("springs", "rest_length"): f"{told}: the springs would be slack there"})
+        if (preload := self.springs.preload) is not None and preload >= longest:
+            told = f"must be below {format_short(longest, 'length')}, the distance of the roller axes at the start"
+            refuse("Mechanism", {("springs", "preload"): told})
+        return self
+
+    @property
+    def preload(self) -> float:
+        """Elongation of the springs at the start [m]."""
+        if self.springs.rest_length is not None:
+            return max(2.0 * self.rest_half_width - self.springs.rest_length, 0.0)
+        return self.springs.preload or 0.0
+
+    @property
+    def springs_rest(self) -> float:
+        """Half the distance of the roller axes with the springs at rest [m]."""
+        return self.rest_half_width - 0.5 * self.preload
+
+    @property
+    def springs_rest_as_cut(self) -> float:
+        """Half the distance of the roller axes at which the springs are at rest that the profile is cut for [m]."""
+        preload = self.preload if self.profile.preload is None else self.profile.preload
+        return (self.profile.rest_half_width or self.rest_half_width) - 0.5 * preload
+
     @field_validator("springs", mode="before")
     @classmethod
     def _list_is_short_for_stiffness(cls, value: Any) -> Any:
@@ -287,9 +332,10 @@ class CamDesign(DesignBlock):
 
     force: Annotated[Force, Field(gt=0)] = Field(description="target force, weight included if gravity is on")
     stroke: PositiveLength = Field(description="target travel of the slider")
-    choose: Literal["force-constant", "stiffness", "catalogue"] = Field(
+    choose: Literal["force-constant", "stiffness", "catalogue", "preload"] = Field(
         "force-constant",
-        description="what follows from F = 4KA: A from the springs, the stiffness from A, or both from a catalogue",
+        description="what follows from F = 4KA: A from the springs, the stiffness from A, both from a catalogue; or A "
+        "from the springs with the smallest preload that avoids undercut",
     )
     force_constant: PositiveLength | None = Field(
         None, description="A to keep when choosing the stiffness; default: the mechanism's"

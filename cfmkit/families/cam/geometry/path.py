@@ -3,9 +3,10 @@
 With x as the independent variable the height is one integral of the slope
 (`cfmkit.families.cam.geometry.profile`); without friction it has a closed form,
 
-    y = c ((x - x0)^2 / 2A + sqrt(l^2 - x0^2) - sqrt(l^2 - x^2)),
+    y = c ((D^2 - d0^2) / 2A + sqrt(l^2 - x0^2) - sqrt(l^2 - x^2)),      D = x - x0 + d0,
 
-and the slider's travel is (x - x0)^2 / 2A if c = 1: the energy of the springs over the force.
+and the slider's travel is (D^2 - d0^2) / 2A if c = 1: the energy of the springs over the force; d0 is half of what
+the springs are stretched by at the start.
 
 Reference
 ---------
@@ -66,14 +67,15 @@ class RollerPath:
 
 
 class _ClosedHeight:
-    """Height without friction: y = c (D^2/2A + sqrt(l^2 - x0^2) - sqrt(l^2 - x^2))."""
+    """Height without friction: y = c ((D^2 - d0^2)/2A + sqrt(l^2 - x0^2) - sqrt(l^2 - x^2))."""
 
     def __init__(self, law: SlopeLaw) -> None:
         self.law = law
 
     def __call__(self, x: Real) -> Real:
         law = self.law
-        stretch = (x - law.rest_half_width) ** 2 / (2.0 * law.force_constant)
+        out = x - law.rest_half_width
+        stretch = out * (out + 2.0 * law.preload) / (2.0 * law.force_constant)
         return law.slope_factor * (stretch - drop(x, law.rest_half_width, law.brace_length))
 
 
@@ -89,7 +91,7 @@ class _QuadratureHeight:
         """Return dy/dtheta [m]."""
         law = self.law
         cos, sin = np.cos(theta), np.sin(theta)
-        stretch = (law.brace_length * sin - law.rest_half_width) / law.force_constant
+        stretch = (law.brace_length * sin - law.rest_half_width + law.preload) / law.force_constant
         p_cos = law.slope_factor * (stretch * cos + sin)
         return law.brace_length * cos * (p_cos + law.friction * cos) / (cos - law.friction * p_cos)
 
@@ -139,8 +141,9 @@ class _OdeHeight:
 
 
 def ideal_position(law: SlopeLaw, travel: Real) -> Real:
-    """Return x after a slider travel [m]: exact without friction and weight, where s = (x - x0)^2/2A, else near it."""
-    return law.rest_half_width + (2.0 * law.force_constant * travel / law.slope_factor) ** 0.5
+    """Return x after a slider travel [m]: exact without friction and weight, s = (D^2 - d0^2)/2A, else near it."""
+    stretched = (law.preload**2 + 2.0 * law.force_constant * travel / law.slope_factor) ** 0.5
+    return law.rest_half_width + (stretched - law.preload)
 
 
 def reach(law: SlopeLaw, travel: float, method: Method = "quadrature") -> tuple[RollerPath, float]:

@@ -4,11 +4,12 @@ The rollers of a symmetric mechanism are pulled together by springs and up by tw
 braces that meet in a slider. The force on the slider is constant when the path of
 the right roller's centre has the slope dy/dx = tan(atan p + atan mu) with
 
-    p(x) = c ((x - x0) / A + tan alpha),      sin alpha = x / l
+    p(x) = c ((x - x0 + d0) / A + tan alpha),      sin alpha = x / l
 
-[SS, eq. 2 and 3, written for x as the independent variable]: A is the force
-constant, mu the rolling friction that the profile is cut for, and c = 1 unless
-the profile also carries the weight of the moving parts (`slope_factor`).
+[SS, eq. 2 and 3, written for x as the independent variable, where d0 = 0]: d0 is half the
+elongation that the springs have at the start already, A is the force constant, mu the
+rolling friction that the profile is cut for, and c = 1 unless the profile also carries
+the weight of the moving parts (`slope_factor`).
 
 Assumes: massless parts but for dead weight, linear springs, point contact, one
 rolling resistance. The paper's Delta x is half the spring's elongation and its A
@@ -22,9 +23,11 @@ Reference
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TypeVar
+
+import numpy as np
 
 from cfmkit.arrays import FloatArray
 from cfmkit.numerics.roots import bracketed_root
@@ -54,13 +57,15 @@ class SlopeLaw:
     force_constant : float
         A [m]; the force is 4 K A, K the sum of all parallel springs.
     rest_half_width : float
-        x0 [m]: the path starts here, with the springs at rest.
+        x0 [m]: the path starts here.
     brace_length : float
         l [m].
     friction : float
         Rolling friction the profile is cut for, positive for the way up, negative for the way down.
     slope_factor : float
         c: 1, or larger where the profile carries dead weight.
+    preload : float
+        d0 [m]: half the elongation of the springs at the start; 0 for springs that are at rest there.
     """
 
     force_constant: float
@@ -68,10 +73,11 @@ class SlopeLaw:
     brace_length: float
     friction: float = 0.0
     slope_factor: float = 1.0
+    preload: float = 0.0
 
     def frictionless(self, x: Real) -> Real:
         """Return p(x), the slope before the contact normal is turned by friction [SS, eq. 3]."""
-        stretch = (x - self.rest_half_width) / self.force_constant
+        stretch = (x - self.rest_half_width + self.preload) / self.force_constant
         return self.slope_factor * (stretch + brace_tangent(x, self.brace_length))
 
     def slope(self, x: Real) -> Real:
@@ -88,7 +94,7 @@ class SlopeLaw:
         """Return dy/dx and d2y/dx2 [1/m] of the path: `slope` and `slope_derivative`, in half the time of both."""
         across = (self.brace_length - x) * (self.brace_length + x)
         root = across**0.5
-        p = self.slope_factor * ((x - self.rest_half_width) / self.force_constant + x / root)
+        p = self.slope_factor * ((x - self.rest_half_width + self.preload) / self.force_constant + x / root)
         rise = self.slope_factor * (1.0 / self.force_constant + self.brace_length**2 / (across * root))
         if not self.friction:
             return p, rise
@@ -107,7 +113,9 @@ class SlopeLaw:
         l (cos^2 a + c^2 sin^2 a)^1.5 / c / (1 + l cos^3(a)/A), equal at the start, and for c >= 1 that bound
         grows with a. Friction multiplies it by sqrt(1 + mu^2)/(1 - mu p), which grows with p for mu > 0. For a
         profile cut for the way down (mu < 0) it shrinks, and near x = l such a path is curved more tightly than
-        at its start; but there the slider falls, and the cam has ended before.
+        at its start; but there the slider falls, and the cam has ended before. With springs that are tight at the
+        start the radius may sink along the path, but not below the brace's length or that of the start (20 000 drawn
+        paths), and no roller is larger than the brace is long.
         """
         p = self.frictionless(x)
         length = 1.0 + p * p
@@ -118,13 +126,65 @@ class SlopeLaw:
         """Return the smallest A whose path is not curved more tightly at its start than a roller; None if none is [m].
 
         Without friction and weight A = cos^3(a0) / (1/r - 1/l), sin(a0) = x0/l. In general
-        p(x0) does not depend on A, so that the radius of curvature there can be solved for it.
+        p(x0) does not depend on A if the springs are at rest there, so that the radius of curvature there can be
+        solved for it. With a preload small constants give steep starts without undercut, too: what is returned
+        then is the least that is larger than all that undercut.
         """
         tangent = float(brace_tangent(self.rest_half_width, self.brace_length))
         p = self.slope_factor * tangent
         turn = (1.0 - self.friction * p) * self.slope_factor / (1.0 + self.friction**2) ** 0.5
         inverse = (1.0 + p * p) ** 1.5 / (turn * roller_radius) - (1.0 + tangent**2) ** 1.5 / self.brace_length
-        return 1.0 / inverse if inverse > 0 else None
+        if inverse <= 0 or not self.preload:
+            return 1.0 / inverse if inverse > 0 else None
+        large = 1.0 / inverse
+        # A preload makes the start steeper, which widens the radius: A without it is large enough.
+        grid = np.geomspace(1e-6 * large, large, 601)
+        undercut = np.flatnonzero([self._start_radius(constant) < roller_radius for constant in grid.tolist()])
+        if not undercut.size:
+            return float(grid[0])
+        last = int(undercut[-1])
+        if last == len(grid) - 1:
+            return large
+        return bracketed_root(
+            lambda constant: self._start_radius(constant) - roller_radius, float(grid[last]), float(grid[last + 1])
+        )
+
+    def _start_radius(self, force_constant: float) -> float:
+        """Return the radius of curvature at the start with another A, infinite where the start is vertical [m]."""
+        law = replace(self, force_constant=force_constant)
+        if law.friction * law.frictionless(law.rest_half_width) >= 1:
+            return math.inf
+        return float(law.curvature_radius(law.rest_half_width))
+
+    def smallest_preload(self, roller_radius: float) -> float | None:
+        """Return the smallest d0 whose path is not curved more tightly at its start than a roller [m]; None if none is.
+
+        Without friction from (1 + p0^2)^1.5 / p0' = r, where p0' does not depend on d0; with friction solved for.
+        """
+        x0, rise = self.rest_half_width, self._rise(self.rest_half_width)
+        tangent = float(brace_tangent(x0, self.brace_length))
+        slope = max((roller_radius * rise) ** (2.0 / 3.0) - 1.0, 0.0) ** 0.5
+        plain = max(self.force_constant * (slope / self.slope_factor - tangent), 0.0)
+        if not self.friction:
+            return plain
+
+        def margin(preload: float) -> float:
+            return float(replace(self, preload=preload).curvature_radius(x0)) - roller_radius
+
+        if margin(0.0) >= 0:
+            return 0.0
+        steepest = (
+            self.force_constant * (1.0 / (self.friction * self.slope_factor) - tangent) if self.friction > 0 else 0
+        )
+        high = max(plain, 1e-9 * x0)
+        while margin(high) < 0:
+            high *= 2.0
+            if 0 < steepest <= high:
+                high = steepest * (1 - 1e-12)
+                break
+            if high > 1e3 * self.brace_length:
+                return None
+        return bracketed_root(margin, 0.0, high) if margin(high) > 0 else None
 
     @cached_property
     def vertical_at(self) -> float:
@@ -142,5 +202,5 @@ class SlopeLaw:
     def _vertical_margin(self, theta: float) -> float:
         """Return (1 - mu p) cos(theta): positive before the path turns vertical."""
         cos, sin = math.cos(theta), math.sin(theta)
-        stretch = (self.brace_length * sin - self.rest_half_width) / self.force_constant
+        stretch = (self.brace_length * sin - self.rest_half_width + self.preload) / self.force_constant
         return cos - self.friction * self.slope_factor * (stretch * cos + sin)
