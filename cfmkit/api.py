@@ -270,7 +270,7 @@ def export(
     tolerance: str | float | None = None,
     format: str | Sequence[str] | None = None,
 ) -> dict[str, bytes]:
-    """Return what is to be cut or printed as files, by name: DXF, SVG and CSV, and bodies where they are asked for.
+    """Return what is to be cut or printed as files, by name: DXF, SVG and CSV, and bodies where they are requested.
 
     Parameters
     ----------
@@ -359,7 +359,7 @@ def drawn_files(
 
 
 def _formats(given: str | Sequence[str] | None, usual: Sequence[str]) -> tuple[str, ...]:
-    """Return the formats that are asked for; of a text those between commas."""
+    """Return the formats that are requested; of a text those between commas."""
     from cfmkit.export import FORMATS
 
     words = usual if given is None else given.split(",") if isinstance(given, str) else given

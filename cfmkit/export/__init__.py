@@ -32,7 +32,7 @@ USUAL = FORMATS[:3]
 def files(
     drawing: Drawing, kerf: float | None = None, tolerance: float = TOLERANCE, formats: Sequence[str] = USUAL
 ) -> dict[str, bytes]:
-    """Return the files of a drawing, by name: DXF, SVG and one CSV per table, and bodies where they are asked for.
+    """Return the files of a drawing, by name: DXF, SVG and one CSV per table, and bodies where they are requested.
 
     A drawing without anything on layer `reference` gets a reference square beside it.
 

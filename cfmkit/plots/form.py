@@ -46,7 +46,7 @@ class FigureForm:
 
     @property
     def plain(self) -> bool:
-        """Whether nothing but the default is asked for."""
+        """Whether nothing but the default is requested."""
         return self == PLAIN
 
     @property

@@ -56,7 +56,7 @@ class Layout:
         return self.size
 
     def placed(self, box: Box) -> Box:
-        """Return the box that axes get, and note the one that was asked for."""
+        """Return the box that axes get, and note the one that was requested."""
         self.asked.append(box)
         return self.boxes[len(self.asked) - 1] if self.boxes else box
 

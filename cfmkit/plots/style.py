@@ -177,7 +177,7 @@ def in_form(form: FigureForm) -> Iterator[None]:
 
 
 def formed(form: FigureForm, make: Callable[[], Figure]) -> Figure:
-    """Return a figure in the form that is asked for."""
+    """Return a figure in the form that is requested."""
     with in_form(form):
         if form.width is None and form.titles:
             return make()

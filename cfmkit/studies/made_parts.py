@@ -204,7 +204,7 @@ class Judged:
 
     def share(self, met: NDArray[np.bool_] | None = None) -> Share:
         """Return the share of parts that meet every requirement."""
-        good = (self.met if met is None else met).all(axis=1)
+        good: NDArray[np.bool_] = np.asarray((self.met if met is None else met).all(axis=1))
         return Share(int(good.sum()), int(self.failed.sum()), len(good), self.why)
 
 
@@ -239,7 +239,7 @@ def judge(made: Tolerances, values: FloatArray, nominal: Result, run: Run, what:
     metrics, spec = _noted(made.spec, nominal), made.spec
     work = Work(Study(spec, made.paths, metrics, seed=run.seed), plan_of(made.parameters, values))
     journal = run.notes if isinstance(run.notes, Journal) else None
-    records = computed(work, run.executor, journal, _Told(run, what, len(values)))  # type: ignore[arg-type]
+    records = computed(work, run.executor, journal, _Told(run, what, len(values)))
     count = len(spec.part_requirements)
     met, failed = np.zeros((len(values), count), dtype=bool), np.ones(len(values), dtype=bool)
     found, why = np.full((len(values), len(metrics)), np.nan), ""

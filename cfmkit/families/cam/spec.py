@@ -262,7 +262,7 @@ class Mechanism(Model):
     mounting: Annotated[Mounting, BeforeValidator(_mounting, json_schema_input_type=str | Mounting)] | None = Field(
         None,
         description="up | horizontal | down, the slider's elevation (30 deg), or {elevation, roll}; weight acts where "
-        "this is given, and upwards where only gravity is asked for",
+        "this is given, and upwards where only gravity is requested",
     )
     safety_factor: SafetyFactor = 1.0
 
