@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from cfmkit import families
 from cfmkit.cli.answer import Answer
-from cfmkit.cli.page_blocks import LABEL, Field, Span, TextLine, field, listed
+from cfmkit.cli.page_blocks import LABEL, Field, Span, TextLine, Verbatim, field, line, listed
 from cfmkit.errors import UsageError
 
 if TYPE_CHECKING:
@@ -154,10 +154,13 @@ def materials_page() -> Answer:
 
 
 def references_page() -> Answer:
-    """Return the papers behind all families."""
+    """Return the papers behind all families, and their BibTeX."""
     records = references()
     columns = (field("name"), field("family"), field("reference", wraps=True))
-    return _page("references", "", (("", records, columns),), {"references": records})
+    shown = _page("references", "", (("", records, columns),), {})
+    bibtex = {record.name: text for record in families.records() if (text := record.bibtex)}
+    page = (*shown.page, *(block for text in bibtex.values() for block in (line(""), Verbatim(text.strip() + "\n"))))
+    return Answer({"references": records, "bibtex": bibtex}, page)
 
 
 def family_page(name: str) -> Answer:

@@ -20,6 +20,10 @@ PERCENT = "percent"
 """Dimension of shares that are drawn in per cent."""
 
 
+LONGEST = 64
+"""Letters of an axis label: so many of 8 pt stand on 92 mm of print, the axis of a map."""
+
+
 @dataclass(frozen=True)
 class DrawnScale:
     """Something that is drawn: a parameter or a metric, in border units.
@@ -34,6 +38,8 @@ class DrawnScale:
         Of a parameter or a metric that is no number.
     short : str
         What it is called beside others; the last part of the name where that is empty.
+    about : str
+        What it is, in a few words; for its axis.
     """
 
     name: str
@@ -41,6 +47,7 @@ class DrawnScale:
     values: FloatArray
     words: tuple[str, ...] = ()
     short: str = ""
+    about: str = ""
 
     @property
     def label(self) -> str:
@@ -50,6 +57,14 @@ class DrawnScale:
             return f"{short.replace('_', ' ')} [%]"
         known = self.dimension not in ("text", "count")
         return axis_label(short, self.dimension) if known else short.replace("_", " ")
+
+    @property
+    def axis(self) -> str:
+        """The label with what it is, where an axis has room for it: ``positive.length: of one leaf, L1 [mm]``."""
+        short, bracket, unit = self.label.partition(" [")
+        path = self.name.removeprefix("mechanism.").replace("_", " ")
+        told = f"{path}: {self.about}{bracket}{unit}"
+        return told if self.about and len(told) <= LONGEST else f"{short}{bracket}{unit}"
 
     @property
     def plain(self) -> str:

@@ -48,7 +48,7 @@ def draw_map(found: StudyMarks, metric: DrawnScale) -> Figure:
         figure.colorbar(mesh, cax=axes_mm(figure, box)).set_label(metric.label)
     if not meets.all():
         _hatch_cells(axes, x, y, ~meets)
-    axes.set(xlabel=across.label, ylabel=down.label)
+    axes.set(xlabel=across.axis, ylabel=down.axis)
     along.dress(axes, "x")
     up.dress(axes, "y")
     best = found.best

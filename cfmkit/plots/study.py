@@ -6,9 +6,10 @@ where nothing was solved it stays grey.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from matplotlib.colors import to_hex
 
 from cfmkit.plots.diagram import padded
 from cfmkit.plots.maps import draw_map
@@ -61,9 +62,10 @@ def _draw_panel(ax: Axes, lines: Sequence[StudyCurve], second: DrawnScale) -> No
     order = sorted({line.parameter for line in lines})
     names = []
     for line in lines:
-        color = LINES[order.index(line.parameter)]
+        number = order.index(line.parameter)
+        color, style = LINES[number], DASHES[number % len(DASHES)] if len(order) > 2 else "-"
         for motion, effort in line.branches.values():
-            ax.plot(motion, effort, color=color, linewidth=1.2)
+            ax.plot(motion, effort, color=color, linewidth=1.2, linestyle=style)
         motion, effort = next(iter(line.branches.values()))
         names.append(Label(second.text(line.parameter), color, np.column_stack([motion, effort]), prefer=0.6))
     efforts = np.concatenate([effort for line in lines for _, effort in line.branches.values()])
@@ -120,10 +122,12 @@ def draw_curves(found: StudyMarks, lines: Sequence[StudyCurve], labels: tuple[st
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
 
-    figure = new_figure(160.0, 100.0 + HEAD)
-    axes = axes_mm(figure, (16, 14, 112, 82))
     (parameter,) = found.varied
     given = [line.parameter for line in lines]
+    if len(given) <= MOST_NAMED:
+        return _draw_named(found, lines, labels)
+    figure = new_figure(160.0, 100.0 + HEAD)
+    axes = axes_mm(figure, (16, 14, 112, 82))
     scale = Normalize(min(given), max(given) if max(given) > min(given) else min(given) + 1)
     for line in lines:
         for motion, effort in line.branches.values():
@@ -131,10 +135,42 @@ def draw_curves(found: StudyMarks, lines: Sequence[StudyCurve], labels: tuple[st
     axes.set(xlabel=labels[0], ylabel=labels[1])
     _clear_of_poles(axes, lines)
     bar = figure.colorbar(ScalarMappable(scale, COLOURS), cax=axes_mm(figure, (133, 14, 4, 82)))
-    bar.set_label(parameter.label)
+    bar.set_label(parameter.axis)
     if parameter.words:
         bar.set_ticks(range(len(parameter.words)), labels=list(parameter.words))
     head(figure, found, f"curves, coloured by {parameter.plain}")
+    return figure
+
+
+MOST_NAMED = 8
+"""Curves that have their names beside them; of more, colours tell the values."""
+
+DASHES: tuple[Any, ...] = ("-", (0, (6, 2)), (0, (2, 1.5)), (0, (8, 2, 2, 2)))
+"""Line styles in turn, so that curves differ without their colours, too."""
+
+
+def _draw_named(found: StudyMarks, lines: Sequence[StudyCurve], labels: tuple[str, str]) -> Figure:
+    """Return a few curves of a study of one parameter, each with its value beside it."""
+    from matplotlib import colormaps
+
+    figure = new_figure(160.0, 100.0 + HEAD - 6.0)
+    axes = axes_mm(figure, (16, 14, 138, 82))
+    (parameter,) = found.varied
+    ordered = sorted(lines, key=lambda line: line.parameter)
+    names = []
+    for number, line in enumerate(ordered):
+        # the light end of the scale cannot be read as text
+        color = colormaps[COLOURS](0.72 * number / max(len(ordered) - 1, 1))
+        style = DASHES[number % len(DASHES)] if len(ordered) > 2 else "-"
+        for motion, effort in line.branches.values():
+            axes.plot(motion, effort, color=color, linewidth=1.3, linestyle=style)
+        motion, effort = next(iter(line.branches.values()))
+        along = 0.55 + 0.35 * number / max(len(ordered) - 1, 1)
+        names.append(Label(parameter.text(line.parameter), to_hex(color), np.column_stack([motion, effort]), along))
+    axes.set(xlabel=labels[0], ylabel=labels[1])
+    _clear_of_poles(axes, ordered)
+    place_labels(axes, names)
+    head(figure, found, f"curves, each a value of {parameter.plain}")
     return figure
 
 
@@ -159,7 +195,7 @@ def draw_metric(found: StudyMarks, metric: DrawnScale) -> Figure:
     x, y = parameter.values[order], levelled(metric.values)[order]
     axes.plot(x, y, color=BLUE, marker="o" if len(x) <= 60 else "", markersize=3)
     _hatch_spans(axes, x, found.meets[order])
-    axes.set(xlabel=parameter.label, ylabel="" if metric.words else metric.label)
+    axes.set(xlabel=parameter.axis, ylabel="" if metric.words else metric.label)
     axes.ticklabel_format(axis="y", useOffset=True)
     ticks(axes.xaxis, parameter)
     ticks(axes.yaxis, metric)

@@ -176,6 +176,11 @@ def in_form(form: FigureForm) -> Iterator[None]:
         _TITLES.reset(titles)
 
 
+def is_to_scale(figure: Figure) -> bool:
+    """Return whether something in a figure has one scale in both directions."""
+    return any(ax.get_aspect() != "auto" for ax in figure.axes)
+
+
 def formed(form: FigureForm, make: Callable[[], Figure]) -> Figure:
     """Return a figure in the form that is requested."""
     with in_form(form):
@@ -183,8 +188,7 @@ def formed(form: FigureForm, make: Callable[[], Figure]) -> Figure:
             return make()
         figure, layout = noted(make)
         width = layout.size[0] if form.width is None else form.width * 1e3
-        to_scale = any(ax.get_aspect() != "auto" for ax in figure.axes)
-        return laid_out(make, layout.stretched(width, form.titles, to_scale)) if layout.asked else figure
+        return laid_out(make, layout.stretched(width, form.titles, is_to_scale(figure))) if layout.asked else figure
 
 
 @styled

@@ -26,7 +26,7 @@ class Example:
     name : str
         Path below the folder of all, without its ending: ``cam``, ``studies/cam_tolerance``.
     family : str
-        As the file says.
+        As the file says; ``figure`` for a figure of several runs.
     about : str
         What it is: the first sentence of the file's comment.
     path : Path
@@ -61,7 +61,7 @@ def examples() -> tuple[Example, ...]:
     --------
     >>> import cfmkit
     >>> cfmkit.examples()[0].name, len({example.family for example in cfmkit.examples()})
-    ('beam_cantilever', 4)
+    ('beam_cantilever', 5)
     """
     root = folder()
     files = sorted(root.rglob("*.yaml"), key=lambda path: (len(path.parts), path))
@@ -71,8 +71,11 @@ def examples() -> tuple[Example, ...]:
 def _example(path: Path, root: Path) -> Example:
     lines = path.read_text(encoding="utf-8").splitlines()
     named = (line.partition(":")[2].strip() for line in lines if line.startswith("family:"))
+    is_figure = any(line.startswith("panels:") for line in lines)
     comment = " ".join(line.removeprefix("#").strip() for line in lines[: _comment(lines)])
-    return Example(path.relative_to(root).with_suffix("").as_posix(), next(named, ""), _first_sentence(comment), path)
+    family = "figure" if is_figure else next(named, "")
+    name = path.relative_to(root).with_suffix("").as_posix()
+    return Example(name, family, _first_sentence(comment), path)
 
 
 def _comment(lines: list[str]) -> int:
@@ -119,11 +122,17 @@ def copy(name: str, out: str | os.PathLike[str] = ".") -> tuple[Path, ...]:
     """
     from cfmkit import api
     from cfmkit.store.disk import discard, make_folders, reporting, write_new
+    from cfmkit.studies.batch import is_figure
     from cfmkit.tables.source import named_in
 
     chosen = example(name)
     target = Path(out) / chosen.path.name
-    data = sorted({str(source): source.path for source in named_in(api.load(chosen.path).model_dump())}.items())
+    if is_figure(str(chosen.path)):
+        from cfmkit.runs.composed_figure import read
+
+        data = [(panel.run, chosen.path.parent / panel.run) for panel in read(str(chosen.path)).panels]
+    else:
+        data = sorted({str(source): source.path for source in named_in(api.load(chosen.path).model_dump())}.items())
     wanted = {target: chosen.path, **{target.parent / text: path for text, path in data}}
     _refuse_taken(wanted)
     written: list[Path] = []

@@ -178,9 +178,24 @@ def _search(pattern: str, out: str, root: str | None = None) -> list[str]:
     for path in sorted(glob.glob(pattern, root_dir=root, recursive=True)):
         whole = os.path.join(root, path) if root else path
         ours = OUTPUTS in Path(path).parts[:-1] or os.path.realpath(whole).startswith(inside)
-        if os.path.isfile(whole) and not ours:
+        if os.path.isfile(whole) and not ours and not is_figure(whole):
             found.append(path)
     return found
+
+
+def is_figure(path: str) -> bool:
+    """Return whether a YAML file says how a figure is composed: a search for specifications passes it by."""
+    if not path.lower().endswith(ENDINGS):
+        return False
+    try:
+        with open(path, encoding="utf-8", errors="replace") as file:
+            return any(line.startswith("panels:") for line in file.read(LONGEST_HEAD).splitlines())
+    except OSError:
+        return False
+
+
+LONGEST_HEAD = 4000
+"""Letters of a file in which the key `panels` is looked for; no comment at the top of a file is as long."""
 
 
 def folders(files: Sequence[str]) -> tuple[str, ...]:

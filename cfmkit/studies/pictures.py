@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cfmkit.plots.findings import PERCENT, DrawnScale, StudyCurve, StudyMarks, short_names
 from cfmkit.plots.study import figures
+from cfmkit.specs.keys import keys
 from cfmkit.tables import Table, TableColumn, border_values, read_csv
 
 if TYPE_CHECKING:
@@ -39,8 +41,9 @@ def findings(records: Records, summary: Summary) -> StudyMarks:
     metrics = [_drawn(study.metrics[column], values[:, k]) for k, column in enumerate(summary.shown)]
     drawn = [metric for metric in metrics if np.isfinite(metric.values).any()]
     names = short_names([item.path for item in plan.variables])
+    about = {key.path: key.description for key in keys(type(study.spec))}
     varied = [
-        _scale(item, shown, name)
+        _scale(item, shown, name, about.get(_place(item.path), ""))
         for item, shown, name in zip(plan.variables, plan.shown(0, len(plan)), names, strict=True)
     ]
     return StudyMarks(tuple(varied), tuple(drawn), _shape(plan), meets, summary.best, study.spec.name, _best(summary))
@@ -64,11 +67,18 @@ def _drawn(metric: Metric, values: FloatArray) -> DrawnScale:
     return DrawnScale(metric.name, metric.dimension, border_values(values, metric.dimension))
 
 
-def _scale(item: Variable, shown: np.ndarray, name: str) -> DrawnScale:
+def _place(path: str) -> str:
+    """Return a path as the list of keys has it: ``springs[].stiffness`` for ``springs.0.stiffness``."""
+    return re.sub(r"\.\d+", "[]", path)
+
+
+def _scale(item: Variable, shown: np.ndarray, name: str, about: str) -> DrawnScale:
     if item.dimension != "text":
-        return DrawnScale(item.path, item.dimension, shown.astype(np.float64), short=name)
+        return DrawnScale(item.path, item.dimension, shown.astype(np.float64), short=name, about=about)
     words = tuple(dict.fromkeys(map(str, item.shown)))
-    return DrawnScale(item.path, item.dimension, np.array([float(words.index(str(one))) for one in shown]), words, name)
+    return DrawnScale(
+        item.path, item.dimension, np.array([float(words.index(str(one))) for one in shown]), words, name, about
+    )
 
 
 def _shape(plan: Plan) -> tuple[int, ...]:

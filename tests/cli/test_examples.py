@@ -17,7 +17,7 @@ def test_every_config_is_listed_with_its_family_and_a_sentence(cli):
         path.relative_to(ROOT / "configs").with_suffix("").as_posix() for path in (ROOT / "configs").rglob("*.yaml")
     }
     assert {one["name"] for one in listed} == files
-    assert {one["family"] for one in listed} == {"beam", "cam", "slider-crank", "vcfm"}
+    assert {one["family"] for one in listed} == {"beam", "cam", "figure", "slider-crank", "vcfm"}
     assert all(len(one["about"]) > 20 for one in listed)
 
 

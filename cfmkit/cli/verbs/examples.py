@@ -44,9 +44,7 @@ def run(options: ExamplesOptions, terminal: Terminal) -> Answer:
         return _checked(options.run, options, terminal)
     if options.name is not None:
         written = [str(path) for path in copy(options.name, options.out or ".")]
-        from cfmkit.families import family
-
-        verb = "design" if family(example(options.name).family).design and _designs(written[0]) else "analyze"
+        verb = _verb(example(options.name).family, written[0])
         page = (
             Paragraph("written", ", ".join(map(visible, written)), GOOD),
             Paragraph("next", command_line("cfmkit", verb, written[0])),
@@ -57,6 +55,15 @@ def run(options: ExamplesOptions, terminal: Terminal) -> Answer:
     records = [{"name": one.name, "family": one.family, "about": one.about} for one in examples()]
     fields = (field("name"), field("family"), field("about", wraps=True))
     return Answer({"examples": records}, tuple(listed("examples", records, fields)))
+
+
+def _verb(kind: str, path: str) -> str:
+    """Return what an example is for."""
+    from cfmkit.families import family
+
+    if kind == "figure":
+        return kind
+    return "design" if family(kind).design and _designs(path) else "analyze"
 
 
 def _designs(path: str) -> bool:

@@ -1,0 +1,59 @@
+"""``cfmkit figure``: several pictures of several runs as one figure."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from cfmkit.cli import completion
+from cfmkit.cli.answer import Answer
+from cfmkit.cli.options import Changing, Drawing, Jobs, Quiet, argument, option
+from cfmkit.cli.page_blocks import Written
+
+if TYPE_CHECKING:
+    from cfmkit.cli.terminal import Terminal
+
+PLACE = 36
+
+
+@dataclass(frozen=True, kw_only=True)
+class FigureOptions(Changing, Drawing):
+    """Arguments and options."""
+
+    file: Annotated[
+        str, argument("FILE", "YAML file: panels (each with run and plot), columns, width.", completion.specs)
+    ]
+    out: Annotated[
+        str | None, option("-o", "--out", metavar="DIR", text="Output folder; default: cfm-out/FILE-figure/.")
+    ] = None
+    jobs: Jobs = None
+    quiet: Quiet = False
+
+
+def run(options: FigureOptions, terminal: Terminal) -> Answer:
+    """Draw several pictures of several runs as one figure, with letters; the file says which, and how wide."""
+    from cfmkit.errors import UsageError
+    from cfmkit.runs.composed_figure import panels, read
+    from cfmkit.store import RunFolder
+    from cfmkit.studies.executors import cores, serial
+    from cfmkit.studies.pool import Pool
+
+    if options.no_plots:
+        raise UsageError("--no-plots: a figure is all that this command makes")
+    if options.out is not None and not options.out.strip():
+        raise UsageError("--out is empty; give a folder")
+    form, asked = options.form, read(options.file, options.changes)
+    form = replace(form, width=form.width or asked.width)
+    out, stem = options.out or str(Path("cfm-out") / f"{Path(options.file).stem}-figure"), Path(options.file).stem
+    jobs = options.jobs or cores()
+    with RunFolder(out) as folder:
+        from cfmkit.plots.composed import composed
+
+        drawn = panels(options.file, asked, serial if jobs == 1 else Pool(jobs))
+        for name, content in form.write(composed(drawn, asked.columns, form), stem):
+            folder.write(name, content)
+        about = {"command": "figure", "arguments": list(terminal.arguments), "spec": {"source": options.file}}
+        manifest = folder.commit({**about, "status": "complete", "exit_code": 0})
+    written = Written(out, (*manifest.files, "manifest.json"))
+    return Answer(dict(written.data), (written.block(terminal.verbose > 0),))

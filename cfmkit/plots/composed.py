@@ -1,0 +1,76 @@
+"""One figure of several panels, each drawn as if it stood alone at that width, with a letter above it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from cfmkit.plots.layout import laid_out, noted
+from cfmkit.plots.style import MM, NORMAL, in_form, is_to_scale, size_mm, styled
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from cfmkit.plots.form import FigureForm
+
+GAP = 4.0
+"""Between panels that stand beside each other [mm], about two letters."""
+
+STRIP = 5.0
+"""Above each panel, for its letter [mm]: a line of text."""
+
+
+@dataclass(frozen=True)
+class DrawnPanel:
+    """One panel: what draws it, and what stands beside its letter."""
+
+    make: Callable[[], Figure]
+    label: str = ""
+
+
+def composed(panels: Sequence[DrawnPanel], columns: int, form: FigureForm) -> Figure:
+    """Return panels as one figure, from left to right and then down.
+
+    Parameters
+    ----------
+    panels : sequence of DrawnPanel
+        At least one.
+    columns : int
+        Beside each other.
+    form : FigureForm
+        With the width of the whole.
+    """
+    columns = min(columns, len(panels))
+    width = (form.width or 0.174) * 1e3
+    cell = (width - GAP * (columns - 1)) / columns
+    with in_form(replace(form, titles=False)):
+        return _composed(panels, columns, cell)
+
+
+@styled
+def _composed(panels: Sequence[DrawnPanel], columns: int, cell: float) -> Figure:
+    layouts = []
+    for panel in panels:
+        figure, layout = noted(panel.make)
+        layouts.append(layout.stretched(cell, titles=False, to_scale=is_to_scale(figure)))
+    rows = [range(start, min(start + columns, len(panels))) for start in range(0, len(panels), columns)]
+    heights = [max(layouts[k].size[1] for k in row) + STRIP for row in rows]
+    widths = [cell, *(size for _ in range(columns - 1) for size in (GAP, cell))]
+    whole = Figure(figsize=(sum(widths) * MM, sum(heights) * MM))
+    FigureCanvasAgg(whole)
+    grid = whole.add_gridspec(len(rows), len(widths), width_ratios=widths, height_ratios=heights)
+    for number, row in enumerate(rows):
+        for place, k in enumerate(row):
+            part = whole.add_subfigure(grid[number, 2 * place])
+            layouts[k].host = part
+            laid_out(panels[k].make, layouts[k])
+            across, up = size_mm(part)
+            letter = f"({chr(ord('a') + k)})"
+            look = {"va": "top", "ha": "left", "size": NORMAL + 0.5}
+            written = part.text(1.0 / across, 1.0 - 1.0 / up, letter, weight="bold", **look)
+            beside = 1.0 + written.get_window_extent().width / part.dpi / MM + 1.5
+            part.text(beside / across, 1.0 - 1.0 / up, panels[k].label, **look)
+    return whole

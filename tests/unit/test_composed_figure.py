@@ -1,0 +1,95 @@
+"""One figure of several panels: what is beside what, at which width, and what is said of a wrong file."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import cfmkit
+from cfmkit.cli.main import main
+from cfmkit.errors import SpecError
+from cfmkit.plots.composed import composed
+from cfmkit.plots.form import FigureForm
+from cfmkit.plots.style import MM, size_mm
+from cfmkit.runs.composed_figure import panels, read
+from cfmkit.studies.batch import files_below
+from cfmkit.studies.executors import serial
+
+STUDIES = Path("configs/studies")
+
+
+@pytest.fixture
+def file(tmp_path):
+    """Return a function that writes a file of a figure and returns its name."""
+
+    def written(text):
+        path = tmp_path / "own.yaml"
+        path.write_text(text)
+        return str(path)
+
+    return written
+
+
+def test_panels_stand_side_by_side_with_letters_in_the_width_that_is_given():
+    name = str(STUDIES / "figure.yaml")
+    asked = read(name, ("width=150 mm",))
+    figure = composed(panels(name, asked, serial), asked.columns, FigureForm(width=asked.width))
+    assert np.isclose(size_mm(figure)[0], 150)
+    assert [[text.get_text() for text in part.texts] for part in figure.subfigs] == [
+        ["(a)", "length of the diamond's leaves"],
+        ["(b)", "thickness of the diamond's leaves"],
+        ["(c)", "angle of the V-beams"],
+        ["(d)", "thickness of the V-beams"],
+    ]
+    lower = [part.bbox.y0 for part in figure.subfigs]
+    assert lower[0] == lower[1] > lower[2] == lower[3]
+    values = [{text.get_text() for text in part.axes[0].texts} for part in figure.subfigs]
+    assert values[0] == {"22 mm", "24 mm", "26 mm", "28 mm"}
+    assert values[2] == {"6 deg", "7 deg", "8 deg", "9 deg"}
+    inches = figure.subfigs[0].axes[0].get_window_extent().width / figure.dpi
+    assert 40 < inches / MM < 60
+
+
+def test_a_panel_may_be_the_folder_of_a_run(file, tmp_path):
+    assert main(["analyze", "configs/cam.yaml", "-o", str(tmp_path / "run"), "-q", "--no-plots"]) == 0
+    name = file("panels: [{run: run, plot: loop}, {run: run, plot: springs}]")
+    (loop, springs) = panels(name, read(name), serial)
+    direct = cfmkit.api.figures(cfmkit.analyze("configs/cam.yaml"))
+    for panel, stem in ((loop, "loop"), (springs, "springs")):
+        drawn, expected = panel.make().axes[0], direct[stem]().axes[0]
+        assert np.array_equal(drawn.lines[0].get_xydata(), expected.lines[0].get_xydata())
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("panels: []", "panels"),
+        ("panels: [{run: a.yaml}]", "own.yaml:1:10: panels.0: the key 'plot' is missing"),
+        ("columns: 2", "the key 'panels' is missing"),
+        ("panels: [{run: a.yaml, plot: b}]\nwidth: 174", "width"),
+        ("panels: [{run: a.yaml, plot: b}]\nrows: 2", "rows"),
+    ],
+)
+def test_a_malformed_file_is_refused_with_the_place(file, text, told):
+    with pytest.raises(SpecError, match=re.escape(told)):
+        read(file(text))
+
+
+def test_a_picture_or_a_run_that_does_not_exist_is_said_with_those_that_do(file):
+    root = Path("configs").absolute()
+    for text, told in (
+        (f"panels:\n  - {{run: {root}/cam.yaml, plot: lop}}", "own.yaml:2:.*did you mean 'loop'"),
+        (f"panels:\n  - {{run: {root}/cam.yaml, plot: xyz}}", "there are loop"),
+        ("panels:\n  - {run: nowhere.yaml, plot: loop}", "own.yaml:2:.*no such file"),
+        (f"panels:\n  - {{run: {root}, plot: loop}}", "is not the folder of a run"),
+    ):
+        name = file(text)
+        with pytest.raises(SpecError, match=told):
+            panels(name, read(name), serial)
+
+
+def test_a_search_for_specifications_passes_files_of_figures_by():
+    found = {Path(name).name for name in files_below(str(STUDIES))}
+    assert "vcfm_fig9_l1.yaml" in found
+    assert "figure.yaml" not in found
