@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -24,63 +24,21 @@ from cfmkit.results import Quantity, Result, Status
 from cfmkit.specs.units import between, format_short
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping
+    from collections.abc import Iterator, Mapping
 
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
     from cfmkit.curves import Kind
-    from cfmkit.export.geometry import Contour
     from cfmkit.families.base import Run
     from cfmkit.families.beam.build import Assembly
     from cfmkit.families.beam.outline import HeldPlace
     from cfmkit.families.beam.spec import BeamSpec
     from cfmkit.results import Finding
-    from cfmkit.solid.course import Course
-    from cfmkit.solid.equilibrium import Problem
-    from cfmkit.solid.supports import Group
+    from cfmkit.solid.part import MeshSolution, Part
 
-ACROSS, SHARE = 2.5, 0.2
-"""Elements across the thinnest beam, and side of an element on a fillet in radii, of the finer mesh: the force of Lan's
-part at 2 mm is then within 3e-4 of that of elements of 0.6 times the size (4.94735 N)."""
-COARSER = 1.5
-"""Sides of the coarser mesh in those of the finer one: half as many nodes, so that the check costs a third more."""
-ON = 5e-6
-"""Nodes nearer to a pad or a hole than this belong to it [m]: outlines are drawn within that."""
 FORCE_APART, STRESS_APART = 2e-3, 0.05
 """Differences of two meshes from which on they are called coarse: a tenth of what parts differ from beams by."""
-
-
-@dataclass(frozen=True, eq=False)
-class MeshSolution:
-    """One mesh of the part, followed over the travel.
-
-    Attributes
-    ----------
-    problem : Problem
-    course : Course
-    held : (n,) array of bool
-        Nodes of pads and holes.
-    """
-
-    problem: Problem
-    course: Course
-    held: NDArray[np.bool_]
-
-    @cached_property
-    def peaks(self) -> tuple[FloatArray, FloatArray]:
-        """Largest stress along a free edge at each pose (k,) [Pa], and where in the unloaded part (k, 2) [m]."""
-        stresses, places = [], []
-        for pose in self.course.poses:
-            stress, nodes = self.problem.elements.along_edges(self.moved(pose), self.held)
-            worst = int(np.abs(stress).argmax())
-            stresses.append(abs(float(stress[worst])))
-            places.append(self.problem.elements.mesh.nodes[nodes[worst]])
-        return read_only(stresses), read_only(places)
-
-    def moved(self, pose: Any) -> FloatArray:
-        """Return the displacements of all nodes at a pose (n, 2) [m]."""
-        return self.problem.supports.displaced(pose.unknowns, pose.travel)
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,12 +139,15 @@ def analyze(spec: BeamSpec, run: Run) -> Result:
         PARTIAL if the path ends before the travel, NO_EQUILIBRIUM if there is no first pose.
     """
     from cfmkit.solid.course import Ending
+    from cfmkit.solid.part import ACROSS, COARSER
 
     assembly = assemble(spec)
     size = spec.analysis.solid.mesh or _thinnest(assembly) / ACROSS
+    stops = _stops(spec)
     try:
-        coarse = _solved(spec, assembly, COARSER * size, lambda share: run.progress(0.35 * share, "coarser mesh"))
-        fine = _solved(spec, assembly, size, lambda share: run.progress(0.35 + 0.65 * share, "finer mesh"))
+        part = part_of(spec, assembly)
+        coarse = part.meshed(COARSER * size).followed(stops, lambda share: run.progress(0.35 * share, "coarser mesh"))
+        fine = part.meshed(size).followed(stops, lambda share: run.progress(0.35 + 0.65 * share, "finer mesh"))
     except GeometryError as error:
         message = f"the part cannot be meshed: {error}; look at analysis.solid.mesh and mechanism.part"
         return Result(resolve(spec), Status.NO_EQUILIBRIUM, message)
@@ -214,34 +175,17 @@ def analyze(spec: BeamSpec, run: Run) -> Result:
     )
 
 
-def _solved(spec: BeamSpec, assembly: Assembly, size: float, report: Callable[[float], None]) -> MeshSolution:
-    """Return the part meshed with elements of a size [m] and followed over the travel."""
-    from cfmkit.solid.boundary import Ring
-    from cfmkit.solid.course import follow
-    from cfmkit.solid.elements import Elements
-    from cfmkit.solid.equilibrium import Problem
+def part_of(spec: BeamSpec, assembly: Assembly) -> Part:
+    """Return the part as it is solved: its outline, with what is held and driven."""
     from cfmkit.solid.law import LAWS
-    from cfmkit.solid.mesh import mesh
-    from cfmkit.solid.supports import Supports
+    from cfmkit.solid.part import Part, Place, rings_of
 
-    part = [contour for contour in drawing(spec).contours if contour.layer == "cut"]
-    rings = tuple(Ring.of(_vertices(one), one.hole) for one in part)
-    places = regions(spec)
-    share = SHARE * size / (_thinnest(assembly) / ACROSS)
-    grid = mesh(rings, size, share, seams=[seam for place in places for seam in place.seams])
-    groups, held = _groups(assembly, grid.nodes, places)
+    cut = [contour for contour in drawing(spec).contours if contour.layer == "cut"]
     beam = next(iter(spec.mechanism.beams.values()))
     material, width = beam.material or spec.mechanism.material, beam.width or spec.mechanism.width
     law = LAWS[spec.analysis.solid.law](material.modulus, material.poisson)
-    elements = Elements(grid, law, np.full(len(grid.triangles), width)).without(held)
-    problem = Problem(elements, Supports(grid.nodes, groups))
-    return MeshSolution(problem, follow(problem, _stops(spec), report), held)
-
-
-def _vertices(contour: Contour) -> FloatArray:
-    """Return the points (n, 2) [m] of a contour of straight edges."""
-    starts = np.array([edge.ends[0] for edge in contour.edges])
-    return np.column_stack([starts.real, starts.imag])
+    places = [Place(one.name, one.shapes, one.at, *_motions(assembly, one), one.seams) for one in regions(spec)]
+    return Part(rings_of(cut), _thinnest(assembly), width, law, tuple(places))
 
 
 def _thinnest(assembly: Assembly) -> float:
@@ -259,24 +203,6 @@ def _stops(spec: BeamSpec) -> list[float]:
     # ends of windows that are an even pose but for rounding are that pose
     near = np.abs(np.diff(found)) < 1e-9 * abs(end)
     return [float(place) for place in np.delete(found, np.flatnonzero(near) + 1)[:: 1 if end > 0 else -1]]
-
-
-def _groups(
-    assembly: Assembly, nodes: FloatArray, places: tuple[HeldPlace, ...]
-) -> tuple[tuple[Group, ...], NDArray[np.bool_]]:
-    """Return the groups of nodes that are held or driven, and which nodes are in one."""
-    from cfmkit.solid.supports import Group, within
-
-    taken = np.zeros(len(nodes), bool)
-    found: list[Group] = []
-    for place in places:
-        inside = np.flatnonzero(within(nodes, place.shapes, ON) & ~taken)
-        if len(inside):
-            found.append(Group(place.name, inside, place.at, *_motions(assembly, place)))
-            taken[inside] = True
-        elif not any(one.name == place.node for one in found):
-            raise GeometryError(f"no node of the mesh lies where {place.name} is held")
-    return tuple(found), taken
 
 
 def _motions(assembly: Assembly, place: HeldPlace) -> tuple[FloatArray, FloatArray]:
