@@ -7,14 +7,18 @@ One rule: the allowable stress is the yield strength over `safety_factor`, which
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Self
+from typing import TYPE_CHECKING, Annotated, Any, Self
 
 from pydantic import BeforeValidator, Field, model_validator
 
 from cfmkit.specs.spec import Model, refuse
-from cfmkit.specs.units import Length, Ratio, Stress
+from cfmkit.specs.units import Length, Ratio, Stress, format_short
 from cfmkit.specs.units.fields import described
 from cfmkit.stock.materials import UnknownMaterial, material
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
 
 PositiveStress = Annotated[Stress, Field(gt=0)]
 SafetyFactor = Annotated[Ratio, Field(ge=1, description="allowable stress: yield strength over this; 1 unless given")]
@@ -92,10 +96,52 @@ MaterialField = Annotated[MaterialSpec, material_input(MaterialSpec)]
 """The type of a key that says what something is made of."""
 
 
+Place = tuple[Length, Length]
+FromZero = Annotated[Length, Field(ge=0)]
+AboveZero = Annotated[Length, Field(gt=0)]
+
+
+class Hole(Model):
+    """A round hole that is cut out of the part."""
+
+    at: Place = Field(description="its middle [x, y], in the drawing")
+    diameter: AboveZero = Field(description="of the hole as cut")
+
+
 class CutPart(Model):
     """How a part is cut: what every family that is cut from a sheet can say."""
 
-    fillet: Annotated[Length, Field(ge=0)] = Field(0.0005, description="radius of inside corners: that of the cutter")
-    sheet: Annotated[Length, Field(gt=0)] | None = Field(
+    fillet: FromZero = Field(
+        0.0005, description="radius of inside corners: that of the cutter; 0: sharp, the stress there has no value"
+    )
+    sheet: AboveZero | None = Field(
         None, description="thickness of the sheet that everything is cut from: every width must be equal to it"
     )
+    holes: Annotated[tuple[Hole, ...], Field(max_length=1000)] = Field(
+        (), description="fixing pattern: [{at: [x, y], diameter: 4 mm}]"
+    )
+
+
+class PaddedPart(CutPart):
+    """The same of a part that ends in pads."""
+
+    pad: tuple[AboveZero, AboveZero] | None = Field(
+        None, description="depth behind the end and breadth across it, of pads at what is held and driven"
+    )
+
+
+def sheet_faults(part: CutPart | None, widths: Mapping[str, float | None]) -> dict[tuple[str, ...], str]:
+    """Return the fault of a sheet from which not every width, by its key below `mechanism`, can be cut; else nothing.
+
+    Examples
+    --------
+    >>> sheet_faults(CutPart(sheet="6 mm"), {"width": 0.006, "beam.width": 0.005})
+    {('mechanism', 'part', 'sheet'): "the sheet is 6 mm, but 'mechanism.beam.width' is 5 mm: make them equal"}
+    """
+    if part is None or part.sheet is None:
+        return {}
+    sheet = float(part.sheet)
+    other = {key: width for key, width in widths.items() if width is not None and abs(width - sheet) > 1e-9 * sheet}
+    listed = ", ".join(f"'mechanism.{key}' is {format_short(width, 'length')}" for key, width in other.items())
+    text = f"the sheet is {format_short(sheet, 'length')}, but {listed}: make them equal"
+    return {("mechanism", "part", "sheet"): text} if other else {}

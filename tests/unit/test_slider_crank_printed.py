@@ -512,12 +512,15 @@ def test_the_travel_up_to_the_allowable_stress_is_found_within_a_longer_travel(
     assert found == pytest.approx(stroke * MM, abs=0.01 * MM)
 
 
+SHARP = "mechanism.part.fillet=0 mm"
+
+
 # --- outline ----------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", ["lumped", "strip", "tapered"])
 def test_the_outline_has_the_flexures_thickness(name: str) -> None:
-    drawn = api.drawing(spec(name))
+    drawn = api.drawing(spec(name, SHARP))
     cut = next(contour for contour in drawn.contours if contour.layer == "cut")
     points = np.array([edge.start for edge in cut.edges])  # type: ignore[union-attr]
     sides = points[: len(points) // 2], points[len(points) // 2 :][::-1]
@@ -530,7 +533,7 @@ def test_the_outline_has_the_flexures_thickness(name: str) -> None:
 @pytest.mark.parametrize("name", ["lumped", "strip", "tapered"])
 def test_every_straight_piece_has_its_thickness_up_to_its_corners(name: str, changes: tuple[str, ...]) -> None:
     """The distance from the centre line of every piece to the edge is half its thickness there, also beside corners."""
-    drawn = api.drawing(spec(name, *changes), 1e-9)
+    drawn = api.drawing(spec(name, SHARP, *changes), 1e-9)
     cut = next(contour for contour in drawn.contours if contour.layer == "cut")
     edges = [(complex(*edge.start), complex(*edge.end)) for edge in cut.edges]  # type: ignore[union-attr]
     table = {key: values for key, (values, _) in drawn.tables[0].columns.items()}

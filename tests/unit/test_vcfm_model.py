@@ -395,6 +395,7 @@ def test_both_structures_can_be_written_for_cutting(kind, structure, loaded):
     inside = loaded == "whole" and structure != "straight"
     assert len(holes) == 2 + inside
     assert len(drawing.contours) == 4 + inside
+    assert not [note for note in drawing.notes if "fillet" in note]
 
 
 @pytest.mark.parametrize("change", ["0.4 mm", "0.2 mm", "0.6 mm"])

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.elastica.model.layout import Layout
-from cfmkit.export.geometry import TOLERANCE, Contour, Curve2D, Drawing, Region, Sheet, Smooth
+from cfmkit.export.geometry import TOLERANCE, Contour, Curve2D, Drawing, Region, Sheet, Smooth, circle
 from cfmkit.export.union import quarter_pieces
 from cfmkit.families.beam.build import assemble, mirror_axis, thickest
 from cfmkit.families.beam.parts.spec import PartSpec
@@ -111,7 +111,7 @@ def _region(assembly: Assembly, node: str, ends: list[tuple[BeamStrip, bool]], b
     about = assembly.network.nodes[node]
     at = np.array([about.x, about.y])
     if _padded(assembly, node):
-        pads = [_pad(strip, last) for strip, last in ends]
+        pads = [_pad(assembly, strip, last) for strip, last in ends]
         return HeldPlace(node, node, at, tuple(pads), tuple(pad[:2] for pad in pads))
     strip, last = ends[0]
     index = -1 if last else 0
@@ -145,8 +145,9 @@ def drawing(spec: BeamSpec, tolerance: float = TOLERANCE) -> Drawing:
         pieces = [*pieces, *(mirrored(piece, *axis)[::-1] for piece in pieces), *_bars(assembly, beams, *axis)]
         holes = [*holes, *(mirrored(hole, *axis)[::-1] for hole in holes)]
         lines = [*lines, *(_mirrored_line(line, *axis) for line in lines)]
-    fillet = (spec.mechanism.part or PartSpec()).fillet
-    contours = merged(pieces, fillet, holes, rough=min(ROUGH, SHARE * tolerance))
+    part = spec.mechanism.part or PartSpec()
+    contours = merged(pieces, part.fillet, holes, rough=min(ROUGH, SHARE * tolerance))
+    contours += tuple(circle(one.at, 0.5 * one.diameter, "cut", hole=True) for one in part.holes)
     paths = tuple(Contour((line,), "path") for line in lines)
     tables = tuple(_table(f"beam-{name}", found) for name, found in beams.items())
     legs = spec.mechanism.copies.legs if spec.mechanism.copies else 1
@@ -189,7 +190,7 @@ def _pieces(
             pieces.append(_disc(at, 0.5 * size, bulge))
             support = network.nodes[node].support
             if _padded(assembly, node):
-                pieces.append(_pad(strip, last))
+                pieces.append(_pad(assembly, strip, last))
             elif support.across and not support.rotation:
                 pieces.append(_disc(at, EYE * size, bulge))
                 holes.append(_disc(at, HOLE * size, bulge))
@@ -227,7 +228,7 @@ def _anchor(assembly: Assembly, beams: dict[str, list[BeamStrip]], node: str) ->
     """Return where bars to a node end [m]: in the middle of a pad there, else at the node."""
     ends = _ends(assembly, beams, node)
     if ends and _padded(assembly, node):
-        middle: FloatArray = _pad(*ends[0]).mean(axis=0)
+        middle: FloatArray = _pad(assembly, *ends[0]).mean(axis=0)
         return middle
     found = assembly.network.nodes[node]
     return np.array([found.x, found.y])
@@ -252,13 +253,16 @@ def _disc(center: FloatArray, radius: float, bulge: float) -> FloatArray:
     return center + radius * np.column_stack([np.cos(turn), np.sin(turn)])
 
 
-def _pad(strip: BeamStrip, last: bool) -> FloatArray:
+def _pad(assembly: Assembly, strip: BeamStrip, last: bool) -> FloatArray:
     """Return a rectangle behind the end of a beam, square to it: the beam keeps its free length."""
+    part = assembly.spec.mechanism.part
     index = -1 if last else 0
     at, angle, size = strip.points[index], float(strip.angle[index]), float(strip.thickness[index])
     out = np.array([math.cos(angle), math.sin(angle)]) * (1 if last else -1)
     side = np.array([-out[1], out[0]])
     depth, half = PAD * size, 0.5 * PAD * size
+    if part is not None and part.pad is not None:
+        depth, half = part.pad[0], 0.5 * part.pad[1]
     return np.array(
         [at + half * side, at - half * side, at - half * side + depth * out, at + half * side + depth * out]
     )
@@ -281,7 +285,7 @@ def _bars(assembly: Assembly, beams: dict[str, list[BeamStrip]], at: complex, di
         if not ends or _on_axis(assembly, node):
             continue
         padded = _padded(assembly, node)
-        middle = _pad(*ends[0])[2:].mean(axis=0) if padded else _anchor(assembly, beams, node)
+        middle = _pad(assembly, *ends[0])[2:].mean(axis=0) if padded else _anchor(assembly, beams, node)
         other = mirrored(middle[None], at, direction)[0]
         if np.hypot(*(other - middle)) > 0:
             found.append(_bar(middle, other, PAD * thick))

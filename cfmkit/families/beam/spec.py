@@ -18,6 +18,7 @@ from cfmkit.specs.formula import formula
 from cfmkit.specs.spec import Analysis, DesignBlock, Displacement, Model, Spec, refuse
 from cfmkit.specs.units import DIMENSIONS, Factor, Force, Length, Ratio, Torque
 from cfmkit.specs.units.fields import LARGEST
+from cfmkit.stock.spec import sheet_faults
 from cfmkit.tables.source import DataSource
 
 Fidelity = Literal["inextensible", "extensible", "reissner", "solid"]
@@ -191,6 +192,15 @@ class BeamSpec(Spec):
     @model_validator(mode="after")
     def _goes_as_far_as_the_drive_says(self) -> Self:
         refuse("BeamSpec", {("analysis", *place): message for place, message in _extent_faults(self)})
+        return self
+
+    @model_validator(mode="after")
+    def _is_cut_from_one_sheet(self) -> Self:
+        mechanism = self.mechanism
+        widths = {"width": mechanism.width} | {
+            f"beams.{name}.width": one.width for name, one in mechanism.beams.items()
+        }
+        refuse("BeamSpec", sheet_faults(mechanism.part, widths))
         return self
 
     @model_validator(mode="after")

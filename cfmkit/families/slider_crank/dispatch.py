@@ -61,4 +61,5 @@ def drawing(spec: SliderCrankSpec, tolerance: float = TOLERANCE) -> Drawing:
     """
     made: Drawing = _in_room(ROOMS[spec.fidelity], "outline:drawing")(resolve(spec))
     legs = spec.mechanism.legs
-    return replace(made, notes=(f"one of {legs} equal legs is drawn: make it {legs} times",) if legs > 1 else ())
+    often = (f"one of {legs} equal legs is drawn: make it {legs} times",) if legs > 1 else ()
+    return replace(made, notes=(*often, *made.notes))

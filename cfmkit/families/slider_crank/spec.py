@@ -11,6 +11,7 @@ from cfmkit.families.slider_crank.printed.spec import Printed, PrintedAnalysis, 
 from cfmkit.families.slider_crank.springs.spec import Limits, PositiveLength, SpringDesign, Springs
 from cfmkit.specs.spec import Spec, refuse
 from cfmkit.specs.units import Angle, Length, Ratio
+from cfmkit.stock.spec import sheet_faults
 
 
 class Mechanism(Printed):
@@ -104,6 +105,15 @@ class SliderCrankSpec(Spec):
     def fidelity(self) -> Literal["prb", "lumped", "beam"]:
         """The model that the analysis uses."""
         return self.analysis.fidelity or self.mechanism.finest
+
+    @model_validator(mode="after")
+    def _is_cut_from_one_sheet(self) -> Self:
+        own = self.mechanism.flexures
+        names = ("pivot", "crank_pin", "slider_pin")
+        widths = {f"flexures.{name}.width": getattr(own, name).width for name in names} if own else {}
+        strip = self.mechanism.beam
+        refuse("Spec", sheet_faults(self.mechanism.part, widths | ({"beam.width": strip.width} if strip else {})))
+        return self
 
     @model_validator(mode="after")
     def _flexures_fit_their_links(self) -> Self:

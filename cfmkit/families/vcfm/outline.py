@@ -11,8 +11,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.export.geometry import TOLERANCE, Arc, Contour, Curve2D, Drawing, Edge, Line, Region, Sheet, Smooth
+from cfmkit.export.fillets import filleted, sharp_notes
+from cfmkit.export.geometry import TOLERANCE, Arc, Contour, Curve2D, Drawing, Edge, Line, Region, Sheet, Smooth, circle
+from cfmkit.families.findings import mm
 from cfmkit.families.vcfm.build import RIM, strip_of
+from cfmkit.stock.spec import CutPart
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -22,6 +25,9 @@ if TYPE_CHECKING:
 
 GAP = 0.01
 """Between the two parts of the drawing [m]."""
+
+FITS = 1.02
+"""Height of rigid blocks beyond a leaf's edge, in what a fillet there takes."""
 
 POINTS = 201
 """Of the edge of a cosine arch."""
@@ -37,7 +43,12 @@ def drawing(spec: VcfmSpec, tolerance: float = TOLERANCE) -> Drawing:
     places, heights, _ = _centre_line(spec)
     table = Curve2D("leaf", {"x": (places, "length"), "y": (heights, "length")})
     spring = spring_contours(spec, low - GAP)
-    return Drawing("vcfm", (*leaves, *spring), (table,), tuple(_notes(spec)), _sheet(spec, spring))
+    part = spec.mechanism.part or CutPart()
+    rounded = [filleted(contour, part.fillet) for contour in (*leaves, *spring)]
+    notes = sharp_notes([place for _, sharp in rounded for place in sharp], part.fillet)
+    holes = [circle(one.at, 0.5 * one.diameter, "cut", hole=True) for one in part.holes]
+    contours = (*(contour for contour, _ in rounded), *holes)
+    return Drawing("vcfm", contours, (table,), (*_notes(spec), *notes), _sheet(spec, spring))
 
 
 def _sheet(spec: VcfmSpec, spring: Sequence[Contour]) -> Sheet:
@@ -56,6 +67,9 @@ def _notes(spec: VcfmSpec) -> Iterator[str]:
         yield "one half of the eight folded beams is drawn: make it twice"
     if count % 2:
         yield f"leaves are drawn as whole Vs: {count + 1} instead of {count}; leave one off"
+    leaves, spring = spec.mechanism.bistable.width, about.width
+    if leaves != spring:
+        yield f"two sheets: leaves with shuttle and walls are {mm(leaves)} thick, the spring {mm(spring)}"
 
 
 def leaves_contours(spec: VcfmSpec) -> tuple[list[Contour], float]:
@@ -129,7 +143,9 @@ def _diamond(spec: VcfmSpec, top: float) -> tuple[list[Item], list[Item], float]
     strip = strip_of(about, spec.mechanism.material)
     half, x = 0.5 * frame.block, 0.5 * frame.block + float(strip.reach)
     rise, v = float(strip.rise), 0.5 * about.thickness / float(np.cos(strip.angle))
-    rim = RIM * about.thickness
+    # high enough for the fillet beside it; where the spring closes, its inner edges meet, not these
+    room = float(np.tan(0.25 * np.pi + 0.5 * strip.angle)) * (spec.mechanism.part or CutPart()).fillet
+    rim = max(RIM * about.thickness, v + FITS * room)
     high = top - frame.block
     up, down = high - rise, high - rise - frame.corner
     base, out = down - rise, x + frame.block

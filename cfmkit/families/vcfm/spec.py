@@ -10,7 +10,7 @@ from pydantic import Field, field_validator, model_validator
 
 from cfmkit.specs.spec import Analysis, DesignBlock, Model, Spec, refuse
 from cfmkit.specs.units import Angle, Force, Length, Ratio, Stiffness
-from cfmkit.stock.spec import MaterialSpec, PositiveStress, SafetyFactor, material_input
+from cfmkit.stock.spec import CutPart, MaterialSpec, PositiveStress, SafetyFactor, material_input, sheet_faults
 
 PositiveLength = Annotated[Length, Field(gt=0)]
 NonNegativeLength = Annotated[Length, Field(ge=0)]
@@ -132,6 +132,7 @@ class Mechanism(Model):
     positive: Positive
     bistable: Bistable
     frame: Frame = Field(default_factory=lambda: Frame(), description="rigid parts, for drawings")
+    part: CutPart | None = Field(None, description="how both parts are cut: inside corners, sheet, holes")
 
     @model_validator(mode="before")
     @classmethod
@@ -241,6 +242,15 @@ class VcfmSpec(Spec):
             case {"mechanism": {"bistable": {"structure": "hybrid"}}} if "analysis" not in data:
                 return dict(data) | {"analysis": {"fidelity": "exact"}}
         return data
+
+    @model_validator(mode="after")
+    def _is_cut_from_one_sheet(self) -> Self:
+        part = self.mechanism
+        widths = {"bistable.width": part.bistable.width, "positive.width": part.positive.width}
+        if self.design is not None and part.part is not None and part.part.sheet is not None:
+            refuse("Spec", {("mechanism", "part", "sheet"): "a design finds both widths: drop the sheet, or 'design'"})
+        refuse("Spec", sheet_faults(part.part, widths))
+        return self
 
     @model_validator(mode="after")
     def _truss_has_two_laws(self) -> Self:

@@ -22,7 +22,7 @@ from cfmkit.specs.units import (
     Torque,
 )
 from cfmkit.stock.materials import material
-from cfmkit.stock.spec import MaterialSpec, material_input
+from cfmkit.stock.spec import MaterialSpec, PaddedPart, material_input
 
 if TYPE_CHECKING:
     pass
@@ -346,9 +346,8 @@ class Copies(Model):
     )
 
 
-class PartSpec(Model):
+class PartSpec(PaddedPart):
     """How the part is cut, and what can be cut."""
 
-    fillet: Annotated[Length, Field(ge=0)] = Field(0.0005, description="radius of inside corners: that of the cutter")
     min_gap: Annotated[Length, Field(ge=0)] = Field(0.0, description="smallest gap that can be cut")
     min_feature: Annotated[Length, Field(ge=0)] = Field(0.0, description="smallest thickness that can be made")

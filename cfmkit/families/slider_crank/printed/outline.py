@@ -12,9 +12,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.export.geometry import Contour, Curve2D, Drawing, Line, Region, Sheet, polygon
+from cfmkit.export.fillets import filleted, sharp_notes
+from cfmkit.export.geometry import Contour, Curve2D, Drawing, Line, Region, Sheet, circle, polygon
 from cfmkit.families.slider_crank.build import linkage_of, unloaded_angle
 from cfmkit.families.slider_crank.printed.assembly import corners, flexures_of, strip_of
+from cfmkit.stock.spec import PaddedPart
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
@@ -38,15 +40,16 @@ def drawing(spec: SliderCrankSpec) -> Drawing:
     unloaded = unloaded_angle(spec.mechanism, linkage)
     if spec.fidelity == "beam":
         beam = spec.mechanism.beam
-        drawn = _strip(strip_of(spec.mechanism, linkage, unloaded), beam.offset if beam else 0)
-        return replace(drawn, sheet=Sheet(beam.width if beam else None))
+        drawn = _strip(strip_of(spec.mechanism, linkage, unloaded), beam.offset if beam else 0, pad_of(spec))
+        return _cut(spec, replace(drawn, sheet=Sheet(beam.width if beam else None)))
     parts = flexures_of(spec.mechanism)
     points = corners(spec.mechanism, None, linkage, unloaded)
     thick = [0.5 * one.thickness for one in parts]
     bar = 0.5 * LINK_RATIO * max(2.0 * half for half in thick)
     order = [0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 5, 5]
     own = [thick[0], thick[0], bar, bar, thick[1], thick[1], bar, bar, thick[2], thick[2]]
-    half = np.array([0.5 * PAD[1], *own, 0.5 * PAD[1]])
+    pad = pad_of(spec)
+    half = np.array([0.5 * pad[1], *own, 0.5 * pad[1]])
     table = {
         "x": (points[:, 0], "length"),
         "y": (points[:, 1], "length"),
@@ -60,7 +63,24 @@ def drawing(spec: SliderCrankSpec) -> Drawing:
         if one.width < widest
     )
     sheet = Sheet(widest, regions)
-    return Drawing("slider-crank", _piece(points[order], half), (Curve2D("flexures", table),), sheet=sheet)
+    return _cut(
+        spec, Drawing("slider-crank", _piece(points[order], half, pad), (Curve2D("flexures", table),), (), sheet)
+    )
+
+
+def pad_of(spec: SliderCrankSpec) -> tuple[float, float]:
+    """Return depth and breadth of the pads [m]."""
+    part = spec.mechanism.part
+    return PAD if part is None or part.pad is None else part.pad
+
+
+def _cut(spec: SliderCrankSpec, drawn: Drawing) -> Drawing:
+    """Return a drawing with its inside corners rounded and its fixing holes."""
+    part = spec.mechanism.part or PaddedPart()
+    outline, *others = drawn.contours
+    rounded, sharp = filleted(outline, part.fillet)
+    holes = (circle(one.at, 0.5 * one.diameter, "cut", hole=True) for one in part.holes)
+    return replace(drawn, contours=(rounded, *holes, *others), notes=sharp_notes(sharp, part.fillet))
 
 
 def _around(start: FloatArray, end: FloatArray, half: float) -> FloatArray:
@@ -70,13 +90,13 @@ def _around(start: FloatArray, end: FloatArray, half: float) -> FloatArray:
     return np.array([start - side, end - side, end + side, start + side])
 
 
-def _strip(strip: Strip, offset: float) -> Drawing:
+def _strip(strip: Strip, offset: float, pad: tuple[float, float]) -> Drawing:
     """Return a strip as it is drawn: without what printing adds."""
     marks = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(strip.corners, axis=0).T))])
     fractions = np.unique(np.concatenate([marks / marks[-1], strip.places]))
     points = np.column_stack([np.interp(fractions * marks[-1], marks, strip.corners[:, k]) for k in (0, 1)])
     thickness = np.interp(fractions, strip.places, np.asarray(strip.thickness)) - offset
-    half = np.array([0.5 * PAD[1], *(0.5 * thickness), 0.5 * PAD[1]])
+    half = np.array([0.5 * pad[1], *(0.5 * thickness), 0.5 * pad[1]])
     order = [0, *range(len(points)), len(points) - 1]
     table = {
         "place": (fractions * marks[-1], "length"),
@@ -84,13 +104,13 @@ def _strip(strip: Strip, offset: float) -> Drawing:
         "y": (points[:, 1], "length"),
         "thickness": (thickness, "length"),
     }
-    return Drawing("slider-crank", _piece(points[order], half), (Curve2D("strip", table),))
+    return Drawing("slider-crank", _piece(points[order], half, pad), (Curve2D("strip", table),))
 
 
-def _piece(points: FloatArray, half: FloatArray) -> tuple[Contour, ...]:
+def _piece(points: FloatArray, half: FloatArray, pad: tuple[float, float]) -> tuple[Contour, ...]:
     """Return the outline around a chain of points with half widths [m], between two pads, and its centre line."""
     begin, end = _direction(points, 0), _direction(points, len(points) - 1)
-    line = np.vstack([points[0] - PAD[0] * begin, points, points[-1] + PAD[0] * end])
+    line = np.vstack([points[0] - pad[0] * begin, points, points[-1] + pad[0] * end])
     wide = np.concatenate([[half[0]], half, [half[-1]]])
     around = [(float(x), float(y)) for x, y in (*_edge(line, wide), *reversed(_edge(line, -wide)))]
     kept = [point for point, following in zip(around, [*around[1:], around[0]], strict=True) if point != following]

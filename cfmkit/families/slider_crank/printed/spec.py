@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 
 from cfmkit.specs.spec import Analysis, Model
 from cfmkit.specs.units import Length, Ratio
-from cfmkit.stock.spec import CutPart, MaterialField, SafetyFactor
+from cfmkit.stock.spec import MaterialField, PaddedPart, SafetyFactor
 
 PositiveLength = Annotated[Length, Field(gt=0)]
 
@@ -114,7 +114,7 @@ class Printed(Model):
     flexures: Flexures | None = Field(None, description="small flexures at the joints, rigid links between: 'lumped'")
     beam: StripSpec | None = Field(None, description="one strip of varying thickness: fidelity 'beam'")
     process: Process | None = Field(None, description="how it is made, for warnings")
-    part: CutPart | None = Field(None, description="how it is cut: fillets, the sheet")
+    part: PaddedPart | None = Field(None, description="how it is cut: inside corners, sheet, pads, holes")
 
     @property
     def finest(self) -> Literal["prb", "lumped", "beam"]:

@@ -1,0 +1,149 @@
+"""Inside corners of exact contours, rounded by the cutter: tangent arcs in the place of corners.
+
+A corner is where the direction turns towards the waste: a cutter of that radius cannot reach into it. Where edges
+beside a corner are too short for the arc it stays sharp, and its place is told.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.export.geometry import Arc, Contour, Line, Smooth
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from cfmkit.arrays import FloatArray
+    from cfmkit.export.geometry import Edge
+
+SMOOTH = math.radians(0.5)
+"""Where the direction turns by less than this the edges are tangent: nothing to round [rad]."""
+
+
+def filleted(contour: Contour, radius: float) -> tuple[Contour, tuple[complex, ...]]:
+    """Return a closed contour with rounded inside corners, and the places x + iy [m] of corners that no arc fits.
+
+    Corners between lines, and between a line and a smooth edge, are rounded; others count as not fitting.
+
+    Parameters
+    ----------
+    contour : Contour
+        Its edges meet; material is within it, or around it where it is a hole.
+    radius : float
+        Of the arcs [m]; 0 leaves all corners.
+    """
+    if radius <= 0 or len(contour.edges) < 2:
+        return contour, ()
+    side = 1.0 if (_area(contour) > 0) != contour.hole else -1.0
+    edges = [edge for edge in contour.edges if not isinstance(edge, Line) or abs(edge.ends[1] - edge.ends[0]) > 1e-12]
+    sharp, arcs = [], {}
+    for k in range(len(edges)):
+        before, after = edges[k - 1], edges[k]
+        turn = float(np.angle(_direction(after, 0) / _direction(before, -1)))
+        if turn * side > -SMOOTH:
+            continue
+        if (found := _rounded(before, after, radius, side)) is None:
+            sharp.append(after.ends[0])
+        else:
+            edges[k - 1], arcs[k], edges[k] = found
+    rounded = [piece for k, edge in enumerate(edges) for piece in ((arcs[k], edge) if k in arcs else (edge,))]
+    return replace(contour, edges=tuple(rounded)), tuple(sharp)
+
+
+def _area(contour: Contour) -> float:
+    x, y = contour.points(1e-5).T
+    return float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
+
+
+def _direction(edge: Edge, end: int) -> complex:
+    """Return the unit tangent at the first (0) or last (-1) point of an edge."""
+    if isinstance(edge, Smooth):
+        return complex(*edge.tangents[end])
+    if isinstance(edge, Line):
+        way = edge.ends[1] - edge.ends[0]
+        return way / abs(way)
+    angle = edge.start if end == 0 else edge.end
+    return complex(-math.sin(angle), math.cos(angle)) * (1 if edge.end > edge.start else -1)
+
+
+def _rounded(before: Edge, after: Edge, radius: float, side: float) -> tuple[Edge, Arc, Edge] | None:
+    """Return two edges, shortened, and the arc between them; None where it does not fit."""
+    if isinstance(before, Line) and isinstance(after, Line):
+        return _between_lines(before, after, radius, side)
+    if isinstance(before, Line) and isinstance(after, Smooth):
+        return _onto_smooth(before, after, radius, side)
+    if isinstance(before, Smooth) and isinstance(after, Line):
+        # the mirror image of the same, run backwards: the waste is then on the other hand
+        if (found := _onto_smooth(after.reversed(), before.reversed(), radius, -side)) is None:
+            return None
+        line, arc, smooth = found
+        return smooth.reversed(), arc.reversed(), line.reversed()
+    return None
+
+
+def _between_lines(before: Line, after: Line, radius: float, side: float) -> tuple[Line, Arc, Line] | None:
+    one, other = _direction(before, -1), _direction(after, 0)
+    corner = after.ends[0]
+    trim = radius * math.tan(0.5 * abs(float(np.angle(other / one))))
+    if trim > min(abs(before.ends[1] - before.ends[0]), abs(after.ends[1] - after.ends[0])):
+        return None
+    center = corner - trim * one - 1j * side * radius * one
+    arc = _arc(center, radius, corner - trim * one, corner + trim * other, side)
+    first, last = arc.ends
+    return Line(before.start, _pair(first)), arc, Line(_pair(last), after.end)
+
+
+def _onto_smooth(line: Line, smooth: Smooth, radius: float, side: float) -> tuple[Line, Arc, Smooth] | None:
+    """Return the arc from a line to the smooth edge that begins at its end."""
+    way, start = _direction(line, -1), line.ends[0]
+    points, tangents = (_complex(values) for values in (smooth.points, smooth.tangents))
+    centers = points - 1j * side * radius * tangents  # of arcs that touch the smooth edge
+    over = ((centers - start) / way).imag + side * radius  # how far these are from touching the line
+    beyond = np.flatnonzero(over[:-1] * over[1:] <= 0)
+    if not len(beyond):
+        return None
+    k = int(beyond[0])
+    share = float(over[k] / (over[k] - over[k + 1]))
+    center = centers[k] + share * (centers[k + 1] - centers[k])
+    tangent = tangents[k] + share * (tangents[k + 1] - tangents[k])
+    tangent /= abs(tangent)
+    touch = start + way * ((center - start) / way).real
+    if ((touch - start) / way).real < 0:
+        return None
+    arc = _arc(center, radius, touch, center + 1j * side * radius * tangent, side)
+    first, last = arc.ends
+    rest = slice(k + 1 if share < 0.999 else k + 2, None)
+    kept = np.vstack([_pair(last), smooth.points[rest]])
+    if len(kept) < 2:
+        return None
+    return Line(line.start, _pair(first)), arc, Smooth(kept, np.vstack([_pair(tangent), smooth.tangents[rest]]))
+
+
+def _arc(center: complex, radius: float, first: complex, last: complex, side: float) -> Arc:
+    """Return the arc that turns towards the waste: clockwise where the material is on the left."""
+    start, turn = float(np.angle(first - center)), float(np.angle((last - center) / (first - center)))
+    return Arc(_pair(center), radius, start, start - side * abs(turn))
+
+
+def _complex(points: FloatArray) -> np.ndarray:
+    return np.asarray(points[:, 0] + 1j * points[:, 1])
+
+
+def _pair(point: complex) -> tuple[float, float]:
+    return float(point.real), float(point.imag)
+
+
+def sharp_notes(places: Sequence[complex], radius: float) -> tuple[str, ...]:
+    """Return one line per corner that no fillet fits, with its place."""
+    from cfmkit.export.arc_outlines import place
+    from cfmkit.specs.units import format_short
+
+    return tuple(
+        f"no fillet of {format_short(radius, 'length')} fits the inside corner at {place(at)}: it stays sharp "
+        "('mechanism.part.fillet')"
+        for at in places
+    )

@@ -1,0 +1,83 @@
+"""Inside corners of exact contours are rounded by the cutter; where no arc fits they stay, and are told."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+import cfmkit
+from cfmkit import api
+from cfmkit.errors import SpecError
+from cfmkit.export.arc_outlines import outlines
+from cfmkit.export.fillets import filleted
+from cfmkit.export.geometry import Arc, Contour, Drawing, Line, Smooth, polygon
+
+ELL = [(0, 0), (0.04, 0), (0.04, 0.01), (0.01, 0.01), (0.01, 0.03), (0, 0.03)]
+
+
+def area(contour):
+    (found,) = outlines(Drawing("part", (replace(contour, hole=False),)))
+    return abs(found.chain.area)
+
+
+@pytest.mark.parametrize("turned", [1, -1])
+def test_only_the_inside_corner_is_rounded_whichever_way_the_contour_runs(turned):
+    contour, sharp = filleted(polygon(ELL[::turned], "cut"), 0.002)
+    assert sharp == ()
+    assert [edge.radius for edge in contour.edges if isinstance(edge, Arc)] == [0.002]
+    assert area(contour) == pytest.approx(area(polygon(ELL, "cut")) + (1 - np.pi / 4) * 0.002**2, rel=1e-9)
+
+
+def test_all_corners_of_a_square_hole_are_inside_corners():
+    hole = polygon([(0, 0), (0.01, 0), (0.01, 0.01), (0, 0.01)], "cut", hole=True)
+    contour, _ = filleted(hole, 0.001)
+    assert sum(isinstance(edge, Arc) for edge in contour.edges) == 4
+    assert area(contour) == pytest.approx(1e-4 - (4 - np.pi) * 1e-6, rel=1e-9)
+
+
+def test_a_fillet_between_a_line_and_a_smooth_edge_is_tangent_to_both():
+    """A circle of 30 mm stands on a line: the arc touches both where two circles and a line touch."""
+    radius, fillet = 0.03, 0.002
+    turn = np.linspace(-0.5 * np.pi + 0.6, 0.5 * np.pi, 400)  # from the floor up to the top
+    floor = float(radius * np.sin(turn[0]))
+    points = radius * np.column_stack([np.cos(turn), np.sin(turn)])
+    smooth = Smooth(points[::-1], np.column_stack([np.sin(turn), -np.cos(turn)])[::-1])
+    low, far = (float(points[0, 0]), floor), (0.05, floor)
+    corners = [far, (0.05, floor - 0.01), (0.0, floor - 0.01), (0.0, radius)]
+    lines = [Line(low, far), *(Line(a, b) for a, b in pairwise(corners))]
+    contour, sharp = filleted(Contour((smooth, *lines), "cut", closed=True), fillet)
+    (arc,) = (edge for edge in contour.edges if isinstance(edge, Arc))
+    assert sharp == ()
+    assert arc.center[1] == pytest.approx(floor + fillet, abs=1e-9)
+    assert np.hypot(*arc.center) == pytest.approx(radius + fillet, abs=2e-7)  # chords of 0.2 mm
+    assert len(outlines(Drawing("part", (contour,)))) == 1  # edges meet, nothing crosses
+
+
+def test_a_corner_that_no_fillet_fits_stays_and_its_place_is_told():
+    contour, sharp = filleted(polygon(ELL, "cut"), 0.025)
+    assert contour.edges == polygon(ELL, "cut").edges
+    assert sharp == (0.01 + 0.01j,)
+    spec = cfmkit.load("configs/vcfm_hybrid.yaml", ["mechanism.part.fillet=3 mm"])
+    notes = [note for note in api.drawing(spec).notes if "fillet" in note]
+    assert notes[0].startswith("no fillet of 3 mm fits the inside corner at (")
+
+
+def test_a_sheet_names_the_widths_that_are_not_its_thickness():
+    told = r"the sheet is 6 mm, but 'mechanism\.positive\.width' is 10 mm: make them equal"
+    with pytest.raises(SpecError, match=told):
+        cfmkit.load("configs/vcfm_ding2022.yaml", ["mechanism.part.sheet=6 mm"])
+    cfmkit.load("configs/beam_lan2010.yaml", ["mechanism.part.sheet=10 mm"])
+
+
+def test_holes_of_the_fixing_pattern_are_cut_and_must_lie_in_the_part():
+    hole = "mechanism.part.holes=[{at: [-10 mm, -6 mm], diameter: 3 mm}]"
+    plain, drilled = (api.drawing(cfmkit.load("configs/slider_crank_strip.yaml", one)) for one in ([], [hole]))
+    assert len(drilled.contours) == len(plain.contours) + 1
+    outside = cfmkit.load(
+        "configs/slider_crank_strip.yaml", ["mechanism.part.holes=[{at: [0 mm, 90 mm], diameter: 3 mm}]"]
+    )
+    with pytest.raises(cfmkit.errors.GeometryError, match=r"is a hole at .*, outside every cut contour"):
+        cfmkit.export(outside)
