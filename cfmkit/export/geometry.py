@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -215,11 +215,38 @@ class Sheet:
 
 
 @dataclass(frozen=True)
+class Dimension:
+    """A length that a drawing states: between two points, measured along x, along y or straight.
+
+    Attributes
+    ----------
+    name : str
+        In words, as the family's keys have it.
+    start, end : (float, float)
+        What is measured between [m].
+    along : {"x", "y", "line"}
+        In which direction.
+    """
+
+    name: str
+    start: tuple[float, float]
+    end: tuple[float, float]
+    along: Literal["x", "y", "line"] = "line"
+
+    @property
+    def value(self) -> float:
+        """The length [m]."""
+        x, y = abs(self.end[0] - self.start[0]), abs(self.end[1] - self.start[1])
+        return {"x": x, "y": y, "line": math.hypot(x, y)}[self.along]
+
+
+@dataclass(frozen=True)
 class Drawing:
     """Everything about a part that can be cut: contours for DXF and SVG, tables for CSV, thickness for STL.
 
     `name` is the file stem; `cut`, `path` and `reference` are the usual layers. `notes` say what the contours do not
-    show: how often a part is to be made.
+    show: how often a part is to be made. `dimensions` and `facts` are what a sheet of paper says beside the outline:
+    main lengths, and what it is made of in (word, text).
     """
 
     name: str
@@ -227,6 +254,14 @@ class Drawing:
     tables: tuple[Curve2D, ...] = ()
     notes: tuple[str, ...] = ()
     sheet: Sheet = Sheet()
+    dimensions: tuple[Dimension, ...] = ()
+    facts: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def extents(self) -> tuple[float, float, float, float]:
+        """Smallest x and y, largest x and y of what is cut [m]."""
+        boxes = np.array([one.extents for one in self.contours if one.layer not in ("path", "reference")])
+        return (*boxes[:, :2].min(axis=0).tolist(), *boxes[:, 2:].max(axis=0).tolist())
 
     def with_reference_square(self, size: float = 0.05) -> Drawing:
         """Return the drawing with a reference square [m] to its right, unless it has a reference already."""

@@ -6,7 +6,8 @@ nothing depends on the time: the same result gives the same bytes.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
 from cfmkit import api
 from cfmkit.errors import SolutionError
@@ -16,6 +17,9 @@ from cfmkit.tables.jsontext import json_bytes
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from matplotlib.figure import Figure
+
+    from cfmkit.export.geometry import Drawing
     from cfmkit.runs.run_findings import Report
     from cfmkit.specs.spec import Spec
 
@@ -50,11 +54,14 @@ def files(
     yield "metrics.json", json_bytes(report.as_json())
     yield "resolved.yaml", api.dumps(api.resolve(result.spec), complete=True).encode()
     yield from sources(result.spec)
-    if designed is not None and result.status.usable:
-        yield from geometry(result.spec)
+    drawing = part_of(result.spec) if designed is not None and result.status.usable else None
+    if drawing is not None:
+        yield from geometry(drawing)
     for name, make in report.supplement.files.items():
         yield name, make()
     makers = {**api.figures(result), **report.supplement.figures} if plots or page else {}
+    if makers and drawing is not None:
+        makers["drawing"] = partial(_drawn, drawing, result.spec)
     drawn = {stem: form.draw(make) for stem, make in makers.items()}
     for stem, figure in drawn.items() if plots else ():
         yield from form.write(figure, stem)
@@ -74,16 +81,41 @@ def sources(spec: Spec) -> Iterator[tuple[str, bytes]]:
         yield str(source), source.path.read_bytes()
 
 
-def geometry(spec: Spec) -> Iterator[tuple[str, bytes]]:
-    """Yield what is to be cut or printed, below ``geometry/``; nothing where there is no part."""
+def part_of(spec: Spec) -> Drawing | None:
+    """Return what is to be cut or printed; None where there is no part."""
     from cfmkit.families import family
 
-    if family(spec.family).outline:
-        from cfmkit.export import files as drawn
+    if not family(spec.family).outline:
+        return None
+    try:
+        return api.drawing(spec)
+    except SolutionError:  # the analysis has a curve all the same, and a warning that says why
+        return None
 
-        try:
-            drawing = api.drawing(spec)
-        except SolutionError:  # the analysis has a curve all the same, and a warning that says why
-            return
-        for name, data in drawn(drawing).items():
-            yield f"geometry/{name}", data
+
+def geometry(drawing: Drawing) -> Iterator[tuple[str, bytes]]:
+    """Yield the files of what is to be cut or printed, below ``geometry/``."""
+    from cfmkit.export import files as drawn
+
+    for name, data in drawn(drawing).items():
+        yield f"geometry/{name}", data
+
+
+def _drawn(drawing: Drawing, spec: Spec) -> Figure:
+    from cfmkit.plots.drawing import drawing_figure
+
+    return drawing_figure(drawing, spec.name or f"a {spec.family} mechanism", stated_tolerances(spec))
+
+
+def stated_tolerances(spec: Spec) -> tuple[str, ...]:
+    """Return a line for each tolerance that the specification's design states."""
+    made = getattr(getattr(spec, "design", None), "tolerances", None)
+    return tuple(f"{path}: {_spread(stated)}" for path, stated in (made or {}).items())
+
+
+def _spread(stated: Any) -> str:
+    """Return a tolerance in words, in the units that it was given in."""
+    if isinstance(stated, tuple):
+        return " ... ".join(str(value) for value in stated)
+    words = stated.model_dump(exclude_none=True)
+    return ", ".join(f"{word} {value}" for word, value in words.items())

@@ -70,6 +70,14 @@ class MaterialSpec(Model):
         """Poisson's ratio."""
         return _POISSON_RATIO if self.poisson_ratio is None else self.poisson_ratio
 
+    @property
+    def words(self) -> str:
+        """What it is in words: its name, if it has one, its modulus, and its strength, if that is known."""
+        values = f"E {format_short(self.modulus, 'stress')}"
+        if self.yield_strength is not None:
+            values += f", yield {format_short(self.yield_strength, 'stress')}"
+        return f"{self.name}: {values}" if self.name else values
+
     def allowable(self, safety_factor: float) -> float | None:
         """Return the yield strength over a safety factor [Pa]; None where no strength is known."""
         return None if self.yield_strength is None else self.yield_strength / safety_factor

@@ -14,13 +14,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.elastica.model.layout import Layout
-from cfmkit.export.geometry import TOLERANCE, Contour, Curve2D, Drawing, Region, Sheet, Smooth, circle
+from cfmkit.export.geometry import TOLERANCE, Contour, Curve2D, Dimension, Drawing, Region, Sheet, Smooth, circle
 from cfmkit.export.union import quarter_pieces
 from cfmkit.families.beam.build import assemble, mirror_axis, thickest
 from cfmkit.families.beam.parts.spec import PartSpec
 from cfmkit.families.beam.strips import BeamStrip, mirrored, strips
+from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica.model.network import Network
     from cfmkit.families.beam.build import Assembly
@@ -152,7 +155,38 @@ def drawing(spec: BeamSpec, tolerance: float = TOLERANCE) -> Drawing:
     tables = tuple(_table(f"beam-{name}", found) for name, found in beams.items())
     legs = spec.mechanism.copies.legs if spec.mechanism.copies else 1
     notes = (f"one of {legs} equal parts side by side is drawn: make it {legs} times",) if legs > 1 else ()
-    return Drawing("beams", (*contours, *paths), tables, notes, _sheet(assembly, beams))
+    dimensions, facts = tuple(_dimensions(assembly)), tuple(_facts(assembly, part.fillet))
+    return Drawing(
+        "beams", (*contours, *paths), tables, notes, _sheet(assembly, beams), dimensions=dimensions, facts=facts
+    )
+
+
+def _dimensions(assembly: Assembly) -> Iterator[Dimension]:
+    """Yield where the driven node is from the first one that is held."""
+    nodes = assembly.network.nodes
+    driven = assembly.spec.mechanism.drive.node
+    held = next((name for name, node in nodes.items() if node.support.along and node.support.across), None)
+    if held is None or driven not in nodes:
+        return
+    start, end = ((nodes[name].x, nodes[name].y) for name in (held, driven))
+    words = f"{driven} from {held}"
+    for along, distance in (("x", end[0] - start[0]), ("y", end[1] - start[1])):
+        if abs(distance) > ROUGH:
+            yield Dimension(words, start, end, "x" if along == "x" else "y")
+
+
+def _facts(assembly: Assembly, fillet: float) -> Iterator[tuple[str, str]]:
+    """Yield what the part is made of, and how thick its beams are."""
+    mechanism = assembly.spec.mechanism
+    yield "material", mechanism.material.words
+    yield "fillets", format_short(fillet, "length") if fillet else "none"
+    thick: dict[str, list[str]] = {}
+    for name, beam in mechanism.beams.items():
+        given = beam.thickness if beam.thickness is not None else mechanism.thickness
+        ends = [given] if isinstance(given, float) else [value for _, value in given or ()]
+        limits = dict.fromkeys(format_short(value, "length") for value in (min(ends), max(ends))) if ends else {}
+        thick.setdefault(" ... ".join(limits), []).append(name)
+    yield "thickness", "; ".join(f"{size}: {', '.join(names)}" for size, names in thick.items())
 
 
 def _sheet(assembly: Assembly, beams: dict[str, list[BeamStrip]]) -> Sheet:

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.export.geometry import TOLERANCE, Arc, Contour, Curve2D, Drawing, Edge, Line, Sheet, Smooth
+from cfmkit.export.geometry import TOLERANCE, Arc, Contour, Curve2D, Dimension, Drawing, Edge, Line, Sheet, Smooth
 from cfmkit.families.cam.build import assemble_sides, flanks_crossing
-from cfmkit.families.findings import mm
+from cfmkit.families.findings import mm, rate
 from cfmkit.families.refusals import CannotBuild
 
 if TYPE_CHECKING:
@@ -50,7 +50,43 @@ def drawing(spec: CamSpec, tolerance: float = TOLERANCE) -> Drawing:
     contours = (*plate_contours(profiles, plate), *paths)
     contact = sides[0].spec.mechanism.contact
     sheet = Sheet(plate.thickness or (contact.width if contact else None), key="mechanism.plate.thickness")
-    return Drawing("cam", contours, tuple(_tables(profiles)), plate_notes(profiles, plate), sheet)
+    dimensions, facts = tuple(_dimensions(profiles, plate)), tuple(_facts(sides[0].spec))
+    return Drawing(
+        "cam",
+        contours,
+        tuple(_tables(profiles)),
+        plate_notes(profiles, plate),
+        sheet,
+        dimensions=dimensions,
+        facts=facts,
+    )
+
+
+def _dimensions(profiles: Profiles, plate: Plate) -> Iterator[Dimension]:
+    """Yield the main lengths of the plate, and where the rollers start."""
+    right, left = (flank_edge(profile).points for profile in profiles)
+    yield Dimension("cam", (0.0, float(right[0, 1])), (0.0, float(right[-1, 1])), "y")
+    yield Dimension("top", (-float(left[-1, 0]), float(left[-1, 1])), (float(right[-1, 0]), float(right[-1, 1])), "x")
+    if half := 0.5 * tab_width(plate, profiles):
+        floor = float(min(right[0, 1], left[0, 1])) - plate.base_height
+        yield Dimension("tab", (-half, floor), (half, floor), "x")
+    x0 = [profile.path.law.rest_half_width for profile in profiles]
+    yield Dimension("roller axes at the start", (-x0[1], 0.0), (x0[0], 0.0), "x")
+
+
+def _facts(spec: CamSpec) -> Iterator[tuple[str, str]]:
+    """Yield what the cam is made of, and what it is cut for."""
+    mechanism, profile = spec.mechanism, spec.mechanism.profile
+    yield "material", mechanism.contact.material.words if mechanism.contact else "not stated"
+    yield "rollers", f"2, diameter {mm(2.0 * mechanism.roller_radius)}"
+    yield "braces", f"2, {mm(mechanism.brace_length)} between pin and roller axis"
+    given, count = mechanism.springs.stiffness, mechanism.springs.count or 1
+    each = given if isinstance(given, tuple) else (given,) * count
+    same = len(set(each)) == 1
+    yield "springs", f"{len(each)} of {rate(each[0])}" if same else f"{len(each)}: {', '.join(map(rate, each))}"
+    if mechanism.preload:
+        yield "preload", f"springs stretched by {mm(mechanism.preload)} at the start"
+    yield "cut for", f"A {mm(profile.force_constant)}, rolling friction {profile.friction:g}"
 
 
 def plate_contours(profiles: Profiles, plate: Plate) -> tuple[Contour, ...]:

@@ -12,9 +12,23 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.export.fillets import filleted, sharp_notes
-from cfmkit.export.geometry import TOLERANCE, Arc, Contour, Curve2D, Drawing, Edge, Line, Region, Sheet, Smooth, circle
+from cfmkit.export.geometry import (
+    TOLERANCE,
+    Arc,
+    Contour,
+    Curve2D,
+    Dimension,
+    Drawing,
+    Edge,
+    Line,
+    Region,
+    Sheet,
+    Smooth,
+    circle,
+)
 from cfmkit.families.findings import mm
 from cfmkit.families.vcfm.build import RIM, strip_of
+from cfmkit.specs.units import format_short
 from cfmkit.stock.spec import CutPart
 
 if TYPE_CHECKING:
@@ -43,12 +57,33 @@ def drawing(spec: VcfmSpec, tolerance: float = TOLERANCE) -> Drawing:
     places, heights, _ = _centre_line(spec)
     table = Curve2D("leaf", {"x": (places, "length"), "y": (heights, "length")})
     spring = spring_contours(spec, low - GAP)
+    dimensions, facts = tuple(_dimensions(spec)), tuple(_facts(spec))
     part = spec.mechanism.part or CutPart()
     rounded = [filleted(contour, part.fillet) for contour in (*leaves, *spring)]
     notes = sharp_notes([place for _, sharp in rounded for place in sharp], part.fillet)
     holes = [circle(one.at, 0.5 * one.diameter, "cut", hole=True) for one in part.holes]
     contours = (*(contour for contour, _ in rounded), *holes)
-    return Drawing("vcfm", contours, (table,), (*_notes(spec), *notes), _sheet(spec, spring))
+    return Drawing("vcfm", contours, (table,), (*_notes(spec), *notes), _sheet(spec, spring), dimensions, facts)
+
+
+def _dimensions(spec: VcfmSpec) -> Iterator[Dimension]:
+    """Yield the span and the rise of a leaf, and the shuttle's width."""
+    about, half = spec.mechanism.bistable, 0.5 * spec.mechanism.frame.shuttle_width
+    strip = strip_of(about, spec.mechanism.material)
+    reach, rise = float(strip.reach), float(strip.rise)
+    yield Dimension("rise h", (half, 0.0), (half + reach, -rise), "y")
+    yield Dimension("span of a leaf", (half, 0.0), (half + reach, -rise), "x")
+    yield Dimension("shuttle", (-half, 0.0), (half, 0.0), "x")
+
+
+def _facts(spec: VcfmSpec) -> Iterator[tuple[str, str]]:
+    """Yield what both parts are made of, and their leaves."""
+    leaves, spring = spec.mechanism.bistable, spec.mechanism.positive
+    yield "material", spec.mechanism.material.words
+    for word, one, count in (("leaves", leaves, leaves.half_beams), ("spring", spring, None)):
+        size = f"{mm(one.length)} long, {mm(one.thickness)} thick, {mm(one.width)} wide"
+        angle = f", at {format_short(one.angle, 'angle')}" if one.angle else ""
+        yield word, f"{f'{count} {one.structure}' if count else one.structure}: {size}{angle}"
 
 
 def _sheet(spec: VcfmSpec, spring: Sequence[Contour]) -> Sheet:

@@ -13,12 +13,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.export.fillets import filleted, sharp_notes
-from cfmkit.export.geometry import Contour, Curve2D, Drawing, Line, Region, Sheet, circle, polygon
+from cfmkit.export.geometry import Contour, Curve2D, Dimension, Drawing, Line, Region, Sheet, circle, polygon
 from cfmkit.families.slider_crank.build import linkage_of, unloaded_angle
 from cfmkit.families.slider_crank.printed.assembly import corners, flexures_of, strip_of
+from cfmkit.specs.units import format_short
 from cfmkit.stock.spec import PaddedPart
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from cfmkit.arrays import FloatArray
     from cfmkit.families.slider_crank.printed.chain import Strip
     from cfmkit.families.slider_crank.spec import SliderCrankSpec
@@ -40,8 +43,12 @@ def drawing(spec: SliderCrankSpec) -> Drawing:
     unloaded = unloaded_angle(spec.mechanism, linkage)
     if spec.fidelity == "beam":
         beam = spec.mechanism.beam
-        drawn = _strip(strip_of(spec.mechanism, linkage, unloaded), beam.offset if beam else 0, pad_of(spec))
-        return _cut(spec, replace(drawn, sheet=Sheet(beam.width if beam else None)))
+        strip = strip_of(spec.mechanism, linkage, unloaded)
+        drawn = _strip(strip, beam.offset if beam else 0, pad_of(spec))
+        drawn = replace(drawn, sheet=Sheet(beam.width if beam else None))
+        return _cut(
+            spec, replace(drawn, dimensions=tuple(_dimensions(strip.corners)), facts=tuple(_facts(spec, drawn)))
+        )
     parts = flexures_of(spec.mechanism)
     points = corners(spec.mechanism, None, linkage, unloaded)
     thick = [0.5 * one.thickness for one in parts]
@@ -63,9 +70,8 @@ def drawing(spec: SliderCrankSpec) -> Drawing:
         if one.width < widest
     )
     sheet = Sheet(widest, regions)
-    return _cut(
-        spec, Drawing("slider-crank", _piece(points[order], half, pad), (Curve2D("flexures", table),), (), sheet)
-    )
+    drawn = Drawing("slider-crank", _piece(points[order], half, pad), (Curve2D("flexures", table),), (), sheet)
+    return _cut(spec, replace(drawn, dimensions=tuple(_dimensions(points)), facts=tuple(_facts(spec, drawn))))
 
 
 def pad_of(spec: SliderCrankSpec) -> tuple[float, float]:
@@ -81,6 +87,23 @@ def _cut(spec: SliderCrankSpec, drawn: Drawing) -> Drawing:
     rounded, sharp = filleted(outline, part.fillet)
     holes = (circle(one.at, 0.5 * one.diameter, "cut", hole=True) for one in part.holes)
     return replace(drawn, contours=(rounded, *holes, *others), notes=sharp_notes(sharp, part.fillet))
+
+
+def _dimensions(points: FloatArray) -> Iterator[Dimension]:
+    """Yield how far the ends of the centre line are apart."""
+    start, end = ((float(x), float(y)) for x, y in (points[0], points[-1]))
+    yield Dimension("ends of the centre line", start, end, "x")
+    if abs(end[1] - start[1]) > STRAIGHT:
+        yield Dimension("ends of the centre line", start, end, "y")
+
+
+def _facts(spec: SliderCrankSpec, drawn: Drawing) -> Iterator[tuple[str, str]]:
+    """Yield what the piece is made of, and how thick it is along its centre line."""
+    if spec.mechanism.material is not None:
+        yield "material", spec.mechanism.material.words
+    thickness = drawn.tables[0].columns["thickness"][0]
+    limits = dict.fromkeys(format_short(float(one), "length") for one in (thickness.min(), thickness.max()))
+    yield "thickness", " ... ".join(limits) + " along the centre line"
 
 
 def _around(start: FloatArray, end: FloatArray, half: float) -> FloatArray:

@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.export.geometry import Arc, Contour, Drawing, Line, Sheet, circle
+from cfmkit.export.geometry import Arc, Contour, Dimension, Drawing, Line, Sheet, circle
 from cfmkit.families.slider_crank.build import linkage_of
+from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
     from cfmkit.families.slider_crank.spec import SliderCrankSpec
@@ -37,4 +38,12 @@ def drawing(spec: SliderCrankSpec) -> Drawing:
         contours.append(Contour(edges, "cut", closed=True))
         contours += [circle((x, y), hole, "cut", hole=True) for x in (0.0, length)]
     part = spec.mechanism.part
-    return Drawing("slider-crank", tuple(contours), sheet=Sheet(part.sheet if part else None, (), KEY))
+    y = -3.0 * eye
+    told = (
+        Dimension("crank", (0.0, 0.0), (linkage.crank, 0.0)),
+        Dimension("coupler", (0.0, y), (linkage.coupler, y)),
+    )
+    facts = [("material", "not stated"), ("pin holes", f"diameter {format_short(2.0 * hole, 'length')}")]
+    facts += [("offset", format_short(linkage.offset, "length"))] if linkage.offset else []
+    sheet = Sheet(part.sheet if part else None, (), KEY)
+    return Drawing("slider-crank", tuple(contours), sheet=sheet, dimensions=told, facts=tuple(facts))

@@ -1,0 +1,277 @@
+"""The part on a sheet of paper: its outline to scale, main dimensions, holes, and what it is made of.
+
+What is cut is drawn in black, centre lines are dash-dotted. The datum of the hole table is the lower left corner of
+everything that is cut. Dimensions stand outside of the part: along x below it, along y to its left, others on
+their line.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.export.geometry import Arc, Dimension, Line, Smooth
+from cfmkit.plots.parts import mm
+from cfmkit.plots.style import GREY, INK, NORMAL, SMALL, VERMILLION, axes_mm, new_figure, styled
+from cfmkit.specs.units import format_short
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from cfmkit.arrays import FloatArray
+    from cfmkit.export.geometry import Contour, Drawing, Edge
+
+PAPER = (240.0, 165.0)
+"""Of the figure [mm]: a landscape A4 sheet within its margins, less a caption."""
+
+COLUMN = 78.0
+"""Width of the column of words [mm]."""
+
+STEP = 7.0
+"""Between dimension lines beside each other [mm of print]."""
+
+SCALES = tuple(factor * 10.0**power for power in range(3, -4, -1) for factor in (5.0, 2.0, 1.0))
+"""Scales that are used on paper (ISO 5455)."""
+
+ARC_POINTS = 91
+"""Points of a full circle of the picture."""
+
+MOST_HOLES = 12
+"""Rows of the hole table; more are counted."""
+
+
+@dataclass(frozen=True)
+class _Hole:
+    """A round hole: where its centre is from the datum, and its diameter [m]."""
+
+    x: float
+    y: float
+    diameter: float
+
+
+@styled
+def drawing_figure(drawing: Drawing, title: str, tolerances: Sequence[str] = ()) -> Figure:
+    """Return a part's drawing.
+
+    Parameters
+    ----------
+    drawing : Drawing
+        Of the part.
+    title : str
+        What the mechanism is called.
+    tolerances : sequence of str
+        One line for each that the specification states.
+    """
+    figure = new_figure(*PAPER)
+    x0, y0, x1, y1 = mm(drawing.extents).tolist()
+    overall = _overall(drawing)
+    own = [one for one in drawing.dimensions if not any(_same(one, whole) for whole in overall)]
+    dimensions = [*own, *overall]
+    below = STEP * (1 + sum(one.along == "x" for one in dimensions))
+    beside = STEP * (1 + sum(one.along == "y" for one in dimensions))
+    room = PAPER[0] - COLUMN - beside - 6.0, PAPER[1] - below - 12.0
+    scale = _scale(min(room[0] / max(x1 - x0, 1e-9), room[1] / max(y1 - y0, 1e-9)))
+    width, height = scale * (x1 - x0), scale * (y1 - y0)
+    left = beside + 0.5 * (room[0] - width)
+    bottom = below + 0.5 * (room[1] - height)
+    ax = axes_mm(figure, (0.0, 0.0, PAPER[0] - COLUMN, PAPER[1]))
+    # one unit of the axes is a millimetre of the part; its lower left corner stands at (left, bottom) of the paper
+    ax.set_xlim(x0 - left / scale, x0 + (PAPER[0] - COLUMN - left) / scale)
+    ax.set_ylim(y0 - bottom / scale, y0 + (PAPER[1] - bottom) / scale)
+    ax.set_aspect("equal")
+    ax.axis("off")
+    for contour in drawing.contours:
+        if contour.layer != "reference":
+            _contour(ax, contour)
+    found = list(holes(drawing))
+    for number, hole in enumerate(found[:MOST_HOLES], start=1):
+        _hole(ax, hole, number, (x0, y0), scale)
+    if found:
+        ax.plot(x0, y0, marker="+", markersize=9, color=VERMILLION, zorder=6, gid="datum")
+    _dimensions(ax, dimensions, (x0, y0, x1, y1), scale)
+    _words(figure, drawing, found, (title, _ratio(scale)), tolerances)
+    return figure
+
+
+def holes(drawing: Drawing) -> Iterator[_Hole]:
+    """Yield the round holes of a drawing, by diameter, then from the datum outwards."""
+    x0, y0, _, _ = drawing.extents
+    found = [
+        _Hole(edge.center[0] - x0, edge.center[1] - y0, 2.0 * edge.radius)
+        for contour in drawing.contours
+        if contour.hole and len(contour.edges) == 1
+        for edge in contour.edges
+        if isinstance(edge, Arc) and edge.full
+    ]
+    yield from sorted(found, key=lambda hole: (round(hole.diameter, 9), round(hole.y, 9), round(hole.x, 9)))
+
+
+def _overall(drawing: Drawing) -> list[Dimension]:
+    """Return width and height over everything that is cut."""
+    x0, y0, x1, y1 = drawing.extents
+    return [Dimension("overall", (x0, y0), (x1, y0), "x"), Dimension("overall", (x0, y0), (x0, y1), "y")]
+
+
+def _same(one: Dimension, other: Dimension) -> bool:
+    """Return whether two dimensions along the same axis have the same ends."""
+    axis = "xy".find(one.along)
+    if one.along != other.along or axis < 0:
+        return False
+    ends = [sorted((each.start[axis], each.end[axis])) for each in (one, other)]
+    return bool(np.allclose(ends[0], ends[1], rtol=0.0, atol=1e-9))
+
+
+def _scale(largest: float) -> float:
+    """Return the largest scale of paper that fits [mm of print for 1 mm]."""
+    found = [one for one in (*SCALES, *(1.0 / one for one in SCALES)) if one <= largest]
+    return max(found, default=largest)
+
+
+def _ratio(scale: float) -> str:
+    return f"{scale:g} : 1" if scale >= 1 else f"1 : {1 / scale:g}"
+
+
+def _points(edge: Edge) -> FloatArray:
+    if isinstance(edge, Smooth):
+        return edge.points
+    if isinstance(edge, Line):
+        return np.array([edge.start, edge.end])
+    share = np.linspace(edge.start, edge.end, max(3, int(ARC_POINTS * abs(edge.end - edge.start) / (2 * np.pi))))
+    return np.array(edge.center) + edge.radius * np.column_stack([np.cos(share), np.sin(share)])
+
+
+def _contour(ax: Axes, contour: Contour) -> None:
+    chain = mm(np.vstack([_points(edge) for edge in contour.edges]))
+    if contour.closed:
+        chain = np.vstack([chain, chain[:1]])
+    if contour.layer == "path":
+        ax.plot(*chain.T, color=GREY, linewidth=0.6, dashes=(8, 2, 1, 2), zorder=2, gid="path")
+    else:
+        ax.plot(*chain.T, color=INK, linewidth=0.9, zorder=3, solid_joinstyle="round", gid=contour.layer)
+
+
+def _hole(ax: Axes, hole: _Hole, number: int, corner: tuple[float, float], scale: float) -> None:
+    """Draw a hole's centre and number."""
+    x, y, radius = corner[0] + hole.x * 1e3, corner[1] + hole.y * 1e3, 0.5e3 * hole.diameter
+    arm = radius + 1.2 / scale
+    ax.plot([x - arm, x + arm], [y, y], color=GREY, linewidth=0.5, zorder=2)
+    ax.plot([x, x], [y - arm, y + arm], color=GREY, linewidth=0.5, zorder=2)
+    ax.text(
+        x + 0.75 * arm, y + 0.75 * arm, str(number), fontsize=SMALL, color=VERMILLION, ha="left", va="bottom", zorder=6
+    )
+
+
+def _dimensions(
+    ax: Axes, dimensions: Sequence[Dimension], box: tuple[float, float, float, float], scale: float
+) -> None:
+    """Draw dimensions: those along x below the part, those along y at its left, the short ones nearest to it."""
+    across = sorted((one for one in dimensions if one.along == "x"), key=lambda one: one.value)
+    up = sorted((one for one in dimensions if one.along == "y"), key=lambda one: one.value)
+    for number, one in enumerate(across, start=1):
+        y = box[1] - number * STEP / scale
+        (xa, ya), (xb, yb) = mm([one.start, one.end]).tolist()
+        _line(ax, (min(xa, xb), y), (max(xa, xb), y), _text(one), scale)
+        _extension(ax, [(xa, ya), (xa, y)], [(xb, yb), (xb, y)])
+    for number, one in enumerate(up, start=1):
+        x = box[0] - number * STEP / scale
+        (xa, ya), (xb, yb) = mm([one.start, one.end]).tolist()
+        _line(ax, (x, min(ya, yb)), (x, max(ya, yb)), _text(one), scale)
+        _extension(ax, [(xa, ya), (x, ya)], [(xb, yb), (x, yb)])
+    for one in dimensions:
+        if one.along == "line":
+            start, end = mm([one.start, one.end]).tolist()
+            _line(ax, (start[0], start[1]), (end[0], end[1]), _text(one), scale)
+
+
+def _text(one: Dimension) -> str:
+    return f"{one.name} {format_short(one.value, 'length')}"
+
+
+def _extension(ax: Axes, *lines: list[tuple[float, float]]) -> None:
+    for line in lines:
+        ax.plot(*np.array(line).T, color=GREY, linewidth=0.35, zorder=1)
+
+
+def _line(ax: Axes, start: tuple[float, float], end: tuple[float, float], text: str, scale: float) -> None:
+    """Draw a dimension line with arrows, and its text above it, or beside it where it is short."""
+    gap = np.subtract(end, start)
+    length = float(np.hypot(*gap)) * scale
+    look = {"arrowstyle": "<|-|>" if length > 5 else "-", "linewidth": 0.5, "color": INK, "shrinkA": 0, "shrinkB": 0}
+    look |= {"mutation_scale": 6}
+    ax.annotate("", xy=end, xytext=start, arrowprops=look, zorder=4, annotation_clip=False)
+    angle = float(np.degrees(np.arctan2(gap[1], gap[0])))
+    angle -= 180.0 * round(angle / 180.0) if abs(angle) > 90.0 + 1e-9 else 0.0
+    middle = 0.5 * (np.asarray(start) + np.asarray(end))
+    normal = np.array([-np.sin(np.radians(angle)), np.cos(np.radians(angle))])
+    at = middle + 0.5 / scale * normal
+    ax.text(
+        float(at[0]),
+        float(at[1]),
+        text,
+        fontsize=SMALL,
+        color=INK,
+        ha="center",
+        va="bottom",
+        rotation=angle,
+        rotation_mode="anchor",
+        zorder=6,
+    )
+
+
+def _words(
+    figure: Figure, drawing: Drawing, found: Sequence[_Hole], about: tuple[str, str], tolerances: Sequence[str]
+) -> None:
+    """Write the column of words: title, what it is made of, dimensions that are no lines, holes, notes."""
+    ax = axes_mm(figure, (PAPER[0] - COLUMN, 0.0, COLUMN, PAPER[1]))
+    ax.set(xlim=(0.0, COLUMN), ylim=(0.0, PAPER[1]))
+    ax.axis("off")
+    ax.plot([0, 0], [6, PAPER[1] - 6], color=GREY, linewidth=0.6)
+    title, ratio = about
+    rows = [*drawing.facts, ("sheet", _sheet(drawing)), ("scale", ratio)]
+    y = PAPER[1] - 10.0
+    y = _written(ax, 4.0, y, title, NORMAL + 1.0, "bold") - 2.0
+    for word, text in rows:
+        ax.text(4.0, y, word, fontsize=SMALL, color=GREY, va="top")
+        y = _written(ax, 24.0, y, text) - 0.6
+    if found:
+        y = _written(ax, 4.0, y - 2.0, "holes, from the lower left corner (+)", NORMAL)
+        for number, hole in enumerate(found[:MOST_HOLES], start=1):
+            place = f"x {format_short(hole.x, 'length')}, y {format_short(hole.y, 'length')}"
+            y = _written(ax, 4.0, y, f"{number}   \u2300 {format_short(hole.diameter, 'length')}   {place}")
+        if len(found) > MOST_HOLES:
+            y = _written(ax, 4.0, y, f"and {len(found) - MOST_HOLES} more, in the DXF file")
+    for heading, lines in (("tolerances", tolerances), ("notes", drawing.notes)):
+        if lines:
+            y = _written(ax, 4.0, y - 2.0, heading, NORMAL)
+            for line in lines:
+                y = _written(ax, 4.0, y, line)
+
+
+def _sheet(drawing: Drawing) -> str:
+    sheet = drawing.sheet
+    others = sorted({region.thickness for region in sheet.regions})
+    if sheet.thickness is None:
+        return "thickness not stated" + (f" ('{sheet.key}')" if sheet.key else "")
+    found = format_short(sheet.thickness, "length")
+    more = [format_short(one, "length") for one in others if one != sheet.thickness]
+    return found + (f"; in part {', '.join(more)}" if more else "")
+
+
+LETTERS = 0.235
+"""Mean width of a letter [mm] in points of its size, measured on the font of the figures."""
+
+
+def _written(ax: Axes, x: float, y: float, text: str, size: float = SMALL, weight: str = "normal") -> float:
+    """Write a text, broken into lines that fit, and return where the next one begins [mm]."""
+    import textwrap
+
+    fit = max(int((COLUMN - x - 3.0) / (LETTERS * size)), 10)
+    for line in textwrap.wrap(text, fit, break_long_words=False) or [""]:
+        ax.text(x, y, line, fontsize=size, color=INK, va="top", fontweight=weight)
+        y -= 0.50 * size
+    return y

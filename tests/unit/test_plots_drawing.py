@@ -1,0 +1,72 @@
+"""The drawing of a part: to scale, with its main dimensions, its holes and what it is made of."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import cfmkit
+from cfmkit.plots.drawing import SCALES, drawing_figure, holes
+from cfmkit.runs.files import files, part_of
+from cfmkit.runs.run_findings import report_on
+from cfmkit.specs.units import format_short
+
+CONFIGS = Path(__file__).parents[2] / "configs"
+EXAMPLES = ("cam", "vcfm_ding2022", "beam_lan2010", "slider_crank_li2019", "slider_crank_strip", "slider_crank_lumped")
+
+
+def texts(figure):
+    """Return everything that a figure says."""
+    return " ".join(text.get_text() for ax in figure.axes for text in ax.texts)
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_every_part_is_drawn_to_a_scale_of_paper_with_its_dimensions(name):
+    drawing = part_of(cfmkit.load(CONFIGS / f"{name}.yaml"))
+    figure = drawing_figure(drawing, name)
+    ax = figure.axes[0]
+    width = np.ptp(ax.get_xlim())
+    scale = figure.get_size_inches()[0] * 25.4 * ax.get_position().width / width
+    assert min(abs(scale / one - 1) for one in (*SCALES, *(1 / one for one in SCALES))) < 1e-9
+    found = texts(figure)
+    assert "overall" in found
+    assert "sheet" in found
+    for one in drawing.dimensions:
+        assert format_short(one.value, "length") in found
+    x0, y0, x1, y1 = drawing.extents
+    (left, right), (low, high) = ax.get_xlim(), ax.get_ylim()
+    assert left < 1e3 * x0 < 1e3 * x1 < right
+    assert low < 1e3 * y0 < 1e3 * y1 < high
+
+
+def test_holes_are_given_from_the_lower_left_corner_of_the_plate():
+    drawing = part_of(cfmkit.load(CONFIGS / "cam.yaml"))
+    found = list(holes(drawing))
+    assert [round(one.diameter * 1e3, 6) for one in found] == [6.6] * 4
+    x0, _, x1, _ = drawing.extents
+    assert found[0].x + found[1].x == pytest.approx(x1 - x0)  # symmetric
+    assert found[0].y == pytest.approx(0.020)  # half of a tab of 40 mm
+    assert "x 89.26 mm, y 20 mm" in texts(drawing_figure(drawing, "cam"))
+
+
+def test_what_a_leaf_measures_is_what_its_drawing_says():
+    spec = cfmkit.load(CONFIGS / "vcfm_ding2022.yaml")
+    span, rise = (
+        {one.name: one.value for one in part_of(spec).dimensions}[name] for name in ("span of a leaf", "rise h")
+    )
+    assert np.hypot(span, rise) == pytest.approx(spec.mechanism.bistable.length, rel=1e-12)
+    assert np.arctan2(rise, span) == pytest.approx(spec.mechanism.bistable.angle, rel=1e-12)
+
+
+def test_a_design_writes_its_drawing_and_names_its_tolerances():
+    spec = cfmkit.load(CONFIGS / "cam.yaml").replace(
+        {"design.tolerances": {"mechanism.brace_length": {"normal": "0.1 mm"}}}
+    )
+    design = cfmkit.design(spec)
+    report = report_on(cfmkit.analyze(design.spec), design)
+    assert "figures/drawing.png" in dict(files(report))
+    assert "figures/drawing.png" not in dict(files(report, plots=False))
+    from cfmkit.runs.files import stated_tolerances
+
+    (line,) = stated_tolerances(design.spec)
+    assert line == "mechanism.brace_length: normal 0.1 mm"
