@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
@@ -69,7 +69,7 @@ def _composed(panels: Sequence[DrawnPanel], columns: int, cell: float) -> Figure
             laid_out(panels[k].make, layouts[k])
             across, up = size_mm(part)
             letter = f"({chr(ord('a') + k)})"
-            look = {"va": "top", "ha": "left", "size": NORMAL + 0.5}
+            look: dict[str, Any] = {"va": "top", "ha": "left", "size": NORMAL + 0.5}
             written = part.text(1.0 / across, 1.0 - 1.0 / up, letter, weight="bold", **look)
             beside = 1.0 + written.get_window_extent().width / part.dpi / MM + 1.5
             part.text(beside / across, 1.0 - 1.0 / up, panels[k].label, **look)

@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     from matplotlib.axes import Axes
+    from matplotlib.figure import SubFigure
     from numpy.typing import NDArray
 
     from cfmkit.plots.form import FigureForm
@@ -154,7 +155,7 @@ def new_figure(width_mm: float = 160.0, height_mm: float = 100.0) -> Figure:
     return figure
 
 
-def size_mm(figure: Figure) -> tuple[float, float]:
+def size_mm(figure: Figure | SubFigure) -> tuple[float, float]:
     """Return width and height of a figure, or of a part of one [mm of print]."""
     dots = figure.dpi * MM
     return float(figure.bbox.width) / dots, float(figure.bbox.height) / dots

@@ -7,7 +7,7 @@ import shlex
 import time
 import traceback
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, Literal, Protocol
 
@@ -18,6 +18,8 @@ from cfmkit.runs.run import Outcome, Request, Verb, analysed, designed, journal_
 from cfmkit.runs.run import carry_out as carried_out
 from cfmkit.runs.run_findings import worst
 from cfmkit.studies.batch import LEFT, Entry
+from cfmkit.studies.changes import TOLERANCE, changes_table, earlier, gone
+from cfmkit.studies.changes import changes as changes_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -25,6 +27,7 @@ if TYPE_CHECKING:
     from cfmkit.runs.run import Noting
     from cfmkit.specs.spec import Spec
     from cfmkit.store import RunFolder
+    from cfmkit.studies.changes import Change, Known
     from cfmkit.studies.executors import Executor, Lost
     from cfmkit.studies.finished_runs import KeptRuns
     from cfmkit.tables import Table
@@ -277,6 +280,38 @@ def complaints(entries: Sequence[Entry], tracebacks: bool) -> Iterator[str]:
 
 
 @dataclass(frozen=True)
+class Comparison:
+    """A batch beside an earlier one.
+
+    Attributes
+    ----------
+    folder : str
+        Of the earlier batch.
+    tolerance : float
+        Relative change up to which a metric counts as the same.
+    changes : tuple of Change
+        Everything that is not as it was.
+    gone : tuple of str
+        Folders of specifications that are not there any more.
+    """
+
+    folder: str
+    tolerance: float
+    changes: tuple[Change, ...]
+    gone: tuple[str, ...]
+
+    @property
+    def beyond(self) -> tuple[Change, ...]:
+        """The changes that are larger than the tolerance."""
+        return tuple(one for one in self.changes if one.beyond)
+
+    def as_json(self) -> dict[str, Any]:
+        """Return what metrics.json says about it."""
+        changes = [asdict(one) for one in self.changes]
+        return {"with": self.folder, "tolerance": self.tolerance, "changes": changes, "gone": list(self.gone)}
+
+
+@dataclass(frozen=True)
 class BatchResult:
     """What became of a batch.
 
@@ -290,17 +325,20 @@ class BatchResult:
         The output folder; each specification has one of its own below.
     files : tuple of str
         What was written there.
+    compared : Comparison or None
+        With an earlier batch.
     """
 
     entries: tuple[Entry, ...]
     exit_code: ExitCode
     folder: str
     files: tuple[str, ...]
+    compared: Comparison | None = None
 
     @property
     def summary(self) -> Mapping[str, Any]:
         """What metrics.json says."""
-        return _data(self.entries, self.exit_code)
+        return _data(self.entries, self.exit_code, self.compared)
 
     @property
     def table(self) -> Table:
@@ -331,6 +369,9 @@ def batch(
     fail_fast: bool = False,
     fresh: bool = False,
     junit: str | None = None,
+    summary: str | None = None,
+    compare: str | os.PathLike[str] | None = None,
+    compare_tolerance: float | None = None,
     page: bool = False,
     form: FigureForm | None = None,
     arguments: Sequence[str] = (),
@@ -367,6 +408,12 @@ def batch(
         Reuse nothing.
     junit : str, optional
         A file for JUnit XML, a test for each requirement.
+    summary : str, optional
+        A file for the outcome in Markdown.
+    compare : path-like, optional
+        The folder of an earlier batch; what has changed beyond the tolerance is a missed requirement. It may be `out`.
+    compare_tolerance : float, optional
+        Relative change of a metric that counts as none; default: 1e-6.
     page : bool
         Whether to write a ``report.html`` for each, and one for all that links them.
     form : FigureForm, optional
@@ -414,15 +461,33 @@ def batch(
     todo = [Job(k, *pair) for k, pair in enumerate(zip(files, folders(files), strict=True))]
     executor = executor_for(jobs, len(todo), timeout_per_point)
     report = None if junit is None else prepared(junit)
+    told = None if summary is None else prepared(summary, "--summary")
+    tolerance = TOLERANCE if compare_tolerance is None else compare_tolerance
+    if not 0 <= tolerance < 1:
+        raise UsageError(f"--compare-tolerance: {tolerance:g} is not allowed: must be >= 0 and < 1")
+    before = None if compare is None else earlier(os.fspath(compare))
     watched = monitor or Unwatched()
     with RunFolder(place) as folder, noting(folder, fresh) as journal:
         folder.check("results.csv", "requirements.csv", "metrics.json")
         entries = carry_out(work, todo, Crew(executor, fail_fast, watched, KeptRuns(place, work.deciding, journal)))
+        compared = None
+        if before is not None:
+            compared = _compared(before, os.fspath(compare or ""), entries, place, tolerance)
         code = exit_code(entries, watched.stopped)
-        written = _write(folder, entries, _about(work, named, code), page)
+        if compared is not None and compared.beyond and not watched.stopped:
+            code = worst([code, ExitCode.REQUIREMENT_MISSED])
+        written = _write(folder, entries, _about(work, named, code), page, compared)
     if report is not None:
         report(junit_of(entries))
-    return BatchResult(entries, code, place, written)
+    if told is not None:
+        from cfmkit.runs.batch_summary import summary as in_markdown
+
+        told(in_markdown(entries, compared))
+    return BatchResult(entries, code, place, written, compared)
+
+
+def _compared(before: Known, folder: str, entries: Sequence[Entry], place: str, tolerance: float) -> Comparison:
+    return Comparison(folder, tolerance, changes_of(before, entries, place, tolerance), gone(before, entries))
 
 
 def _named(specs: Any) -> list[str]:
@@ -460,14 +525,18 @@ def _about(work: BatchWork, named: Sequence[str], code: ExitCode) -> dict[str, A
     }
 
 
-def _write(folder: RunFolder, entries: Sequence[Entry], about: dict[str, Any], page: bool) -> tuple[str, ...]:
+def _write(
+    folder: RunFolder, entries: Sequence[Entry], about: dict[str, Any], page: bool, compared: Comparison | None = None
+) -> tuple[str, ...]:
     from cfmkit.studies.batch import message, requirements_table, results_table
     from cfmkit.tables import to_csv
     from cfmkit.tables.jsontext import json_bytes
 
     folder.write("results.csv", to_csv(results_table(entries)))
     folder.write("requirements.csv", to_csv(requirements_table(entries)))
-    folder.write("metrics.json", json_bytes(_data(entries, ExitCode(about["exit_code"]))))
+    folder.write("metrics.json", json_bytes(_data(entries, ExitCode(about["exit_code"]), compared)))
+    if compared is not None:
+        folder.write("changes.csv", to_csv(changes_table(compared.changes)))
     if page:
         from cfmkit.runs import batch_page
 
@@ -476,7 +545,7 @@ def _write(folder: RunFolder, entries: Sequence[Entry], about: dict[str, Any], p
     return (*folder.commit(about).files, "manifest.json")
 
 
-def _data(entries: Sequence[Entry], code: ExitCode) -> dict[str, Any]:
+def _data(entries: Sequence[Entry], code: ExitCode, compared: Comparison | None = None) -> dict[str, Any]:
     from cfmkit.studies.batch import message
 
     required = [{"spec": one.spec, **requirement} for one in entries for requirement in one.requirements]
@@ -487,4 +556,5 @@ def _data(entries: Sequence[Entry], code: ExitCode) -> dict[str, Any]:
         "requirements": required,
         "warnings": [{"spec": one.spec, **item} for one in entries for item in one.warnings],
         "specs": [one.as_json() for one in entries],
+        **({"compared": compared.as_json()} if compared is not None else {}),
     }

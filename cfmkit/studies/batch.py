@@ -21,7 +21,7 @@ OUTPUTS = "cfm-out"
 """Folders of this name hold results: a search for specifications does not look into them."""
 
 ENDINGS = (".yaml", ".yml")
-TAKEN = ("results.csv", "requirements.csv", "metrics.json", "manifest.json", "report.html")
+TAKEN = ("results.csv", "requirements.csv", "metrics.json", "manifest.json", "report.html", "changes.csv")
 """Names in the output folder that no specification's folder may have."""
 
 SKIPPED, LEFT = "skipped", "not run: an earlier specification failed"

@@ -120,7 +120,7 @@ def clean(text: str) -> str:
     return NOT_XML.sub("\N{REPLACEMENT CHARACTER}", text)
 
 
-def prepared(path: str) -> Callable[[bytes], None]:
+def prepared(path: str, option: str = "--junit") -> Callable[[bytes], None]:
     """Return what writes a file; its folder is made now, and a folder in its place is reported now.
 
     Raises
@@ -132,7 +132,7 @@ def prepared(path: str) -> Callable[[bytes], None]:
     from cfmkit.store.disk import reporting
 
     if not path.strip():
-        raise UsageError("--junit is empty; name a file")
+        raise UsageError(f"{option} is empty; name a file")
     with reporting(path):
         os.makedirs(os.path.dirname(os.path.abspath(path)), exist_ok=True)
     if os.path.isdir(path):

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
     from cfmkit.cli.page_blocks import Block
     from cfmkit.cli.terminal import Terminal
-    from cfmkit.runs.batch import BatchResult
+    from cfmkit.runs.batch import BatchResult, Comparison
     from cfmkit.studies.batch import Entry
 
 PLACE = 26
@@ -54,6 +54,25 @@ class BatchOptions(Changing, Drawing):
     ] = None
     junit: Annotated[
         str | None, option("--junit", metavar="FILE", text="Write JUnit XML: a test for each requirement.")
+    ] = None
+    summary: Annotated[
+        str | None, option("--summary", metavar="FILE", text="Write the outcome in Markdown, e.g. for a job's summary.")
+    ] = None
+    annotations: Annotated[
+        Literal["github"] | None,
+        option("--annotations", text="Report what is wrong beside the lines of the files, as GitHub reads it."),
+    ] = None
+    compare: Annotated[
+        str | None,
+        option(
+            "--compare",
+            metavar="OLDDIR",
+            text="Compare the metrics with those of an earlier batch; return 5 if one has changed.",
+        ),
+    ] = None
+    compare_tolerance: Annotated[
+        str | None,
+        option("--compare-tolerance", metavar="SHARE", text="Relative change that counts as none; default: 0.0001 %."),
     ] = None
     fail_fast: Annotated[bool, flag("--fail-fast", text="Start no more specs once one has failed.")] = False
     jobs: Jobs = None
@@ -91,6 +110,9 @@ def run(options: BatchOptions, terminal: Terminal) -> Answer:
             fail_fast=options.fail_fast,
             fresh=options.fresh,
             junit=options.junit,
+            summary=options.summary,
+            compare=options.compare,
+            compare_tolerance=_tolerance(options),
             page=options.report,
             form=options.form,
             arguments=terminal.arguments,
@@ -100,12 +122,36 @@ def run(options: BatchOptions, terminal: Terminal) -> Answer:
     written = Written(found.folder, found.files, studies.now() - start)
     return Answer(
         dict(found.summary) | written.data | {"junit": options.junit, "reused": _reused(found.entries)},
-        _page(found.entries, written, options.junit, terminal.verbose > 0),
+        _page(found, written, tuple(filter(None, (options.junit, options.summary))), terminal.verbose > 0),
         found.exit_code,
-        (*_complaints(found, options, terminal), *unreached(found.entries, options.changes)),
+        (
+            *_complaints(found, options, terminal),
+            *unreached(found.entries, options.changes),
+            *(_annotations(found) if options.annotations else ()),
+        ),
         () if found.exit_code is ExitCode.OK else (message(found.entries),),
         tuple({"message": line} for one in found.entries for line in one.errors),
     )
+
+
+def _tolerance(options: BatchOptions) -> float | None:
+    from cfmkit.errors import QuantityError, UsageError
+    from cfmkit.specs.units import read_quantity
+
+    if options.compare_tolerance is None:
+        return None
+    if options.compare is None:
+        raise UsageError("--compare-tolerance is for a comparison: name an earlier batch with --compare")
+    try:
+        return read_quantity(options.compare_tolerance, "ratio")
+    except QuantityError as error:
+        raise UsageError(f"--compare-tolerance: {error}") from None
+
+
+def _annotations(found: BatchResult) -> Iterator[str]:
+    from cfmkit.cli.annotations import github
+
+    yield from github(found.entries, found.compared.changes if found.compared else ())
 
 
 def _complaints(found: BatchResult, options: BatchOptions, terminal: Terminal) -> Iterator[str]:
@@ -122,10 +168,15 @@ def _reused(entries: Sequence[Entry]) -> int:
     return sum(one.reused for one in entries)
 
 
-def _page(entries: Sequence[Entry], written: Written, junit: str | None, everything: bool) -> Iterator[Block]:
+MOST_CHANGES = 8
+"""Changed values that are shown without ``-v``, so that verdicts stay on the screen."""
+
+
+def _page(found: BatchResult, written: Written, more: Sequence[str], everything: bool) -> Iterator[Block]:
     """Yield one line per specification, and what is wrong below it."""
     from cfmkit.studies.batch import message
 
+    entries = found.entries
     count = _reused(entries)
     reused = f", {count} reused" if count else ""
     yield TextLine((Span(message(entries), LABEL),), f"{written.seconds:.2f} s{reused}")
@@ -138,9 +189,23 @@ def _page(entries: Sequence[Entry], written: Written, junit: str | None, everyth
             yield Paragraph("missed", f"{visible(one.spec)}: {told}", BAD)
         for item in one.warnings if everything else ():
             yield Paragraph("warning", f"{visible(one.spec)}: {item['name']}: {item['message']}", BAD)
+    if found.compared is not None:
+        yield from _changes(found.compared, everything)
     yield written.block(everything)
-    if junit:
-        yield Paragraph("written", junit, GOOD)
+    for file in more:
+        yield Paragraph("written", file, GOOD)
+
+
+def _changes(compared: Comparison, everything: bool) -> Iterator[Block]:
+    """Yield what has changed since an earlier batch, those values first that changed beyond the tolerance."""
+    beyond = compared.beyond
+    told = f"{len(compared.changes)} values differ from {visible(compared.folder)}, {len(beyond)} beyond the tolerance"
+    yield Paragraph("compared", told, BAD if beyond else GOOD)
+    shown = compared.changes if everything else beyond[:MOST_CHANGES]
+    for one in shown:
+        yield Paragraph("changed", f"{visible(one.spec)}: {one.sentence}", BAD if one.beyond else FAINT)
+    if len(beyond) > len(shown):
+        yield Paragraph("changed", f"{len(beyond) - len(shown)} more; -v shows all, changes.csv has them", FAINT)
 
 
 def _row(one: Entry) -> tuple[str | Span, ...]:

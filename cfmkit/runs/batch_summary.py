@@ -1,0 +1,94 @@
+"""A batch in Markdown, for the pages that continuous integration shows beside a change."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING
+
+from cfmkit.errors import ExitCode
+from cfmkit.studies.batch import message, outcome
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from cfmkit.runs.batch import Comparison
+    from cfmkit.studies.batch import Entry
+
+MOST_CHANGES = 50
+"""Changed values that are listed; all stand in changes.csv."""
+
+MARKUP = re.compile(r"([\\`*_{}\[\]<>()#+\-.!|~&@:$])")
+
+
+def summary(entries: Sequence[Entry], compared: Comparison | None = None) -> bytes:
+    """Return the summary: one row per specification, what is missed, and what has changed.
+
+    Parameters
+    ----------
+    entries : sequence of Entry
+        Every specification of the batch.
+    compared : Comparison, optional
+        With an earlier batch.
+    """
+    return ("\n".join(_lines(entries, compared)) + "\n").encode()
+
+
+def _lines(entries: Sequence[Entry], compared: Comparison | None) -> Iterator[str]:
+    yield f"## cfmkit: {plain(message(entries))}"
+    yield ""
+    yield "| specification | verb | verdict | requirements | warnings |"
+    yield "|---|---|---|---|---|"
+    for one in entries:
+        met = len(one.requirements) - len(one.missed)
+        required = f"{met} of {len(one.requirements)} met" if one.requirements else ""
+        yield f"| {plain(one.spec)} | {one.verb} | {_mark(one)} | {required} | {plain(one.warned or '')} |"
+    troubles = [line for one in entries for line in _troubles(one)]
+    if troubles:
+        yield from ("", "### What is wrong", "", *troubles)
+    if compared is not None:
+        yield from _compared(compared)
+
+
+def _mark(one: Entry) -> str:
+    word = outcome(one)
+    return word if word == "ok" or one.skipped else f"**{word}**"
+
+
+def _troubles(one: Entry) -> Iterator[str]:
+    if one.errors:
+        yield from (f"- {plain(line)}" for line in one.errors)
+    elif one.code is ExitCode.REQUIREMENT_MISSED:
+        for requirement in one.missed:
+            yield f"- {plain(one.spec)}: {plain(requirement['sentence'])}"
+    elif one.code:
+        yield f"- {plain(one.spec)}: {plain(one.message)}"
+
+
+def _compared(compared: Comparison) -> Iterator[str]:
+    count = len(compared.beyond)
+    yield from ("", f"### Compared with {plain(compared.folder)}", "")
+    if not compared.changes:
+        yield "No metric has changed."
+    else:
+        told = f"{count} value{'s' * (count != 1)} changed by more than {100 * compared.tolerance:.4g} %"
+        less = len(compared.changes) - count
+        yield plain(f"{told}, {less} by less." if less else f"{told}.")
+        shown = (*compared.beyond, *(one for one in compared.changes if not one.beyond))[:MOST_CHANGES]
+        yield from ("", "| specification | change |", "|---|---|")
+        for one in shown:
+            yield f"| {plain(one.spec)} | {'**' * one.beyond}{plain(one.sentence)}{'**' * one.beyond} |"
+        if len(compared.changes) > len(shown):
+            yield from ("", f"{len(compared.changes) - len(shown)} more stand in changes.csv.")
+    if compared.gone:
+        yield from ("", f"No longer there: {plain(', '.join(compared.gone))}")
+
+
+def plain(text: str) -> str:
+    """Return text that Markdown and HTML show as it is, on one line.
+
+    Examples
+    --------
+    >>> plain("a_b | <i>")
+    'a\\\\_b \\\\| \\\\<i\\\\>'
+    """
+    return MARKUP.sub(r"\\\1", " ".join(text.split()))

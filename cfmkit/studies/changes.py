@@ -1,0 +1,169 @@
+"""What has changed in the metrics of many specifications since an earlier batch."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from cfmkit.errors import UsageError, visible
+from cfmkit.tables import Table, TableColumn
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping, Sequence
+
+    from cfmkit.studies.batch import Entry
+
+    Known = Mapping[str, "Earlier"]
+
+TOLERANCE = 1e-6
+"""Relative change that is none: other versions of the libraries round in the last digits, and searches stop there."""
+
+NOTHING = 1e-9
+"""Values in border units between which there is no difference: what should be zero is rounding, and rounding varies."""
+
+
+@dataclass(frozen=True)
+class Earlier:
+    """What an earlier batch found for one specification: how it ended, and its metrics as metrics.json has them."""
+
+    status: str
+    exit_code: int
+    metrics: Mapping[str, Mapping[str, Any]]
+
+
+@dataclass(frozen=True)
+class Change:
+    """One value that is not what it was.
+
+    Attributes
+    ----------
+    spec, name : str
+        The specification, and the metric; ``status`` for how it ended.
+    before, after : float, str or None
+        In border units; None where there was no value.
+    unit : str
+        Of both.
+    relative : float or None
+        The difference over the larger of both; None where they are no numbers.
+    beyond : bool
+        Whether it is more than the tolerance.
+    """
+
+    spec: str
+    name: str
+    before: float | str | None
+    after: float | str | None
+    unit: str
+    relative: float | None
+    beyond: bool
+
+    @property
+    def sentence(self) -> str:
+        """The change in words."""
+        share = "" if self.relative is None else f" ({100 * self.relative:+.3g} %)"
+        unit = f" {self.unit}" if self.unit not in ("", "1") else ""
+        return f"{self.name}: {_told(self.before)} -> {_told(self.after)}{unit}{share}"
+
+
+def _told(value: float | str | None) -> str:
+    return "no value" if value is None else value if isinstance(value, str) else f"{value:.8g}"
+
+
+def earlier(folder: str) -> Known:
+    """Return what a batch found, by folder of the specification; one that wrote nothing has no metrics.
+
+    Raises
+    ------
+    cfmkit.errors.UsageError
+        If the folder is none of a batch.
+    """
+    whole = _read(os.path.join(folder, "metrics.json"))
+    if whole is None or not isinstance(listed := whole.get("specs"), list):
+        raise UsageError(f"--compare: {visible(folder)} is not the folder of a batch: it has no metrics.json of one")
+    known = {}
+    for one in listed:
+        if isinstance(one, dict) and isinstance(name := one.get("folder"), str):
+            own = _read(os.path.join(folder, name, "metrics.json")) or {}
+            metrics = own.get("metrics", {})
+            known[name] = Earlier(str(one.get("status", "")), int(one.get("exit_code", 0)), metrics)
+    return known
+
+
+def _read(path: str) -> dict[str, Any] | None:
+    try:
+        with open(path, encoding="utf-8") as file:
+            found = json.load(file)
+    except (OSError, ValueError):
+        return None
+    return found if isinstance(found, dict) else None
+
+
+def changes(known: Known, entries: Sequence[Entry], folder: str, tolerance: float = TOLERANCE) -> tuple[Change, ...]:
+    """Return what is not as it was, in the order of the specifications and their metrics.
+
+    Parameters
+    ----------
+    known : mapping of str to Earlier
+        What `earlier` returns.
+    entries : sequence of Entry
+        What was found now; those that the earlier batch did not have are new, and no change.
+    folder : str
+        Where they have their folders.
+    tolerance : float
+        Relative change of a metric up to which it counts as the same.
+    """
+    found: list[Change] = []
+    for entry in entries:
+        before = known.get(entry.folder)
+        if before is None or entry.skipped:
+            continue
+        if (before.status, before.exit_code) != (entry.status, int(entry.code)):
+            found.append(Change(entry.spec, "status", before.status, entry.status, "", None, True))
+        if entry.written:
+            now = (_read(os.path.join(folder, entry.folder, "metrics.json")) or {}).get("metrics", {})
+            found += _of_metrics(entry.spec, before.metrics, now, tolerance)
+    return tuple(found)
+
+
+def _of_metrics(spec: str, before: Mapping[str, Any], after: Mapping[str, Any], tolerance: float) -> Iterator[Change]:
+    for name in dict.fromkeys((*before, *after)):
+        old, new = (side.get(name, {}).get("value") for side in (before, after))
+        unit = str((after.get(name) or before.get(name) or {}).get("unit", ""))
+        if old == new:
+            continue
+        numbers = all(isinstance(value, int | float) and math.isfinite(value) for value in (old, new))
+        if not numbers:
+            yield Change(spec, name, old, new, unit, None, True)
+            continue
+        if abs(new - old) > NOTHING:
+            relative = (new - old) / max(abs(old), abs(new))
+            yield Change(spec, name, old, new, unit, relative, abs(relative) > tolerance)
+
+
+def gone(known: Known, entries: Sequence[Entry]) -> tuple[str, ...]:
+    """Return the folders of specifications that the earlier batch had and this one has not."""
+    there = {entry.folder for entry in entries}
+    return tuple(name for name in known if name not in there)
+
+
+def changes_table(found: Sequence[Change]) -> Table:
+    """Return changes.csv: one row per value that is not as it was."""
+    return Table(
+        (
+            TableColumn("spec", tuple(one.spec for one in found)),
+            TableColumn("metric", tuple(one.name for one in found)),
+            TableColumn("before", tuple(_cell(one.before) for one in found)),
+            TableColumn("after", tuple(_cell(one.after) for one in found)),
+            TableColumn("unit", tuple(one.unit for one in found)),
+            TableColumn("relative_change", tuple(one.relative for one in found)),
+            TableColumn("beyond_tolerance", tuple(one.beyond for one in found)),
+        )
+    )
+
+
+def _cell(value: float | str | None) -> str:
+    """Return a value as text: words and numbers stand in one column."""
+    return "" if value is None else value if isinstance(value, str) else repr(float(value))

@@ -1,0 +1,147 @@
+"""What a batch leaves for continuous integration: a summary, annotations, and a comparison with an earlier batch."""
+
+import csv
+import json
+import os
+import re
+import subprocess
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+import yaml
+
+import cfmkit
+from cfmkit.cli.annotations import github
+from cfmkit.cli.main import main
+from cfmkit.errors import ExitCode, UsageError
+from cfmkit.runs.batch_summary import summary
+from cfmkit.studies.batch import Entry
+from cfmkit.studies.changes import Earlier, changes
+
+ROOT = Path(__file__).parents[2]
+SPEC = (ROOT / "configs" / "vcfm_ding2022.yaml").read_text()
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    (tmp_path / "a.yaml").write_text(SPEC)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def batch(**more):
+    return cfmkit.batch("a.yaml", "out", verb="analyze", plots=False, **more)
+
+
+def test_a_batch_compared_with_itself_has_no_changes_and_one_that_changed_returns_5(folder):
+    assert batch().exit_code is ExitCode.OK
+    same = batch(compare="out")
+    assert (same.exit_code, same.compared.changes) == (ExitCode.OK, ())
+    assert (folder / "out" / "changes.csv").read_text().startswith("spec,metric,before,after")
+    (folder / "a.yaml").write_text(SPEC + "\n")
+    thicker = [f"mechanism.positive.width={width} mm" for width in (10.01, 10.02)]
+    moved = batch(compare="out", changes=thicker[:1], summary="reports/summary.md")
+    assert moved.exit_code is ExitCode.REQUIREMENT_MISSED
+    rows = list(csv.DictReader((folder / "out" / "changes.csv").read_text().splitlines()))
+    assert "force_mean" in {row["metric"] for row in rows}
+    assert all(row["beyond_tolerance"] == "true" for row in rows if abs(float(row["relative_change"])) > 1e-6)
+    told = json.loads((folder / "out" / "metrics.json").read_text())
+    assert told["status"] == "requirement_missed"
+    assert len(told["compared"]["changes"]) == len(rows)
+    assert "### Compared with out" in (folder / "reports" / "summary.md").read_text()
+    wide = batch(compare="out", compare_tolerance=0.2, changes=thicker[1:])
+    assert wide.exit_code is ExitCode.OK
+    assert wide.compared.changes
+
+
+def one(**more):
+    return replace(Entry("a.yaml", "a", "analyze", "vcfm", "a", "complete", written=True), **more)
+
+
+def compared(tmp_path, before, after, entry=None, **more):
+    (tmp_path / "a").mkdir(exist_ok=True)
+    (tmp_path / "a" / "metrics.json").write_text(json.dumps({"metrics": after}))
+    known = {"a": Earlier("complete", 0, before)}
+    return [(change.name, change.beyond) for change in changes(known, [entry or one()], str(tmp_path), **more)]
+
+
+def value(number, unit="N"):
+    return {"value": number, "unit": unit}
+
+
+def test_only_what_differs_by_more_than_rounding_is_a_change(tmp_path):
+    before = {"f": value(10.0), "zero": value(1e-14), "gone": value(1.0), "kind": value("stable"), "none": value(None)}
+    after = {"f": value(10.0 * (1 + 1e-8)), "zero": value(-3e-13), "gone": value(None), "kind": value("bistable")}
+    after |= {"none": value(None), "new": value(3.0)}
+    found = compared(tmp_path, before, after)
+    assert found == [("f", False), ("gone", True), ("kind", True), ("new", True)]
+    assert compared(tmp_path, {"f": value(10.0)}, {"f": value(10.2)}, tolerance=0.05) == [("f", False)]
+    assert compared(tmp_path, {"f": value(10.0)}, {"f": value(10.2)}, tolerance=0.01) == [("f", True)]
+
+
+def test_a_run_that_ends_otherwise_is_a_change_whatever_its_metrics(tmp_path):
+    failed = one(status="no_equilibrium", code=ExitCode.NO_SOLUTION)
+    assert compared(tmp_path, {}, {}, failed) == [("status", True)]
+
+
+def test_a_folder_that_is_none_of_a_batch_is_refused(folder):
+    with pytest.raises(UsageError, match="is not the folder of a batch"):
+        batch(compare=".")
+    with pytest.raises(UsageError, match="must be >= 0"):
+        batch(compare=".", compare_tolerance=-1.0)
+
+
+HOSTILE = "a|b<script>%0A::error::,:\n*x*.yaml"
+
+
+def test_annotations_name_file_and_line_and_let_no_name_through(folder):
+    broken = SPEC.replace("family: vcfm", "family: vcfm\nmechansim: 3")
+    (folder / "a.yaml").write_text(broken)
+    found = cfmkit.batch("a.yaml", "out", plots=False)
+    lines = list(github(found.entries))
+    number = broken.splitlines().index("mechansim: 3") + 1
+    assert any(re.fullmatch(rf"::error file=a\.yaml,line={number},col=\d+::.*mechansim.*", line) for line in lines)
+    hostile = one(spec=HOSTILE, warnings=({"name": "x,y", "message": "50 %\r\n::stop"},))
+    (line,) = github([hostile])
+    assert "\n" not in line
+    assert line.count("::") == 3
+    assert line.startswith("::warning file=a|b<script>%250A%3A%3Aerror%3A%3A%2C%3A%0A*x*.yaml,title=x%2Cy::50 %25%0D")
+
+
+def test_a_missed_requirement_is_annotated_at_its_line(folder, capsys):
+    strict = re.sub(r"metric: force_ripple, max: [^,}]+", "metric: force_ripple, max: 0.001 %", SPEC)
+    line = next(number for number, row in enumerate(strict.splitlines(), 1) if "max: 0.001 %" in row)
+    (folder / "a.yaml").write_text(strict)
+    assert main(["batch", "a.yaml", "-o", "out", "--no-plots", "-j", "1", "-q", "--annotations", "github"]) == 5
+    err = capsys.readouterr().err
+    assert re.search(rf"^::error file=a\.yaml,line={line},col=\d+,title=requirement missed::", err, re.MULTILINE)
+
+
+def test_the_summary_is_a_table_in_which_no_name_becomes_markup():
+    text = summary([one(), one(spec=HOSTILE, code=ExitCode.INVALID, status="invalid", errors=("x: <b>",))]).decode()
+    assert "| a\\.yaml | analyze | ok |" in text
+    assert "<script>" not in text
+    assert "<b>" not in text
+    assert "**invalid**" in text
+    rows = [line for line in text.splitlines() if line.startswith("|")]
+    assert len(rows) == 4
+
+
+def test_the_tolerance_needs_a_comparison(folder, capsys):
+    assert main(["batch", "a.yaml", "--compare-tolerance", "1 %"]) == 2
+    assert main(["batch", "a.yaml", "--compare", "out", "--compare-tolerance", "1 mm"]) == 2
+    assert "--compare-tolerance" in capsys.readouterr().err
+
+
+def test_the_action_and_the_hook_call_commands_that_exist():
+    """What a runner would do with the action is done here with the shell of its last step."""
+    action = yaml.safe_load((ROOT / "action.yml").read_text())
+    step = action["runs"]["steps"][-1]
+    words = step["run"].replace("\\\n", " ")
+    for option in re.findall(r"--[a-z-]+", words):
+        assert f'"{option}"' in (ROOT / "cfmkit/cli/verbs/batch.py").read_text() or option == "--out"
+    (hook,) = yaml.safe_load((ROOT / ".pre-commit-hooks.yaml").read_text())
+    assert hook["entry"] == "cfmkit check"
+    checked = subprocess.run(["bash", "-n", "-c", step["run"]], env=os.environ, check=False)
+    assert checked.returncode == 0
