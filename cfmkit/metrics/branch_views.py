@@ -202,7 +202,8 @@ class Branch:
             )
             motion, chosen = np.unique(motion, return_index=True)
             motion, effort = motion[np.isfinite(effort[chosen])], effort[chosen][np.isfinite(effort[chosen])]
-        top, bottom = closed.extremes(partial(model.effort, self.name), motion[None, :], effort[None, :])
+        uneven = bool(between.any()) and len(peaks) < closed.FEW
+        top, bottom = closed.extremes(partial(model.effort, self.name), motion[None, :], effort[None, :], uneven)
         return float(top[0]), float(bottom[0])
 
     @cached_property

@@ -51,7 +51,7 @@ def mean(function: Callable[[FloatArray], FloatArray], places: FloatArray, low: 
 
 
 def extremes(
-    function: Callable[[FloatArray], FloatArray], motion: FloatArray, effort: FloatArray
+    function: Callable[[FloatArray], FloatArray], motion: FloatArray, effort: FloatArray, uneven: bool = False
 ) -> tuple[FloatArray, FloatArray]:
     """Return the largest and the smallest value of each row next to its samples, (d,) each.
 
@@ -61,6 +61,8 @@ def extremes(
         Values at any places of each row, (d, m) -> (d, m); where it is not a number, it does not count.
     motion, effort : (d, n) array
         Samples, monotonic in the motion; their values.
+    uneven : bool
+        Whether samples stand closer in some places than in others: then their number does not tell how close.
 
     Examples
     --------
@@ -78,7 +80,7 @@ def extremes(
     rows = np.arange(len(effort))[:, None, None]
     x, y = np.broadcast_to(motion, effort.shape)[rows, near], sign[:, None] * effort[rows, near]
     best = np.stack([effort.max(axis=1), -effort.min(axis=1)], axis=1)
-    rounds, beside = (ROUNDS, BESIDE) if last < FEW else (1, np.zeros(1))
+    rounds, beside = (ROUNDS, BESIDE) if uneven or last < FEW else (1, np.zeros(1))
     for _ in range(rounds):
         places = _next(x, y, beside)
         found = sign[:, None] * function(places.reshape(len(places), -1)).reshape(places.shape)

@@ -7,11 +7,13 @@ convention gives the same ripple). Each function takes a `Branch` (or the
 
 from __future__ import annotations
 
+from functools import partial
 from math import sqrt
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.metrics.closed import extremes
 from cfmkit.metrics.many import UNIFORM_POINTS
 from cfmkit.metrics.traces import BranchTrace, Undefined, Window
 
@@ -121,9 +123,13 @@ def _area(branch: Branch, window: Window) -> float:
 
 
 def stress_max(branch: Branch) -> float:
-    """Return the largest stress in the window, in whatever load case it is."""
+    """Return the largest stress in the window, in whatever load case it is; of a model, next to the points, too."""
     beside = [float(one.stress.max()) for one in branch.inside_beside if one.stress is not None]
-    return max([float(_stress(branch.inside).max()), *beside])
+    own, model = _stress(branch.inside), branch.frame.closed
+    if model is None:
+        return max([float(own.max()), *beside])
+    top, _ = extremes(partial(model.stress, branch.name), branch.inside.motion[None, :], own[None, :])
+    return max([float(top[0]), *beside])
 
 
 def safety_factor(branch: Branch) -> float:

@@ -14,7 +14,11 @@ EPS = float(np.finfo(float).eps)
 
 
 def invert_increasing(
-    evaluate: Evaluate, targets: FloatArray, bracket: tuple[float, float], guess: FloatArray, iterations: int = 80
+    evaluate: Evaluate,
+    targets: FloatArray,
+    bracket: tuple[float | FloatArray, float | FloatArray],
+    guess: FloatArray,
+    iterations: int = 80,
 ) -> FloatArray:
     """Return x in the bracket with value(x) = target for an increasing function, element by element.
 
@@ -27,7 +31,7 @@ def invert_increasing(
         ``evaluate(x) -> (value, derivative)`` for an array x; value increasing.
     targets : (n,) array
         Values wanted; those outside the function's range end at the nearer bracket end, NaN stays NaN.
-    bracket : (float, float)
+    bracket : (float, float) or pair of (n,) array
         Where to look.
     guess : (n,) array
         First estimates; clipped to the bracket.
@@ -49,7 +53,7 @@ def invert_increasing(
     low, high = np.full(targets.shape, bracket[0]), np.full(targets.shape, bracket[1])
     x = np.minimum(np.maximum(guess, bracket[0]), bracket[1])
     fine = 16.0 * EPS * np.maximum(np.abs(targets), np.abs(targets).max(initial=0.0))
-    tolerance = 16.0 * EPS * max(abs(bracket[0]), abs(bracket[1]))
+    tolerance = 16.0 * EPS * np.maximum(np.abs(bracket[0]), np.abs(bracket[1]))
     before = np.zeros(targets.shape)
     for _ in range(iterations):
         value, slope = evaluate(x)

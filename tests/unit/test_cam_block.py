@@ -8,6 +8,7 @@ from cfmkit.families.base import Block, Measure
 from cfmkit.families.cam.block import VARIED, analyze_block
 from cfmkit.families.cam.block_measures import CYCLES, KNOWN, WINDOWED
 from cfmkit.results import Status
+from cfmkit.studies import blocks
 from cfmkit.studies.blocks import evaluate_block, vectorised
 from cfmkit.studies.engine import Work, run
 from cfmkit.studies.executors import Lost
@@ -255,9 +256,76 @@ def test_one_cut_cam_with_other_parts_is_done_in_blocks_with_the_numbers_of_each
         alone, block = many.study.evaluate(many.plan.point(k)), together.row(k)
         assert block.status(0) == (alone.status, alone.message)
         expected = [np.nan if value is None else value for value in alone.values]
-        np.testing.assert_allclose(block.values[0], expected, rtol=1e-12, atol=1e-13, err_msg=str(k))
+        # At a dead point the place of a roller is known to half the digits of the slider's only.
+        close = 1e-12 if spec.mechanism.profile.force_constant < 0.01 else 1e-7
+        np.testing.assert_allclose(block.values[0], expected, rtol=close, atol=1e-13, err_msg=str(k))
         assert tuple(block.met[0].tolist()) == alone.met
         if answer.done[k]:
             found = cfmkit.analyze(spec.replace(dict(zip(many.plan.paths, many.plan.point(k), strict=True)))).warnings
             warned = [name for name, where in answer.warnings.items() if where[k]]
             assert warned == list(dict.fromkeys(item.name for item in found))
+
+
+BARE = {"mechanism.roller_radius": "8 mm", "mechanism.profile.roller_radius": "8 mm"}
+SMALL = AROUND | {"mechanism.roller_radius": "7.5 mm:8.5 mm"}
+WINDOW = {"analysis.window": ("5 mm", "235 mm")}
+HEAVY = {
+    "mechanism.masses": {"slider": "0.068 kg", "brace": "0.077 kg", "roller": "0.38 kg"},
+    "analysis.gravity": True,
+}
+PRESSED = {"mechanism.contact": {"width": "8 mm"}}
+
+
+@pytest.mark.parametrize(
+    ("changes", "ranges"),
+    [
+        ({}, AROUND),
+        (WINDOW | PRESSED, AROUND | {"mechanism.contact.width": "6 mm:10 mm"}),
+        (HEAVY | PRESSED, AROUND | {"mechanism.masses.roller": "0.2 kg:0.5 kg"}),
+        ({"analysis.travel": None, "analysis.window": ("2 mm", "240 mm")}, AROUND),
+        (WINDOW | BARE, SMALL),
+        (WINDOW | BARE | HEAVY, SMALL),
+        (WINDOW | BARE, {"mechanism.rolling_friction": "0:0.01"}),
+        (WINDOW | BARE | {"mechanism.profile.friction": 0.002}, SMALL),
+        (WINDOW | HEAVY | {"mechanism.profile.slope_factor": 1.05}, AROUND),
+        (WINDOW | PRESSED | {"mechanism.profile.offset": "-0.1 mm"}, AROUND),
+        (WINDOW, AROUND | {"mechanism.brace_length": "190 mm:260 mm", "mechanism.rolling_friction": "0:0.1"}),
+    ],
+    ids=("plain", "contact", "weights", "stroke", "bare", "heavy", "jams", "friction", "carrying", "offset", "wide"),
+)
+def test_every_metric_of_one_cut_cam_with_other_parts_is_that_of_each(changes, ranges):
+    spec = cfmkit.load("configs/studies/cam_tolerance.yaml").replace(changes)
+    plan = sampled(axes(spec, wishes(ranges), drawn=True), Draw("sobol", 16))
+    metrics = metrics_of(spec, (), cfmkit.analyze(spec).curve)
+    many = Work(Study(spec, plan.paths, metrics), plan)
+    assert many.vectorised
+    answer = blocks._answer(many.study, plan, 0, 16)
+    assert answer.done.mean() > 0.8
+    together = run(many)
+    for k in np.flatnonzero(answer.done).tolist():
+        alone = many.study.evaluate(plan.point(k))
+        assert alone.status is Status.COMPLETE
+        found = cfmkit.analyze(spec.replace(dict(zip(plan.paths, plan.point(k), strict=True)))).warnings
+        names = list(dict.fromkeys(item.name for item in found))
+        assert [name for name, where in answer.warnings.items() if where[k]] == names
+        expected = np.array([np.nan if value is None else value for value in alone.values])
+        # Next to a dead point and a jam, half of the digits of the place are lost in the slider's.
+        near = (
+            {"contact_force_max", "friction_half_gap_max", "jam_travel"} if {"dead_point", "up_jam"} & {*names} else ()
+        )
+        close = np.where([item.name in near for item in metrics], 1e-6, 1e-11)
+        wrong = ~(np.abs(together.row(k).values[0] - expected) <= close * np.abs(expected) + 1e-15)
+        wrong &= ~(np.isnan(expected) & np.isnan(together.row(k).values[0]))
+        assert not wrong.any(), [
+            (metrics[m].name, together.row(k).values[0, m], expected[m]) for m in wrong.nonzero()[0]
+        ]
+
+
+def test_forces_on_the_corner_of_an_undercut_cam_do_not_depend_on_the_number_of_points():
+    found = []
+    for points in (13, 301, 3001):
+        result = cfmkit.analyze(SPEC.replace({"analysis.points": points, "analysis.window": None}))
+        metrics = cfmkit.metrics.evaluate(result, ["force_max[load]", "force_max[unload]", "corner_force_max"])
+        found.append([quantity.value for quantity in metrics.values()])
+    np.testing.assert_allclose(found, np.broadcast_to(found[-1], (3, 3)), rtol=1e-10)
+    assert found[0][0] == pytest.approx(found[0][2], rel=1e-12)

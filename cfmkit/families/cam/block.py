@@ -4,8 +4,9 @@ Such a cam carries its roller along s = (x - x0)^2 / 2A, so that the state at ev
 is explicit, and whole arrays of designs are one array operation. The formulas are those
 of `cam_profile` and `statics`, in the same order, for a cam with its own brace and
 roller, without weight. An undercut cam is one of these from the end of its corner on (`block_corner`).
-One cut cam with other braces, rollers and springs around it has a solver of its own (`block_built`).
-Everything else (a stroke that the brace does not reach, a jam) is left to the model of one cam.
+One cut cam of any profile with other braces, rollers, springs and weights around it has a solver of its
+own (`block_built`). Everything else (a stroke that the brace does not reach, a jam within it) is left to the
+model of one cam.
 """
 
 from __future__ import annotations
@@ -16,12 +17,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.families.base import BlockAnswer
-from cfmkit.families.cam.block_built import BuiltSlab
+from cfmkit.families.cam.block_built import Around, BuiltSlab
 from cfmkit.families.cam.block_corner import CornerSlab, shapes
 from cfmkit.families.cam.block_forces import Designs, Slab
-from cfmkit.families.cam.block_measures import BRANCHES, CYCLES, KNOWN, KNOWN_OF_BUILT, WINDOWED, measured
-from cfmkit.families.cam.build import assemble
+from cfmkit.families.cam.block_measures import BRANCHES, CYCLES, KNOWN, KNOWN_OF_BUILT, STRESSES, WINDOWED, measured
+from cfmkit.families.cam.build import assemble, weights
+from cfmkit.families.cam.geometry.many_tracks import ManyTracks
 from cfmkit.families.refusals import CannotBuild
+from cfmkit.specs.units import Share
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -63,12 +66,13 @@ def analyze_block(spec: CamSpec, block: Block) -> BlockAnswer | None:
     """
     names = {measure.name for measure in block.measures}
     settings = spec.analysis.points, "contact_force_max" in names, spec.analysis.band
+    if _one_cam(spec, block) and names <= (KNOWN_OF_BUILT if spec.mechanism.contact else KNOWN):
+        values = _values_around(spec, block)
+        built = _designs_around(spec, values)
+        return _answer(spec, block, built, _around(spec, (built, values), settings))
     if _applies(spec, block) and names <= KNOWN:
         designs = _designs(spec, block)
         return _answer(spec, block, designs, (*_plain(designs, settings), *_undercut(designs, settings)))
-    if _one_cam(spec, block) and names <= KNOWN_OF_BUILT:
-        built = _designs_around(spec, block)
-        return _answer(spec, block, built, _around(spec, built, settings))
     return None
 
 
@@ -173,58 +177,135 @@ def _designs(spec: CamSpec, block: Block) -> Designs:
     return Designs(**(full | {"target": target}))
 
 
-_AROUND = {path: name for path, name in VARIED.items() if name in ("brace", "x0", "radius", "friction", "stiffness")}
+_AROUND = {
+    path: name for path, name in VARIED.items() if name in ("brace", "x0", "radius", "friction", "stiffness", "count")
+} | {
+    "mechanism.masses.slider": "slider",
+    "mechanism.masses.brace": "brace_mass",
+    "mechanism.masses.roller": "roller",
+    "mechanism.contact.width": "width",
+}
 _SPRING = re.compile(r"mechanism\.springs\.stiffness\.(\d+)")
 
 
 def _one_cam(spec: CamSpec, block: Block) -> bool:
     """Return whether all variants are built around one cam that is cut, with parts of their own."""
-    mechanism, profile, travel = spec.mechanism, spec.mechanism.profile, spec.analysis.travel
-    fixed = None not in (profile.stroke, profile.brace_length, profile.rest_half_width, profile.roller_radius)
-    if travel is None or not fixed or not _symmetric_closed(spec):
+    mechanism, profile, analysis = spec.mechanism, spec.mechanism.profile, spec.analysis
+    fixed = (profile.brace_length, profile.rest_half_width, profile.roller_radius)
+    stroke = profile.stroke or analysis.travel or (spec.design.stroke if spec.design else None)
+    asked = [*(ends for _, ends in spec.windows()), *(one.window for one in block.measures if one.window)]
+    if any(isinstance(end, Share) or end < 0 for ends in asked for end in ends):
+        return False
+    if None in (*fixed, stroke) or mechanism.left or mechanism.errors or profile.file:
+        return False
+    if mechanism.pins or mechanism.bearings or mechanism.guide or (spec.gravity and mechanism.mounting):
+        return False
+    if profile.preload is None and mechanism.preload:  # the cam follows what its springs have at the start
+        return False
+    if spec.fidelity != "quasi-static" or analysis.manufacturing or analysis.path_method != "quadrature":
         return False
     listed = isinstance(mechanism.springs.stiffness, tuple)
-    known = all(_SPRING.fullmatch(path) if listed and "stiffness" in path else path in _AROUND for path in block.values)
-    windows = [measure.window for measure in block.measures if measure.window]
-    return known and all(low >= 0 and high <= travel for low, high in windows)
+    if analysis.origin != "path-start" or (listed and "mechanism.springs.count" in block.values):
+        return False
+    for path in block.values:
+        if not (_SPRING.fullmatch(path) if listed and "stiffness" in path else path in _AROUND):
+            return False
+        if path.startswith("mechanism.masses.") and mechanism.masses is None:
+            return False
+        if path == "mechanism.contact.width" and mechanism.contact is None:
+            return False
+    return True
 
 
-def _designs_around(spec: CamSpec, block: Block) -> Designs:
-    """Return the parts around a cam; `x0` is where their springs are at rest."""
-    mechanism, profile = spec.mechanism, spec.mechanism.profile
-    given = {_AROUND[path]: np.asarray(values, float) for path, values in block.values.items() if path in _AROUND}
-    springs = mechanism.springs.stiffness
-    each = springs if isinstance(springs, tuple) else (springs,)
-    total, number = np.zeros(block.size), 1 if isinstance(springs, tuple) else mechanism.springs.count or 1
-    for index, stated in enumerate(each):
-        one = block.values.get(f"mechanism.springs.stiffness.{index}", given.get("stiffness", stated))
-        total = total + np.where(np.asarray(one, float) > 0, one, np.nan)
+def _values_around(spec: CamSpec, block: Block) -> dict[str, FloatArray]:
+    """Return the parts around a cam, each of all variants: NaN where a value is none that a specification may have."""
+    mechanism, masses = spec.mechanism, spec.mechanism.masses
     values: dict[str, Any] = {
         "brace": mechanism.brace_length,
         "x0": mechanism.rest_half_width,
         "radius": mechanism.roller_radius,
         "friction": mechanism.rolling_friction,
+        "slider": masses.slider if masses else 0.0,
+        "brace_mass": masses.brace if masses else 0.0,
+        "roller": masses.roller if masses else 0.0,
+        "width": mechanism.contact.width if mechanism.contact else 1.0,
+        "count": 1 if isinstance(mechanism.springs.stiffness, tuple) else mechanism.springs.count or 1,
     }
+    given = {_AROUND[path]: np.asarray(found, float) for path, found in block.values.items() if path in _AROUND}
     full = {name: np.broadcast_to(np.float64(value), block.size) for name, value in values.items()} | given
-    full |= {"stiffness": total * number, "constant": np.full(block.size, profile.force_constant)}
-    force = 4.0 * full["stiffness"] * full["constant"]
-    target = force if spec.design is None else np.full(block.size, spec.design.force)
-    return Designs(**(full | {"stroke": np.full(block.size, profile.stroke), "target": target}))
+    springs = mechanism.springs.stiffness
+    total = np.zeros(block.size)
+    for index, stated in enumerate(springs if isinstance(springs, tuple) else (springs,)):
+        one = block.values.get(f"mechanism.springs.stiffness.{index}", given.get("stiffness", stated))
+        total = total + np.where(np.asarray(one, float) > 0, one, np.nan)
+    count = full.pop("count")
+    full["stiffness"] = total * np.where((count >= 1) & (count <= 1000) & (count == np.rint(count)), count, np.nan)
+    return full
 
 
-def _around(spec: CamSpec, designs: Designs, settings: Settings) -> Iterator[tuple[NDArray[np.intp], Slab]]:
+def _designs_around(spec: CamSpec, values: dict[str, FloatArray]) -> Designs:
+    """Return the parts around a cam; `x0` is where their springs are at rest."""
+    profile, size = spec.mechanism.profile, len(values["brace"])
+    names = ("brace", "x0", "radius", "friction", "stiffness")
+    values = values | {"x0": _at_rest(spec, values["x0"])}
+    constant = np.full(size, profile.force_constant)
+    if spec.design is not None:
+        target = np.full(size, spec.design.force)
+    else:
+        target = 4.0 * values["stiffness"] * constant + _weights(spec, values)[1]
+    own = {name: values[name] for name in names}
+    return Designs(**own, constant=constant, stroke=np.full(size, np.nan), target=target)
+
+
+def _at_rest(spec: CamSpec, half_width: FloatArray) -> FloatArray:
+    """Return half the distances of the roller axes at which springs are at rest; NaN where that cannot be [m]."""
+    springs = spec.mechanism.springs
+    if springs.rest_length is not None:
+        return np.where(springs.rest_length <= 2.0 * half_width, 0.5 * springs.rest_length, np.nan)
+    return half_width - 0.5 * (springs.preload or 0.0)
+
+
+def _weights(spec: CamSpec, values: dict[str, FloatArray]) -> tuple[FloatArray, FloatArray]:
+    """Return the weights that hang on one roller and on the slider [N]."""
+    if not spec.gravity:
+        return np.zeros_like(values["brace"]), np.zeros_like(values["brace"])
+    return weights(values["slider"], values["brace_mass"], values["roller"])
+
+
+def _around(
+    spec: CamSpec,
+    built: tuple[Designs, dict[str, FloatArray]],
+    settings: Settings,
+) -> Iterator[tuple[NDArray[np.intp], Slab]]:
     """Yield (places, mechanisms around the specification's cam), few at a time; none if there is no such cam."""
+    designs, values = built
     try:
         cam = assemble(spec)
     except CannotBuild:
         return
-    profile, reach = cam.profile, float(spec.analysis.travel or 0.0)
-    end = profile.end + np.abs(designs.radius - profile.roller_radius)
-    fits = (designs.radius > 0) & (designs.brace > 1.001 * end) & (designs.x0 > 0) & (designs.stiffness > 0)
-    fits &= (designs.friction >= 0) & (designs.friction < 1) & (cam.shortfall is None)
-    for chosen in _slabs(np.flatnonzero(fits), settings[0]):
-        slab = BuiltSlab(designs.take(chosen), *settings).with_cam(profile, reach)
-        yield chosen, slab
+    law, asked = cam.profile.path.law, spec.analysis.travel
+    windows = [(float(low), float(high)) for _, (low, high) in spec.windows()]
+    masses = np.minimum.reduce([values["slider"], values["brace_mass"], values["roller"]])
+    shortest = np.minimum(designs.brace, law.brace_length)
+    sound = (designs.radius > 0) & (designs.brace > 0) & (designs.x0 > 0) & (designs.stiffness > 0)
+    sound &= (designs.friction >= 0) & (designs.friction < 1) & (masses >= 0) & (values["width"] > 0)
+    sound &= (law.rest_half_width < shortest * (1 - 1e-6)) & (designs.radius < designs.brace)
+    if cam.shortfall is not None:
+        return
+    rows = np.flatnonzero(sound)
+    pairs = np.stack([designs.radius[rows], designs.brace[rows]], axis=1)
+    unique, which = np.unique(pairs, axis=0, return_inverse=True)
+    left = max(spec.mechanism.profile.offset, 0.0)
+    tracks = ManyTracks(cam.track.profile, unique[:, 0] + left, unique[:, 1])
+    parts = (*_weights(spec, values), values["radius"], values["width"])
+    around = Around(cam, tracks, which.reshape(-1), asked, *(each[rows] for each in parts))
+    # A cam without a corner, or one that some rollers pass over, has fewer places to look at.
+    corner = (tracks.corner_end > tracks.start)[around.which, 0]
+    usable = tracks.fits[around.which]
+    for alike in (usable & corner, usable & ~corner):
+        for chosen in _slabs(np.flatnonzero(alike), settings[0]):
+            slab = BuiltSlab(designs.take(rows[chosen]), *settings)
+            yield rows[chosen], slab.built(around.take(chosen), windows)
 
 
 def _slabs(chosen: NDArray[np.intp], points: int) -> list[NDArray[np.intp]]:
@@ -233,5 +314,5 @@ def _slabs(chosen: NDArray[np.intp], points: int) -> list[NDArray[np.intp]]:
 
 
 def _empty(name: str, size: int) -> dict[str, FloatArray]:
-    branches = BRANCHES if name in WINDOWED and name not in CYCLES else ("",)
+    branches = BRANCHES if name in (*WINDOWED, *STRESSES) and name not in CYCLES else ("",)
     return {branch: np.full(size, np.nan) for branch in branches}

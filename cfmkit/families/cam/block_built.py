@@ -1,174 +1,151 @@
-"""Many mechanisms at once around one cut cam: other braces, rollers and springs than those it is cut for.
+"""Many mechanisms at once around one cut cam: other braces, rollers, springs and weights than those it is cut for.
 
 The cam is put together once. Where a roller of another radius or a brace of another length runs on it is
-solved for all mechanisms and samples together; the formulas are those of `cam_track.Track` and `statics`, for a
-profile cut for no friction, with the whole travel reached and nothing that holds a roller. Every other
-mechanism is left to the model of one cam.
+solved for all mechanisms and samples together; the formulas are those of `geometry.track.Track`, `statics` and
+`contact`. A mechanism whose curve is not complete, or whose force changes sign, is left to the model of one cam.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from cfmkit.families.cam.block_forces import Forces, Slab, tangents
-from cfmkit.families.cam.geometry.path import ideal_position
-from cfmkit.families.cam.geometry.track import Pivot, pivot_angle
-from cfmkit.numerics.roots import invert_increasing
+from cfmkit.families.cam.block_forces import Forces, Pose, Slab
+from cfmkit.families.cam.block_windows import Sampled, Spread
+from cfmkit.families.cam.contact import YIELD_PRESSURE, allowable_stress, pressure_between
+from cfmkit.families.cam.geometry.many_tracks import sign_changes, tangents
+from cfmkit.families.cam.model import nodes
+from cfmkit.families.cam.statics import JAM_SHARES, at_dead_point
+from cfmkit.metrics.closed import extremes
+from cfmkit.metrics.traces import ROUNDING, TOLERANCE
+from cfmkit.results import WINDOW_OUTSIDE
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.cam.geometry.cut import CamProfile
+    from cfmkit.families.cam.geometry.many_tracks import ManyTracks, Poses
+    from cfmkit.families.cam.solution import Assembly
 
-_LOOKED_AT = 65
-"""Places on the corner and on the flank at which the slider must rise and friction must not hold the roller."""
+    Rows = NDArray[np.intp]
+
+FEW = 100
+"""Samples below which `Solution.jams` looks at all of them."""
 
 
-@dataclass(frozen=True)
-class Cut:
-    """One cam with many rollers and braces, (d,) each [m].
+@dataclass(frozen=True, eq=False)
+class Around:
+    """What is built around one cam: (d,) arrays.
 
     Attributes
     ----------
-    profile : CamProfile
-        The cam.
-    radius, brace : (d,) array
-        Of the parts that are built in.
+    cam : Assembly
+        The cam, with the parts of the specification.
+    tracks : ManyTracks
+        Of the different pairs of roller and brace, (t,).
+    which : (d,) array of int
+        Which of them each mechanism has.
+    asked : float or None
+        Requested travel [m]; None: as far as the flank goes.
+    roller_weight, slider_weight : (d,) array
+        Weight that hangs on one roller, and on the slider [N].
+    roller_radius, width : (d,) array
+        Of the rollers without the material left on the flank, and of the line contact [m].
     """
 
-    profile: CamProfile
-    radius: FloatArray
-    brace: FloatArray
+    cam: Assembly
+    tracks: ManyTracks
+    which: Rows
+    asked: float | None
+    roller_weight: FloatArray
+    slider_weight: FloatArray
+    roller_radius: FloatArray
+    width: FloatArray
 
-    def on_flank(self, u: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        """Return slider position, its derivative by u, x and slope at path coordinates u, (d, n) each [m]."""
-        law, brace = self.profile.path.law, self.brace[:, None]
-        shift = (self.radius - self.profile.roller_radius)[:, None]
-        slope = law.slope(u)
-        length = (1.0 + slope * slope) ** 0.5
-        x, y = u + shift * slope / length, self.profile.path.height(u) - shift / length
-        rate = (slope - tangents(x, brace)) * (1.0 + shift / law.curvature_radius(u))
-        return y + ((brace - x) * (brace + x)) ** 0.5, rate, x, slope
-
-    @cached_property
-    def pivot(self) -> Pivot:
-        """How the rollers pivot on the corner; of a cam without one, a corner that is left at once."""
-        corner, law = self.profile.corner, self.profile.path.law
-        xc, yc = corner.point if corner else self.profile.flank(self.profile.start)
-        high = np.arctan(law.slope(self.profile.start))
-        low = np.arctan2(law.rest_half_width - xc, yc) if corner else high
-        return Pivot(float(xc), float(yc), self.radius[:, None], self.brace[:, None], float(low), float(high))
-
-    def on_corner(self, turn: FloatArray | float) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return slider position, x and slope where the contact normal is turned by an angle, (d, n) each [m]."""
-        pivot = self.pivot
-        x = pivot.x + pivot.radius * np.sin(turn)
-        y = pivot.y - pivot.radius * np.cos(turn)
-        return y + ((pivot.brace - x) * (pivot.brace + x)) ** 0.5, x, np.tan(turn) + 0.0 * x
-
-    @cached_property
-    def start(self) -> FloatArray:
-        """Position of the slider at the start, (d, 1) [m]."""
-        return self.on_corner(self.pivot.low)[0]
-
-    @cached_property
-    def corner_end(self) -> FloatArray:
-        """Position at which the roller leaves the corner, (d, 1) [m]."""
-        return self.on_flank(np.full((len(self.radius), 1), self.profile.start))[0]
-
-    @cached_property
-    def end(self) -> FloatArray:
-        """Position at the end of the flank, (d, 1) [m]."""
-        return self.on_flank(np.full((len(self.radius), 1), self.profile.end))[0]
-
-    def possible(self, friction: FloatArray) -> NDArray[np.bool_]:
-        """Return for which mechanisms the slider rises all along, and friction holds no roller, (d,)."""
-        share = np.linspace(0.0, 1.0, _LOOKED_AT)
-        count, mu = len(self.radius), friction[:, None]
-        u = self.profile.start + (self.profile.end - self.profile.start) * share**2
-        _, rate, x, slope = self.on_flank(np.broadcast_to(u, (count, _LOOKED_AT)))
-        pivot = self.pivot
-        _, x_corner, slope_corner = self.on_corner(pivot.low + (pivot.high - pivot.low) * share)
-        levers = []
-        for across, steep in ((x, slope), (x_corner, slope_corner)):
-            tangent = tangents(across, self.brace[:, None])
-            levers.append((steep - mu - tangent * (1.0 + mu * steep) > 1e-9).all(axis=1))
-            levers.append((steep - tangent > 1e-9).all(axis=1))
-        room = (x_corner[:, 0] >= self.radius) & (self.profile.flank(self.profile.start)[0] > 0)
-        return np.asarray((rate > 0).all(axis=1) & np.logical_and.reduce(levers) & room)
+    def take(self, rows: Rows) -> Around:
+        """Return what some of the mechanisms have."""
+        some = (self.roller_weight, self.slider_weight, self.roller_radius, self.width)
+        return Around(self.cam, self.tracks, self.which[rows], self.asked, *(each[rows] for each in some))
 
 
 class BuiltSlab(Slab):
     """Some mechanisms around one cam at all their samples; `designs.x0` is where their springs are at rest."""
 
-    cut: Cut
-    reach: float
+    around: Around
+    windows: Sequence[tuple[float, float]]
 
-    def with_cam(self, profile: CamProfile, reach: float) -> BuiltSlab:
-        """Return the slab itself, with its cam and the travel that is requested [m]."""
-        self.cut, self.reach = Cut(profile, self.designs.radius, self.designs.brace), reach
+    def built(self, around: Around, windows: Sequence[tuple[float, float]]) -> BuiltSlab:
+        """Return the slab itself, with what its mechanisms are built of, and the windows of the specification [m]."""
+        self.around, self.windows = around, windows
         return self
+
+    @cached_property
+    def _every(self) -> Rows:
+        return np.arange(len(self.designs))
+
+    @cached_property
+    def _kinds(self) -> tuple[Rows, Rows]:
+        """Return the different tracks in this slab, and which of these each mechanism has."""
+        found, which = np.unique(self.around.which, return_inverse=True)
+        return found, which.ravel()
+
+    @property
+    def _pressed(self) -> bool:
+        return self.around.cam.spec.mechanism.contact is not None
+
+    @cached_property
+    def _reach(self) -> FloatArray:
+        """Travel of each different track, (k,) [m]."""
+        tracks, kinds = self.around.tracks, self._kinds[0]
+        available = (tracks.end - tracks.start)[kinds, 0]
+        return available if self.around.asked is None else np.full(len(kinds), self.around.asked)
+
+    def _of_kinds(self, travel: FloatArray) -> Poses:
+        """Return the poses of all mechanisms at travels of the different tracks, (k, n) [m]."""
+        kinds, which = self._kinds
+        tracks = self.around.tracks
+        return tracks.poses(tracks.start[kinds] + travel, kinds).take(which)
 
     @cached_property
     def travel(self) -> FloatArray:
         """Travel of the slider [m]."""
-        return np.broadcast_to(np.linspace(0.0, self.reach, self.points), (len(self.designs), self.points))
+        return np.linspace(0.0, self._reach, self.points, axis=1)[self._kinds[1]]
 
     @cached_property
-    def _states(self) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
-        """Return x and slope of the rollers, and where they run on the flank."""
-        return self._states_at(self.travel)
+    def _poses(self) -> Poses:
+        """How the rollers stand at all samples."""
+        return self._of_kinds(np.linspace(0.0, self._reach, self.points, axis=1))
 
-    def _states_at(self, travel: FloatArray) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
-        """Return x and slope of the rollers at travels, (d, m) each [m], and where they run on the flank."""
-        cut, slider = self.cut, self.cut.start + travel
-        flank = (slider >= cut.corner_end) | (cut.profile.corner is None)
-        law, low, high = cut.profile.path.law, cut.profile.start, cut.profile.end
-        guess = np.minimum(np.maximum(ideal_position(law, np.maximum(travel, 0.0)), low), high)
-        targets = np.where(flank, slider, cut.corner_end).ravel()
+    def _poses_at(self, travel: FloatArray, rows: Rows) -> Poses:
+        """Return how the rollers stand at travels of some mechanisms, (r, m) [m]."""
+        tracks, which = self.around.tracks, self.around.which[rows]
+        travel = np.minimum(np.maximum(travel, 0.0), self.travel[rows, -1:])
+        return tracks.poses(tracks.start[which] + travel, which)
 
-        def evaluate(u: FloatArray) -> tuple[FloatArray, FloatArray]:
-            value, rate, _, _ = cut.on_flank(u.reshape(slider.shape))
-            return value.ravel(), rate.ravel()
+    def pose(self, travel: FloatArray, rows: Rows) -> Pose:
+        """Return how the rollers stand at travels of some mechanisms, (r, m) [m]."""
+        found, cams = self._poses_at(travel, rows), self.designs.take(rows)
+        return Pose(found.x - cams.x0[:, None], found.slope, tangents(found.x, cams.brace[:, None]))
 
-        u = invert_increasing(evaluate, targets, (low, high), guess.ravel()).reshape(slider.shape)
-        _, _, x, slope = cut.on_flank(u)
-        turn = pivot_angle(slider, cut.pivot)
-        turn = np.where(slider <= cut.start, cut.pivot.low, turn)
-        _, x_corner, slope_corner = cut.on_corner(turn)
-        return np.where(flank, x, x_corner), np.where(flank, slope, slope_corner), flank
-
-    def exact(self, branch: str, travel: FloatArray) -> FloatArray:
-        """Return the force of a branch at travels of each mechanism, (d, m) [N]; NaN where friction holds a roller."""
-        x, slope, _ = self._states_at(travel)
-        mu, tangent = self.designs.friction[:, None], tangents(x, self.designs.brace[:, None])
-        mu = mu if branch == "load" else -mu
-        turn = 1.0 + mu * slope
-        lever = slope - mu - tangent * turn
-        spring = 2.0 * self.designs.stiffness[:, None] * np.maximum(x - self.designs.x0[:, None], 0.0)
-        return np.asarray(np.where(lever > 0, 2.0 * (spring * turn) / np.where(lever > 0, lever, 1.0), np.nan))
-
-    @cached_property
+    @property
     def half_width(self) -> FloatArray:
         """x of the right roller's centre [m]."""
-        return self._states[0]
+        return self._poses.x
 
-    @cached_property
+    @property
     def slope(self) -> FloatArray:
         """Slope of the track."""
-        return self._states[1]
+        return self._poses.slope
 
-    @cached_property
+    @property
     def flank(self) -> NDArray[np.bool_]:
         """Where the roller runs on the flank."""
-        return self._states[2]
+        return ~self._poses.on_corner
 
     @cached_property
     def stretch(self) -> FloatArray:
@@ -178,33 +155,286 @@ class BuiltSlab(Slab):
     @cached_property
     def corner_travel(self) -> FloatArray:
         """Travel at which the roller leaves the corner [m]."""
-        found = np.maximum((self.cut.corner_end - self.cut.start)[:, 0], 0.0)
-        return found if self.cut.profile.corner else np.zeros_like(found)
+        tracks = self.around.tracks
+        return np.asarray(np.maximum((tracks.corner_end - tracks.start)[self.around.which, 0], 0.0))
 
-    def warned(self, max_elongation: float | None) -> Iterator[tuple[str, NDArray[np.bool_]]]:
-        """Yield the findings that `checks.findings_of` has of such mechanisms, in its order."""
-        found = list(super().warned(max_elongation))
-        at = [name for name, _ in found].index("up_jam") + 1
-        slack: NDArray[np.bool_] = np.asarray((2.0 * self.stretch < -1e-12).any(axis=1))
-        yield from (*found[:at], ("spring_slack", slack), *found[at:])
+    @cached_property
+    def places(self) -> FloatArray:
+        """Travels at which metrics that are places look at the force, (designs, n) [m]."""
+        return nodes(self.travel[:, -1], self.corner_travel)
+
+    @cached_property
+    def everywhere(self) -> tuple[FloatArray, FloatArray]:
+        """Force at `places` on the way up, and on the way down [N]."""
+        kinds, which = self._kinds
+        first = np.zeros(len(kinds), dtype=np.intp)
+        first[which] = self._every
+        poses = self._of_kinds(nodes(self.travel[first, -1], self.corner_travel[first]))
+        return self._slider(poses, self._every, 1.0), self._slider(poses, self._every, -1.0)
+
+    def somewhere(self, way: float | FloatArray, travel: FloatArray, rows: Rows) -> FloatArray:
+        """Return the force at travels of some mechanisms, (r, m) [N]; NaN where friction holds a roller."""
+        return self._slider(self._poses_at(travel, rows), rows, way)
+
+    def _forces(self, friction: FloatArray) -> Forces:
+        way = -1.0 if (friction < 0).any() else 1.0
+        contact = self._contact(self._poses, self._every, way) if self.contacts or self._pressed else None
+        slider = self._slider(self._poses, self._every, way)
+        return Forces(slider, contact, np.asarray(np.isfinite(slider[:, 1:]).all(axis=1)))
+
+    def _levers(self, poses: Poses, rows: Rows, way: float | FloatArray) -> tuple[FloatArray, ...]:
+        """Return friction, tangent, 1 + mu f, the lever, and the spring force on one roller [N]."""
+        cams = self.designs.take(rows)
+        mu, tangent = way * cams.friction[:, None], tangents(poses.x, cams.brace[:, None])
+        turn = 1.0 + mu * poses.slope
+        lever = poses.slope - mu - tangent * turn
+        spring = 2.0 * cams.stiffness[:, None] * np.maximum(poses.x - cams.x0[:, None], 0.0)
+        return mu, tangent, turn, lever, spring
+
+    def _slider(self, poses: Poses, rows: Rows, way: float | FloatArray) -> FloatArray:
+        """Return the force on the slider [N], as `statics.forces` does."""
+        mu, _, turn, lever, spring = self._levers(poses, rows, way)
+        weight = self.around.roller_weight[rows, None]
+        load = spring * turn
+        pull = _over(2.0 * (load + weight * (poses.slope - mu) if weight.any() else load), lever)
+        for at in self._idle(poses, rows, lever):
+            pull[at] = self._limit(poses, rows, way, at)
+        return pull + self.around.slider_weight[rows, None]
+
+    def _contact(self, poses: Poses, rows: Rows, way: float | FloatArray) -> FloatArray:
+        """Return the force at a contact [N], as `statics.forces` does."""
+        _, tangent, turn, lever, spring = self._levers(poses, rows, way)
+        weight, along = self.around.roller_weight[rows, None], np.sqrt(1.0 + poses.slope * poses.slope)
+        contact = _over(along * (spring + weight * tangent if weight.any() else spring), lever)
+        for at in self._idle(poses, rows, lever):
+            contact[at] = 0.5 * self._limit(poses, rows, way, at) * along[at] / turn[at]
+        return contact
+
+    def _idle(self, poses: Poses, rows: Rows, lever: FloatArray) -> list[tuple[int, int]]:
+        """Return where nothing is loaded and nothing has a lever, so that the force is a limit."""
+        rest, weight = self.designs.x0[rows, None], self.around.roller_weight[rows, None]
+        found = (np.abs(lever) < 1e-13) & (np.abs(poses.x - rest) <= 1e-15 * rest) & (weight == 0)
+        return [(int(row), int(column)) for row, column in np.argwhere(found)] if found.any() else []
+
+    def _limit(self, poses: Poses, rows: Rows, way: float | FloatArray, at: tuple[int, int]) -> float:
+        tracks, law = self.around.tracks, self.around.tracks.profile.path.law
+        row, slope, u = int(rows[at[0]]), poses.slope[at], poses.parameter[at]
+        if poses.on_corner[at]:
+            cosine = (1.0 + slope * slope) ** -0.5
+            bend = 1.0 / (float(tracks.radius[self.around.which[row]]) * cosine**3)
+        else:
+            shift = float(tracks.shift[self.around.which[row], 0])
+            bend = law.slope_derivative(u) / (1.0 + shift / law.curvature_radius(u) if shift else 1.0)
+        cams = self.designs
+        friction = float(np.broadcast_to(way, (len(rows), 1))[at[0], 0] * cams.friction[row])
+        return at_dead_point(
+            float(slope),
+            float(bend),
+            (float(cams.x0[row]), float(cams.brace[row]), float(cams.stiffness[row])),
+            friction,
+        )
+
+    @cached_property
+    def _jams(self) -> tuple[NDArray[np.bool_], FloatArray, NDArray[np.bool_]]:
+        """Return who is jammed at the start, up to which travel [m], and of whom it is known."""
+        tracks, count = self.around.tracks, len(self.designs)
+        ends, known = np.zeros(count), np.ones(count, dtype=bool)
+        rows = np.flatnonzero(self.designs.friction)
+        if not rows.size:
+            return np.zeros(count, dtype=bool), ends, known
+        start, which = tracks.start[self.around.which], self.around.which
+        passed = start > tracks.dead_point[which]
+        first = self._poses_at(np.zeros((count, 1)), self._every)
+        corner, (low, high), pivot = self.corner_travel > 0, tracks.flank_range, tracks.pivot
+        turn = np.where(passed, np.arctan(first.slope), pivot.low)
+        begin = np.where(passed & ~corner[:, None], first.parameter, low[which])
+        ranges = ((turn, np.full((count, 1), pivot.high)), (begin, high[which]))
+        samples = np.isnan(self.up.slider).any(axis=1) | (self.points < FEW)
+        held = []
+        for on_corner, (below, above) in zip((True, False), ranges, strict=True):
+            grid = np.minimum(np.maximum(below + (above - below) * JAM_SHARES, below), above)
+            short = self._lever_at(on_corner, grid, self._every) < 0
+            # `statics.jams` looks between the ends of a stretch if one of them is held, or a force is missing.
+            looked = samples | short[:, 0] | short[:, -1]
+            there = corner if on_corner else np.ones(count, dtype=bool)
+            held.append(short & (looked & there)[:, None])
+        both = np.hstack(held)
+        both[~corner, : len(JAM_SHARES)] = both[~corner, len(JAM_SHARES), None]
+        both[~self.designs.friction.astype(bool)] = False
+        jammed, last = np.asarray(both.any(axis=1)), both.sum(axis=1) - 1
+        known &= ~jammed | (both[:, 0] & (last == both.shape[1] - 1 - both[:, ::-1].argmax(axis=1)))
+        known &= ~jammed | ((last < both.shape[1] - 1) & (last != len(JAM_SHARES) - 1))
+        for on_corner, (below, above), offset in zip((True, False), ranges, (0, len(JAM_SHARES)), strict=True):
+            inside = (last >= offset) & (last < offset + len(JAM_SHARES) - 1)
+            some = np.flatnonzero(jammed & known & inside)
+            if some.size:
+                shares = JAM_SHARES[last[some] - offset], JAM_SHARES[last[some] - offset + 1]
+                near, far = (below[some] + (above - below)[some] * share[:, None] for share in shares)
+                lever = self._lever_on(on_corner)
+                at = sign_changes(lever, near, far, some)
+                slider = tracks.on_corner(at, which[some])[0] if on_corner else tracks.on_flank(at, which[some])[0]
+                ends[some] = np.minimum(slider - start[some], self.travel[some, -1:])[:, 0]
+        return jammed, ends, known
+
+    def _lever_on(self, on_corner: bool) -> Callable[[FloatArray, Rows], FloatArray]:
+        return lambda place, rows: self._lever_at(on_corner, place, rows)
+
+    def _lever_at(self, on_corner: bool, place: FloatArray, rows: Rows) -> FloatArray:
+        """Return the lever of the slider on the way up, rounding added, at angles or path coordinates of a stretch."""
+        tracks, which = self.around.tracks, self.around.which[rows]
+        x, slope = tracks.on_corner(place, which)[1:] if on_corner else tracks.on_flank(place, which)[2:]
+        mu, brace = self.designs.friction[rows, None], self.designs.brace[rows, None]
+        return slope - mu - tangents(x, brace) * (1.0 + mu * slope) + 1e-12
 
     @property
     def jammed(self) -> NDArray[np.bool_]:
-        """Nowhere: see `Cut.possible`."""
-        return np.zeros(len(self.designs), dtype=bool)
+        """Whether friction lets no force move the slider up somewhere on the travel."""
+        return self._jams[0]
+
+    @property
+    def held_on_corner(self) -> NDArray[np.bool_]:
+        """Whether friction lets no force move the slider up somewhere on the corner: where it does, at the start."""
+        return self._jams[0]
+
+    @property
+    def jam_travel(self) -> FloatArray:
+        """Travel at the start over which friction lets no force move the slider up [m]."""
+        return self._jams[1]
+
+    @cached_property
+    def _dead(self) -> NDArray[np.bool_]:
+        """Whether the slider has no leverage on the rollers at the start, or must go down first."""
+        tracks, which = self.around.tracks, self.around.which
+        down = (tracks.dead_point < tracks.start - 1e-9 * tracks.brace[:, None])[which, 0]
+        return np.asarray(down | np.isnan(self.up.slider[:, 0]) | np.isnan(self.down.slider[:, 0]))
+
+    def warned(self, max_elongation: float | None) -> Iterator[tuple[str, NDArray[np.bool_]]]:
+        """Yield the findings that `findings.findings_of` has of such mechanisms, in its order."""
+        found = dict(super().warned(max_elongation))
+        yield from ((name, found[name]) for name in ("undercut", "contact_not_single_valued"))
+        if self._pressed:
+            yield "corner_pressure", found["undercut"]
+        yield "up_jam", found["up_jam"]
+        yield "dead_point", self._dead
+        yield "spring_slack", np.asarray((2.0 * self.stretch < -1e-12).any(axis=1))
+        yield from ((name, found[name]) for name in ("spring_overstretched", "slack_cable") if name in found)
+        if self._allowable is not None:
+            yield "overstressed", self.pressure_max > YIELD_PRESSURE * self._allowable * (1 + 1e-9)
+        ends = self.travel[:, -1]
+        short = [ends < high - TOLERANCE * (high - low) for low, high in self.windows]
+        yield WINDOW_OUTSIDE, np.logical_or.reduce(short) if short else np.zeros(len(ends), dtype=bool)
 
     @property
     def solved(self) -> NDArray[np.bool_]:
-        """Whether the slider rises all along up to the requested travel, and a force was found at every sample."""
-        reached = ((self.cut.end - self.cut.start)[:, 0] >= self.reach) & (self.stretch[:, -1] > 0)
-        return self.up.moves & self.down.moves & reached & self.cut.possible(self.designs.friction)
+        """Whether the curve is complete, its force is nowhere negative, and all is known of it that is asked."""
+        tracks, which, mechanism = self.around.tracks, self.around.which, self.around.cam.spec.mechanism
+        x0, profile = self.designs.x0, tracks.profile
+        reached = (tracks.end - tracks.start)[which, 0] >= self.travel[:, -1]
+        if self.around.asked is None:
+            reached &= ~tracks.turns_back[which]
+        room = self.half_width[:, 0] - self.around.roller_radius >= -0.5e-12 * self.designs.brace
+        crossed = (
+            float(profile.shifted(profile.start, max(mechanism.profile.offset, 0.0) - profile.roller_radius)[0]) <= 0
+        )
+        held = self.stretch.max(axis=1) >= 0
+        pulls = np.minimum(self.up.slider[:, 1:].min(axis=1), self.down.slider[:, 1:].min(axis=1)) >= 0
+        ends = np.minimum(self.up.slider[:, -1], self.down.slider[:, -1]) > 0
+        good = tracks.fits[which] & reached & room & held & pulls & ends & self._jams[2] & (x0 > 0) & (not crossed)
+        return np.asarray(good & self.up.moves & self.down.moves)
 
-    def _forces(self, friction: FloatArray) -> Forces:
-        mu, tangent = friction[:, None], self.tangent
-        turn = 1.0 + mu * self.slope
-        lever = self.slope - mu - tangent * turn
-        spring = 2.0 * self.designs.stiffness[:, None] * np.maximum(self.stretch, 0.0)
-        moves = lever > 0
-        divisor = np.where(moves, lever, 1.0)
-        contact = np.sqrt(1.0 + self.slope * self.slope) * spring / divisor if self.contacts else None
-        return Forces(2.0 * (spring * turn) / divisor, contact, np.asarray(moves.all(axis=1)))
+    @property
+    def _allowable(self) -> float | None:
+        return allowable_stress(self.around.cam.spec.mechanism)
+
+    @property
+    def allowable_stress(self) -> float:
+        """What the stress of contacts is compared with [Pa]; NaN: nothing."""
+        return np.nan if self._allowable is None else self._allowable
+
+    def _pressure(self, poses: Poses, rows: Rows, contact: FloatArray) -> FloatArray:
+        """Return the pressure of contacts on the flank [Pa]; NaN on the corner."""
+        pressing, cam = self.around.cam.spec.mechanism.contact, self.around.cam.profile
+        if pressing is None:
+            return np.full_like(contact, np.nan)
+        law, offset = cam.path.law, self.around.cam.spec.mechanism.profile.offset
+        curvature = 1.0 / self.around.roller_radius[rows, None]
+        curvature = curvature + 1.0 / (law.curvature_radius(poses.parameter) - cam.roller_radius + offset)
+        found = pressure_between(contact, curvature, pressing.material, self.around.width[rows, None])
+        return np.where(poses.on_corner, np.nan, found)
+
+    def stress_at(self, way: float, travel: FloatArray, rows: Rows) -> FloatArray:
+        """Return the stress below the contact at travels of some mechanisms, (r, m) [Pa]; NaN on the corner."""
+        poses = self._poses_at(travel, rows)
+        return self._pressure(poses, rows, self._contact(poses, rows, way)) / YIELD_PRESSURE
+
+    def excess(self, way: float) -> Callable[[FloatArray, Rows], FloatArray] | None:
+        """Return by what share the stress exceeds what is allowed; None: it is not judged."""
+        allowed = self._allowable
+        if allowed is None:
+            return None
+        return lambda travel, rows: self.stress_at(way, travel, rows) / allowed - (1 + ROUNDING)
+
+    def stressed(self, branch: str, window: tuple[float, float] | None) -> FloatArray:
+        """Return the largest stress of a branch inside a window [Pa]; NaN where it is unbounded."""
+        way, forces = (1.0, self.up) if branch == "load" else (-1.0, self.down)
+        if forces.contact is None:
+            return np.full(len(self.designs), np.nan)
+        values = self._pressure(self._poses, self._every, forces.contact) / YIELD_PRESSURE
+        exact = self._exact_stress(way)
+        known = np.isfinite(self.spread(branch, window).mean)
+        return np.where(known, Spread(Sampled(self.travel, values, exact), window).max, np.nan)
+
+    def _exact_stress(self, way: float) -> Callable[[FloatArray, Rows], FloatArray]:
+        return lambda travel, rows: self.stress_at(way, travel, rows)
+
+    @cached_property
+    def pressure_max(self) -> FloatArray:
+        """Largest pressure of the contact on the flank, on the way up [Pa]."""
+        travel = np.concatenate([self.corner_travel[:, None], self.travel], axis=1)
+        pressed = YIELD_PRESSURE * self.stress_at(1.0, travel, self._every)
+        known = np.isfinite(pressed)
+        # Where the roller leaves a corner on the travel, that place comes before the samples on the flank.
+        known[:, :1] &= self.begin_there
+        known[:, 1:] &= ~self.begin_there | (travel[:, 1:] > travel[:, :1])
+        order = np.argsort(~known, axis=1, kind="stable")
+        travel, pressed = (np.take_along_axis(each, order, axis=1) for each in (travel, pressed))
+        counts, found = known.sum(axis=1), np.full(len(travel), np.nan)
+        for count in np.unique(counts[counts > 0]).tolist():
+            rows = np.flatnonzero(counts == count)
+            high, _ = extremes(self._pressed_on(rows), travel[rows, :count], pressed[rows, :count], uneven=True)
+            found[rows] = high
+        return found
+
+    def _pressed_on(self, rows: Rows) -> Callable[[FloatArray], FloatArray]:
+        return lambda travel: YIELD_PRESSURE * self.stress_at(1.0, travel, rows)
+
+    @property
+    def begin_there(self) -> NDArray[np.bool_]:
+        """Whether each roller leaves a corner on the travel, (d, 1)."""
+        return np.zeros((len(self.designs), 1), dtype=bool) if self.begin is None else self.begin.there
+
+    @property
+    def _law(self) -> Any:
+        return self.around.cam.profile.path.law
+
+    own: ClassVar[Mapping[str, Callable[[Any], FloatArray]]] = {
+        "theoretical_force": lambda cams: (
+            4.0 * cams.designs.stiffness * cams.designs.constant + cams.around.slider_weight
+        ),
+        "roller_radius_max": lambda cams: cams.same(cams._law.curvature_radius(cams._law.rest_half_width)),
+        "force_constant_min": lambda cams: cams.same(
+            cams._law.smallest_force_constant(cams.around.cam.profile.roller_radius)
+        ),
+        "contact_pressure_max": lambda cams: cams.pressure_max,
+    }
+    """Values of the family that are not those of a cam with its own brace and roller."""
+
+    def same(self, value: float | None) -> FloatArray:
+        """Return one value for every mechanism; NaN where there is none."""
+        return np.full(len(self.designs), np.nan if value is None else float(value))
+
+
+def _over(load: FloatArray, lever: FloatArray) -> FloatArray:
+    """Return load / lever; 0 for nothing over anything, NaN where there is no leverage to move the load."""
+    moves = lever > 0
+    return np.where(moves | (load == 0), load / np.where(moves, lever, 1.0), np.nan)

@@ -12,15 +12,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.cam.block_forces import Forces, Pose, Slab, tangents
+from cfmkit.families.cam.block_forces import Begin, Forces, Pose, Slab, force_at
 from cfmkit.families.cam.build import CLOSE
 from cfmkit.families.cam.geometry.cut import WholeCamUndercut, cut
+from cfmkit.families.cam.geometry.many_tracks import tangents
 from cfmkit.families.cam.geometry.path import reach
 from cfmkit.families.cam.geometry.profile import SlopeLaw
 from cfmkit.families.cam.geometry.track import Pivot, Track, pivot_angle
 from cfmkit.families.cam.geometry.track_records import NoTrack
 from cfmkit.families.cam.statics import jams
-from cfmkit.numerics import sampled_extremes
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -28,9 +28,6 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.families.cam.block_forces import Designs
     from cfmkit.families.cam.geometry.track_records import TrackStates
-
-PEAK = 129
-"""Samples on the corner among which the largest force is looked for."""
 
 SHAPE = ("constant", "x0", "brace", "radius", "stroke")
 """What decides where the corner is, in the order of `shape`."""
@@ -40,12 +37,12 @@ _SAME = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Shape:
-    """One cam with its roller's states: at all samples, and on the corner."""
+    """One cam with its roller's states at all samples, and where it leaves the corner."""
 
     track: Track
     travel: FloatArray
     states: TrackStates
-    corner: TrackStates
+    begin: TrackStates
 
     @property
     def corner_travel(self) -> float:
@@ -66,8 +63,8 @@ def shape(law: SlopeLaw, radius: float, stroke: float, points: int) -> Shape | N
     if profile.corner is None or not rises or abs(total - stroke) > _SAME * stroke or track.corner_end <= track.start:
         return None
     travel = np.linspace(0.0, total, points)
-    on_corner = np.linspace(0.0, min(track.corner_end - track.start, total) * (1 - 1e-9), PEAK)
-    return Shape(track, travel, track.states(track.start + travel), track.states(track.start + on_corner))
+    begin = track.states(np.array([track.corner_end]))
+    return Shape(track, travel, track.states(track.start + travel), begin)
 
 
 def shapes(designs: Designs, points: int) -> tuple[list[Shape | None], NDArray[np.intp]]:
@@ -98,9 +95,8 @@ class CornerSlab(Slab):
         self.found, self.which = found, which
         return self
 
-    def _states(self, name: str, corner: bool = False) -> FloatArray:
-        each = [getattr(one.corner if corner else one.states, name) for one in self.found]
-        return np.asarray(np.stack(each)[self.which])
+    def _states(self, name: str) -> FloatArray:
+        return np.asarray(np.stack([getattr(one.states, name) for one in self.found])[self.which])
 
     @cached_property
     def travel(self) -> FloatArray:
@@ -166,6 +162,16 @@ class CornerSlab(Slab):
         return flank
 
     @cached_property
+    def begin(self) -> Begin:
+        """Where rollers leave the corner, as the tracks have it: next to a jam the last digits decide."""
+        x, slope = (np.array([getattr(one.begin, name)[0] for one in self.found]) for name in ("x", "slope"))
+        x, slope = x[self.which, None], slope[self.which, None]
+        tangent = tangents(x, self.designs.brace[:, None])
+        pose = Pose(x - self.designs.x0[:, None], slope, tangent)
+        up, down = (force_at(self.designs, pose, way) for way in (1.0, -1.0))
+        return Begin(up, down, slope, tangent, self.corner_travel[:, None] <= self.travel[:, -1:])
+
+    @cached_property
     def pivots(self) -> Pivot:
         """How the roller of each design pivots on its corner."""
         return Pivot(*np.array([one.track.pivot for one in self.found]).T[:, self.which])
@@ -182,23 +188,16 @@ class CornerSlab(Slab):
         return np.array([any(low < end for low, _ in each) for each, end in zip(self.jams, total, strict=True)])
 
     @cached_property
-    def corner_peak(self) -> FloatArray:
-        """Largest force on the way up on the corner [N], from samples refined by a parabola through the highest."""
-        x, slope = self._states("x", corner=True), self._states("slope", corner=True)
-        force = self._over(x - self.designs.x0[:, None], slope, x, self.designs.friction).slider
-        top, last = force.argmax(axis=1), force.shape[1] - 1
-        refined, _, _ = sampled_extremes.largest(np.arange(last + 1.0), force)
-        held = np.array(
+    def held_on_corner(self) -> NDArray[np.bool_]:
+        """Whether friction lets no force move the slider up somewhere on the corner."""
+        return np.array(
             [any(low < end for low, _ in each) for each, end in zip(self.jams, self.corner_travel, strict=True)]
         )
-        return np.where(held, np.nan, np.where((top > 0) & (top < last), refined, force.max(axis=1)))
 
     def _forces(self, friction: FloatArray) -> Forces:
-        return self._over(self.stretch, self.slope, self.half_width, friction)
-
-    def _over(self, stretch: FloatArray, slope: FloatArray, x: FloatArray, friction: FloatArray) -> Forces:
-        """Return the forces at some states, as `statics.forces` does without weight."""
-        mu, tangent = friction[:, None], tangents(x, self.designs.brace[:, None])
+        """Return the forces at all samples, as `statics.forces` does without weight."""
+        stretch, slope, mu = self.stretch, self.slope, friction[:, None]
+        tangent = tangents(self.half_width, self.designs.brace[:, None])
         turn = 1.0 + mu * slope
         lever = slope - mu - tangent * turn
         moves = lever > 0

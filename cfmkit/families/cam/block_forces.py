@@ -8,25 +8,23 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from cfmkit.families.cam.block_windows import Spread
+from cfmkit.families.cam.block_windows import Sampled, Spread
+from cfmkit.families.cam.geometry.many_tracks import tangents
 from cfmkit.families.cam.model import nodes
+from cfmkit.families.cam.solution import ON_CORNER
+from cfmkit.metrics.closed import extremes
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator, Mapping
 
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
     from cfmkit.metrics.many import ManyBranches
-
-
-def tangents(x: FloatArray, brace: FloatArray) -> FloatArray:
-    """Return `cam_profile.brace_tangent` where every brace has its own length."""
-    return x / ((brace - x) * (brace + x)) ** 0.5
 
 
 @dataclass(frozen=True)
@@ -103,6 +101,19 @@ class Pose(NamedTuple):
     tangent: FloatArray
 
 
+class Begin(NamedTuple):
+    """Where rollers leave a corner, (designs, 1) each: force on the way up and down [N], slope of the track, tangent.
+
+    `there` tells which of them leave it on the travel.
+    """
+
+    up: FloatArray
+    down: FloatArray
+    slope: FloatArray
+    tangent: FloatArray
+    there: NDArray[np.bool_]
+
+
 @dataclass(frozen=True)
 class Forces:
     """Force on the slider and at a contact, (designs, points) each [N], and where a lever is missing."""
@@ -126,6 +137,9 @@ class Slab:
     band : float
         Half width of the force band of the usable stroke, as a fraction.
     """
+
+    own: ClassVar[Mapping[str, Callable[[Any], FloatArray]]] = {}
+    """Values of the family that are not those of `block_measures.SCALARS`."""
 
     def __init__(self, designs: Designs, points: int, contacts: bool, band: float = 0.05) -> None:
         """Remember what is asked."""
@@ -240,9 +254,53 @@ class Slab:
         return np.zeros(len(self.designs))
 
     @cached_property
-    def corner_peak(self) -> FloatArray:
-        """Largest force on the way up on the corner [N]; NaN without one."""
+    def begin(self) -> Begin | None:
+        """Where rollers leave the corner; None where there is none."""
+        if not self.corner_travel.any():
+            return None
+        rows, corner = np.arange(len(self.designs)), self.corner_travel[:, None]
+        there = (corner > 0) & (corner <= self.travel[:, -1:])
+        _, slope, tangent = self.pose(corner, rows)
+        up, down = (self.somewhere(way, corner, rows) for way in (1.0, -1.0))
+        return Begin(up, down, slope, tangent, there)
+
+    @property
+    def allowable_stress(self) -> float:
+        """What the stress of contacts is compared with [Pa]; NaN: nothing."""
+        return np.nan
+
+    def stressed(self, _branch: str, _window: Any) -> FloatArray:
+        """Return the largest stress of a branch inside a window [Pa]; NaN where there is none."""
         return np.full(len(self.designs), np.nan)
+
+    def excess(self, _way: float) -> Callable[[FloatArray, NDArray[np.intp]], FloatArray] | None:
+        """Return by what share the stress exceeds what is allowed, ``excess(travel, rows)``; None: it is not judged."""
+        return None
+
+    @property
+    def held_on_corner(self) -> NDArray[np.bool_]:
+        """Whether friction lets no force move the slider up somewhere on the corner."""
+        return np.zeros(len(self.designs), dtype=bool)
+
+    @cached_property
+    def corner_peak(self) -> FloatArray:
+        """Largest force on the way up on the corner [N]; NaN without one, and next to a jam."""
+        rows, corner = np.arange(len(self.designs)), np.minimum(self.corner_travel, self.travel[:, -1])[:, None]
+        if not corner.any():
+            return np.full(len(rows), np.nan)
+        travel = np.concatenate([np.zeros_like(corner), corner * ON_CORNER], axis=1)
+        found = self.somewhere(1.0, travel, rows)
+        known = np.isfinite(found)
+        peak = np.full(len(rows), np.nan)
+        # A start without any force does not count.
+        for counts, first in ((known.all(axis=1), 0), (known[:, 1:].all(axis=1) & ~known[:, 0], 1)):
+            if (some := np.flatnonzero(counts & (corner[:, 0] > 0) & ~self.held_on_corner)).size:
+                exact = partial(self._on_rows, some)
+                peak[some] = extremes(exact, travel[some, first:], found[some, first:], uneven=True)[0]
+        return peak
+
+    def _on_rows(self, rows: NDArray[np.intp], travel: FloatArray) -> FloatArray:
+        return self.somewhere(1.0, travel, rows)
 
     @cached_property
     def jam_travel(self) -> FloatArray:
@@ -278,11 +336,18 @@ class Slab:
         """Whether friction lets no force move the slider up somewhere on the travel."""
         return self.jam_travel > 0
 
+    @cached_property
+    def peaks(self) -> FloatArray | None:
+        """Travels next to which a force has a peak that the samples miss, (designs, k) [m]; None where it has none."""
+        corner = np.minimum(self.corner_travel, self.travel[:, -1])
+        return corner[:, None] * ON_CORNER if corner.any() else None
+
     def spread(self, branch: str, window: Any) -> Spread:
         """Return the forces of one branch inside a window."""
         if (branch, window) not in self.spreads:
-            forces = self.up if branch == "load" else self.down
-            self.spreads[branch, window] = Spread(self.travel, forces.slider, window, partial(self.exact, branch))
+            way, forces = (1.0, self.up) if branch == "load" else (-1.0, self.down)
+            sampled = Sampled(self.travel, forces.slider, partial(self.somewhere, way), self.peaks)
+            self.spreads[branch, window] = Spread(sampled, window)
         return self.spreads[branch, window]
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.cam.block_forces import tangents
+from cfmkit.families.cam.geometry.many_tracks import tangents
 from cfmkit.families.cam.values import DEFINITIONS
 from cfmkit.metrics.many import RANGES, ManyBranches, rms_to_target, usable_interval
 
@@ -28,8 +28,10 @@ BRANCHES = ("load", "unload")
 
 def measured(cams: Slab, measure: Measure) -> Mapping[str, FloatArray]:
     """Return what a measure is for some designs: branch -> (n,) values, "" for what belongs to no branch."""
-    if measure.name in SCALARS:
-        return {"": SCALARS[measure.name](cams)}
+    if (scalar := cams.own.get(measure.name) or SCALARS.get(measure.name)) is not None:
+        return {"": scalar(cams)}
+    if measure.name in STRESSES:
+        return {branch: _stress(cams, measure, branch) for branch in BRANCHES}
     if measure.name in ABSENT:
         return {"": np.full(len(cams.designs), np.nan)}
     if measure.name in CYCLES:
@@ -38,18 +40,24 @@ def measured(cams: Slab, measure: Measure) -> Mapping[str, FloatArray]:
         function = METRICS[measure.name]
         return {branch: function(cams.spread(branch, measure.window), cams.designs) for branch in BRANCHES}
     if measure.name == RMS:
-        sampled = {branch: _branch(cams, branch, measure.window) for branch in BRANCHES}
-        return {branch: rms_to_target(many, cams.designs.target) for branch, many in sampled.items()}
+        return {branch: _rms(cams, branch, measure.window) for branch in BRANCHES}
     both = RANGES[measure.name](_everywhere(cams, measure.window))
+    if measure.window is not None:
+        reached = np.tile(cams.travel[:, -1], 2) * (1 + 1e-9)
+        asked = sum(measure.window) / 2 if measure.name.startswith("band") else measure.window[1]
+        both = np.where(asked <= reached, both, np.nan)
     return dict(zip(BRANCHES, np.split(both, 2), strict=True))
 
 
-def _branch(cams: Slab, branch: str, window: Window) -> ManyBranches:
-    effort, exact = (cams.up if branch == "load" else cams.down).slider, lambda at, _rows: cams.exact(branch, at)
-    if window is None:
-        return ManyBranches(cams.travel, effort, cams.travel[:, 0], cams.travel[:, -1], exact)
-    low, high = (np.full(len(cams.designs), end) for end in window)
-    return ManyBranches(cams.travel, effort, low, high, exact)
+def _rms(cams: Slab, branch: str, window: Window) -> FloatArray:
+    effort = (cams.up if branch == "load" else cams.down).slider
+    low, high = cams.travel[:, 0], cams.travel[:, -1]
+    if window is not None:
+        low, high = (np.full(len(cams.designs), end) for end in window)
+    many = ManyBranches(cams.travel, effort, low, high, lambda at, _rows: cams.exact(branch, at))
+    # Where a sample has no force, nothing inside the window is measured.
+    known = np.isfinite(cams.spread(branch, window).mean)
+    return np.where(known, rms_to_target(many, cams.designs.target), np.nan)
 
 
 def _everywhere(cams: Slab, window: Window) -> ManyBranches:
@@ -59,11 +67,13 @@ def _everywhere(cams: Slab, window: Window) -> ManyBranches:
         ends = window if window is not None else (0.0, np.inf)
         low = np.full(2 * count, ends[0])
         high = np.minimum(np.full(2 * count, ends[1]), places[:, -1])
+        pose = np.minimum(np.full(2 * count, sum(ends) / 2), places[:, -1]) if window is not None else None
 
         def exact(travel: FloatArray, rows: NDArray[np.intp]) -> FloatArray:
             return cams.somewhere(np.where(rows < count, 1.0, -1.0)[:, None], travel, rows % count)
 
-        cams.known[window] = ManyBranches(places, np.concatenate([*cams.everywhere]), low, high, exact)
+        effort = np.concatenate([*cams.everywhere])
+        cams.known[window] = ManyBranches(places, effort, low, high, exact, None, pose)
     return cams.known[window]
 
 
@@ -81,6 +91,13 @@ def _from_mean(one: Spread, _cams: Designs) -> FloatArray:
 
 def _from_target(one: Spread, cams: Designs) -> FloatArray:
     return np.maximum(np.abs(one.max - cams.target), np.abs(one.min - cams.target)) / cams.target
+
+
+def _stress(cams: Slab, measure: Measure, branch: str) -> FloatArray:
+    largest = cams.stressed(branch, measure.window)
+    if measure.name == "stress_max":
+        return largest
+    return np.where(largest > 0, cams.allowable_stress / np.where(largest > 0, largest, 1.0), np.nan)
 
 
 METRICS: dict[str, Callable[[Spread, Designs], FloatArray]] = {
@@ -106,7 +123,7 @@ def _usable(cams: Slab) -> tuple[FloatArray, FloatArray]:
     if cams.usable is None:
         ends = cams.travel[:, 0], cams.travel[:, -1]
         branches = [
-            ManyBranches(cams.places, force, *ends, partial(cams.somewhere, way))
+            ManyBranches(cams.places, force, *ends, partial(cams.somewhere, way), cams.excess(way))
             for force, way in zip(cams.everywhere, (1.0, -1.0), strict=True)
         ]
         cams.usable = usable_interval(branches, cams.designs.target, cams.band, cams.corner_travel)
@@ -136,19 +153,30 @@ def _smallest_constant(cams: Slab) -> FloatArray:
 
 def _largest_contact(cams: Slab) -> FloatArray:
     contacts = [forces.contact for forces in (cams.up, cams.down) if forces.contact is not None]
-    return np.asarray(np.max([one.max(axis=1) for one in contacts], axis=0))
+    return np.asarray(np.max([np.where(np.isfinite(one), one, -np.inf).max(axis=1) for one in contacts], axis=0))
 
 
 def _half_gap(cams: Slab) -> FloatArray:
-    up, down = cams.up.slider, cams.down.slider
+    up, down, flank = cams.up.slider, cams.down.slider, cams.flank
+    if cams.begin is not None:
+        up, down = np.hstack([cams.begin.up, up]), np.hstack([cams.begin.down, down])
+        flank = np.hstack([cams.begin.there, np.broadcast_to(flank, cams.travel.shape)])
     total = up + down
-    usable = cams.flank & (total > 0)
-    return np.asarray(np.where(usable, (up - down) / np.where(usable, total, 1.0), -np.inf).max(axis=1))
+    usable = flank & (total > 0)
+    found = np.asarray(np.where(usable, (up - down) / np.where(usable, total, 1.0), -np.inf).max(axis=1))
+    return np.where(np.isfinite(found), found, np.nan)
 
 
 def _pressure_angle(cams: Slab) -> FloatArray:
-    angle = np.arctan2(1.0 + cams.slope * cams.tangent, cams.slope - cams.tangent)
-    return np.asarray(np.where(cams.flank, angle, -np.inf).max(axis=1))
+    angle = np.where(cams.flank, _angle(cams.slope, cams.tangent), -np.inf).max(axis=1)
+    if cams.begin is not None:
+        first = np.where(cams.begin.there, _angle(cams.begin.slope, cams.begin.tangent), -np.inf)
+        angle = np.maximum(angle, first[:, 0])
+    return np.where(np.isfinite(angle), angle, np.nan)
+
+
+def _angle(slope: FloatArray, tangent: FloatArray) -> FloatArray:
+    return np.arctan2(1.0 + slope * tangent, slope - tangent)
 
 
 SCALARS: dict[str, Callable[[Slab], FloatArray]] = {
@@ -177,20 +205,7 @@ WINDOWED = frozenset((*METRICS, *CYCLES, *RANGES, RMS))
 KNOWN = WINDOWED | frozenset(DEFINITIONS)
 """Everything that can be asked."""
 
-KNOWN_OF_BUILT = frozenset(
-    (
-        *METRICS,
-        RMS,
-        "hysteresis_area",
-        "force_constant",
-        "spring_stiffness",
-        "theoretical_force",
-        "undercut_travel",
-        "spring_elongation_max",
-        "contact_force_max",
-        "pressure_angle_max",
-        "brace_angle_max",
-        "friction_half_gap_max",
-    )
-)
-"""What can be asked of mechanisms around one cam that is cut for other parts."""
+STRESSES = ("stress_max", "safety_factor")
+
+KNOWN_OF_BUILT = KNOWN | frozenset(STRESSES)
+"""What can be asked of mechanisms around one cam whose contact is judged."""

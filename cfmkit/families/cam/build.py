@@ -26,6 +26,7 @@ from cfmkit.families.refusals import CannotBuild
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
+    from cfmkit.families.cam.geometry.profile import Real
     from cfmkit.families.cam.spec import CamSpec, Left, Masses, Mechanism, Mounting
     from cfmkit.results import Finding
 
@@ -99,7 +100,12 @@ def hanging_weights(masses: Masses | None) -> tuple[float, float]:
     """Return the weight that hangs on one roller and on the slider [N]: each brace counts half at each end."""
     if masses is None:
         return 0.0, 0.0
-    return GRAVITY * (masses.roller + 0.5 * masses.brace), GRAVITY * (masses.slider + masses.brace)
+    return weights(masses.slider, masses.brace, masses.roller)
+
+
+def weights(slider: Real, brace: Real, roller: Real) -> tuple[Real, Real]:
+    """Return the weights that hang on one roller and on the slider [N] from the masses of the parts [kg]."""
+    return GRAVITY * (roller + 0.5 * brace), GRAVITY * (slider + brace)
 
 
 class Weights(NamedTuple):

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from cfmkit.families.cam.geometry.track_records import TrackStates
     from cfmkit.families.cam.solution import Assembly
     from cfmkit.families.cam.spec import Contact, Mechanism
+    from cfmkit.stock.spec import MaterialSpec
 
 
 YIELD_PRESSURE = 1.67
@@ -39,10 +40,16 @@ def pressure(force: FloatArray, curvature: FloatArray, contact: Contact) -> Floa
     contact : Contact
         Width and material.
     """
-    solid = contact.material
+    return pressure_between(force, curvature, contact.material, contact.width)
+
+
+def pressure_between(
+    force: FloatArray, curvature: FloatArray, solid: MaterialSpec, width: float | FloatArray
+) -> FloatArray:
+    """Return `pressure` of a contact of some width [m], or of many, between bodies of one material [Pa]."""
     modulus = solid.modulus / (2.0 * (1.0 - solid.poisson**2))
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.asarray(np.sqrt(force * modulus * curvature / (np.pi * contact.width)))
+        return np.asarray(np.sqrt(force * modulus * curvature / (np.pi * width)))
 
 
 def flank_curvature(assembly: Assembly, parameter: FloatArray) -> FloatArray:

@@ -13,10 +13,11 @@ import numpy as np
 from cfmkit.families.cam.contact import YIELD_PRESSURE, allowable_stress, worst
 from cfmkit.families.cam.statics import spring_force
 from cfmkit.families.cam.values import (
-    contact_pressure,
+    FlankSamples,
     errors_used,
     half_extent,
     largest,
+    largest_pressure,
     pressure_of,
     root_mean_square,
 )
@@ -271,11 +272,11 @@ def _bearings(solution: Solution) -> Iterator[Finding]:
 
 
 def _pressure(solution: Solution) -> Iterator[Finding]:
-    pressed = contact_pressure(solution)
-    if (top := worst(pressed)) is not None:
-        place = f"at {mm(float(solution.travel[top]))} of travel"
-        if told := overstressed(solution.assembly.spec.mechanism, float(pressed[top]), place):
-            yield told
+    if solution.assembly.spec.mechanism.contact is None:
+        return
+    top, travel = largest_pressure(FlankSamples.of(solution))
+    if told := overstressed(solution.assembly.spec.mechanism, top, f"at {mm(travel)} of travel"):
+        yield told
 
 
 def _where(travel: FloatArray, mask: NDArray[np.bool_]) -> str:

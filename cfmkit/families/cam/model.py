@@ -23,7 +23,7 @@ from cfmkit.curves import Column, Curve
 from cfmkit.families.cam.build import CLOSE, assemble, check_first_pose, check_springs, displacement_origin
 from cfmkit.families.cam.contact import allowable_stress, flank_pressure, stress
 from cfmkit.families.cam.findings import finding, findings_of, left_out
-from cfmkit.families.cam.solution import Assembly, Solution
+from cfmkit.families.cam.solution import ON_CORNER, Assembly, Solution
 from cfmkit.families.cam.statics import Forces, forces
 from cfmkit.families.cam.values import contact_pressure, theoretical_force, values_of
 from cfmkit.families.findings import mm
@@ -226,10 +226,11 @@ class DenseLoop:
         grid = nodes(solution.travel[-1:], np.array([solution.corner_travel]))[0]
         return np.asarray(grid + solution.origin)
 
-    @property
+    @cached_property
     def peaks(self) -> FloatArray:
-        """None: between two samples of a usual curve no cam has a peak of its own."""
-        return np.empty(0)
+        """Places all over the corner of an undercut cam, where the force has a peak between two samples [m]."""
+        corner = min(self.solution.corner_travel, float(self.solution.travel[-1]))
+        return np.asarray(corner * ON_CORNER + self.solution.origin) if corner > 0 else np.empty(0)
 
     def effort(self, branch: str, places: FloatArray) -> FloatArray:
         """Return the force on the way up or down at displacements of any shape [N]."""

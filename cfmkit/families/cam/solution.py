@@ -24,6 +24,17 @@ if TYPE_CHECKING:
     from cfmkit.results import Finding
 
 
+ON_CORNER = np.linspace(0.0, 1.0, 34)[1:]
+"""Shares of the travel on a corner next to which an extreme of the force is looked for: its end is a kink."""
+
+
+def pressure_angle(states: TrackStates, brace_length: float) -> FloatArray:
+    """Return the angle between a brace's pull and its roller's motion [rad]; at 90 deg the slider moves nothing."""
+    slope, tangent = states.slope, brace_tangent(states.x, brace_length)
+    angle: FloatArray = np.arctan2(1.0 + slope * tangent, slope - tangent)
+    return angle
+
+
 @dataclass(frozen=True)
 class Assembly:
     """A mechanism put together.
@@ -115,9 +126,7 @@ class Solution:
     @cached_property
     def pressure_angle(self) -> FloatArray:
         """Angle between the brace's pull and the roller's motion [rad]; at 90 deg the slider moves nothing."""
-        slope, tangent = self.states.slope, brace_tangent(self.states.x, self.assembly.track.brace_length)
-        angle: FloatArray = np.arctan2(1.0 + slope * tangent, slope - tangent)
-        return angle
+        return pressure_angle(self.states, self.assembly.track.brace_length)
 
     @cached_property
     def elongation(self) -> FloatArray:

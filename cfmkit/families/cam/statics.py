@@ -45,7 +45,7 @@ if TYPE_CHECKING:
 GRAVITY = 9.81
 """Standard acceleration used throughout [m/s^2]."""
 
-_SHARES = np.sort(np.concatenate([[0.0], np.geomspace(1e-6, 1.0, 40), 1.0 - np.geomspace(1e-6, 0.1, 20)]))
+JAM_SHARES = np.sort(np.concatenate([[0.0], np.geomspace(1e-6, 1.0, 40), 1.0 - np.geomspace(1e-6, 0.1, 20)]))
 """Where to look for a jam along a part of the track: mostly it is at the ends."""
 
 
@@ -169,7 +169,8 @@ def forces(states: TrackStates, loads: Loads, friction: float, way: float = 1.0)
     at_rest = np.abs(states.x - loads.rest_half_width) <= 1e-15 * loads.rest_half_width
     idle = np.flatnonzero(at_rest & (np.abs(lever) < 1e-13))
     if idle.size and not weight:
-        pull[idle] = _at_dead_point(slope[idle], states.bend[idle], loads, friction)
+        parts = loads.rest_half_width, loads.brace_length, loads.stiffness
+        pull[idle] = at_dead_point(slope[idle], states.bend[idle], parts, friction)
         contact[idle] = 0.5 * pull[idle] * along[idle] / turn[idle]
     return Forces(pull + loads.slider_weight, contact, 0.5 * pull * np.sqrt(1.0 + tangent * tangent))
 
@@ -181,17 +182,26 @@ def _over(load: FloatArray, lever: FloatArray) -> FloatArray:
     return np.where(moves | (load == 0), force, np.nan)
 
 
-def _at_dead_point(slope: FloatArray, bend: FloatArray, loads: Loads, friction: float) -> FloatArray:
-    """Return the limit of 0/0, the ratio of the derivatives.
+def at_dead_point(slope: Real, bend: Real, parts: tuple[float, float, float], friction: float) -> Real:
+    """Return the limit of 0/0, the ratio of the derivatives [N].
 
     At the first point of an ideal profile the springs carry nothing and the slider has
     no leverage on the roller; the force has a limit there, which is the constant force.
+
+    Parameters
+    ----------
+    slope, bend : float or (n,) array
+        First and second derivative of the roller's track there [1, 1/m].
+    parts : (float, float, float)
+        Half width at which the springs are at rest [m], length of the brace [m], stiffness of all springs [N/m].
+    friction : float
+        Rolling friction mu: positive on the way up, negative on the way down.
     """
-    x, brace = loads.rest_half_width, loads.brace_length
+    x, brace, stiffness = parts
     across = (brace - x) * (brace + x)
     turn = 1.0 + friction * slope
     lever_rate = bend * (1.0 - friction * brace_tangent(x, brace)) - brace**2 / across**1.5 * turn
-    limit: FloatArray = 4.0 * loads.stiffness * turn / lever_rate
+    limit: Real = 4.0 * stiffness * turn / lever_rate
     return limit
 
 
@@ -273,7 +283,8 @@ def _side(states: TrackStates, loads: Loads, losses: Losses, way: float, outward
     pull, bend = np.where(idle, 0.0, pull), np.where(idle, 0.0, bend)
     if not turn and not losses.pin and not weight and not outward:
         dead = (np.abs(states.x - loads.rest_half_width) <= 1e-15 * loads.rest_half_width) & (np.abs(lever) < 1e-13)
-        pull = np.where(dead, 0.5 * _at_dead_point(slope, states.bend, loads, 0.0), pull)
+        parts = loads.rest_half_width, loads.brace_length, loads.stiffness
+        pull = np.where(dead, 0.5 * at_dead_point(slope, states.bend, parts, 0.0), pull)
     contact = ((slope - turn) * (pulled + bend + pull * tangent) + one * (pull - weight)) / ((1.0 + turn**2) * along)
     return _Side(pull, pull * tangent + bend, contact, (pull + bend * cos * sin) / cos)
 
@@ -367,7 +378,7 @@ def jams(
 
 def _places(part: TrackStretch, states: TrackStates | None) -> FloatArray:
     """Return where to look for a jam on a stretch: its parameters in increasing order."""
-    grid = part.low + (part.high - part.low) * _SHARES
+    grid = part.low + (part.high - part.low) * JAM_SHARES
     if states is not None:
         known = np.arctan(states.slope[states.on_corner]) if part.on_corner else states.parameter[~states.on_corner]
         grid = np.sort(np.concatenate([known, grid]))

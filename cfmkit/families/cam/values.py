@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cfmkit.families.cam.contact import flank_pressure
-from cfmkit.families.cam.statics import Losses, forces, normal_turn
-from cfmkit.numerics import sampled_extremes
+from cfmkit.families.cam.geometry.track_records import TrackStates
+from cfmkit.families.cam.solution import ON_CORNER, pressure_angle
+from cfmkit.families.cam.statics import Forces, Losses, forces, normal_turn
+from cfmkit.metrics.closed import extremes
 from cfmkit.results import Quantity
 from cfmkit.specs.units import between
 
@@ -19,7 +22,6 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.families.cam.solution import Assembly, Built, Solution
-    from cfmkit.families.cam.statics import Forces
 
 
 BUILT_DEFINITIONS = {
@@ -132,7 +134,7 @@ def values_of(solution: Solution) -> Mapping[str, Quantity]:
     """Return the scalar results by name; None where a value does not exist."""
     assembly = solution.assembly
     law = assembly.profile.path.law
-    flank = ~solution.states.on_corner
+    flank = FlankSamples.of(solution)
     numbers: dict[str, float | None] = {
         **design_values(assembly),
         "undercut_travel": solution.corner_travel,
@@ -142,12 +144,12 @@ def values_of(solution: Solution) -> Mapping[str, Quantity]:
         "jam_travel": next((high for low, high in solution.jams if low == 0), 0.0),
         "spring_elongation_max": float(solution.elongation.max()),
         "contact_force_max": largest(solution.up.contact, solution.down.contact),
-        "pressure_angle_max": largest(solution.pressure_angle[flank]),
+        "pressure_angle_max": largest(flank.pressure_angle),
         "brace_angle_max": float(np.arcsin(solution.states.x.max() / assembly.track.brace_length)),
-        "friction_half_gap_max": _half_gap(solution, flank),
+        "friction_half_gap_max": _half_gap(flank),
     }
     if assembly.spec.mechanism.contact:
-        numbers["contact_pressure_max"] = largest(contact_pressure(solution)[flank])
+        numbers["contact_pressure_max"] = largest_pressure(flank)[0]
     if assembly.loads.losses is not None:
         numbers |= loop_shares(solution)
     if assembly.spec.mechanism.bearings:
@@ -231,25 +233,93 @@ def _bearing(solution: Solution) -> dict[str, float | None]:
     return found
 
 
-def _half_gap(solution: Solution, flank: NDArray[np.bool_]) -> float | None:
-    up, down = solution.up.slider, solution.down.slider
-    usable = flank & np.isfinite(up) & np.isfinite(down) & (up + down > 0)
+@dataclass(frozen=True, eq=False)
+class FlankSamples:
+    """What rolls on the flank: the samples there, and before them the place at which the roller leaves the corner.
+
+    Attributes
+    ----------
+    solution : Solution
+        The mechanism.
+    travel : (n,) array
+        Increasing [m].
+    states : TrackStates
+        Where the rollers are, (n,).
+    up, down : Forces
+        On the way up and on the way down, (n,) each.
+    """
+
+    solution: Solution
+    travel: FloatArray
+    states: TrackStates
+    up: Forces
+    down: Forces
+
+    @classmethod
+    def of(cls, solution: Solution) -> FlankSamples:
+        """Return those of a solved mechanism."""
+        corner = solution.corner_travel
+        if not 0 < corner <= solution.travel[-1]:
+            keep = ~solution.states.on_corner
+            states = TrackStates(*(field[keep] for field in solution.states.fields()))
+            up, down = (Forces(one.slider[keep], one.contact[keep], one.brace[keep]) for one in _both(solution))
+            return cls(solution, solution.travel[keep], states, up, down)
+        track, mu = solution.assembly.track, solution.assembly.spec.mechanism.rolling_friction
+        travel = np.concatenate([[corner], solution.travel[~solution.states.on_corner & (solution.travel > corner)]])
+        states = track.states(np.maximum(track.start + travel, track.corner_end))
+        up, down = (forces(states, solution.assembly.loads, way * mu, way) for way in (1.0, -1.0))
+        return cls(solution, travel, states, up, down)
+
+    @property
+    def pressure_angle(self) -> FloatArray:
+        """Angle between the brace's pull and the roller's motion [rad]."""
+        return pressure_angle(self.states, self.solution.assembly.track.brace_length)
+
+    def pressure(self, travel: FloatArray) -> FloatArray:
+        """Return the pressure of the contact on the way up at travels of any shape [Pa]; NaN where there is none."""
+        track, mechanism = self.solution.assembly.track, self.solution.assembly.spec.mechanism
+        states = track.states(np.maximum(track.start + np.ravel(travel), track.corner_end))
+        contact = forces(states, self.solution.assembly.loads, mechanism.rolling_friction).contact
+        return flank_pressure(self.solution.assembly, states, contact).reshape(np.shape(travel))
+
+
+def _both(solution: Solution) -> tuple[Forces, Forces]:
+    return solution.up, solution.down
+
+
+def largest_pressure(flank: FlankSamples) -> tuple[float | None, float]:
+    """Return the largest pressure of the contact on the way up [Pa], None without one, and about where it is [m]."""
+    pressed = flank.pressure(flank.travel)
+    known = np.isfinite(pressed)
+    if not known.any():
+        return None, 0.0
+    travel, pressed = flank.travel[known], pressed[known]
+    top, _ = extremes(flank.pressure, travel[None, :], pressed[None, :], uneven=True)
+    return float(top[0]), float(travel[np.argmax(pressed)])
+
+
+def _half_gap(flank: FlankSamples) -> float | None:
+    up, down = flank.up.slider, flank.down.slider
+    usable = np.isfinite(up) & np.isfinite(down) & (up + down > 0)
     return largest(((up - down) / np.where(usable, up + down, 1.0))[usable])
 
 
 def _corner_peak(solution: Solution) -> float | None:
-    """Return the peak force on the corner, from samples refined by a parabola through the highest [N]."""
+    """Return the peak force on the corner, on the way up [N]."""
     assembly = solution.assembly
     corner = min(solution.corner_travel, float(solution.travel[-1]))
     if corner <= 0 or any(low < corner for low, _ in solution.jams):  # next to a jam the force is unbounded
         return None
-    travel = np.linspace(0.0, corner * (1 - 1e-9), 129)
-    states = assembly.track.states(assembly.track.start + travel)
-    force = forces(states, assembly.loads, assembly.spec.mechanism.rolling_friction, 1.0).slider
-    top = int(np.argmax(force))
-    if not 0 < top < len(force) - 1:
-        return float(force[top])
-    return float(sampled_extremes.largest(travel, force)[0])
+
+    def force(travel: FloatArray) -> FloatArray:
+        states = assembly.track.states(assembly.track.start + np.ravel(travel))
+        found = forces(states, assembly.loads, assembly.spec.mechanism.rolling_friction).slider
+        return np.asarray(found.reshape(np.shape(travel)))
+
+    travel = np.concatenate([[0.0], corner * ON_CORNER])[None, :]
+    found = force(travel)
+    known = np.isfinite(found[0])
+    return float(extremes(force, travel[:, known], found[:, known], uneven=True)[0][0])
 
 
 def values_of_built(built: Built) -> Mapping[str, Quantity]:
