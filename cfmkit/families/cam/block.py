@@ -194,7 +194,7 @@ def _one_cam(spec: CamSpec, block: Block) -> bool:
     fixed = (profile.brace_length, profile.rest_half_width, profile.roller_radius)
     stroke = profile.stroke or analysis.travel or (spec.design.stroke if spec.design else None)
     asked = [*(ends for _, ends in spec.windows()), *(one.window for one in block.measures if one.window)]
-    if any(isinstance(end, Share) or end < 0 for ends in asked for end in ends):
+    if any(isinstance(end, Share) or end < 0 for ends in requested end in ends):
         return False
     if None in (*fixed, stroke) or mechanism.left or mechanism.errors or profile.file:
         return False
