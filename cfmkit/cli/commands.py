@@ -125,6 +125,22 @@ def _place(field: dataclasses.Field[Any]) -> int:
     return int(field.name in {item.name for item in dataclasses.fields(Common)})
 
 
+ALONE = ("--figure",)
+"""Options whose value may be left out; typer has none of that kind, so an empty value is written for it."""
+
+
+def _spelled(arguments: list[str]) -> list[str]:
+    """Return arguments with an empty value where one is left out.
+
+    Examples
+    --------
+    >>> _spelled(["show", "--figure", "--json"])
+    ['show', '--figure=', '--json']
+    """
+    followed = zip(arguments, [*arguments[1:], "-"], strict=False)
+    return [f"{one}=" if one in ALONE and after.startswith("-") else one for one, after in followed]
+
+
 def parse(app: typer.Typer, arguments: list[str]) -> Call | None:
     """Return what a command line asks for; None if the parser answered it itself (``--help``).
 
@@ -134,7 +150,7 @@ def parse(app: typer.Typer, arguments: list[str]) -> Call | None:
         Of typer's kind, if it is malformed.
     """
     try:
-        call = _plain(typer.main.get_command(app)).main(arguments, "cfmkit", standalone_mode=False)
+        call = _plain(typer.main.get_command(app)).main(_spelled(arguments), "cfmkit", standalone_mode=False)
     except SystemExit:
         # The reader of the help text has left.
         return None

@@ -290,6 +290,9 @@ class Family:
         of its departure from the model, by name, and their `DEFINITIONS`; imported when there is a measurement.
     draw : str, optional
         ``"module"`` with ``figures(result)``, imported when drawing.
+    scheme : str, optional
+        ``"module"`` with ``figure()``: a drawing of the mechanism with its dimensions named, and `DIMENSIONS`, which
+        key of the specification each of them is; imported when it is shown.
     outline : str, optional
         ``"module"`` with ``drawing(spec, tolerance)``, imported when exporting. Edges that are not
         `Smooth` lie within the tolerance [m] of the exact ones; smooth ones are fitted by whoever writes them.
@@ -324,6 +327,7 @@ class Family:
     gradient: Callable[[Any, Sequence[str]], Any] | None = None
     attribution: str | None = None
     draw: str | None = None
+    scheme: str | None = None
     outline: str | None = None
     room: str | None = None
     headline: tuple[str, ...] = ()

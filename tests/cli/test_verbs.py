@@ -213,7 +213,7 @@ def test_show_cam_says_kind_default_and_bounds_of_a_key(cli):
     assert keys["mechanism.brace_length"]["allowed"] == "> 0"
     assert keys["mechanism.plate.top_margin"]["default"] == "10 mm"
     assert keys["mechanism.springs.stiffness"]["kind"] == "stiffness or list of stiffness"
-    assert keys["design.choose"]["kind"] == "force-constant | stiffness | catalogue"
+    assert keys["design.choose"]["kind"] == "force-constant | stiffness | catalogue | preload"
     assert keys["design.catalogue[].name"]["kind"] == "text"
     assert keys["analysis.points"]["default"] == "481"
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Annotated
 
 from cfmkit.cli import completion
 from cfmkit.cli.answer import Answer, told_of
-from cfmkit.cli.options import Common, argument
+from cfmkit.cli.options import Common, argument, option
+from cfmkit.cli.page_blocks import BLANK, GOOD, Paragraph, field, listed
+from cfmkit.errors import visible
 
 if TYPE_CHECKING:
     from cfmkit.cli.terminal import Terminal
@@ -27,11 +29,42 @@ class ShowOptions(Common):
             completion.topics,
         ),
     ] = None
+    figure: Annotated[
+        str | None,
+        option(
+            "--figure",
+            metavar="[FILE]",
+            text="Write a drawing of a family with its dimensions named: .png, .svg or .pdf; default: FAMILY.png.",
+        ),
+    ] = None
 
 
 def run(options: ShowOptions, terminal: Terminal) -> Answer:
     """Explain a family with every key of its spec, list units, metrics, materials or papers, or explain one by name."""
     from cfmkit.cli.topics import explain, skipped
 
+    if options.figure is not None:
+        return _drawn(options.topic, options.figure)
     found = explain(options.topic)
     return told_of(skipped(options.topic), replace(found, data={"show": options.topic, **found.data}))
+
+
+def _drawn(name: str | None, given: str) -> Answer:
+    """Write the drawing of a family to a file that is not there yet."""
+    from pathlib import Path
+
+    from cfmkit.runs.scheme import drawn, scheme
+    from cfmkit.store.disk import reporting, write_new
+
+    found = scheme(name)
+    path = Path(given or f"{found.family}.png")
+    content = drawn(found, path.suffix)
+    with reporting(path):
+        write_new(path, content)
+    known = [asdict(one) for one in found.dimensions]
+    page = (
+        *listed("", known, (field("symbol"), field("key", wraps=True), field("meaning", wraps=True))),
+        BLANK,
+        Paragraph("written", visible(str(path)), GOOD),
+    )
+    return Answer({"show": name, "dimensions": known, "file": str(path)}, page)

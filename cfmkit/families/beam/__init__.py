@@ -24,6 +24,7 @@ FAMILY = Family(
     values=DEFINITIONS | SURFACE,
     resolve=resolve,
     draw="cfmkit.families.beam.draw",
+    scheme="cfmkit.families.beam.scheme",
     outline="cfmkit.families.beam.outline",
     room="cfmkit.families.beam.room:room",
     headline=(

@@ -22,6 +22,7 @@ FAMILY = Family(
     resolve=resolve,
     attribution="cfmkit.families.cam.attribution",
     draw="cfmkit.families.cam.draw",
+    scheme="cfmkit.families.cam.scheme",
     analyze_block=analyze_block,
     outline="cfmkit.families.cam.outline",
     room="cfmkit.families.cam.room:room",

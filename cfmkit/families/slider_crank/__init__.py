@@ -29,6 +29,7 @@ FAMILY = Family(
     resolve=resolve,
     gradient=gradient,
     draw="cfmkit.families.slider_crank.dispatch",
+    scheme="cfmkit.families.slider_crank.scheme",
     outline="cfmkit.families.slider_crank.dispatch",
     room="cfmkit.families.slider_crank.room:room",
     headline=("stiffness_class", "band_range_05pct", "half_band", "energy_max", "crank_pin_rotation_max"),

@@ -18,6 +18,7 @@ FAMILY = Family(
     design=design,
     values=DEFINITIONS,
     draw="cfmkit.families.vcfm.draw",
+    scheme="cfmkit.families.vcfm.scheme",
     outline="cfmkit.families.vcfm.outline",
     room="cfmkit.families.vcfm.room:room",
     analyze_block=analyze_block,
