@@ -27,6 +27,8 @@ STRAY = 0.5
 SOFTLY = 1e-3
 """Corrections below this part of the part's size count as small: next to a bifurcation rounding is amplified along the
 soft mode beyond any short step."""
+FARTHEST = 2.5
+"""Step, in those of the last one, up to which a cubic is a better prediction than a tangent."""
 GROWTH = 2.0
 """Of the step after one that was easy."""
 CORNER = 0.3
@@ -99,10 +101,11 @@ def follow(problem: Problem, stops: Sequence[float], report: Callable[[float], N
         return Course((), Ending.NO_START)
     span = stops[-1] - stops[0]
     course, state, step = Course((start.kept(),), Ending.COMPLETE), start, stops[1] - stops[0]
+    before: Balance | None = None
     for stop in stops[1:]:
         while state.travel != stop:
             ahead = stop if abs(stop - state.travel) <= abs(step) * (1 + 1e-9) else state.travel + step
-            found = advanced(problem, state, ahead)
+            found = advanced(problem, state, ahead, before)
             if found is not None and found.unstable <= state.unstable:
                 step = GROWTH * (ahead - state.travel)
             elif abs(ahead - state.travel) > SMALLEST * abs(span):
@@ -114,8 +117,10 @@ def follow(problem: Problem, stops: Sequence[float], report: Callable[[float], N
                 step = SMALLEST * span
                 if found is None:
                     return replace(course, ending=_ending(start, state, beyond))
+            before = state.kept()
             if bends(state, found, 8 * SMALLEST * abs(span)):
                 course = replace(course, bifurcations=(*course.bifurcations, state.travel))
+                before = None  # no cubic leads round a corner
             course, state = replace(course, poses=(*course.poses, found.kept())), found
             report((state.travel - stops[0]) / span)
     return course
@@ -127,15 +132,29 @@ def bends(state: Balance, found: Balance, short: float) -> bool:
     return abs(found.travel - state.travel) <= short and abs(found.stiffness - state.stiffness) > CORNER * largest
 
 
-def advanced(problem: Problem, state: Balance, travel: float) -> Balance | None:
-    """Return the pose at a travel that continues the path from a pose; None where there is none in reach."""
+def advanced(problem: Problem, state: Balance, travel: float, before: Balance | None = None) -> Balance | None:
+    """Return the pose at a travel that continues the path from a pose; None where there is none in reach.
+
+    With a pose before it, on the same branch, the prediction is the cubic through both with their slopes.
+    """
     predicted = state.slope * (travel - state.travel)
+    if before is not None and abs(travel - state.travel) <= FARTHEST * abs(state.travel - before.travel):
+        predicted = predicted + _bending(before, state, travel)
     found = problem.solve(state.unknowns + predicted, travel)
     if found is None:
         return None
     size = float(np.ptp(problem.elements.mesh.nodes, axis=0).max())
     correction = float(np.abs(found.unknowns - state.unknowns - predicted).max())
     return found if correction <= STRAY * float(np.abs(predicted).max()) + SOFTLY * size else None
+
+
+def _bending(before: Balance, state: Balance, travel: float) -> FloatArray:
+    """Return by how much the cubic through two poses departs from the tangent at the second, at a travel."""
+    way, ahead = state.travel - before.travel, (travel - state.travel) / (state.travel - before.travel)
+    # in s = (t - t2)/way: u = u2 + s way u2' + s^2 a + s^3 b, with u and u' of the first pose at s = -1
+    gap = before.unknowns - state.unknowns + way * state.slope
+    drop = way * (before.slope - state.slope)
+    return np.asarray(ahead**2 * (3 * gap + drop) + ahead**3 * (2 * gap + drop))
 
 
 def softest(problem: Problem, state: Balance) -> FloatArray:

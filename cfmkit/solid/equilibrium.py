@@ -7,7 +7,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.sparse import csc_array
+from scipy.sparse import block_array, csc_array
 from scipy.sparse.linalg import splu
 
 if TYPE_CHECKING:
@@ -21,6 +21,10 @@ CLOSE = 1e-9
 """Largest force out of balance, in parts of the largest nodal force: Newton's last step is then below 1e-9, too."""
 ROUNDS = 12
 """Of Newton's method; steps that need more are too long: from a predictor three to five are usual."""
+CORRECTIONS, SHRINK = 10, 0.25
+"""With the factors of one tangent, and how much smaller each must be: one costs a sixth of new factors."""
+REFINEMENTS, FINE = 6, 1e-7
+"""Of the path's slope with factors of a tangent nearby, until the last changes it by less than this part."""
 FAR = 0.5
 """Largest correction in one round, in parts of the part's size: farther away the tangent says nothing."""
 
@@ -93,8 +97,9 @@ class Linear:
 
     Attributes
     ----------
-    factors : Factors
-        Of the tangent.
+    matrix : csc_array
+        The tangent (q, q), unknowns in the order of `order`.
+    order : (q,) array of int
     slope : (q,) array
         Derivative of the residual with respect to the travel.
     pinned : float
@@ -105,11 +110,58 @@ class Linear:
         On the nodes [N].
     """
 
-    factors: Factors
+    matrix: csc_array
+    order: NDArray[np.int64]
     slope: FloatArray
     pinned: float
     residual: FloatArray
     forces: FloatArray
+
+    def factored(self) -> Factors:
+        """Return the tangent's factors; RuntimeError where it is singular."""
+        found = splu(self.matrix, permc_spec="NATURAL", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+        return Factors(found, self.order)
+
+    def times(self, vector: FloatArray) -> FloatArray:
+        """Return the tangent times a vector (q,)."""
+        found = np.empty_like(vector)
+        found[self.order] = self.matrix @ vector[self.order]
+        return found
+
+
+@dataclass(frozen=True)
+class Selection:
+    """Where the stiffnesses of loose nodes by each other stand among all, in an order in which factors stay sparse.
+
+    Attributes
+    ----------
+    order : (l,) array of int
+        Of the loose displacements: minimum degree.
+    entries, indices, starts : arrays of int
+        Which entries of the whole matrix, and the pattern of what they make.
+    """
+
+    order: NDArray[np.int64]
+    entries: NDArray[np.int64]
+    indices: NDArray[np.int32]
+    starts: NDArray[np.int32]
+
+    @classmethod
+    def of(cls, stiffness: csc_array, loose: NDArray[np.int64]) -> Selection:
+        """Return the selection of some displacements of a matrix, whose pattern stays."""
+        own = csc_array(stiffness[loose][:, loose])
+        first = splu(own, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+        order = np.argsort(first.perm_c)
+        count = np.arange(1.0, stiffness.nnz + 1)  # numbers of the entries: none is 0, none is lost
+        numbers = csc_array((count, stiffness.indices, stiffness.indptr), shape=stiffness.shape)
+        kept = csc_array(numbers[loose[order]][:, loose[order]])
+        kept.sort_indices()
+        return cls(order, kept.data.astype(np.int64) - 1, kept.indices, kept.indptr)
+
+    def taken(self, stiffness: csc_array) -> csc_array:
+        """Return these entries as a matrix (l, l)."""
+        size = len(self.order)
+        return csc_array((stiffness.data[self.entries], self.indices, self.starts), shape=(size, size))
 
 
 @dataclass(frozen=True)
@@ -130,57 +182,83 @@ class Problem:
         return float(np.ptp(self.elements.mesh.nodes, axis=0).max())
 
     def linearised(self, unknowns: FloatArray, travel: float) -> Linear:
-        """Return the problem's linearisation at some displacements; RuntimeError where the tangent is singular."""
+        """Return the problem's linearisation at some displacements; RuntimeError where it is singular at first."""
         moved = self.supports.displaced(unknowns, travel)
         forces, stiffness = self.elements.tangent(moved)
-        matrix, slope, pinned = self.supports.condensed(unknowns, travel, forces, stiffness)
-        order = self._order(matrix)
-        shuffled = csc_array(matrix[order][:, order])
-        found = splu(shuffled, permc_spec="NATURAL", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
-        residual = self.supports.residual(unknowns, travel, forces)
-        return Linear(Factors(found, order), slope, pinned, residual, forces)
+        beside, corner, slope, pinned = self.supports.borders(unknowns, travel, forces, stiffness)
+        selection = self._selection(stiffness)
+        order = np.concatenate([selection.order, np.arange(len(selection.order), self.supports.size)])
+        matrix = selection.taken(stiffness)
+        if len(corner):  # free motions are last: their full rows fill nothing in
+            side = csc_array(beside[selection.order])
+            matrix = csc_array(block_array([[matrix, side], [side.T, csc_array(corner)]], format="csc"))
+        return Linear(matrix, order, slope, pinned, self.supports.residual(unknowns, travel, forces), forces)
 
-    def _order(self, matrix: csc_array) -> NDArray[np.int64]:
-        """Return the order of the unknowns in which factors stay sparse: minimum degree, found once."""
-        found: NDArray[np.int64] | None = self.__dict__.get("_found_order")
+    def _selection(self, stiffness: csc_array) -> Selection:
+        """Return the selection of the loose displacements, found once."""
+        found: Selection | None = self.__dict__.get("_found_selection")
         if found is None:
-            first = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
-            found = np.argsort(first.perm_c)
-            self.__dict__["_found_order"] = found
+            found = Selection.of(stiffness, self.supports.loose)
+            self.__dict__["_found_selection"] = found
         return found
 
     def solve(self, guess: FloatArray, travel: float) -> Balance | None:
-        """Return the equilibrium near a guess; None where Newton's method finds none."""
+        """Return the equilibrium near a guess; None where Newton's method finds none.
+
+        Factors of a tangent serve as long as each correction is much smaller than the last.
+        """
         unknowns = guess.copy()
         with np.errstate(all="ignore"):
             for _ in range(ROUNDS):
                 try:
                     here = self.linearised(unknowns, travel)
+                    factors = here.factored()
                 except RuntimeError:  # exactly singular
                     return None
-                largest = float(np.abs(here.forces).max())
-                step = here.factors.solve(here.residual)
-                if not np.isfinite(largest) or not self._near(step):
+                step = factors.solve(here.residual)
+                if not self._believed(here.forces, step):
                     return None
-                if np.abs(here.residual).max(initial=0.0) <= CLOSE * largest:
-                    return self._balance(unknowns, travel, here)
+                if self._balanced(here.residual, here.forces):
+                    return self._balance(unknowns, travel, here, factors)
                 unknowns = unknowns - step
+                for _ in range(CORRECTIONS):
+                    forces = self.elements.forces(self.supports.displaced(unknowns, travel))
+                    residual = self.supports.residual(unknowns, travel, forces)
+                    if self._balanced(residual, forces):
+                        return self._balance(unknowns, travel, self.linearised(unknowns, travel), factors)
+                    more = factors.solve(residual)
+                    if not np.abs(more).max() <= SHRINK * np.abs(step).max():
+                        break
+                    unknowns, step = unknowns - more, more
         return None
 
-    def _near(self, step: FloatArray) -> bool:
-        """Tell whether a correction is small enough to be believed."""
-        return bool(np.abs(step[: len(self.supports.loose)]).max(initial=0.0) < FAR * self._scale)
+    def _balanced(self, residual: FloatArray, forces: FloatArray) -> bool:
+        return bool(np.abs(residual).max(initial=0.0) <= CLOSE * np.abs(forces).max())
 
-    def _balance(self, unknowns: FloatArray, travel: float, here: Linear) -> Balance:
-        slope = -here.factors.solve(here.slope)
+    def _believed(self, forces: FloatArray, step: FloatArray) -> bool:
+        """Tell whether a correction is small enough to be believed."""
+        finite = np.isfinite(np.abs(forces).max())
+        return bool(finite and np.abs(step[: len(self.supports.loose)]).max(initial=0.0) < FAR * self._scale)
+
+    def _balance(self, unknowns: FloatArray, travel: float, here: Linear, factors: Factors) -> Balance | None:
+        """Return the equilibrium, with factors of a tangent close to its own; None where they are not close enough."""
+        slope = -factors.solve(here.slope)
+        for _ in range(REFINEMENTS):
+            more = factors.solve(here.times(slope) + here.slope)
+            slope = slope - more
+            if np.abs(more).max() <= FINE * np.abs(slope).max():
+                break
+        else:
+            factors = here.factored()
+            slope = -factors.solve(here.slope)
         return Balance(
             travel,
             unknowns,
             self._effort(unknowns, travel, here.forces),
             here.pinned + float(slope @ here.slope),
-            here.factors.negative,
+            factors.negative,
             slope,
-            here.factors,
+            factors,
         )
 
     def _effort(self, unknowns: FloatArray, travel: float, forces: FloatArray) -> float:

@@ -12,12 +12,12 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.sparse import csc_array, hstack
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
+    from scipy.sparse import csc_array
 
     from cfmkit.arrays import FloatArray
 
@@ -88,11 +88,6 @@ class Supports:
         """Number of unknowns."""
         return int(len(self.loose) + sum(group.free.shape[1] for group in self.groups))
 
-    @cached_property
-    def _loose(self) -> csc_array:
-        count = len(self.loose)
-        return csc_array((np.ones(count), (self.loose, np.arange(count))), shape=(2 * len(self.places), count))
-
     def motions(self, unknowns: FloatArray, travel: float) -> list[FloatArray]:
         """Return x, y [m] and turn [rad] of every group."""
         found, first = [], len(self.loose)
@@ -134,40 +129,39 @@ class Supports:
         ends = [group.free.T @ reaction for group, reaction in zip(self.groups, reactions, strict=True)]
         return np.concatenate([forces.ravel()[self.loose], *ends])
 
-    def condensed(
+    def borders(
         self, unknowns: FloatArray, travel: float, forces: FloatArray, stiffness: csc_array
-    ) -> tuple[csc_array, FloatArray, float]:
-        """Return the derivatives of the residual with respect to the unknowns and to the travel, and the effort's.
+    ) -> tuple[FloatArray, FloatArray, FloatArray, float]:
+        """Return the derivatives of the residual that are not those of loose nodes by each other, and the effort's.
 
-        The last is the derivative of the effort on the drive with respect to the travel, the unknowns held.
+        Returns
+        -------
+        beside : (l, f) array
+            Of the l residuals of loose nodes with respect to the f free motions.
+        corner : (f, f) array
+            Of the free motions' residuals with respect to them.
+        slope : (l + f,) array
+            Of all residuals with respect to the travel.
+        pinned : float
+            Of the effort on the drive with respect to the travel, the unknowns held.
         """
         motions = self.motions(unknowns, travel)
-        columns, curvatures = [self._loose], np.zeros(len(self.groups))
-        along = np.zeros(2 * len(self.places))
-        for k, (group, motion, lever) in enumerate(zip(self.groups, motions, self._levers(motions), strict=True)):
+        count = sum(group.free.shape[1] for group in self.groups)
+        ways = np.zeros((2 * len(self.places), count + 1))  # the last: what the travel moves
+        corner, bent, pinned, first = np.zeros((count, count)), np.zeros(count), 0.0, 0
+        for group, motion, lever in zip(self.groups, motions, self._levers(motions), strict=True):
             rows = (2 * group.nodes[:, None] + np.arange(2)).ravel()
-            along[rows] = lever @ group.driven
-            free = group.free.shape[1]
-            values = (lever @ group.free).ravel()
-            place = (np.repeat(rows, free), np.tile(np.arange(free), len(rows)))
-            columns.append(csc_array((values, place), shape=(2 * len(self.places), free)))
+            last = first + group.free.shape[1]
+            ways[rows, first:last] = lever @ group.free
+            ways[rows, -1] = lever @ group.driven
             arm = (self.places[group.nodes] - group.center) @ turned(motion[2], 2).T
-            curvatures[k] = float((forces[group.nodes] * arm).sum())
-        every = csc_array(hstack(columns))
-        pulled = stiffness @ every
-        matrix, slope = csc_array(every.T @ pulled), pulled.T @ along
-        first = len(self.loose)
-        bent = np.zeros(self.size)
-        added: list[tuple[int, int, float]] = []
-        for group, curvature in zip(self.groups, curvatures, strict=True):
+            curvature = float((forces[group.nodes] * arm).sum())
             turns = group.free[2]
-            bent[first : first + len(turns)] = curvature * turns * group.driven[2]
-            added += [
-                (first + i, first + j, curvature * a * b) for i, a in enumerate(turns) for j, b in enumerate(turns)
-            ]
-            first += len(turns)
-        if added:
-            i, j, value = zip(*added, strict=True)
-            matrix = csc_array(matrix + csc_array((value, (i, j)), shape=matrix.shape))
-        turned_by = sum(c * group.driven[2] ** 2 for c, group in zip(curvatures, self.groups, strict=True))
-        return matrix, slope + bent, float(along @ (stiffness @ along) + turned_by)
+            corner[first:last, first:last] = curvature * np.outer(turns, turns)
+            bent[first:last] = curvature * turns * group.driven[2]
+            pinned += curvature * group.driven[2] ** 2
+            first = last
+        pulled = stiffness @ ways
+        corner += ways[:, :-1].T @ pulled[:, :-1]
+        slope = np.concatenate([pulled[self.loose, -1], ways[:, :-1].T @ pulled[:, -1] + bent])
+        return pulled[self.loose, :-1], corner, slope, pinned + float(ways[:, -1] @ pulled[:, -1])

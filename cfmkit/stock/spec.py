@@ -138,7 +138,7 @@ class PaddedPart(CutPart):
     )
 
 
-def sheet_faults(part: CutPart | None, widths: Mapping[str, float | None]) -> dict[tuple[str, ...], str]:
+def sheet_faults(part: CutPart | None, widths: Mapping[str, float | None]) -> dict[tuple[str | int, ...], str]:
     """Return the fault of a sheet from which not every width, by its key below `mechanism`, can be cut; else nothing.
 
     Examples

@@ -114,12 +114,14 @@ class SolidSolution:
     @cached_property
     def differences(self) -> tuple[float, float]:
         """Of force and of largest stress, between the meshes, in parts of the finer one's largest."""
-        last = min(abs(one.course.travel[-1]) for one in (self.fine, self.coarse))
-        poses = self.fine.course.travel[np.abs(self.fine.course.travel) <= last]
-        force, other = (one.course.effort(poses) for one in (self.fine, self.coarse))
-        peaks = [float(one.peaks[0][np.abs(one.course.travel) <= last].max()) for one in (self.fine, self.coarse)]
+        _, one, other = np.intersect1d(self.fine.course.travel, self.coarse.course.travel, return_indices=True)
+        force, coarse = (
+            np.array([mesh.course.poses[k].effort for k in which])
+            for mesh, which in ((self.fine, one), (self.coarse, other))
+        )
+        peaks = [float(mesh.peaks[0][which].max()) for mesh, which in ((self.fine, one), (self.coarse, other))]
         largest = float(np.abs(force).max())
-        apart = float(np.abs(force - other).max()) / largest if largest else 0.0
+        apart = float(np.abs(force - coarse).max()) / largest if largest else 0.0
         return apart, abs(peaks[1] / peaks[0] - 1) if peaks[0] else 0.0
 
 
@@ -146,7 +148,10 @@ def analyze(spec: BeamSpec, run: Run) -> Result:
     stops = _stops(spec)
     try:
         part = part_of(spec, assembly)
-        coarse = part.meshed(COARSER * size).followed(stops, lambda share: run.progress(0.35 * share, "coarser mesh"))
+        every_second = [*stops[:-1:2], stops[-1]]
+        coarse = part.meshed(COARSER * size).followed(
+            every_second, lambda share: run.progress(0.35 * share, "coarser mesh")
+        )
         fine = part.meshed(size).followed(stops, lambda share: run.progress(0.35 + 0.65 * share, "finer mesh"))
     except GeometryError as error:
         message = f"the part cannot be meshed: {error}; look at analysis.solid.mesh and mechanism.part"
