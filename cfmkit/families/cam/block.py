@@ -193,8 +193,8 @@ def _one_cam(spec: CamSpec, block: Block) -> bool:
     mechanism, profile, analysis = spec.mechanism, spec.mechanism.profile, spec.analysis
     fixed = (profile.brace_length, profile.rest_half_width, profile.roller_radius)
     stroke = profile.stroke or analysis.travel or (spec.design.stroke if spec.design else None)
-    asked = [*(ends for _, ends in spec.windows()), *(one.window for one in block.measures if one.window)]
-    if any(isinstance(end, Share) or end < 0 for ends in requested end in ends):
+    windows = [*(ends for _, ends in spec.windows()), *(one.window for one in block.measures if one.window)]
+    if any(isinstance(end, Share) or end < 0 for ends in windows for end in ends):
         return False
     if None in (*fixed, stroke) or mechanism.left or mechanism.errors or profile.file:
         return False
