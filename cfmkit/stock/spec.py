@@ -1,7 +1,7 @@
 """How every family's specification says what a part is made of, and how much of its strength may be used.
 
 One grammar: a name from the library, a block of values, or a name with some of its values changed; and one for how
-a part is cut.
+a part is cut, and for plain pins and guides that rub.
 One rule: the allowable stress is the yield strength over `safety_factor`, which is 1 unless given.
 """
 
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Self
 from pydantic import BeforeValidator, Field, model_validator
 
 from cfmkit.specs.spec import Model, refuse
-from cfmkit.specs.units import Length, Ratio, Stress, format_short
+from cfmkit.specs.units import Force, Length, Ratio, Stress, format_short
 from cfmkit.specs.units.fields import described
 from cfmkit.stock.materials import UnknownMaterial, material
 
@@ -81,6 +81,38 @@ class MaterialSpec(Model):
     def allowable(self, safety_factor: float) -> float | None:
         """Return the yield strength over a safety factor [Pa]; None where no strength is known."""
         return None if self.yield_strength is None else self.yield_strength / safety_factor
+
+
+Friction = Annotated[Ratio, Field(ge=0, lt=1)]
+
+
+class Pins(Model):
+    """Plain pins that rub as the parts on them turn."""
+
+    diameter: Annotated[Length, Field(gt=0)] = Field(description="of the pins")
+    friction: Friction = Field(0.0, description="Coulomb friction in them")
+
+
+class Guide(Model):
+    """The slider's way: what it takes from the force."""
+
+    friction: Friction = Field(0.0, description="Coulomb friction on what the slider presses across its way")
+    drag: Annotated[Force, Field(ge=0)] = Field(0.0, description="friction without load: seals, preload")
+    length: Annotated[Length, Field(gt=0)] | None = Field(
+        None, description="of the guide, between its ends; needed for 'offset'"
+    )
+    offset: Annotated[Length, Field(ge=0)] = Field(
+        0.0, description="distance of the force's line from the guide's middle"
+    )
+
+    @model_validator(mode="after")
+    def _offset_has_a_length(self) -> Self:
+        if self.offset and self.length is None:
+            raise ValueError("'offset' presses the guide's ends apart: it needs the guide's 'length'")
+        if self.length and 2.0 * self.friction * self.offset >= self.length:
+            jam = format_short(2.0 * self.friction * self.offset, "length")
+            raise ValueError(f"a guide shorter than {jam} (twice friction times offset) jams like a drawer")
+        return self
 
 
 def _as_block(value: Any) -> Any:

@@ -9,14 +9,13 @@ from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, mo
 
 from cfmkit.specs.spec import Analysis, DesignBlock, Model, OldWords, Spec, refuse
 from cfmkit.specs.units import Angle, Force, Inertia, Length, Mass, Ratio, Stiffness, Time, format_short
-from cfmkit.stock.spec import MaterialField, MaterialSpec, SafetyFactor
+from cfmkit.stock.spec import Friction, Guide, MaterialField, MaterialSpec, Pins, SafetyFactor
 from cfmkit.tables.source import DataSource
 
 Positive = Field(gt=0)
 PositiveLength = Annotated[Length, Field(gt=0)]
 PositiveStiffness = Annotated[Stiffness, Field(gt=0)]
 NonNegativeLength = Annotated[Length, Field(ge=0)]
-Friction = Annotated[Ratio, Field(ge=0, lt=1)]
 NonNegativeInertia = Annotated[Inertia, Field(ge=0)]
 SmallAngle = Annotated[Angle, Field(ge=-radians(45), le=radians(45))]
 DesignFriction = Annotated[Ratio, Field(gt=-1, lt=1)]
@@ -154,13 +153,6 @@ class Contact(Model):
     )
 
 
-class Pins(Model):
-    """Slider pin and spring hooks: plain pins that rub as the braces swing."""
-
-    diameter: PositiveLength = Field(description="of the pin")
-    friction: Friction = Field(0.0, description="Coulomb friction in it")
-
-
 class Bearings(Model):
     """What a roller turns on: its friction, and how long it lasts."""
 
@@ -175,24 +167,6 @@ class Bearings(Model):
     kind: Literal["ball", "roller"] = Field("ball", description="exponent of the life: 3, or 10/3")
     per_roller: int = Field(1, ge=1, le=16, description="bearings side by side in one roller; they share its load")
     name: str | None = Field(None, min_length=1, description="its maker's name, for the list of bought parts")
-
-
-class Guide(Model):
-    """The slider's way: what it takes from the force."""
-
-    friction: Friction = Field(0.0, description="Coulomb friction on what the slider presses across its way")
-    drag: Annotated[Force, Field(ge=0)] = Field(0.0, description="friction without load: seals, preload")
-    length: PositiveLength | None = Field(None, description="of the guide, between its ends; needed for 'offset'")
-    offset: NonNegativeLength = Field(0.0, description="distance of the force's line from the guide's middle")
-
-    @model_validator(mode="after")
-    def _offset_has_a_length(self) -> Self:
-        if self.offset and self.length is None:
-            raise ValueError("'offset' presses the guide's ends apart: it needs the guide's 'length'")
-        if self.length and 2.0 * self.friction * self.offset >= self.length:
-            jam = format_short(2.0 * self.friction * self.offset, "length")
-            raise ValueError(f"a guide shorter than {jam} (twice friction times offset) jams like a drawer")
-        return self
 
 
 MOUNTINGS = {"up": 0.5 * pi, "horizontal": 0.0, "down": -0.5 * pi}

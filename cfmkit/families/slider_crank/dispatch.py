@@ -5,7 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from cfmkit.export.geometry import TOLERANCE
+import numpy as np
+
+from cfmkit.export.geometry import TOLERANCE, Arc, Line, Smooth, polygons
 from cfmkit.families.base import function_named
 from cfmkit.families.slider_crank.build import resolve
 
@@ -14,7 +16,7 @@ if TYPE_CHECKING:
 
     from matplotlib.figure import Figure
 
-    from cfmkit.export.geometry import Drawing
+    from cfmkit.export.geometry import Contour, Drawing, Edge
     from cfmkit.families.base import Run
     from cfmkit.families.slider_crank.spec import SliderCrankSpec
     from cfmkit.plots.moving import Moving
@@ -61,5 +63,33 @@ def drawing(spec: SliderCrankSpec, tolerance: float = TOLERANCE) -> Drawing:
     """
     made: Drawing = _in_room(ROOMS[spec.fidelity], "outline:drawing")(resolve(spec))
     legs = spec.mechanism.legs
-    often = (f"one of {legs} equal legs is drawn: make it {legs} times",) if legs > 1 else ()
-    return replace(made, notes=(*often, *made.notes))
+    notes = (f"one of {legs} equal legs is drawn: make it {legs} times",) if legs > 1 else ()
+    if spec.mechanism.copies == "mirrored":
+        made = with_mirror_image(made)
+        notes = (*notes, "the pair is drawn: the lower part is the mirror image of the upper one, on the same slider")
+    return replace(made, notes=(*notes, *made.notes))
+
+
+def with_mirror_image(one: Drawing) -> Drawing:
+    """Return a drawing with the mirror image of its parts below them, apart from them."""
+    heights = np.concatenate(polygons(one.contours, "cut"))[:, 1]
+    low, high = float(heights.min()), float(heights.max())
+    axis = low - 0.05 * (high - low) - 0.002
+    mirrored = tuple(_mirrored(contour, axis) for contour in one.contours)
+    return replace(one, contours=(*one.contours, *mirrored))
+
+
+def _mirrored(contour: Contour, axis: float) -> Contour:
+    """Return a contour as seen in a mirror along y = axis [m]."""
+
+    def edge(one: Edge) -> Edge:
+        if isinstance(one, Line):
+            (a, b), (c, d) = one.start, one.end
+            return Line((a, 2.0 * axis - b), (c, 2.0 * axis - d))
+        if isinstance(one, Arc):
+            x, y = one.center
+            return Arc((x, 2.0 * axis - y), one.radius, -one.start, -one.end)
+        flip = np.array([1.0, -1.0])
+        return Smooth(one.points * flip + np.array([0.0, 2.0 * axis]), one.tangents * flip)
+
+    return replace(contour, edges=tuple(edge(one).reversed() for one in reversed(contour.edges)))

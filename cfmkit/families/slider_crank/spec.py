@@ -11,7 +11,7 @@ from cfmkit.families.slider_crank.printed.spec import Printed, PrintedAnalysis, 
 from cfmkit.families.slider_crank.springs.spec import Limits, PositiveLength, SpringDesign, Springs
 from cfmkit.specs.spec import Spec, refuse
 from cfmkit.specs.units import Angle, Length, Ratio
-from cfmkit.stock.spec import sheet_faults
+from cfmkit.stock.spec import Guide, Pins, sheet_faults
 
 
 class Mechanism(Printed):
@@ -32,7 +32,17 @@ class Mechanism(Printed):
     )
     springs: Springs = Field(default_factory=Springs, description="rates of one leg, each 0 unless given")
     legs: int = Field(1, ge=1, le=1000, description="equal legs in parallel on one crank, or on one slider")
+    copies: Literal["single", "mirrored"] = Field(
+        "single", description="mirrored: a second set of legs, mirrored at the slider's way; the guide carries nothing"
+    )
+    pins: Pins | None = Field(None, description="at pivot, crank pin and slider pin: their friction")
+    guide: Guide | None = Field(None, description="of the slider: its friction")
     limits: Limits | None = Field(None, description="largest rotations and travel of the springs")
+
+    @property
+    def sets(self) -> int:
+        """Legs that act together: those stated, twice for a mirrored pair."""
+        return self.legs * (2 if self.copies == "mirrored" else 1)
 
     @model_validator(mode="after")
     def _coupler_is_known(self) -> Self:
@@ -116,6 +126,12 @@ class SliderCrankSpec(Spec):
         return self
 
     @model_validator(mode="after")
+    def _a_mirrored_pair_is_on_one_slider(self) -> Self:
+        if self.mechanism.copies == "mirrored" and self.analysis.drive != "force":
+            raise ValueError("'copies: mirrored' is a pair on one slider: set 'analysis.drive: force'")
+        return self
+
+    @model_validator(mode="after")
     def _flexures_fit_their_links(self) -> Self:
         part = self.mechanism
         if part.flexures is None:
@@ -142,7 +158,7 @@ class SliderCrankSpec(Spec):
         if (asked == "lumped" and part.flexures is None) or (asked == "beam" and part.beam is None):
             block = "flexures" if asked == "lumped" else "beam"
             raise ValueError(f"fidelity {asked!r} needs 'mechanism.{block}'")
-        if asked == "prb" and part.finest != "prb" and not any(self.mechanism.springs.model_dump().values()):
+        if asked == "prb" and part.finest != "prb" and not any(self.mechanism.springs.rates):
             raise ValueError("fidelity 'prb' needs the rates of 'mechanism.springs'")
         if self.fidelity != "prb" and self.analysis.drive != "force":
             raise ValueError("flexures and strips are pressed at the slider: set 'analysis.drive: force'")

@@ -237,7 +237,7 @@ def task_of(spec: SliderCrankSpec, linkage: Linkage, unloaded: float) -> Task:
         line,
         travel_direction(linkage),
         type(made_of)(made_of.youngs_modulus, made_of.poisson_ratio, limit),
-        wanted.force / spec.mechanism.legs,
+        wanted.force / spec.mechanism.sets,
         float(start),
         float(stroke),
         ripple or LOOSE,

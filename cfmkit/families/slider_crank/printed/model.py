@@ -100,11 +100,12 @@ def analyze(spec: SliderCrankSpec, run: Run) -> Result:
         chain,
         pressed,
         elasticity(spec.mechanism),
-        spec.mechanism.legs,
+        spec.mechanism.sets,
         window,
         spec.analysis.recheck,
         side,
         spec.analysis.accuracy,
+        spec.mechanism.copies == "mirrored",
     )
     return Result(
         spec=spec,

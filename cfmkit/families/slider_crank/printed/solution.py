@@ -184,6 +184,8 @@ class Solution:
         To which it was to bend, as `Chain.press` takes it.
     accuracy : float
         Of the path, relative.
+    mirrored : bool
+        Whether a mirrored pair keeps the guide free of load.
     """
 
     model: Model
@@ -195,6 +197,7 @@ class Solution:
     checked: bool = False
     side: int = 0
     accuracy: float = 1e-7
+    mirrored: bool = False
 
     @cached_property
     def _at(self) -> Any:
@@ -224,12 +227,12 @@ class Solution:
     @property
     def side_force(self) -> FloatArray:
         """Force of the slider on its guide, across its way [N]."""
-        return -self._reaction[:, 1]
+        return np.zeros(len(self.travel)) if self.mirrored else -self._reaction[:, 1]
 
     @property
     def guide_moment(self) -> FloatArray:
         """Moment of the slider on its guide [N m]."""
-        return -self._reaction[:, 2]
+        return np.zeros(len(self.travel)) if self.mirrored else -self._reaction[:, 2]
 
     @cached_property
     def _peak(self) -> tuple[FloatArray, FloatArray]:

@@ -7,7 +7,7 @@ slider pin; the slider passes on its own spring's force and what drives it.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.curves import Kind
     from cfmkit.families.slider_crank.linkage import Linkage
-    from cfmkit.families.slider_crank.spec import SliderCrankSpec
+    from cfmkit.families.slider_crank.spec import Mechanism, SliderCrankSpec
 
 
 TURN = 2.0 * math.pi
@@ -35,6 +35,34 @@ SHORT_OF_END = 1e-3
 
 CLOSEST = 1e-6
 """Nearer to such an end, as a share of the way to it, the last digits of the motion decide the effort's."""
+
+
+@dataclass(frozen=True)
+class Rubbing:
+    """What rubs in a slider-crank.
+
+    Attributes
+    ----------
+    pin : float
+        Friction couple per load of each pin, mu d/2 [m].
+    guide, drag : float
+        Friction of the slider's guide, and what it takes without load [N].
+    tilt : float
+        Distance of the force from the guide's middle line over half the guide's length.
+    mirrored : bool
+        Whether a mirrored pair keeps the guide free of load.
+    """
+
+    pin: float = 0.0
+    guide: float = 0.0
+    drag: float = 0.0
+    tilt: float = 0.0
+    mirrored: bool = False
+
+    @property
+    def there(self) -> bool:
+        """Whether anything rubs."""
+        return bool(self.pin or self.guide or self.drag)
 
 
 @dataclass(frozen=True)
@@ -53,6 +81,10 @@ class Assembly:
         What the motion is: the crank's angle or the slider's travel.
     side : int
         Of a force drive: 1 beyond, -1 before the stretched position.
+    anchor : float
+        How far the anchor of the slider's spring is screwed beyond where that spring is relaxed [m].
+    rubbing : Rubbing
+        Friction of its pins and guide; efforts of `units` and `forces` are without.
     """
 
     linkage: Linkage
@@ -60,18 +92,50 @@ class Assembly:
     rates: FloatArray
     drive: Kind = "torque"
     side: int = 1
+    anchor: float = 0.0
+    rubbing: Rubbing = Rubbing()
 
     def units(self, motion: FloatArray) -> UnitCurves:
         """Return what unit springs do along the motion of the drive."""
         if self.drive == "torque":
-            return along_crank(self.linkage, self.unloaded, motion)
-        return along_slider(self.linkage, self.unloaded, self.side, motion)
+            plain = along_crank(self.linkage, self.unloaded, motion)
+        else:
+            plain = along_slider(self.linkage, self.unloaded, self.side, motion)
+        return self._anchored(plain, motion) if self.anchor else plain
+
+    def _anchored(self, plain: UnitCurves, motion: FloatArray) -> UnitCurves:
+        """Return unit curves whose spring at the slider is tight by the anchor's way."""
+        turn, effort, stiffness = plain.turn.copy(), plain.effort.copy(), plain.stiffness.copy()
+        tight = -self.linkage.branch * self.anchor
+        turn[3] += tight
+        first, second = self._slider_rates(motion)
+        effort[3] += tight * first
+        stiffness[3] += tight * second
+        return replace(plain, turn=turn, effort=effort, stiffness=stiffness)
+
+    def _slider_rates(self, motion: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return dx/d(motion) and its derivative, of the slider's place x."""
+        link = self.linkage
+        if self.drive == "force":
+            return np.full(np.shape(motion), -float(link.branch)), np.zeros(np.shape(motion))
+        sine, cosine = np.sin(motion), np.cos(motion)
+        beta = link.coupler_angle(motion)
+        rise, level = np.sin(beta), np.cos(beta)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            swing = -link.crank * cosine / (link.coupler * level)
+            sway = (link.crank * sine / link.coupler + rise * swing**2) / level
+        first = -link.crank * sine - link.coupler * rise * swing
+        return first, -link.crank * cosine - link.coupler * (level * swing**2 + rise * sway)
 
     def forces(self, motion: FloatArray) -> FloatArray:
         """Return the efforts of `units` alone, (4, n)."""
         if self.drive == "torque":
-            return crank_efforts(self.linkage, self.unloaded, motion)
-        return slider_forces(self.linkage, self.unloaded, self.side, motion)
+            found = crank_efforts(self.linkage, self.unloaded, motion)
+        else:
+            found = slider_forces(self.linkage, self.unloaded, self.side, motion)
+        if self.anchor:
+            found[3] -= self.linkage.branch * self.anchor * self._slider_rates(motion)[0]
+        return found
 
     @property
     def motion_name(self) -> Literal["angle", "travel"]:
@@ -93,7 +157,7 @@ class Assembly:
         """The motion at which the springs are relaxed; NaN on the side of the stretched position where they are not."""
         knee = self.linkage.knee(self.unloaded)
         other_side = self.drive == "force" and self.side * knee < 0.0 and knee != math.pi
-        return math.nan if other_side else self.start
+        return math.nan if other_side or self.anchor else self.start
 
     @property
     def reach(self) -> tuple[float, float]:
@@ -176,9 +240,28 @@ def assemble(spec: SliderCrankSpec) -> Assembly:
     linkage = linkage_of(mechanism)
     unloaded = unloaded_angle(mechanism, linkage)
     springs = mechanism.springs
-    rates = np.array([springs.pivot, springs.crank_pin, springs.slider_pin, springs.slider]) * mechanism.legs
+    rates = np.array(springs.rates) * mechanism.sets
     rates.setflags(write=False)
-    return Assembly(linkage, unloaded, rates, analysis.drive, side_of(spec, linkage, unloaded))
+    return Assembly(
+        linkage,
+        unloaded,
+        rates,
+        analysis.drive,
+        side_of(spec, linkage, unloaded),
+        springs.anchor or 0.0,
+        _rubbing(mechanism),
+    )
+
+
+def _rubbing(mechanism: Mechanism) -> Rubbing:
+    pins, guide = mechanism.pins, mechanism.guide
+    return Rubbing(
+        pin=0.5 * pins.diameter * pins.friction if pins else 0.0,
+        guide=guide.friction if guide else 0.0,
+        drag=guide.drag if guide else 0.0,
+        tilt=2.0 * guide.offset / guide.length if guide and guide.length else 0.0,
+        mirrored=mechanism.copies == "mirrored",
+    )
 
 
 def default_motion(assembly: Assembly) -> tuple[float, float]:
@@ -211,7 +294,7 @@ def reactions(assembly: Assembly, units: UnitCurves, drive: FloatArray) -> tuple
         upwards) [N]; for the rates and the drive given, so of all legs together or of one.
     """
     link, rates, turn = assembly.linkage, assembly.rates, units.turn
-    beta = _coupler_angle(link, units)
+    beta = coupler_angle(link, units)
     along = -rates[3] * turn[3] - link.branch * drive  # force of spring and drive on the slider, along x
     moment = -rates[1] * turn[1] - rates[2] * turn[2]  # of both torsion springs on the coupler
     sine, cosine = np.sin(beta), np.cos(beta)
@@ -222,7 +305,7 @@ def reactions(assembly: Assembly, units: UnitCurves, drive: FloatArray) -> tuple
     return coupler, -across
 
 
-def _coupler_angle(link: Linkage, units: UnitCurves) -> FloatArray:
+def coupler_angle(link: Linkage, units: UnitCurves) -> FloatArray:
     """Return the direction of the coupler [rad].
 
     A slider that is driven takes the crank pin past the place where the coupler stands across its way; from there on

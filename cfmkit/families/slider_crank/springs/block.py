@@ -57,6 +57,13 @@ def analyze_block(spec: SliderCrankSpec, block: Block) -> BlockAnswer | None:
     block : Block
         The variants and the measures.
     """
+    if (
+        spec.mechanism.pins
+        or spec.mechanism.guide
+        or spec.mechanism.copies != "single"
+        or spec.mechanism.springs.anchor
+    ):
+        return None
     base = _base(spec) if set(block.values) <= {*RATES, LEGS} else None
     if base is None or not all(base.knows(measure) for measure in block.measures):
         return None

@@ -13,6 +13,7 @@ Reference
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -80,6 +81,7 @@ def design(spec: SliderCrankSpec, run: Run) -> Design:
         return Design(None, Status.INVALID, "this spec has no 'design' block: add 'torque' or 'force', and a window")
     try:
         solved, search = _searched(spec, wanted, run)
+        solved = _compensated(solved)
         solved = _kept(audited(solved, _written(solved)))
     except Infeasible as problem:
         return no_design(problem.finding, problem.nearest)
@@ -96,6 +98,24 @@ def design(spec: SliderCrankSpec, run: Run) -> Design:
         warnings=warnings,
         search=search_of(solved),
     )
+
+
+ROUNDS = 40
+"""Rounds in which springs and the friction that they cause are fitted to each other; some 10 are enough."""
+
+
+def _compensated(solved: Solved) -> Solved:
+    """Return springs that hold the target with the friction that they cause, on the way that the design names."""
+    task = solved.task
+    if task.wanted.branch is None or not task.assembly.rubbing.there:
+        return solved
+    for _ in range(ROUNDS):
+        again = solve(replace(task, rates=solved.rates))
+        change = np.abs(again.rates - solved.rates).max()
+        solved = again
+        if change <= 1e-12 * np.abs(again.rates).max():
+            break
+    return solved
 
 
 def _kept(solved: Solved) -> Solved:
@@ -214,7 +234,9 @@ def solve(task: Task, tolerance: float | None = None) -> Solved:
 def _written(solved: Solved) -> SliderCrankSpec:
     """Return the spec with springs and lengths written in, and an analysis that looks where the design did."""
     spec, wanted = resolve(solved.task.spec), solved.task.wanted
-    springs = spec.mechanism.springs.model_copy(update=dict(zip(JOINTS, solved.rates.tolist(), strict=True)))
+    rates = dict(zip(JOINTS, solved.rates.tolist(), strict=True))
+    anchor = {"anchor": spec.mechanism.springs.anchor or 0.0} if wanted.adjustment is not None else {}
+    springs = spec.mechanism.springs.model_copy(update=rates | anchor)
     mechanism = spec.mechanism.model_copy(update={"springs": springs})
     if any(getattr(wanted, name) is not None for name in ("crank_length", "offset")):
         mechanism = solved.task.spec.mechanism.model_copy(update={"springs": springs})
@@ -250,7 +272,7 @@ def _reference(solved: Solved) -> float:
 
     low, high = solved.window
     places = np.linspace(low, high, DENSE)
-    legs, target = solved.task.spec.mechanism.legs, solved.task.wanted.target
+    legs, target = solved.task.spec.mechanism.sets, solved.task.wanted.target
     unit = solved.task.assembly
     offset = solved.rates @ unit.units(places).effort * legs - target
     change = np.flatnonzero(np.isfinite(offset[:-1]) & (offset[:-1] * offset[1:] <= 0.0))

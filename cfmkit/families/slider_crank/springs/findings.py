@@ -30,13 +30,27 @@ def findings_of(spec: SliderCrankSpec, solution: Solution) -> tuple[Finding, ...
     """Return everything that the user must know."""
     if not solution.assembly.rates.any():
         return (finding("no_spring", "no spring has a rate: the mechanism moves freely; set 'mechanism.springs'"),)
+    held = _of_friction(solution)
     own = _of_torque(solution) if solution.assembly.drive == "torque" else _of_force(spec, solution)
-    return (*_of_class(solution), *own, *_of_band(spec, solution), *_of_limits(spec, solution))
+    return (*held, *_of_class(solution), *own, *_of_band(spec, solution), *_of_limits(spec, solution))
 
 
 def place(solution: Solution, motion: float) -> str:
     """Return a place of the motion as the user reads it."""
     return format_short(motion, solution.assembly.dimension)
+
+
+def _of_friction(solution: Solution) -> Iterator[Finding]:
+    for name, way in zip(("forth", "back"), solution.ways or (), strict=False):
+        held = ~np.isfinite(way.effort)
+        if held[1:].any():
+            first, last = (place(solution, float(solution.motion[held][end])) for end in (0, -1))
+            yield finding(
+                "self_locks",
+                f"on the way {name} the mechanism holds itself from {first} to {last}: the line of force runs inside "
+                "the friction circles of the pins; use thinner or smoother pins ('mechanism.pins'), or keep off the "
+                "stretched position",
+            )
 
 
 def _of_class(solution: Solution) -> Iterator[Finding]:

@@ -61,7 +61,7 @@ def analyze(spec: SliderCrankSpec, run: Run) -> Result:
     Returns
     -------
     Result
-        One branch, ``load``. NO_EQUILIBRIUM if the mechanism cannot be built, PARTIAL if
+        One branch, ``load``; with friction ``unload``, too. NO_EQUILIBRIUM if the mechanism cannot be built, PARTIAL if
         the linkage does not reach all of the requested motion.
     """
     try:
@@ -70,11 +70,12 @@ def analyze(spec: SliderCrankSpec, run: Run) -> Result:
         solution, shortfalls = solve(spec, assembly)
     except CannotBuild as problem:
         return no_result(spec, problem.finding)
-    status, said = Status.PARTIAL if shortfalls else Status.COMPLETE, {item.name for item in shortfalls}
+    said, stuck = {item.name for item in shortfalls}, _held(solution)
+    status = Status.PARTIAL if shortfalls or stuck else Status.COMPLETE
     return Result(
         spec=_as_run(spec, assembly),
         status=status,
-        message=shortfalls[0].message if shortfalls else "",
+        message=shortfalls[0].message if shortfalls else stuck,
         curves=(_curve(solution),),
         values=values_of(solution),
         warnings=(*shortfalls, *(item for item in findings_of(spec, solution) if item.name not in said)),
@@ -119,7 +120,10 @@ def solve(spec: SliderCrankSpec, assembly: Assembly) -> tuple[Solution, tuple[Fi
         motion = motion[finite]
         units = assembly.units(motion)
     character = Character(assembly, start, stop, spec.analysis.tolerance, window_of(spec, assembly))
-    solution = Solution(assembly, motion, units, character, reference_motion(spec, assembly), spec.mechanism.legs)
+    anchored = spec.mechanism.springs.anchor is not None
+    solution = Solution(
+        assembly, motion, units, character, reference_motion(spec, assembly), spec.mechanism.sets, anchored
+    )
     return solution, short
 
 
@@ -221,7 +225,37 @@ def _curve(solution: Solution) -> Curve:
         "guide_force": Column(solution.reactions[1], "force"),
     }
     points = len(solution.motion)
+    if solution.ways is not None:
+        return _loop(solution, extra)
     return Curve(solution.motion, solution.effort, np.repeat("load", points), np.ones(points, dtype=bool), extra, drive)
+
+
+def _loop(solution: Solution, extra: dict[str, Column]) -> Curve:
+    """Return the way through the motion and back, with friction."""
+    assert solution.ways is not None
+    forth, back = solution.ways
+    drive, points = solution.assembly.drive, len(solution.motion)
+
+    def both(one: FloatArray, other: FloatArray) -> FloatArray:
+        return np.concatenate([one, other[::-1]])
+
+    columns = {name: Column(both(item.values, item.values), item.dimension) for name, item in extra.items()}
+    columns["coupler_force"] = Column(both(forth.coupler, back.coupler) / solution.legs, "force")
+    columns["guide_force"] = Column(both(forth.guide, back.guide) / solution.legs, "force")
+    columns |= {f"lost_to_{kind}": Column(both(forth.lost[kind], back.lost[kind]), drive) for kind in forth.lost}
+    effort, branches = both(forth.effort, back.effort), np.repeat(["load", "unload"], points)
+    return Curve(both(solution.motion, solution.motion), effort, branches, np.isfinite(effort), columns, drive)
+
+
+def _held(solution: Solution) -> str:
+    """Return what to say of places where friction leaves no equilibrium; empty without any."""
+    ways = solution.ways or ()
+    failed = sum(int((~np.isfinite(way.effort)[1:]).sum()) for way in ways)
+    return (
+        f"{failed} of {2 * len(solution.motion)} points have no equilibrium: friction holds the mechanism"
+        if failed
+        else ""
+    )
 
 
 def gradient(spec: SliderCrankSpec, paths: Sequence[str]) -> dict[str, dict[str, float]]:
@@ -234,7 +268,7 @@ def gradient(spec: SliderCrankSpec, paths: Sequence[str]) -> dict[str, dict[str,
     paths : sequence of str
         Those that are no rate of a spring are left out.
     """
-    if spec.fidelity != "prb":
+    if spec.fidelity != "prb" or spec.mechanism.pins or spec.mechanism.guide:
         return {}
     try:
         spec = resolve(spec)
@@ -244,7 +278,7 @@ def gradient(spec: SliderCrankSpec, paths: Sequence[str]) -> dict[str, dict[str,
     if short or not solution.assembly.rates.any():
         return {}
     known = {path: RATES[path] for path in paths if path in RATES}
-    legs = spec.mechanism.legs
+    legs = spec.mechanism.sets
     slopes = dict(_slopes(spec, solution))
     return {name: {path: legs * float(by[row]) for path, row in known.items()} for name, by in slopes.items()}
 

@@ -71,9 +71,15 @@ def audited(solved: Solved, spec: SliderCrankSpec) -> Solved:
     result, target = analyze(spec, Run()), abs(solved.task.wanted.target)
     if not result.curves or not result.target:
         return solved
+    way = ""
+    if solved.task.assembly.rubbing.there:
+        way = solved.task.wanted.branch or "mean"
+        if way == "mean":  # no way of the curve is the mean of both
+            return solved
+        way = f"[{way}]"
     (largest,), (rms,) = (
-        measured(result, solved.judged, "deviation_from_target"),
-        measured(result, solved.window, "rms_to_target"),
+        measured(result, solved.judged, f"deviation_from_target{way}"),
+        measured(result, solved.window, f"rms_to_target{way}"),
     )
     if largest is None or rms is None:
         return solved

@@ -32,12 +32,21 @@ class Goal:
         Largest rates, perhaps infinite; zero for a spring that may not be used.
     held : tuple of (m,) array and float, or None
         A row and what it must give exactly.
+    lower : (m,) array or None
+        Smallest rates; None: zero.
     """
 
     matrix: FloatArray
     wanted: FloatArray
     upper: FloatArray
     held: tuple[FloatArray, float] | None = None
+    lower: FloatArray | None = None
+
+    @property
+    def bounds(self) -> list[tuple[float, float | None]]:
+        """Smallest and largest rate of each spring; None for no limit."""
+        low = np.zeros(len(self.upper)) if self.lower is None else self.lower
+        return [(float(a), None if np.isinf(b) else float(b)) for a, b in zip(low, self.upper, strict=True)]
 
     def residual(self, rates: FloatArray) -> FloatArray:
         """Return the deviations from the goal, as fractions of the target."""
@@ -121,7 +130,10 @@ def _solved(goal: Goal, cost: FloatArray, worst: float | None) -> FloatArray | N
     matrix = goal.matrix / scales
     one = np.ones((len(goal.wanted), 1))
     rows = np.vstack([np.hstack([matrix, -one]), np.hstack([-matrix, -one])])
-    bounds = [(0.0, None if np.isinf(top) else top) for top in goal.upper * scales]
+    bounds = [
+        (low * scale, None if top is None else top * scale)
+        for (low, top), scale in zip(goal.bounds, scales, strict=True)
+    ]
     equal: dict[str, Any] = {}
     if goal.held is not None:
         size = float(np.abs(goal.held[0] / scales).max()) or 1.0
@@ -143,6 +155,12 @@ def least_squares(goal: Goal) -> FloatArray | None:
 
     if goal.held is not None:
         return _held_least_squares(goal)
+    if goal.lower is not None and goal.lower.any():
+        above = replace(
+            goal, wanted=goal.wanted - goal.matrix @ goal.lower, upper=goal.upper - goal.lower, held=None, lower=None
+        )
+        more = least_squares(above)
+        return None if more is None else more + goal.lower
     scales, there = goal.scales(), goal.upper > 0.0
     matrix, scaled = goal.matrix / scales, np.zeros(len(goal.upper))
     if np.isinf(goal.upper[there]).all():
@@ -237,6 +255,7 @@ def _most_even(goal: Goal, worst: float) -> FloatArray | None:
         rows += [above, below]
         right += [0.0, 0.0]
     cost = np.concatenate([np.zeros(count), [1.0, -1.0]])
-    bounds = [*((0.0, None if np.isinf(top) else top / unit) for top in goal.upper), (0.0, None), (0.0, None)]
+    own = ((low / unit, None if top is None else top / unit) for low, top in goal.bounds)
+    bounds = [*own, (0.0, None), (0.0, None)]
     found = linprog(cost, A_ub=np.array(rows), b_ub=right, bounds=bounds, method="highs")
     return None if found.status != 0 or found.x is None else np.maximum(found.x[:count], 0.0) * unit

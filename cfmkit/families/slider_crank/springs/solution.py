@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.families.slider_crank.springs.assembly import reactions
+from cfmkit.families.slider_crank.springs.friction import Branch, branch
 from cfmkit.families.slider_crank.springs.stiffness import CLASSES, Classified, classify, signs
 from cfmkit.numerics.roots import bracketed_root
 from cfmkit.numerics.turning_points import Monotone, monotone
@@ -235,6 +236,8 @@ class Solution:
         Where the constant band is taken.
     legs : int
         How many share the efforts.
+    anchored : bool
+        Whether the slider's spring has an anchor that can be screwed.
     """
 
     assembly: Assembly
@@ -243,6 +246,7 @@ class Solution:
     character: Character
     reference: float
     legs: int = 1
+    anchored: bool = False
 
     @cached_property
     def energy(self) -> FloatArray:
@@ -254,6 +258,13 @@ class Solution:
     def shares(self) -> FloatArray:
         """Effort of each spring, (4, n) [N m or N]."""
         return _weighed(self.assembly.rates, self.units.effort)
+
+    @cached_property
+    def ways(self) -> tuple[Branch, Branch] | None:
+        """The motion with friction, forth and back; None where nothing rubs."""
+        if not self.assembly.rubbing.there:
+            return None
+        return branch(self.assembly, self.motion, 1.0), branch(self.assembly, self.motion, -1.0)
 
     @cached_property
     def effort(self) -> FloatArray:
@@ -272,6 +283,8 @@ class Solution:
         """Tension in the coupler of one leg, and force of its slider on the guide [N]."""
         drive = self.effort if self.assembly.drive == "force" else np.zeros_like(self.effort)
         coupler, guide = reactions(self.assembly, self.units, drive)
+        if self.assembly.rubbing.mirrored:
+            guide = np.zeros_like(guide)
         return coupler / self.legs, guide / self.legs
 
     @cached_property
@@ -309,8 +322,12 @@ class ClosedForm:
         """None: springs bend the curve on the scale of the linkage only."""
         return np.empty(0)
 
-    def effort(self, _branch: str, places: FloatArray, /) -> FloatArray:
+    def effort(self, branch_name: str, places: FloatArray, /) -> FloatArray:
         """Return torque [N m] or force [N] at places of any shape."""
+        assembly = self.character.assembly
+        if assembly.rubbing.there:
+            way = -1.0 if branch_name == "unload" else 1.0
+            return branch(assembly, np.ravel(places), way).effort.reshape(np.shape(places))
         return self.character.efforts(np.ravel(places)).reshape(np.shape(places))
 
     def stress(self, _branch: str, places: FloatArray, /) -> FloatArray:

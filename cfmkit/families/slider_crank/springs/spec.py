@@ -22,6 +22,16 @@ class Springs(Model):
     crank_pin: TorsionRate = Field(0.0, description="torsion between crank and coupler, K_RB")
     slider_pin: TorsionRate = Field(0.0, description="torsion between coupler and slider, K_RC")
     slider: ExtensionRate = Field(0.0, description="extension between slider and ground, K_PC")
+    anchor: Length | None = Field(
+        None,
+        description="how far the anchor of the slider's spring is screwed beyond where that spring is relaxed in the "
+        "unloaded position: a trim, positive adds force against the travel; needs 'slider'",
+    )
+
+    @property
+    def rates(self) -> tuple[float, float, float, float]:
+        """Rates at pivot, crank pin, slider pin and slider [N m/rad, the last N/m]."""
+        return self.pivot, self.crank_pin, self.slider_pin, self.slider
 
 
 class Limits(Model):
@@ -96,6 +106,24 @@ class SpringDesign(DesignBlock):
     prefer: Literal["small-rotation", "even-rates", "soft-springs"] = Field(
         "small-rotation", description="which of several equally good designs to take"
     )
+
+    branch: Literal["load", "unload", "mean"] | None = Field(
+        None,
+        description="on which way the target is to hold where pins or guide rub; default: the springs alone, between "
+        "both ways",
+    )
+    adjustment: PositiveForce | None = Field(
+        None, description="how much more force the anchor of the slider's spring is to give when it is screwed back"
+    )
+    anchor_travel: PositiveLength | None = Field(None, description="how far that anchor can be screwed")
+
+    @model_validator(mode="after")
+    def _adjustment_has_its_travel(self) -> Self:
+        if (self.adjustment is None) != (self.anchor_travel is None):
+            raise ValueError("'adjustment' and 'anchor_travel' belong together: give both or neither")
+        if self.adjustment is not None and (self.torque is not None or "slider" not in self.springs):
+            raise ValueError("'adjustment' is that of the force by the slider's spring: it needs 'force' and 'slider'")
+        return self
 
     @model_validator(mode="after")
     def _one_target(self) -> Self:

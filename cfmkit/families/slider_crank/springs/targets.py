@@ -12,6 +12,7 @@ import numpy as np
 from cfmkit.families.refusals import Infeasible
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.springs.assembly import assemble
+from cfmkit.families.slider_crank.springs.friction import branch
 from cfmkit.families.slider_crank.springs.rates import Goal
 from cfmkit.families.slider_crank.unit_springs import JOINTS
 
@@ -44,10 +45,13 @@ class Task:
         With the lengths; its springs do not matter.
     assembly : Assembly
         The same put together; its rates do not matter.
+    rates : (4,) array or None
+        Springs of one leg whose friction is compensated, from the round before; None: none is.
     """
 
     spec: SliderCrankSpec
     assembly: Assembly
+    rates: FloatArray | None = None
 
     @property
     def wanted(self) -> CrankDesign:
@@ -126,18 +130,42 @@ class Task:
         effort = self.assembly.units(places).effort
         if not np.isfinite(effort).all():
             return None
-        legs, target = self.spec.mechanism.legs, self.wanted.target
-        goal = Goal(effort.T * (legs / target), np.ones(len(places)), self._upper())
+        legs, target = self.spec.mechanism.sets, self.wanted.target
+        goal = Goal(
+            effort.T * (legs / target), np.ones(len(places)) - self._lost(places), self._upper(), lower=self._lower()
+        )
         return goal if self.wanted.stiffness is None else self._sloping(goal, places)
+
+    def _lost(self, places: FloatArray) -> FloatArray | float:
+        """Return what friction adds to the effort with the springs of the last round, over the target."""
+        way = self.wanted.branch
+        if self.rates is None or way is None or not self.assembly.rubbing.there:
+            return 0.0
+        rubbed = replace(self.assembly, rates=self.rates * self.spec.mechanism.sets)
+        ways = {"load": (1.0,), "unload": (-1.0,), "mean": (1.0, -1.0)}[way]
+        free = rubbed.rates @ rubbed.units(places).effort
+        added = sum(branch(rubbed, places, one).effort - free for one in ways) / len(ways)
+        if not np.isfinite(added).all():
+            text = "friction holds the mechanism within the window: the line of force runs through its pins"
+            raise Infeasible(finding("self_locks", f"{text}; use thinner pins ('mechanism.pins'), or another window"))
+        return np.asarray(added / self.wanted.target)
+
+    def _lower(self) -> FloatArray | None:
+        """Return the smallest rates: that of the slider's spring whose anchor is to adjust the force."""
+        wanted = self.wanted
+        if wanted.adjustment is None or wanted.anchor_travel is None:
+            return None
+        least = wanted.adjustment / wanted.anchor_travel / self.spec.mechanism.sets
+        return np.array([0.0, 0.0, 0.0, least])
 
     def _sloping(self, goal: Goal, places: FloatArray) -> Goal:
         """Return a goal that is a line through the stretched position."""
         wanted, at = self.wanted, self.assembly.stretched
         slope = (wanted.stiffness or 0.0) / wanted.target
-        line = 1.0 + slope * (places - at)
+        line = goal.wanted + slope * (places - at)
         if not wanted.hold_stiffness:
             return replace(goal, wanted=line)
-        row = self.assembly.units(np.array([at])).stiffness[:, 0] * (self.spec.mechanism.legs / wanted.target)
+        row = self.assembly.units(np.array([at])).stiffness[:, 0] * (self.spec.mechanism.sets / wanted.target)
         return replace(goal, wanted=line, held=(row, slope))
 
     def _upper(self) -> FloatArray:

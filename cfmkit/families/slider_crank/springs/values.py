@@ -57,6 +57,15 @@ DEFINITIONS = {
         "K_P kappa^2 phi^2/(2 k), k = K_A + (1 + r1/r2)^2 K_B + (r1/r2)^2 K_C, kappa = r1 (1 + r1/r2)/cos t2, phi the "
         "lead of the unloaded position; for small phi above 4 bistable, 1 zero stiffness, below 1 positive",
     ),
+    "loop_energy_pins": ("energy", "energy that the pins take over the window, forth and back"),
+    "loop_energy_guide": ("energy", "energy that the slider's guide takes over the window, forth and back"),
+    "loop_share_pins": ("ratio", "the share of the loop's area that the pins take"),
+    "loop_share_guide": ("ratio", "the share of the loop's area that the slider's guide takes"),
+    "force_per_anchor": (
+        "stiffness",
+        "by how much the force rises per travel of the anchor of the slider's spring: alike over the whole motion, so "
+        "that a trim leaves the shape of the curve as it is",
+    ),
     "stretched_angle": ("angle", "crank angle with crank and coupler in one line, theta_A2 [LH, eq. 13b]"),
     "folded_angle": ("angle", "crank angle with the coupler folded over the crank [LH, eq. 13a, other branch]"),
     "unloaded_angle": ("angle", "crank angle with all springs relaxed, theta_A0"),
@@ -78,9 +87,39 @@ def values_of(solution: Solution) -> Mapping[str, Quantity]:
     }
 
 
+def _loop(solution: Solution) -> Iterator[tuple[str, float | None]]:
+    """Yield what pins and guide take over the window, and their shares; nothing without friction."""
+    if solution.ways is None:
+        return
+    (forth, back), motion = solution.ways, solution.motion
+    low, high = solution.character.window or (float(motion[0]), float(motion[-1]))
+    low, high = max(low, float(motion[0])), min(high, float(motion[-1]))
+    at = np.concatenate([[low], motion[(motion > low) & (motion < high)], [high]])
+    taken = {
+        kind: float(np.trapezoid(np.interp(at, motion, forth.lost[kind] + back.lost[kind]), at)) for kind in forth.lost
+    }
+    area = sum(taken.values())
+    for kind, value in taken.items():
+        yield f"loop_energy_{kind}", value if np.isfinite(area) else None
+        yield f"loop_share_{kind}", value / area if np.isfinite(area) and area > 0 else None
+
+
+def _trim(solution: Solution) -> Iterator[tuple[str, float | None]]:
+    """Yield what the anchor of the slider's spring does, where there is one to be screwed."""
+    if solution.anchored and solution.assembly.drive == "force":
+        yield "force_per_anchor", float(solution.assembly.rates[3])
+
+
 def _numbers(solution: Solution) -> Iterator[tuple[str, tuple[float | None, str]]]:
     """Yield names with values, or the reason why there is none."""
-    for name, value in (*_positions(solution), *_band(solution), *_pose(solution), *_extremes(solution)):
+    for name, value in (
+        *_positions(solution),
+        *_band(solution),
+        *_pose(solution),
+        *_extremes(solution),
+        *_loop(solution),
+        *_trim(solution),
+    ):
         reason = "" if value is not None else _WHY.get(name.removesuffix("_start").removesuffix("_end"), "")
         yield name, (value, reason)
 

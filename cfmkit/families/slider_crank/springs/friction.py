@@ -1,0 +1,172 @@
+"""Friction of pins and guide in a slider-crank with springs: the way in and the way out differ by it.
+
+Every pin takes a couple mu d/2 |R| against its rotation, R the force that passes through it; with massless
+links that is the same force in pivot, crank pin and slider pin. The guide takes what the slider presses across its way.
+With the coupler and the crank in balance about their pins, the force in the coupler is P0 + h P1, h the friction couple of
+one pin, and |P0 + h P1| = h/(mu d/2) is a quadratic in h with one positive root. Without one the
+mechanism holds itself: the line of force stays inside the friction circles of the pins, as close to the stretched position.
+
+Assumes: Coulomb friction, massless links, all pins alike, guide pressed in its middle.
+
+Reference
+---------
+[LH] B. Li, G. Hao, Chin. J. Mech. Eng. 32 (2019) 10.1186/s10033-019-0369-z, sec. 2 (the linkage).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.families.slider_crank.springs.assembly import coupler_angle
+
+if TYPE_CHECKING:
+    from cfmkit.arrays import FloatArray
+    from cfmkit.families.slider_crank.springs.assembly import Assembly
+
+
+@dataclass(frozen=True)
+class Branch:
+    """One way through the motion, n places.
+
+    Attributes
+    ----------
+    effort : (n,) array
+        Torque [N m] or force [N]; NaN where the mechanism holds itself.
+    coupler : (n,) array
+        Force in the coupler, of all legs [N].
+    guide : (n,) array
+        Force on the guide, of all legs, positive upwards [N]; zero for a mirrored pair.
+    lost : mapping of str to (n,) array
+        What ``pins`` and ``guide`` take from the effort [N m or N].
+    """
+
+    effort: FloatArray
+    coupler: FloatArray
+    guide: FloatArray
+    lost: dict[str, FloatArray]
+
+
+def branch(assembly: Assembly, motion: FloatArray, way: float) -> Branch:
+    """Return the efforts with friction.
+
+    Parameters
+    ----------
+    assembly : Assembly
+        With its springs' rates and its `rubbing`.
+    motion : (n,) array
+        Crank angles [rad] or slider travels [m].
+    way : float
+        1 while the motion grows, -1 on the way back.
+
+    Returns
+    -------
+    Branch
+        Efforts, forces inside, and what friction takes.
+    """
+    units, link, rates = assembly.units(motion), assembly.linkage, assembly.rates
+    angle, beta = units.angle, coupler_angle(link, units)
+    turns = np.stack([rates[k] * units.turn[k] for k in range(4)])
+    on_coupler, on_crank = -turns[1] - turns[2], turns[1] - turns[0]
+    crank_rate, coupler_rate, slider_rate = _rates(assembly, angle, beta)
+    signs = [np.sign(way * rate) for rate in (crank_rate, coupler_rate - crank_rate, coupler_rate)]
+    rubbing, torque = assembly.rubbing, assembly.drive == "torque"
+    sine, cosine = np.sin(beta), np.cos(beta)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        if torque:
+            along = -turns[3] - np.sign(way * slider_rate) * rubbing.drag
+            rubbed = _pressed(
+                rubbing.guide * np.sign(way * slider_rate), along, (sine, cosine), on_coupler, signs, assembly
+            )
+        else:
+            rows = (link.coupler * np.stack([-sine, cosine]), link.crank * np.stack([-np.sin(angle), np.cos(angle)]))
+            straight = _balance(rows, -on_coupler, -on_crank)
+            bent = _balance(rows, signs[1] + signs[2], signs[0] - signs[1])
+            rubbed = _through_pins(straight, bent, rubbing.pin)
+        pull, couple = rubbed
+        across = -pull[1] * (0.0 if rubbing.mirrored else 1.0)
+        if torque:
+            # The crank is in balance under the coupler's pull, its springs, and the couples of both its pins.
+            moment = link.crank * (np.cos(angle) * pull[1] - np.sin(angle) * pull[0]) + on_crank
+            effort = -moment + couple * (signs[0] - signs[1])
+            dragged = (rubbing.drag + rubbing.guide * np.abs(across)) * np.abs(slider_rate)
+        else:
+            free = link.branch * (-turns[3] - pull[0])
+            effort = _along_guide(free, np.abs(across), assembly, way)
+            dragged = np.abs(effort - free)
+        swept = sum(np.abs(rate) for rate in (crank_rate, coupler_rate - crank_rate, coupler_rate))
+        lost = {"pins": couple * swept, "guide": dragged}
+    return Branch(effort, np.hypot(pull[0], pull[1]), across, lost)
+
+
+def _rates(assembly: Assembly, angle: FloatArray, beta: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return how crank and coupler turn and the slider moves along x with the motion."""
+    link = assembly.linkage
+    with np.errstate(divide="ignore", invalid="ignore"):
+        if assembly.drive == "torque":
+            coupler = -link.crank * np.cos(angle) / (link.coupler * np.cos(beta))
+            return np.ones_like(angle), coupler, -link.crank * np.sin(angle - beta) / np.cos(beta)
+        knee = np.sin(angle - beta)
+        crank = link.branch * np.cos(beta) / (link.crank * knee)
+        coupler = -link.branch * np.cos(angle) / (link.coupler * knee)
+    return crank, coupler, np.full_like(angle, -float(link.branch))
+
+
+def _balance(rows: tuple[FloatArray, FloatArray], first: FloatArray, second: FloatArray) -> FloatArray:
+    """Return the pull on the coupler, (2, n), that has these moments about the pins of coupler and crank."""
+    (a, b), (c, d) = rows
+    size = a * d - b * c
+    return np.stack([(first * d - b * second) / size, (a * second - c * first) / size])
+
+
+def _through_pins(straight: FloatArray, bent: FloatArray, pin: float) -> tuple[FloatArray, FloatArray]:
+    """Return the pull P0 + h P1 and h = pin |P0 + h P1|; NaN where no h fits."""
+    if not pin:
+        return straight, np.zeros(straight.shape[1])
+    square = 1.0 - pin**2 * (bent**2).sum(axis=0)
+    cross, level = pin**2 * (straight * bent).sum(axis=0), pin**2 * (straight**2).sum(axis=0)
+    root = (cross + np.sqrt(cross**2 + square * level)) / square
+    couple = np.where(square > 0.0, root, np.nan)
+    return straight + couple * bent, couple
+
+
+def _pressed(
+    friction: FloatArray,
+    along: FloatArray,
+    direction: tuple[FloatArray, FloatArray],
+    on_coupler: FloatArray,
+    signs: list[FloatArray],
+    assembly: Assembly,
+) -> tuple[FloatArray, FloatArray]:
+    """Return pull and couple where a torque drives: the guide's friction depends on which way the slider is pressed."""
+    sine, cosine = direction
+    length = assembly.linkage.coupler
+    found = None
+    for sign in (1.0, -1.0):
+        # X + sign friction Y = along, and the coupler's balance about the crank pin
+        rubs = 0.0 if assembly.rubbing.mirrored else sign * friction
+        rows = (np.stack([np.ones_like(sine), rubs * np.ones_like(sine)]), length * np.stack([-sine, cosine]))
+        straight = _balance(rows, along, -on_coupler)
+        bent = _balance(rows, np.zeros_like(sine), signs[1] + signs[2])
+        pull, couple = _through_pins(straight, bent, assembly.rubbing.pin)
+        if found is None:
+            found = pull, couple
+        else:
+            other = found[0][1] < 0.0
+            found = np.where(other, pull, found[0]), np.where(other, couple, found[1])
+    assert found is not None
+    return found
+
+
+def _along_guide(free: FloatArray, across: FloatArray, assembly: Assembly, way: float) -> FloatArray:
+    """Return the force on the slider with its guide's friction [N]: of what presses across, or of a force beside it."""
+    rubbing = assembly.rubbing
+    force = free + way * (rubbing.drag + rubbing.guide * across)
+    if not rubbing.tilt:
+        return force
+    still = free + way * rubbing.drag
+    tilted = still / (1.0 - way * np.sign(still) * rubbing.guide * rubbing.tilt)
+    found: FloatArray = np.where(rubbing.tilt * np.abs(tilted) > across, tilted, force)
+    return found

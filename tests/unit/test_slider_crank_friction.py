@@ -1,0 +1,119 @@
+"""Friction of pins and guide in a slider-crank, mirrored pairs and the trim by an anchor: balance and energy."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import cfmkit
+from cfmkit.families import family
+from cfmkit.families.base import Run
+
+CONFIGS = Path(__file__).parents[2] / "configs"
+PINS = {"diameter": "3 mm", "friction": 0.1}
+GUIDE = {"friction": 0.1, "drag": "0.01 N"}
+
+
+def spec(name, **changes):
+    return cfmkit.load(CONFIGS / f"slider_crank_{name}.yaml").replace(
+        {f"mechanism.{key}": value for key, value in changes.items()}
+    )
+
+
+def analyze(one):
+    return family("slider-crank").analyze(one, Run())
+
+
+@pytest.mark.parametrize("name", ["bilancia2019", "li2019"])
+@pytest.mark.parametrize("parts", [{"pins": PINS}, {"guide": GUIDE}, {"pins": PINS, "guide": GUIDE}])
+def test_both_ways_differ_by_what_pins_and_guide_take(name, parts):
+    """The forces follow from the balance of crank and coupler, what is lost from how fast they turn."""
+    state = analyze(spec(name, **parts)).state
+    forth, back = state.ways
+    scale = np.abs(state.effort).max()
+    for way, sign in ((forth, 1.0), (back, -1.0)):
+        known = np.isfinite(way.effort)
+        assert known.sum() >= len(known) - 1
+        np.testing.assert_allclose(
+            (way.effort - state.effort)[known], (sign * sum(way.lost.values()))[known], atol=1e-12 * scale
+        )
+
+
+@pytest.mark.parametrize("branch", ["right", "left"])
+def test_the_area_of_the_loop_is_shared_by_pins_and_guide(branch):
+    found = analyze(spec("bilancia2019", pins=PINS, guide=GUIDE))
+    window = found.spec.analysis.window
+    motion, (forth, back) = found.state.motion, found.state.ways
+    inside = np.isfinite(forth.effort) & (motion >= 0.001) & (motion <= 0.035)
+    area = np.trapezoid((forth.effort - back.effort)[inside], motion[inside])
+    assert window is not None
+    total = sum(found.values[f"loop_energy_{kind}"].value for kind in ("pins", "guide"))
+    assert total == pytest.approx(area, rel=1e-9)
+
+
+def test_a_mirrored_pair_has_twice_the_force_and_a_free_guide():
+    one, pair = analyze(spec("bilancia2019")), analyze(spec("bilancia2019", copies="mirrored"))
+    np.testing.assert_allclose(pair.curve.force, 2.0 * one.curve.force, rtol=1e-12)
+    assert one.values["guide_force_max"].value > 0 == pair.values["guide_force_max"].value
+    rubs = analyze(spec("bilancia2019", copies="mirrored", guide={"friction": 0.3}))
+    np.testing.assert_allclose(rubs.state.ways[0].effort, pair.curve.force, rtol=1e-12)
+
+
+def test_the_outline_of_a_mirrored_pair_holds_every_part_twice():
+    from cfmkit.export.geometry import polygons
+    from cfmkit.families.slider_crank.dispatch import drawing
+
+    one, pair = (drawing(spec("strip", copies=copies)) for copies in ("single", "mirrored"))
+    assert len(pair.contours) == 2 * len(one.contours)
+    first, second = polygons(pair.contours, "cut")[0], polygons(pair.contours[len(one.contours) :], "cut")[0]
+    np.testing.assert_allclose(first[:, 0], second[:, 0], atol=1e-12)
+    assert np.ptp(first[:, 1] + second[:, 1]) < 1e-12
+    assert second[:, 1].max() < first[:, 1].min()
+
+
+def test_near_the_stretched_position_thick_pins_hold_the_mechanism():
+    found = analyze(spec("bilancia2019", pins={"diameter": "20 mm", "friction": 0.3}))
+    assert not found.status.usable or found.status.name == "PARTIAL"
+    assert "self_locks" in {item.name for item in found.warnings}
+    assert "friction" in found.message
+
+
+def test_an_anchor_adds_a_force_that_is_the_same_everywhere():
+    given = spec("bilancia2019").replace({"mechanism.springs.slider": "0.05 N/mm", "mechanism.springs.anchor": "0 mm"})
+    plain, tight = analyze(given), analyze(given.replace({"mechanism.springs.anchor": "4 mm"}))
+    np.testing.assert_allclose(tight.curve.force - plain.curve.force, 0.2, rtol=1e-9)
+    assert plain.values["force_per_anchor"].value == pytest.approx(50.0)
+
+
+def test_a_torque_with_a_tight_spring_is_the_change_of_its_energy():
+    given = spec("li2019").replace({"mechanism.springs.slider": "0.1 N/mm", "mechanism.springs.anchor": "-7 mm"})
+    curve, state = analyze(given).curve, analyze(given).state
+    slope = np.gradient(state.energy, state.motion, edge_order=2)
+    np.testing.assert_allclose(slope[5:-5], curve.torque[5:-5], atol=2e-5 * np.abs(curve.torque).max())
+    stiffness = np.gradient(curve.torque, state.motion, edge_order=2)
+    np.testing.assert_allclose(stiffness[5:-5], state.stiffness[5:-5], atol=2e-4 * np.abs(state.stiffness).max())
+
+
+@pytest.mark.parametrize("way", ["load", "unload"])
+def test_springs_that_make_up_for_their_own_friction_hold_the_force_better_than_those_that_do_not(way):
+    given = cfmkit.load(CONFIGS / "slider_crank_friction.yaml")
+    found = family("slider-crank").design
+    deviations = {}
+    for branch in (None, way):
+        made = found(given.replace({"design.branch": branch}), Run())
+        force = analyze(made.spec).curve.on(way)
+        inside = (force.displacement >= 0.003) & (force.displacement <= 0.035)
+        deviations[branch] = np.abs(force.force[inside] / 3.0 - 1.0).max()
+    assert deviations[way] < 0.8 * deviations[None]
+
+
+def test_the_spring_of_an_adjustment_is_stiff_enough_for_its_screw():
+    given = cfmkit.load(CONFIGS / "slider_crank_friction.yaml")
+    made = family("slider-crank").design(
+        given.replace({"design.adjustment": "0.9 N", "design.anchor_travel": "10 mm"}), Run()
+    )
+    springs = made.spec.mechanism.springs
+    assert 2 * springs.slider * 0.010 >= 0.9 * (1 - 1e-12)
+    assert springs.anchor == 0.0
