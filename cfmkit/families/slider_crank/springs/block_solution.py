@@ -421,7 +421,13 @@ OF_TARGET: dict[str, Callable[[Slab, tuple[float, float] | None], FloatArray]] =
 }
 """Metrics against the effort that the design asks for."""
 
-NO_LOOP = frozenset({"hysteresis_area"})
+NO_LOOP = frozenset(
+    {
+        "hysteresis_area",
+        "force_per_anchor",
+        *(f"loop_{what}_{kind}" for what in ("energy", "share") for kind in ("pins", "guide")),
+    }
+)
 """Metrics of two branches: these curves have one."""
 
 OTHER_DRIVE: dict[str, tuple[str, ...]] = {
