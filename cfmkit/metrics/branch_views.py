@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.curves import Curve, Kind
+    from cfmkit.metrics.longterm import Durability
     from cfmkit.results import ClosedForm
 
 
@@ -48,6 +49,8 @@ class Frame:
         Whose stress counts beside the curve's own.
     closed : ClosedForm or None
         The model at every place, for metrics that are places.
+    durability : Durability or None
+        Fatigue and relaxation of the material.
     """
 
     target: float | None = None
@@ -57,6 +60,7 @@ class Frame:
     valid: tuple[tuple[float, float], ...] | None = None
     load_cases: tuple[Curve, ...] = ()
     closed: ClosedForm | None = field(default=None, compare=False)
+    durability: Durability | None = None
 
     def needed_target(self) -> float:
         """Return the target, which may not be zero.

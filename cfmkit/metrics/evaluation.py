@@ -6,6 +6,7 @@ Nothing is measured over a window that the curve does not cover, and the user he
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 from math import isfinite
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -13,7 +14,8 @@ import numpy as np
 
 from cfmkit.errors import UsageError
 from cfmkit.metrics.branch_views import Cycle, Frame, cycle, span_text
-from cfmkit.metrics.table import Definition, definitions, metrics_by_name, split_name, unknown_metric
+from cfmkit.metrics.longterm import hold_text
+from cfmkit.metrics.table import Definition, definitions, metrics_by_name, split_name, time_of, unknown_metric
 from cfmkit.metrics.traces import Undefined, Window, covers, traces
 from cfmkit.results import WINDOW_OUTSIDE, Finding, Quantity, Status
 from cfmkit.specs.units import Share, between
@@ -49,6 +51,11 @@ class Survey:
         function = definition.function
         if function is None:
             return (Value(None, "it was not computed"),)
+        if definition.argument:
+            if branch is None:
+                return (Value(None, f"it needs a {definition.argument} in brackets: {definition.name}[1000 h]"),)
+            time = time_of(branch)
+            return tuple(_value(partial(function, time=time), item) for item in self.subject.branches)
         chosen = tuple(item for item in self.subject.branches if branch in (None, item.name))
         if not chosen:
             return (Value(None, self._no_branch(branch)),)
@@ -127,7 +134,13 @@ def _all(view: Survey, table: Iterable[Definition]) -> dict[str, Quantity]:
 
 def _entries(view: Survey, definition: Definition) -> Iterator[tuple[str, Quantity]]:
     """Yield the worst branch's value under the plain name, then each branch's."""
-    if definition.function is None:
+    known = view.subject.frame.durability
+    if definition.function is None or (definition.of_material and known is None):
+        return
+    if definition.argument:
+        for text in map(hold_text, known.holds if known else ()):
+            found = view.worst(definition, view.each(definition, text))
+            yield f"{definition.name}[{text}]", _quantity(definition, found)
         return
     values = view.each(definition)
     yield definition.name, _quantity(definition, view.worst(definition, values))
@@ -151,6 +164,7 @@ def frame_of(result: Result) -> Frame:
         result.valid,
         result.load_cases,
         result.closed,
+        getattr(result.spec, "durability", None),
     )
 
 

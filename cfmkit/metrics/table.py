@@ -19,10 +19,11 @@ from __future__ import annotations
 import difflib
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
-from cfmkit.errors import UsageError
-from cfmkit.metrics import flatness, ranges
+from cfmkit.errors import QuantityError, UsageError
+from cfmkit.metrics import flatness, longterm, ranges
+from cfmkit.specs.units import read_quantity
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -62,20 +63,26 @@ class Definition:
         closed loop only; or no curve at all.
     windowed : bool
         Whether it looks only inside the window.
+    argument : str
+        What stands in its brackets in place of a branch: a dimension, or nothing.
+    of_material : bool
+        Whether it is there only where the material says something about use.
     """
 
     name: str
     dimension: str
     definition: str
-    function: Callable[[Any], float] | None = None
+    function: Callable[..., float] | None = None
     worst: Worst = "largest"
     scope: Scope = "branch"
     windowed: bool = True
+    argument: str = ""
+    of_material: bool = False
 
     @property
     def per_branch(self) -> bool:
         """Whether ``name[branch]`` means something."""
-        return self.scope in ("branch", "cycle")
+        return self.scope in ("branch", "cycle") and not self.argument
 
     def of(self, kind: Kind) -> Definition:
         """Return the definition in the words and units of one kind of curve."""
@@ -196,7 +203,29 @@ _LOADS = (
     ),
 )
 
-TABLE = (*_FLATNESS, *_RANGES, *_LOADS)
+_LONG_TERM = (
+    Definition(
+        "fatigue_life",
+        "count",
+        "cycles to failure between the least and the largest stress in the window, of all load cases, by the "
+        "material's `fatigue` with Goodman's line",
+        longterm.fatigue_life,
+        "smallest",
+        of_material=True,
+    ),
+    Definition(
+        "force_after",
+        "effort",
+        "mean {effort} in the window after a hold of the time in brackets, as in `force_after[1000 h]`: it follows "
+        "the material's `relaxation`",
+        longterm.effort_after,
+        "smallest",
+        argument="time",
+        of_material=True,
+    ),
+)
+
+TABLE = (*_FLATNESS, *_RANGES, *_LOADS, *_LONG_TERM)
 """Every metric of the contract, in the order in which they are shown."""
 
 
@@ -321,8 +350,28 @@ def definition_of(name: str, known: Mapping[str, Definition], branches: Sequence
     return known[plain]
 
 
+def time_of(text: str) -> float:
+    """Return the time in the brackets of a metric [s].
+
+    Raises
+    ------
+    cfmkit.errors.QuantityError
+        If it is none, or not above 0.
+    """
+    found = read_quantity(text, "time")
+    if found <= 0:
+        raise QuantityError(f"{text!r} is no time of a hold: it must be above 0")
+    return found
+
+
 def branch_fault(meant: Definition, branch: str, branches: Sequence[str]) -> str:
     """Return what is wrong with asking for one branch of a metric; nothing if it can be had."""
+    if meant.argument:
+        try:
+            time_of(branch)
+        except QuantityError as problem:
+            return f"{meant.name}[{branch}]: {problem}"
+        return ""
     if not meant.per_branch:
         return f"{meant.name!r} is not a matter of one branch; write it without [{branch}]"
     if branches and branch not in branches:

@@ -58,8 +58,11 @@ class Requirement(Model):
     @field_validator("metric")
     @classmethod
     def _well_formed(cls, text: str) -> str:
-        if not re.fullmatch(r"[a-z_0-9]+(\[[a-z_0-9-]+\])?", text):
-            raise ValueError("must be a metric's name, with a branch in brackets where wanted: 'force_mean[load]'")
+        if not re.fullmatch(r"[a-z_0-9]+(\[([a-z_0-9-]+|[0-9.eE+-]+ ?[A-Za-z]+)\])?", text):
+            raise ValueError(
+                "must be a metric's name, with a branch in brackets where wanted: 'force_mean[load]', or a time: "
+                "'force_after[1000 h]'"
+            )
         return text
 
     @model_validator(mode="after")

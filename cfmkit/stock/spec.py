@@ -7,12 +7,14 @@ One rule: the allowable stress is the yield strength over `safety_factor`, which
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import TYPE_CHECKING, Annotated, Any, Self
 
 from pydantic import BeforeValidator, Field, model_validator
 
+from cfmkit.metrics.longterm import Durability, FatigueLaw, RelaxationLaw
 from cfmkit.specs.spec import Model, refuse
-from cfmkit.specs.units import Force, Length, Ratio, Stress, format_short
+from cfmkit.specs.units import Force, Length, Ratio, Stress, Time, format_short
 from cfmkit.specs.units.fields import described
 from cfmkit.stock.materials import UnknownMaterial, material
 
@@ -21,10 +23,78 @@ if TYPE_CHECKING:
 
 
 PositiveStress = Annotated[Stress, Field(gt=0)]
+PositiveTime = Annotated[Time, Field(gt=0)]
+PositiveRatio = Annotated[Ratio, Field(gt=0, lt=1)]
+PositiveNumber = Annotated[float, Field(gt=0)]
 SafetyFactor = Annotated[Ratio, Field(ge=1, description="allowable stress: yield strength over this; 1 unless given")]
 
 _POISSON_RATIO = 0.3
 """Of a material described by its values alone: between that of metals and that of plastics."""
+
+
+class Fatigue(Model):
+    """How many cycles a material lasts: S-N points or Basquin's line, with Goodman's line for the mean stress."""
+
+    points: tuple[tuple[PositiveNumber, PositiveStress], ...] | None = Field(
+        None, min_length=2, description="S-N points [[cycles, amplitude], ...], fully reversed, cycles increasing"
+    )
+    coefficient: PositiveStress | None = Field(None, description="instead of points: s_f' of Basquin's s_f' (2 N)^b")
+    exponent: Annotated[Ratio, Field(gt=-1, lt=0)] | None = Field(None, description="b of the same, negative")
+    ultimate_strength: PositiveStress = Field(description="s_u, at which Goodman's line ends")
+    cycles: Annotated[float, Field(gt=0)] | None = Field(
+        None, description="that a part is to last: the allowable stress is then at most what lasts them from 0 and back"
+    )
+    source: str | None = Field(None, max_length=300, description="where the values were read")
+
+    @model_validator(mode="after")
+    def _one_line(self) -> Self:
+        basquin = self.coefficient is not None and self.exponent is not None
+        if (self.coefficient is None) != (self.exponent is None):
+            raise ValueError("'coefficient' and 'exponent' belong together")
+        if basquin == (self.points is not None):
+            raise ValueError("give either 'points' or 'coefficient' and 'exponent'")
+        for (before, above), (after, below) in pairwise(self.points or ()):
+            if after <= before or below > above:
+                raise ValueError("'points' must have increasing cycles and amplitudes that do not rise")
+        return self
+
+    @property
+    def law(self) -> FatigueLaw:
+        """The same as numbers."""
+        line = None if self.coefficient is None or self.exponent is None else (self.coefficient, self.exponent)
+        return FatigueLaw(self.points or (), line, self.ultimate_strength)
+
+
+class Relaxation(Model):
+    """How the modulus falls while a strain is held: Prony terms, or the modulus at some times."""
+
+    terms: tuple[tuple[PositiveRatio, PositiveTime], ...] | None = Field(
+        None, min_length=1, description="Prony terms [[share, relaxation time], ...]: [[20 %, 10 h], [15 %, 500 h]]"
+    )
+    points: tuple[tuple[Annotated[Time, Field(ge=0)], PositiveStress], ...] | None = Field(
+        None, min_length=2, description="or the modulus after some times [[0 h, 1.5 GPa], [1000 h, 1.1 GPa]]"
+    )
+    hold: tuple[PositiveTime, ...] = Field(
+        (3.6e6,), min_length=1, description="after which the force is reported as `force_after[...]`; default: 1000 h"
+    )
+    temperature: str | None = Field(None, max_length=100, description="of the data, in words")
+    source: str | None = Field(None, max_length=300, description="where the values were read")
+
+    @model_validator(mode="after")
+    def _one_kind(self) -> Self:
+        if (self.terms is None) == (self.points is None):
+            raise ValueError("give either 'terms' or 'points'")
+        if self.terms is not None and sum(share for share, _ in self.terms) >= 1:
+            raise ValueError("the shares of 'terms' must add up to less than 100 %: something of the modulus remains")
+        for (before, above), (after, below) in pairwise(self.points or ()):
+            if after <= before or below > above:
+                raise ValueError("'points' must have increasing times and moduli that do not rise")
+        return self
+
+    @property
+    def law(self) -> RelaxationLaw:
+        """The same as numbers."""
+        return RelaxationLaw(self.terms or (), self.points or ())
 
 
 class MaterialSpec(Model):
@@ -41,6 +111,12 @@ class MaterialSpec(Model):
     )
     yield_strength: PositiveStress | None = Field(
         None, description="for the allowable stress; default: the named material's, if known"
+    )
+    fatigue: Fatigue | None = Field(
+        None, description="S-N points or Basquin's line, for `fatigue_life`; none unless given"
+    )
+    relaxation: Relaxation | None = Field(
+        None, description="Prony terms or moduli over time, for `force_after[1000 h]`; none unless given"
     )
 
     @model_validator(mode="after")
@@ -79,8 +155,25 @@ class MaterialSpec(Model):
         return f"{self.name}: {values}" if self.name else values
 
     def allowable(self, safety_factor: float) -> float | None:
-        """Return the yield strength over a safety factor [Pa]; None where no strength is known."""
-        return None if self.yield_strength is None else self.yield_strength / safety_factor
+        """Return the yield strength over a safety factor [Pa]; None where no strength is known.
+
+        Where a part is to last some cycles, it is at most what lasts them, over the same factor.
+        """
+        limits = [] if self.yield_strength is None else [self.yield_strength]
+        if self.fatigue is not None and self.fatigue.cycles is not None:
+            limits.append(self.fatigue.law.strength(self.fatigue.cycles))
+        return min(limits) / safety_factor if limits else None
+
+    @property
+    def durability(self) -> Durability | None:
+        """Fatigue and relaxation as metrics need them; None where neither is known."""
+        if self.fatigue is None and self.relaxation is None:
+            return None
+        return Durability(
+            self.fatigue.law if self.fatigue else None,
+            self.relaxation.law if self.relaxation else None,
+            self.relaxation.hold if self.relaxation else (),
+        )
 
 
 Friction = Annotated[Ratio, Field(ge=0, lt=1)]

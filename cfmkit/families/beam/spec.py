@@ -14,6 +14,7 @@ from cfmkit.families.beam.parts.spec import (
     PositiveLength,
 )
 from cfmkit.families.beam.shaping.spec import Optimise, optimise_faults
+from cfmkit.metrics.longterm import Durability
 from cfmkit.specs.formula import formula
 from cfmkit.specs.spec import Analysis, DesignBlock, Displacement, Model, Spec, refuse
 from cfmkit.specs.units import DIMENSIONS, Factor, Force, Length, Ratio, Torque
@@ -247,6 +248,13 @@ class BeamSpec(Spec):
     def stress(self) -> Literal["bending", "total"]:
         """What counts as stress."""
         return self.analysis.stress or ("bending" if self.fidelity == "inextensible" else "total")
+
+    @property
+    def durability(self) -> Durability | None:
+        """Of all beams; None where they are not of one material."""
+        about = self.mechanism
+        kinds = {beam.material or about.material for beam in about.beams.values()}
+        return kinds.pop().durability if len(kinds) == 1 else None
 
     @property
     def motion(self) -> Literal["length", "angle"]:

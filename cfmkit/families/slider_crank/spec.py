@@ -9,6 +9,7 @@ from pydantic import Field, model_validator
 
 from cfmkit.families.slider_crank.printed.spec import Printed, PrintedAnalysis, PrintedDesign
 from cfmkit.families.slider_crank.springs.spec import Limits, PositiveLength, SpringDesign, Springs
+from cfmkit.metrics.longterm import Durability
 from cfmkit.specs.spec import Spec, refuse
 from cfmkit.specs.units import Angle, Length, Ratio
 from cfmkit.stock.spec import Guide, Pins, sheet_faults
@@ -105,6 +106,11 @@ class SliderCrankSpec(Spec):
     mechanism: Mechanism
     design: CrankDesign | None = Field(None, description="what `cfmkit design` is to reach")
     analysis: CrankAnalysis = Field(default_factory=CrankAnalysis, description="how it is run")
+
+    @property
+    def durability(self) -> Durability | None:
+        """Of flexures or strip."""
+        return self.mechanism.material.durability if self.mechanism.material else None
 
     @property
     def motion(self) -> Literal["length", "angle"]:

@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
+from cfmkit.metrics.longterm import Durability
 from cfmkit.specs.spec import Analysis, DesignBlock, Model, Spec, refuse
 from cfmkit.specs.units import Angle, Force, Length, Ratio, Stiffness
 from cfmkit.stock.spec import CutPart, MaterialSpec, PositiveStress, SafetyFactor, material_input, sheet_faults
@@ -265,6 +266,11 @@ class VcfmSpec(Spec):
         if self.design is not None and kinds != ("diamond", "v-beam"):
             raise ValueError("only 'diamond' and 'v-beam' can be designed; remove 'design'")
         return self
+
+    @property
+    def durability(self) -> Durability | None:
+        """Of leaves and spring."""
+        return self.mechanism.material.durability
 
     @property
     def motion(self) -> Literal["length", "angle"]:
