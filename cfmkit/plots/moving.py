@@ -74,6 +74,12 @@ def film(moving: Moving, title: str) -> str:
     return _merged(drawn, title)
 
 
+@styled
+def still(moving: Moving, number: int, title: str) -> str:
+    """Return one pose as SVG for a page."""
+    return _merged([_pose(moving, number)], title)
+
+
 def _pose(moving: Moving, number: int) -> ElementTree.Element:
     left, bottom, right, top = moving.box
     scale = min(WIDTH / (right - left), HIGHEST / (top - bottom))

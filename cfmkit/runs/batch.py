@@ -7,7 +7,7 @@ import shlex
 import time
 import traceback
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, Literal, Protocol
 
@@ -18,7 +18,7 @@ from cfmkit.runs.run import Outcome, Request, Verb, analysed, designed, journal_
 from cfmkit.runs.run import carry_out as carried_out
 from cfmkit.runs.run_findings import worst
 from cfmkit.studies.batch import LEFT, Entry
-from cfmkit.studies.changes import TOLERANCE, changes_table, earlier, gone
+from cfmkit.studies.changes import TOLERANCE, Comparison, changes_table, earlier, gone
 from cfmkit.studies.changes import changes as changes_of
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from cfmkit.runs.run import Noting
     from cfmkit.specs.spec import Spec
     from cfmkit.store import RunFolder
-    from cfmkit.studies.changes import Change, Known
+    from cfmkit.studies.changes import Known
     from cfmkit.studies.executors import Executor, Lost
     from cfmkit.studies.finished_runs import KeptRuns
     from cfmkit.tables import Table
@@ -277,38 +277,6 @@ def complaints(entries: Sequence[Entry], tracebacks: bool) -> Iterator[str]:
             yield f"error    {visible(one.spec)}: {one.message}"
         if one.bug and tracebacks:
             yield from one.bug.rstrip("\n").split("\n")
-
-
-@dataclass(frozen=True)
-class Comparison:
-    """A batch beside an earlier one.
-
-    Attributes
-    ----------
-    folder : str
-        Of the earlier batch.
-    tolerance : float
-        Relative change up to which a metric counts as the same.
-    changes : tuple of Change
-        Everything that is not as it was.
-    gone : tuple of str
-        Folders of specifications that are not there any more.
-    """
-
-    folder: str
-    tolerance: float
-    changes: tuple[Change, ...]
-    gone: tuple[str, ...]
-
-    @property
-    def beyond(self) -> tuple[Change, ...]:
-        """The changes that are larger than the tolerance."""
-        return tuple(one for one in self.changes if one.beyond)
-
-    def as_json(self) -> dict[str, Any]:
-        """Return what metrics.json says about it."""
-        changes = [asdict(one) for one in self.changes]
-        return {"with": self.folder, "tolerance": self.tolerance, "changes": changes, "gone": list(self.gone)}
 
 
 @dataclass(frozen=True)

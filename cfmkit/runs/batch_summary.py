@@ -11,13 +11,13 @@ from cfmkit.studies.batch import message, outcome
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from cfmkit.runs.batch import Comparison
     from cfmkit.studies.batch import Entry
+    from cfmkit.studies.changes import Comparison
 
 MOST_CHANGES = 50
 """Changed values that are listed; all stand in changes.csv."""
 
-MARKUP = re.compile(r"([\\`*_{}\[\]<>()#+\-.!|~&@:$])")
+MARKUP = re.compile(r"([\\`*_\[\]<>|~&@#])")
 
 
 def summary(entries: Sequence[Entry], compared: Comparison | None = None) -> bytes:

@@ -160,7 +160,7 @@ class Film:
 
 def _film(result: Result, drawn: Mapping[str, Figure], figures: dict[str, str]) -> Film | None:
     """Return the film of a result; None where its family has none. The figure beside it gets its cursors."""
-    moving = _moving(result)
+    moving = moving_of(result)
     if moving is None or len(moving.motion) < 2 or not drawn:
         return None
     from cfmkit.plots.moving import film
@@ -177,7 +177,8 @@ def _film(result: Result, drawn: Mapping[str, Figure], figures: dict[str, str]) 
     return Film(drawing, name, data, len(texts), texts[0])
 
 
-def _moving(result: Result) -> Moving | None:
+def moving_of(result: Result) -> Moving | None:
+    """Return a mechanism in motion; None where its family has no film."""
     place = family(result.spec.family).draw
     if not place or not result.curves:
         return None

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 from cfmkit.errors import UsageError, visible
@@ -66,6 +66,38 @@ class Change:
         share = "" if self.relative is None else f" ({100 * self.relative:+.3g} %)"
         unit = f" {self.unit}" if self.unit not in ("", "1") else ""
         return f"{self.name}: {_told(self.before)} -> {_told(self.after)}{unit}{share}"
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """A batch beside an earlier one.
+
+    Attributes
+    ----------
+    folder : str
+        Of the earlier batch.
+    tolerance : float
+        Relative change up to which a metric counts as the same.
+    changes : tuple of Change
+        Everything that is not as it was.
+    gone : tuple of str
+        Folders of specifications that are not there any more.
+    """
+
+    folder: str
+    tolerance: float
+    changes: tuple[Change, ...]
+    gone: tuple[str, ...]
+
+    @property
+    def beyond(self) -> tuple[Change, ...]:
+        """The changes that are larger than the tolerance."""
+        return tuple(one for one in self.changes if one.beyond)
+
+    def as_json(self) -> dict[str, Any]:
+        """Return what metrics.json says about it."""
+        changes = [asdict(one) for one in self.changes]
+        return {"with": self.folder, "tolerance": self.tolerance, "changes": changes, "gone": list(self.gone)}
 
 
 def _told(value: float | str | None) -> str:

@@ -29,8 +29,9 @@ if TYPE_CHECKING:
 
     from cfmkit.cli.page_blocks import Block
     from cfmkit.cli.terminal import Terminal
-    from cfmkit.runs.batch import BatchResult, Comparison
+    from cfmkit.runs.batch import BatchResult
     from cfmkit.studies.batch import Entry
+    from cfmkit.studies.changes import Comparison
 
 PLACE = 26
 

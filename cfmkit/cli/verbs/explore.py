@@ -1,0 +1,64 @@
+"""``cfmkit explore``: a spec with sliders, in the browser."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated
+
+from cfmkit.cli import completion
+from cfmkit.cli.answer import Answer
+from cfmkit.cli.failures import Stopped
+from cfmkit.cli.options import Changing, argument, flag, option
+from cfmkit.cli.page_blocks import line, whole_line
+
+if TYPE_CHECKING:
+    from cfmkit.cli.terminal import Terminal
+
+PLACE = 23
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExploreOptions(Changing):
+    """Arguments and options."""
+
+    spec: Annotated[str, argument("SPEC", "YAML file of one mechanism.", completion.specs)]
+    port: Annotated[
+        int, option("--port", metavar="N", low=0, text="Port of this computer to listen on; default: a free one.")
+    ] = 0
+    no_browser: Annotated[bool, flag("--no-browser", text="Open no browser; print the address only.")] = False
+
+
+def run(options: ExploreOptions, terminal: Terminal) -> Answer:
+    """Move the numbers of a spec by sliders in the browser and see curve, metrics and requirements follow.
+
+    The page is served on this computer only, and only to whoever has the address with its token. It reads and writes
+    nothing outside the spec's folder. Ctrl-C ends it.
+    """
+    from cfmkit.errors import UsageError
+    from cfmkit.runs.explorer import Explorer
+    from cfmkit.runs.explorer_server import ExplorerServer
+    from cfmkit.runs.specfile import STDIN
+
+    if options.spec == STDIN:
+        raise UsageError("explore needs a file: what it saves stands beside it")
+    if options.port > 65535:
+        raise UsageError(f"--port: {options.port} is not allowed: must be <= 65535")
+    explorer = Explorer.of(options.spec, options.changes)
+    try:
+        server = ExplorerServer(explorer, options.port)
+    except OSError as error:
+        told = (error.strerror or str(error)).lower()
+        raise UsageError(f"--port: {options.port} cannot be listened on: {told}") from None
+    with server:
+        if options.json:  # the one document comes at the end
+            terminal.complain([f"explore  {server.address}"])
+        else:
+            terminal.show(whole_line(f"explore  {server.address}"), line("end      with Ctrl-C"))
+        if not options.no_browser:
+            import webbrowser
+
+            webbrowser.open(server.address)
+        with suppress(Stopped):  # the ordinary end, no failure
+            server.serve_forever()
+        return Answer({"address": server.address.partition("?")[0]})

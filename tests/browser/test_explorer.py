@@ -1,0 +1,87 @@
+"""The explorer in a real browser: a slider moves, curve and badges follow; YAML is shown and saved."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import threading
+from pathlib import Path
+
+import pytest
+
+import cfmkit
+from cfmkit.runs.explorer import Explorer
+from cfmkit.runs.explorer_server import ExplorerServer
+
+sync_api = pytest.importorskip("playwright.sync_api")
+CONFIGS = Path(__file__).parents[2] / "configs"
+BROWSER = os.environ.get("CFMKIT_BROWSER") or shutil.which("chromium") or shutil.which("chromium-browser")
+
+pytestmark = [
+    pytest.mark.browser,
+    pytest.mark.skipif(BROWSER is None, reason="no Chromium: install it or name one in CFMKIT_BROWSER"),
+]
+
+
+@pytest.fixture
+def page(tmp_path):
+    (tmp_path / "cam.yaml").write_text((CONFIGS / "cam.yaml").read_text())
+    server = ExplorerServer(Explorer.of(str(tmp_path / "cam.yaml")))
+    thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.01}, daemon=True)
+    thread.start()
+    errors, urls = [], []
+    with sync_api.sync_playwright() as driver:
+        browser = driver.chromium.launch(executable_path=BROWSER, args=["--no-sandbox"])
+        opened = browser.new_page()
+        opened.on("request", lambda one: urls.append(one.url))
+        opened.on("console", lambda one: errors.append(one.text) if one.type == "error" else None)
+        opened.on("pageerror", lambda one: errors.append(str(one)))
+        opened.goto(server.address)
+        yield opened
+        browser.close()
+    server.shutdown()
+    server.server_close()
+    thread.join()
+    assert errors == []
+    assert [url for url in urls if not url.startswith(f"http://127.0.0.1:{server.server_port}/")] == []
+
+
+def test_a_slider_moves_and_the_curve_and_the_badges_follow(page, tmp_path):
+    expect = sync_api.expect
+    curve, badges = page.locator("#curve path.now").first, page.locator("#badges li")
+    before = curve.get_attribute("d")
+    assert badges.count() == len(cfmkit.load(tmp_path / "cam.yaml").requirements)
+    assert page.locator("#badges li.bad").count() == 0
+    slider = page.get_by_role("slider", name="mechanism.springs.stiffness")
+    slider.focus()
+    for _ in range(12):
+        page.keyboard.press("ArrowRight")
+    expect(page.locator("#curve path.before").first).to_be_attached()
+    expect(curve).not_to_have_attribute("d", before)
+    page.keyboard.press("End")
+    expect(page.locator("#verdict strong")).to_have_text("a requirement is missed")
+    assert page.locator("#badges li.bad").count() > 0
+    expect(page.locator("#mechanism svg")).to_be_visible()
+    page.locator("#copy").click()
+    expect(page.locator("#yaml")).to_contain_text("stiffness:")
+    page.locator("#name").fill("mine.yaml")
+    page.locator("#save").click()
+    expect(page.locator("#said")).to_have_text("saved as mine.yaml")
+    saved = cfmkit.load(tmp_path / "mine.yaml").mechanism.springs.stiffness
+    assert saved > cfmkit.load(tmp_path / "cam.yaml").mechanism.springs.stiffness
+    page.locator("#save").click()
+    expect(page.locator("#said")).to_contain_text("in the way")
+    page.locator("#reset").click()
+    expect(page.locator("#verdict strong")).to_have_text("all requirements are met")
+
+
+def test_a_value_that_is_not_allowed_says_why_and_keys_can_be_found(page):
+    expect = sync_api.expect
+    field = page.locator('.key[data-path="mechanism.springs.stiffness"] input[type="text"]')
+    field.fill("-1")
+    field.press("Tab")
+    expect(page.locator("#verdict strong")).to_have_text("not valid")
+    expect(page.locator("#verdict span")).to_contain_text("stiffness")
+    page.locator("#find").fill("roller radius")
+    expect(page.locator('.key[data-path="mechanism.roller_radius"]')).to_be_visible()
+    expect(field).to_be_hidden()

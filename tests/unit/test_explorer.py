@@ -1,0 +1,143 @@
+"""The explorer without a browser: sliders for every number, answers, what is saved, and who is answered."""
+
+import json
+import threading
+import time
+import urllib.error
+import urllib.request
+from pathlib import Path
+
+import pytest
+
+import cfmkit
+from cfmkit.errors import OutputError, UsageError
+from cfmkit.runs.explorer import Explorer
+from cfmkit.runs.explorer_server import ExplorerServer
+
+CONFIGS = Path(__file__).parents[2] / "configs"
+
+
+@pytest.fixture
+def explorer(tmp_path):
+    (tmp_path / "cam.yaml").write_text((CONFIGS / "cam.yaml").read_text())
+    return Explorer.of(str(tmp_path / "cam.yaml"))
+
+
+@pytest.mark.parametrize("name", ["cam", "slider_crank_li2019", "vcfm_ding2022", "cam_six_springs"])
+def test_every_number_has_a_slider_whose_ends_the_file_takes(name):
+    explorer = Explorer.of(str(CONFIGS / f"{name}.yaml"))
+    sliders = explorer.sliders()
+    assert len({slider.path for slider in sliders}) == len(sliders) > 10
+    document = explorer.document
+    for slider in sliders:
+        assert slider.low <= slider.value <= slider.high
+        assert slider.high > slider.low
+        assert slider.step > 0
+        written = f"{slider.path}={slider.value:.15g} {slider.unit}"
+        assert document.set(written).problems == ()
+    same = explorer.spec([f"{slider.path}={slider.value:.15g} {slider.unit}" for slider in sliders])
+    assert same.mechanism == explorer.spec().mechanism
+
+
+def test_an_answer_is_what_analyze_says(explorer):
+    changes = ["mechanism.springs.stiffness=0.8 N/mm"]
+    found = explorer.answer(changes)
+    result = cfmkit.analyze(explorer.spec(changes))
+    assert list(found["curve"]["branches"]) == list(dict.fromkeys(result.curve.branches))
+    assert found["curve"]["x"] == "displacement [mm]"
+    assert [one["ok"] for one in found["requirements"]] == [one.ok for one in cfmkit.check(result)]
+    last = found["curve"]["branches"]["load"][1][-1]
+    assert last == pytest.approx(result.curve.effort[result.curve.branch == "load"][-1], rel=1e-4)
+    assert found["curve"] != explorer.answer(())["curve"]
+    assert json.dumps(found, allow_nan=False)
+
+
+def test_a_value_that_is_not_allowed_is_an_answer_with_its_reason(explorer):
+    (told,) = explorer.answer(["mechanism.springs.stiffness=-1 N/mm"])["problem"]
+    assert "stiffness" in told
+    assert "problem" in explorer.answer(["mechanism.nothing=1"])
+
+
+@pytest.mark.parametrize(
+    "name", ["../a.yaml", "/tmp/a.yaml", "a/b.yaml", ".a.yaml", "a.txt", "", "a.yaml\n", "a\0.yaml"]
+)
+def test_nothing_is_saved_but_a_plain_file_beside_the_spec(explorer, name):
+    with pytest.raises(UsageError, match="name a file"):
+        explorer.save(name, ())
+
+
+def test_what_is_saved_can_be_analysed_and_replaces_nothing(explorer):
+    assert explorer.save("mine.yaml", ["mechanism.springs.stiffness=0.8 N/mm"]) == {"saved": "mine.yaml"}
+    saved = cfmkit.load(explorer.folder / "mine.yaml")
+    assert saved.mechanism.springs.stiffness == pytest.approx(800.0)
+    with pytest.raises(OutputError, match="in the way"):
+        explorer.save("mine.yaml", ())
+    with pytest.raises(OutputError, match="in the way"):
+        explorer.save("cam.yaml", ())
+
+
+@pytest.fixture
+def served(explorer):
+    server = ExplorerServer(explorer)
+    thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.01}, daemon=True)
+    thread.start()
+    yield server
+    server.shutdown()
+    server.server_close()
+    thread.join()
+
+
+def asked(server, path="/answer", data=None, **headers):
+    """Return (status, content) of a request."""
+    body = None if data is None else data if isinstance(data, bytes) else json.dumps(data).encode()
+    request = urllib.request.Request(f"http://127.0.0.1:{server.server_port}{path}", body, headers)
+    try:
+        with urllib.request.urlopen(request, timeout=20) as found:
+            return found.status, found.read()
+    except urllib.error.HTTPError as error:
+        with error:
+            return error.code, error.read()
+
+
+def test_only_this_computer_with_the_token_is_answered(served):
+    assert served.server_address[0] == "127.0.0.1"
+    token = {"X-Token": served.token}
+    assert asked(served, "/")[0] == 403
+    assert asked(served, "/?token=wrong")[0] == 403
+    status, page = asked(served, f"/?token={served.token}")
+    assert status == 200
+    assert b"sanchez-salinas-2022" in page
+    assert asked(served, f"/?token={served.token}", Host="evil.example")[0] == 403
+    assert asked(served, f"/../../etc/passwd?token={served.token}")[0] == 404
+    assert asked(served, data={"changes": []})[0] == 403
+    assert asked(served, data={"changes": []}, **token, Host="evil.example")[0] == 403
+    assert asked(served, data={"changes": []}, **token)[0] == 200
+    assert asked(served, "/etc/passwd", data={"changes": []}, **token)[0] == 404
+
+
+@pytest.mark.parametrize(
+    "data", [b"no json", {"changes": 3}, {"changes": [3]}, {}, [1], b"[" * 100_000, b" " * 300_000]
+)
+def test_a_malformed_request_is_refused_and_the_next_one_answered(served, data):
+    token = {"X-Token": served.token}
+    assert asked(served, data=data, **token)[0] == 400
+    assert asked(served, data={"changes": []}, **token)[0] == 200
+
+
+def test_no_name_of_a_spec_becomes_markup(tmp_path):
+    hostile = '</script><img src=x onerror="alert(1)">'
+    text = (CONFIGS / "cam.yaml").read_text().replace("name: sanchez-salinas-2022", f"name: '{hostile}'")
+    (tmp_path / "cam.yaml").write_text(text)
+    page = Explorer.of(str(tmp_path / "cam.yaml")).page("token").decode()
+    assert "<img" not in page
+    assert page.count("</script>") == 2
+
+
+def test_a_closed_model_answers_within_a_tenth_of_a_second(explorer):
+    explorer.answer(())
+    taken = []
+    for k in range(7):
+        start = time.process_time()
+        explorer.answer([f"mechanism.springs.stiffness=0.{60 + k} N/mm"])
+        taken.append(time.process_time() - start)
+    assert min(taken) < 0.1
