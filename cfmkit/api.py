@@ -155,7 +155,13 @@ def design(spec: AnySpec, run: Run | None = None) -> Design:
     record = family(spec.family)
     if record.design is None:
         raise UsageError(f"{record.phrase} cannot be designed, only analysed")
-    return record.design(spec, run or Run())
+    run = run or Run()
+    found = record.design(spec, run)
+    if getattr(getattr(spec, "design", None), "yield", None) is None:
+        return found
+    from cfmkit.studies.margins import with_design_margins
+
+    return with_design_margins(spec, found, run)
 
 
 def evaluate(

@@ -155,6 +155,22 @@ class BlockAnswer:
 
 
 @dataclass(frozen=True)
+class Sampled:
+    """Effort and stress of one part at p places of its motion.
+
+    Attributes
+    ----------
+    effort : mapping of str to (p,) array
+        Branch -> force [N] or torque [N m].
+    stress : (s, p) array
+        Stresses of s parts of the mechanism, or the largest alone [Pa]; s = 0 where there is none.
+    """
+
+    effort: Mapping[str, FloatArray]
+    stress: FloatArray
+
+
+@dataclass(frozen=True)
 class MeasuredLoop:
     """Both branches of a measured loop at the same places.
 
@@ -285,6 +301,12 @@ class Family:
     gradient : callable, optional
         ``gradient(spec, paths) -> {metric: {path: derivative}}``: exact derivatives [SI] of those
         metrics (over the window of the analysis) and paths that the family knows; `local` asks for it.
+    sampled : str, optional
+        ``"module:function"`` with ``sampled(spec, places) -> Sampled``: effort and stress at a few places [m or
+        rad], faster than the analysis and equal to it; None where it cannot. Searches over many parts ask for it.
+    free : str, optional
+        ``"module:function"`` with ``free(spec, designed) -> {path: (low, high)}``: which values of a designed
+        specification may move, and in which ranges [SI], as its `design` block says it for the design itself.
     attribution : str, optional
         ``"module"`` with ``attribute(result, loop) -> quantities``: what a measured loop says about the causes
         of its departure from the model, by name, and their `DEFINITIONS`; imported when there is a measurement.
@@ -325,6 +347,8 @@ class Family:
     resolve: Callable[[Any], Any] | None = None
     analyze_block: Callable[[Any, Block], BlockAnswer | None] | None = None
     gradient: Callable[[Any, Sequence[str]], Any] | None = None
+    sampled: str | None = None
+    free: str | None = None
     attribution: str | None = None
     draw: str | None = None
     scheme: str | None = None

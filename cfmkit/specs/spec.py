@@ -184,6 +184,16 @@ class DesignKeys(Model):
         description="how far values of made parts are off, as in `sensitivity.parameters`: {path: {normal: 0.02 mm}}",
     )
     correlated: tuple[Correlated, ...] = Field((), description="tolerances that deviate together, as in `sensitivity`")
+    free: dict[str, tuple[MetricValue, MetricValue]] = Field(
+        {},
+        description="values of the design that may move for `yield`, and in which ranges: {path: [4 mm, 8 mm]}; "
+        "default: those that the family's design chooses",
+    )
+    robust: Literal["cvar", "worst"] | None = Field(
+        None,
+        description="after margins to first order: 24 drawn parts are solved at each step, and the mean of the worst "
+        "share of them counts (cvar), or the worst",
+    )
     samples: int = Field(
         400, ge=20, le=1_000_000, description="parts that are drawn from the tolerances to judge the design"
     )

@@ -139,6 +139,13 @@ def faults(spec: Spec, design: DesignBlock) -> Iterator[tuple[tuple[str | int, .
             continue
         if found.kind not in ("quantity", "number"):
             yield ("design", "tolerances", path), f"{path!r} does not vary continuously"
+    for path in design.free:
+        try:
+            leaf(type(spec), path)
+        except CannotVary as problem:
+            yield ("design", "free", path), str(problem)
+    if design.robust is not None and getattr(design, "yield") is None:
+        yield ("design", "robust"), "says how a yield is reached: give 'design.yield', too"
     if getattr(design, "yield") is not None and not design.tolerances:
         yield ("design", "yield"), "a yield is a share of made parts: say with 'design.tolerances' how they are made"
     if design.tolerances and not spec.part_requirements:

@@ -108,8 +108,8 @@ class BeamDesign(DesignBlock):
 
     @model_validator(mode="after")
     def _one_way(self) -> Self:
-        if (self.rescale is None) == (self.optimise is None):
-            raise ValueError("give either 'rescale' or 'optimise'")
+        if (self.rescale and self.optimise) or not (self.rescale or self.optimise or self.free):
+            raise ValueError("give either 'rescale' or 'optimise', or 'free' with 'tolerances' and 'yield'")
         return self
 
 

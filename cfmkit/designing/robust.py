@@ -1,0 +1,436 @@
+"""Values of a design for which the parts that are made of it are good: margins from tolerances, and drawn parts.
+
+What is seen of a part are numbers such as the force at some poses; limits are rows of them that must be at least zero.
+Near a design both move in proportion to its values and to the errors of its parts. So the numbers of drawn parts are
+known to first order, without solving one of them, and with them how far each limit must be drawn in: none is guessed.
+
+A step minimises, over such parts, the mean of the worst share of them (the conditional value at risk of the row that is
+missed most, counted in standard deviations of that row) [RU]. That is a linear program. It is followed as far as the
+numbers are trusted to be linear, judged anew where it ends, and repeated until the share that was wanted is reached,
+or no step gains. Where first order does not do, a few drawn parts are solved themselves, at every step (`drawn`).
+
+Reference
+---------
+[RU] R. T. Rockafellar, S. Uryasev, J. Risk 2 (2000) 21, eq. 9 and 17.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from cfmkit.arrays import FloatArray
+
+STEP = 2e-4
+"""Step of a difference by a value of the design, as a share of its range."""
+
+SIGMA_STEP = 0.5
+"""Step of a difference by an error, in standard deviations: so small that its own curvature does not count."""
+
+LINEAR_PARTS, ROWS = 192, 24
+"""Parts of a linear program, and how many of its rows each brings: those that are missed most, or nearly."""
+
+SURE = 0.01
+"""The estimated share is to be so much above what was asked for: the estimate is of first order."""
+
+FIRST_TRUST, LEAST_TRUST, MOST_TRUST = 0.1, 1e-4, 0.5
+"""How far a step may go, as a share of the ranges."""
+
+FLOOR = 1e-2
+"""Least standard deviation of a row, as a share of the largest of its limit: what no error moves is kept strictly."""
+
+
+class Seen(Protocol):
+    """What a family sees of a part."""
+
+    def __call__(self, x: FloatArray, errors: FloatArray, /) -> FloatArray | None:
+        """Return the numbers of a part (q,) whose design has the values x (n,) and whose errors are (d,); or None."""
+
+
+@dataclass(frozen=True)
+class Problem:
+    """What may vary, what errors there are, and what must hold.
+
+    Attributes
+    ----------
+    seen : callable
+        Numbers of a part: its design's values (n,) and its errors (d,) in, (q,) out; None where it has none.
+    bounds : (n, 2) array
+        Of the values.
+    errors : (k, d) array
+        Errors of drawn parts.
+    deviations : (d,) array
+        Standard deviations of the errors.
+    matrix, constant : (m, q) array and (m,) array
+        Rows of the numbers, which must be at least zero: ``matrix @ numbers + constant``.
+    about : (m,) array of int
+        Which limit each row belongs to.
+    share : float
+        Of parts that are to be good.
+    late : callable
+        Tells whether the time is up.
+    tell : callable
+        Takes the share estimated and the number of steps so far.
+    """
+
+    seen: Seen
+    bounds: FloatArray
+    errors: FloatArray
+    deviations: FloatArray
+    matrix: FloatArray
+    constant: FloatArray
+    about: NDArray[np.int64]
+    share: float
+    late: Callable[[], bool] = lambda: False
+    tell: Callable[[float, int], None] = lambda _share, _steps: None
+
+    @property
+    def reach(self) -> FloatArray:
+        """Widths of the ranges, (n,)."""
+        return np.asarray(self.bounds[:, 1] - self.bounds[:, 0])
+
+    @property
+    def none(self) -> FloatArray:
+        """The errors of a perfect part."""
+        return np.zeros(len(self.deviations))
+
+
+@dataclass(frozen=True)
+class Linear:
+    """A design to first order.
+
+    Attributes
+    ----------
+    x : (n,) array
+        Its values.
+    rows : (m,) array
+        Limits of the perfect part.
+    by_x : (m, n) array
+        Their derivatives by the values.
+    by_error : (m, d) array
+        By the errors.
+    """
+
+    x: FloatArray
+    rows: FloatArray
+    by_x: FloatArray
+    by_error: FloatArray
+
+    def parts(self, errors: FloatArray) -> FloatArray:
+        """Return the limits of parts, (k, m)."""
+        return np.asarray(self.rows + errors @ self.by_error.T)
+
+    def share(self, errors: FloatArray) -> float:
+        """Return the share of parts that keep every limit, to first order."""
+        return float((self.parts(errors) >= 0).all(axis=1).mean())
+
+    def spread(self, deviations: FloatArray, correlated: FloatArray | None = None) -> FloatArray:
+        """Return the standard deviation of each row, (m,)."""
+        moved = self.by_error if correlated is None else self.by_error @ correlated
+        return np.asarray(np.sqrt(((moved * deviations) ** 2).sum(axis=1)))
+
+
+@dataclass(frozen=True)
+class Found:
+    """Where the steps ended.
+
+    Attributes
+    ----------
+    x : (n,) array
+        Values of the design.
+    share : float
+        Of good parts: estimated to first order, or of the drawn parts that were solved.
+    began : float
+        The same where the steps began.
+    steps, seen : int
+        Steps that gained something, and parts that were solved.
+    linear : Linear
+        The design to first order.
+    reached : bool
+        Whether the share is what was asked for.
+    """
+
+    x: FloatArray
+    share: float
+    began: float
+    steps: int
+    seen: int
+    linear: Linear
+    reached: bool
+
+
+class NoPart(Exception):
+    """The design that the search begins with has no numbers: there is nothing to improve."""
+
+
+@dataclass
+class _Counted:
+    """A problem whose parts are counted."""
+
+    problem: Problem
+    count: int = 0
+
+    def __call__(self, x: FloatArray, errors: FloatArray) -> FloatArray | None:
+        self.count += 1
+        found = self.problem.seen(x, errors)
+        return found if found is not None and np.isfinite(found).all() else None
+
+    def rows(self, numbers: FloatArray) -> FloatArray:
+        return np.asarray(self.problem.matrix @ numbers + self.problem.constant)
+
+
+def linear(problem: Problem, x: FloatArray, seen: Seen) -> Linear | None:
+    """Return a design to first order, by central differences; None where it or a neighbour has no numbers."""
+    middle = seen(x, problem.none)
+    if middle is None:
+        return None
+    by_x = _by_values(problem, x, problem.none, seen)
+    by_error = np.empty((len(middle), len(problem.deviations)))
+    for k, sigma in enumerate(problem.deviations.tolist()):
+        step = SIGMA_STEP * sigma * np.eye(len(problem.deviations))[k]
+        ends = [seen(x, sign * step) for sign in (1.0, -1.0)]
+        if ends[0] is None or ends[1] is None:
+            return None
+        by_error[:, k] = (ends[0] - ends[1]) / (2.0 * SIGMA_STEP * sigma)
+    if by_x is None:
+        return None
+    matrix = problem.matrix
+    return Linear(x, matrix @ middle + problem.constant, matrix @ by_x, matrix @ by_error)
+
+
+def _by_values(problem: Problem, x: FloatArray, errors: FloatArray, seen: Seen) -> FloatArray | None:
+    """Return the derivatives of the numbers of a part by the values of its design, (q, n)."""
+    columns = []
+    for k, width in enumerate(problem.reach.tolist()):
+        low, high = x.copy(), x.copy()
+        low[k] = max(problem.bounds[k, 0], x[k] - STEP * width)
+        high[k] = min(problem.bounds[k, 1], x[k] + STEP * width)
+        ends = seen(high, errors), seen(low, errors)
+        if ends[0] is None or ends[1] is None:
+            return None
+        columns.append((ends[0] - ends[1]) / (high[k] - low[k]))
+    return np.array(columns).T
+
+
+def with_margins(problem: Problem, x: FloatArray, most: int = 40) -> Found:
+    """Return values for which the share of good parts, estimated to first order, is what was asked for, or largest.
+
+    Parameters
+    ----------
+    problem : Problem
+        What may vary and what must hold.
+    x : (n,) array
+        Where to begin.
+    most : int
+        Steps.
+
+    Raises
+    ------
+    NoPart
+        If the first design has no numbers.
+    """
+    seen = _Counted(problem)
+    now = linear(problem, np.clip(x, *problem.bounds.T), seen)
+    if now is None:
+        raise NoPart
+    scale = _scale(now, problem)
+    few = problem.errors[:LINEAR_PARTS]
+    began = share = now.share(problem.errors)
+    best = now
+    best_share, risk, trust, steps = share, _risk(now.parts(few) / scale, problem.share), FIRST_TRUST, 0
+    for _ in range(most):
+        if best_share >= min(problem.share + SURE, 1.0) or trust < LEAST_TRUST or problem.late():
+            break
+        parts = now.parts(few) / scale
+        slopes = np.broadcast_to(now.by_x / scale[:, None], (len(few), *now.by_x.shape))
+        move = _step(parts, slopes, problem, now.x, trust)
+        if move is None:
+            break
+        there = np.clip(now.x + move, *problem.bounds.T)
+        # one part tells most of what the way bends: errors and slopes are looked at where that is good only
+        if not _moved_risk(now, there, few, scale, problem, seen) < risk:
+            trust *= 0.5
+            continue
+        next_ = linear(problem, there, seen)
+        new_risk = np.inf if next_ is None else _risk(next_.parts(few) / scale, problem.share)
+        if next_ is None or not new_risk < risk - 1e-6 * (1.0 + abs(risk)):
+            trust *= 0.5
+            continue
+        now, risk, steps = next_, new_risk, steps + 1
+        trust = min(MOST_TRUST, 1.6 * trust)
+        share = now.share(problem.errors)
+        if share >= best_share:
+            best, best_share = now, share
+        problem.tell(share, steps)
+    return Found(best.x, best_share, began, steps, seen.count, best, best_share >= problem.share)
+
+
+def _moved_risk(
+    now: Linear, there: FloatArray, few: FloatArray, scale: FloatArray, problem: Problem, seen: _Counted
+) -> float:
+    """Return the risk of other values, errors moving the rows as they do now."""
+    numbers = seen(there, problem.none)
+    if numbers is None:
+        return np.inf
+    return _risk(replace(now, rows=seen.rows(numbers)).parts(few) / scale, problem.share)
+
+
+def _scale(now: Linear, problem: Problem) -> FloatArray:
+    """Return by what each row is divided: its standard deviation over the drawn parts."""
+    moved = (problem.errors @ now.by_error.T).std(axis=0)
+    out: FloatArray = np.empty(len(moved))
+    for one in np.unique(problem.about):
+        mine = problem.about == one
+        # limits that no error moves at all have their own size for a scale
+        largest = float(moved[mine].max()) or float(np.abs(problem.constant[mine]).max()) or 1.0
+        out[mine] = np.maximum(moved[mine], FLOOR * largest)
+    return out
+
+
+def _risk(parts: FloatArray, share: float) -> float:
+    """Return the conditional value at risk of the row that parts (k, m) miss most: below zero, the share is reached."""
+    worst = np.sort(-parts.min(axis=1))[::-1]
+    tail = max(1.0, (1.0 - share) * len(worst))
+    whole = int(tail)
+    rest = tail - whole
+    total = worst[:whole].sum() + (rest * worst[whole] if rest and whole < len(worst) else 0.0)
+    return float(total / tail)
+
+
+def _step(
+    parts: FloatArray, slopes: NDArray[np.float64], problem: Problem, x: FloatArray, trust: float
+) -> FloatArray | None:
+    """Return the move of the values (n,) that lowers the risk most within the trust; None where there is none.
+
+    Parameters
+    ----------
+    parts : (k, m) array
+        Rows of each part.
+    slopes : (k, m, n) array
+        Their derivatives by the values.
+    problem, x : Problem and (n,) array
+        Bounds, and where the values are.
+    trust : float
+        Largest move, as a share of the ranges.
+    """
+    from scipy.optimize import linprog
+    from scipy.sparse import csr_matrix, hstack
+
+    count, size = len(parts), len(x)
+    reach = problem.reach
+    kept = min(ROWS, parts.shape[1])
+    # what a row can still lose within the trust decides whether it may come to matter
+    possible = parts - trust * np.abs(slopes * reach).sum(axis=2)
+    chosen = np.argpartition(possible, kept - 1, axis=1)[:, :kept]
+    part = np.repeat(np.arange(count), kept)
+    row = chosen.ravel()
+    # slack of the part + level + row + slope move >= 0
+    moves = csr_matrix(-slopes[part, row] * reach)
+    level = csr_matrix(-np.ones((len(part), 1)))
+    slack = csr_matrix((-np.ones(len(part)), (np.arange(len(part)), part)), shape=(len(part), count))
+    tail = max(1.0, (1.0 - problem.share) * count)
+    cost = np.concatenate([np.zeros(size), [1.0], np.full(count, 1.0 / tail)])
+    low = np.maximum(-trust, (problem.bounds[:, 0] - x) / reach)
+    high = np.minimum(trust, (problem.bounds[:, 1] - x) / reach)
+    limits = [*zip(low.tolist(), high.tolist(), strict=True), (None, None), *([(0.0, None)] * count)]
+    solve: Any = linprog  # its stubs know no sparse matrices
+    found = solve(
+        cost, A_ub=hstack([moves, level, slack]).tocsr(), b_ub=parts[part, row], bounds=limits, method="highs"
+    )
+    return None if found.x is None else np.asarray(found.x[:size] * reach)
+
+
+@dataclass
+class _Parts:
+    """Drawn parts that are solved themselves."""
+
+    problem: Problem
+    errors: FloatArray
+    seen: _Counted
+    slopes: FloatArray | None = field(default=None)
+
+    def rows(self, x: FloatArray) -> FloatArray | None:
+        """Return the rows of all parts, (k, m); None where a part has no numbers."""
+        found = [self.seen(x, error) for error in self.errors]
+        return None if any(one is None for one in found) else np.array([self.seen.rows(one) for one in found])  # type: ignore[arg-type]
+
+    def sloped(self, x: FloatArray, rows: FloatArray) -> FloatArray | None:
+        """Return the derivatives of those rows by the values, (k, m, n), by one-sided differences."""
+        bounds, out = self.problem.bounds, np.empty((*rows.shape, len(x)))
+        for k, width in enumerate(self.problem.reach.tolist()):
+            step = STEP * width if x[k] + STEP * width <= bounds[k, 1] else -STEP * width
+            moved = x.copy()
+            moved[k] += step
+            there = self.rows(moved)
+            if there is None:
+                return None
+            out[..., k] = (there - rows) / step
+        return out
+
+
+def drawn(problem: Problem, found: Found, count: int, worst: bool = False, most: int = 25) -> Found:
+    """Return values for which drawn parts, each solved itself, are good: from a design that first order led to.
+
+    Parameters
+    ----------
+    problem : Problem
+        What may vary and what must hold.
+    found : Found
+        Where to begin.
+    count : int
+        Parts that are drawn.
+    worst : bool
+        Whether the worst of them counts, and not the mean of the worst share.
+    most : int
+        Steps.
+    """
+    asked = replace(problem, share=1.0) if worst else problem
+    seen = _Counted(problem)
+    parts = _Parts(problem, problem.errors[-count:], seen)
+    scale = _scale(found.linear, problem)
+    x, rows = found.x, parts.rows(found.x)
+    if rows is None:
+        return found
+    risk, trust, steps = _risk(rows / scale, asked.share), 0.25 * FIRST_TRUST, 0
+    slopes = None
+    for _ in range(most):
+        if trust < LEAST_TRUST or problem.late():
+            break
+        slopes = parts.sloped(x, rows) if slopes is None else slopes
+        move = None if slopes is None else _step(rows / scale, slopes / scale[:, None], asked, x, trust)
+        if move is None:
+            break
+        there = np.clip(x + move, *problem.bounds.T)
+        new = parts.rows(there)
+        new_risk = np.inf if new is None else _risk(new / scale, asked.share)
+        if new is None or not new_risk < risk - 1e-6 * (1.0 + abs(risk)):
+            trust *= 0.35
+            continue
+        small = risk - new_risk < 1e-3
+        x, rows, risk, slopes, steps = there, new, new_risk, None, steps + 1
+        trust = min(MOST_TRUST, 1.6 * trust)
+        problem.tell(float((rows >= 0).all(axis=1).mean()), steps)
+        if small:
+            break
+    now = linear(problem, x, seen)
+    if now is None:
+        return found
+    share = now.share(problem.errors)
+    return Found(x, share, found.began, found.steps + steps, found.seen + seen.count, now, share >= problem.share)
+
+
+def costliest(found: Found, problem: Problem, groups: list[tuple[int, ...]]) -> int:
+    """Return the number of the group of errors without which most more parts would be good, to first order."""
+    shares = []
+    for members in groups:
+        still = problem.errors.copy()
+        still[:, members] = 0.0
+        shares.append(found.linear.share(still))
+    return int(np.argmax(shares))

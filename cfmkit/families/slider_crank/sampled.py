@@ -1,0 +1,64 @@
+"""Force and stress of a printed slider-crank at a few travels, in a part of the time of its analysis: for searches."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.families.base import Sampled
+from cfmkit.families.refusals import CannotBuild
+from cfmkit.families.slider_crank.build import linkage_of, resolve, unloaded_angle
+from cfmkit.families.slider_crank.printed.assembly import elasticity
+from cfmkit.families.slider_crank.printed.design import DEFAULT_THICKNESS
+from cfmkit.families.slider_crank.printed.model import chain_of
+from cfmkit.families.slider_crank.printed.pressing import Ending
+from cfmkit.families.slider_crank.printed.solution import Solution
+
+if TYPE_CHECKING:
+    from cfmkit.arrays import FloatArray
+    from cfmkit.families.slider_crank.spec import SliderCrankSpec
+
+
+def sampled(spec: SliderCrankSpec, places: FloatArray) -> Sampled | None:
+    """Return force and stress at travels; None of springs, and where the chain has no equilibrium at one of them.
+
+    Parameters
+    ----------
+    spec : SliderCrankSpec
+        With flexures or a strip.
+    places : (p,) array
+        Increasing travels [m].
+    """
+    if spec.fidelity == "prb" or spec.analysis.side is not None or places[0] < 0:
+        return None
+    try:
+        spec = resolve(spec)
+        linkage = linkage_of(spec.mechanism)
+        chain = chain_of(spec, linkage, unloaded_angle(spec.mechanism, linkage))
+    except CannotBuild:
+        return None
+    pressed = chain.press(places, 0, spec.analysis.accuracy)
+    if pressed.ending is not Ending.COMPLETE:
+        return None
+    model = "lumped" if spec.fidelity == "lumped" else "beam"
+    ends = float(places[0]), float(places[-1])
+    solution = Solution(model, chain, pressed, elasticity(spec.mechanism), spec.mechanism.legs, ends, False)  # type: ignore[arg-type]
+    return Sampled({"load": np.asarray(solution.force)}, np.asarray(solution.stress)[None])
+
+
+def free(given: SliderCrankSpec, designed: SliderCrankSpec) -> dict[str, tuple[float, float]]:
+    """Return the thicknesses and the width of a designed strip with the ranges of `design.beam`; nothing of springs."""
+    wanted, beam = given.design.beam if given.design else None, designed.mechanism.beam
+    if wanted is None or beam is None:
+        return {}
+    found: dict[str, tuple[float, float]] = {}
+    if isinstance(beam.thickness, tuple):
+        ranges = wanted.thicknesses or (wanted.thickness or DEFAULT_THICKNESS,) * len(beam.thickness)
+        if len(ranges) == len(beam.thickness):
+            found |= {f"mechanism.beam.thickness.{k}": ends for k, ends in enumerate(ranges)}
+    else:
+        found["mechanism.beam.thickness"] = wanted.thickness or DEFAULT_THICKNESS
+    if isinstance(wanted.width, tuple):
+        found["mechanism.beam.width"] = wanted.width
+    return {path: (float(low), float(high)) for path, (low, high) in found.items() if low < high}

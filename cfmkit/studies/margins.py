@@ -1,0 +1,539 @@
+"""Designs with margins: values of a designed specification moved until enough of its made parts are good.
+
+What may move is what `design.free` names, or what the family says that its design may choose; what errors there are
+say `design.tolerances`; what must hold say the requirements. Requirements on forces and stresses become rows of the
+force and the stress at a few poses, which are smooth where the metrics, largest and smallest values, are not:
+(max - min)/(max + min) <= b holds if (1 + b) F_j - (1 - b) F_i >= 0 for every pair of poses. Any other metric is a
+number of its own. How limits are drawn in is `designing.robust`'s; the yield is judged afterwards, on parts drawn anew.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.designing.audit import searched
+from cfmkit.designing.robust import Found, NoPart, Problem, costliest, drawn, with_margins
+from cfmkit.designing.starts import Clock
+from cfmkit.errors import CfmError, SpecError
+from cfmkit.errors import Problem as Fault
+from cfmkit.families import family
+from cfmkit.families.base import Sampled, function_named
+from cfmkit.metrics import split_name, window_of
+from cfmkit.metrics.requirements import Bounds
+from cfmkit.results import Design, Status
+from cfmkit.studies.made_parts import tolerances_of
+from cfmkit.studies.noted_metrics import metrics_of
+from cfmkit.studies.sensitivity.intervals import clopper_pearson
+from cfmkit.studies.spec_values import CannotVary, leaf
+from cfmkit.studies.study import Study
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from cfmkit.arrays import FloatArray
+    from cfmkit.families.base import Run
+    from cfmkit.results import Result
+    from cfmkit.specs.spec import Requirement, Spec
+    from cfmkit.studies.made_parts import Tolerances
+    from cfmkit.studies.study import Metric
+
+POSES = 15
+"""Chebyshev-Lobatto poses in a window; between them the force of a mechanism that is worth making is smooth."""
+
+NARROW = 0.02
+"""A window that is a smaller share of the whole span has its ends only."""
+
+ESTIMATED = 4000
+"""Parts whose yield is estimated to first order: one standard deviation of the estimate is 0.5 % at 90 %."""
+
+SEARCH_SEED = 7919
+"""Added to the seed: the parts that a search looks at are not those that it is judged by."""
+
+CHECKED, ROUNDS, MOST_ASKED = 400, 4, 0.9975
+"""Parts that are solved to see whether the estimate holds, how often it is then asked for more, and for how much."""
+
+DRAWN = 24
+"""Parts that `design.robust` solves at each step."""
+
+DIGITS = 6
+"""Decimals of a value that is written, as a share of its range."""
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Requirements as rows of what is seen of a part.
+
+    Attributes
+    ----------
+    places : (p,) array
+        Poses at which effort and stress are looked at [m or rad].
+    branches : tuple of str
+        Of the curve.
+    stresses : int
+        Rows of stress.
+    matrix, constant : (m, q) and (m,) array
+        ``matrix @ numbers + constant`` is at least zero where all requirements hold.
+    metrics : tuple of Metric
+        Those that are numbers of their own: the last ones.
+    about : tuple of int
+        To which requirement each row belongs.
+    """
+
+    places: FloatArray
+    branches: tuple[str, ...]
+    stresses: int
+    matrix: FloatArray
+    constant: FloatArray
+    metrics: tuple[Metric, ...]
+    about: tuple[int, ...]
+
+
+class _Builder:
+    """Gathers rows over the numbers: each branch at all places, then each stress at all places, then metrics."""
+
+    def __init__(self, nominal: Result, places: FloatArray, first: Sampled) -> None:
+        self.nominal, self.places = nominal, places
+        self.branches, self.stresses = tuple(first.effort), len(first.stress)
+        self.first = first
+        self.metrics: list[Metric] = []
+        self.rows: list[tuple[dict[int, float], float, int]] = []
+
+    def at(self, over: Any) -> Any:
+        """Return the numbers of the places in a window."""
+        low, high = _window(self.nominal, over)
+        slack = 1e-9 * (self.places[-1] - self.places[0])
+        return np.flatnonzero((self.places >= low - slack) & (self.places <= high + slack))
+
+    def add(self, one: Requirement, number: int) -> None:
+        """Add the rows of a requirement."""
+        name, branch = split_name(one.metric)
+        (metric,) = metrics_of(self.nominal.spec, [one.metric], self.nominal.curve)
+        limits = Bounds.of(one, metric.dimension)
+        plain = name.replace("torque_", "force_", 1)
+        if plain in _OF_STRESS and self.stresses and self._stress(plain, limits, one.over, number):
+            return
+        if plain in _OF_EFFORT:
+            found = [
+                rows
+                for k, each in enumerate(self.branches)
+                if branch in (None, each)
+                for rows in [self._effort(plain, limits, one.over, k)]
+            ]
+            if found and all(rows is not None for rows in found):
+                self.rows += [(row, constant, number) for rows in found for row, constant in rows or ()]
+                return
+        column = self._numbers + len(self.metrics)
+        self.metrics.append(replace(metric, over=one.over, label=str(number)))
+        if limits.min is not None:
+            self.rows.append(({column: 1.0}, -limits.min, number))
+        if limits.max is not None:
+            self.rows.append(({column: -1.0}, limits.max, number))
+
+    @property
+    def _numbers(self) -> int:
+        return (len(self.branches) + self.stresses) * len(self.places)
+
+    def _stress(self, name: str, limits: Bounds, over: Any, number: int) -> bool:
+        """Add rows of the stress; False where they would not say it."""
+        allowed = self.nominal.allowable_stress
+        most = limits.max if name == "stress_max" else None
+        if name == "safety_factor" and allowed is not None and limits.min and limits.max is None:
+            most = allowed / limits.min
+        if most is None or (limits.min is not None and name == "stress_max"):
+            return False
+        count, first = len(self.places), len(self.branches) * len(self.places)
+        for s in range(self.stresses):
+            self.rows += [({first + s * count + int(k): -1.0}, most, number) for k in self.at(over)]
+        return True
+
+    def _effort(self, name: str, limits: Bounds, over: Any, k: int) -> list[tuple[dict[int, float], float]] | None:
+        """Return rows of the effort on one branch; None where they would not say it."""
+        at, first = self.at(over), k * len(self.places)
+        values = self.first.effort[self.branches[k]][at]
+        if not len(at) or not np.isfinite(values).all():
+            return None
+        columns, sign = (first + at).tolist(), float(np.sign(values.mean())) or 1.0
+        return _OF_EFFORT[name](_View(columns, values, sign, self.places[at], self.nominal.target), limits)
+
+    def rows_of(self) -> Rows:
+        """Return all rows."""
+        size = self._numbers + len(self.metrics)
+        matrix = np.zeros((len(self.rows), size))
+        for r, (row, _, _) in enumerate(self.rows):
+            for column, weight in row.items():
+                matrix[r, column] += weight
+        constant = np.array([constant for _, constant, _ in self.rows])
+        about = tuple(number for _, _, number in self.rows)
+        return Rows(self.places, self.branches, self.stresses, matrix, constant, tuple(self.metrics), about)
+
+
+@dataclass(frozen=True)
+class _View:
+    """The effort on one branch in one window: its columns, its values in the design and its sign."""
+
+    columns: list[int]
+    values: FloatArray
+    sign: float
+    places: FloatArray
+    target: float | None
+
+    @cached_property
+    def weights(self) -> FloatArray:
+        """Weights of the mean over the window."""
+        if len(self.places) == 1:
+            return np.ones(1)
+        widths = np.diff(self.places)
+        found = np.zeros(len(self.places))
+        found[:-1] += 0.5 * widths
+        found[1:] += 0.5 * widths
+        return np.asarray(found / widths.sum())
+
+
+_Lines = list[tuple[dict[int, float], float]]
+
+
+def _pairs(view: _View, above: float, below: float) -> _Lines:
+    """Return sign (above F_j - below F_i) >= 0 for all pairs."""
+    return [({i: -view.sign * below, j: view.sign * above}, 0.0) for i in view.columns for j in view.columns if i != j]
+
+
+def _half_band(view: _View, limits: Bounds) -> _Lines | None:
+    return None if limits.max is None or limits.min else _pairs(view, 1.0 + limits.max, 1.0 - limits.max)
+
+
+def _ripple(view: _View, limits: Bounds) -> _Lines | None:
+    return None if limits.max is None or limits.min else _pairs(view, 1.0, 1.0 - limits.max)
+
+
+def _from_target(view: _View, limits: Bounds) -> _Lines | None:
+    if limits.max is None or limits.min or not view.target:
+        return None
+    reach, target = limits.max * abs(view.target), view.target
+    return [({i: -way}, reach + way * target) for i in view.columns for way in (1.0, -1.0)]
+
+
+def _from_mean(view: _View, limits: Bounds) -> _Lines | None:
+    if limits.max is None or limits.min:
+        return None
+    lines: _Lines = []
+    for i in view.columns:
+        for way in (1.0, -1.0):
+            row = {
+                j: view.sign * float(w) * (limits.max + way) for j, w in zip(view.columns, view.weights, strict=True)
+            }
+            row[i] -= way * view.sign
+            lines.append((row, 0.0))
+    return lines
+
+
+def _mean(view: _View, limits: Bounds) -> _Lines:
+    row = dict(zip(view.columns, view.weights.tolist(), strict=True))
+    lines: _Lines = [] if limits.min is None else [(row, -limits.min)]
+    return lines if limits.max is None else [*lines, ({j: -w for j, w in row.items()}, limits.max)]
+
+
+def _largest(view: _View, limits: Bounds) -> _Lines:
+    top = view.columns[int(view.values.argmax())]
+    lines: _Lines = [] if limits.max is None else [({i: -1.0}, limits.max) for i in view.columns]
+    return lines if limits.min is None else [*lines, ({top: 1.0}, -limits.min)]
+
+
+def _smallest(view: _View, limits: Bounds) -> _Lines:
+    bottom = view.columns[int(view.values.argmin())]
+    lines: _Lines = [] if limits.min is None else [({i: 1.0}, -limits.min) for i in view.columns]
+    return lines if limits.max is None else [*lines, ({bottom: -1.0}, limits.max)]
+
+
+_OF_EFFORT: Mapping[str, Callable[[_View, Bounds], _Lines | None]] = {
+    "half_band": _half_band,
+    "force_ripple": _ripple,
+    "deviation_from_target": _from_target,
+    "deviation_from_mean": _from_mean,
+    "force_mean": _mean,
+    "force_max": _largest,
+    "force_min": _smallest,
+}
+_OF_STRESS = ("stress_max", "safety_factor")
+
+
+def _window(nominal: Result, over: Any) -> tuple[float, float]:
+    found = window_of(nominal, over)
+    motion = nominal.curve.motion
+    return (found.lo, found.hi) if found else (float(motion.min()), float(motion.max()))
+
+
+def places_of(nominal: Result) -> FloatArray:
+    """Return the poses at which a part is looked at: those of the windows of all requirements."""
+    wanted: list[FloatArray] = []
+    spans = [_window(nominal, one.over) for one in nominal.spec.part_requirements]
+    whole = max(high for _, high in spans) - min(low for low, _ in spans)
+    for low, high in dict.fromkeys(spans):
+        share = 0.5 * (1.0 - np.cos(np.linspace(0.0, np.pi, POSES if high - low > NARROW * whole else 2)))
+        wanted.append(low + (high - low) * share)
+        wanted[-1][-1] = high
+    places = np.unique(np.concatenate(wanted))
+    near = np.append(True, np.diff(places) > 1e-9 * max(whole, 1e-12))
+    return np.asarray(places[near])
+
+
+def rows_of(nominal: Result, first: Sampled, places: FloatArray) -> Rows:
+    """Return the requirements on a result as rows of what is seen of its parts."""
+    builder = _Builder(nominal, places, first)
+    for number, one in enumerate(nominal.spec.part_requirements):
+        builder.add(one, number)
+    return builder.rows_of()
+
+
+def sampled_of(spec: Spec, places: FloatArray, run: Run) -> Sampled | None:
+    """Return effort and stress of a part at places: by the family's quick way, else from its analysis."""
+    quick = family(spec.family).sampled
+    if quick is not None:
+        found: Sampled | None = function_named(quick)(spec, places)
+        if found is not None:
+            return found
+    result = family(spec.family).analyze(spec, run)
+    if result.status is not Status.COMPLETE or not result.curves:
+        return None
+    curve, effort, stress = result.curve, {}, []
+    for branch in curve.branches:
+        on = curve.branch == branch
+        motion, order = curve.motion[on], np.argsort(curve.motion[on], kind="stable")
+        if len(motion) < 2 or not (np.diff(motion[order]) > 0).all():
+            return None
+        effort[branch] = np.interp(places, motion[order], curve.effort[on][order])
+        if "max_stress" in curve.extra:
+            values = np.asarray(curve.extra["max_stress"].values, dtype=float)[on]
+            stress.append(np.interp(places, motion[order], values[order]))
+    return Sampled(effort, np.array(stress).reshape(-1, len(places)))
+
+
+@dataclass
+class Sight:
+    """What is seen of a part: `designing.robust.Seen`.
+
+    Attributes
+    ----------
+    spec : Spec
+        The design that the search began with.
+    free : tuple of str
+        Paths of the values that may move.
+    made : Tolerances
+        What errors there are.
+    rows : Rows
+        What is looked at.
+    run : Run
+        Seed.
+    """
+
+    spec: Spec
+    free: tuple[str, ...]
+    made: Tolerances
+    rows: Rows
+    run: Run
+    known: dict[bytes, Any] = field(default_factory=dict)
+
+    def variant(self, x: FloatArray, errors: FloatArray) -> Spec:
+        """Return the specification of a part."""
+        changes = dict(zip(self.free, x.tolist(), strict=True))
+        for path, error, at in zip(self.made.paths, errors.tolist(), self.made.nominal.tolist(), strict=True):
+            if error:
+                changes[path] = changes.get(path, at) + error
+        return self.spec.replace(changes)
+
+    def __call__(self, x: FloatArray, errors: FloatArray) -> FloatArray | None:
+        """Return the numbers of a part; None where it has none."""
+        rows = self.rows
+        try:
+            spec = self.variant(x, errors)
+            found = sampled_of(spec, rows.places, self.run)
+            if found is None or tuple(found.effort) != rows.branches or len(found.stress) != rows.stresses:
+                return None
+            numbers = [*found.effort.values(), *found.stress]
+            if rows.metrics:
+                result = family(spec.family).analyze(spec, self.run)
+                if not result.curves:
+                    return None
+                values = Study(spec, (), rows.metrics).quantities(result)
+                numbers.append(np.array([np.nan if one.value is None else one.value for one in values]))
+        except CfmError:
+            return None
+        return np.concatenate(numbers)
+
+
+def free_of(given: Spec, designed: Spec) -> dict[str, tuple[float, float]]:
+    """Return which values may move, and in which ranges [SI]: those of `design.free`, else those of the family.
+
+    Raises
+    ------
+    cfmkit.errors.SpecError
+        If a path of `design.free` is not in the design, or its value is not in the range.
+    """
+    block = getattr(given, "design", None)
+    stated = getattr(block, "free", None)
+    if stated:
+        found, faults = {}, []
+        for path, ends in stated.items():
+            try:
+                found[path] = _range_of(designed, path, ends)
+            except CannotVary as problem:
+                faults.append(Fault("", 0, 0, f"design.free.{path}", str(problem)))
+        if faults:
+            raise SpecError(faults)
+        return found
+    record = family(designed.family)
+    return dict(function_named(record.free)(given, designed)) if record.free is not None else {}
+
+
+def _range_of(spec: Spec, path: str, ends: tuple[str, str]) -> tuple[float, float]:
+    one = leaf(type(spec), path)
+    low, high = (float(one.read(_plain(one.kind, end))[0]) for end in ends)
+    if not low < high:
+        raise CannotVary(f"[{ends[0]}, {ends[1]}] is not a range: the first must be smaller than the second")
+    try:
+        value = spec.at(path)
+    except KeyError:
+        value = None
+    if not isinstance(value, int | float):
+        raise CannotVary(f"{path!r} has no value in the design; give it one, or name its items")
+    return low, high
+
+
+def _plain(kind: str, text: str) -> Any:
+    from cfmkit.specs.units import read_number
+
+    return read_number(text) if kind == "number" else text
+
+
+def with_design_margins(given: Spec, design: Design, run: Run) -> Design:
+    """Return a design whose made parts are good as often as `design.yield` asks, moved from one that was found.
+
+    Parameters
+    ----------
+    given : Spec
+        With `design.tolerances` and `design.yield`.
+    design : Design
+        What the family made of it; returned as it is where nothing may move or nothing is asked.
+    run : Run
+        Seed, progress, time budget.
+    """
+    block = getattr(given, "design", None)
+    wanted = getattr(block, "yield", None)
+    if design.spec is None or block is None or wanted is None or not getattr(block, "tolerances", None):
+        return design
+    free = free_of(given, design.spec)
+    if not free:
+        told = "design.yield: nothing of this design may move to reach it; name values and ranges in 'design.free'"
+        return replace(design, notes=(*design.notes, ("margins", told)))
+    nominal = family(given.family).analyze(design.spec, run)
+    made = tolerances_of(design.spec, block, run.seed)
+    if made is None or nominal.status is not Status.COMPLETE:
+        return design
+    places = places_of(nominal)
+    first = sampled_of(design.spec, places, run)
+    if first is None:
+        return replace(design, notes=(*design.notes, ("margins", "the design cannot be followed: no margins")))
+    sight = Sight(design.spec, tuple(free), made, rows_of(nominal, first, places), run)
+    problem = _problem(sight, free, wanted, run)
+    start = np.array([float(design.spec.at(path)) for path in free])
+    try:
+        found, good = _held(problem, sight, start)
+        if block.robust is not None:
+            again = drawn(problem, found, DRAWN, block.robust == "worst")
+            better = checked(sight, again.x)
+            found, good = (again, better) if better >= good else (found, good)
+    except NoPart:
+        return replace(design, notes=(*design.notes, ("margins", "a neighbour of the design has no curve: no margins")))
+    return _designed(design, sight, found, good, problem)
+
+
+def _held(problem: Problem, sight: Sight, start: FloatArray) -> tuple[Found, int]:
+    """Return the design with margins and how many of `CHECKED` parts are good: asked for more until that is enough."""
+    best: tuple[Found, int] | None = None
+    asked, x, began = problem.share, start, None
+    for _ in range(ROUNDS):
+        found = with_margins(replace(problem, share=asked), x)
+        began = found.began if began is None else began
+        good = checked(sight, found.x)
+        if best is None or good > best[1]:
+            best = replace(found, began=began), good
+        short = problem.share - good / CHECKED
+        if short <= 0 or not found.reached or asked >= MOST_ASKED or problem.late():
+            break
+        asked, x = min(MOST_ASKED, max(found.share, asked) + 0.5 * short), found.x
+    assert best is not None
+    return best
+
+
+def checked(sight: Sight, x: FloatArray) -> int:
+    """Return how many of `CHECKED` parts keep every row; each is solved, and none was seen by the search."""
+    errors = sight.made.drawn(CHECKED, sight.made.seed + SEARCH_SEED + 1) - sight.made.nominal
+    good = 0
+    for one in errors:
+        numbers = sight(x, one)
+        good += numbers is not None and bool((sight.rows.matrix @ numbers + sight.rows.constant >= 0).all())
+    return good
+
+
+def _problem(sight: Sight, free: Mapping[str, tuple[float, float]], wanted: float, run: Run) -> Problem:
+    made, clock = sight.made, Clock.of(run.time_budget)
+    values = made.drawn(ESTIMATED, made.seed + SEARCH_SEED)
+    errors = values - made.nominal
+    spreads = [one.spread for one in made.parameters]
+    sigma = np.array([one.deviation if one.kind == "normal" else (one.high - one.low) / 12**0.5 for one in spreads])
+
+    def tell(share: float, steps: int) -> None:
+        run.progress(min(0.99, steps / 20.0), f"step {steps}: about {100.0 * share:.3g} % of parts good")
+
+    return Problem(
+        sight,
+        np.array(list(free.values())),
+        errors,
+        sigma,
+        sight.rows.matrix,
+        sight.rows.constant,
+        np.array(sight.rows.about),
+        wanted,
+        clock.late,
+        tell,
+    )
+
+
+def _designed(design: Design, sight: Sight, found: Found, good: int, problem: Problem) -> Design:
+    """Return the design with its values moved, or why there is none, and what the search says of it."""
+    steps = 10.0**-DIGITS * problem.reach
+    x = np.clip(np.round(found.x / steps) * steps, *problem.bounds.T)
+    spec = sight.variant(np.array([float(f"{value:.9g}") for value in x]), problem.none)
+    groups = sight.made.joined()
+    worst = ", ".join(sight.made.paths[k] for k in groups[costliest(found, problem, groups)])
+    if clopper_pearson(good, CHECKED)[1] < problem.share:
+        return _impossible(design, sight, good, worst, problem)
+    told = (
+        f"{len(x)} values moved in {found.steps} steps: to first order about {100 * found.began:.3g} % of parts were "
+        f"good before and {100 * found.share:.3g} % are now; of {CHECKED} parts that were solved {good} are; the "
+        f"tolerance that costs most is that of {worst}"
+    )
+    numbers: dict[str, tuple[float | None, str, str]] = {
+        "margins_steps": (float(found.steps), "count", "steps towards the yield that was asked for"),
+        "margins_first_order": (found.share, "ratio", "share of good parts, estimated to first order"),
+        "margins_solved": (good / CHECKED, "ratio", f"share of {CHECKED} parts that were solved at a few poses"),
+    }
+    places = sight.rows.places
+    motion = sight.spec.motion or "length"
+    about = searched(numbers, sight.spec.fidelity or "model", (float(places[0]), float(places[-1])), motion)
+    return replace(design, spec=spec, search={**design.search, **about}, notes=(*design.notes, ("margins", told)))
+
+
+def _impossible(design: Design, sight: Sight, good: int, worst: str, problem: Problem) -> Design:
+    """Return why no design was found: the largest yield, and what stands in its way."""
+    value = 100.0 * good / CHECKED
+    told = (
+        f"no values in the ranges were found with which {100 * problem.share:.4g} % of parts are good: {value:.3g} % "
+        f"at most, of {CHECKED} that were solved; the tolerance that costs most is that of {worst}: make it tighter, "
+        "widen the ranges (design.free) or ask for less"
+    )
+    nearest = {"design.yield": f"{np.floor(value):.0f} %"}
+    return Design(None, Status.INFEASIBLE, told, nearest_feasible=nearest, search=design.search, tables=design.tables)

@@ -1,0 +1,77 @@
+"""Margins from tolerances: problems whose best design and yield are known in closed form."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from statistics import NormalDist
+
+import numpy as np
+import pytest
+
+from cfmkit.designing.robust import NoPart, Problem, costliest, drawn, linear, with_margins
+
+PHI = NormalDist().cdf
+
+
+def problem(seen, errors, matrix, constant, bounds, share=0.9):
+    """Return a problem with unit errors; every row is a limit of its own."""
+    matrix, constant = np.asarray(matrix, dtype=float), np.asarray(constant, dtype=float)
+    deviations = np.ones(errors.shape[1])
+    about = np.arange(len(constant))
+    return Problem(seen, np.array(bounds, dtype=float), errors, deviations, matrix, constant, about, share)
+
+
+def normal(count, size):
+    return np.random.default_rng(1).standard_normal((count, size))
+
+
+def test_a_part_between_two_limits_goes_to_their_middle_and_has_the_yield_of_the_normal_law():
+    # 0 <= x + e <= 4 with e of N(0, 1): best at 2, where P = 2 Phi(2) - 1
+    one = problem(lambda x, e: x + e, normal(4000, 1), [[1.0], [-1.0]], [0.0, 4.0], [[-5.0, 5.0]], share=0.99)
+    found = with_margins(one, np.array([0.1]))
+    assert found.x[0] == pytest.approx(2.0, abs=0.15)  # of the tail of 192 parts
+    assert found.share == pytest.approx(2 * PHI(2) - 1, abs=0.01)
+    assert found.began == pytest.approx(PHI(0.1), abs=0.03)
+    assert not found.reached
+
+
+def test_no_more_is_moved_than_the_share_asks_for():
+    one = problem(lambda x, e: x + e, normal(4000, 1), [[1.0]], [0.0], [[0.0, 100.0]], share=0.9)
+    found = with_margins(one, np.array([0.5]))
+    assert found.reached
+    assert PHI(found.x[0]) > 0.9
+    assert found.x[0] < 15
+
+
+def test_the_margin_of_a_limit_grows_with_what_the_tolerances_move_it():
+    # a curve x^2: its error is 2 x e, so the spread of the limit grows with the value that is moved
+    one = problem(lambda x, e: (x + 0.1 * e) ** 2, normal(4000, 1), [[1.0]], [-1.0], [[0.5, 3.0]])
+    at = linear(one, np.array([1.5]), one.seen)
+    assert at.spread(one.deviations)[0] == pytest.approx(2 * 1.5 * 0.1, rel=1e-6)
+    found = with_margins(one, np.array([1.0]))
+    assert found.reached
+    assert (found.x[0] - 1.0) / 0.1 > 1.28
+
+
+def test_drawn_parts_see_what_first_order_does_not():
+    # e^2 moves the limit and its first derivative is nothing: only parts that are solved show it
+    def seen(x, e):
+        return np.array([x[0] - e[0] ** 2, -x[0]])
+
+    one = problem(seen, normal(2000, 1), np.eye(2), [0.0, 5.0], [[0.0, 6.0]], share=0.9)
+    first = with_margins(one, np.array([0.1]))
+    found = drawn(one, replace(first, x=np.array([0.1])), 24)
+    assert first.x[0] < found.x[0] <= 5.0
+    good = (one.errors[:, 0] ** 2 <= found.x[0]).mean()
+    assert good > (one.errors[:, 0] ** 2 <= first.x[0]).mean()
+
+
+def test_the_tolerance_that_costs_most_is_the_one_with_the_largest_share_of_the_spread():
+    one = problem(lambda x, e: x + np.array([e[0] + 3 * e[1]]), normal(2000, 2), [[1.0]], [0.0], [[0.0, 1.0]], 0.99)
+    found = with_margins(one, np.array([0.5]))
+    assert costliest(found, one, [(0,), (1,)]) == 1
+
+
+def test_a_design_without_numbers_is_refused():
+    with pytest.raises(NoPart):
+        with_margins(problem(lambda x, e: None, normal(10, 1), [[1.0]], [0.0], [[0, 1]]), np.array([0.5]))

@@ -1,0 +1,113 @@
+"""Designs moved until enough of their parts are good: requirements as rows, every family, and where there is none."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+import cfmkit
+from cfmkit.cli.main import main
+from cfmkit.families.base import Run
+from cfmkit.studies import margins
+from cfmkit.studies.margins import places_of, rows_of, sampled_of, with_design_margins
+
+CRANK = "configs/studies/slider_crank_strip_yield.yaml"
+
+
+def rows_and_numbers(spec):
+    result = cfmkit.analyze(spec)
+    places = places_of(result)
+    seen = sampled_of(spec, places, Run())
+    rows = rows_of(result, seen, places)
+    numbers = np.concatenate([*seen.effort.values(), *seen.stress])
+    return result, rows, rows.matrix @ numbers + rows.constant
+
+
+@pytest.mark.parametrize("name", ["beam_lan2010_yield", "slider_crank_strip_yield"])
+def test_what_is_seen_quickly_is_what_the_analysis_finds(name):
+    spec = cfmkit.load(f"configs/studies/{name}.yaml")
+    result = cfmkit.analyze(spec)
+    places = places_of(result)
+    seen = sampled_of(spec, places, Run())
+    curve = result.curve
+    exact = spec.replace({"analysis.points": 1201})
+    curve = cfmkit.analyze(exact).curve
+    assert seen.effort["load"] == pytest.approx(np.interp(places, curve.motion, curve.effort), rel=2e-4)
+    stress = np.interp(places, curve.motion, curve.extra["max_stress"].values)
+    assert seen.stress.max(axis=0) == pytest.approx(stress, rel=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("requirement", "key"),
+    [
+        ("half_band", "max"),
+        ("force_ripple", "max"),
+        ("deviation_from_mean", "max"),
+        ("force_max", "max"),
+        ("force_min", "min"),
+        ("force_mean", "max"),
+        ("stress_max", "max"),
+    ],
+)
+def test_rows_of_a_requirement_hold_just_as_long_as_the_metric_keeps_it(requirement, key):
+    spec = cfmkit.load("configs/vcfm_pla.yaml").replace({"analysis.window": ("1.5 mm", "3 mm"), "requirements": ()})
+    value = cfmkit.evaluate(cfmkit.analyze(spec), [requirement])[requirement].value
+    sign = 1.0 if key == "max" else -1.0
+    unit = {"half_band": "", "force_ripple": "", "deviation_from_mean": ""}.get(requirement, " N")
+    unit = " Pa" if requirement == "stress_max" else unit
+    for share, kept in ((1.03, True), (0.97, False)):
+        bound = value * share if sign > 0 else value / share
+        asked = {"metric": requirement, key: f"{bound:.12g}{unit}", "over": ("1.5 mm", "3 mm")}
+        _, rows, values = rows_and_numbers(spec.replace({"requirements": (asked,)}))
+        assert not rows.metrics
+        assert (values >= 0).all() == kept
+
+
+@pytest.fixture
+def few(monkeypatch):
+    """Judge by few parts: what is tested is where the search goes."""
+    monkeypatch.setattr(margins, "CHECKED", 60)
+
+
+def test_a_strip_is_moved_until_nine_of_ten_parts_are_good(few):
+    spec = cfmkit.load(CRANK)
+    design = cfmkit.design(spec)
+    assert design.spec is not None
+    moved = design.spec.mechanism.beam
+    assert moved.thickness < 0.00095 < spec.mechanism.beam.thickness
+    assert design.search["margins_solved"].quantity.value >= 0.85
+    assert all(one.ok for one in cfmkit.check(cfmkit.analyze(design.spec)))
+
+
+def test_without_a_range_nothing_moves_and_that_is_said():
+    spec = cfmkit.load("configs/cam.yaml").replace(
+        {"design.yield": 0.9, "design.tolerances": {"mechanism.springs.stiffness": {"normal": "1 %"}}}
+    )
+    design = cfmkit.design(spec)
+    assert "design.free" in dict(design.notes)["margins"]
+
+
+def test_a_closed_model_is_moved_as_well():
+    spec = cfmkit.load("configs/cam.yaml")
+    tolerances = {"mechanism.springs.stiffness": {"normal": "0.5 %"}}
+    free = {"mechanism.springs.stiffness": ("0.6 N/mm", "0.8 N/mm")}
+    asked = ({"metric": "force_mean", "min": "50.2 N", "max": "53 N", "over": ("10 mm", "200 mm")},)
+    spec = spec.replace(
+        {"design.yield": 0.9, "design.tolerances": tolerances, "design.free": free, "requirements": asked}
+    )
+    design = with_design_margins(spec, cfmkit.results.Design(spec, cfmkit.results.Status.COMPLETE), Run())
+    means = [cfmkit.evaluate(cfmkit.analyze(one), ["force_mean[unload]"]) for one in (spec, design.spec)]
+    before, after = (one["force_mean[unload]"].value for one in means)
+    assert before < 50.2 < after
+
+
+def test_a_tolerance_that_no_design_meets_ends_with_4_and_names_it(few, tmp_path, capsys):
+    options = ["--set", "design.tolerances={mechanism.material.youngs_modulus: {normal: 12 %}, "
+               "mechanism.beam.width: {normal: 0.05 mm}}", "--set", "design.yield=95 %"]  # fmt: skip
+    code = main(["design", CRANK, "-o", str(tmp_path / "out"), "--no-plots", "--json", *options])
+    found = json.loads(capsys.readouterr().out)
+    assert code == 4
+    assert "youngs_modulus" in found["message"]
+    assert found["nearest_feasible"]["design.yield"].endswith(" %")
