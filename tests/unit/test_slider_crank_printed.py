@@ -506,7 +506,7 @@ def test_goals_without_what_they_need_are_refused() -> None:
 def test_the_travel_up_to_the_allowable_stress_is_found_within_a_longer_travel(
     name: str, end: int, stroke: float
 ) -> None:
-    """The numbers of the README's table: results, not the travel at which the configurations end."""
+    """The strokes that the strips reach, not the travel at which the configurations end."""
     changes = f"analysis.travel=[0 mm, {end} mm]", "analysis.points=161", "analysis.recheck=false"
     found = api.analyze(spec(name, *changes)).values["stress_stroke"].value
     assert found == pytest.approx(stroke * MM, abs=0.01 * MM)
