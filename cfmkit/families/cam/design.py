@@ -27,13 +27,16 @@ from cfmkit.families.cam.outline import plate_notes
 from cfmkit.families.findings import at_least, at_most, mm, newton, rate
 from cfmkit.families.refusals import CannotBuild, Infeasible, no_design
 from cfmkit.results import Design, Status
+from cfmkit.stock.springs.catalogue import Miss, nearest
+from cfmkit.stock.springs.spec import offers
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator
 
     from cfmkit.families.base import Run
-    from cfmkit.families.cam.spec import CamDesign, CamSpec, CatalogueSpring, Mechanism, Springs
+    from cfmkit.families.cam.spec import CamDesign, CamSpec, Mechanism, Springs
     from cfmkit.results import Finding
+    from cfmkit.stock.springs.catalogue import Offer
 
 
 @dataclass(frozen=True)
@@ -228,27 +231,67 @@ def _from_constant(spec: CamSpec, target: CamDesign, pull: float, factor: float,
 
 def _from_catalogue(spec: CamSpec, target: CamDesign, pull: float, factor: float, smallest: float | None) -> Choice:
     """Pick the spring and number whose cam has the smallest two-way deviation, within all limits."""
-    rejected: list[str] = []
-    fitting: list[tuple[float, Choice]] = []
-    for item, count in _offers(target):
-        springs = _bought(item, count)
-        constant = pull / (4.0 * springs.total)
-        label = f"{count} x {item.name}"
-        law = _law(spec, target, constant, factor)
-        reason = _why_not(spec, law, target, springs, smallest)
-        if reason:
-            rejected.append(f"{label}: {reason}")
-            continue
-        gap = two_way_gap(law, target, spec.mechanism.rolling_friction)
-        if gap == float("inf"):
-            rejected.append(f"{label}: friction holds the roller")
-            continue
-        note = f"{label} of the catalogue: A = {mm(constant)}"
-        fitting.append((gap, Choice(constant, springs, note=note, preload=spec.mechanism.preload)))
-    if not fitting:
-        told = f"no spring of the catalogue fits: {'; '.join(rejected)}; add others to 'design.catalogue'"
-        raise Infeasible(finding("no_spring_fits", f"{told}, or change {_in_the_way(rejected)}"))
-    return min(fitting, key=lambda pair: pair[0])[1]
+    tried = [
+        _with_spring(spec, target, (pull, factor, smallest), item, count)
+        for item in offers(target.catalogue, "extension")
+        for count in item.counts
+    ]
+    fitting = [one for one in tried if not isinstance(one, Miss)]
+    if fitting:
+        return min(fitting, key=lambda pair: pair[0])[1]
+    rejected = [one for one in tried if isinstance(one, Miss)]
+    if not rejected:
+        none = "the catalogue has no extension spring, which is what pulls the rollers together"
+        raise Infeasible(finding("no_spring_fits", f"{none} ('design.catalogue')"))
+    told = f"no spring of the catalogue fits: {nearest(rejected)}; add others to 'design.catalogue'"
+    raise Infeasible(finding("no_spring_fits", f"{told}, or change {_in_the_way(told)}"))
+
+
+def _with_spring(
+    spec: CamSpec, target: CamDesign, wanted: tuple[float, float, float | None], item: Offer, count: int
+) -> tuple[float, Choice] | Miss:
+    """Return the deviation of both ways and the choice of one spring of a catalogue, or why it does not fit.
+
+    Between axes that are farther apart than its free length a spring is stretched at the start; its initial tension
+    acts like more of that.
+    """
+    from cfmkit.families.cam.spec import Springs
+
+    label, (pull, factor, smallest) = f"{count} x {item.name}", wanted
+    preload, reserve = spec.mechanism.preload, item.initial_tension / item.rate
+    if item.free_length is not None:
+        room = 2.0 * spec.mechanism.rest_half_width
+        if item.free_length > room * (1 + 1e-9):
+            text = f"too long ({mm(item.free_length)} relaxed between axes {mm(room)} apart at the start)"
+            return Miss(label, item.free_length / room - 1.0, text)
+        preload = room - item.free_length + reserve
+    largest = None if item.largest is None else item.largest + reserve
+    springs = Springs(stiffness=item.rate, count=count, max_elongation=largest, name=item.name)
+    constant = pull / (4.0 * springs.total)
+    law = _law(spec, target, constant, factor, preload)
+    if smallest is not None and _undercuts(spec, law, smallest):
+        text = f"undercut (A = {mm(constant)} < {mm(smallest)})"
+        return Miss(label, smallest / constant - 1.0, text)
+    try:
+        _check_stroke(law, target, springs)
+    except Infeasible as problem:
+        reached = _stroke_of(law, target, springs)
+        text = f"{problem.finding.name.replace('_', ' ')} (for a stroke of {mm(reached)})"
+        return Miss(label, target.stroke / max(reached, 1e-9) - 1.0, text)
+    gap = two_way_gap(law, target, spec.mechanism.rolling_friction)
+    if gap == float("inf"):
+        return Miss(label, float("inf"), "friction holds the roller")
+    note = f"{label} of the catalogue: A = {mm(constant)}"
+    return gap, Choice(constant, springs, note=note, preload=preload)
+
+
+def _stroke_of(law: SlopeLaw, target: CamDesign, springs: Springs) -> float:
+    """Return the travel up to which geometry and springs hold out [m]."""
+    path, end = reach(law, target.stroke)
+    limit = springs.max_elongation
+    if limit:
+        end = min(end, law.rest_half_width + 0.5 * limit - law.preload)
+    return max(float(path.travel(end)), 0.0) if end > law.rest_half_width else 0.0
 
 
 _LIMITS = {
@@ -256,37 +299,15 @@ _LIMITS = {
     "brace too short": "'mechanism.brace_length'",
     "spring overstretched": "their 'max_elongation'",
     "friction": "'mechanism.rolling_friction'",
+    "too long": "'mechanism.rest_half_width'",
 }
 """Which key blocks a spring of the catalogue that is refused for a reason."""
 
 
-def _in_the_way(rejected: Sequence[str]) -> str:
+def _in_the_way(told: str) -> str:
     """Return the keys that block springs of the catalogue: those of their reasons, and what all of them are to do."""
-    keys = [key for word, key in _LIMITS.items() if any(f": {word}" in one for one in rejected)]
+    keys = [key for word, key in _LIMITS.items() if f": {word}" in told]
     return ", ".join([*keys, "'design.stroke'"]) + " or 'design.force'"
-
-
-def _offers(target: CamDesign) -> Iterator[tuple[CatalogueSpring, int]]:
-    for item in target.catalogue:
-        for count in item.counts:
-            yield item, count
-
-
-def _bought(item: CatalogueSpring, count: int) -> Springs:
-    from cfmkit.families.cam.spec import Springs
-
-    return Springs(stiffness=item.stiffness, count=count, max_elongation=item.max_elongation)
-
-
-def _why_not(spec: CamSpec, law: SlopeLaw, target: CamDesign, springs: Springs, smallest: float | None) -> str:
-    """Return why a catalogue choice is refused; empty if it is not."""
-    if smallest is not None and _undercuts(spec, law, smallest):
-        return f"undercut (A = {mm(law.force_constant)} < {mm(smallest)})"
-    try:
-        _check_stroke(law, target, springs)
-    except Infeasible as problem:
-        return problem.finding.name.replace("_", " ")
-    return ""
 
 
 def two_way_gap(law: SlopeLaw, target: CamDesign, friction: float) -> float:

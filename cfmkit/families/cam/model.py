@@ -23,12 +23,14 @@ from cfmkit.curves import Column, Curve
 from cfmkit.families.cam.build import CLOSE, assemble, check_first_pose, check_springs, displacement_origin
 from cfmkit.families.cam.contact import allowable_stress, flank_pressure, stress
 from cfmkit.families.cam.findings import finding, findings_of, left_out
+from cfmkit.families.cam.parts import parts_of
 from cfmkit.families.cam.solution import ON_CORNER, Assembly, Solution
 from cfmkit.families.cam.statics import Forces, forces
 from cfmkit.families.cam.values import contact_pressure, theoretical_force, values_of
 from cfmkit.families.findings import mm
 from cfmkit.families.refusals import CannotBuild, no_result
 from cfmkit.results import Result, Status
+from cfmkit.stock.parts import listed
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
@@ -86,6 +88,7 @@ def analyze(spec: CamSpec, run: Run) -> Result:
         target=spec.design.force if spec.design else theoretical_force(solution),
         allowable_stress=allowable_stress(spec.mechanism),
         closed=DenseLoop(solution),
+        tables=listed(parts_of(spec)),
         state=solution,
     )
 

@@ -10,6 +10,7 @@ from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, mo
 from cfmkit.specs.spec import Analysis, DesignBlock, Model, OldWords, Spec, refuse
 from cfmkit.specs.units import Angle, Force, Inertia, Length, Mass, Ratio, Stiffness, Time, format_short
 from cfmkit.stock.spec import Friction, Guide, MaterialField, MaterialSpec, Pins, SafetyFactor
+from cfmkit.stock.springs.spec import Catalogue
 from cfmkit.tables.source import DataSource
 
 Positive = Field(gt=0)
@@ -37,6 +38,7 @@ class Springs(Model):
         None, description="instead of `preload`: distance of the roller axes at which the springs are at rest"
     )
     max_elongation: PositiveLength | None = Field(None, description="largest elongation that a spring may see")
+    name: str | None = Field(None, min_length=1, description="of the spring as it is bought, for the list of parts")
 
     @model_validator(mode="after")
     def _one_way_to_say_preload(self) -> Self:
@@ -292,15 +294,6 @@ class Mechanism(Model):
         return {"stiffness": value} if isinstance(value, tuple | list) else value
 
 
-class CatalogueSpring(Model):
-    """A spring that can be bought."""
-
-    name: str = Field(min_length=1, description="part number")
-    stiffness: PositiveStiffness = Field(description="of one spring")
-    max_elongation: PositiveLength | None = Field(None, description="largest elongation allowed")
-    counts: tuple[Annotated[int, Field(ge=1, le=1000)], ...] = Field((2,), description="numbers in parallel to try")
-
-
 class CamDesign(DesignBlock):
     """What `cfmkit design` is to reach, and what it may choose."""
 
@@ -314,7 +307,9 @@ class CamDesign(DesignBlock):
     force_constant: PositiveLength | None = Field(
         None, description="A to keep when choosing the stiffness; default: the mechanism's"
     )
-    catalogue: tuple[CatalogueSpring, ...] = Field((), description="springs to pick from")
+    catalogue: Catalogue = Field(
+        (), description="springs to pick from: a list, a CSV file beside the specification, or `generic`"
+    )
     friction: DesignFriction = Field(
         0.0, description="rolling friction to cut for; positive: exact on the way up, negative: on the way down"
     )

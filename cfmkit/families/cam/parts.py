@@ -1,0 +1,37 @@
+"""What is bought for a cam mechanism: springs, bearings and pins that the specification names or dimensions."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from cfmkit.families.findings import mm, newton, rate
+from cfmkit.stock.parts import Part
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from cfmkit.families.cam.spec import CamSpec
+
+
+def parts_of(spec: CamSpec) -> tuple[Part, ...]:
+    """Return the bought parts; none where the specification names no spring, bearing or pin."""
+    return tuple(_parts(spec))
+
+
+def _parts(spec: CamSpec) -> Iterator[Part]:
+    mechanism, springs = spec.mechanism, spec.mechanism.springs
+    if not (springs.name or mechanism.bearings or mechanism.pins):
+        return
+    rates = springs.stiffness if isinstance(springs.stiffness, tuple) else (springs.stiffness,)
+    count = len(rates) if len(rates) > 1 else springs.count or 1
+    limit = f", up to {mm(springs.max_elongation)}" if springs.max_elongation else ""
+    tight = f", stretched by {mm(mechanism.preload)} at the start" if mechanism.preload else ""
+    told = " to ".join(dict.fromkeys((rate(min(rates)), rate(max(rates)))))
+    yield Part("between the rollers", springs.name or "", count, f"extension spring, {told}{limit}{tight}")
+    if bearings := mechanism.bearings:
+        rated = f", C {newton(bearings.dynamic_rating)}" if bearings.dynamic_rating else ""
+        rated += f", C0 {newton(bearings.static_rating)}" if bearings.static_rating else ""
+        data = f"{bearings.kind} bearing, bore {mm(bearings.bore)}{rated}"
+        yield Part("in the rollers", bearings.name or "", 2 * bearings.per_roller, data)
+    if pins := mechanism.pins:
+        yield Part("slider pin and spring hooks", "", 3, f"pin, diameter {mm(pins.diameter)}")

@@ -1,0 +1,44 @@
+"""The list of what is bought for a mechanism: `parts.csv`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from cfmkit.tables import Table, TableColumn
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+
+@dataclass(frozen=True)
+class Part:
+    """A part that is bought.
+
+    Attributes
+    ----------
+    place : str
+        What it does in the mechanism.
+    name : str
+        By which it is ordered; empty where none is stated.
+    count : int
+        How many of it.
+    data : str
+        What decides whether another one would do.
+    """
+
+    place: str
+    name: str
+    count: int
+    data: str = ""
+
+
+def parts_table(parts: Sequence[Part]) -> Table:
+    """Return the list as a table: place, name, count, data."""
+    columns = ("place", "name", "count", "data")
+    return Table(tuple(TableColumn(name, tuple(getattr(part, name) for part in parts)) for name in columns))
+
+
+def listed(parts: Sequence[Part]) -> dict[str, Callable[[], Table]]:
+    """Return the list as a result carries it; empty where nothing is bought by name."""
+    return {"parts": lambda: parts_table(parts)} if parts else {}

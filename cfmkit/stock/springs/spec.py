@@ -1,0 +1,186 @@
+"""How every family's `design.catalogue` says what springs are on offer: a list, a file, or the generic series."""
+
+from __future__ import annotations
+
+import csv
+import re
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
+
+from pydantic import Field, ValidationError, ValidationInfo, WrapValidator, model_validator
+
+from cfmkit.errors import DataError
+from cfmkit.specs.spec import Model
+from cfmkit.specs.units import Angle, Force, Length, Ratio, RotationalStiffness, Stiffness, Stress, Torque
+from cfmkit.stock.springs.catalogue import GENERIC, Offer, generic
+from cfmkit.stock.springs.wound import SHEAR_MODULUS, YOUNGS_MODULUS, Wound
+from cfmkit.tables.source import DataSource
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from cfmkit.stock.springs.wound import Kind
+
+Positive = Field(gt=0)
+AGREE = 0.1
+"""A stated rate may be off by so much from that of wire, coil and turns: makers' tolerance."""
+
+
+class CatalogueSpring(Model):
+    """A spring that can be bought."""
+
+    name: str = Field(min_length=1, description="part number")
+    kind: Literal["extension", "compression", "torsion"] = Field("extension", description="what it is loaded by")
+    stiffness: Annotated[Stiffness, Positive] | None = Field(
+        None, description="of one spring; default: from wire, coil and turns"
+    )
+    rate: Annotated[RotationalStiffness, Positive] | None = Field(
+        None, description="of one torsion spring, per rad or per deg; default: from wire, coil and turns"
+    )
+    wire: Annotated[Length, Positive] | None = Field(None, description="diameter of the wire")
+    coil: Annotated[Length, Positive] | None = Field(None, description="mean diameter of the coil")
+    turns: Annotated[Ratio, Positive] | None = Field(None, description="active turns")
+    shear_modulus: Annotated[Stress, Positive] = Field(SHEAR_MODULUS, description="of the wire; default: music wire")
+    youngs_modulus: Annotated[Stress, Positive] = Field(
+        YOUNGS_MODULUS, description="of a torsion spring's wire; default: music wire"
+    )
+    free_length: Annotated[Length, Positive] | None = Field(
+        None, description="relaxed, between the hooks; a spring that is longer than its place is not chosen"
+    )
+    body_length: Annotated[Length, Positive] | None = Field(None, description="of the coil; default: turns on turns")
+    outer_diameter: Annotated[Length, Positive] | None = Field(None, description="of the coil; default: coil and wire")
+    initial_tension: Annotated[Force, Field(ge=0)] = Field(
+        0.0, description="force at which an extension spring begins to open"
+    )
+    max_elongation: Annotated[Length, Positive] | None = Field(
+        None, description="largest elongation (compression) allowed"
+    )
+    max_angle: Annotated[Angle, Positive] | None = Field(None, description="largest angle of a torsion spring")
+    max_torque: Annotated[Torque, Positive] | None = Field(None, description="the same as its largest couple")
+    counts: tuple[Annotated[int, Field(ge=1, le=1000)], ...] = Field((2,), description="numbers in parallel to try")
+
+    @model_validator(mode="after")
+    def _rate_is_known(self) -> Self:
+        stated = self.rate if self.kind == "torsion" else self.stiffness
+        other = "'stiffness'" if self.kind == "torsion" else "'rate'"
+        if (self.stiffness if self.kind == "torsion" else self.rate) is not None:
+            raise ValueError(f"{other} is not what a spring of kind {self.kind!r} has")
+        given = [self.wire, self.coil, self.turns]
+        if any(item is not None for item in given) and None in given:
+            raise ValueError("'wire', 'coil' and 'turns' belong together: a rate follows from all three")
+        if self.wire and self.coil and self.coil < 2.0 * self.wire:
+            raise ValueError("'coil' is the mean diameter: at least twice the wire's")
+        if stated is None and self.wound is None:
+            word = "rate" if self.kind == "torsion" else "stiffness"
+            raise ValueError(f"needs {word!r}, or 'wire', 'coil' and 'turns', from which it follows")
+        if stated is not None and self.wound is not None and abs(stated / self.wound.rate - 1.0) > AGREE:
+            raise ValueError(
+                f"wire, coil and turns give {self.wound.rate / stated:.3g} times the rate that is stated: "
+                "leave one of them out, or give the wire's modulus"
+            )
+        return self
+
+    @property
+    def wound(self) -> Wound | None:
+        """Its wire, coil and turns; None where they are not stated."""
+        if self.wire is None or self.coil is None or self.turns is None:
+            return None
+        return Wound(self.kind, self.wire, self.coil, self.turns, self.shear_modulus, self.youngs_modulus)
+
+    @property
+    def offer(self) -> Offer:
+        """The spring as designs look at it."""
+        wound = self.wound
+        stated = self.rate if self.kind == "torsion" else self.stiffness
+        rate = stated if stated is not None else wound.rate if wound is not None else 0.0
+        largest = self.max_elongation
+        if self.kind == "torsion":
+            ends = [self.max_angle, self.max_torque / rate if self.max_torque else None]
+            largest = min((end for end in ends if end is not None), default=None)
+        return Offer(
+            name=self.name,
+            kind=self.kind,
+            rate=rate,
+            largest=largest,
+            free_length=self.free_length,
+            body_length=self.body_length or (wound.body_length if wound else None),
+            initial_tension=self.initial_tension,
+            outer_diameter=self.outer_diameter or (wound.outer_diameter if wound else None),
+            wound=wound,
+            counts=self.counts,
+        )
+
+
+def _named(value: Any, handler: Any, info: ValidationInfo) -> Any:
+    """Return a file's name as a file beside the specification; lists and the generic series' word as they are."""
+    found = handler(value)
+    if not isinstance(found, str) or found == GENERIC:
+        return found
+    folder = getattr(value, "folder", None) or (info.context or {}).get("folder") or "."
+    return DataSource(found, folder)
+
+
+Catalogue = Annotated[tuple[CatalogueSpring, ...] | str, WrapValidator(_named)]
+"""The type of a key that lists springs: blocks, a CSV file beside the specification, or ``generic``."""
+
+
+def offers(catalogue: tuple[CatalogueSpring, ...] | str, *kinds: Kind) -> tuple[Offer, ...]:
+    """Return the springs of some kinds on offer.
+
+    Parameters
+    ----------
+    catalogue : tuple of CatalogueSpring or str
+        A list, a file's name, or "generic".
+    *kinds : str
+        Which are wanted.
+
+    Raises
+    ------
+    cfmkit.errors.DataError
+        If the file cannot be read.
+    """
+    if isinstance(catalogue, DataSource):
+        return tuple(item.offer for item in _from_file(catalogue) if item.kind in kinds)
+    if isinstance(catalogue, str):
+        return tuple(item for kind in kinds for item in generic(kind))
+    return tuple(item.offer for item in catalogue if item.kind in kinds)
+
+
+_HEADER = re.compile(r"\s*(?P<name>[a-z_]+)\s*(?:\[(?P<unit>[^\[\]]+)\])?\s*")
+
+
+def _from_file(source: DataSource) -> Iterator[CatalogueSpring]:
+    """Yield the springs of a CSV: columns are the keys of a catalogue's spring, with units: ``stiffness [N/mm]``."""
+    with source.path.open(encoding="utf-8-sig", newline="") as stream:
+        rows = csv.reader(stream)
+        heads = [_HEADER.fullmatch(cell) for cell in next(rows, [])]
+        names = [head["name"] if head else "" for head in heads]
+        if wrong := [name for name in names if name not in CatalogueSpring.model_fields]:
+            allowed = ", ".join(CatalogueSpring.model_fields)
+            raise DataError(f"{source}:1: {wrong[0]!r} is no column of a list of springs; columns are {allowed}")
+        for cells in rows:
+            if not any(cell.strip() for cell in cells):
+                continue
+            if len(cells) != len(heads):
+                raise DataError(f"{source}:{rows.line_num}: has {len(cells)} cells, but the header has {len(heads)}")
+            units = (head["unit"] for head in heads if head)
+            block = {
+                name: _cell(name, cell.strip(), unit)
+                for name, unit, cell in zip(names, units, cells, strict=True)
+                if cell.strip()
+            }
+            try:
+                yield CatalogueSpring.model_validate(block)
+            except ValidationError as error:
+                first = error.errors()[0]
+                place = ".".join(str(part) for part in first["loc"]) or str(block.get("name", ""))
+                told = first["msg"].removeprefix("Value error, ")
+                raise DataError(f"{source}:{rows.line_num}: {place}: {told}") from None
+
+
+def _cell(name: str, cell: str, unit: str | None) -> object:
+    """Return a cell as a specification would say it."""
+    if name == "counts":
+        return tuple(int(one) if one.isdigit() else one for one in cell.split())
+    if name == "turns":
+        return float(cell) if cell.replace(".", "", 1).isdigit() else cell
+    return cell if unit is None else f"{cell} {unit}"

@@ -1,0 +1,152 @@
+"""Springs that can be bought: formulas of round wire, lists and files, and what designs choose of them."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from cam_support import analyze, cam, design
+from pydantic import ValidationError
+
+import cfmkit
+from cfmkit.errors import DataError
+from cfmkit.stock.springs.catalogue import Miss, generic, nearest
+from cfmkit.stock.springs.spec import CatalogueSpring, offers
+from cfmkit.stock.springs.wound import Wound
+from cfmkit.tables.source import DataSource
+
+WANTED = {"force": "50 N", "stroke": "200 mm", "choose": "catalogue"}
+
+
+def chosen(catalogue, **changes):
+    parts = {"roller_radius": "8 mm", "rolling_friction": 0.002} | changes
+    return design(cam(**parts).replace({"design": WANTED | {"catalogue": catalogue}}))
+
+
+def test_the_rate_of_a_coil_is_the_twist_of_a_long_straight_wire():
+    """Castigliano: the wire of length pi D n carries the torque F D/2, or the bending moment M."""
+    d, mean, n, shear, young = 1e-3, 10e-3, 25.0, 72e9, 190e9
+    length, polar, plane = math.pi * mean * n, math.pi * d**4 / 32, math.pi * d**4 / 64
+    pulled, wound = (Wound(kind, d, mean, n, shear, young) for kind in ("extension", "torsion"))
+    assert pulled.rate == pytest.approx(shear * polar / (length * (mean / 2) ** 2), rel=1e-12)
+    assert wound.rate == pytest.approx(young * plane / length, rel=1e-12)
+
+
+def test_far_from_its_axis_a_coil_is_stressed_as_a_straight_wire():
+    wire = 1e-3
+    far = Wound("compression", wire, 1000 * wire, 5.0)
+    assert far.stress(1.0) == pytest.approx(16 * 0.5 * far.coil / (math.pi * wire**3), rel=2e-3)
+    bent = Wound("torsion", wire, 1000 * wire, 5.0)
+    assert bent.stress(1.0) == pytest.approx(32 / (math.pi * wire**3), rel=2e-3)
+    assert far.stress(far.rate * far.deflection_at(300e6)) == pytest.approx(300e6, rel=1e-12)
+
+
+def test_a_spring_that_is_too_long_for_its_place_is_not_chosen():
+    short = {"name": "short", "stiffness": "0.55 N/mm", "free_length": "130 mm", "counts": (2,)}
+    long = {"name": "long", "stiffness": "0.40 N/mm", "free_length": "136.1 mm", "counts": (2,)}
+    found = chosen((short, long))
+    assert found.spec.mechanism.springs.name == "short"
+    alone = chosen((long,))
+    assert alone.spec is None
+    assert alone.status.exit_code == 4
+    assert "2 x long: too long (136.1 mm relaxed between axes 136 mm apart" in alone.message
+
+
+def test_a_spring_shorter_than_its_place_is_tight_at_the_start_and_the_cam_is_cut_for_that():
+    bought = {
+        "name": "tight",
+        "stiffness": "0.69 N/mm",
+        "free_length": "130 mm",
+        "initial_tension": "1.38 N",
+        "counts": (2,),
+    }
+    found = chosen((bought,), rolling_friction=0)
+    assert found.spec.mechanism.springs.preload == pytest.approx(0.008)
+    np.testing.assert_allclose(analyze(found.spec).curve.force, 50.0, rtol=1e-9)
+
+
+def test_the_largest_elongation_is_counted_from_the_free_length():
+    base = {"name": "one", "stiffness": "0.69 N/mm", "free_length": "120 mm", "counts": (2,)}
+    used = chosen((base,))
+    longest = analyze(used.spec).state.elongation.max()
+    assert chosen((base | {"max_elongation": f"{longest * 1.0001e3} mm"},)).spec is not None
+    refused = chosen((base | {"max_elongation": f"{longest * 0.999e3} mm"},))
+    assert refused.spec is None
+    assert "spring overstretched (for a stroke of 199" in refused.message
+
+
+def test_springs_that_only_press_or_turn_are_no_springs_for_a_cam():
+    found = chosen(({"name": "press", "kind": "compression", "stiffness": "0.69 N/mm"},))
+    assert found.spec is None
+    assert "no extension spring" in found.message
+
+
+def test_the_generic_series_serves_and_says_what_is_bought():
+    found = chosen("generic")
+    springs, result = found.spec.mechanism.springs, analyze(found.spec)
+    offer = {item.name: item for item in generic("extension")}[springs.name]
+    assert springs.stiffness == offer.rate
+    assert offer.stress(result.state.elongation.max()) <= offer.wound.stress(offer.rate * offer.largest) * (1 + 1e-9)
+    table = result.tables["parts"]()
+    assert [column.name for column in table.columns] == ["place", "name", "count", "data"]
+    assert table.columns[1].cells() == [springs.name]
+    assert table.columns[2].cells() == [springs.count]
+
+
+def test_nothing_is_listed_where_nothing_is_named():
+    assert not analyze(cam()).tables
+
+
+def test_a_list_may_be_a_file(tmp_path):
+    text = "name,kind,stiffness [N/mm],free_length [mm],counts,wire [mm],coil [mm],turns\n"
+    text += "E-1,extension,0.55,130,1 2,,,\nT-1,torsion,,,,0.8,8,5\nE-2,,,120,2,1.25,12.5,40\n"
+    (tmp_path / "springs.csv").write_text(text, encoding="utf-8")
+    source = DataSource("springs.csv", tmp_path)
+    pulled = offers(source, "extension")
+    assert [(one.name, one.counts) for one in pulled] == [("E-1", (1, 2)), ("E-2", (2,))]
+    assert pulled[0].rate == pytest.approx(550.0)
+    assert pulled[1].rate == pytest.approx(72e9 * 1.25e-3**4 / (8 * 12.5e-3**3 * 40))
+    assert offers(source, "torsion")[0].rate == pytest.approx(190e9 * 0.8e-3**4 / (64 * 8e-3 * 5))
+
+
+@pytest.mark.parametrize(
+    ("line", "told"),
+    [
+        ("E-1,0.55 mm", "stiffness"),
+        ("E-1,-1", "stiffness"),
+        ("E-1", "has 1 cells"),
+        (",0.55", "name"),
+    ],
+)
+def test_a_fault_of_a_file_is_told_with_its_line(tmp_path, line, told):
+    (tmp_path / "springs.csv").write_text(f"name,stiffness [N/mm]\nE-0,1\n{line}\n", encoding="utf-8")
+    with pytest.raises(DataError, match=r"springs\.csv:3") as caught:
+        offers(DataSource("springs.csv", tmp_path), "extension")
+    assert told in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("block", "told"),
+    [
+        ({}, "needs 'stiffness'"),
+        ({"kind": "torsion", "stiffness": "1 N/mm"}, "'stiffness' is not what"),
+        ({"wire": "1 mm", "coil": "10 mm"}, "belong together"),
+        ({"wire": "1 mm", "coil": "10 mm", "turns": 40, "stiffness": "5 N/mm"}, "times the rate that is stated"),
+    ],
+)
+def test_a_spring_that_contradicts_itself_is_refused(block, told):
+    with pytest.raises(ValidationError, match=told):
+        CatalogueSpring.model_validate({"name": "x"} | block)
+
+
+def test_of_what_misses_the_nearest_three_are_told():
+    misses = [Miss(f"s{k}", share, f"by {share}") for k, share in enumerate((0.5, 0.1, 0.3, 0.2))]
+    assert nearest(misses) == "s1: by 0.1; s3: by 0.2; s2: by 0.3; 1 others miss more"
+
+
+def test_a_design_with_the_generic_series_is_written_and_read_again(tmp_path):
+    found = chosen("generic")
+    again = cfmkit.loads(cfmkit.dumps(found.spec)) if hasattr(cfmkit, "loads") else found.spec
+    assert again.mechanism.springs.name == found.spec.mechanism.springs.name
+    assert again.design.catalogue == "generic"
