@@ -11,7 +11,13 @@ system of 18 unknowns, solved and its inertia counted. The rest is Python: the n
 tables and arrays 0.05, around the march 0.08, the error's second mesh 0.07, path and forces 0.05; no line of it takes
 more than 0.01 ms. Of the cantilever's 0.34 ms 0.05 are compiled. A V-beam takes 3.3 ms: 1.0 compiled, half of that 17
 solutions of 45 unknowns on the finer mesh on which its bifurcations are placed, and 2.3 the decisions there, in Python;
-on the mesh that is marched on they take no less. The first compilation of the solver is numba's typing for two thirds,
+on the mesh that is marched on they take no less. Thirteen gradients
+take 1.05 ms beside a curve of 0.68 ms at 1e-5: 0.40 compiled, 0.23 the thirteen networks that the caller builds, the
+rest their plain slopes in Python, no function more than 0.05. A design of a batch takes 0.75 ms: 0.29 compiled in three
+calls, 0.02 its network, the rest the same Python as around a single curve; what designs share is kept between them
+(numbering, mesh), but decisions, paths and checks are made for each. Of a whole process (`analyze` of Lan, warm, 0.58 s
+of processor time) imports are four fifths: numpy 0.09, pydantic and the specification's models 0.13, typer 0.09.
+The first compilation of the solver is numba's typing for two thirds,
 optimisation for a fifth, translation for a tenth.
 """
 
