@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.curves import Curve, Kind
-    from cfmkit.metrics.longterm import Durability
+    from cfmkit.metrics.material_laws import Durability
     from cfmkit.results import ClosedForm
 
 
