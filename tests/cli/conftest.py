@@ -1,17 +1,32 @@
-"""The installed command, run as a user runs it: in an empty folder, in a process of its own."""
+"""The command, run as a user runs it in an empty folder: in the process of the tests, or the installed program.
+
+Most tests call the program's entry in their own process, for an interpreter and its libraries take ten times as long
+to start as most runs take. What only a process of its own can show is shown by `Cli.program`: signals and kills,
+closed streams and other encodings, permissions, and that each verb works as it is installed.
+"""
 
 from __future__ import annotations
 
 import ctypes
 import json
+import logging
 import os
+import signal
 import subprocess
 import sys
+import tempfile
+import warnings
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pytest
+
+from cfmkit.cli.main import main
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
 
 COMMAND = Path(sys.executable).parent / "cfmkit"
 CONFIGS = Path(__file__).parents[2] / "configs"
@@ -42,13 +57,83 @@ def as_a_user() -> None:
                 raise OSError(ctypes.get_errno(), "cannot give up a capability")
 
 
+@contextmanager
+def as_the_process(folder: Path, environment: dict[str, str], given: bytes) -> Iterator[tuple[Any, Any]]:
+    """Make this process look like one that was started for a command, and undo it; yield where it writes to.
+
+    The streams are files in the place of file descriptors 0 to 2, so that what libraries and child processes write is
+    seen, too. Put back is whatever a command may change of a process: folder, environment, streams, filters of
+    warnings, signal handlers, logging.
+    """
+    log = logging.getLogger("cfmkit")
+    kept = dict(os.environ), Path.cwd(), log.handlers[:], log.level, log.propagate, sys.unraisablehook
+    handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    with ExitStack() as stack:
+        out, err = (stack.enter_context(tempfile.TemporaryFile()) for _ in range(2))
+        patch = stack.enter_context(pytest.MonkeyPatch.context())
+        stack.enter_context(warnings.catch_warnings())
+        stack.enter_context(_descriptors(given, out, err))
+        warnings.simplefilter("error")
+        patch.setattr(sys, "warnoptions", ["error"])
+        for name, number, mode in (("stdin", 0, "r"), ("stdout", 1, "w"), ("stderr", 2, "w")):
+            stream = stack.enter_context(open(number, mode, encoding="utf-8", closefd=False))
+            patch.setattr(sys, name, stream)
+        try:
+            os.chdir(folder)
+            _replace_environment(environment)
+            yield out, err
+        finally:
+            _replace_environment(kept[0])
+            os.chdir(kept[1])
+            log.handlers, log.propagate, sys.unraisablehook = kept[2], kept[4], kept[5]
+            log.setLevel(kept[3])
+            for number, handler in handlers.items():
+                signal.signal(number, handler)
+
+
+@contextmanager
+def _descriptors(given: bytes, out: Any, err: Any) -> Iterator[None]:
+    """Put files in the place of file descriptors 0 to 2."""
+    with tempfile.TemporaryFile() as source:
+        source.write(given)
+        source.seek(0)
+        kept = [os.dup(number) for number in range(3)]
+        for number, file in enumerate((source, out, err)):
+            os.dup2(file.fileno(), number)
+        try:
+            yield
+        finally:
+            for number, old in enumerate(kept):
+                os.dup2(old, number)
+                os.close(old)
+
+
+def _replace_environment(wanted: dict[str, str]) -> None:
+    for name in set(os.environ) - set(wanted):
+        del os.environ[name]
+    os.environ.update(wanted)
+
+
 class Cli:
     """Runs commands in one folder."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
 
-    def __call__(self, *arguments: str, stdin: str | bytes = "", timeout: float = 300, **environment: str) -> Outcome:
+    def __call__(self, *arguments: str, stdin: str | bytes = "", **environment: str) -> Outcome:
+        """Run a command in this process."""
+        given = stdin.encode() if isinstance(stdin, str) else stdin
+        with as_the_process(self.folder, self.environment(**environment), given) as (out, err):
+            code = main(arguments)
+            told = []
+            for stream, file in ((sys.stdout, out), (sys.stderr, err)):
+                stream.flush()
+                file.seek(0)
+                told.append(file.read().decode())
+        return Outcome(int(code), *told)
+
+    def program(self, *arguments: str, stdin: str | bytes = "", timeout: float = 300, **environment: str) -> Outcome:
+        """Run the installed program."""
         done = subprocess.run(
             [COMMAND, *arguments],
             cwd=self.folder,

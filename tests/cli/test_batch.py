@@ -45,7 +45,7 @@ def batch(cli, *arguments: str, quick: bool = True):
     "verb", [("--verb", "analyze"), pytest.param((), id="design", marks=pytest.mark.slow)], ids=lambda verb: verb[-1]
 )
 def test_the_configurations_of_the_package_pass_as_a_batch(cli, verb):
-    done = cli("batch", str(CONFIGS), "-o", "out", "--no-plots", "--junit", "reports/cfmkit.xml", *verb, timeout=1200)
+    done = cli("batch", str(CONFIGS), "-o", "out", "--no-plots", "--junit", "reports/cfmkit.xml", *verb)
     assert done.code == 0, done.out + done.err
     found = rows(cli)
     assert len(found) == len([path for path in CONFIGS.rglob("*.yaml") if path.name != "figure.yaml"])

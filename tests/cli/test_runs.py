@@ -75,8 +75,8 @@ def test_the_curve_has_both_branches_with_units_in_the_header(cli, cam):
 
 
 def test_the_same_command_gives_the_same_bytes_but_for_the_manifest(cli, cam):
-    for folder in ("one", "two"):
-        assert cli("design", cam, "-o", folder).code == 0
+    for run, folder in ((cli, "one"), (cli.program, "two")):
+        assert run("design", cam, "-o", folder).code == 0
     names = written(cli.folder / "one")
     assert names == written(cli.folder / "two")
     assert any(name.startswith("figures/") for name in names)

@@ -82,7 +82,7 @@ def test_a_name_that_the_encoding_cannot_say_is_escaped(cli, cam, encoding):
 
 
 def test_json_is_readable_in_every_encoding(cli, cam):
-    done = cli(*RUN, "--json", "--set", "name=Kräfte 力", PYTHONIOENCODING="ascii", PYTHONUTF8="0")
+    done = cli.program(*RUN, "--json", "--set", "name=Kräfte 力", PYTHONIOENCODING="ascii", PYTHONUTF8="0")
     assert done.document["name"] == "Kräfte 力"
 
 

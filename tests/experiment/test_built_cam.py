@@ -312,7 +312,7 @@ def test_pictures_are_drawn(tmp_path):
 
 def test_the_model_for_many_variants_leaves_measured_cams_to_this_one(tmp_path):
     from cfmkit.families.base import Block, Measure
-    from cfmkit.families.cam.block import analyze_block
+    from cfmkit.families.cam.many_designs.model import analyze_block
 
     write(tmp_path, measured())
     block = Block({"mechanism.rolling_friction": np.array([0.001, 0.002])}, (Measure("force_ripple", None),), 2)

@@ -5,8 +5,8 @@ import pytest
 
 import cfmkit
 from cfmkit.families.base import Block, Measure
-from cfmkit.families.cam.block import VARIED, analyze_block
-from cfmkit.families.cam.block_measures import CYCLES, KNOWN, WINDOWED
+from cfmkit.families.cam.many_designs.measures import CYCLES, KNOWN, WINDOWED
+from cfmkit.families.cam.many_designs.model import VARIED, analyze_block
 from cfmkit.results import Status
 from cfmkit.studies import blocks
 from cfmkit.studies.blocks import evaluate_block, vectorised

@@ -9,7 +9,7 @@ from slider_crank import config
 import cfmkit
 from cfmkit import api
 from cfmkit.families.base import Block, Measure
-from cfmkit.families.slider_crank.springs.block import analyze_block
+from cfmkit.families.slider_crank.springs.many_designs.model import analyze_block
 from cfmkit.plots.findings import DrawnScale, StudyMarks
 from cfmkit.plots.study import draw_map, draw_metric
 from cfmkit.plots.style import png

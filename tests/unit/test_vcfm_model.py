@@ -12,13 +12,13 @@ import cfmkit
 from cfmkit import api
 from cfmkit.export import files
 from cfmkit.families.base import Block, Measure
-from cfmkit.families.vcfm.block import METRICS, SCALARS, VARIED, analyze_block
 from cfmkit.families.vcfm.build import parts
 from cfmkit.families.vcfm.findings import extreme_sums
 from cfmkit.families.vcfm.leaves.s_form import POLE, axial_root, compliance, end_curvature, pose
 from cfmkit.families.vcfm.leaves.springs import Diamond
 from cfmkit.families.vcfm.leaves.strip import Strip
 from cfmkit.families.vcfm.leaves.v_beam import VBeam
+from cfmkit.families.vcfm.many_designs import METRICS, SCALARS, VARIED, analyze_block
 from cfmkit.families.vcfm.model import rest_of, rests_of
 from cfmkit.families.vcfm.scene import centre_line
 from cfmkit.families.vcfm.solution import force_of

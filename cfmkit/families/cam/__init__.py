@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from cfmkit.families.base import Family, Search
-from cfmkit.families.cam.block import analyze_block
 from cfmkit.families.cam.build import resolve
 from cfmkit.families.cam.design import design
 from cfmkit.families.cam.findings import FINDINGS
+from cfmkit.families.cam.many_designs.model import analyze_block
 from cfmkit.families.cam.model import analyze
 from cfmkit.families.cam.spec import CamSpec
 from cfmkit.families.cam.values import DEFINITIONS

@@ -8,7 +8,7 @@ from cfmkit.families.slider_crank.dispatch import design
 from cfmkit.families.slider_crank.findings import FINDINGS
 from cfmkit.families.slider_crank.printed.values import DEFINITIONS as OF_PARTS
 from cfmkit.families.slider_crank.spec import SliderCrankSpec
-from cfmkit.families.slider_crank.springs.block import analyze_block
+from cfmkit.families.slider_crank.springs.many_designs.model import analyze_block
 from cfmkit.families.slider_crank.springs.model import analyze, gradient
 from cfmkit.families.slider_crank.springs.stiffness import CLASSES
 from cfmkit.families.slider_crank.springs.values import DEFINITIONS as OF_SPRINGS

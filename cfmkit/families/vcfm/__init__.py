@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from cfmkit.families.base import Family
-from cfmkit.families.vcfm.block import analyze_block
 from cfmkit.families.vcfm.design import design
 from cfmkit.families.vcfm.findings import FINDINGS
+from cfmkit.families.vcfm.many_designs import analyze_block
 from cfmkit.families.vcfm.model import analyze
 from cfmkit.families.vcfm.spec import VcfmSpec
 from cfmkit.families.vcfm.values import DEFINITIONS

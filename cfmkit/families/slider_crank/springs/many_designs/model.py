@@ -14,8 +14,8 @@ from cfmkit.families.base import BlockAnswer
 from cfmkit.families.refusals import CannotBuild
 from cfmkit.families.slider_crank.build import resolve
 from cfmkit.families.slider_crank.springs.assembly import TURN, assemble
-from cfmkit.families.slider_crank.springs.block_solution import EACH, PLACES, Base, Slab
 from cfmkit.families.slider_crank.springs.findings import findings_of
+from cfmkit.families.slider_crank.springs.many_designs.solution import EACH, PLACES, Base, Slab
 from cfmkit.families.slider_crank.springs.model import (
     RATES,
     asked_motion,

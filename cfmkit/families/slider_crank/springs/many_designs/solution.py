@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.families.slider_crank.printed.values import DEFINITIONS as OF_PARTS
-from cfmkit.families.slider_crank.springs.bands_of_designs import edges
-from cfmkit.families.slider_crank.springs.block_metrics import CURVE, PLAIN, of_curve
+from cfmkit.families.slider_crank.springs.many_designs.bands import edges
+from cfmkit.families.slider_crank.springs.many_designs.metrics import CURVE, PLAIN, of_curve
 from cfmkit.families.slider_crank.springs.model import (
     efforts_inside,
     reference_motion,

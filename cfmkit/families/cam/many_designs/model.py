@@ -2,10 +2,10 @@
 
 Such a cam carries its roller along s = (x - x0)^2 / 2A, so that the state at every travel
 is explicit, and whole arrays of designs are one array operation. The formulas are those
-of `cam_profile` and `statics`, in the same order, for a cam with its own brace and
-roller, without weight. An undercut cam is one of these from the end of its corner on (`block_corner`).
+of `geometry` and `statics`, in the same order, for a cam with its own brace and
+roller, without weight. An undercut cam is one of these from the end of its corner on (`undercut`).
 One cut cam of any profile with other braces, rollers, springs and weights around it has a solver of its
-own (`block_built`). Everything else (a stroke that the brace does not reach, a jam within it) is left to the
+own (`around_one_cam`). Everything else (a stroke that the brace does not reach, a jam within it) is left to the
 model of one cam.
 """
 
@@ -17,12 +17,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.families.base import BlockAnswer
-from cfmkit.families.cam.block_built import Around, BuiltSlab
-from cfmkit.families.cam.block_corner import CornerSlab, shapes
-from cfmkit.families.cam.block_forces import Designs, Slab
-from cfmkit.families.cam.block_measures import BRANCHES, CYCLES, KNOWN, KNOWN_OF_BUILT, STRESSES, WINDOWED, measured
 from cfmkit.families.cam.build import assemble, weights
 from cfmkit.families.cam.geometry.many_tracks import ManyTracks
+from cfmkit.families.cam.many_designs.around_one_cam import Around, BuiltSlab
+from cfmkit.families.cam.many_designs.forces import Designs, Slab
+from cfmkit.families.cam.many_designs.measures import (
+    BRANCHES,
+    CYCLES,
+    KNOWN,
+    KNOWN_OF_BUILT,
+    STRESSES,
+    WINDOWED,
+    measured,
+)
+from cfmkit.families.cam.many_designs.undercut import CornerSlab, shapes
 from cfmkit.families.refusals import CannotBuild
 from cfmkit.specs.units import Share
 

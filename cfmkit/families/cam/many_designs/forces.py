@@ -1,7 +1,7 @@
 """Forces and metrics of many cams at all their samples, as arrays: (designs, points).
 
 Each cam carries its roller along s = (x - x0)^2 / 2A with its own brace and roller; the
-formulas are those of `cam_profile`, `statics` and `cfmkit.metrics`, in the same order.
+formulas are those of `geometry`, `statics` and `cfmkit.metrics`, in the same order.
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from cfmkit.families.cam.block_windows import Sampled, Spread
 from cfmkit.families.cam.geometry.many_tracks import tangents
+from cfmkit.families.cam.many_designs.windows import Sampled, Spread
 from cfmkit.families.cam.model import nodes
 from cfmkit.families.cam.solution import ON_CORNER
 from cfmkit.metrics.closed import extremes
@@ -322,7 +322,7 @@ class Slab:
         return self.up.moves & self.down.moves
 
     def warned(self, max_elongation: float | None) -> Iterator[tuple[str, NDArray[np.bool_]]]:
-        """Yield the findings that `checks.findings_of` has of such cams, in its order: name, and which designs."""
+        """Yield the findings that `findings.findings_of` has of such cams, in its order: name, and which designs."""
         corner = self.corner_travel > 0
         yield from (("undercut", corner), ("contact_not_single_valued", corner), ("up_jam", self.jammed))
         if max_elongation:

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.cam.block_forces import Begin, Forces, Pose, Slab, force_at
 from cfmkit.families.cam.build import CLOSE
 from cfmkit.families.cam.geometry.cut import WholeCamUndercut, cut
 from cfmkit.families.cam.geometry.many_tracks import tangents
@@ -20,14 +19,15 @@ from cfmkit.families.cam.geometry.path import reach
 from cfmkit.families.cam.geometry.profile import SlopeLaw
 from cfmkit.families.cam.geometry.track import Pivot, Track, pivot_angle
 from cfmkit.families.cam.geometry.track_records import NoTrack
+from cfmkit.families.cam.many_designs.forces import Begin, Forces, Pose, Slab, force_at
 from cfmkit.families.cam.statics import jams
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.cam.block_forces import Designs
     from cfmkit.families.cam.geometry.track_records import TrackStates
+    from cfmkit.families.cam.many_designs.forces import Designs
 
 SHAPE = ("constant", "x0", "brace", "radius", "stroke")
 """What decides where the corner is, in the order of `shape`."""

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.families.base import Measure
-    from cfmkit.families.cam.block_forces import Designs, Slab
-    from cfmkit.families.cam.block_windows import Spread
+    from cfmkit.families.cam.many_designs.forces import Designs, Slab
+    from cfmkit.families.cam.many_designs.windows import Spread
 
     Window = tuple[float, float] | None
 

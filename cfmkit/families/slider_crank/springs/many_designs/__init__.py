@@ -1,0 +1,1 @@
+"""Many slider-cranks at once that differ in their springs."""
