@@ -42,13 +42,19 @@ def batch(cli, *arguments: str, quick: bool = True):
 
 
 @pytest.mark.parametrize(
-    "verb", [("--verb", "analyze"), pytest.param((), id="design", marks=pytest.mark.slow)], ids=lambda verb: verb[-1]
+    ("folder", "verb"),
+    [
+        ("studies", ("--verb", "analyze")),  # the others are analysed one by one in test_contract.py
+        pytest.param(".", ("--verb", "analyze"), marks=pytest.mark.slow),
+        pytest.param(".", (), marks=pytest.mark.slow),
+    ],
+    ids=["studies", "analyze", "design"],
 )
-def test_the_configurations_of_the_package_pass_as_a_batch(cli, verb):
-    done = cli("batch", str(CONFIGS), "-o", "out", "--no-plots", "--junit", "reports/cfmkit.xml", *verb)
+def test_the_configurations_of_the_package_pass_as_a_batch(cli, folder, verb):
+    done = cli("batch", str(CONFIGS / folder), "-o", "out", "--no-plots", "--junit", "reports/cfmkit.xml", *verb)
     assert done.code == 0, done.out + done.err
     found = rows(cli)
-    assert len(found) == len([path for path in CONFIGS.rglob("*.yaml") if path.name != "figure.yaml"])
+    assert len(found) == len([path for path in (CONFIGS / folder).rglob("*.yaml") if path.name != "figure.yaml"])
     assert {row["status"] for row in found} == {"complete"}
     assert all(int(row["requirements"]) > 0 and row["missed"] == "0" for row in found)
     root = ElementTree.parse(cli.folder / "reports" / "cfmkit.xml").getroot()

@@ -37,7 +37,7 @@ COMMANDS = {
     "warm": ("warm",),
 }
 
-SECONDS = re.compile(r" +(\w+ )*[\d.]+ m?s$", re.M)
+SECONDS = re.compile(r" +(\w+ )*[\d.]+ (ms|s|min|h)( \d+ s)?$", re.M)
 """What differs on the page between two runs: how long they took."""
 
 OWN = ("manifest.json", ".cfmkit-journal.jsonl")

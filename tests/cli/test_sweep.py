@@ -172,13 +172,14 @@ def test_a_time_limit_costs_its_points_only(cli, tmp_path):
     assert [row["status"] for row in rows(tmp_path / "out")] == ["complete", "timeout"]
 
 
-MANY = (
-    "--vary", "mechanism.roller_radius=8 mm:16 mm:50", "--vary", "mechanism.springs.stiffness=0.5 N/mm:0.9 N/mm:40",
-)  # fmt: skip
+SOME, MANY = (
+    ("--vary", "mechanism.roller_radius=8 mm:16 mm:50", "--vary", f"mechanism.springs.stiffness=0.5 N/mm:0.9 N/mm:{n}")
+    for n in (16, 40)
+)
 
 
 def test_ctrl_c_writes_what_is_there_and_the_same_command_goes_on(cli, tmp_path):
-    command = ("sweep", str(CAM), *MANY, "-o", "out", *FEW, "-j", "2")
+    command = ("sweep", str(CAM), *SOME, "-o", "out", *FEW, "-j", "2")
     process = cli.start(*command, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     journal = tmp_path / "out" / JOURNAL
     until(lambda: journal.exists() and journal.stat().st_size > 20_000)
@@ -187,10 +188,10 @@ def test_ctrl_c_writes_what_is_there_and_the_same_command_goes_on(cli, tmp_path)
     assert process.returncode == 130
     assert b"run the same command again to go on" in complaints
     part = rows(tmp_path / "out")
-    assert 0 < len(part) < 2000
+    assert 0 < len(part) < 800
     assert cli(*command).code == 0
     whole = rows(tmp_path / "out")
-    assert len(whole) == 2000
+    assert len(whole) == 800
     assert [row for row in whole if row in part] == part
 
 
@@ -223,7 +224,7 @@ def test_ctrl_c_twice_ends_at_once_and_keeps_the_journal(cli, tmp_path):
     assert not (tmp_path / "out" / "results.csv").exists()
 
 
-@pytest.mark.parametrize("kills", [25, pytest.param(100, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("kills", [8, pytest.param(100, marks=pytest.mark.slow)])
 def test_kills_at_random_moments_lose_no_row_and_change_no_byte(cli, tmp_path, kills):
     """Every record that was in the journal stays until all are in the table, which is that of an undisturbed run."""
     quiet = (*MANY, *FEW, "-q")
@@ -256,7 +257,7 @@ def test_kills_at_random_moments_lose_no_row_and_change_no_byte(cli, tmp_path, k
     }  # fmt: skip
 
 
-@pytest.mark.parametrize("races", [5, pytest.param(50, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("races", [2, pytest.param(50, marks=pytest.mark.slow)])
 def test_of_two_runs_into_one_folder_exactly_one_works(cli, tmp_path, races):
     slow = ("--vary", "analysis.points=100000:100040:41", "--no-plots", "-q", "-j", "1")
     for race in range(races):

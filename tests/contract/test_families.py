@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pickle
 import re
+from functools import cache
 from importlib import import_module
 from pathlib import Path
 
@@ -44,6 +45,18 @@ every_design = pytest.mark.parametrize(
         if designable(path)
     ],
 )
+
+
+@cache
+def analysed(path):
+    """Return the result of a config; results are values, so tests may share them."""
+    return api.analyze(cfmkit.load(path))
+
+
+@cache
+def designed(path):
+    """Return the design of a config, likewise."""
+    return api.design(cfmkit.load(path))
 
 
 def numbers(quantities):
@@ -99,7 +112,7 @@ def test_what_a_family_says_about_itself_is_complete(name):
 
 @every_config
 def test_a_config_solves_and_meets_its_requirements(path):
-    found = run_findings.report_on(api.analyze(cfmkit.load(path)))
+    found = run_findings.report_on(analysed(path))
     assert found.result.status is Status.COMPLETE, found.result.message
     assert found.requirements
     assert [outcome.sentence for outcome in found.missed] == []
@@ -118,7 +131,7 @@ def test_a_config_round_trips_through_yaml(path, complete, monkeypatch):
 
 @every_config
 def test_the_arrays_of_a_result_are_finite_and_cannot_be_written_to(path):
-    result = api.analyze(cfmkit.load(path))
+    result = analysed(path)
     for curve in result.curves:
         for name, column in curve.columns():
             assert not column.values.flags.writeable, name
@@ -132,7 +145,7 @@ def test_the_arrays_of_a_result_are_finite_and_cannot_be_written_to(path):
 
 @every_config
 def test_the_same_spec_gives_the_same_result(path):
-    one, other = (api.analyze(cfmkit.load(path)) for _ in range(2))
+    one, other = analysed(path), api.analyze(cfmkit.load(path))
     assert numbers(api.evaluate(one)) == numbers(api.evaluate(other))
     for curve, again in zip(one.curves, other.curves, strict=True):
         np.testing.assert_array_equal(curve.effort, again.effort)
@@ -141,7 +154,7 @@ def test_the_same_spec_gives_the_same_result(path):
 @every_config
 def test_the_resolved_spec_gives_the_same_result(path, monkeypatch):
     monkeypatch.chdir(path.parent)
-    result = api.analyze(cfmkit.load(path))
+    result = analysed(path)
     again = api.analyze(cfmkit.loads(cfmkit.dumps(result.spec, complete=True)))
     assert again.spec == result.spec
     assert numbers(api.evaluate(again)) == numbers(api.evaluate(result))
@@ -163,7 +176,7 @@ def test_every_numeric_leaf_can_be_replaced(path):
 
 @every_config
 def test_every_value_and_finding_is_one_that_the_family_explains(path):
-    record, result = families.family(cfmkit.load(path).family), api.analyze(cfmkit.load(path))
+    record, result = families.family(cfmkit.load(path).family), analysed(path)
     assert set(result.values) <= set(record.values)
     assert {item.name for item in result.warnings} <= set(record.findings)
     for name, quantity in result.values.items():
@@ -174,18 +187,18 @@ def test_every_value_and_finding_is_one_that_the_family_explains(path):
 @every_config
 def test_a_cure_is_a_change_that_the_spec_takes(path):
     spec = cfmkit.load(path)
-    for item in api.analyze(spec).warnings:
+    for item in analysed(path).warnings:
         for cure in item.cures:
             assert cfmkit.load(path, [cure]) != spec
 
 
 def test_some_configuration_has_a_cure():
-    assert any(item.cures for path in CONFIGS for item in api.analyze(cfmkit.load(path)).warnings)
+    assert any(item.cures for path in CONFIGS for item in analysed(path).warnings)
 
 
 @every_config
 def test_spec_and_curves_survive_the_way_to_another_process(path):
-    result = api.analyze(cfmkit.load(path))
+    result = analysed(path)
     spec, curves = pickle.loads(pickle.dumps((result.spec, result.curves)))
     assert spec == result.spec
     np.testing.assert_array_equal(curves[0].effort, result.curve.effort)
@@ -193,7 +206,7 @@ def test_spec_and_curves_survive_the_way_to_another_process(path):
 
 @every_design
 def test_a_design_is_judged_like_any_other_spec(path):
-    design = api.design(cfmkit.load(path))
+    design = designed(path)
     assert design.status is Status.COMPLETE, design.message
     written = cfmkit.loads(cfmkit.dumps(design.spec))
     assert written == design.spec
@@ -207,7 +220,7 @@ def test_a_design_is_judged_like_any_other_spec(path):
 
 @every_design
 def test_designing_a_design_changes_nothing(path):
-    design = api.design(cfmkit.load(path))
+    design = designed(path)
     assert api.design(design.spec).spec == design.spec
 
 
@@ -225,7 +238,7 @@ def test_the_parts_of_a_config_can_be_drawn(path):
 
 @every_config
 def test_the_files_of_a_run_are_the_same_every_time(path):
-    found = run_findings.report_on(api.analyze(cfmkit.load(path)))
+    found = run_findings.report_on(analysed(path))
     one, other = (dict(files(found, plots=False)) for _ in range(2))
     assert {"metrics.json", "resolved.yaml", "curve.csv"} <= set(one)
     assert one == other

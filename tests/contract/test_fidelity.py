@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -39,6 +40,7 @@ def quick(path):
     return spec.replace({"analysis.solid.poses": 3, "analysis.solid.mesh": "1 mm"})
 
 
+@cache
 def comparable(path):
     try:
         return choices_of(quick(path))
