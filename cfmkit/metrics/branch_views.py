@@ -14,6 +14,7 @@ import numpy as np
 
 from cfmkit.metrics import closed, many
 from cfmkit.metrics.many import ManyBranches
+from cfmkit.metrics.spread import Spread, level
 from cfmkit.metrics.traces import ROUNDING, BranchTrace, Undefined, Window, covers, restrict, traces
 
 if TYPE_CHECKING:
@@ -73,15 +74,6 @@ class Frame:
         if not self.target:
             raise Undefined("there is no target to compare with" if self.target is None else "the target is zero")
         return self.target
-
-
-class Spread(NamedTuple):
-    """Mean and extremes of the effort over the points in the window, times `sign` so that the mean is not negative."""
-
-    mean: float
-    max: float
-    min: float
-    sign: float
 
 
 class Function(NamedTuple):
@@ -214,17 +206,14 @@ class Branch:
     def spread(self) -> Spread:
         """Mean and extremes in the window."""
         effort = self.inside.effort
-        mean, (high, low) = float(effort.sum()) / len(effort), self._extremes
-        if mean < 0:
-            return Spread(-mean, -low, -high, -1.0)
-        return Spread(mean, high, low, 1.0)
+        return Spread.of(float(effort.sum()) / len(effort), *self._extremes)
 
     @cached_property
     def level(self) -> float:
         """Mean effort in the window: over its points, or over the way where the model gives it at every place."""
         model = self.frame.closed
         if model is None:
-            return self.spread.sign * self.spread.mean
+            return float(level(self.spread))
         self.inside  # noqa: B018  (raises where the window is not covered)
         return closed.mean(partial(model.effort, self.name), model.places, *self.ends)
 

@@ -8,11 +8,12 @@ convention gives the same ripple). Each function takes a `Branch` (or the
 from __future__ import annotations
 
 from functools import partial
-from math import sqrt
+from math import isnan, sqrt
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.metrics import spread
 from cfmkit.metrics.closed import extremes
 from cfmkit.metrics.many import UNIFORM_POINTS
 from cfmkit.metrics.traces import BranchTrace, Undefined, Window
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
 
 def mean(branch: Branch) -> float:
     """Return the mean effort over the points in the window."""
-    return branch.spread.sign * branch.spread.mean
+    return float(spread.level(branch.spread))
 
 
 def standard_deviation(branch: Branch) -> float:
@@ -32,50 +33,43 @@ def standard_deviation(branch: Branch) -> float:
     effort = branch.inside.effort
     if len(effort) < 2:
         raise Undefined("a standard deviation needs two points")
-    offset = effort - mean(branch)
-    return sqrt(float(offset @ offset) / (len(effort) - 1))
+    return float(spread.deviation(effort, mean(branch)))
 
 
 def largest(branch: Branch) -> float:
     """Return the largest effort in the window."""
-    spread = branch.spread
-    return spread.max if spread.sign > 0 else -spread.min
+    return float(spread.largest(branch.spread))
 
 
 def smallest(branch: Branch) -> float:
     """Return the smallest effort in the window."""
-    spread = branch.spread
-    return spread.min if spread.sign > 0 else -spread.max
+    return float(spread.smallest(branch.spread))
 
 
 def ripple(branch: Branch) -> float:
     """Return (max - min) / max."""
-    spread = branch.spread
-    return (spread.max - spread.min) / _positive(spread.max, branch)
+    return _known(spread.ripple(branch.spread), branch)
 
 
 def half_band(branch: Branch) -> float:
     """Return (max - min) / (max + min)."""
-    spread = branch.spread
-    return (spread.max - spread.min) / _positive(spread.max + spread.min, branch)
-
-
-def _positive(value: float, branch: Branch) -> float:
-    if value <= 0:
-        raise Undefined(f"the {branch.kind} changes sign or is zero")
-    return value
+    return _known(spread.half_band(branch.spread), branch)
 
 
 def deviation_from_mean(branch: Branch) -> float:
     """Return the largest ``|F - mean| / mean``."""
-    spread = branch.spread
-    return max(spread.max - spread.mean, spread.mean - spread.min) / _positive(spread.mean, branch)
+    return _known(spread.deviation_from_mean(branch.spread), branch)
+
+
+def _known(share: float, branch: Branch) -> float:
+    if isnan(share):
+        raise Undefined(f"the {branch.kind} changes sign or is zero")
+    return float(share)
 
 
 def deviation_from_target(branch: Branch) -> float:
     """Return the largest ``|F - target| / target``."""
-    target = branch.frame.needed_target()
-    return max(abs(largest(branch) - target), abs(smallest(branch) - target)) / abs(target)
+    return float(spread.deviation_from_target(branch.spread, branch.frame.needed_target()))
 
 
 def rms_to_target(branch: Branch) -> float:

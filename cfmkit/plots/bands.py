@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from cfmkit.metrics import Outcome
-    from cfmkit.metrics.branch_views import Spread
+    from cfmkit.metrics.spread import Spread
     from cfmkit.results import Result
 
 Bounds = tuple[float | None, float | None]

@@ -30,6 +30,7 @@ from cfmkit.families.vcfm.leaves.v_beam import (
 )
 from cfmkit.families.vcfm.windows import extremes, flat_window
 from cfmkit.metrics.closed import extremes as extremes_next_to
+from cfmkit.metrics.spread import ManyWindows, metric_of, metrics_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -74,7 +75,7 @@ def analyze_block(spec: VcfmSpec, block: Block) -> BlockAnswer | None:
         for measure, found in zip(block.measures, values, strict=True):
             found[chosen] = _measured(slab, measure)
             if measure.name in METRICS:
-                done[chosen] &= slab.spread(measure.window).mean > 0
+                done[chosen] &= slab.inside(measure.window).mean > 0
         for name, mask in warned(spec, slab).items():
             warnings.setdefault(name, np.zeros(block.size, dtype=bool))[chosen] = mask
     named = [{"load" if one.name in METRICS else "": found} for one, found in zip(block.measures, values, strict=True)]
@@ -168,14 +169,22 @@ class Slab:
         return self.force_at(self.grid)
 
     @cached_property
-    def _spreads(self) -> dict[Any, Spread]:
+    def _windows(self) -> dict[Any, ManyWindows]:
         return {}
 
-    def spread(self, window: tuple[float, float] | None) -> Spread:
+    def inside(self, window: tuple[float, float] | None) -> ManyWindows:
         """Return the forces inside a window."""
-        if window not in self._spreads:
-            self._spreads[window] = Spread(*self._inside(window), self)
-        return self._spreads[window]
+        if window not in self._windows:
+            self._windows[window] = ManyWindows(*self._inside(window), self._extremes)
+        return self._windows[window]
+
+    def _extremes(self, travel: FloatArray, force: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the largest and smallest force: next to the samples, or where the leaves buckle and straighten."""
+        ends = (np.broadcast_to(end, (len(force), 1)) for end in self.leaf.linear)
+        knots = np.hstack([np.where(np.isfinite(end), end, travel[0]) for end in ends])
+        there = self.exact(np.clip(knots, travel[0], travel[-1]))
+        high, low = extremes_next_to(self.exact, travel[None, :], force)
+        return np.maximum(high, there.max(axis=1)), np.minimum(low, there.min(axis=1))
 
     def _inside(self, window: tuple[float, float] | None) -> tuple[FloatArray, FloatArray]:
         """Return the samples in a window, its ends included, as the metrics of one curve take them: travel, force."""
@@ -207,61 +216,14 @@ class Slab:
         return flat_window(self.grid, self.force, self.flatness, self.exact)
 
 
-class Spread:
-    """Mean and extremes of forces, (k, n), at travels in a window, (n,)."""
-
-    def __init__(self, travel: FloatArray, force: FloatArray, slab: Slab) -> None:
-        """Keep the forces."""
-        self.travel, self.force, self.slab = travel, force, slab
-        self.mean = force.mean(axis=1)
-
-    @cached_property
-    def _extremes(self) -> tuple[FloatArray, FloatArray]:
-        """Largest and smallest force: next to the samples, or where the leaves buckle and straighten."""
-        ends = (np.broadcast_to(end, (len(self.force), 1)) for end in self.slab.leaf.linear)
-        knots = np.hstack([np.where(np.isfinite(end), end, self.travel[0]) for end in ends])
-        there = self.slab.exact(np.clip(knots, self.travel[0], self.travel[-1]))
-        high, low = extremes_next_to(self.slab.exact, self.travel[None, :], self.force)
-        return np.maximum(high, there.max(axis=1)), np.minimum(low, there.min(axis=1))
-
-    @property
-    def max(self) -> FloatArray:
-        """Largest force [N]."""
-        return self._extremes[0]
-
-    @property
-    def min(self) -> FloatArray:
-        """Smallest force [N]."""
-        return self._extremes[1]
-
-    @property
-    def deviation(self) -> FloatArray:
-        """Standard deviation (n - 1) [N]."""
-        return np.asarray(self.force.std(axis=1, ddof=1))
-
-
 def _measured(slab: Slab, measure: Measure) -> FloatArray:
     if measure.name in SCALARS:
         return np.ravel(np.broadcast_to(SCALARS[measure.name](slab), (len(slab.half_beams), 1)))
-    return np.asarray(METRICS[measure.name](slab.spread(measure.window), slab))
+    return metric_of(measure.name, slab.inside(measure.window), slab.target)
 
 
-def _from_target(one: Spread, slab: Slab) -> FloatArray:
-    if slab.target is None:
-        return np.full(len(one.mean), np.nan)
-    return np.asarray(np.maximum(np.abs(one.max - slab.target), np.abs(one.min - slab.target)) / slab.target)
-
-
-METRICS: dict[str, Callable[[Spread, Slab], FloatArray]] = {
-    "force_mean": lambda one, _slab: one.mean,
-    "force_sd": lambda one, _slab: one.deviation,
-    "force_max": lambda one, _slab: one.max,
-    "force_min": lambda one, _slab: one.min,
-    "force_ripple": lambda one, _slab: (one.max - one.min) / one.max,
-    "half_band": lambda one, _slab: (one.max - one.min) / (one.max + one.min),
-    "deviation_from_mean": lambda one, _slab: np.maximum(one.max - one.mean, one.mean - one.min) / one.mean,
-    "deviation_from_target": _from_target,
-}
+METRICS = metrics_of("force")
+"""Metrics of one branch inside its window."""
 
 
 def _window_length(slab: Slab) -> FloatArray:

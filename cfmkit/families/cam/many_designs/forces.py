@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 import numpy as np
 
 from cfmkit.families.cam.geometry.many_tracks import tangents
-from cfmkit.families.cam.many_designs.windows import Sampled, Spread
+from cfmkit.families.cam.many_designs.windows import CutWindows, Sampled
 from cfmkit.families.cam.model import nodes
 from cfmkit.families.cam.solution import ON_CORNER
 from cfmkit.metrics.closed import extremes
@@ -139,13 +139,13 @@ class Slab:
     """
 
     own: ClassVar[Mapping[str, Callable[[Any], FloatArray]]] = {}
-    """Values of the family that are not those of `block_measures.SCALARS`."""
+    """Values of the family that are not those of `measures.SCALARS`."""
 
     def __init__(self, designs: Designs, points: int, contacts: bool, band: float = 0.05) -> None:
         """Remember what is asked."""
         self.designs, self.points, self.contacts, self.band = designs, points, contacts, band
         self.usable: tuple[FloatArray, FloatArray] | None = None
-        self.spreads: dict[tuple[str, Any], Spread] = {}
+        self.windows: dict[tuple[str, Any], CutWindows] = {}
         self.known: dict[Any, ManyBranches] = {}
 
     @cached_property
@@ -342,13 +342,13 @@ class Slab:
         corner = np.minimum(self.corner_travel, self.travel[:, -1])
         return corner[:, None] * ON_CORNER if corner.any() else None
 
-    def spread(self, branch: str, window: Any) -> Spread:
+    def inside(self, branch: str, window: Any) -> CutWindows:
         """Return the forces of one branch inside a window."""
-        if (branch, window) not in self.spreads:
+        if (branch, window) not in self.windows:
             way, forces = (1.0, self.up) if branch == "load" else (-1.0, self.down)
             sampled = Sampled(self.travel, forces.slider, partial(self.somewhere, way), self.peaks)
-            self.spreads[branch, window] = Spread(sampled, window)
-        return self.spreads[branch, window]
+            self.windows[branch, window] = CutWindows(sampled, window)
+        return self.windows[branch, window]
 
 
 def force_at(cams: Designs, pose: Pose, way: float | FloatArray) -> FloatArray:

@@ -10,6 +10,7 @@ import numpy as np
 from cfmkit.families.cam.geometry.many_tracks import tangents
 from cfmkit.families.cam.values import DEFINITIONS
 from cfmkit.metrics.many import RANGES, ManyBranches, rms_to_target, usable_interval
+from cfmkit.metrics.spread import metric_of, metrics_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -18,8 +19,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.families.base import Measure
-    from cfmkit.families.cam.many_designs.forces import Designs, Slab
-    from cfmkit.families.cam.many_designs.windows import Spread
+    from cfmkit.families.cam.many_designs.forces import Slab
 
     Window = tuple[float, float] | None
 
@@ -37,8 +37,8 @@ def measured(cams: Slab, measure: Measure) -> Mapping[str, FloatArray]:
     if measure.name in CYCLES:
         return {"": CYCLES[measure.name](cams, measure.window)}
     if measure.name in METRICS:
-        function = METRICS[measure.name]
-        return {branch: function(cams.spread(branch, measure.window), cams.designs) for branch in BRANCHES}
+        target = cams.designs.target
+        return {one: metric_of(measure.name, cams.inside(one, measure.window), target) for one in BRANCHES}
     if measure.name == RMS:
         return {branch: _rms(cams, branch, measure.window) for branch in BRANCHES}
     both = RANGES[measure.name](_everywhere(cams, measure.window))
@@ -56,7 +56,7 @@ def _rms(cams: Slab, branch: str, window: Window) -> FloatArray:
         low, high = (np.full(len(cams.designs), end) for end in window)
     many = ManyBranches(cams.travel, effort, low, high, lambda at, _rows: cams.exact(branch, at))
     # Where a sample has no force, nothing inside the window is measured.
-    known = np.isfinite(cams.spread(branch, window).mean)
+    known = np.isfinite(cams.inside(branch, window).mean)
     return np.where(known, rms_to_target(many, cams.designs.target), np.nan)
 
 
@@ -77,22 +77,6 @@ def _everywhere(cams: Slab, window: Window) -> ManyBranches:
     return cams.known[window]
 
 
-def _ripple(one: Spread, _cams: Designs) -> FloatArray:
-    return (one.max - one.min) / one.max
-
-
-def _half_band(one: Spread, _cams: Designs) -> FloatArray:
-    return (one.max - one.min) / (one.max + one.min)
-
-
-def _from_mean(one: Spread, _cams: Designs) -> FloatArray:
-    return np.maximum(one.max - one.mean, one.mean - one.min) / one.mean
-
-
-def _from_target(one: Spread, cams: Designs) -> FloatArray:
-    return np.maximum(np.abs(one.max - cams.target), np.abs(one.min - cams.target)) / cams.target
-
-
 def _stress(cams: Slab, measure: Measure, branch: str) -> FloatArray:
     largest = cams.stressed(branch, measure.window)
     if measure.name == "stress_max":
@@ -100,23 +84,14 @@ def _stress(cams: Slab, measure: Measure, branch: str) -> FloatArray:
     return np.where(largest > 0, cams.allowable_stress / np.where(largest > 0, largest, 1.0), np.nan)
 
 
-METRICS: dict[str, Callable[[Spread, Designs], FloatArray]] = {
-    "force_mean": lambda one, _cams: one.mean,
-    "force_sd": lambda one, _cams: one.deviation,
-    "force_max": lambda one, _cams: one.max,
-    "force_min": lambda one, _cams: one.min,
-    "force_ripple": _ripple,
-    "half_band": _half_band,
-    "deviation_from_mean": _from_mean,
-    "deviation_from_target": _from_target,
-}
+METRICS = metrics_of("force")
 """Metrics of one branch inside its window."""
 
 RMS = "rms_to_target"
 
 
 def _hysteresis(cams: Slab, window: Window) -> FloatArray:
-    return cams.spread("load", window).work - cams.spread("unload", window).work
+    return cams.inside("load", window).work - cams.inside("unload", window).work
 
 
 def _usable(cams: Slab) -> tuple[FloatArray, FloatArray]:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cfmkit.metrics.closed import extremes
+from cfmkit.metrics.spread import ManyWindows
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -51,7 +52,7 @@ class Sampled:
         )
 
 
-class Spread:
+class CutWindows(ManyWindows):
     """What one branch of many cams has inside a window: each cam its own samples, those alike worked on together."""
 
     def __init__(self, sampled: Sampled, window: tuple[float, float] | None) -> None:
@@ -60,41 +61,36 @@ class Spread:
         ways = _ways(sampled, window)
         _, first, which = np.unique(ways, axis=0, return_index=True, return_inverse=True)
         if len(first) == 1 and ways[0, 1]:
-            self.parts = [(np.arange(self.count), _Part(sampled, window, ways[0]))]
+            self.parts = [(np.arange(self.count), _part(sampled, window, ways[0]))]
             return
         groups = [np.flatnonzero(which.ravel() == k) for k in range(len(first)) if ways[first[k], 1]]
-        self.parts = [(rows, _Part(sampled.take(rows), window, ways[rows[0]])) for rows in groups]
+        self.parts = [(rows, _part(sampled.take(rows), window, ways[rows[0]])) for rows in groups]
 
-    def _each(self, name: str) -> FloatArray:
+    def _each(self, number: Callable[[ManyWindows], FloatArray]) -> FloatArray:
         found = np.full(self.count, np.nan)
         for rows, part in self.parts:
-            found[rows] = getattr(part, name)
+            found[rows] = number(part)
         return found
 
     @cached_property
     def mean(self) -> FloatArray:
-        """Mean force of each design [N]."""
-        return self._each("mean")
+        """Mean of each cam, (d,)."""
+        return self._each(lambda part: part.mean)
 
     @cached_property
-    def max(self) -> FloatArray:
-        """Largest force [N]."""
-        return self._each("max")
+    def extremes(self) -> tuple[FloatArray, FloatArray]:
+        """Largest and smallest value of each cam, (d,) each."""
+        return self._each(lambda part: part.extremes[0]), self._each(lambda part: part.extremes[1])
 
-    @cached_property
-    def min(self) -> FloatArray:
-        """Smallest force [N]."""
-        return self._each("min")
-
-    @cached_property
+    @property
     def deviation(self) -> FloatArray:
-        """Standard deviation (n - 1) of the force [N]."""
-        return self._each("deviation")
+        """Sample standard deviation (n - 1) of each cam, (d,)."""
+        return self._each(lambda part: part.deviation)
 
-    @cached_property
+    @property
     def work(self) -> FloatArray:
-        """Integral of the force over the travel [J]."""
-        return self._each("work")
+        """Integral over the travel of each cam, (d,) [J]."""
+        return self._each(lambda part: part.work)
 
 
 def _ways(sampled: Sampled, window: tuple[float, float] | None) -> NDArray[np.intp]:
@@ -127,58 +123,35 @@ def _ways(sampled: Sampled, window: tuple[float, float] | None) -> NDArray[np.in
     return np.column_stack([ways, between.astype(np.intp)])
 
 
-class _Part:
-    """Cams whose samples the window cuts alike."""
+def _part(sampled: Sampled, window: tuple[float, float] | None, way: NDArray[np.intp]) -> ManyWindows:
+    """Return what lies in a window that cuts the samples of all these cams alike."""
+    rows, (start, stop, before, after) = np.arange(len(sampled.values)), way[:4].tolist()
 
-    def __init__(self, sampled: Sampled, window: tuple[float, float] | None, way: NDArray[np.intp]) -> None:
-        self.sampled, self.rows = sampled, np.arange(len(sampled.values))
-        start, stop, before, after = way[:4].tolist()
-        parts = [(sampled.travel[:, start:stop], sampled.values[:, start:stop])]
-        if window is not None and before:
-            parts.insert(0, self._at(window[0]))
-        if window is not None and after:
-            parts.append(self._at(window[1]))
-        self.motion, self.force = (np.hstack(each) if len(parts) > 1 else each[0] for each in zip(*parts, strict=True))
-        self.peaks = way[4:].astype(bool)
+    def at(place: float) -> tuple[FloatArray, FloatArray]:
+        places = np.full((len(rows), 1), place)
+        return places, sampled.exact(places, rows)
 
-    def _at(self, place: float) -> tuple[FloatArray, FloatArray]:
-        """Return one travel and the forces of all curves there."""
-        places = np.full((len(self.rows), 1), place)
-        return places, self.sampled.exact(places, self.rows)
+    parts = [(sampled.travel[:, start:stop], sampled.values[:, start:stop])]
+    if window is not None and before:
+        parts.insert(0, at(window[0]))
+    if window is not None and after:
+        parts.append(at(window[1]))
+    motion, force = (np.hstack(each) if len(parts) > 1 else each[0] for each in zip(*parts, strict=True))
+    return ManyWindows(motion, force, partial(_extremes, sampled, way[4:].astype(bool)))
 
-    @cached_property
-    def _extremes(self) -> tuple[FloatArray, FloatArray]:
-        """Return largest and smallest force, NaN where one of the samples has none."""
-        motion, force, more = self.motion, self.force, self.sampled.peaks
-        known = np.isfinite(force.sum(axis=1))
-        if more is not None and self.peaks.any():
-            more = more[:, self.peaks]
-            heights = self.sampled.exact(more, self.rows)
-            motion = np.concatenate([np.broadcast_to(motion, force.shape), more], axis=1)
-            order = np.argsort(motion, axis=1, kind="stable")
-            motion = np.take_along_axis(motion, order, axis=1)
-            force = np.take_along_axis(np.concatenate([force, heights], axis=1), order, axis=1)
-        high, low = extremes(lambda at: self.sampled.exact(at, self.rows), motion, force, bool(self.peaks.any()))
-        return np.where(known, high, np.nan), np.where(known, low, np.nan)
 
-    @property
-    def mean(self) -> FloatArray:
-        return np.asarray(self.force.mean(axis=1))
-
-    @property
-    def max(self) -> FloatArray:
-        return self._extremes[0]
-
-    @property
-    def min(self) -> FloatArray:
-        return self._extremes[1]
-
-    @property
-    def deviation(self) -> FloatArray:
-        offset = self.force - self.force.mean(axis=1)[:, None]
-        return np.asarray(np.sqrt(np.einsum("ij,ij->i", offset, offset) / (offset.shape[1] - 1)))
-
-    @property
-    def work(self) -> FloatArray:
-        steps = np.diff(np.broadcast_to(self.motion, self.force.shape), axis=1)
-        return np.asarray(np.einsum("ij,ij->i", steps, 0.5 * (self.force[:, 1:] + self.force[:, :-1])))
+def _extremes(
+    sampled: Sampled, inside: NDArray[np.bool_], motion: FloatArray, force: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return largest and smallest force, NaN where one of the samples has none; `inside` says which peaks are."""
+    rows, more = np.arange(len(force)), sampled.peaks
+    known = np.isfinite(force.sum(axis=1))
+    if more is not None and inside.any():
+        more = more[:, inside]
+        heights = sampled.exact(more, rows)
+        motion = np.concatenate([np.broadcast_to(motion, force.shape), more], axis=1)
+        order = np.argsort(motion, axis=1, kind="stable")
+        motion = np.take_along_axis(motion, order, axis=1)
+        force = np.take_along_axis(np.concatenate([force, heights], axis=1), order, axis=1)
+    high, low = extremes(lambda at: sampled.exact(at, rows), motion, force, bool(inside.any()))
+    return np.where(known, high, np.nan), np.where(known, low, np.nan)

@@ -9,14 +9,13 @@ one mechanism, which is laid once for all of them.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cfmkit.families.slider_crank.printed.values import DEFINITIONS as OF_PARTS
 from cfmkit.families.slider_crank.springs.many_designs.bands import edges
-from cfmkit.families.slider_crank.springs.many_designs.metrics import CURVE, PLAIN, of_curve
 from cfmkit.families.slider_crank.springs.model import (
     efforts_inside,
     reference_motion,
@@ -29,6 +28,7 @@ from cfmkit.families.slider_crank.springs.values import DEFINITIONS
 from cfmkit.metrics.branch_views import Frame
 from cfmkit.metrics.closed import extremes, mean
 from cfmkit.metrics.many import UNIFORM_POINTS, ManyBranches, range_95, range_95_fraction, usable_interval
+from cfmkit.metrics.spread import ManyWindows, metric_of, metrics_of
 from cfmkit.numerics.turning_points import Monotone, monotone, sharpened
 
 if TYPE_CHECKING:
@@ -124,13 +124,12 @@ class Base:
             return True
         if name in EACH:
             return self.bounded
-        known = self.spreads(name) or name in BANDS or name in OF_TARGET or (name in PLACES and self.bounded)
+        known = self.spreads(name) or name in BANDS or name == RMS or (name in PLACES and self.bounded)
         return known and (window is None or (self.low <= window[0] and window[1] <= self.high))
 
     def spreads(self, name: str) -> bool:
         """Return whether a metric is one of mean and extremes in a window."""
-        kind, _, rest = name.partition("_")
-        return (kind == self.assembly.drive and rest in CURVE) or name in PLAIN
+        return name in metrics_of(self.assembly.drive)
 
     def lacks(self, name: str) -> bool:
         """Return whether a mechanism with this drive has no such value: its cells are empty."""
@@ -216,23 +215,23 @@ class Slab:
             return np.array([EACH[name](one) for one in self.each], dtype=float)  # None: NaN
         if name in PLACES:
             return PLACES[name](self, measure.window)
-        if name in OF_TARGET:
-            return OF_TARGET[name](self, measure.window)
+        if name == RMS:
+            return _rms_to_target(self, measure.window)
         if name in BANDS:
             low, high = self.within(BANDS[name])
             return high - low
-        return of_curve(name, *self.inside(measure.window))
+        return metric_of(name, self.inside(measure.window), target_of(self.base.spec))
 
-    def inside(self, window: tuple[float, float] | None) -> tuple[FloatArray, tuple[FloatArray, FloatArray]]:
-        """Return the efforts in a window, (m, k), and the largest and the smallest of each design, (m,) each."""
+    def inside(self, window: tuple[float, float] | None) -> ManyWindows:
+        """Return the efforts in a window."""
         if window not in self.cut:
             base = self.base
             motion = base.motion
             effort = self.effort if window is None else self.rates @ base.inside(window)
             if window is not None:
                 motion = np.concatenate([window[:1], motion[(motion > window[0]) & (motion < window[1])], window[1:]])
-            self.cut[window] = effort, extremes(self._exact, motion[None, :], effort)
-            self.balance(effort.mean(axis=1), effort)
+            self.cut[window] = ManyWindows(motion[None, :], effort, partial(extremes, self._exact))
+            self.balance(self.cut[window].mean, effort)
         return self.cut[window]
 
     @cached_property
@@ -246,7 +245,7 @@ class Slab:
         np.logical_or(self.balanced, nothing, out=self.balanced)
 
     @cached_property
-    def cut(self) -> dict[tuple[float, float] | None, tuple[FloatArray, tuple[FloatArray, FloatArray]]]:
+    def cut(self) -> dict[tuple[float, float] | None, ManyWindows]:
         """What is known of windows."""
         return {}
 
@@ -399,13 +398,6 @@ PLACES: dict[str, Callable[[Slab, tuple[float, float] | None], FloatArray]] = {
 """Metrics that are places, on curves that are known at every place."""
 
 
-def _from_target(slab: Slab, window: tuple[float, float] | None) -> FloatArray:
-    target, (top, bottom) = target_of(slab.base.spec), slab.inside(window)[1]
-    if not target:
-        return np.full(len(slab.rates), np.nan)
-    return np.maximum(np.abs(top - target), np.abs(bottom - target)) / abs(target)
-
-
 def _rms_to_target(slab: Slab, window: tuple[float, float] | None) -> FloatArray:
     target, (low, high) = target_of(slab.base.spec), window or (slab.base.low, slab.base.high)
     if not target:
@@ -415,11 +407,7 @@ def _rms_to_target(slab: Slab, window: tuple[float, float] | None) -> FloatArray
     return np.asarray(np.sqrt(np.einsum("ij,ij->i", offset, offset) / UNIFORM_POINTS))
 
 
-OF_TARGET: dict[str, Callable[[Slab, tuple[float, float] | None], FloatArray]] = {
-    "deviation_from_target": _from_target,
-    "rms_to_target": _rms_to_target,
-}
-"""Metrics against the effort that the design asks for."""
+RMS = "rms_to_target"
 
 NO_LOOP = frozenset(
     {

@@ -1,0 +1,180 @@
+"""Mean and extremes of an effort in a window, and the metrics that follow from them: of one curve, or of many at once.
+
+The numbers of a `Spread` are floats for one curve and (d,) arrays for many; every metric is written once, for both.
+An effort whose mean is negative is judged in its own direction: the opposite sign convention gives the same ripple.
+A share of something that is not positive is NaN.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from cfmkit.arrays import FloatArray
+
+    Number = Any  # a float or a (d,) array: what goes in comes out
+    Pair = tuple[FloatArray, FloatArray]
+
+
+class Spread(NamedTuple):
+    """Mean and extremes of the effort over the points in a window, times `sign` so that the mean is not negative.
+
+    Attributes
+    ----------
+    mean, max, min : float or (d,) array
+        In the effort's own direction [N or N m].
+    sign : float or (d,) array
+        1 or -1.
+    """
+
+    mean: Number
+    max: Number
+    min: Number
+    sign: Number
+
+    @classmethod
+    def of(cls, mean: Number, largest: Number, smallest: Number) -> Spread:
+        """Return the spread of efforts with this mean and these extremes."""
+        if isinstance(mean, float):
+            return cls(-mean, -smallest, -largest, -1.0) if mean < 0 else cls(mean, largest, smallest, 1.0)
+        down = mean < 0
+        high, low = np.where(down, -smallest, largest), np.where(down, -largest, smallest)
+        return cls(np.abs(mean), high, low, np.where(down, -1.0, 1.0))
+
+
+def level(found: Spread) -> Number:
+    """Return the mean effort."""
+    return found.sign * found.mean
+
+
+def largest(found: Spread) -> Number:
+    """Return the largest effort."""
+    return _either(found.sign > 0, found.max, -found.min)
+
+
+def smallest(found: Spread) -> Number:
+    """Return the smallest effort."""
+    return _either(found.sign > 0, found.min, -found.max)
+
+
+def ripple(found: Spread) -> Number:
+    """Return (max - min) / max."""
+    return _share(found.max - found.min, found.max)
+
+
+def half_band(found: Spread) -> Number:
+    """Return (max - min) / (max + min)."""
+    return _share(found.max - found.min, found.max + found.min)
+
+
+def deviation_from_mean(found: Spread) -> Number:
+    """Return the largest ``|F - mean| / mean``."""
+    return _share(_larger(found.max - found.mean, found.mean - found.min), found.mean)
+
+
+def deviation_from_target(found: Spread, target: Number) -> Number:
+    """Return the largest ``|F - target| / |target|``; NaN where the target is zero."""
+    away = _larger(abs(largest(found) - target), abs(smallest(found) - target))
+    return _share(away, abs(target))
+
+
+def deviation(effort: FloatArray, mean: Number) -> Number:
+    """Return the sample standard deviation (n - 1) of efforts, (n,) or (d, n), about their mean."""
+    offset = effort - np.asarray(mean)[..., None]
+    return np.sqrt(np.einsum("...j,...j->...", offset, offset) / (effort.shape[-1] - 1))
+
+
+def _either(which: Number, one: Number, other: Number) -> Number:
+    if isinstance(one, float):
+        return one if which else other
+    return np.where(which, one, other)
+
+
+def _larger(one: Number, other: Number) -> Number:
+    return max(one, other) if isinstance(one, float) else np.maximum(one, other)
+
+
+def _share(part: Number, whole: Number) -> Number:
+    if isinstance(part, float):
+        return part / whole if whole > 0 else np.nan
+    return np.where(whole > 0, part / np.where(whole > 0, whole, 1.0), np.nan)
+
+
+class ManyWindows:
+    """The efforts of one branch of many curves in a window, one row each.
+
+    Parameters
+    ----------
+    motion : (n,) or (d, n) array
+        Where they are [m or rad].
+    effort : (d, n) array
+        [N or N m].
+    extremes : callable
+        Returns their largest and smallest values, (d,) each, next to the samples as well; called when they are needed.
+    """
+
+    def __init__(self, motion: FloatArray, effort: FloatArray, extremes: Callable[[FloatArray, FloatArray], Pair]):
+        """Keep the efforts."""
+        self.motion, self.effort, self._extremes_of = motion, effort, extremes
+
+    @cached_property
+    def mean(self) -> FloatArray:
+        """Mean effort of each curve, (d,)."""
+        return np.asarray(self.effort.mean(axis=1))
+
+    @cached_property
+    def extremes(self) -> Pair:
+        """Largest and smallest effort of each curve, (d,) each."""
+        return self._extremes_of(self.motion, self.effort)
+
+    @cached_property
+    def spread(self) -> Spread:
+        """Mean and extremes of each curve."""
+        return Spread.of(self.mean, *self.extremes)
+
+    @property
+    def deviation(self) -> FloatArray:
+        """Sample standard deviation (n - 1) of each curve, (d,)."""
+        return np.asarray(deviation(self.effort, self.mean))
+
+    @property
+    def work(self) -> FloatArray:
+        """Integral of the effort over the motion, (d,) [J]."""
+        steps = np.diff(np.broadcast_to(self.motion, self.effort.shape), axis=1)
+        return np.asarray(np.einsum("ij,ij->i", steps, 0.5 * (self.effort[:, 1:] + self.effort[:, :-1])))
+
+
+OF_EFFORT: dict[str, Callable[[ManyWindows], FloatArray]] = {
+    "mean": lambda many: many.mean,
+    "sd": lambda many: many.deviation,
+    "max": lambda many: many.extremes[0],
+    "min": lambda many: many.extremes[1],
+    "ripple": lambda many: ripple(many.spread),
+}
+"""Metrics whose names begin with ``force_`` or ``torque_``."""
+
+OF_EITHER: dict[str, Callable[[ManyWindows], FloatArray]] = {
+    "half_band": lambda many: half_band(many.spread),
+    "deviation_from_mean": lambda many: deviation_from_mean(many.spread),
+}
+"""Metrics that are called the same for forces and torques."""
+
+TO_TARGET = "deviation_from_target"
+
+
+def metrics_of(kind: str) -> frozenset[str]:
+    """Return the names of the metrics of a `ManyWindows` whose effort is a ``force`` or a ``torque``."""
+    return frozenset((*(f"{kind}_{name}" for name in OF_EFFORT), *OF_EITHER, TO_TARGET))
+
+
+def metric_of(name: str, many: ManyWindows, target: FloatArray | float | None) -> FloatArray:
+    """Return one of `metrics_of` of each curve, (d,); NaN where it is undefined."""
+    if name == TO_TARGET:
+        wanted = np.broadcast_to(np.nan if target is None else target, len(many.mean))
+        return np.asarray(deviation_from_target(many.spread, wanted))
+    return OF_EITHER[name](many) if name in OF_EITHER else OF_EFFORT[name.partition("_")[2]](many)
