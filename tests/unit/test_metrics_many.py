@@ -7,6 +7,7 @@ from cfmkit.curves import Curve
 from cfmkit.metrics import Frame, Window
 from cfmkit.metrics.evaluation import survey
 from cfmkit.metrics.many import RANGES, ManyBranches, rms_to_target, usable_interval
+from cfmkit.metrics.spread import ManyWindows, Spread, metric_of, metrics_of
 from cfmkit.metrics.table import TABLE
 
 DEFINED = {item.name: item for item in TABLE}
@@ -64,3 +65,23 @@ def test_the_usable_interval_of_many_loops_is_that_of_each(seed):
         wanted = [alone(motion[k], [load[k], unload[k]], None, name) for k in range(COUNT)]
         assert np.allclose(values, wanted, rtol=1e-12, atol=1e-13, equal_nan=True)
     assert 20 < np.isfinite(start).sum() < COUNT
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("name", sorted(metrics_of("force")))
+def test_a_metric_of_many_windows_is_that_of_each_whichever_way_the_force_acts(name, sign):
+    motion, effort = curves(4)
+    effort = sign * effort
+    rows = ManyWindows(motion, effort, lambda _, rows: (rows.max(axis=1), rows.min(axis=1)))
+    found = metric_of(name, rows, 10.0)
+    wanted = [alone(motion[k], [effort[k]], None, name) for k in range(COUNT)]
+    assert np.allclose(found, wanted, rtol=1e-12, atol=0.0)
+    assert np.ptp(found) > 1e-3
+
+
+def test_a_spread_is_judged_in_the_direction_of_its_mean_and_without_a_target_nothing_deviates_from_it():
+    assert Spread.of(-0.5, 2.0, -3.0) == (0.5, 3.0, -2.0, -1.0)
+    rows = ManyWindows(np.arange(2.0), np.array([[-1.0, -3.0], [1.0, -3.0]]), lambda _, e: (e.max(1), e.min(1)))
+    assert metric_of("force_ripple", rows, None) == pytest.approx([2 / 3, 4 / 3])
+    assert metric_of("force_max", rows, None).tolist() == [-1.0, 1.0]
+    assert np.isnan(metric_of("deviation_from_target", rows, None)).all()

@@ -145,7 +145,7 @@ class Slab:
         """Remember what is asked."""
         self.designs, self.points, self.contacts, self.band = designs, points, contacts, band
         self.usable: tuple[FloatArray, FloatArray] | None = None
-        self.windows: dict[tuple[str, Any], CutWindows] = {}
+        self.cut_windows: dict[tuple[str, Any], CutWindows] = {}
         self.known: dict[Any, ManyBranches] = {}
 
     @cached_property
@@ -344,11 +344,11 @@ class Slab:
 
     def inside(self, branch: str, window: Any) -> CutWindows:
         """Return the forces of one branch inside a window."""
-        if (branch, window) not in self.windows:
+        if (branch, window) not in self.cut_windows:
             way, forces = (1.0, self.up) if branch == "load" else (-1.0, self.down)
             sampled = Sampled(self.travel, forces.slider, partial(self.somewhere, way), self.peaks)
-            self.windows[branch, window] = CutWindows(sampled, window)
-        return self.windows[branch, window]
+            self.cut_windows[branch, window] = CutWindows(sampled, window)
+        return self.cut_windows[branch, window]
 
 
 def force_at(cams: Designs, pose: Pose, way: float | FloatArray) -> FloatArray:
