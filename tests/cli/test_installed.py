@@ -28,8 +28,10 @@ COMMANDS = {
     "doctor": ("doctor",),
     "examples": ("examples",),
     "export": ("export", "cam.yaml", "-o", "out"),
+    "figure": ("figure", "one.yaml", "-o", "out"),
     "measure": ("measure", "synthetic/cam_loop.csv", "-o", "out", "--no-plots"),
     "new": ("new", "cam", "-o", "new.yaml"),
+    "papers": ("papers", "cam", "--json"),
     "schema": ("schema",),
     "sensitivity": ("sensitivity", "studies/cam_tolerance.yaml", *FEW, "-o", "out", "--no-plots"),
     "show": ("show", "cam"),
@@ -44,8 +46,12 @@ OWN = ("manifest.json", ".cfmkit-journal.jsonl")
 """Files that hold the time, the first, and the hash of such a file, the second."""
 
 
+SERVES = {"explore"}
+"""Listens until it is stopped: tests/unit/test_explorer.py and tests/browser."""
+
+
 def test_every_verb_is_tried():
-    assert set(COMMANDS) == set(names())
+    assert set(COMMANDS) | SERVES == set(names())
 
 
 @pytest.mark.parametrize("command", COMMANDS.values(), ids=COMMANDS)
@@ -56,6 +62,7 @@ def test_the_program_says_and_writes_what_the_same_command_does_here(cli, comman
         shutil.copytree(CONFIGS, configs)
         *head, lines = (configs / "synthetic/cam_loop.csv").read_text().split("\n", 2)
         (configs / "few.csv").write_text("\n".join([*head, *lines.splitlines()[::20]]))
+        (configs / "one.yaml").write_text("panels:\n  - {run: cam.yaml, plot: loop}\n")
         cli.folder = configs
         done = run(*command)
         files = {str(path.relative_to(configs)): path for path in configs.rglob("*") if path.is_file()}
