@@ -88,8 +88,14 @@ def _command(name: str) -> Any:
     )
     callback.__annotations__ = {field.name: hints[field.name] for field in fields}
     app = typer.Typer(**_STYLE)
-    app.command(name, help=inspect.getdoc(module.run))(callback)
+    app.command(name, help=inspect.getdoc(module.run), epilog=_example(module))(callback)
     return _plain(typer.main.get_command(app))
+
+
+def _example(module: ModuleType) -> str | None:
+    """Return what a verb's help ends with: a command that can be tried."""
+    command = getattr(module, "EXAMPLE", None)
+    return None if command is None else f"Example: {command}"
 
 
 def _plain(command: Any) -> Any:
@@ -110,6 +116,8 @@ def _untyped(item: Any) -> Any:
         item.metavar = ""
     elif getattr(item, "param_type_name", "") == "argument":
         item.display_type_rich = lambda ctx: None  # its name says it; older versions of typer do not call this
+        if item.required:  # SPEC and not {SPEC}, as older versions have it
+            item._usage_display_name = lambda: item.display_name_raw + ("" if item.nargs == 1 else "...")
     return item
 
 

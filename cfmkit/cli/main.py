@@ -26,7 +26,11 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
     from types import FrameType
 
-TEXT = "Design and analysis of constant-force mechanisms, from a YAML spec to a part that can be cut."
+TEXT = (
+    "Design and analysis of constant-force mechanisms, from a YAML spec to a part that can be cut.\n\n"
+    "A spec is a YAML file that describes one mechanism. `cfmkit new cam` writes one to start from, `cfmkit examples` "
+    "lists ready ones, `cfmkit show` explains families, keys, metrics and units."
+)
 EPILOG = (
     "Exit codes: 0 ok, 2 usage, 3 invalid spec or data, 4 no solution, 5 a requirement is missed, 6 partial, "
     "7 input/output, 8 folder in use, 70 a bug, 130 and 143 stopped by a signal."

@@ -67,7 +67,10 @@ def flag(*names: str, text: str) -> Any:
 
 Out = Annotated[str | None, option("-o", "--out", metavar="DIR", text="Output folder; default: cfm-out/SPEC-VERB/.")]
 Fidelity = Annotated[
-    str | None, option("--fidelity", metavar="NAME", text="Shorthand for --set analysis.fidelity=NAME.")
+    str | None,
+    option(
+        "--fidelity", metavar="NAME", text="Which model computes it; `cfmkit show FAMILY` names them at `fidelity`."
+    ),
 ]
 Seed = Annotated[int, option("--seed", metavar="N", shown=True, low=0, text="Seed of everything random.")]
 Quiet = Annotated[bool, flag("-q", "--quiet", text="Print only what went wrong.")]
@@ -97,10 +100,9 @@ class Changing(Common):
         option(
             "--set",
             metavar="A.B=VALUE",
-            text="Replace a value of the spec, with its unit, e.g. --set mechanism.roller_radius='10 mm'. Put a key "
-            """that itself has dots in quotes: 'sensitivity.parameters."mechanism.width"=[1 mm, 2 mm]'. With several """
-            "specs, a family in front changes those of that family only: --set cam:mechanism.roller_radius='10 mm'. "
-            "Repeatable.",
+            text="Replace a value of the spec, with its unit, e.g. --set mechanism.roller_radius='10 mm'. Repeatable. "
+            """Put a key that itself has dots in quotes: 'sensitivity.parameters."mechanism.width"=[1 mm, 2 mm]'. """
+            "With a family in front, for the specs of that family only: cam:mechanism.roller_radius='10 mm'.",
         ),
     ] = None
 
@@ -120,7 +122,11 @@ class Drawing(Common):
     ] = None
     figure_width: Annotated[
         str | None,
-        option("--figure-width", metavar="84mm", text="Width of the figures in print; letters keep their size."),
+        option(
+            "--figure-width",
+            metavar="84mm",
+            text="Width of the figures in print, default: 160mm; letters keep their size.",
+        ),
     ] = None
     no_titles: Annotated[bool, flag("--no-titles", text="Draw no headings above the figures.")] = False
     figure_style: Annotated[

@@ -66,13 +66,29 @@ def _page(title: str, text: str, sections: Iterable[Section], data: Mapping[str,
     return Answer(data, blocks())
 
 
+BY_NAME = {
+    "force_ripple": "a metric",
+    "pla": "a material",
+    "MPa": "a unit",
+    "undercut": "a warning or failure",
+    "lan-2010": "a paper",
+}
+"""Examples of what else `explain` finds."""
+
+
 def overview() -> Answer:
     """Return the list of families and topics."""
     mechanisms = [{"name": record.name, "summary": record.summary} for record in families.records()]
     topics = [{"name": name, "summary": summary} for name, (summary, _) in TOPICS.items()]
     columns = (field("name", ""), field("summary", "", wraps=True))
-    sections = (("families", mechanisms, columns), ("topics", topics, columns))
-    return _page("cfmkit show", "explains one of these:", sections, {"families": mechanisms, "topics": topics})
+    by_name = [{"name": name, "summary": what} for name, what in BY_NAME.items()]
+    sections = (
+        ("families", mechanisms, columns),
+        ("topics", topics, columns),
+        ("anything else by its name, such as", by_name, columns),
+    )
+    text = "explains one of these; `cfmkit show FAMILY --figure` draws a mechanism with its dimensions named"
+    return _page("cfmkit show", text, sections, {"families": mechanisms, "topics": topics})
 
 
 def units_page() -> Answer:
@@ -183,7 +199,13 @@ def family_page(name: str) -> Answer:
         ("references", references, (field("reference", "", wraps=True),)),
     )
     data = {"keys": known, "values": values, "findings": findings, "references": references}
-    return _page(name, record.summary, sections, data)
+    drawn = f"; `cfmkit show {name} --figure` draws it with its dimensions named" if record.scheme else ""
+    text = f"{record.summary}. `cfmkit new {name}` starts a file{drawn}"
+    return _page(name, text, sections, data)
+
+
+READ_FIRST = {name: place for place, name in enumerate(("mechanism", "design", "analysis", "requirements"))}
+"""Blocks in the order in which a file is written; those of studies come after them."""
 
 
 def _key_sections(known: Sequence[Record]) -> list[Section]:
@@ -195,7 +217,14 @@ def _key_sections(known: Sequence[Record]) -> list[Section]:
     about = {key["path"]: key["description"] for key in known}
     top = [key for key in blocks.pop("", []) if key["path"] not in blocks]
     named = {f"{head}: {about.get(head, '')}": rows for head, rows in blocks.items()}
-    return [(heading, rows, KEY_FIELDS) for heading, rows in ({"spec": top} | named).items()]
+    ordered = sorted(named.items(), key=lambda item: READ_FIRST.get(item[0].partition(":")[0], len(READ_FIRST)))
+    sections = [("spec", top), *((heading, sorted(rows, key=_is_nested)) for heading, rows in ordered)]
+    return [(heading, rows, KEY_FIELDS) for heading, rows in sections]
+
+
+def _is_nested(key: Record) -> bool:
+    """Return whether a key is one of a block within its block: those come after what a block says itself."""
+    return "." in key["path"]
 
 
 def _number(value: float | None, size: float) -> str:

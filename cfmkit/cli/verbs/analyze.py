@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from cfmkit.studies.fidelity import FidelityComparison
 
 PLACE = 20
+EXAMPLE = "cfmkit analyze cam.yaml --set mechanism.rolling_friction=0.004 --report"
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from cfmkit.studies.changes import Comparison
 
 PLACE = 26
+EXAMPLE = "cfmkit batch 'specs/*.yaml' --junit results.xml"
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from cfmkit.specs.spec import Spec
 
 PLACE = 34
+EXAMPLE = "cfmkit calibrate cam.yaml loop.csv --fit mechanism.rolling_friction"
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from cfmkit.specs.spec import Spec
 
 PLACE = 40
+EXAMPLE = "cfmkit check specs/"
 
 
 @dataclass(frozen=True, kw_only=True)

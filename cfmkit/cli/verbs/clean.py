@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from cfmkit.runs.remains import Remains
 
 PLACE = 80
+EXAMPLE = "cfmkit clean cfm-out"
 
 
 @dataclass(frozen=True, kw_only=True)

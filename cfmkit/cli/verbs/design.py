@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from cfmkit.store import RunFolder
 
 PLACE = 10
+EXAMPLE = "cfmkit design cam.yaml --set design.force='80 N'"
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from cfmkit.studies.batch import Entry
 
 PLACE = 52
+EXAMPLE = "cfmkit examples cam"
 
 ALL = "all"
 

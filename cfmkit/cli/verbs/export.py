@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from cfmkit.cli.terminal import Terminal
 
 PLACE = 30
+EXAMPLE = "cfmkit export cam.yaml --kerf 0.2mm"
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from cfmkit.experiment.report import MeasureReport
 
 PLACE = 32
+EXAMPLE = "cfmkit measure loop.csv --window '40 mm:210 mm'"
 
 
 @dataclass(frozen=True, kw_only=True)

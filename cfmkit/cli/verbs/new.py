@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from cfmkit.cli.terminal import Terminal
 
 PLACE = 50
+EXAMPLE = "cfmkit new cam -o mine.yaml"
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     Record = Mapping[str, Any]
 
 PLACE = 64
+EXAMPLE = "cfmkit papers lan-2010"
 
 
 @dataclass(frozen=True, kw_only=True)

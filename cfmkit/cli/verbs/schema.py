@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from cfmkit.cli.terminal import Terminal
 
 PLACE = 70
+EXAMPLE = "cfmkit schema cam > cam.schema.json"
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from cfmkit.studies.sensitivity.tolerance import Yield
 
 PLACE = 24
+EXAMPLE = "cfmkit sensitivity cam.yaml --method tolerance --vary mechanism.roller_radius=normal:0.05mm --samples 400"
 
 SHOWN = {
     "oat": ("swing", "normalised_slope"),

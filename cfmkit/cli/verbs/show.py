@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from cfmkit.cli.terminal import Terminal
 
 PLACE = 60
+EXAMPLE = "cfmkit show cam --figure"
 
 
 @dataclass(frozen=True, kw_only=True)

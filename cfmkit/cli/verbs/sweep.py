@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from cfmkit.studies.sweep import SweepRequest
 
 PLACE = 22
+EXAMPLE = "cfmkit sweep cam.yaml --vary mechanism.roller_radius=8mm:16mm:5"
 
 MOST_METRICS = 6
 """Metrics of the best point that are shown without ``-v``, so that the page of a sweep fits on a screen of 24 lines."""

@@ -1,0 +1,60 @@
+"""What a newcomer reads: the help of every verb, and the pages of `cfmkit show`."""
+
+from __future__ import annotations
+
+import shlex
+from importlib import import_module
+
+import pytest
+
+from cfmkit import families
+from cfmkit.cli.commands import names, parse, program
+from cfmkit.cli.main import EPILOG, TEXT, _before_the_verb, main
+from cfmkit.cli.topics import READ_FIRST, explain
+
+EXAMPLES = {
+    name: module.EXAMPLE
+    for name in names()
+    if hasattr(module := import_module(f"cfmkit.cli.verbs.{name.replace('-', '_')}"), "EXAMPLE")
+}
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_the_example_of_a_help_is_a_command_that_is_understood(name):
+    command = EXAMPLES[name].partition(" > ")[0]
+    program_name, verb, *_ = words = shlex.split(command)
+    assert (program_name, verb) == ("cfmkit", name)
+    assert parse(program(_before_the_verb, TEXT, EPILOG), words[1:]) is not None
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_the_example_ends_the_help(name, capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "160")
+    main([name, "--help"])
+    shown = capsys.readouterr().out
+    assert f"Example: {EXAMPLES[name]}" in " ".join(shown.split())
+    assert "{SPEC}" not in shown
+
+
+def test_the_help_says_what_a_spec_is_and_where_to_start(capsys):
+    main(["--help"])
+    shown = " ".join(capsys.readouterr().out.split())
+    assert "A spec is a YAML file" in shown
+    assert "`cfmkit new cam`" in shown
+
+
+@pytest.mark.parametrize("name", families.names())
+def test_a_family_is_explained_in_the_order_in_which_a_file_is_written(name, capsys):
+    main(["show", name])
+    lines = capsys.readouterr().out.splitlines()
+    heads = [line.partition(":")[0] for line in lines if line and not line.startswith(" ") and ":" in line]
+    blocks = [head for head in heads if head in READ_FIRST or head in ("sweep", "sensitivity")]
+    assert blocks == [head for head in (*READ_FIRST, "sweep", "sensitivity") if head in blocks]
+    assert f"cfmkit new {name}" in " ".join(lines[:3])
+
+
+def test_what_the_overview_names_is_explained():
+    from cfmkit.cli.topics import BY_NAME
+
+    for name in BY_NAME:
+        assert explain(name).data
