@@ -38,7 +38,7 @@ LINEAR_PARTS, ROWS = 192, 24
 """Parts of a linear program, and how many of its rows each brings: those that are missed most, or nearly."""
 
 SURE = 0.01
-"""The estimated share is to be so much above what was asked for: the estimate is of first order."""
+"""The estimated share is to be so much above what was requested: the estimate is of first order."""
 
 FIRST_TRUST, LEAST_TRUST, MOST_TRUST = 0.1, 1e-4, 0.5
 """How far a step may go, as a share of the ranges."""
@@ -154,7 +154,7 @@ class Found:
     linear : Linear
         The design to first order.
     reached : bool
-        Whether the share is what was asked for.
+        Whether the share is what was requested.
     """
 
     x: FloatArray
@@ -220,7 +220,7 @@ def _by_values(problem: Problem, x: FloatArray, errors: FloatArray, seen: Seen) 
 
 
 def with_margins(problem: Problem, x: FloatArray, most: int = 40) -> Found:
-    """Return values for which the share of good parts, estimated to first order, is what was asked for, or largest.
+    """Return values for which the share of good parts, estimated to first order, is what was requested, or largest.
 
     Parameters
     ----------

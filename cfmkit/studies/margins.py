@@ -54,7 +54,7 @@ SEARCH_SEED = 7919
 """Added to the seed: the parts that a search looks at are not those that it is judged by."""
 
 CHECKED, ROUNDS, MOST_ASKED = 400, 4, 0.9975
-"""Parts that are solved to see whether the estimate holds, how often it is then asked for more, and for how much."""
+"""Parts that are solved to see whether the estimate holds, how often more is then requested, and for how much."""
 
 DRAWN = 24
 """Parts that `design.robust` solves at each step."""
@@ -451,7 +451,7 @@ def with_design_margins(given: Spec, design: Design, run: Run) -> Design:
 
 
 def _held(problem: Problem, sight: Sight, start: FloatArray) -> tuple[Found, int]:
-    """Return the design with margins and how many of `CHECKED` parts are good: asked for more until that is enough."""
+    """Return the design with margins and how many of `CHECKED` parts are good: more is requested until that is enough."""
     best: tuple[Found, int] | None = None
     asked, x, began = problem.share, start, None
     for _ in range(ROUNDS):
@@ -517,7 +517,7 @@ def _designed(design: Design, sight: Sight, found: Found, good: int, problem: Pr
         f"tolerance that costs most is that of {worst}"
     )
     numbers: dict[str, tuple[float | None, str, str]] = {
-        "margins_steps": (float(found.steps), "count", "steps towards the yield that was asked for"),
+        "margins_steps": (float(found.steps), "count", "steps towards the requested yield"),
         "margins_first_order": (found.share, "ratio", "share of good parts, estimated to first order"),
         "margins_solved": (good / CHECKED, "ratio", f"share of {CHECKED} parts that were solved at a few poses"),
     }
