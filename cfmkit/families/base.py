@@ -244,14 +244,23 @@ class Room:
         In the plane, across and along the direction of travel [m].
     depth : float or None
         Out of the plane [m]; None where nothing is known of it.
+    parts : int
+        Separate pieces that the mechanism is put together from, bought ones included.
     assumed : str
         What of it no value of the specification says, in one clause; empty if all of it does.
+    corner : (float, float)
+        Its lower left corner in the drawings of the mechanism [m].
+    sideways : bool
+        Whether the travel is along x in the drawings, not along y.
     """
 
     across: float
     along: float
     depth: float | None = None
+    parts: int = 1
     assumed: str = ""
+    corner: tuple[float, float] = (0.0, 0.0)
+    sideways: bool = False
 
 
 @dataclass(frozen=True)
@@ -318,6 +327,8 @@ class Family:
     outline : str, optional
         ``"module"`` with ``drawing(spec, tolerance)``, imported when exporting. Edges that are not
         `Smooth` lie within the tolerance [m] of the exact ones; smooth ones are fitted by whoever writes them.
+    propose : str, optional
+        ``"module:function"``, ``propose(wish, run) -> Offer``: what the family could do with a wish, by scaling laws.
     room : str, optional
         ``"module:function"``, ``room(result) -> Room``: the box that a solved mechanism stays in.
     headline : tuple of str
@@ -353,6 +364,7 @@ class Family:
     draw: str | None = None
     scheme: str | None = None
     outline: str | None = None
+    propose: str | None = None
     room: str | None = None
     headline: tuple[str, ...] = ()
     branches: tuple[str, ...] = ()

@@ -27,6 +27,7 @@ FAMILY = Family(
     draw="cfmkit.families.beam.draw",
     scheme="cfmkit.families.beam.scheme",
     outline="cfmkit.families.beam.outline",
+    propose="cfmkit.families.beam.propose:propose",
     room="cfmkit.families.beam.room:room",
     headline=(
         "nominal_force",

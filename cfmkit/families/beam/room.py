@@ -41,7 +41,11 @@ def room(result: Result) -> Room | None:
     high = np.maximum(spread.max(axis=0), bent.max(axis=0) + half)
     across, along = (high - low).tolist()
     legs = mechanism.copies.legs if mechanism.copies else 1
-    return Room(across, along, legs * mechanism.width)
+    corner = np.minimum(np.concatenate(points).min(axis=0), np.concatenate(_bent(solution)).min(axis=0) - half)
+    sideways = bool(abs(np.cos(angle)) > abs(np.sin(angle)))
+    return Room(
+        across, along, legs * mechanism.width, legs, corner=(float(corner[0]), float(corner[1])), sideways=sideways
+    )
 
 
 def _bent(solution: Solution) -> list[FloatArray]:

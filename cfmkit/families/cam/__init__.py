@@ -25,6 +25,7 @@ FAMILY = Family(
     scheme="cfmkit.families.cam.scheme",
     analyze_block=analyze_block,
     outline="cfmkit.families.cam.outline",
+    propose="cfmkit.families.cam.propose:propose",
     room="cfmkit.families.cam.room:room",
     headline=(
         "force_constant",

@@ -1,4 +1,4 @@
-"""The box that a cam mechanism stays in: plate with tab, rollers, and the slider's pin on its way up."""
+"""The box that a cam mechanism stays in: plate with tab, rollers, springs, and the slider's pin on its way up."""
 
 from __future__ import annotations
 
@@ -9,19 +9,21 @@ import numpy as np
 from cfmkit.families.base import Room
 from cfmkit.families.cam.outline import plate_contours
 from cfmkit.families.cam.picture_parts import pose, roller_path
+from cfmkit.stock.coils import extension_spring
 
 if TYPE_CHECKING:
+    from cfmkit.families.cam.spec import Springs
     from cfmkit.results import Result
 
 PLATE = 0.008
 """Thickness of the plate where no `contact.width` says it [m]: that of the contact's example."""
 
-LAYERS = 5
-"""Plate, a brace on both sides of it, springs outside of the braces: each is taken to be as thick as the plate."""
-
 
 def room(result: Result) -> Room | None:
-    """Return the box of a solved mechanism over its travel; None of a motion in time, or of a cam as built."""
+    """Return the box of a solved mechanism over its travel; None of a motion in time, or of a cam as built.
+
+    In the depth there are the plate, a brace on both sides of it, and outside of these the springs.
+    """
     solution = result.state
     if not hasattr(solution, "states"):
         return None
@@ -33,5 +35,37 @@ def room(result: Result) -> Room | None:
     pins = [pose(solution, index).slider[1] + radius for index in (0, -1)]
     high = max(*pins, float(path[:, 1].max()) + radius, float(plate[:, 3].max()))
     thick = PLATE if mechanism.contact is None else mechanism.contact.width
-    told = f"depth: {LAYERS} layers (springs, braces, plate) of {1e3 * thick:.4g} mm"
-    return Room(2.0 * half, high - low, LAYERS * thick, told)
+    depth = depth_of(thick, mechanism.springs, float(solution.elongation.max()), mechanism.rest_half_width)
+    told = (
+        f"depth: plate {1e3 * thick:.4g} mm, braces {1e3 * min(thick, BRACE):.4g} mm each, springs wound of steel wire"
+    )
+    if depth is None:
+        told = "no steel spring fits between the rollers"
+    # plate, two rollers, two braces, slider
+    return Room(2.0 * half, high - low, depth, 6 + count_of(mechanism.springs), told, (-half, low))
+
+
+BRACE = 0.010
+"""Thickness of a brace where the plate is thicker [m]: it is pulled along, the plate is pressed on its edge."""
+
+
+def depth_of(thick: float, springs: Springs, stretch: float, half_width: float) -> float | None:
+    """Return the depth with springs that are wound of steel wire [m]; None where no such spring fits.
+
+    Parameters
+    ----------
+    thick : float
+        Of the plate, and of each brace up to `BRACE` [m].
+    springs : Springs
+        How many of what stiffness: half of them on either side, above each other.
+    stretch, half_width : float
+        Their largest elongation, and half their length at rest [m].
+    """
+    count = count_of(springs)
+    coil = extension_spring(springs.total / count, stretch, 2.0 * half_width)
+    return None if coil is None else thick + 2.0 * min(thick, BRACE) + min(count, 2) * coil.outside
+
+
+def count_of(springs: Springs) -> int:
+    """Return how many springs there are."""
+    return len(springs.stiffness) if isinstance(springs.stiffness, tuple) else springs.count or 1

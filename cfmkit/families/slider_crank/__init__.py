@@ -33,6 +33,7 @@ FAMILY = Family(
     draw="cfmkit.families.slider_crank.dispatch",
     scheme="cfmkit.families.slider_crank.scheme",
     outline="cfmkit.families.slider_crank.dispatch",
+    propose="cfmkit.families.slider_crank.propose:propose",
     room="cfmkit.families.slider_crank.room:room",
     headline=("stiffness_class", "band_range_05pct", "half_band", "energy_max", "crank_pin_rotation_max"),
     template="cfmkit/families/slider_crank/template.yaml",

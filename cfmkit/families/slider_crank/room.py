@@ -43,7 +43,8 @@ def _part(result: Result) -> Room:
     pad = np.array([high[0] - rest[0] if rest[0] > 0.0 else low[0] - rest[0], 0.0])
     moved = np.concatenate([points - half, points + half, ends + pad])
     low, high = np.minimum(low, moved.min(axis=0)), np.maximum(high, moved.max(axis=0))
-    return Room(float(high[1] - low[1]), float(high[0] - low[0]), spec.mechanism.legs * _widest(spec))
+    legs, corner = spec.mechanism.legs, (float(low[0]), float(low[1]))
+    return Room(float(high[1] - low[1]), float(high[0] - low[0]), legs * _widest(spec), legs, "", corner, True)
 
 
 def _thickest(spec: SliderCrankSpec) -> float:
@@ -69,4 +70,6 @@ def _linkage(result: Result) -> Room:
     rim = 2.0 * PIN * link.crank
     told = f"links {2e3 * PIN * link.crank:.3g} mm wide; springs at pins have no size, and no depth"
     across, along = float(np.ptp(y)) + rim, float(np.ptp(x)) + rim
-    return Room(across, along, None, told)
+    springs = int(np.count_nonzero(solution.assembly.rates))
+    corner = float(x.min()) - 0.5 * rim, float(y.min()) - 0.5 * rim
+    return Room(across, along, None, 3 + springs, told, corner, True)

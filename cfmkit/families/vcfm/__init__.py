@@ -20,6 +20,7 @@ FAMILY = Family(
     draw="cfmkit.families.vcfm.draw",
     scheme="cfmkit.families.vcfm.scheme",
     outline="cfmkit.families.vcfm.outline",
+    propose="cfmkit.families.vcfm.propose:propose",
     room="cfmkit.families.vcfm.room:room",
     analyze_block=analyze_block,
     headline=(

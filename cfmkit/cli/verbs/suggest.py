@@ -1,0 +1,233 @@
+"""``cfmkit suggest``: from a wish to mechanisms of every family that does it."""
+
+from __future__ import annotations
+
+import re
+import time
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cfmkit.cli import completion
+from cfmkit.cli.answer import Answer
+from cfmkit.cli.options import Common, Fresh, Jobs, NoPlots, Out, Quiet, Seed, argument, option
+from cfmkit.cli.page_blocks import BAD, BLANK, LABEL, Grid, GridColumn, Paragraph, Span, TextLine, Written, line
+from cfmkit.errors import ExitCode, UsageError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    from cfmkit.cli.page_blocks import Block
+    from cfmkit.cli.terminal import Terminal
+
+PLACE = 5
+
+BUDGET = "60s"
+
+
+def _key(name: str, metavar: str, text: str) -> Any:
+    return option(f"--{name}", metavar=metavar, text=text)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SuggestOptions(Common):
+    """Arguments and options."""
+
+    wish: Annotated[
+        str | None, argument("[WISH]", "YAML file with a block 'wish'; - reads standard input.", completion.specs)
+    ] = None
+    force: Annotated[str | None, _key("force", "FORCE", "Constant force, '20 N', or a band, '[19 N, 21 N]'.")] = None
+    torque: Annotated[str | None, _key("torque", "TORQUE", "Constant torque, '100 N*mm', or a band.")] = None
+    travel: Annotated[str | None, _key("travel", "LENGTH", "Over which the force is constant.")] = None
+    angle: Annotated[str | None, _key("angle", "ANGLE", "Over which the torque is constant.")] = None
+    ripple: Annotated[str | None, _key("ripple", "SHARE", "Largest (max - min)/max over the travel; else 5 %.")] = None
+    room: Annotated[
+        str | None, _key("room", "AxBxCmm", "Across the travel, along it, and the depth, which may be left out.")
+    ] = None
+    material: Annotated[str | None, _key("material", "A,B", "What it may be made of: `show materials`.")] = None
+    process: Annotated[str | None, _key("process", "NAME", "fdm, sls, laser, wire-edm or mill.")] = None
+    adjustable: Annotated[str | None, _key("adjustable", "A,B", "Between which forces it is adjusted: 15N,25N.")] = None
+    hysteresis: Annotated[str | None, _key("hysteresis", "SHARE", "Largest loss of a cycle, over its work.")] = None
+    cycles: Annotated[str | None, _key("cycles", "N", "Presses that it has to survive; not judged yet.")] = None
+    made_well: Annotated[
+        str | None, _key("yield", "SHARE", "Share of made parts that is to be good; not judged yet.")
+    ] = None
+    prefer: Annotated[str | None, _key("prefer", "A,B", "What decides the order: size,ripple,parts,stress,depth.")] = (
+        None
+    )
+    time_budget: Annotated[
+        str, option("--time-budget", metavar="TIME", shown=True, text="Time for everything: 60s, 10min.")
+    ] = BUDGET
+    out: Out = None
+    seed: Seed = 0
+    jobs: Jobs = None
+    fresh: Fresh = False
+    no_plots: NoPlots = False
+    quiet: Quiet = False
+
+
+KEYS = (
+    "force", "torque", "travel", "angle", "ripple", "room", "material", "process", "adjustable", "hysteresis", "cycles",
+    "made_well", "prefer",
+)  # fmt: skip
+"""Options that are keys of a wish."""
+
+LISTS = ("material", "adjustable", "prefer")
+
+
+def run(options: SuggestOptions, terminal: Terminal) -> Answer:
+    """Suggest mechanisms for a wish: a force, a travel and a room. Start here if there is no spec yet.
+
+    Every family is asked; what it names is designed, analysed with its exact model from the file that is written, and
+    shown only if it does everything that is wished.
+    """
+    from cfmkit.cli.studies import noting
+    from cfmkit.families.base import Run
+    from cfmkit.runs import suggestions
+    from cfmkit.runs.run import long_run
+    from cfmkit.store import RunFolder
+    from cfmkit.studies.executors import cores
+    from cfmkit.suggest.search import suggest
+
+    start = time.perf_counter()
+    budget = seconds(options.time_budget)
+    given = keys(options)
+    if options.wish is None and not given:
+        raise UsageError("a wish is missing: name a file, or say --force, --travel and --room")
+    block = suggestions.wish_of(options.wish, given)
+    out = _folder(options)
+    with RunFolder(out) as folder, terminal.progress() as progress:
+        folder.check("metrics.json", "suggestions.csv")
+        plain = Run(options.seed, progress, time_budget=budget - (time.perf_counter() - start))
+        with long_run(options.jobs or cores(), options.fresh, folder, plain, noting) as working:
+            found = suggest(block.wish(), working, block.prefer)
+            drawing = replace(working, time_budget=None)
+            for name, content in suggestions.files(found, block, drawing, not options.no_plots):
+                folder.write(name, content)
+        code = suggestions.exit_code(found)
+        manifest = folder.commit(
+            {
+                "command": "suggest", "arguments": list(terminal.arguments), "seed": options.seed,
+                "wish": block.model_dump(mode="json", exclude_unset=True, by_alias=True), "reused": found.reused,
+                "status": code.name.lower(), "exit_code": int(code),
+            }
+        )  # fmt: skip
+    written = Written(out, (*manifest.files, "manifest.json"), time.perf_counter() - start)
+    data = suggestions.as_json(found, block) | written.data | {"reused": found.reused}
+    complaints = () if code is ExitCode.OK else (f"error    {data['message']}",)
+    return Answer(data, _page(data, written, terminal.verbose > 0), code, quiet_complaints=complaints)
+
+
+def keys(options: SuggestOptions) -> dict[str, str]:
+    """Return the keys of a wish that options say, each as a file would have it."""
+    found = {}
+    for one in fields(options):
+        value = getattr(options, one.name)
+        if one.name not in KEYS or value is None:
+            continue
+        if one.name == "room":
+            value = room(value)
+        elif one.name in LISTS and not value.strip().startswith("["):
+            value = f"[{value}]"
+        found["yield" if one.name == "made_well" else one.name] = value
+    return found
+
+
+def room(text: str) -> str:
+    """Return the sides of a room as a list: ``80x60x6mm``, or ``80 mm x 60 mm``.
+
+    Examples
+    --------
+    >>> room("80x60x6mm"), room("80 mm x 6 cm")
+    ('[80 mm, 60 mm, 6 mm]', '[80 mm, 6 cm]')
+    """
+    if text.strip().startswith("["):
+        return text
+    sides = [side.strip() for side in re.split(r"(?<=[\d. a-z])x(?=[\d. ])", text.strip())]
+    unit = re.sub(r"^[\d.eE+-]*\s*", "", sides[-1])
+    full = [side if re.search(r"[a-zA-Z]", side) else f"{side} {unit}" for side in sides]
+    return "[" + ", ".join(re.sub(r"(?<=\d)(?=[a-zA-Z])", " ", side) for side in full) + "]"
+
+
+def seconds(text: str) -> float:
+    """Return a time budget [s].
+
+    Raises
+    ------
+    cfmkit.errors.UsageError
+        If it is no time above zero.
+    """
+    from cfmkit.errors import QuantityError
+    from cfmkit.specs.units import read_quantity
+
+    spaced = re.sub(r"(?<=\d)(?=[a-zA-Z])", " ", text.strip())
+    try:
+        value = float(spaced) if re.fullmatch(r"[\d.]+", spaced) else read_quantity(spaced, "time")
+    except (QuantityError, ValueError) as error:
+        raise UsageError(f"--time-budget: {error}") from None
+    if not 0.0 < value < 1e6:
+        raise UsageError(f"--time-budget: {text} is not allowed: must be > 0")
+    return value
+
+
+def _folder(options: SuggestOptions) -> str:
+    if options.out is not None:
+        if not options.out.strip():
+            raise UsageError("--out is empty; give a folder")
+        return options.out
+    if options.wish == "-":
+        raise UsageError("a wish from standard input has no name; say with --out where to write")
+    stem = "options" if options.wish is None else Path(options.wish).stem
+    return str(Path("cfm-out") / f"{stem}-suggest")
+
+
+HEADS = ("", "", "mean", "ripple", "room", "hysteresis", "safety", "parts")
+
+
+def _page(data: Mapping[str, Any], written: Written, everything: bool) -> Iterator[Block]:
+    """Yield the proposals as a table, near misses, families out of reach with their nearest wish, files."""
+    yield TextLine((Span("suggest", LABEL), Span(f"  {data['message']}")), f"{written.seconds:.1f} s")
+    if data["proposals"]:
+        yield BLANK
+        rows = [_row(str(number), one, data) for number, one in enumerate(data["proposals"], 1)]
+        yield Grid(tuple(GridColumn(head, False) for head in HEADS), rows, gap=2, indented=True)
+    if data["near_misses"]:
+        yield BLANK
+        yield line("misses one wish", LABEL)
+        near = [[one["family"], f"{one['variant']}: {one['misses'][0]}"] for one in data["near_misses"]]
+        yield Grid((GridColumn("", False), GridColumn()), near, gap=2, indented=True)
+    silent = [one for one in data["families"] if not one["proposals"]]
+    if silent:
+        yield BLANK
+        yield line("nothing of these families", LABEL)
+        yield Grid((GridColumn("", False), GridColumn()), [_silent(one) for one in silent], gap=2, indented=True)
+    for one in data["warnings"]:
+        yield Paragraph("warning", f"{one['name']}: {one['message']}", BAD)
+    yield BLANK
+    yield written.block(everything)
+
+
+def _silent(one: Mapping[str, Any]) -> list[str]:
+    """Return why a family has no proposal, and the nearest wish that it could meet."""
+    nearest = ", ".join(f"{key} {value}" for key, value in one["nearest"].items())
+    return [one["family"], (one["reason"] or "nothing that fits") + (f"; nearest: {nearest}" if nearest else "")]
+
+
+def _row(number: str, one: Mapping[str, Any], data: Mapping[str, Any]) -> list[str]:
+    unit = "N*mm" if "torque" in data["wish"] else "N"
+    sides = [one["across"], one["along"], one["depth"]]
+    told = " x ".join(f"{side:.3g}" for side in sides if side is not None) + " mm"
+    return [
+        f"{number} {one['family']}",
+        one["variant"],
+        f"{one['mean']:.4g} {unit}",
+        _percent(one["ripple"]),
+        told,
+        _percent(one["hysteresis"]),
+        "-" if one["safety_factor"] is None else f"{one['safety_factor']:.3g}",
+        str(one["parts"]),
+    ]
+
+
+def _percent(value: float | None) -> str:
+    return "-" if value is None else f"{100 * value:.2g} %"

@@ -1,0 +1,240 @@
+"""From a wish to networks of beams worth designing: kept shapes, rescaled.
+
+Beams that only bend follow one curve: with every length in the plane times k, the thickness times q and the width times
+b, the force at the k-fold displacement is b q^3/k^2 times as large, the stress q/k times [L, eq. 6]. So a shape that
+was followed once tells, for every size, which window of its travel is the flattest, how thick its beams may be and how
+wide they must be.
+
+Reference
+---------
+[L] C.-C. Lan, J.-H. Wang, Y.-H. Chen, IEEE ICRA (2010) 2131, sec. 2.3.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from importlib.resources import files
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.families.base import Run
+from cfmkit.families.beam.model import analyze
+from cfmkit.families.beam.room import room
+from cfmkit.families.beam.spec import BeamSpec
+from cfmkit.families.findings import mm, percent
+from cfmkit.families.flattest_window import flattest, ripples
+from cfmkit.families.wishes import Candidate, Offer
+from cfmkit.specs.units import Place
+from cfmkit.specs.yamlio import read_document
+from cfmkit.stock.spec import MaterialSpec
+
+if TYPE_CHECKING:
+    from cfmkit.arrays import FloatArray
+    from cfmkit.families.base import Room
+    from cfmkit.families.wishes import Wish
+
+SHAPES = ("lan-2010", "lan-flat", "arch", "end-effector", "end-effector-leg")
+"""Files of `shapes`: each a complete specification, as the papers or the shape search have it."""
+
+SIZES = (1.0, 0.85, 0.7, 0.55, 0.42, 0.32, 0.24)
+"""Sizes that are tried, over the largest that fits the room."""
+
+STRESS = 0.95
+"""Share of the allowable stress by bending alone: what stretching adds is judged afterwards."""
+
+RIPPLE = 0.95
+"""Share of the ripple wished that the scaled curve may have."""
+
+STOUT = 1.15
+"""Largest thickness over that of the shape at the same size: thicker beams would touch, and hardly bend as lines do."""
+
+FLAT = 1.0
+"""Least width of a beam over its thickness: narrower ones leave the plane."""
+
+OFFERED = 14
+
+
+@dataclass(frozen=True)
+class Kept:
+    """A shape with its curve, as it was followed once.
+
+    Attributes
+    ----------
+    name : str
+    spec : BeamSpec
+    motion, force, stress : (n,) array
+        [m], [N], [Pa].
+    room : Room
+    """
+
+    name: str
+    spec: BeamSpec
+    motion: FloatArray
+    force: FloatArray
+    stress: FloatArray
+    room: Room
+
+
+@lru_cache(maxsize=1)
+def kept_shapes() -> tuple[Kept, ...]:
+    """Return all shapes that are kept, each followed over its travel by bending alone."""
+    return tuple(_followed(name) for name in SHAPES)
+
+
+def _followed(name: str) -> Kept:
+    text = files("cfmkit").joinpath(f"families/beam/shapes/{name}.yaml").read_text(encoding="utf-8")
+    spec = read_document(text, name).bind(BeamSpec)
+    result = analyze(spec, Run())
+    space = room(result)
+    assert space is not None
+    curve = result.curve
+    return Kept(name, spec, curve.motion, curve.effort, curve.extra["max_stress"].values, space)
+
+
+def propose(wish: Wish, run: Run) -> Offer:
+    """Return rescaled shapes that do what is wished as far as bending goes, those that fill the room least first."""
+    if wish.kind == "torque":
+        return Offer(reason="the kept shapes are pushed: they give a force, no torque")
+    if wish.adjustable is not None:
+        return Offer(reason="the force of a network of beams is fixed: nothing adjusts it")
+    found: list[Candidate] = []
+    missed: list[tuple[float, str, dict[str, str]]] = []
+    for kept in kept_shapes():
+        largest = min(wish.room[0] / kept.room.across, wish.room[1] / kept.room.along)
+        for share in SIZES:
+            for block in wish.materials or ({"name": "pom"},):
+                one = _rescaled(wish, kept, share * largest, dict(block))
+                if isinstance(one, Candidate):
+                    found.append(one)
+                else:
+                    missed.append(one)
+    if found:
+        return Offer(tuple(_varied(found)[:OFFERED]))
+    _, reason, nearest = min(missed, key=lambda one: one[0])
+    return Offer(reason=reason, nearest=nearest)
+
+
+def _varied(found: list[Candidate]) -> list[Candidate]:
+    kinds = list(dict.fromkeys(one.variant for one in found))
+    rows = [sorted((one for one in found if one.variant == kind), key=lambda one: one.promise) for kind in kinds]
+    longest = max(map(len, rows))
+    return [row[k] for k in range(longest) for row in rows if k < len(row)]
+
+
+def _rescaled(
+    wish: Wish, kept: Kept, size: float, block: dict[str, Any]
+) -> Candidate | tuple[float, str, dict[str, str]]:
+    """Return a shape at a size, or how far it misses what is wished, why, and the nearest wish."""
+    length = wish.travel / size
+    low, high = float(kept.motion[0]), float(kept.motion[-1])
+    if length > 0.98 * (high - low):
+        longest = 0.6 * (high - low) * size
+        return (
+            length / (high - low),
+            (f"beams of this room travel {mm(longest)} at a constant force"),
+            {"travel": mm(longest), "room": " x ".join(mm(side * wish.travel / longest) for side in wish.room[:2])},
+        )
+    starts = np.linspace(low, high - length, 200)
+    ripple = ripples(kept.motion, kept.force, starts, length)
+    ends = np.searchsorted(kept.motion, starts + length).clip(max=len(kept.motion) - 1)
+    stress = np.maximum.accumulate(kept.stress)[ends]
+    flat = np.flatnonzero(ripple <= RIPPLE * wish.ripple)
+    if not len(flat):
+        least = float(ripple.min())
+        reason = f"the force of beams in this room changes by {percent(least)} over the travel"
+        return 1.0 + least / wish.ripple, reason, {"ripple": percent(least / RIPPLE)}
+    best = int(flat[np.argmin(stress[flat] / 1e3 ** (1 - ripple[flat]))])
+    window = float(starts[best]) * size, float(starts[best] + length) * size
+    return _sized(wish, kept, size, block, window, (float(stress[best]), _mean(kept, starts[best], length)))
+
+
+def _mean(kept: Kept, start: float, length: float) -> float:
+    places = np.linspace(start, start + length, 101)
+    return float(np.interp(places, kept.motion, kept.force).mean())
+
+
+def _sized(
+    wish: Wish, kept: Kept, size: float, block: dict[str, Any], window: tuple[float, float], curve: tuple[float, float]
+) -> Candidate | tuple[float, str, dict[str, str]]:
+    """Return the shape with its thickness from the stress and its width from the force."""
+    material, own = MaterialSpec.model_validate(block), kept.spec.mechanism
+    stiffer = material.modulus / own.material.modulus
+    thin = float(own.thickness) if isinstance(own.thickness, float) else 0.0
+    stress, force = curve
+    if material.yield_strength is None or not force > 0.0:
+        return 1e9, "no strength of the material is known", {}
+    thicker = min(STRESS * material.yield_strength * size / (stress * stiffer), STOUT * size)
+    wide = _width(wish, kept, size, stiffer, thicker, force)
+    if wide < FLAT * thicker * thin:
+        # thinner, so that the same force wants as much width as the beam is thick
+        thicker *= (wide / (FLAT * thicker * thin)) ** 0.25
+        wide = _width(wish, kept, size, stiffer, thicker, force)
+    if thicker * thin < wish.thinnest:
+        return wish.thinnest / (thicker * thin), f"beams would be {mm(thicker * thin)} thick", {}
+    if wish.depth is not None and wide > 0.99 * wish.depth:
+        less = wish.target * wish.depth / wide
+        reason = f"the beams would be {mm(wide)} wide"
+        return (
+            wide / wish.depth,
+            reason,
+            {"force": f"{less:.3g} N", "room": " x ".join(mm(side) for side in (*wish.room[:2], 1.02 * wide))},
+        )
+    spec = _written(kept, size, block, (thicker * thin, wide), window)
+    area = size**2 * kept.room.across * kept.room.along / (wish.room[0] * wish.room[1])
+    return Candidate(f"shape {kept.name}", spec, False, "cfmkit.families.beam.propose:finish", area)
+
+
+def _width(wish: Wish, kept: Kept, size: float, stiffer: float, thicker: float, force: float) -> float:
+    return float(kept.spec.mechanism.width * wish.target / force * size**2 / (stiffer * thicker**3))
+
+
+def _written(
+    kept: Kept, size: float, block: dict[str, Any], section: tuple[float, float], window: tuple[float, float]
+) -> BeamSpec:
+    """Return the shape at a size, with another material and section."""
+    data = kept.spec.model_dump(exclude_unset=True) | {"family": "beam", "name": "suggested"}
+    mechanism: dict[str, Any] = data["mechanism"]
+    for node in mechanism["nodes"].values():
+        node["at"] = tuple(size * value for value in node["at"])
+    for beam in mechanism["beams"].values():
+        if "length" in beam["shape"]:
+            beam["shape"]["length"] *= size
+    mechanism |= {"material": block, "thickness": section[0], "width": section[1], "safety_factor": 1.0}
+    travel = {"travel": Place(window[1], "length"), "window": tuple(Place(end, "length") for end in window)}
+    data["analysis"] = {"points": 181, "fidelity": "reissner", **travel}
+    return BeamSpec.model_validate(data)
+
+
+def finish(spec: BeamSpec, wish: Wish) -> BeamSpec:
+    """Return a rescaled shape with the flattest window and the width that its model with stretch and shear wants.
+
+    The force is linear in the width. Where the stress of that model is above the allowable one, the beams get
+    thinner and wider: it falls nearly as the thickness.
+    """
+    made, allowed = spec, spec.mechanism.material.yield_strength or np.inf
+    for _ in range(2):
+        longer = 1.12 * float(made.analysis.travel or 0.0)
+        result = analyze(made.replace({"analysis.travel": longer, "analysis.window": None}), Run())
+        found = flattest(result, wish.travel)
+        if found is None:
+            return made
+        curve = result.curve
+        at = np.linspace(*found, 101)
+        mean = float(np.interp(at, curve.motion, curve.effort).mean())
+        top = float(np.interp(at, curve.motion, np.maximum.accumulate(curve.extra["max_stress"].values)).max())
+        thinner = min(1.0, 0.99 * allowed / top)
+        thickness = float(made.mechanism.thickness) * thinner  # type: ignore[arg-type]
+        width = made.mechanism.width * wish.target / (mean * thinner**3)
+        made = made.replace(
+            {
+                "mechanism.thickness": thickness,
+                "mechanism.width": width,
+                "analysis.travel": Place(found[1], "length"),
+                "analysis.window": tuple(Place(end, "length") for end in found),
+            }
+        )
+        if thinner == 1.0:
+            break
+    return made

@@ -1,0 +1,204 @@
+"""From a wish to cams worth designing: closed forms of size, ripple, undercut and springs over many proportions.
+
+With D = x - x0 the travel is s = D^2/(2A), the springs are stretched by 2D and add up to K = F/(4A) [SS, eq. 1].
+Friction makes F/F0 = 1 +- mu (1 + f^2) A/D with the path's slope f = D/A + tan a; the roller fits the path's start if
+its radius is below 1/(cos^3 a0/A + 1/l).
+
+Reference
+---------
+[SS] S. Sanchez-Salinas et al., Mech. Mach. Theory 173 (2022) 104819.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.families.cam.contact import YIELD_PRESSURE
+from cfmkit.families.cam.room import depth_of
+from cfmkit.families.cam.spec import CamSpec, Springs
+from cfmkit.families.findings import mm, percent
+from cfmkit.families.wishes import Candidate, Offer
+from cfmkit.specs.units import Place
+from cfmkit.stock.spec import MaterialSpec
+
+if TYPE_CHECKING:
+    from cfmkit.arrays import FloatArray
+    from cfmkit.families.base import Run
+    from cfmkit.families.wishes import Wish
+
+FRICTION = 0.002
+"""Rolling resistance over roller radius: what [SS] measured on steel rollers; assumed for every material."""
+
+DRAWN = 60_000
+"""Proportions that are looked at."""
+
+OFFERED = 12
+"""Designs that are worth being made."""
+
+TAB, TOP, HOLE = 0.06, 0.02, 0.0066
+"""Height of the plate's tab and of its margin above the flanks over that of the room; largest fixing hole [m]."""
+
+PLATE_MIN, LOAD = 0.002, 4.5
+"""Thinnest plate [m]; largest force between roller and cam over the mechanism's, as in [SS]'s, where it is 4.1."""
+
+ROLLER_MIN = 0.0015
+"""Smallest radius of a roller [m]: that of the smallest usual ball bearings."""
+
+COUNTS = (1, 2, 4, 6, 8, 12, 20, 40)
+"""Numbers of springs that are tried."""
+
+RESERVE, FLAT_RESERVE = 0.97, 0.9
+"""Shares of room and ripple that closed forms may fill: they leave out the plate's margins, and friction squared."""
+
+
+def propose(wish: Wish, run: Run) -> Offer:
+    """Return cams that the closed forms say are worth designing, the smallest and the flattest first."""
+    if wish.kind == "torque":
+        return Offer(reason="a cam with rollers gives a force at its slider, no torque")
+    if wish.adjustable is not None:
+        return Offer(
+            reason="the force of a cam is fixed by its springs: nothing adjusts it", nearest={"adjustable": "none"}
+        )
+    draw = np.random.default_rng(run.seed).uniform(size=(DRAWN, 5)).T
+    found = _sized(wish, draw)
+    fitting = found["fits"] & found["flat"] & found["lossless"]
+    if not fitting.any():
+        return _out_of_reach(wish, found)
+    chosen = _spread(found, np.flatnonzero(fitting))
+    candidates: list[Candidate] = []
+    for index in chosen:
+        made = _candidate(wish, {name: float(values[index]) for name, values in found.items()})
+        candidates += [made] if made else []
+        if len(candidates) == OFFERED:
+            break
+    if not candidates:
+        depth = "" if wish.depth is None else f" within a depth of {mm(wish.depth)}"
+        return Offer(reason=f"no steel spring of this force and stretch fits between the rollers{depth}")
+    return Offer(tuple(candidates))
+
+
+def _sized(wish: Wish, draw: FloatArray) -> dict[str, Any]:
+    """Return sizes and measures of many proportions, by name: lengths [m], ratios, and which fit."""
+    across, along = wish.room[:2]
+    longest = max(across, along)
+    brace = longest * 10.0 ** (-1.3 * draw[0])
+    start = brace * (0.02 + 0.9 * draw[1])
+    constant = brace * 10.0 ** (-2.0 + 2.0 * draw[2])
+    roller = np.minimum(start, brace) * (0.04 + 0.9 * draw[3])
+    run_in = wish.travel * 10.0 ** (-2.3 + 2.0 * draw[4])
+    stroke = run_in + wish.travel
+    with np.errstate(invalid="ignore", divide="ignore"):
+        end = start + np.sqrt(2.0 * constant * stroke)
+        rise = np.sqrt(brace**2 - start**2)
+        radius = 1.0 / ((rise / brace) ** 3 / constant + 1.0 / brace)
+        places = np.linspace(0.0, 1.0, 9)[:, None] * wish.travel + run_in
+        stretch = np.sqrt(2.0 * constant * places)
+        x = start + stretch
+        slope = stretch / constant + x / np.sqrt(brace**2 - x**2)
+        loss = FRICTION * (1.0 + slope**2) * constant / stretch
+        ripple = 1.0 - (1.0 + loss.min(axis=0)) / (1.0 + loss.max(axis=0))
+        down = 1.0 - (1.0 - loss.max(axis=0)) / (1.0 - loss.min(axis=0))
+    tab = TAB * along
+    width = 2.0 * (end + roller)
+    height = stroke + rise + roller + np.maximum(roller, tab)
+    there = (end < 0.97 * brace) & (roller > ROLLER_MIN) & (roller < 0.99 * radius) & np.isfinite(loss).all(axis=0)
+    ripple = np.where(there, np.maximum(ripple, down), np.inf)
+    hysteresis = np.where(there, 2.0 * loss.mean(axis=0), np.inf)
+    return {
+        "brace": brace, "start": start, "constant": constant, "roller": roller, "run_in": run_in, "end": end,
+        "width": width, "height": height, "ripple": ripple, "hysteresis": hysteresis, "loss": loss.mean(axis=0),
+        "there": there,
+        "fits": there & (width < RESERVE * across) & (height < RESERVE * along),
+        "flat": there & (ripple < FLAT_RESERVE * wish.ripple) & (loss.max(axis=0) < 0.2),
+        "lossless": there & (hysteresis < RESERVE * (wish.hysteresis or np.inf)),
+    }  # fmt: skip
+
+
+def _spread(found: dict[str, Any], fitting: Any) -> list[int]:
+    """Return designs that fit, by turns the smallest, the flattest and those with the softest springs."""
+    size = (found["width"] * found["height"])[fitting]
+    soft = (found["end"] - found["start"])[fitting] / found["start"][fitting]
+    orders = [
+        fitting[np.argsort(key)] for key in (size, found["ripple"][fitting], soft, size * found["ripple"][fitting])
+    ]
+    return list(dict.fromkeys(int(order[k]) for k in range(min(60, len(fitting))) for order in orders))
+
+
+def _candidate(wish: Wish, size: dict[str, float]) -> Candidate | None:
+    """Return a design with springs that exist and a plate that bears the rollers; None if the depth is too small."""
+    total = wish.target / (4.0 * size["constant"])
+    stretch = 2.0 * (size["end"] - size["start"])
+    for block in wish.materials or ({"name": "steel-s235"},):
+        material = MaterialSpec.model_validate(dict(block))
+        if material.yield_strength is None:
+            continue
+        modulus = material.modulus / (2.0 * (1.0 - material.poisson**2))
+        bearable = YIELD_PRESSURE * material.yield_strength
+        thick = max(PLATE_MIN, 1.1 * LOAD * wish.target * modulus / (np.pi * size["roller"] * bearable**2))
+        depths = {}
+        for count in COUNTS:
+            springs = Springs(stiffness=total / count, count=count)
+            depth = depth_of(thick, springs, stretch, size["start"])
+            if depth is not None and depth <= (wish.depth or sum(wish.room)):
+                depths[count] = depth
+        if depths:
+            # as few springs as there is room for; without a depth they may be as deep as the room is wide
+            modest = [count for count, depth in depths.items() if wish.depth or depth <= max(wish.room)]
+            count = modest[0] if modest else min(depths, key=lambda one: depths[one])
+            return _written(wish, size, dict(block), thick, count, total)
+    return None
+
+
+def _written(
+    wish: Wish, size: dict[str, float], material: dict[str, Any], thick: float, count: int, total: float
+) -> Candidate:
+    along = wish.room[1]
+    begin = float(f"{size['run_in']:.6g}")
+    stroke = begin + wish.travel
+    mechanism = {
+        "brace_length": size["brace"],
+        "rest_half_width": size["start"],
+        "roller_radius": size["roller"],
+        "springs": {"stiffness": total / count, "count": count},
+        "rolling_friction": FRICTION,
+        "profile": {"force_constant": size["constant"], "stroke": stroke},
+        "plate": {
+            "base_height": TAB * along,
+            "top_margin": min(TOP * along, 0.5 * size["roller"]),
+            "hole_diameter": min(HOLE, 0.4 * TAB * along),
+        },
+        "contact": {"width": thick, "material": material},
+    }
+    data = {
+        "family": "cam",
+        "name": "suggested",
+        "mechanism": mechanism,
+        "design": {"force": wish.target, "stroke": stroke},
+        "analysis": {"window": (Place(begin, "length"), Place(stroke, "length"))},
+    }
+    spec = CamSpec.model_validate(data)
+    area = size["width"] * size["height"] / (wish.room[0] * wish.room[1])
+    variant = f"{count} spring{'s' if count > 1 else ''}"
+    return Candidate(variant, spec, design=True, promise=area + size["ripple"] / wish.ripple)
+
+
+def _out_of_reach(wish: Wish, found: dict[str, Any]) -> Offer:
+    """Return why no proportions fit, and the nearest wish that some would: one key changed at a time."""
+    if not found["there"].any():
+        return Offer(reason="no cam of this travel has a path that its roller can follow within such a room")
+    nearest: dict[str, str] = {}
+    flat = found["flat"] & found["lossless"]
+    if flat.any():
+        scale = np.maximum(found["width"] / wish.room[0], found["height"] / wish.room[1])[flat].min() / RESERVE
+        nearest["room"] = " x ".join(mm(side * float(scale)) for side in wish.room[:2])
+        reason = f"the rollers, braces and the slider's way need {nearest['room']} of room"
+    else:
+        reason = "friction of the rollers leaves more ripple or loss than wished"
+    roomy = found["fits"]
+    if roomy.any():
+        nearest["ripple"] = percent(float(found["ripple"][roomy].min()) / FLAT_RESERVE)
+        if wish.hysteresis is not None:
+            nearest["hysteresis"] = percent(float(found["hysteresis"][roomy].min()) / RESERVE)
+    return Offer(reason=reason, nearest=nearest)

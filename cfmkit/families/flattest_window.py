@@ -1,0 +1,52 @@
+"""Where on a curve the force is flattest over a given length."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from cfmkit.arrays import FloatArray
+    from cfmkit.results import Result
+
+PLACES = 400
+"""Windows that are compared, evenly over the curve."""
+
+INSIDE = 1e-6
+"""A window is made longer by this share of its length: to write it down must not make it shorter."""
+
+
+def flattest(result: Result, length: float) -> tuple[float, float] | None:
+    """Return the ends of the window of a length [m or rad] with the smallest ripple of its worst branch.
+
+    Of the nominal curve; None where it is shorter, or has no force.
+    """
+    if not result.curves:
+        return None
+    curve = result.curve
+    motion = np.asarray(curve.motion)
+    low, high = float(motion.min()), float(motion.max())
+    length = length * (1.0 + INSIDE)
+    if not high - low >= length:
+        return None
+    starts = np.linspace(low, high - length, PLACES)
+    worst = np.zeros(PLACES)
+    for branch in curve.branches:
+        part = curve.on(branch)
+        order = np.argsort(part.motion, kind="stable")
+        worst = np.maximum(worst, ripples(part.motion[order], part.effort[order], starts, length))
+    best = int(np.argmin(worst))
+    return (float(starts[best]), float(starts[best]) + length) if np.isfinite(worst[best]) else None
+
+
+def ripples(places: FloatArray, effort: FloatArray, starts: FloatArray, length: float) -> FloatArray:
+    """Return (max - min)/max over windows of a length that begin at some places; infinite where the effort ends."""
+    found = np.full(len(starts), np.inf)
+    for number, start in enumerate(starts):
+        inside = (places > start) & (places < start + length)
+        ends = np.interp([start, start + length], places, effort)
+        values = np.concatenate([ends, effort[inside]])
+        if np.isfinite(values).all() and values.max() > 0:
+            found[number] = 1.0 - values.min() / values.max()
+    return found

@@ -1,0 +1,307 @@
+"""From a wish to slider-cranks worth designing: kept proportions at the size that travel and room allow.
+
+Lengths scale with one factor: angles, and the shape of the curve, stay. For springs at pins the rates follow from the
+effort. For a strip the stress decides the thickness and the force the width, for flexures likewise; both are left to
+the family's own design.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import radians
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.families.findings import mm
+from cfmkit.families.slider_crank.room import PIN
+from cfmkit.families.slider_crank.spec import SliderCrankSpec
+from cfmkit.families.wishes import Candidate, Offer
+from cfmkit.specs.units import Place
+
+if TYPE_CHECKING:
+    from cfmkit.families.base import Run
+    from cfmkit.families.wishes import Wish
+
+
+@dataclass(frozen=True)
+class Proportions:
+    """A linkage over its crank's length, and what of its room is known.
+
+    Attributes
+    ----------
+    stretched, offset : float
+        Position of the stretched slider, and height of its way, over the crank's length.
+    unloaded : float
+        Crank angle with all springs relaxed [rad].
+    reach : float
+        Largest travel that is of use, over the crank's length.
+    """
+
+    stretched: float
+    offset: float
+    unloaded: float
+    reach: float
+
+
+PUSHED = (
+    Proportions(100.0 / 54.0, 60.0 / 54.0, 0.542, 38.0 / 54.0),  # Bilancia, Geraci, Berselli 2019
+    Proportions(1.6, 1.0, 0.56, 0.8),
+    Proportions(2.4, 1.1, 0.43, 0.6),
+)
+"""For a force at the slider: the published lengths, and two linkages beside them, shorter and longer."""
+
+STARTS = (0.04, 0.1)
+"""Where the travel begins, over its length: before that the force of an elastic part comes up from zero."""
+
+SIZES = (1.0, 0.8, 0.6, 0.42, 0.3)
+"""Sizes that are tried, over the largest that the room allows."""
+
+PAD = 0.012
+"""Length of the pads at both ends of a printed part [m]."""
+
+NODES = 5
+"""Thicknesses of a tapered strip: more of them take longer and are hardly flatter."""
+
+LATER = 10.0
+"""Promise of what takes seconds to design, where everything else takes a part of one."""
+
+FLEXURE = 0.2
+"""Length of a flexure, over the crank's length, as in Bilancia, Geraci, Berselli 2019."""
+
+TURNED = (
+    (1.0, 5.0, 0.3, -5.0),
+    (1.0, 5.0, 0.3, -9.0),
+    (1.0, 2.5, 0.0, -8.0),
+    (1.0, 3.0, 0.3, -15.0),
+    (1.0, 2.0, 0.5, -25.0),
+)
+"""For a torque: crank, coupler, offset (over the crank's length) and unloaded angle [deg]; first Li and Hao 2019."""
+
+OFFERED = 24
+
+
+def propose(wish: Wish, run: Run) -> Offer:
+    """Return linkages at sizes that fit the room, to be given springs, flexures or a strip by the family's design."""
+    return _of_torque(wish) if wish.kind == "torque" else _of_force(wish)
+
+
+def _of_torque(wish: Wish) -> Offer:
+    if wish.depth is not None:
+        return Offer(
+            reason="springs at pins have no size here, and no depth: wish a room without one",
+            nearest={"room": " x ".join(mm(side) for side in wish.room[:2])},
+        )
+    found = [_turned(wish, *one) for one in TURNED]
+    return Offer(tuple(one for one in found if one is not None))
+
+
+def _turned(wish: Wish, crank: float, coupler: float, offset: float, unloaded: float) -> Candidate | None:
+    """Return a linkage that turns as much as is wished around its stretched position, as large as the room allows."""
+    low = radians(unloaded)
+    span = max(3.0 * wish.travel, radians(20.0))
+    angles = np.linspace(low, low + span, 181)
+    y = crank * np.sin(angles)
+    inside = coupler**2 - (offset - y) ** 2
+    if (inside <= 0.0).any():
+        return None
+    x = np.concatenate([[0.0], crank * np.cos(angles), crank * np.cos(angles) + np.sqrt(inside)])
+    sides = np.ptp(x) + 2.0 * PIN * crank, np.ptp(np.concatenate([[0.0, offset], y])) + 2.0 * PIN * crank
+    size = 0.96 * min(max(wish.room[:2]) / max(sides), min(wish.room[:2]) / min(sides))
+    data = {
+        "family": "slider-crank",
+        "name": "suggested",
+        "mechanism": {
+            "crank_length": crank * size, "coupler_length": coupler * size, "offset": offset * size,
+            "unloaded_angle": low, "springs": {},
+        },
+        "design": {
+            "torque": wish.target, "tolerance": min(0.45 * wish.ripple, 0.2),
+            "angle_within": (low, low + span),
+        },
+        "analysis": {"angle": (low, low + span), "points": 961},
+    }  # fmt: skip
+    spec = SliderCrankSpec.model_validate(data)
+    return Candidate("springs at pins", spec, True, "cfmkit.families.slider_crank.propose:finish")
+
+
+def finish(spec: SliderCrankSpec, wish: Wish) -> SliderCrankSpec:
+    """Return a designed linkage that is judged over the middle of the window found, as long as the travel wished."""
+    low, high = (float(end) for end in spec.analysis.window or (0.0, 0.0))
+    name = "length" if wish.kind == "force" else "angle"
+    spare = 0.5 * max(high - low - wish.travel * (1.0 + 1e-6), 0.0)
+    window = low + spare, high - spare
+    # the motion is the window: what the linkage could do outside of it needs no room
+    keys = {"analysis.window": tuple(Place(end, name) for end in window), "design": None, "requirements": ()}
+    start = spec.at("mechanism.unloaded_angle") if name == "angle" else 0.0
+    ends = (min(start, window[0]), max(start, window[1]))
+    return spec.replace(keys | {"analysis.angle" if name == "angle" else "analysis.travel": ends})
+
+
+def _of_force(wish: Wish) -> Offer:
+    if wish.adjustable is not None:
+        return Offer(reason="the force of a slider-crank is fixed by its springs: nothing adjusts it")
+    found = [one for lengths in PUSHED for one in _pushed(wish, lengths)]
+    if found:
+        return Offer(tuple(_varied(found)[:OFFERED]))
+    need = _room_for(wish, PUSHED[0], wish.travel * (1.0 + STARTS[0]) / PUSHED[0].reach, pads=wish.depth is not None)
+    scale = max(need[0] / wish.room[0], need[1] / wish.room[1])
+    longest = wish.travel / scale
+    return Offer(
+        reason=f"a linkage for this travel needs {mm(need[0])} across it and {mm(need[1])} along it",
+        nearest={"room": " x ".join(mm(side) for side in need), "travel": f"about {mm(longest)}"},
+    )
+
+
+def _room_for(wish: Wish, lengths: Proportions, crank: float, pads: bool) -> tuple[float, float]:
+    """Return the room that a linkage needs across and along the slider's way [m]."""
+    pin = crank * np.sin(lengths.unloaded)
+    across = max(lengths.offset * crank, pin) + 2.0 * PAD * pads + 2.0 * PIN * crank * (not pads)
+    along = lengths.stretched * crank + 2.0 * PAD * pads + 2.0 * PIN * crank * (not pads)
+    return float(across), float(along)
+
+
+def _pushed(wish: Wish, lengths: Proportions) -> list[Candidate]:
+    """Return parts and linkages of some proportions at all sizes that fit."""
+    pads = 2.0 * PAD
+    printed = min((wish.room[0] - pads) / lengths.offset, (wish.room[1] - pads - 0.003) / lengths.stretched)
+    pinned = min(wish.room[0] / (lengths.offset + 2 * PIN), wish.room[1] / (lengths.stretched + 2 * PIN))
+    found = []
+    for size in SIZES:
+        for start in STARTS:
+            travel = start * wish.travel, (1.0 + start) * wish.travel * (1.0 + 1e-6)
+            if travel[1] <= lengths.reach * size * printed:
+                found += [_strip(wish, block, lengths, size * printed, travel) for block in _materials(wish)]
+                found += [_flexures(wish, block, lengths, size * printed, travel) for block in _materials(wish)]
+                if start == STARTS[-1] and size in SIZES[:2]:
+                    found += [_tapered(wish, block, lengths, size * printed, travel) for block in _materials(wish)]
+            if travel[1] <= lengths.reach * size * pinned and wish.depth is None and start == STARTS[0]:
+                found.append(_springs(wish, lengths, size * pinned, travel))
+    return found
+
+
+def _varied(found: list[Candidate]) -> list[Candidate]:
+    """Return candidates, those of different kinds by turns; what takes long to design comes last."""
+    kinds = list(dict.fromkeys(one.variant for one in found))
+    rows = [sorted((one for one in found if one.variant == kind), key=lambda one: one.promise) for kind in kinds]
+    longest = max(map(len, rows))
+    return [row[k] for k in range(longest) for row in rows if k < len(row)]
+
+
+def _materials(wish: Wish) -> list[dict[str, Any]]:
+    return [dict(block) for block in wish.materials] or [{"name": "pom"}]
+
+
+def _mechanism(lengths: Proportions, crank: float) -> dict[str, Any]:
+    return {
+        "crank_length": crank, "stretched_position": lengths.stretched * crank, "offset": lengths.offset * crank,
+        "unloaded_angle": lengths.unloaded,
+    }  # fmt: skip
+
+
+def _rank(crank: float, wish: Wish) -> float:
+    """Return how soon a size is tried: the largest first, which is the flattest and needs the least depth."""
+    return -crank / wish.room[1]
+
+
+def _analysis(travel: tuple[float, float]) -> dict[str, Any]:
+    return {
+        "drive": "force", "travel": (0.0, travel[1]), "window": tuple(Place(end, "length") for end in travel),
+        "points": 241,
+    }  # fmt: skip
+
+
+def _strip(
+    wish: Wish, material: dict[str, Any], lengths: Proportions, crank: float, travel: tuple[float, float]
+) -> Candidate:
+    """Return a strip of one thickness, to be sized by stress and force."""
+    thick, wide = (wish.thinnest, 0.1 * crank), (wish.thinnest, wish.depth or crank)
+    data = {
+        "family": "slider-crank",
+        "name": "suggested",
+        "mechanism": {
+            **_mechanism(lengths, crank), "material": material, "safety_factor": 1.01,
+            "beam": {"width": wide[1], "thickness": 0.02 * crank},
+        },
+        "design": {
+            "force": wish.target, "travel": travel,
+            "beam": {"shape": "uniform", "goal": "ripple", "width": wide, "thickness": thick},
+        },
+        "analysis": _analysis(travel),
+    }  # fmt: skip
+    spec = SliderCrankSpec.model_validate(data)
+    return Candidate("strip", spec, True, "cfmkit.families.slider_crank.propose:part", _rank(crank, wish))
+
+
+def _tapered(
+    wish: Wish, material: dict[str, Any], lengths: Proportions, crank: float, travel: tuple[float, float]
+) -> Candidate:
+    """Return a strip of varying thickness, to be searched for the flattest force."""
+    plain = _strip(wish, material, lengths, crank, travel)
+    thick = (max(wish.thinnest, 0.005 * crank), 0.05 * crank)
+    wide = plain.spec.design.beam.width  # type: ignore[attr-defined]
+    shape = {"shape": "even", "nodes": NODES, "goal": "ripple", "width": wide, "thickness": thick}
+    return Candidate("tapered strip", plain.spec.replace({"design.beam": shape}), True, plain.finish, LATER)
+
+
+def _flexures(
+    wish: Wish, material: dict[str, Any], lengths: Proportions, crank: float, travel: tuple[float, float]
+) -> Candidate:
+    """Return a chain of links and flexures: first the springs for the force, then flexures of that stiffness."""
+    scale = crank / 0.054
+    rate = wish.target / 1.5 * scale
+    long = FLEXURE * crank
+    thick = 0.09 * long
+    one = {"length": long, "thickness": thick, "width": 2.0 * thick}
+    # rates per rad grow with force times length; those of Bilancia et al. 2019 are for 1.5 N at 54 mm
+    springs = {"pivot": 0.028303 * rate, "crank_pin": 0.035379 * rate, "slider_pin": 0.035379 * rate}
+    data = {
+        "family": "slider-crank",
+        "name": "suggested",
+        "mechanism": {
+            **_mechanism(lengths, crank), "material": material, "safety_factor": 1.01, "springs": springs,
+            "flexures": {"pivot": one, "crank_pin": one, "slider_pin": one},
+        },
+        "design": {"force": wish.target, "travel": (0.0, travel[1]), "flexures": {}},
+        "analysis": _analysis(travel),
+    }  # fmt: skip
+    spec = SliderCrankSpec.model_validate(data)
+    return Candidate("flexures", spec, True, "cfmkit.families.slider_crank.propose:part", _rank(crank, wish))
+
+
+def part(spec: SliderCrankSpec, wish: Wish) -> SliderCrankSpec:
+    """Return a designed part whose widths, in which force is linear, give exactly the mean that is wished."""
+    from cfmkit.families.base import Run
+    from cfmkit.families.slider_crank.printed.model import analyze
+
+    made = spec.replace({"design": None, "requirements": (), "mechanism.safety_factor": 1.0})
+    result = analyze(made, Run())
+    if not result.curves:
+        return made
+    low, high = (float(end) for end in made.analysis.window or (0.0, 0.0))
+    inside = (result.curve.motion >= low) & (result.curve.motion <= high)
+    mean = float(np.mean(result.curve.effort[inside])) if inside.any() else 0.0
+    if not mean > 0.0:
+        return made
+    factor = wish.target / mean
+    if made.fidelity == "beam" and made.mechanism.beam is not None:
+        return made.replace({"mechanism.beam.width": made.mechanism.beam.width * factor})
+    names = ("pivot", "crank_pin", "slider_pin")
+    parts = {name: getattr(made.mechanism.flexures, name).width * factor for name in names}
+    return made.replace({f"mechanism.flexures.{name}.width": width for name, width in parts.items()})
+
+
+def _springs(wish: Wish, lengths: Proportions, crank: float, travel: tuple[float, float]) -> Candidate:
+    """Return a linkage with springs at its pins, the flattest that there are."""
+    data = {
+        "family": "slider-crank",
+        "name": "suggested",
+        "mechanism": {
+            "crank_length": crank, "stretched_position": lengths.stretched * crank, "offset": lengths.offset * crank,
+            "unloaded_offset": 4e-4, "springs": {},
+        },
+        "design": {"force": wish.target, "travel": travel, "springs": ("pivot", "crank_pin", "slider_pin")},
+        "analysis": _analysis(travel),
+    }  # fmt: skip
+    spec = SliderCrankSpec.model_validate(data)
+    return Candidate("springs at pins", spec, True, "", _rank(crank, wish))

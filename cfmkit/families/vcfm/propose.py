@@ -1,0 +1,210 @@
+"""From a wish to V-beams beside a diamond worth designing: the closed forms over rises, leaf lengths and leaf pairs.
+
+The linear region of leaves with rise h and thickness t = h/Q is (4 h/3) sqrt(1 - (pi/Q)^2) long: for a travel, Q
+decides the rise. The stress gives the shortest leaf, force and rise the widths. Everything here is the design's own
+closed form; what it refuses is not offered.
+"""
+
+from __future__ import annotations
+
+from math import pi, sqrt
+from typing import TYPE_CHECKING, Any
+
+from cfmkit.families.findings import mm
+from cfmkit.families.refusals import Infeasible
+from cfmkit.families.vcfm.design import closed_form
+from cfmkit.families.vcfm.spec import VcfmSpec
+from cfmkit.families.wishes import Candidate, Offer
+from cfmkit.specs.units import Place
+
+if TYPE_CHECKING:
+    from cfmkit.families.base import Run
+    from cfmkit.families.vcfm.design import DesignSizes
+    from cfmkit.families.wishes import Wish
+
+SLENDERNESS = (3.7, 4.0, 4.5, 5.5, 7.0)
+"""Rise over thickness of the leaves: below 3.63 they are no longer buckled half way, above 7 they are thin and wide."""
+
+LONGER = (1.04, 1.15, 1.4, 1.8, 2.4)
+"""Leaf lengths, over the shortest that the stress allows: longer leaves are wider, and the force flatter."""
+
+PAIRS = (2, 1, 3, 4)
+"""Vs that carry the shuttle; one V alone needs a guide."""
+
+THICKER = (1.0, 1.6, 2.4)
+"""Thickness of the diamond's leaves over that of the Vs."""
+
+MIDDLE = (0.8, 0.9)
+"""Share of the linear region that is used: the exact leaves depart from the line at its ends."""
+
+SPRING_ANGLE = 7.0 * pi / 180.0
+"""Of the diamond's leaves, as in Ding, Li and Li 2022."""
+
+SAFETY = 1.03
+"""On the stress: the exact model has a little more of it than the closed forms that give the leaf's length."""
+
+LITTLE = 0.02
+"""Adjustment, over the force, where none is wished: every such mechanism has one."""
+
+OFFERED = 12
+
+
+def propose(wish: Wish, run: Run) -> Offer:
+    """Return mechanisms that the closed forms say are worth designing, the smallest first."""
+    if wish.kind == "torque":
+        return Offer(reason="leaves that snap through give a force at their shuttle, no torque")
+    found: list[Candidate] = []
+    closest: tuple[float, dict[str, float]] | None = None
+    for block in wish.materials or ({"name": "pom"},):
+        for spec, sizes in _designs(wish, dict(block)):
+            over = _room_over(wish, spec, sizes)
+            excess = max(over.values())
+            if closest is None or excess < closest[0]:
+                closest = excess, over
+            if excess <= 1.0:
+                pairs = spec.mechanism.bistable.half_beams // 2
+                variant = f"{pairs} V{'s' if pairs > 1 else ', guided'}"
+                promise = over["across"] * over["along"]
+                found.append(Candidate(variant, spec, True, "cfmkit.families.vcfm.propose:finish", float(promise)))
+    if found:
+        return Offer(tuple(_varied(sorted(found, key=lambda one: one.promise))[:OFFERED]))
+    if closest is None:
+        return Offer(
+            reason=f"no leaf as thin as {mm(wish.thinnest)} or thicker, too wide to buckle out of the plane, has "
+            "this travel, force and adjustment within the stress"
+        )
+    return _out_of_reach(wish, *closest)
+
+
+def _varied(found: list[Candidate]) -> list[Candidate]:
+    """Return candidates, those of different numbers of Vs by turns."""
+    kinds = list(dict.fromkeys(one.variant for one in found))
+    rows = [[one for one in found if one.variant == kind] for kind in kinds]
+    longest = max(map(len, rows))
+    return [row[k] for k in range(longest) for row in rows if k < len(row)]
+
+
+def _designs(wish: Wish, material: dict[str, Any]) -> Any:
+    """Yield (specification, sizes) of every choice that the closed forms allow."""
+    base, adjustment = wish.target, LITTLE * wish.target
+    if wish.adjustable is not None:
+        base = wish.target
+        adjustment = 1.03 * max(wish.adjustable[1] - base, base - wish.adjustable[0], adjustment)
+    for share in MIDDLE:
+        for slender in SLENDERNESS:
+            stroke = wish.travel / share
+            rise = 0.75 * stroke / sqrt(1.0 - (pi / slender) ** 2)
+            for pairs in PAIRS:
+                for thicker in THICKER:
+                    data = _data(material, base, adjustment, stroke, rise, slender, pairs, thicker)
+                    yield from _lengths(VcfmSpec.model_validate(data), wish)
+
+
+def _lengths(spec: VcfmSpec, wish: Wish) -> Any:
+    """Yield designs with the shortest leaf and with longer ones; one that is too narrow gets the length it needs."""
+    try:
+        first = closed_form(spec, spec.design)  # type: ignore[arg-type]
+    except Infeasible as problem:
+        longer = problem.nearest.get("design.leaf_length") if problem.nearest else None
+        if longer is None:
+            return
+        try:
+            spec = spec.replace({"design.leaf_length": longer.split()[-2] + " " + longer.split()[-1]})
+            first = closed_form(spec, spec.design)  # type: ignore[arg-type]
+        except Infeasible:
+            return
+    for more in LONGER:
+        made = spec.replace({"design.leaf_length": float(first.leaf.length) * more})
+        try:
+            sizes = closed_form(made, made.design)  # type: ignore[arg-type]
+        except Infeasible:
+            continue
+        if min(sizes.leaf.thickness, sizes.side.thickness) >= wish.thinnest:
+            yield made, sizes
+
+
+def _data(
+    material: dict[str, Any], force: float, adjustment: float, stroke: float, rise: float, slender: float, pairs: int,
+    thicker: float,
+) -> dict[str, Any]:  # fmt: skip
+    thin = rise / slender
+    block = max(3.0 * thin * max(thicker, 1.0), 0.4 * rise, 1e-3)
+    return {
+        "family": "vcfm",
+        "name": "suggested",
+        "mechanism": {
+            "material": material,
+            "safety_factor": SAFETY,
+            "positive": {
+                "structure": "diamond", "length": 20.0 * thin * thicker, "angle": SPRING_ANGLE,
+                "thickness": thin * thicker, "width": 5.0 * thin,
+            },
+            "bistable": {
+                "structure": "v-beam", "half_beams": 2 * pairs, "length": 20.0 * rise, "angle": 0.05,
+                "thickness": thin, "width": 5.0 * thin,
+            },
+            "frame": {
+                "shuttle_width": 1.3 * block, "block": block, "spacing": 1.2 * rise + 2.0 * thin + 2.0 * block,
+                "corner": 1.2 * block, "clearance": rise + block,
+            },
+        },
+        "design": {"force": force, "adjustment": adjustment, "stroke": stroke, "rise": rise},
+    }  # fmt: skip
+
+
+def _room_over(wish: Wish, spec: VcfmSpec, sizes: DesignSizes) -> dict[str, float]:
+    """Return what a design needs of the room over what there is, by side."""
+    frame, pairs = spec.mechanism.frame, spec.mechanism.bistable.half_beams // 2
+    leaf, side = sizes.leaf, sizes.side
+    halves = leaf.reach + 0.5 * frame.shuttle_width + frame.block, side.reach + 1.5 * frame.block
+    across = 2.0 * float(max(halves))
+    target = spec.design
+    corner = max(
+        frame.corner, float(sizes.linear[1]) + (target.preload_stroke if target else 0.0) - 2 * float(side.rise)
+    )
+    along = (pairs - 1) * frame.spacing + 2.0 * frame.clearance + 2.0 * frame.block + 2.0 * float(side.rise) + corner
+    over = {"across": across / wish.room[0], "along": along / wish.room[1]}
+    if wish.depth is not None:
+        over["depth"] = float(max(leaf.width, side.width)) / wish.depth
+    return over
+
+
+def _out_of_reach(wish: Wish, excess: float, over: dict[str, float]) -> Offer:
+    """Return which side of the room is too small for the design that comes nearest, and the room that it needs."""
+    sides = dict(zip(("across", "along", "depth"), wish.room, strict=False))
+    need = {name: mm(side * max(1.0, over[name])) for name, side in sides.items()}
+    worst = max(over, key=lambda name: over[name])
+    words = {"across": "across the travel", "along": "along the travel", "depth": "out of the plane"}[worst]
+    reason = f"leaves and spring need {mm(sides[worst] * excess)} {words}"
+    nearest = {"room": " x ".join(need.values())}
+    if worst == "depth":
+        nearest["force"] = f"{wish.target / excess:.3g} N"
+    return Offer(reason=reason, nearest=nearest)
+
+
+def finish(spec: VcfmSpec, wish: Wish) -> VcfmSpec:
+    """Return a designed mechanism that is judged by its exact model over the flattest window as long as the travel."""
+    from cfmkit.families.base import Run
+    from cfmkit.families.flattest_window import flattest
+    from cfmkit.families.vcfm.build import spring_room
+    from cfmkit.families.vcfm.exact import analyze
+
+    design = spec.design
+    preloads: tuple[float, ...] = (0.0,)
+    if wish.adjustable is not None and design is not None:
+        per_force = design.preload_stroke / design.adjustment
+        low, high = wish.adjustable
+        preloads = (0.0, *(one for one in ((high - wish.target) * per_force, (low - wish.target) * per_force) if one))
+    window = spec.analysis.window or (Place(0.0, "length"), Place(wish.travel, "length"))
+    wide = float(window[1]) + 0.2 * wish.travel
+    keys = {"analysis.fidelity": "exact", "analysis.preloads": preloads, "design": None, "mechanism.safety_factor": 1.0}
+    made = spec.replace({**keys, "analysis.window": None, "analysis.travel": wide, "requirements": ()})
+    closing = wide + max(preloads) - spring_room(made)
+    if closing > 0.0:
+        # higher corners, so that the spring stays open: a rigid part, which no force depends on
+        made = made.replace({"mechanism.frame.corner": made.mechanism.frame.corner + 1.1 * closing})
+    result = analyze(made, Run())
+    found = flattest(result, wish.travel)
+    if found is None:
+        return made
+    return made.replace({"analysis.window": tuple(Place(end, "length") for end in found), "analysis.travel": found[1]})

@@ -1,0 +1,111 @@
+"""A wish for a constant force, and what a family answers to it: types only, SI throughout.
+
+A family's ``propose(wish, run)`` looks at scaling laws, which takes milliseconds, and names designs that are worth
+being made; who asks makes them, analyses each with its exact model and keeps those that do what is wished.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Literal
+
+if TYPE_CHECKING:
+    from cfmkit.specs.spec import Spec
+
+MaterialBlock = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Wish:
+    """What somebody wants of a mechanism.
+
+    Attributes
+    ----------
+    kind : {"force", "torque"}
+        What is to be constant: over a travel, or over an angle.
+    target : float
+        How large [N or N m]; of a band, its middle.
+    low, high : float
+        Ends of the band in which every force has to lie, or, where only a number is wished, of what the mean may be.
+    banded : bool
+        Whether a band is wished.
+    travel : float
+        Over which it is constant [m or rad].
+    ripple : float
+        Largest (max - min)/max over the travel.
+    room : tuple of two or three floats
+        Across and along the travel, and out of the plane [m].
+    materials : tuple of mapping
+        `mechanism.material` of each one allowed; empty: whatever is usual.
+    adjustable : (float, float), optional
+        Between which forces it is to be adjusted [N].
+    hysteresis : float, optional
+        Largest loss of a cycle over its work.
+    thinnest : float
+        Thinnest leaf that the process makes [m].
+    """
+
+    kind: Literal["force", "torque"]
+    target: float
+    low: float
+    high: float
+    banded: bool
+    travel: float
+    ripple: float
+    room: tuple[float, ...]
+    materials: tuple[MaterialBlock, ...] = ()
+    adjustable: tuple[float, float] | None = None
+    hysteresis: float | None = None
+    thinnest: float = 2e-5
+
+    @property
+    def depth(self) -> float | None:
+        """What there is out of the plane [m]; None where it does not matter."""
+        return self.room[2] if len(self.room) > 2 else None
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A design that is worth being made.
+
+    Attributes
+    ----------
+    variant : str
+        Which of the family's, in a few words.
+    spec : Spec
+        Complete, or with a block `design` that the family's own design completes.
+    design : bool
+        Whether it is to be designed.
+    finish : str
+        ``"module:function"``, ``function(spec, wish) -> spec``: what makes the designed one the one that is judged, its
+        window and travel written out. Empty: nothing has to be done.
+    promise : float
+        The smaller, the sooner it is worth a try.
+    """
+
+    variant: str
+    spec: Spec
+    design: bool = False
+    finish: str = ""
+    promise: float = 0.0
+
+
+@dataclass(frozen=True)
+class Offer:
+    """What a family could do with a wish.
+
+    Attributes
+    ----------
+    candidates : tuple of Candidate
+        Worth being made, the most promising first; empty where the wish is out of reach.
+    reason : str
+        Why there are none.
+    nearest : mapping of str to str
+        Where there are none: keys of the wish -> the nearest values that the family could meet, each with the other
+        keys as wished.
+    """
+
+    candidates: tuple[Candidate, ...] = ()
+    reason: str = ""
+    nearest: Mapping[str, str] = field(default_factory=dict)

@@ -1,0 +1,213 @@
+"""A run that goes from a wish to designs: read it, ask the families, write one folder for each proposal."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from cfmkit.errors import ExitCode
+from cfmkit.runs.specfile import content
+from cfmkit.specs.units import to_border
+from cfmkit.specs.yamlio import read_document
+from cfmkit.suggest.spec import WishFile
+from cfmkit.tables.jsontext import json_bytes
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    from cfmkit.families.base import Run
+    from cfmkit.suggest.proposal import Proposal
+    from cfmkit.suggest.search import Suggestions
+    from cfmkit.suggest.spec import WishBlock
+
+COLUMNS: Mapping[str, tuple[str, str]] = {
+    "mean": ("", ""),
+    "ripple": ("ratio", "1"),
+    "hysteresis": ("ratio", "1"),
+    "safety_factor": ("ratio", "1"),
+    "across": ("length", "mm"),
+    "along": ("length", "mm"),
+    "depth": ("length", "mm"),
+    "parts": ("count", ""),
+}
+"""What is told of each proposal: its dimension and the unit of the files."""
+
+
+def wish_of(name: str | None, keys: Mapping[str, str]) -> WishBlock:
+    """Return the wish of a file, or of none, with keys replaced by what options say.
+
+    Parameters
+    ----------
+    name : str, optional
+        The file; ``-`` is standard input.
+    keys : mapping of str to str
+        Key of the wish -> its value as a file would have it.
+
+    Raises
+    ------
+    cfmkit.errors.SpecError
+        With everything that is wrong with it.
+    """
+    from cfmkit.runs.specfile import STDIN, standard_input
+
+    if name is None:
+        document = read_document("cfmkit: 1\nwish: {}\n", "options")
+    else:
+        document = read_document(standard_input() if name == STDIN else content(name), name)
+    for key, value in keys.items():
+        document = document.set(f"wish.{key}={value}")
+    return document.bind(WishFile).wish
+
+
+def told(proposal: Proposal) -> dict[str, Any]:
+    """Return a proposal's numbers in border units, by the name of its column."""
+    found: dict[str, Any] = {}
+    for name, value in proposal.numbers.items():
+        dimension = COLUMNS[name][0] or "ratio"
+        found[name] = (
+            None if value is None else float(to_border(value, dimension)) if dimension != "count" else int(value)
+        )
+    return found
+
+
+def with_force(found: Suggestions, proposal: Proposal) -> dict[str, Any]:
+    """Return the same with the mean in N or N*mm."""
+    mean = proposal.numbers.get("mean")
+    return told(proposal) | {"mean": None if mean is None else float(to_border(mean, found.wish.kind))}
+
+
+def exit_code(found: Suggestions) -> ExitCode:
+    """Return 0 where a proposal does all that is wished, else 6 where the time ended the search, and 4 where not."""
+    if found.proposals:
+        return ExitCode.OK
+    return ExitCode.PARTIAL if found.late else ExitCode.NO_SOLUTION
+
+
+def folder_name(number: int, proposal: Proposal) -> str:
+    """Return the folder of a proposal: ``1-vcfm-2-vs``."""
+    words = "".join(letter if letter.isalnum() else "-" for letter in proposal.variant.lower())
+    return f"{number}-{proposal.family}-" + "-".join(word for word in words.split("-") if word)
+
+
+def as_json(found: Suggestions, block: WishBlock) -> dict[str, Any]:
+    """Return what metrics.json and ``--json`` say."""
+    code = exit_code(found)
+    return {
+        "status": "complete" if code is ExitCode.OK else "partial" if code is ExitCode.PARTIAL else "infeasible",
+        "message": message(found),
+        "wish": block.model_dump(mode="json", exclude_unset=True, by_alias=True),
+        "proposals": [_record(found, one, number) for number, one in enumerate(found.proposals, 1)],
+        "near_misses": [_record(found, one) for one in found.near],
+        "families": [
+            {
+                "family": one.family,
+                "candidates": len(one.offer.candidates),
+                "made": one.made,
+                "proposals": sum(each.family == one.family for each in found.proposals),
+                "reason": _reason(found, one.family, one.offer.reason),
+                "nearest": dict(one.offer.nearest),
+            }
+            for one in found.answers
+        ],
+        "warnings": list(_warnings(found, block)),
+    }
+
+
+def message(found: Suggestions) -> str:
+    """Return how it ended, in one sentence."""
+    if found.proposals:
+        late = "; the time budget ended the search before everything was tried" if found.late else ""
+        return f"{len(found.proposals)} mechanisms do all that is wished{late}"
+    if found.late:
+        return "the time budget ended the search before anything did what is wished; give it more (--time-budget)"
+    return "no mechanism does what is wished"
+
+
+def _reason(found: Suggestions, name: str, out_of_reach: str) -> str:
+    if out_of_reach or any(one.family == name for one in found.proposals):
+        return out_of_reach
+    near = [one.missed[0] for one in found.near if one.family == name]
+    return (near or list(found.failed.get(name, ())) or [""])[0]
+
+
+def _warnings(found: Suggestions, block: WishBlock) -> Iterator[dict[str, str]]:
+    if found.late and found.proposals:
+        yield {"name": "search_cut_short", "message": "the time budget ended the search: --time-budget gives it more"}
+    if block.made_well is not None:
+        yield {
+            "name": "yield_not_judged",
+            "message": "the share of good parts was not judged: `cfmkit sensitivity` tells it of a design.yaml",
+        }
+    if block.cycles is not None:
+        yield {
+            "name": "cycles_not_judged",
+            "message": "the life was not judged: no material here has fatigue data; compare the safety factor",
+        }
+
+
+def _record(found: Suggestions, one: Proposal, number: int | None = None) -> dict[str, Any]:
+    about = {"family": one.family, "variant": one.variant, **with_force(found, one)}
+    place = {} if number is None else {"folder": folder_name(number, one)}
+    return about | place | {"misses": list(one.missed), "notes": list(one.notes)}
+
+
+def files(found: Suggestions, block: WishBlock, run: Run, plots: bool) -> Iterator[tuple[str, bytes]]:
+    """Yield every file of the run as (name below the folder, content)."""
+    yield "metrics.json", json_bytes(as_json(found, block))
+    yield "suggestions.csv", table(found)
+    if plots and found.proposals:
+        from cfmkit.plots.style import png
+        from cfmkit.suggest import draw
+
+        yield "figures/pareto.png", png(draw.pareto(found.proposals, found.wish))
+        yield "figures/proposals.png", png(draw.to_one_scale(found.proposals, found.wish))
+    jobs = list(enumerate(found.proposals, 1))
+    made = {number: files for (number, _), files in run.executor(partial(_made, plots), iter(jobs), lambda: False)}
+    for number, one in jobs:
+        for name, data in made[number]:
+            yield f"{folder_name(number, one)}/{name}", data
+
+
+def _made(plots: bool, job: tuple[int, Proposal]) -> list[tuple[str, bytes]]:
+    """Return the files of one proposal: its specification first, which `analyze` takes."""
+    from cfmkit import api
+    from cfmkit.runs.files import files, geometry
+    from cfmkit.runs.run_findings import report_on
+
+    _, proposal = job
+    spec = proposal.spec
+    result = api.analyze(spec)
+    found = [("design.yaml", proposal.text.encode())]
+    found += list(files(report_on(result), plots))
+    from cfmkit.families import family
+
+    if family(spec.family).outline is not None and _has_a_part(proposal):
+        found += list(geometry(result.spec))
+    return found
+
+
+def _has_a_part(proposal: Proposal) -> bool:
+    """Return whether there is something to cut: springs at pins are links, which no drawing shows."""
+    return "at pins" not in proposal.variant
+
+
+def table(found: Suggestions) -> bytes:
+    """Return suggestions.csv: a row a proposal, then the near misses."""
+    from cfmkit.tables import to_csv
+    from cfmkit.tables.table import Table, TableColumn
+
+    rows = [(number, one) for number, one in enumerate(found.proposals, 1)] + [(None, one) for one in found.near]
+    numbers = [with_force(found, one) for _, one in rows]
+    unit = "N" if found.wish.kind == "force" else "N*mm"
+    columns = [
+        TableColumn("number", tuple(number for number, _ in rows)),
+        TableColumn("family", tuple(one.family for _, one in rows)),
+        TableColumn("variant", tuple(one.variant for _, one in rows)),
+    ]
+    for name, (dimension, border) in COLUMNS.items():
+        head = f"{found.wish.kind}_mean" if name == "mean" else name
+        values = tuple(each.get(name) for each in numbers)
+        columns.append(TableColumn(head, values, unit if name == "mean" else border if dimension != "count" else None))
+    columns.append(TableColumn("misses", tuple("; ".join(one.missed) for _, one in rows)))
+    columns.append(TableColumn("folder", tuple("" if n is None else folder_name(n, one) for n, one in rows)))
+    return to_csv(Table(tuple(columns)))

@@ -1,0 +1,128 @@
+"""Pictures of what came of a wish: size against ripple, and all proposals to one scale in the room given."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from cfmkit.families import family
+from cfmkit.families.base import Run, function_named
+from cfmkit.plots.style import BAND, GREY, INK, LINES, NORMAL, SMALL, axes_mm, new_figure, styled
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from cfmkit.families.wishes import Wish
+    from cfmkit.suggest.proposal import Proposal
+
+COLUMNS = 3
+
+MOST = 12
+"""Proposals that are drawn."""
+
+
+def named(number: int, proposal: Proposal) -> str:
+    """Return what a proposal is called in tables and pictures."""
+    return f"{number} {proposal.family}, {proposal.variant}"
+
+
+@styled
+def pareto(proposals: Sequence[Proposal], wish: Wish) -> Figure:
+    """Return the area that each proposal needs against its ripple; the larger the bubble, the more it is stressed."""
+    figure = new_figure(160.0, 100.0)
+    ax = axes_mm(figure, (17.0, 13.0, 100.0, 76.0))
+    kinds = list(dict.fromkeys(one.family for one in proposals))
+    areas, ripples = [], []
+    for number, one in enumerate(proposals, 1):
+        values = one.numbers
+        area = 1e4 * float(values["across"] or 0.0) * float(values["along"] or 0.0)
+        ripple = 100.0 * float(values["ripple"] or 0.0)
+        factor = values.get("safety_factor")
+        used = 1.0 / factor if factor else 0.0
+        color = LINES[kinds.index(one.family) % len(LINES)]
+        ax.scatter([area], [ripple], s=20.0 + 200.0 * used, color=color, alpha=0.55, linewidths=0.6, edgecolors=INK)
+        ax.annotate(str(number), (area, ripple), ha="center", va="center", fontsize=SMALL, zorder=5)
+        areas.append(area)
+        ripples.append(ripple)
+    given = 1e4 * wish.room[0] * wish.room[1]
+    ax.axvline(given, color=BAND, linewidth=0.8, dashes=(5, 2))
+    ax.axhline(100.0 * wish.ripple, color=BAND, linewidth=0.8, dashes=(5, 2))
+    ax.set_xlim(0.0, 1.08 * max([given, *areas]))
+    ax.set_ylim(0.0, 1.12 * max([100.0 * wish.ripple, *ripples]))
+    ax.set_xlabel("room needed in the plane [cm²]")
+    ax.set_ylabel("ripple over the travel [%]")
+    figure.text(0.02, 0.965, "what the proposals need, and how flat they are", fontsize=NORMAL, color=INK)
+    told = [(named(number, one), one.family) for number, one in enumerate(proposals, 1)][:MOST]
+    for row, (text, kind) in enumerate(told):
+        color = LINES[kinds.index(kind) % len(LINES)]
+        figure.text(0.745, 0.88 - 0.045 * row, text, fontsize=SMALL, color=color)
+    key = "bubbles: stress over the\nallowable one; the smallest:\nno stress is modelled.\nDashed: what was wished"
+    figure.text(0.745, 0.88 - 0.045 * (len(told) + 2), key, fontsize=SMALL, color=GREY)
+    return figure
+
+
+@styled
+def to_one_scale(proposals: Sequence[Proposal], wish: Wish) -> Figure:
+    """Return every proposal as it is made, to one scale, in the room that was given."""
+    drawn = [_drawn(one) for one in proposals[:MOST]]
+    sizes = [_room_in_the_drawing(space, wish) for _, space in drawn]
+    wide, high = (max(size[k] for size in sizes) * 1.08 for k in (0, 1))
+    rows = -(-len(drawn) // COLUMNS)
+    columns = min(COLUMNS, len(drawn))
+    scale = min(150.0 / (columns * wide), 190.0 / (rows * high), 90.0 / max(wide, high))
+    cell = wide * scale, high * scale
+    figure = new_figure(160.0, rows * (cell[1] + 7.0) + 14.0)
+    total = figure.get_figheight() * 25.4
+    for number, ((moving, space), size) in enumerate(zip(drawn, sizes, strict=True)):
+        row, column = divmod(number, COLUMNS)
+        left = 5.0 + column * (150.0 / columns) + 0.5 * (150.0 / columns - cell[0])
+        ax = axes_mm(figure, (left, total - 8.0 - (row + 1) * (cell[1] + 7.0), *cell))
+        moving.draw(ax, 0)
+        _frame(ax, space, size, (wide, high))
+        ax.set_title(named(number + 1, proposals[number]), fontsize=SMALL, loc="left", pad=1.5)
+    figure.text(0.02, 1.0 - 5.0 / total, "the proposals to one scale, each in the room given", fontsize=NORMAL)
+    figure.text(0.02, 1.5 / total, _scale_told(wish), fontsize=SMALL, color=GREY)
+    return figure
+
+
+def _scale_told(wish: Wish) -> str:
+    sides = " x ".join(f"{1e3 * side:.4g}" for side in wish.room[:2])
+    return f"dashed: the room, {sides} mm across and along the travel"
+
+
+def _drawn(proposal: Proposal) -> Any:
+    """Return what draws a proposal, and its own room."""
+    record = family(proposal.family)
+    result = record.analyze(proposal.spec, Run())
+    return import_module(str(record.draw)).moving(result), function_named(str(record.room))(result)
+
+
+def _room_in_the_drawing(space: Any, wish: Wish) -> tuple[float, float]:
+    """Return width and height of the room as it lies in the family's drawings [m]."""
+    across, along = wish.room[:2]
+    if wish.kind == "torque":
+        # what turns may lie either way: the long side where it is long itself
+        long, short = max(across, along), min(across, along)
+        width, height = (space.along, space.across) if space.sideways else (space.across, space.along)
+        return (long, short) if width >= height else (short, long)
+    return (along, across) if space.sideways else (across, along)
+
+
+def _frame(ax: Axes, space: Any, size: tuple[float, float], view: tuple[float, float]) -> None:
+    """Draw the room around a mechanism, in the middle of a view."""
+    from matplotlib.patches import Rectangle
+
+    own = (space.along, space.across) if space.sideways else (space.across, space.along)
+    middle = [1e3 * (corner + 0.5 * side) for corner, side in zip(space.corner, own, strict=True)]
+    corner = [at - 500.0 * side for at, side in zip(middle, size, strict=True)]
+    look: dict[str, Any] = {"fill": False, "edgecolor": BAND, "linewidth": 0.8, "linestyle": (0, (5, 2)), "zorder": 6}
+    ax.add_patch(Rectangle((corner[0], corner[1]), 1e3 * size[0], 1e3 * size[1], **look))
+    ax.set_xlim(middle[0] - 500.0 * view[0], middle[0] + 500.0 * view[0])
+    ax.set_ylim(middle[1] - 500.0 * view[1], middle[1] + 500.0 * view[1])
+    ax.set_axis_off()
+
+
+__all__ = ["named", "pareto", "to_one_scale"]

@@ -1,0 +1,141 @@
+"""What a wish file may say."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import Field, field_validator, model_validator
+
+from cfmkit.families.wishes import Wish
+from cfmkit.specs.spec import Model, refuse
+from cfmkit.specs.units import Angle, Force, Length, Ratio, Torque, format_short
+from cfmkit.stock.spec import MaterialField  # noqa: TC001 - read by pydantic
+
+PositiveForce = Annotated[Force, Field(gt=0)]
+PositiveTorque = Annotated[Torque, Field(gt=0)]
+PositiveLength = Annotated[Length, Field(gt=0)]
+Share = Annotated[Ratio, Field(gt=0, lt=1)]
+
+MEAN = 0.025
+"""How far the mean may be from a force that is wished as a number; who wants less gives a band."""
+
+RIPPLE = 0.05
+"""Ripple where none is wished."""
+
+PROCESSES: dict[str, tuple[float, tuple[str, ...]]] = {
+    "fdm": (0.4e-3, ("pla", "petg", "abs")),
+    "sls": (0.7e-3, ("pa12-sls",)),
+    "laser": (0.3e-3, ("pom",)),
+    "wire-edm": (0.1e-3, ("aluminium-7075-t6", "titanium-6al-4v", "steel-1.4310")),
+    "mill": (0.5e-3, ("pom", "aluminium-7075-t6")),
+}
+"""Thinnest leaf [m] and materials of a process. Assumed: one line of a 0.4 mm nozzle, the wall that sintering services
+ask for, a few kerfs of a laser or a wire, the wall that a cutter leaves standing; a maker's own numbers go first."""
+
+PREFERENCES = ("size", "ripple", "parts", "stress", "depth")
+
+Prefer = Literal["size", "ripple", "parts", "stress", "depth"]
+
+
+class WishBlock(Model):
+    """What somebody wants of a mechanism. Force with travel, or torque with angle; every number is a hard limit."""
+
+    force: PositiveForce | tuple[PositiveForce, PositiveForce] | None = Field(
+        None, description="what is to be constant; or a band, in which every force has to lie: [19 N, 21 N]"
+    )
+    torque: PositiveTorque | tuple[PositiveTorque, PositiveTorque] | None = Field(
+        None, description="the same at a crank"
+    )
+    travel: PositiveLength | None = Field(None, description="over which the force is constant")
+    angle: Annotated[Angle, Field(gt=0)] | None = Field(None, description="over which the torque is constant")
+    ripple: Share = Field(RIPPLE, description="largest (max - min)/max over the travel, in each direction")
+    room: tuple[PositiveLength, ...] = Field(
+        min_length=2,
+        max_length=3,
+        description="box that it stays in, pressed or not, frame included: across the travel, along it, and the depth, "
+        "which may be left out",
+    )
+    material: MaterialField | tuple[MaterialField, ...] | None = Field(
+        None, description="what it may be made of: names from `show materials`, or values"
+    )
+    process: Literal["fdm", "sls", "laser", "wire-edm", "mill"] | None = Field(
+        None, description="how it is made: the thinnest leaf, and the materials unless they are given"
+    )
+    adjustable: tuple[PositiveForce, PositiveForce] | None = Field(
+        None, description="between which forces it is to be adjusted"
+    )
+    hysteresis: Share | None = Field(None, description="largest loss of a cycle, over its work")
+    cycles: Annotated[int, Field(ge=1)] | None = Field(
+        None, description="presses that it has to survive; not judged yet"
+    )
+    made_well: Share | None = Field(
+        None, alias="yield", description="share of made parts that is to be good; not judged yet"
+    )
+    prefer: tuple[Prefer, ...] = Field(("size", "ripple", "parts", "stress"), description="what decides the order")
+
+    @field_validator("force", "torque", "adjustable")
+    @classmethod
+    def _increasing(cls, value: Any) -> Any:
+        if isinstance(value, tuple) and not value[0] < value[1]:
+            raise ValueError("a range has to increase: the smaller value first")
+        return value
+
+    @model_validator(mode="after")
+    def _is_one_wish(self) -> Self:
+        if (self.force is None) == (self.torque is None):
+            raise ValueError("give either 'force' (with 'travel') or 'torque' (with 'angle')")
+        wanted, other = ("travel", "angle") if self.force is not None else ("angle", "travel")
+        what = "force" if self.force is not None else "torque"
+        if getattr(self, other) is not None:
+            raise ValueError(f"a {what} is constant over a {wanted}: '{other}' does not go with '{what}'")
+        if getattr(self, wanted) is None:
+            raise ValueError(f"'{wanted}' is missing: over which the {what} is constant")
+        return self
+
+    @model_validator(mode="after")
+    def _fits_itself(self) -> Self:
+        if self.travel is not None and self.travel >= self.room[1]:
+            told = f"a travel of {format_short(self.travel, 'length')} does not fit into the second side of the room, "
+            refuse("Wish", {("travel",): told + format_short(self.room[1], "length")})
+        if self.adjustable is not None:
+            if self.force is None:
+                refuse("Wish", {("adjustable",): "goes with 'force' only"})
+            low, high = self.ends
+            if not self.adjustable[0] <= high or not low <= self.adjustable[1]:
+                refuse("Wish", {("adjustable",): "the force wished is not in this range"})
+        return self
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """The band in which every force has to lie, or of what the mean may be [N or N m]."""
+        value: Any = self.force if self.force is not None else self.torque
+        return value if isinstance(value, tuple) else (value * (1.0 - MEAN), value * (1.0 + MEAN))
+
+    def wish(self) -> Wish:
+        """Return the same as families know it."""
+        value: Any = self.force if self.force is not None else self.torque
+        thinnest, usual = PROCESSES[self.process] if self.process else (None, ())
+        given = self.material if isinstance(self.material, tuple) else () if self.material is None else (self.material,)
+        blocks: tuple[dict[str, Any], ...] = tuple(one.model_dump(exclude_unset=True) for one in given)
+        low, high = self.ends
+        return Wish(
+            kind="force" if self.force is not None else "torque",
+            target=0.5 * (low + high) if isinstance(value, tuple) else value,
+            low=low,
+            high=high,
+            banded=isinstance(value, tuple),
+            travel=float(self.travel if self.travel is not None else self.angle or 0.0),
+            ripple=self.ripple,
+            room=self.room,
+            materials=blocks or tuple({"name": name} for name in usual),
+            adjustable=self.adjustable,
+            hysteresis=self.hysteresis,
+            **({} if thinnest is None else {"thinnest": thinnest}),
+        )
+
+
+class WishFile(Model):
+    """A file with a wish."""
+
+    cfmkit: Literal[1] = Field(1, description="schema version")
+    wish: WishBlock = Field(description="what is wanted")
