@@ -171,24 +171,16 @@ def files(found: Suggestions, block: WishBlock, run: Run, plots: bool) -> Iterat
 def _made(plots: bool, job: tuple[int, Proposal]) -> list[tuple[str, bytes]]:
     """Return the files of one proposal: its specification first, which `analyze` takes."""
     from cfmkit import api
-    from cfmkit.runs.files import files, geometry
+    from cfmkit.results import Design, Status
+    from cfmkit.runs.files import files
     from cfmkit.runs.run_findings import report_on
 
     _, proposal = job
     spec = proposal.spec
-    result = api.analyze(spec)
-    found = [("design.yaml", proposal.text.encode())]
-    found += list(files(report_on(result), plots))
-    from cfmkit.families import family
-
-    if family(spec.family).outline is not None and _has_a_part(proposal):
-        found += list(geometry(result.spec))
-    return found
-
-
-def _has_a_part(proposal: Proposal) -> bool:
-    """Return whether there is something to cut: springs at pins are links, which no drawing shows."""
-    return "at pins" not in proposal.variant
+    # springs at pins have links that no drawing shows: nothing of them is cut
+    design = None if "at pins" in proposal.variant else Design(spec, Status.COMPLETE)
+    found = dict(files(report_on(api.analyze(spec), design), plots))
+    return list(({"design.yaml": b""} | found | {"design.yaml": proposal.text.encode()}).items())
 
 
 def table(found: Suggestions) -> bytes:
