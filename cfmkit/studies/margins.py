@@ -451,7 +451,7 @@ def with_design_margins(given: Spec, design: Design, run: Run) -> Design:
 
 
 def _held(problem: Problem, sight: Sight, start: FloatArray) -> tuple[Found, int]:
-    """Return the design with margins and how many of `CHECKED` parts are good: more is requested until that is enough."""
+    """Return the design with margins and how many of `CHECKED` parts are good; more is requested until enough are."""
     best: tuple[Found, int] | None = None
     asked, x, began = problem.share, start, None
     for _ in range(ROUNDS):
