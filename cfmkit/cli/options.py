@@ -103,6 +103,7 @@ class Changing(Common):
             text="Replace a value of the spec, with its unit, e.g. --set mechanism.roller_radius='10 mm'. Repeatable. "
             """Put a key that itself has dots in quotes: 'sensitivity.parameters."mechanism.width"=[1 mm, 2 mm]'. """
             "With a family in front, for the specs of that family only: cam:mechanism.roller_radius='10 mm'.",
+            autocompletion=completion.changes,
         ),
     ] = None
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from cfmkit.plots.layout import laid_out, noted
-from cfmkit.plots.style import MM, NORMAL, in_form, is_to_scale, size_mm, styled
+from cfmkit.plots.style import MM, NORMAL, is_to_scale, size_mm, styled, with_settings
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -46,7 +46,7 @@ def composed(panels: Sequence[DrawnPanel], columns: int, form: FigureForm) -> Fi
     columns = min(columns, len(panels))
     width = (form.width or 0.174) * 1e3
     cell = (width - GAP * (columns - 1)) / columns
-    with in_form(replace(form, titles=False)):
+    with with_settings(form.settings, titles=False):
         return _composed(panels, columns, cell)
 
 

@@ -56,16 +56,27 @@ class FigureForm:
 
     def draw(self, make: Callable[[], Figure]) -> Figure:
         """Return a figure in this form."""
-        from cfmkit.plots.style import formed
+        from cfmkit.plots.layout import laid_out, noted
+        from cfmkit.plots.style import is_to_scale, with_settings
 
-        return formed(self, make)
+        with with_settings(self.settings, self.titles):
+            if self.width is None and self.titles:
+                return make()
+            figure, layout = noted(make)
+            if not layout.asked:
+                return figure
+            width = layout.size[0] if self.width is None else self.width * 1e3
+            return laid_out(make, layout.stretched(width, self.titles, is_to_scale(figure)))
 
     def write(self, figure: Figure, stem: str) -> Iterator[tuple[str, bytes]]:
         """Yield a figure's files as (name, content), below ``figures/``."""
         from cfmkit.plots.formats import written
+        from cfmkit.plots.style import with_settings
 
         for kind in self.formats:
-            yield f"figures/{stem}.{kind}", written(figure, kind, self)
+            with with_settings(self.settings, self.titles):
+                content = written(figure, kind)
+            yield f"figures/{stem}.{kind}", content
 
     def files(self, makers: Mapping[str, Callable[[], Figure]]) -> Iterator[tuple[str, bytes]]:
         """Yield the files of figures as (name, content), each when it is needed."""

@@ -11,12 +11,10 @@ from typing import TYPE_CHECKING, Any
 
 import matplotlib
 
-from cfmkit.plots.style import in_form, png, styled
+from cfmkit.plots.style import png, styled
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-    from cfmkit.plots.form import FigureForm
 
 _WRITERS: Any = {
     "svg.fonttype": "none",  # letters, not their outlines
@@ -42,10 +40,9 @@ def pdf(figure: Figure) -> bytes:
     return _written(figure, "pdf", {"CreationDate": None})
 
 
-def written(figure: Figure, kind: str, form: FigureForm) -> bytes:
-    """Return a figure as a file of the kind ``png``, ``svg`` or ``pdf``, with the settings of a form."""
-    with in_form(form):
-        return {"png": png, "svg": svg, "pdf": pdf}[kind](figure)
+def written(figure: Figure, kind: str) -> bytes:
+    """Return a figure as a file of the kind ``png``, ``svg`` or ``pdf``."""
+    return {"png": png, "svg": svg, "pdf": pdf}[kind](figure)
 
 
 def _written(figure: Figure, kind: str, metadata: dict[str, None]) -> bytes:

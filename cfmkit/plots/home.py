@@ -31,3 +31,23 @@ def _is_writable(folder: Path) -> bool:
     """Return whether a folder can be written, or made: then the nearest of those above it that exists counts."""
     there = next((one for one in (folder, *folder.parents) if one.exists()), Path("/"))
     return os.access(there, os.W_OK | os.X_OK)
+
+
+def kept_lists() -> Path:
+    """Return where matplotlib keeps its list of fonts."""
+    find_room()
+    import matplotlib
+
+    return Path(matplotlib.get_cachedir())
+
+
+def font_of_figures() -> tuple[str, str]:
+    """Return the name of the font that figures are written in, and its file; empty where it is missing."""
+    find_room()
+    from matplotlib.font_manager import FontProperties, findfont
+
+    name = "DejaVu Sans"
+    try:
+        return name, str(findfont(FontProperties(family=name), fallback_to_default=False))
+    except ValueError:
+        return name, ""

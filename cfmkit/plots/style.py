@@ -29,7 +29,7 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from cfmkit.plots.layout import current, laid_out, noted
+from cfmkit.plots.layout import current
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -37,8 +37,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import SubFigure
     from numpy.typing import NDArray
-
-    from cfmkit.plots.form import FigureForm
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -167,29 +165,19 @@ def has_titles() -> bool:
 
 
 @contextmanager
-def in_form(form: FigureForm) -> Iterator[None]:
-    """Apply the settings of a form, and whether headings are written, inside a ``with`` block."""
-    settings, titles = _SETTINGS_OF_USER.set(form.settings), _TITLES.set(form.titles)
+def with_settings(settings: tuple[tuple[str, Any], ...], titles: bool) -> Iterator[None]:
+    """Apply more settings of matplotlib, and whether headings are written, inside a ``with`` block."""
+    mine, headed = _SETTINGS_OF_USER.set(settings), _TITLES.set(titles)
     try:
         yield
     finally:
-        _SETTINGS_OF_USER.reset(settings)
-        _TITLES.reset(titles)
+        _SETTINGS_OF_USER.reset(mine)
+        _TITLES.reset(headed)
 
 
 def is_to_scale(figure: Figure) -> bool:
     """Return whether something in a figure has one scale in both directions."""
     return any(ax.get_aspect() != "auto" for ax in figure.axes)
-
-
-def formed(form: FigureForm, make: Callable[[], Figure]) -> Figure:
-    """Return a figure in the form that is requested."""
-    with in_form(form):
-        if form.width is None and form.titles:
-            return make()
-        figure, layout = noted(make)
-        width = layout.size[0] if form.width is None else form.width * 1e3
-        return laid_out(make, layout.stretched(width, form.titles, is_to_scale(figure))) if layout.asked else figure
 
 
 @styled

@@ -110,8 +110,10 @@ def example(name: str) -> Example:
     raise UsageError(f"there is no example {visible(name)!r}{hint}")
 
 
-def copy(name: str, out: str | os.PathLike[str] = ".") -> tuple[Path, ...]:
+def copy(name: str, out: str | os.PathLike[str] = ".", schema: bool = False) -> tuple[Path, ...]:
     """Copy an example with the data files that it names, and return what was written; nothing is replaced.
+
+    With `schema` it gets the line by which editors find the schema of its family, and that file, which may be replaced.
 
     Raises
     ------
@@ -140,13 +142,30 @@ def copy(name: str, out: str | os.PathLike[str] = ".") -> tuple[Path, ...]:
         for place, source in wanted.items():
             with reporting(place):
                 make_folders(place.absolute().parent)
-                write_new(place, source.read_bytes())
+                write_new(place, source.read_bytes() if place != target else _text(chosen, schema))
             written.append(place)
     except OutputError:
         for place in written:
             discard(place)
         raise
+    if schema and chosen.family != "figure":
+        from cfmkit.families import family
+        from cfmkit.runs.editor_schema import content, file_name
+        from cfmkit.store import atomic_write
+
+        record = family(chosen.family)
+        written.append(target.with_name(file_name(record)))
+        atomic_write(written[-1], content(record))
     return tuple(written)
+
+
+def _text(chosen: Example, schema: bool) -> bytes:
+    """Return an example's own text, with the line by which editors find its schema where that is requested."""
+    from cfmkit.families import family
+    from cfmkit.runs.editor_schema import with_line
+
+    text = chosen.path.read_bytes()
+    return with_line(text.decode(), family(chosen.family)).encode() if schema and chosen.family != "figure" else text
 
 
 def _refuse_taken(places: Iterable[Path]) -> None:

@@ -41,6 +41,8 @@ def run(options: DoctorOptions, terminal: Terminal) -> Answer:
         "packages": list(_packages()),
         "folders": [_folder(what, path) for what, path in _folders().items()],
         "solver": _solver(),
+        "fonts": _fonts(),
+        "caches": list(_caches()),
         "families": list(_families()),
     }
     troubles = tuple(_troubles(found))
@@ -102,6 +104,25 @@ def _solver() -> Record:
     return {"compiled": folder is not None, "folder": None if folder is None else str(folder)}
 
 
+def _fonts() -> Record:
+    """Return the font of all figures and where it is: it comes with matplotlib, and another one changes their bytes."""
+    from cfmkit.plots.home import font_of_figures
+
+    name, path = font_of_figures()
+    return {"name": name, "path": path}
+
+
+def _caches() -> Iterator[Record]:
+    """Yield what cfmkit and its libraries keep between runs: everything there can be deleted and is made again."""
+    from cfmkit.elastica.kernels.kept import folders
+    from cfmkit.plots.home import kept_lists
+
+    for what, path in {"compiled solver": next(iter(folders())), "list of fonts": kept_lists()}.items():
+        files = [one for one in Path(path).glob("*") if one.is_file()] if Path(path).is_dir() else []
+        size = sum(one.stat().st_size for one in files)
+        yield {"name": what, "path": str(path), "files": len(files), "megabytes": round(size / 1e6, 2)}
+
+
 def _families() -> Iterator[Record]:
     """Yield every family that is offered, with what is wrong with it."""
     from cfmkit import families
@@ -125,6 +146,8 @@ def _troubles(found: Mapping[str, Any]) -> Iterator[str]:
     for one in found["folders"]:
         if not one["writable"]:
             yield f"{one['path']} cannot be written to: {one['name']}"
+    if not found["fonts"]["path"]:
+        yield f"the font {found['fonts']['name']} is not there: figures get another one, and other bytes"
     for one in found["families"]:
         if one["reason"]:
             yield one["reason"]
@@ -138,6 +161,10 @@ def _page(found: Mapping[str, Any], troubles: Sequence[str]) -> Iterator[Block]:
     yield from listed("folders", found["folders"], (field("name"), Field("", _access), field("path", wraps=True)))
     compiled = found["solver"]["folder"] or "not yet: about half a minute at the first use, or `cfmkit warm`"
     yield from listed("beam solver", [{"compiled": compiled}], (field("compiled", wraps=True),))
+    fonts = {"name": found["fonts"]["name"], "path": found["fonts"]["path"] or "not found: matplotlib is not whole"}
+    yield from listed("font of the figures", [fonts], (field("name"), field("path", wraps=True)))
+    size = Field("size", lambda one: f"{one['files']} files, {one['megabytes']} MB")
+    yield from listed("caches (may be deleted)", found["caches"], (field("name"), size, field("path", wraps=True)))
     state = Field("state", lambda one: one["reason"] or one["state"], wraps=True)
     yield from listed("families", found["families"], (field("name"), field("package"), field("version"), state))
     told = [f"warning  {one}" for one in troubles] or ["nothing is wrong"]

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cfmkit.cli.answer import Answer
-from cfmkit.cli.options import Common, Jobs, argument, option
+from cfmkit.cli.options import Common, Jobs, argument, flag, option
 from cfmkit.cli.page_blocks import BAD, GOOD, Paragraph, command_line, field, listed
 from cfmkit.errors import UsageError, visible
 
@@ -32,6 +32,9 @@ class ExamplesOptions(Common):
         str | None,
         option("--run", metavar="NAME|all", text="Run one, or all, to check this installation; nothing is kept."),
     ] = None
+    schema: Annotated[
+        bool, flag("--schema", text="With a copy: write the JSON schema, too, and the line by which editors find it.")
+    ] = False
     jobs: Jobs = None
 
 
@@ -44,15 +47,15 @@ def run(options: ExamplesOptions, terminal: Terminal) -> Answer:
             raise UsageError("--run keeps nothing: it takes neither NAME nor --out")
         return _checked(options.run, options, terminal)
     if options.name is not None:
-        written = [str(path) for path in copy(options.name, options.out or ".")]
+        written = [str(path) for path in copy(options.name, options.out or ".", options.schema)]
         verb = _verb(example(options.name).family, written[0])
         page = (
             Paragraph("written", ", ".join(map(visible, written)), GOOD),
             Paragraph("next", command_line("cfmkit", verb, written[0])),
         )
         return Answer({"files": written}, page)
-    if options.out is not None:
-        raise UsageError("--out says where a copy goes: name an example")
+    if options.out is not None or options.schema:
+        raise UsageError("--out and --schema are for a copy: name an example")
     records = [{"name": one.name, "family": one.family, "about": one.about} for one in examples()]
     fields = (field("name"), field("family"), field("about", wraps=True))
     return Answer({"examples": records}, tuple(listed("examples", records, fields)))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cfmkit.cli import completion
 from cfmkit.cli.answer import Answer
-from cfmkit.cli.options import Common, argument, option
+from cfmkit.cli.options import Common, argument, flag, option
 from cfmkit.cli.page_blocks import GOOD, Paragraph, Verbatim, command_line
 from cfmkit.errors import UsageError, visible
 
@@ -28,20 +28,32 @@ class NewOptions(Common):
         str | None,
         option("-o", "--out", metavar="FILE", text="File to write, - prints it; default: FAMILY.yaml."),
     ] = None
+    schema: Annotated[
+        bool, flag("--schema", text="Write the JSON schema beside it, too, and the line by which editors find it.")
+    ] = False
 
 
 def run(options: NewOptions, terminal: Terminal) -> Answer:
     """Write a commented spec to start from; an existing file is never replaced."""
     from cfmkit.families import family
+    from cfmkit.runs.editor_schema import content, file_name, with_line
 
-    text = template(options.family)
+    record = family(options.family)
+    text = with_line(template(options.family), record) if options.schema else template(options.family)
     name = f"{options.family}.yaml" if options.out is None else options.out
     if name == "-":
         return Answer({"family": options.family, "text": text}, (Verbatim(text),))
     _write(Path(name), text)
-    verb = "design" if family(options.family).design else "analyze"
-    page = Paragraph("written", visible(name), GOOD), Paragraph("next", command_line("cfmkit", verb, name))
-    return Answer({"family": options.family, "file": name}, page)
+    names = [name]
+    if options.schema:
+        from cfmkit.store import atomic_write
+
+        names.append(str(Path(name).with_name(file_name(record))))
+        atomic_write(names[-1], content(record))  # it holds nothing of the user's: that of another version is replaced
+    verb = "design" if record.design else "analyze"
+    page = Paragraph("written", ", ".join(map(visible, names)), GOOD)
+    follow = Paragraph("next", command_line("cfmkit", verb, name))
+    return Answer({"family": options.family, "file": name, "files": names}, (page, follow))
 
 
 def template(name: str) -> str:

@@ -27,11 +27,11 @@ class SchemaOptions(Common):
 def run(options: SchemaOptions, terminal: Terminal) -> Answer:
     """Print the JSON schema of specs, for editors."""
     from cfmkit import families
-    from cfmkit.specs.keys import schema
+    from cfmkit.runs.editor_schema import schema
 
     if options.family is not None:
-        return _answer(schema({options.family: families.family(options.family).spec_type}))
-    return told_of(families.skipped(), _answer(schema({one.name: one.spec_type for one in families.records()})))
+        return _answer(schema([families.family(options.family)]))
+    return told_of(families.skipped(), _answer(schema(families.records())))
 
 
 def _answer(found: dict[str, Any]) -> Answer:

@@ -1,0 +1,79 @@
+"""The JSON schema of specifications with the names of metrics, and the line by which an editor finds it.
+
+`cfmkit.specs` knows keys and units; which metrics there are, and of which branches, only the families say.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from cfmkit.metrics import known_metrics, values_of_family
+from cfmkit.specs.keys import schema as plain_schema
+from cfmkit.tables.jsontext import json_bytes
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+    from cfmkit.families.base import Family
+
+LINE = "# yaml-language-server: $schema="
+"""How the line begins by which the YAML language server, and so most editors, finds a schema."""
+
+
+def schema(records: Iterable[Family]) -> dict[str, Any]:
+    """Return the schema of the specifications of some families; metrics are a closed list of names.
+
+    Parameters
+    ----------
+    records : iterable of Family
+        One: its specifications alone; several: any of theirs.
+    """
+    known = {record.name: record for record in records}
+    found = plain_schema({name: record.spec_type for name, record in known.items()})
+    for title, block in found.get("$defs", {}).items():
+        prefix, dot, name = title.rpartition(".")
+        names = [*metric_names(known[prefix] if dot else next(iter(known.values())))]
+        properties = block.get("properties", {})
+        if name in ("Requirement", "PartRequirement") and "metric" in properties:
+            properties["metric"] = _closed(properties["metric"], names)
+        elif name in ("Sweep", "Sensitivity") and "items" in properties.get("metrics", {}):
+            properties["metrics"] = properties["metrics"] | {"items": _closed(properties["metrics"]["items"], names)}
+    return found
+
+
+def metric_names(record: Family) -> Iterator[str]:
+    """Yield what a requirement of a family may name: every metric and value, those of a branch with its name."""
+    for item in known_metrics(None, values_of_family(record.values)):
+        yield item.name
+        if item.scope == "branch" and len(record.branches) > 1:
+            yield from (f"{item.name}[{branch}]" for branch in record.branches)
+
+
+def _closed(node: dict[str, Any], names: list[str]) -> dict[str, Any]:
+    """Return the schema of a name: one of those that are known, or one with brackets, which may hold more."""
+    kept = {key: value for key, value in node.items() if key != "type"}
+    return kept | {"anyOf": [{"enum": names}, {"type": "string", "pattern": r"^[a-z0-9_]+\[.+\]$"}]}
+
+
+def file_name(record: Family) -> str:
+    """Return what the file of a family's schema is called beside a specification.
+
+    Examples
+    --------
+    >>> from cfmkit.families import family
+    >>> file_name(family("cam"))
+    'cfmkit-cam.schema.json'
+    """
+    return f"cfmkit-{record.name}.schema.json"
+
+
+def with_line(text: str, record: Family) -> str:
+    """Return a specification that tells editors where its schema is."""
+    if text.startswith(LINE):
+        return text
+    return f"{LINE}{file_name(record)}\n{text}"
+
+
+def content(record: Family) -> bytes:
+    """Return the file of a family's schema."""
+    return json_bytes(schema([record]))

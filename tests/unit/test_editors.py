@@ -1,0 +1,83 @@
+"""What editors and shells are told: metrics, the line that finds the schema, keys of --set; what the recipe lists."""
+
+import json
+import re
+import tomllib
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+import cfmkit
+from cfmkit import families
+from cfmkit.cli import completion
+from cfmkit.cli.main import main
+from cfmkit.runs.editor_schema import LINE, metric_names, schema
+
+ROOT = Path(__file__).parents[2]
+EXAMPLES = [one for one in cfmkit.examples() if one.family != "figure" and "/" not in one.name]
+
+
+@pytest.mark.parametrize("name", ["cam", "beam", "vcfm", "slider-crank"])
+def test_the_schema_lists_every_metric_that_an_example_requires(name):
+    found = schema([families.family(name)])
+    closed, pattern = found["$defs"]["Requirement"]["properties"]["metric"]["anyOf"]
+    names = set(closed["enum"])
+    assert names == set(metric_names(families.family(name)))
+    required = {
+        requirement.metric
+        for one in EXAMPLES
+        if one.family == name
+        for requirement in cfmkit.load(one.path).requirements
+    }
+    assert required
+    assert all(metric in names or re.match(pattern["pattern"], metric) for metric in required)
+    assert "force_rippel" not in names
+
+
+def test_new_and_examples_write_the_schema_that_their_first_line_names(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(["new", "vcfm", "--schema", "--json"]) == 0
+    assert main(["examples", "cam_as_built", "--schema", "--json"]) == 0
+    for spec in ("vcfm.yaml", "cam_as_built.yaml"):
+        first = Path(spec).read_text().splitlines()[0]
+        assert first.startswith(LINE)
+        assert json.loads(Path(first.removeprefix(LINE)).read_text())["$defs"]["Requirement"]
+        cfmkit.load(spec)
+    assert main(["examples", "--schema"]) == 2
+
+
+def test_without_the_option_nothing_is_different(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(["new", "cam", "--json"]) == 0
+    assert [one.name for one in tmp_path.iterdir()] == ["cam.yaml"]
+    assert not Path("cam.yaml").read_text().startswith(LINE)
+
+
+def completed(text, **named):
+    return completion.changes(SimpleNamespace(params=named), text)
+
+
+def test_keys_of_set_are_those_of_the_family_on_the_command_line():
+    cam = str(ROOT / "configs" / "cam.yaml")
+    assert "mechanism.roller_radius=" in completed("mechanism.ro", spec=cam)
+    assert all(word.startswith("mechanism.ro") for word in completed("mechanism.ro", spec=cam))
+    assert "mechanism.bistable.length=" not in completed("mechanism.", spec=cam)
+    assert "mechanism.bistable.length=" in completed("mechanism.b", spec="nowhere.yaml")
+    assert "mechanism.bistable.length=" in completed("mechanism.b", specs=(str(ROOT / "configs/vcfm_pla.yaml"),))
+
+
+def test_after_the_sign_of_equality_come_the_words_of_a_closed_choice():
+    found = completed("mechanism.positive.structure=", spec=str(ROOT / "configs/vcfm_pla.yaml"))
+    assert "mechanism.positive.structure=diamond" in found
+    assert completed("mechanism.positive.length=", spec=str(ROOT / "configs/vcfm_pla.yaml")) == []
+
+
+def test_the_recipe_for_conda_needs_what_the_package_needs():
+    other = {"matplotlib-base": "matplotlib"}
+    recipe = (ROOT / "conda" / "meta.yaml").read_text()
+    run = recipe[recipe.index("  run:") : recipe.index("\ntest:")]
+    listed = {tuple(line.strip("- ").split(" >=")) for line in run.splitlines()[1:] if ">=" in line}
+    listed = {(other.get(name, name), version) for name, version in listed if name != "python"}
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    assert listed == {tuple(one.lower().split(">=")) for one in project["dependencies"]}
