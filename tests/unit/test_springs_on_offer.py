@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,11 +13,15 @@ from pydantic import ValidationError
 
 import cfmkit
 from cfmkit.errors import DataError
+from cfmkit.families import family
+from cfmkit.families.base import Run
+from cfmkit.families.slider_crank.springs.assembly import assemble
 from cfmkit.stock.springs.catalogue import Miss, generic, nearest
 from cfmkit.stock.springs.spec import CatalogueSpring, offers
 from cfmkit.stock.springs.wound import Wound
 from cfmkit.tables.source import DataSource
 
+CONFIGS = Path(__file__).parents[2] / "configs"
 WANTED = {"force": "50 N", "stroke": "200 mm", "choose": "catalogue"}
 
 
@@ -150,3 +156,59 @@ def test_a_design_with_the_generic_series_is_written_and_read_again(tmp_path):
     again = cfmkit.loads(cfmkit.dumps(found.spec)) if hasattr(cfmkit, "loads") else found.spec
     assert again.mechanism.springs.name == found.spec.mechanism.springs.name
     assert again.design.catalogue == "generic"
+
+
+LIST = (
+    {"name": "T-30", "kind": "torsion", "rate": "30 N*mm/rad", "counts": (1, 2)},
+    {"name": "T-35", "kind": "torsion", "rate": "35 N*mm/rad", "counts": (1,)},
+    {"name": "T-7", "kind": "torsion", "rate": "7 N*mm/rad", "counts": (1, 2, 3)},
+    {"name": "weak", "kind": "torsion", "rate": "33 N*mm/rad", "max_angle": "20 deg", "counts": (1,)},
+)
+
+
+def cranked(**changes):
+    given = cfmkit.load(CONFIGS / "slider_crank_bought.yaml")
+    spec = given.replace({f"design.{key}": value for key, value in ({"catalogue": LIST} | changes).items()})
+    return spec, family("slider-crank").design(spec, Run())
+
+
+def test_of_a_list_the_programme_takes_what_trying_all_of_it_takes():
+    """Every joint: nothing, or one of the five combinations of spring and number that are not overwound."""
+    spec, found = cranked(tolerance="20 %")
+    rates = sorted({0.0, *(float(f"{n * r:.9g}") for r, ns in ((30, (1, 2)), (35, (1,)), (7, (1, 2, 3))) for n in ns)})
+    motion = np.linspace(0.001, 0.035, 1001)
+    unit = assemble(spec).units(motion).effort[:3] * 1e-3
+    deviations = {
+        trial: np.abs(np.array(trial) @ unit / 1.5 - 1.0).max() for trial in itertools.product(rates, repeat=3)
+    }
+    best = min(deviations.values())
+    springs = found.spec.mechanism.springs
+    got = deviations[tuple(float(f"{1e3 * rate:.9g}") for rate in springs.rates[:3])]
+    assert got == pytest.approx(best, rel=2e-3)
+    assert {one.name for one in springs.bought} <= {"T-30", "T-35", "T-7"}
+    for one in springs.bought:
+        rate = {"T-30": 30.0, "T-35": 35.0, "T-7": 7.0}[one.name] * one.count
+        assert getattr(springs, one.at) == pytest.approx(rate * 1e-3)
+
+
+def test_a_spring_that_the_window_overwinds_is_not_taken_however_well_it_would_fit():
+    only = ({"name": "weak", "kind": "torsion", "rate": "33 N*mm/rad", "max_angle": "20 deg", "counts": (1,)},)
+    _, found = cranked(catalogue=only)
+    assert found.spec is None
+    assert found.status.exit_code == 4
+    assert "it allows 20 deg" in found.message
+
+
+def test_where_no_set_keeps_the_tolerance_the_nearest_three_are_told():
+    _, found = cranked(tolerance="0.01 %")
+    assert found.spec is None
+    assert found.message.count("off by") == 3
+    shares = [float(text.split("%")[0]) for text in found.message.split("off by ")[1:]]
+    assert shares == sorted(shares)
+
+
+def test_a_pair_needs_every_spring_twice():
+    spec, _ = cranked()
+    pair = spec.replace({"mechanism.copies": "mirrored"})
+    counts = [family("slider-crank").analyze(one, Run()).tables["parts"]().columns[2].cells() for one in (spec, pair)]
+    assert counts == [[1, 1, 1], [2, 2, 2]]

@@ -33,6 +33,7 @@ FINDINGS = {
     "infeasible_targets": "no springs meet the targets of the design",
     "spring_at_bound": "a spring rate is at one of its bounds",
     "spring_dropped": "the best rate of a spring is zero: the design does without it",
+    "no_spring_fits": "no springs of the catalogue hold the target within the limits",
     "near_optima": "many designs are equally good: a secondary criterion chose among them",
     "window_not_proven": "the widest window found is not proven to be the widest: a wider one may exist",
     "straight_start": "the chain is exactly straight: it buckles, and only chance or a guide decides to which side",

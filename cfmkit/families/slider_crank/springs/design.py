@@ -22,6 +22,7 @@ from cfmkit.families.refusals import CannotBuild, Infeasible, no_design
 from cfmkit.families.slider_crank.build import resolve
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.springs.assembly import TURN, default_motion
+from cfmkit.families.slider_crank.springs.bought import choose
 from cfmkit.families.slider_crank.springs.outcome import (
     Solved,
     about_springs,
@@ -216,6 +217,12 @@ def solve(task: Task, tolerance: float | None = None) -> Solved:
         text = "in the window the effort is unbounded: a dead point, or the stretched position, lies in it"
         text += f"; change 'design.{task.assembly.motion_name}'"
         raise Infeasible(finding("infeasible_targets", text))
+    if wanted.catalogue:
+        picked = choose(task, goal, window)
+        if picked.deviation > HOPELESS and wanted.tolerance is None:
+            raise Infeasible(hopeless(task, picked.deviation))
+        rms, places = goal.rms(picked.rates), len(goal.wanted)
+        return Solved(task, window, picked.rates, picked.deviation, rms, proven, places, bought=picked.options)
     rates = least_squares(goal) if wanted.objective == "least-squares" else minimax(goal)
     if rates is None:
         raise Infeasible(cannot_hold(task))
@@ -236,7 +243,8 @@ def _written(solved: Solved) -> SliderCrankSpec:
     spec, wanted = resolve(solved.task.spec), solved.task.wanted
     rates = dict(zip(JOINTS, solved.rates.tolist(), strict=True))
     anchor = {"anchor": spec.mechanism.springs.anchor or 0.0} if wanted.adjustment is not None else {}
-    springs = spec.mechanism.springs.model_copy(update=rates | anchor)
+    bought = {"bought": tuple(option.written for option in solved.bought)}
+    springs = spec.mechanism.springs.model_copy(update=rates | anchor | bought)
     mechanism = spec.mechanism.model_copy(update={"springs": springs})
     if any(getattr(wanted, name) is not None for name in ("crank_length", "offset")):
         mechanism = solved.task.spec.mechanism.model_copy(update={"springs": springs})
@@ -317,6 +325,8 @@ def even_best(spec: SliderCrankSpec, names: tuple[str, ...], search: Lowest) -> 
 
 def alternatives(solved: Solved, search: Lowest | None) -> tuple[Finding, ...]:
     """Return how far rates and lengths may move without harm, if they may move far."""
+    if solved.bought:
+        return ()
     told = [text for text in (_of_lengths(solved, search), _of_rates(solved)) if text]
     if not told:
         return ()

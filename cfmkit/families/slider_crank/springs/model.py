@@ -29,7 +29,8 @@ from cfmkit.families.slider_crank.springs.solution import Character, ClosedForm,
 from cfmkit.families.slider_crank.springs.values import values_of
 from cfmkit.families.slider_crank.unit_springs import JOINTS
 from cfmkit.results import Result, Status
-from cfmkit.specs.units import between
+from cfmkit.specs.units import between, format_short
+from cfmkit.stock.parts import Part, listed
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -83,8 +84,23 @@ def analyze(spec: SliderCrankSpec, run: Run) -> Result:
         target=target_of(spec),
         reference=solution.reference,
         closed=ClosedForm(solution.character),
+        tables=listed(parts_of(spec)),
         state=solution,
     )
+
+
+def parts_of(spec: SliderCrankSpec) -> tuple[Part, ...]:
+    """Return the bought parts: springs that the specification names, and pins; of all legs together."""
+    mechanism, found = spec.mechanism, []
+    for one in mechanism.springs.bought:
+        value = getattr(mechanism.springs, one.at)
+        rate = format_short(value, "stiffness" if one.at == "slider" else "rotational_stiffness")
+        kind = "spring" if one.at == "slider" else "torsion spring"
+        place = one.at.replace("_", " ")
+        found.append(Part(place, one.name, one.count * mechanism.sets, f"{kind}, {rate} of all in one leg"))
+    if mechanism.pins:
+        found.append(Part("joints", "", 3 * mechanism.sets, f"pin, diameter {mm(mechanism.pins.diameter)}"))
+    return tuple(found)
 
 
 def target_of(spec: SliderCrankSpec) -> float | None:

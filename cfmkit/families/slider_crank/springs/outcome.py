@@ -19,6 +19,7 @@ from cfmkit.specs.units import format_short
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.families.slider_crank.spec import CrankDesign, SliderCrankSpec
+    from cfmkit.families.slider_crank.springs.bought import Option
     from cfmkit.families.slider_crank.springs.targets import Task
     from cfmkit.results import Finding, Searched
 
@@ -43,6 +44,8 @@ class Solved:
         At so many of the window the deviations were looked at.
     exact : bool
         Whether deviation and rms are those that the analysis of the design measures.
+    bought : tuple of Option
+        Springs of a catalogue; none where any rate may be had.
     """
 
     task: Task
@@ -53,6 +56,7 @@ class Solved:
     proven: bool = True
     places: int = 0
     exact: bool = False
+    bought: tuple[Option, ...] = ()
 
     @property
     def judged(self) -> tuple[float, float]:
@@ -178,6 +182,8 @@ def active_bounds(solved: Solved, wanted: CrankDesign) -> tuple[str, ...]:
 def about_springs(solved: Solved) -> tuple[Finding, ...]:
     """Return what to say about springs that are not needed, and about those that would like to be stiffer."""
     found, wanted = [], solved.task.wanted
+    if solved.bought:
+        return ()  # which joint gets none is the choice of the catalogue's springs
     gone = [name for name, rate in zip(JOINTS, solved.rates, strict=True) if rate == 0.0 and name in wanted.springs]
     if gone:
         names = " and ".join(name.replace("_", " ") for name in gone)

@@ -8,11 +8,23 @@ from pydantic import Field, model_validator
 
 from cfmkit.specs.spec import DesignBlock, Model
 from cfmkit.specs.units import Angle, Force, Length, Ratio, RotationalStiffness, Stiffness, Torque
+from cfmkit.stock.springs.spec import Catalogue
 
 PositiveLength = Annotated[Length, Field(gt=0)]
 PositiveAngle = Annotated[Angle, Field(gt=0)]
 TorsionRate = Annotated[RotationalStiffness, Field(ge=0)]
 ExtensionRate = Annotated[Stiffness, Field(ge=0)]
+
+
+JointName = Literal["pivot", "crank_pin", "slider_pin", "slider"]
+
+
+class Bought(Model):
+    """A spring of one leg that is bought."""
+
+    at: JointName = Field(description="where it is")
+    name: str = Field(min_length=1, description="part number")
+    count: int = Field(1, ge=1, le=1000, description="how many in parallel in one leg")
 
 
 class Springs(Model):
@@ -27,6 +39,8 @@ class Springs(Model):
         description="how far the anchor of the slider's spring is screwed beyond where that spring is relaxed in the "
         "unloaded position: a trim, positive adds force against the travel; needs 'slider'",
     )
+
+    bought: tuple[Bought, ...] = Field((), description="springs as they are bought, for the list of parts")
 
     @property
     def rates(self) -> tuple[float, float, float, float]:
@@ -43,7 +57,6 @@ class Limits(Model):
     slider: PositiveLength | None = Field(None, description="travel of the slider")
 
 
-JointName = Literal["pivot", "crank_pin", "slider_pin", "slider"]
 PositiveForce = Annotated[Force, Field(gt=0)]
 
 
@@ -87,6 +100,11 @@ class SpringDesign(DesignBlock):
     )
     springs: tuple[JointName, ...] = Field(
         ("pivot", "crank_pin", "slider_pin", "slider"), min_length=1, description="those that may be used"
+    )
+    catalogue: Catalogue | None = Field(
+        None,
+        description="springs to pick from, at most one kind per joint: a list, a CSV file beside the specification, "
+        "or `generic`; default: any rate",
     )
     max_rates: MaxRates | None = Field(None, description="largest rates; no limit unless given")
     crank_length: tuple[PositiveLength, PositiveLength] | None = Field(
