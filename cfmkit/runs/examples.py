@@ -129,7 +129,9 @@ def copy(name: str, out: str | os.PathLike[str] = ".", schema: bool = False) -> 
 
     chosen = example(name)
     target = Path(out) / chosen.path.name
-    if is_figure(str(chosen.path)):
+    composed = is_figure(str(chosen.path))
+    schema = schema and not composed
+    if composed:
         from cfmkit.runs.composed_figure import read
 
         data = [(panel.run, chosen.path.parent / panel.run) for panel in read(str(chosen.path)).panels]
@@ -148,7 +150,7 @@ def copy(name: str, out: str | os.PathLike[str] = ".", schema: bool = False) -> 
         for place in written:
             discard(place)
         raise
-    if schema and chosen.family != "figure":
+    if schema:
         from cfmkit.families import family
         from cfmkit.runs.editor_schema import content, file_name
         from cfmkit.store import atomic_write
@@ -165,7 +167,7 @@ def _text(chosen: Example, schema: bool) -> bytes:
     from cfmkit.runs.editor_schema import with_line
 
     text = chosen.path.read_bytes()
-    return with_line(text.decode(), family(chosen.family)).encode() if schema and chosen.family != "figure" else text
+    return with_line(text.decode(), family(chosen.family)).encode() if schema else text
 
 
 def _refuse_taken(places: Iterable[Path]) -> None:
