@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from cfmkit.cli.terminal import Terminal
 
 PLACE = 23
+EXAMPLE = "cfmkit explore cam.yaml"
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from cfmkit.cli.terminal import Terminal
 
 PLACE = 36
+EXAMPLE = "cfmkit figure figure.yaml --figures pdf"
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from cfmkit.cli.terminal import Terminal
 
 PLACE = 5
+EXAMPLE = "cfmkit suggest --force '20 N' --travel '10 mm' --room 100x100x20mm"
 
 BUDGET = "60s"
 
@@ -34,7 +35,7 @@ class SuggestOptions(Common):
     """Arguments and options."""
 
     wish: Annotated[
-        str | None, argument("[WISH]", "YAML file with a block 'wish'; - reads standard input.", completion.specs)
+        str | None, argument("WISH", "YAML file with a block 'wish'; - reads standard input.", completion.specs)
     ] = None
     force: Annotated[str | None, _key("force", "FORCE", "Constant force, '20 N', or a band, '[19 N, 21 N]'.")] = None
     torque: Annotated[str | None, _key("torque", "TORQUE", "Constant torque, '100 N*mm', or a band.")] = None
