@@ -9,6 +9,7 @@ bifurcation: from a little beyond it the part is pushed along its softest mode u
 from __future__ import annotations
 
 import enum
+import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -31,8 +32,9 @@ FARTHEST = 2.5
 """Step, in those of the last one, up to which a cubic is a better prediction than a tangent."""
 GROWTH = 2.0
 """Of the step after one that was easy."""
-CORNER = 0.3
-"""Change of the stiffness, in parts of the larger one, that no smooth curve makes within a few smallest steps."""
+CORNER, SEEN, SHORT = 0.3, 0.1, 8.0
+"""Change of the stiffness, in parts of the larger one and of the largest so far, for which steps are cut, down to so
+many smallest ones: a smooth curve changes less and less, one that does not has a corner, as at a bifurcation."""
 PUSHES = np.geomspace(1e-4, 0.1, 13)
 """Amplitudes along the softest mode, in parts of the part's size: a branch leaves its bifurcation like a root."""
 BEYOND = (2.0, 8.0, 32.0)
@@ -106,7 +108,11 @@ def follow(problem: Problem, stops: Sequence[float], report: Callable[[float], N
         while state.travel != stop:
             ahead = stop if abs(stop - state.travel) <= abs(step) * (1 + 1e-9) else state.travel + step
             found = advanced(problem, state, ahead, before)
+            steepest = max(abs(pose.stiffness) for pose in course.poses)
             if found is not None and found.unstable <= state.unstable:
+                if bends(state, found, steepest) and abs(ahead - state.travel) > SHORT * SMALLEST * abs(span):
+                    step = 0.5 * (ahead - state.travel)  # between poses the curve is a cubic: none has a corner
+                    continue
                 step = GROWTH * (ahead - state.travel)
             elif abs(ahead - state.travel) > SMALLEST * abs(span):
                 step = 0.5 * (ahead - state.travel)
@@ -118,18 +124,20 @@ def follow(problem: Problem, stops: Sequence[float], report: Callable[[float], N
                 if found is None:
                     return replace(course, ending=_ending(start, state, beyond))
             before = state.kept()
-            if bends(state, found, 8 * SMALLEST * abs(span)):
-                course = replace(course, bifurcations=(*course.bifurcations, state.travel))
+            if bends(state, found, steepest):
                 before = None  # no cubic leads round a corner
+                last = course.bifurcations[-1] if course.bifurcations else math.inf
+                if abs(state.travel - last) > 8 * SHORT * SMALLEST * abs(span):  # a corner is seen by its neighbours
+                    course = replace(course, bifurcations=(*course.bifurcations, state.travel))
             course, state = replace(course, poses=(*course.poses, found.kept())), found
             report((state.travel - stops[0]) / span)
     return course
 
 
-def bends(state: Balance, found: Balance, short: float) -> bool:
-    """Tell whether the curve has a corner between two poses: another stiffness within a short way [m or rad]."""
-    largest = max(abs(state.stiffness), abs(found.stiffness))
-    return abs(found.travel - state.travel) <= short and abs(found.stiffness - state.stiffness) > CORNER * largest
+def bends(state: Balance, found: Balance, steepest: float) -> bool:
+    """Tell whether the curve may have a corner between two poses: another stiffness, seen against the steepest, too."""
+    change = abs(found.stiffness - state.stiffness)
+    return change > CORNER * max(abs(state.stiffness), abs(found.stiffness)) and change > SEEN * steepest
 
 
 def advanced(problem: Problem, state: Balance, travel: float, before: Balance | None = None) -> Balance | None:

@@ -172,6 +172,18 @@ class MeshSolution:
             places.append(self.problem.elements.mesh.nodes[nodes[worst]])
         return read_only(stresses), read_only(places)
 
+    def differences(self, coarse: MeshSolution) -> tuple[float, float]:
+        """Return by how much a coarser mesh differs at the poses of both: in force and in largest stress.
+
+        Both in parts of this one's largest.
+        """
+        _, own, other = np.intersect1d(self.course.travel, coarse.course.travel, return_indices=True)
+        force = np.array([self.course.poses[k].effort for k in own])
+        apart = float(np.abs(force - [coarse.course.poses[k].effort for k in other]).max(initial=0.0))
+        largest, peak = float(np.abs(force).max(initial=0.0)), float(self.peaks[0][own].max(initial=0.0))
+        stress = abs(float(coarse.peaks[0][other].max(initial=0.0)) / peak - 1.0) if peak else 0.0
+        return apart / largest if largest else 0.0, stress
+
     def moved(self, pose: Any) -> FloatArray:
         """Return the displacements of all nodes at a pose (n, 2) [m]."""
         return self.problem.supports.displaced(pose.unknowns, pose.travel)

@@ -97,6 +97,20 @@ class Analysis(Model):
 SweepValue = str | int | float | bool
 
 
+class SolidAnalysis(Model):
+    """How the part is solved as a planar solid."""
+
+    poses: int = Field(
+        21, ge=3, le=2000, description="poses that are solved, rest included; cubics interpolate between them"
+    )
+    mesh: Annotated[Length, Field(gt=0)] | None = Field(
+        None, description="side of an element; default: 0.4 of the thickness of the thinnest beam, leaf or strip"
+    )
+    law: Literal["st-venant-kirchhoff", "neo-hookean"] = Field(
+        "st-venant-kirchhoff", description="material law at large strain"
+    )
+
+
 class Sweep(Model):
     """What `cfmkit sweep` varies: the durable form of ``--vary``."""
 

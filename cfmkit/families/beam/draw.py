@@ -22,6 +22,7 @@ from cfmkit.plots.loop import loop_figure
 from cfmkit.plots.moving import Moving, chosen
 from cfmkit.plots.place import place_labels
 from cfmkit.plots.rounding import vanishing
+from cfmkit.plots.stress_map import StressView, stress_map_figure
 from cfmkit.plots.style import BLUE, GREY, INK, LINES, TROUBLE, VERMILLION, axes_mm, new_figure, styled
 from cfmkit.plots.text import Heading, color_key, value_text, write_heading
 
@@ -92,60 +93,13 @@ def curve(result: Result) -> Figure:
     return loop_figure(only, look, f"{result.curve.kind} over {result.curve.motion_name}")
 
 
-@styled
 def stress_map(result: Result) -> Figure:
     """Return the stress of the part as a solid at up to three poses, in one scale, with the place of its peak."""
-    from matplotlib.tri import Triangulation
-
-    from cfmkit.solid.elements import equivalent
-
     solution: SolidSolution = result.state
     solved, poses = solution.fine, solution.fine.course.poses
     shown = sorted({len(poses) // 2, int(solved.peaks[0].argmax()), len(poses) - 1})
-    grid = solved.problem.elements.mesh
-    # each six-node triangle as four: the colour is linear in them
-    small = grid.triangles[:, [0, 3, 5, 3, 1, 4, 5, 4, 2, 3, 4, 5]].reshape(-1, 3)
-    moved = [grid.nodes + solved.moved(poses[pose]) for pose in shown]
-    stress = [equivalent(solved.problem.elements.stress(solved.moved(poses[pose]))[0]) / 1e6 for pose in shown]
-    top = max(float(solved.peaks[0][shown].max()) / 1e6, 1e-12)
-    low, high = np.min([one.min(axis=0) for one in moved], axis=0), np.max([one.max(axis=0) for one in moved], axis=0)
-    width, height = (high - low) * 1.05
-    # beside each other where the part is tall, else above each other
-    beside = height > width
-    scale = min((140.0 / len(shown) if beside else 140.0) / width, 110.0 / height if beside else 62.0 / height)
-    step = np.array([width * scale + 3.0, 0.0]) if beside else np.array([0.0, height * scale + 7.0])
-    heading = Heading.of(result, "equivalent stress of the part as cut, in one scale; the peak stress at its place")
-    room = step * len(shown) + (np.array([0.0, height * scale + 7.0]) if beside else np.array([140.0, 0.0]))
-    figure = new_figure(160.0, room[1] + 18.0 + heading.height_mm)
-    write_heading(figure, heading)
-    for number, (pose, places, values) in enumerate(zip(shown, moved, stress, strict=True)):
-        x, y = np.array([10.0, 16.0]) + step * (number if beside else len(shown) - 1 - number)
-        ax = axes_mm(figure, (x, y, width * scale, height * scale))
-        shades = ax.tripcolor(
-            Triangulation(1e3 * places[:, 0], 1e3 * places[:, 1], small),
-            values,
-            shading="gouraud",
-            vmin=0.0,
-            vmax=top,
-            cmap="viridis",
-            zorder=3,
-        )
-        shades.set_zorder(3)
-        chains = [grid.edges[grid.rings == ring][:, [0, 2]].ravel() for ring in np.unique(grid.rings)]
-        parts.plate(ax, [places[chain] for chain in chains])
-        start = int(np.hypot(*(grid.nodes - solved.peaks[1][pose]).T).argmin())
-        ax.plot(
-            *(1e3 * places[start]), marker="o", markersize=6, color=VERMILLION, fillstyle="none", linestyle="", zorder=4
-        )
-        said = value_text(float(solved.peaks[0][pose]), "stress")
-        at = value_text(poses[pose].travel, result.curve.motion_dimension)
-        ax.set_title(f"{at}: {said}", fontsize=7, loc="left", pad=1.0)
-        ax.set_xlim(1e3 * low[0], 1e3 * (low[0] + width))
-        ax.set_ylim(1e3 * low[1], 1e3 * (low[1] + height))
-        ax.set_axis_off()
-    bar = axes_mm(figure, (30.0, 10.0, 100.0, 3.0))
-    figure.colorbar(shades, cax=bar, orientation="horizontal").set_label("stress [MPa]", labelpad=1)
-    return figure
+    views = [StressView(solved, pose, value_text(poses[pose].travel, result.curve.motion_dimension)) for pose in shown]
+    return stress_map_figure(result, views, "equivalent stress of the part as cut")
 
 
 @styled

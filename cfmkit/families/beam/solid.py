@@ -114,15 +114,7 @@ class SolidSolution:
     @cached_property
     def differences(self) -> tuple[float, float]:
         """Of force and of largest stress, between the meshes, in parts of the finer one's largest."""
-        _, one, other = np.intersect1d(self.fine.course.travel, self.coarse.course.travel, return_indices=True)
-        force, coarse = (
-            np.array([mesh.course.poses[k].effort for k in which])
-            for mesh, which in ((self.fine, one), (self.coarse, other))
-        )
-        peaks = [float(mesh.peaks[0][which].max()) for mesh, which in ((self.fine, one), (self.coarse, other))]
-        largest = float(np.abs(force).max())
-        apart = float(np.abs(force - coarse).max()) / largest if largest else 0.0
-        return apart, abs(peaks[1] / peaks[0] - 1) if peaks[0] else 0.0
+        return self.fine.differences(self.coarse)
 
 
 def analyze(spec: BeamSpec, run: Run) -> Result:

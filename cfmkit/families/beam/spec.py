@@ -16,7 +16,7 @@ from cfmkit.families.beam.parts.spec import (
 from cfmkit.families.beam.shaping.spec import Optimise, optimise_faults
 from cfmkit.metrics.material_laws import Durability
 from cfmkit.specs.formula import formula
-from cfmkit.specs.spec import Analysis, DesignBlock, Displacement, Model, Spec, refuse
+from cfmkit.specs.spec import Analysis, DesignBlock, Displacement, Model, SolidAnalysis, Spec, refuse
 from cfmkit.specs.units import DIMENSIONS, Factor, Force, Length, Ratio, Torque
 from cfmkit.specs.units.fields import LARGEST
 from cfmkit.stock.spec import sheet_faults
@@ -121,20 +121,6 @@ class Outputs(Model):
         (), max_length=100, description="nodes whose reactions are, of support and drive: [root]"
     )
     cross_stiffness: bool = Field(False, description="the stiffness of the driven node across the drive, along the way")
-
-
-class SolidAnalysis(Model):
-    """How the part is solved as a planar solid."""
-
-    poses: int = Field(
-        21, ge=3, le=2000, description="poses that are solved, rest included; cubics interpolate between them"
-    )
-    mesh: PositiveLength | None = Field(
-        None, description="side of an element; default: half the thickness of the thinnest beam"
-    )
-    law: Literal["st-venant-kirchhoff", "neo-hookean"] = Field(
-        "st-venant-kirchhoff", description="material law at large strain"
-    )
 
 
 class BeamAnalysis(Analysis):

@@ -14,7 +14,12 @@ FAMILY = Family(
     name="vcfm",
     summary="V-beams that snap through beside a diamond spring, adjustable by the spring's preload",
     spec_type=VcfmSpec,
-    models={"truss": analyze, "analytic": analyze, "exact": "cfmkit.families.vcfm.exact:analyze"},
+    models={
+        "truss": analyze,
+        "analytic": analyze,
+        "exact": "cfmkit.families.vcfm.exact:analyze",
+        "solid": "cfmkit.families.vcfm.solid:analyze",
+    },
     design=design,
     values=DEFINITIONS,
     draw="cfmkit.families.vcfm.draw",

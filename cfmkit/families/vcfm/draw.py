@@ -20,6 +20,7 @@ from cfmkit.plots.curves import CurveLook, plot_curve
 from cfmkit.plots.diagram import Diagram, Limit, Region, Scale, Series, diagram_figure
 from cfmkit.plots.loop import loop_figure
 from cfmkit.plots.moving import Moving, chosen
+from cfmkit.plots.stress_map import StressView, stress_map_figure
 from cfmkit.plots.style import (
     BLACK,
     BLUE,
@@ -61,6 +62,8 @@ def figures(result: Result) -> dict[str, Callable[[], Figure]]:
     makers = [force, split, stress, mechanism]
     if len(result.curves) > 1:
         makers += [preloads, from_rest, adjustability]
+    if result.spec.at("analysis.fidelity") == "solid":
+        makers.append(stress_map)
     return {maker.__name__: partial(maker, result) for maker in makers}
 
 
@@ -207,6 +210,17 @@ def _starts(solution: Solution, preloads: FloatArray) -> FloatArray:
 def _shift(solution: Solution, preload: float, grid: FloatArray) -> float:
     rest = rest_of(solution.sampler, preload, grid)
     return np.nan if rest is None else -rest
+
+
+def stress_map(result: Result) -> Figure:
+    """Return the stress of a leaf and of a chain of the spring as drawn, where each has its largest one."""
+    solution: Solution = result.state
+    leaf, spring = solution.sampler.pushed.solved, solution.sampler.sides[0].solved  # type: ignore[attr-defined]
+    views = []
+    for name, solved, share in (("leaf", leaf, 1.0), ("spring", spring, solution.sampler.chain.travel)):  # type: ignore[attr-defined]
+        pose = int(solved.peaks[0].argmax())
+        views.append(StressView(solved, pose, f"{name} at {value_text(solved.course.travel[pose] / share, 'length')}"))
+    return stress_map_figure(result, views, "stress of leaf and spring as drawn")
 
 
 @styled

@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from cfmkit.families.base import Run
     from cfmkit.families.vcfm.leaves.strip import Strip
     from cfmkit.families.vcfm.spec import VcfmSpec
-    from cfmkit.families.vcfm.traced import Traced
     from cfmkit.results import Result
 
 DOWN = -0.5 * np.pi
@@ -121,6 +120,11 @@ class ExactSampler:
         How far it is pulled back at most, positive [m].
     """
 
+    # paths of beams, or of solids (`solid.SolidPath`), which answer the same questions
+    pushed: Any
+    pulled: Any
+    sides: list[Any]
+
     def __init__(self, spec: VcfmSpec, end: float, back: float) -> None:
         """Trace leaf and spring."""
         about, preloads = spec.mechanism.bistable, spec.analysis.preloads
@@ -131,7 +135,7 @@ class ExactSampler:
         self.chain = spring_chain(spec)
         ends = (max(preloads) + end, min(min(preloads) - back, -0.02 * end))
         self.sides = [traced(self.chain.network, self.chain.node, self.chain.travel * side) for side in ends]
-        self.problem = _problem("leaves were", (self.pushed, self.pulled), 1.0) or _problem(
+        self.problem = problem_of("leaves were", (self.pushed, self.pulled), 1.0) or problem_of(
             "spring was", self.sides, self.chain.travel
         )
 
@@ -178,7 +182,7 @@ class ExactSampler:
         )
 
 
-def _problem(subject: str, paths: Sequence[Traced], travel: float) -> str:
+def problem_of(subject: str, paths: Sequence[Any], travel: float) -> str:
     """Return how far a part was followed, in shares `travel` of its node, and why no farther; empty if to the end."""
     short = next((one for one in paths if one.problem), None)
     return "" if short is None else f"the {subject} followed to {mm(short.edges[-1] / travel)} only: {short.problem}"

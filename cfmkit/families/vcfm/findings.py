@@ -32,6 +32,9 @@ if TYPE_CHECKING:
     from cfmkit.results import Finding
 
 
+TRACED = ("exact", "solid")
+"""Models that follow leaves along their branches."""
+
 FINDINGS = {
     "no_negative_stiffness": "the leaves are too thick for their rise: no negative stiffness anywhere",
     "no_linear_region": "the leaves do not buckle: their negative stiffness is nowhere constant",
@@ -52,6 +55,8 @@ FINDINGS = {
     "measured_contradiction": "the reported force and stiffness cannot both hold for these leaves",
     "too_thin": "the design needs a leaf thinner than can be made",
     "envelope": "the design does not fit into the given space",
+    "mesh_coarse": "results on two meshes of leaf or spring differ by more than the limit",
+    "sharp_corners": "without fillets the stress in inside corners has no value",
     "stress_unreachable": "no leaf length brings the exact stress below the one allowed",
 }
 
@@ -289,7 +294,7 @@ def _strength(solution: Solution) -> Iterator[Finding]:
     allowed = solution.spec.mechanism.allowable_stress
     if allowed is None:
         return
-    exact = solution.spec.analysis.fidelity == "exact"
+    exact = solution.spec.analysis.fidelity in TRACED
     slack = EXACT_FORM if exact else overrated(float(solution.parts.strip.angle))
     parts = [
         (push, name, stress)
@@ -311,7 +316,7 @@ def _strength(solution: Solution) -> Iterator[Finding]:
 def _buckling(solution: Solution) -> Iterator[Finding]:
     about = solution.spec.mechanism.bistable
     if not about.guided:
-        hint = "" if solution.spec.analysis.fidelity == "exact" else "; only 'analysis.fidelity: exact' shows it"
+        hint = "" if solution.spec.analysis.fidelity in TRACED else "; only 'analysis.fidelity: exact' shows it"
         yield finding(
             "asymmetric_buckling",
             f"the shuttle can turn, so the leaves buckle at {percent(TURNING)} of the load and lose their straight "
@@ -327,7 +332,7 @@ def _buckling(solution: Solution) -> Iterator[Finding]:
 
 
 def _imperfect(solution: Solution) -> Iterator[Finding]:
-    about, exact = solution.spec.mechanism.bistable, solution.spec.analysis.fidelity == "exact"
+    about, exact = solution.spec.mechanism.bistable, solution.spec.analysis.fidelity in TRACED
     share = about.waviness / about.thickness
     if share > WAVY or (about.waviness and not exact):
         told = "is counted in" if exact else "is left out: only 'analysis.fidelity: exact' has it"

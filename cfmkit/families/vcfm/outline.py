@@ -6,6 +6,7 @@ folded beams one half is drawn, to be made twice, and an odd number of leaves is
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -153,6 +154,74 @@ def _edge(spec: VcfmSpec, side: float, apex: Point) -> list[Item]:
         (apex[0] + share * float(x[-1]), apex[1] + share * float(y[-1]) + up * height)
         for share, height in zip(*about.profile, strict=True)
     ]
+
+
+@dataclass(frozen=True)
+class SolvedPiece:
+    """As much of a part as symmetry leaves: a closed contour with its fillets, and what of it is rigid.
+
+    Attributes
+    ----------
+    contour : Contour
+    moved, held : (n, 2) array
+        Polygon, or line of two points, that moves down, and the one that stands [m].
+    of_leaf : bool
+        Whether it is of the leaves, not of the spring.
+    glides : bool
+        Whether what is held moves across as it likes: the middle of a corner.
+    """
+
+    contour: Contour
+    moved: FloatArray
+    held: tuple[FloatArray, ...]
+    of_leaf: bool
+    glides: bool = False
+
+
+def solved_leaf(spec: VcfmSpec) -> SolvedPiece:
+    """Return one leaf between shuttle and wall; both leaves of a V where the shuttle can turn."""
+    about, part = spec.mechanism.bistable, spec.mechanism.part or CutPart()
+    strip = strip_of(about, spec.mechanism.material)
+    half, far = 0.5 * spec.mechanism.frame.shuttle_width, 0.5 * spec.mechanism.frame.shuttle_width + float(strip.reach)
+    rise, over = float(strip.rise), 2.0 * (max(about.profile[1]) + part.fillet)
+    upper, lower = (_edge(spec, side, (half, 0.0)) for side in (1.0, -1.0))
+    out = far + spec.mechanism.frame.block
+    right: list[Item] = [(0.0, over), (half, over), *upper, (far, over - rise), (out, over - rise)]
+    right += [(out, -over - rise), (far, -over - rise), *_back(lower), (half, -over), (0.0, -over)]
+    wall = np.array([[far, over - rise], [out, over - rise], [out, -over - rise], [far, -over - rise]])
+    if about.guided:
+        shuttle = np.array([[0.0, over], [half, over], [half, -over], [0.0, -over]])
+        return SolvedPiece(filleted(_contour(right), part.fillet)[0], shuttle, (wall,), True)
+    shuttle = np.array([[-half, over], [half, over], [half, -over], [-half, -over]])
+    return SolvedPiece(filleted(_whole(right), part.fillet)[0], shuttle, (wall, wall * np.array([-1.0, 1.0])), True)
+
+
+def solved_spring(spec: VcfmSpec) -> SolvedPiece:
+    """Return one chain of the spring, of a diamond or folded beams the upper half of it."""
+    about, frame, part = spec.mechanism.positive, spec.mechanism.frame, spec.mechanism.part or CutPart()
+    half = 0.5 * frame.block
+    if about.structure == "straight":
+        right, bottom = _straight(spec, 0.0)
+        x, middle, out = half + about.length, -frame.block, half + about.length + frame.block
+        end = np.array([[x, middle + half], [out, middle + half], [out, middle - half], [x, middle - half]])
+        top = np.array([[0.0, 0.0], [half, 0.0], [half, bottom], [0.0, bottom]])
+        return SolvedPiece(filleted(_contour(right), part.fillet)[0], top, (end,), False)
+    if about.structure == "u-shape":
+        outer, inner, base = _bend(spec, 0.0)
+        low, high = _corners(inner)[1][1], _corners(inner)[0][1]
+        around: list[Item] = [(0.0, 0.0), (half, 0.0), *outer, (half, base - frame.block), (0.0, base - frame.block)]
+        around += [(0.0, low), *_back(inner), (0.0, high)]
+        top = np.array([[0.0, 0.0], [half, 0.0], [half, high], [0.0, high]])
+        foot = np.array([[0.0, low], [half, low], [half, base - frame.block], [0.0, base - frame.block]])
+        return SolvedPiece(filleted(_contour(around), part.fillet)[0], top, (foot,), False)
+    outer, inner, base = _diamond(spec, 0.0)
+    middle, (leaf, corner) = 0.5 * (base - frame.block), (inner[0], inner[1])
+    out, x = _corners(outer[3:4])[0][0], _corners(outer[1:2])[0][0]
+    around = [(0.0, 0.0), (half, 0.0), *outer[:4], (out, middle), (x, middle), corner, leaf]
+    start = _corners([leaf])[0][1]
+    top = np.array([[0.0, 0.0], [half, 0.0], [half, start], [0.0, start]])
+    line = np.array([[x, middle], [out, middle]])
+    return SolvedPiece(filleted(_contour([*around, (0.0, start)]), part.fillet)[0], top, (line,), False, True)
 
 
 def spring_contours(spec: VcfmSpec, top: float) -> list[Contour]:

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, field_validator, model_validator
 
 from cfmkit.metrics.material_laws import Durability
-from cfmkit.specs.spec import Analysis, DesignBlock, Model, Spec, refuse
+from cfmkit.specs.spec import Analysis, DesignBlock, Model, SolidAnalysis, Spec, refuse
 from cfmkit.specs.units import Angle, Force, Length, Ratio, Stiffness
 from cfmkit.stock.spec import CutPart, MaterialSpec, PositiveStress, SafetyFactor, material_input, sheet_faults
 
@@ -203,11 +203,12 @@ class VcfmAnalysis(Analysis):
         description="of the spring's far end, the nominal one first; pull: negative",
     )
     travel: PositiveLength | None = Field(None, description="how far the shuttle goes; default: 1.4 times the rise")
-    fidelity: Literal["truss", "analytic", "exact"] = Field(
+    fidelity: Literal["truss", "analytic", "exact", "solid"] = Field(
         "analytic",
-        description="the paper's eq. 18 and 19, the corrected closed forms, or beams in large deflection; "
-        "for hybrid leaves the default is exact",
+        description="the paper's eq. 18 and 19, the corrected closed forms, beams in large deflection, or leaves and "
+        "spring as drawn, as planar solids; for hybrid leaves the default is exact",
     )
+    solid: SolidAnalysis = Field(SolidAnalysis(poses=41), description="of fidelity 'solid'; default: 41 poses")
     branch: Literal["stable", "primary"] = Field(
         "stable",
         description="where a leaf buckles: switch to the stable branch, or stay on the S shape; exact model only",
@@ -258,6 +259,19 @@ class VcfmSpec(Spec):
         kinds = self.mechanism.positive.structure, self.mechanism.bistable.structure
         if self.analysis.fidelity == "truss" and kinds != ("diamond", "v-beam"):
             raise ValueError("the truss laws are for 'diamond' and 'v-beam'; choose another 'analysis.fidelity'")
+        return self
+
+    @model_validator(mode="after")
+    def _solid_is_of_what_is_made(self) -> Self:
+        if self.analysis.fidelity == "solid":
+            found: dict[tuple[str | int, ...], str] = {}
+            if self.mechanism.bistable.waviness:
+                found["mechanism", "bistable", "waviness"] = "the model 'solid' does not know it: leaves are as drawn"
+            if self.analysis.branch == "primary":
+                found["analysis", "branch"] = "the model 'solid' follows the stable branch only"
+            if self.analysis.solid.law == "neo-hookean" and self.mechanism.material.poisson >= 0.5:
+                found["analysis", "solid", "law"] = "'neo-hookean' needs a poisson_ratio below 0.5"
+            refuse("Spec", found)
         return self
 
     @model_validator(mode="after")

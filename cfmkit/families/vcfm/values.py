@@ -20,7 +20,12 @@ if TYPE_CHECKING:
     from cfmkit.families.vcfm.solution import Push, Solution
 
 
+OF_MESHES = ("mesh_force_difference", "mesh_stress_difference")
+"""Known of solids only."""
+
 DEFINITIONS = {
+    "mesh_force_difference": ("ratio", "largest difference of the force on a coarser mesh, in parts of the largest"),
+    "mesh_stress_difference": ("ratio", "difference of the largest stress on a coarser mesh"),
     "positive_stiffness": ("stiffness", "K_p of the spring as made"),
     "negative_stiffness": ("stiffness", "size of the leaves' negative stiffness: constant where they are buckled"),
     "first_stiffness": ("stiffness", "K_b1 of the leaves as made"),
@@ -90,6 +95,9 @@ def values_of(solution: Solution) -> Mapping[str, Quantity]:
         "travel_stress_max": over_travel,
         "travel_safety_factor": allowed / over_travel if allowed and over_travel else None,
     } | _adjustment(solution)
+    numbers |= getattr(
+        solution.sampler, "mesh_differences", {"mesh_force_difference": None, "mesh_stress_difference": None}
+    )
     return {name: _quantity(name, value) for name, value in numbers.items()}
 
 

@@ -1,0 +1,130 @@
+"""Stress on deformed parts: several poses in one colour scale, the peak marked where it is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.plots import parts
+from cfmkit.plots.style import VERMILLION, axes_mm, new_figure, styled
+from cfmkit.plots.text import Heading, value_text, write_heading
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from cfmkit.arrays import FloatArray
+    from cfmkit.results import Result
+    from cfmkit.solid.part import MeshSolution
+
+WIDE, BESIDE, ABOVE = 140.0, 110.0, 62.0
+"""Room for the parts: across, and in height where they stand beside or above each other [mm]."""
+GAP = 7.0
+"""Between views, for what stands above each [mm]."""
+
+
+@dataclass(frozen=True)
+class StressView:
+    """One part at one pose.
+
+    Attributes
+    ----------
+    solved : MeshSolution
+    pose : int
+        Number of the pose.
+    name : str
+        What stands above it.
+    """
+
+    solved: MeshSolution
+    pose: int
+    name: str
+
+    @property
+    def moved(self) -> FloatArray:
+        """Nodes where they are now (n, 2) [m]."""
+        return np.asarray(self.solved.problem.elements.mesh.nodes + self.solved.moved(self._balance))
+
+    @property
+    def stress(self) -> FloatArray:
+        """Von Mises' equivalent stress at the nodes (n,) [Pa]."""
+        from cfmkit.solid.elements import equivalent
+
+        return equivalent(self.solved.problem.elements.stress(self.solved.moved(self._balance))[0])
+
+    @property
+    def peak(self) -> float:
+        """Largest stress along a free edge [Pa]."""
+        return float(self.solved.peaks[0][self.pose])
+
+    @property
+    def _balance(self) -> Any:
+        return self.solved.course.poses[self.pose]
+
+
+@styled
+def stress_map_figure(result: Result, views: Sequence[StressView], subject: str) -> Figure:
+    """Return a figure of parts at poses, coloured by stress in one scale, each with the place of its peak.
+
+    Parameters
+    ----------
+    result : Result
+        What the heading names.
+    views : sequence of StressView
+        Beside each other where the parts are tall, else above each other.
+    subject : str
+        What the heading says of them.
+    """
+    moved = [view.moved for view in views]
+    low = [places.min(axis=0) for places in moved]
+    sizes = np.array([np.ptp(places, axis=0) for places in moved]) * 1.05
+    width, height = sizes.max(axis=0)
+    beside = bool(height > width)
+    scale = min((WIDE / len(views) if beside else WIDE) / width, (BESIDE if beside else ABOVE) / height)
+    step = np.array([width * scale + 3.0, 0.0]) if beside else np.array([0.0, height * scale + GAP])
+    heading = Heading.of(result, f"{subject}; peaks marked")
+    tall = (1 if beside else len(views)) * (height * scale + GAP)
+    figure = new_figure(160.0, tall + 18.0 + heading.height_mm)
+    write_heading(figure, heading)
+    top = max(*(view.peak for view in views), 1e-6) / 1e6
+    for number, view in enumerate(views):
+        x, y = np.array([10.0, 16.0]) + step * (number if beside else len(views) - 1 - number)
+        ax = axes_mm(figure, (x, y, width * scale, height * scale))
+        shades = _drawn(ax, view, moved[number], top)
+        ax.set_xlim(1e3 * low[number][0], 1e3 * (low[number][0] + width))
+        ax.set_ylim(1e3 * low[number][1], 1e3 * (low[number][1] + height))
+        ax.set_axis_off()
+    bar = axes_mm(figure, (30.0, 10.0, 100.0, 3.0))
+    figure.colorbar(shades, cax=bar, orientation="horizontal").set_label("stress [MPa]", labelpad=1)
+    return figure
+
+
+def _drawn(ax: Axes, view: StressView, places: FloatArray, top: float) -> Any:
+    """Draw one part [mm] with its stress, 0 ... top [MPa]; return what a colour bar is made of."""
+    from matplotlib.tri import Triangulation
+
+    grid = view.solved.problem.elements.mesh
+    # each six-node triangle as four: the colour is linear in them
+    small = grid.triangles[:, [0, 3, 5, 3, 1, 4, 5, 4, 2, 3, 4, 5]].reshape(-1, 3)
+    shades = ax.tripcolor(
+        Triangulation(1e3 * places[:, 0], 1e3 * places[:, 1], small),
+        view.stress / 1e6,
+        shading="gouraud",
+        vmin=0.0,
+        vmax=top,
+        cmap="viridis",
+        zorder=3,
+    )
+    shades.set_zorder(3)
+    chains = [grid.edges[grid.rings == ring][:, [0, 2]].ravel() for ring in np.unique(grid.rings)]
+    parts.plate(ax, [places[chain] for chain in chains])
+    start = int(np.hypot(*(grid.nodes - view.solved.peaks[1][view.pose]).T).argmin())
+    ax.plot(
+        *(1e3 * places[start]), marker="o", markersize=6, color=VERMILLION, fillstyle="none", linestyle="", zorder=4
+    )
+    ax.set_title(f"{view.name}: {value_text(view.peak, 'stress')}", fontsize=7, loc="left", pad=1.0)
+    return shades

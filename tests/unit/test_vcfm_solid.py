@@ -1,0 +1,93 @@
+"""Leaves and spring as drawn, as planar solids: what beams give where parts are slender, and what they leave out."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import cfmkit
+from cfmkit import api
+from cfmkit.errors import SpecError
+from cfmkit.families.vcfm.outline import solved_leaf, solved_spring
+from cfmkit.results import Status
+
+QUICK = ("analysis.solid.poses=15", "analysis.solid.mesh=0.7 mm", "analysis.points=121", "analysis.fidelity=solid")
+
+
+def spec(name, *changes):
+    return cfmkit.load(f"configs/vcfm_{name}.yaml", list(changes))
+
+
+@pytest.fixture(scope="module")
+def straight():
+    """Four paths on three meshes: two seconds, the least in which a mechanism can be had; and the same as beams."""
+    return {
+        "solid": api.analyze(spec("straight", *QUICK, "analysis.preloads=[0 mm, 0.5 mm]")),
+        "exact": api.analyze(spec("straight", "analysis.fidelity=exact", "analysis.points=121")),
+    }
+
+
+def test_slender_leaves_are_as_stiff_as_beams_and_buckle_where_they_do(straight):
+    solid, exact = (straight[name].values for name in ("solid", "exact"))
+    assert straight["solid"].status is Status.COMPLETE
+    assert solid["first_stiffness"].value == pytest.approx(exact["first_stiffness"].value, rel=0.01)
+    assert solid["linear_start"].value == pytest.approx(exact["linear_start"].value, rel=0.02)
+    assert solid["linear_end"].value == pytest.approx(exact["linear_end"].value, rel=0.02)
+
+
+def test_fillets_make_leaves_and_spring_a_few_percent_stiffer(straight):
+    for name in ("negative_stiffness", "positive_stiffness"):
+        solid, exact = (straight[model].values[name].value for model in ("solid", "exact"))
+        assert 1.01 < solid / exact < 1.06
+
+
+def test_a_preload_moves_the_spring_only(straight):
+    nominal, pressed = straight["solid"].curves
+    sampler = straight["solid"].state.sampler
+    at = np.linspace(0.5e-3, 4e-3, 7)
+    more = sampler.spring(at + 0.5e-3)[0] - sampler.spring(at)[0]
+    forces = [np.interp(at, one.motion, one.effort) for one in (nominal, pressed)]
+    assert forces[1] - forces[0] == pytest.approx(more, rel=1e-3)
+
+
+def test_the_curve_is_stable_and_its_stress_map_is_drawn(straight):
+    assert straight["solid"].curve.stable.all()
+    figure = api.figures(straight["solid"])["stress_map"]()
+    assert len(figure.axes) == 3
+
+
+@pytest.mark.parametrize("positive", ["diamond", "folded", "straight", "u-shape"])
+@pytest.mark.parametrize("leaf", ["v-beam", "cosine", "hybrid"])
+def test_what_is_solved_is_a_part_of_what_is_drawn(leaf, positive):
+    """Its fillets and edges are those of the drawing: every arc of it stands in the drawing, moved up or down."""
+    made = spec(
+        "ding2022", f"mechanism.bistable.structure={leaf}", f"mechanism.positive.structure={positive}",
+        "mechanism.bistable.flexure_length=5 mm", "mechanism.positive.radius=4 mm",
+    )  # fmt: skip
+    arcs = [edge for contour in api.drawing(made).contours for edge in contour.edges if hasattr(edge, "radius")]
+    places = np.array([edge.center[0] for edge in arcs])
+    for piece in (solved_leaf(made), solved_spring(made)):
+        own = [edge for edge in piece.contour.edges if hasattr(edge, "radius")]
+        assert len(own) >= 2
+        for edge in own:
+            assert np.abs(places - edge.center[0]).min() < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        ("mechanism.bistable.waviness=0.1 mm", "does not know it: leaves are as drawn"),
+        ("analysis.branch=primary", "follows the stable branch only"),
+    ],
+)
+def test_what_a_solid_does_not_know_is_refused(change, told):
+    with pytest.raises(SpecError, match=told):
+        spec("ding2022", "analysis.fidelity=solid", change)
+
+
+def test_sharp_corners_are_told_and_a_mesh_that_is_too_large_for_the_machine_is_one_line():
+    found = api.analyze(spec("straight", *QUICK, "mechanism.part.fillet=0 mm", "analysis.travel=0.3 mm"))
+    assert "sharp_corners" in [warning.name for warning in found.warnings]
+    found = api.analyze(spec("straight", *QUICK, "analysis.solid.mesh=0.001 mm"))
+    assert found.status is Status.NO_EQUILIBRIUM
+    assert found.message.startswith("the part cannot be meshed: the mesh would have more than 400000 nodes")
