@@ -31,6 +31,7 @@ if TYPE_CHECKING:
         load,
         loads,
         sensitivity,
+        suggest,
         sweep,
     )
     from cfmkit.curves import Curve
@@ -70,6 +71,7 @@ _HOMES = {
         "load",
         "loads",
         "sensitivity",
+        "suggest",
         "sweep",
     ),
     "cfmkit.runs.batch": ("BatchResult", "batch"),
@@ -140,6 +142,7 @@ __all__ = [
     "loads",
     "measure",
     "sensitivity",
+    "suggest",
     "sweep",
 ]
 
@@ -154,7 +157,7 @@ def __getattr__(name: str) -> Any:
 
 
 class _Package(ModuleType):
-    """The package `cfmkit`, whose name `export` stays the function when the package of that name is imported."""
+    """The package `cfmkit`, whose `export` and `suggest` stay functions when packages so called are imported."""
 
     @property
     def export(self) -> Any:
@@ -164,6 +167,15 @@ class _Package(ModuleType):
     @export.setter
     def export(self, package: ModuleType) -> None:
         """Leave it at that: the import system sets packages as attributes, and this one is found without."""
+
+    @property
+    def suggest(self) -> Any:
+        """The function `cfmkit.api.suggest`."""
+        return import_module("cfmkit.api").suggest
+
+    @suggest.setter
+    def suggest(self, package: ModuleType) -> None:
+        """Leave it at that, as above."""
 
 
 sys.modules[__name__].__class__ = _Package

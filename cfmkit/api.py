@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from cfmkit.runs.notebook import Analysis
     from cfmkit.specs.spec import Spec
     from cfmkit.studies.outcome import StudyResult
+    from cfmkit.suggest.search import Suggestions
 
     AnySpec: TypeAlias = Spec | str | os.PathLike[str]
 
@@ -266,6 +267,55 @@ def sensitivity(spec: AnySpec, jobs: int = 1, **block: Any) -> StudyResult:
     from cfmkit.studies.outcome import examined
 
     return examined(spec_of(spec), jobs, block)
+
+
+def suggest(
+    wish: str | os.PathLike[str] | None = None,
+    *,
+    seed: int = 0,
+    jobs: int = 1,
+    time_budget: float | None = 60.0,
+    **keys: Any,
+) -> Suggestions:
+    """Return mechanisms of every family that do what is wished, the best first.
+
+    Parameters
+    ----------
+    wish : path-like, optional
+        A YAML file with a block `wish`.
+    seed : int
+        Of everything random.
+    jobs : int
+        Processes.
+    time_budget : float, optional
+        In seconds; None: no limit.
+    **keys
+        Keys of the wish, which replace those of the file: texts with units (``force="20 N"``), numbers for shares,
+        lists (``room=["80 mm", "60 mm", "6 mm"]``).
+
+    Raises
+    ------
+    cfmkit.errors.SpecError
+        If the wish contradicts itself, or is malformed.
+
+    Examples
+    --------
+    >>> import cfmkit
+    >>> found = cfmkit.suggest(force="10 kN", travel="10 mm", room=["20 mm", "20 mm", "1 mm"], material="pla")
+    >>> len(found.proposals), len(found.answers)
+    (0, 4)
+    """
+    from cfmkit.runs.suggestions import wish_of
+    from cfmkit.studies.executors import serial
+    from cfmkit.studies.pool import Pool
+    from cfmkit.suggest.search import suggest as searched
+
+    def written(value: Any) -> str:
+        return "[" + ", ".join(map(written, value)) + "]" if isinstance(value, list | tuple) else str(value)
+
+    block = wish_of(None if wish is None else os.fspath(wish), {key: written(value) for key, value in keys.items()})
+    executor = serial if jobs == 1 else Pool(jobs)
+    return searched(block.wish(), Run(seed, time_budget=time_budget, executor=executor), block.prefer)
 
 
 def export(

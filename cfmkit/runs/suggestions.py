@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
+from time import time
 from typing import TYPE_CHECKING, Any
 
 from cfmkit.errors import ExitCode
@@ -151,8 +152,20 @@ def _record(found: Suggestions, one: Proposal, number: int | None = None) -> dic
     return about | place | {"misses": list(one.missed), "notes": list(one.notes)}
 
 
-def files(found: Suggestions, block: WishBlock, run: Run, plots: bool) -> Iterator[tuple[str, bytes]]:
-    """Yield every file of the run as (name below the folder, content)."""
+def files(found: Suggestions, block: WishBlock, run: Run, plots: bool, deadline: float) -> Iterator[tuple[str, bytes]]:
+    """Yield every file of the run as (name below the folder, content).
+
+    Parameters
+    ----------
+    found, block : Suggestions and WishBlock
+        What came of the wish, and what it said.
+    run : Run
+        Its executor draws the proposals.
+    plots : bool
+        Whether to draw.
+    deadline : float
+        When the time is up [s since the epoch]: proposals whose turn comes later have their files, but no figures.
+    """
     yield "metrics.json", json_bytes(as_json(found, block))
     yield "suggestions.csv", table(found)
     if plots and found.proposals:
@@ -162,13 +175,15 @@ def files(found: Suggestions, block: WishBlock, run: Run, plots: bool) -> Iterat
         yield "figures/pareto.png", png(draw.pareto(found.proposals, found.wish))
         yield "figures/proposals.png", png(draw.to_one_scale(found.proposals, found.wish))
     jobs = list(enumerate(found.proposals, 1))
-    made = {number: files for (number, _), files in run.executor(partial(_made, plots), iter(jobs), lambda: False)}
+    made = {
+        number: files for (number, _), files in run.executor(partial(_made, plots, deadline), iter(jobs), lambda: False)
+    }
     for number, one in jobs:
         for name, data in made[number]:
             yield f"{folder_name(number, one)}/{name}", data
 
 
-def _made(plots: bool, job: tuple[int, Proposal]) -> list[tuple[str, bytes]]:
+def _made(plots: bool, deadline: float, job: tuple[int, Proposal]) -> list[tuple[str, bytes]]:
     """Return the files of one proposal: its specification first, which `analyze` takes."""
     from cfmkit import api
     from cfmkit.results import Design, Status
@@ -179,7 +194,7 @@ def _made(plots: bool, job: tuple[int, Proposal]) -> list[tuple[str, bytes]]:
     spec = proposal.spec
     # springs at pins have links that no drawing shows: nothing of them is cut
     design = None if "at pins" in proposal.variant else Design(spec, Status.COMPLETE)
-    found = dict(files(report_on(api.analyze(spec), design), plots))
+    found = dict(files(report_on(api.analyze(spec), design), plots and time() < deadline))
     return list(({"design.yaml": b""} | found | {"design.yaml": proposal.text.encode()}).items())
 
 

@@ -25,6 +25,9 @@ EXAMPLE = "cfmkit suggest --force '20 N' --travel '10 mm' --room 100x100x20mm"
 
 BUDGET = "60s"
 
+SPARE = 4.0
+"""Before the end of the time budget no more figures are begun [s]: those of one proposal take about two."""
+
 
 def _key(name: str, metavar: str, text: str) -> Any:
     return option(f"--{name}", metavar=metavar, text=text)
@@ -90,11 +93,12 @@ def run(options: SuggestOptions, terminal: Terminal) -> Answer:
     from cfmkit.studies.executors import cores
     from cfmkit.suggest.search import suggest
 
-    start = time.perf_counter()
+    start, begun = time.perf_counter(), time.time()
     budget = seconds(options.time_budget)
     given = keys(options)
     if options.wish is None and not given:
         raise UsageError("a wish is missing: name a file, or say --force, --travel and --room")
+    ends = begun + budget
     block = suggestions.wish_of(options.wish, given)
     out = _folder(options)
     with RunFolder(out) as folder, terminal.progress() as progress:
@@ -103,7 +107,7 @@ def run(options: SuggestOptions, terminal: Terminal) -> Answer:
         with long_run(options.jobs or cores(), options.fresh, folder, plain, noting) as working:
             found = suggest(block.wish(), working, block.prefer)
             drawing = replace(working, time_budget=None)
-            for name, content in suggestions.files(found, block, drawing, not options.no_plots):
+            for name, content in suggestions.files(found, block, drawing, not options.no_plots, ends - SPARE):
                 folder.write(name, content)
         code = suggestions.exit_code(found)
         manifest = folder.commit(

@@ -57,8 +57,9 @@ STARTS = (0.04, 0.1)
 SIZES = (1.0, 0.8, 0.6, 0.42, 0.3)
 """Sizes that are tried, over the largest that the room allows."""
 
-PAD = 0.012
-"""Length of the pads at both ends of a printed part [m]."""
+PADS = (0.031, 0.040)
+"""What the pads at both ends of a printed part add across the slider's way and along it [m]: twice their length, and
+the corners of the inclined one."""
 
 NODES = 5
 """Thicknesses of a tapered strip: more of them take longer and are hardly flatter."""
@@ -156,15 +157,14 @@ def _of_force(wish: Wish) -> Offer:
 def _room_for(wish: Wish, lengths: Proportions, crank: float, pads: bool) -> tuple[float, float]:
     """Return the room that a linkage needs across and along the slider's way [m]."""
     pin = crank * np.sin(lengths.unloaded)
-    across = max(lengths.offset * crank, pin) + 2.0 * PAD * pads + 2.0 * PIN * crank * (not pads)
-    along = lengths.stretched * crank + 2.0 * PAD * pads + 2.0 * PIN * crank * (not pads)
+    across = max(lengths.offset * crank, pin) + PADS[0] * pads + 2.0 * PIN * crank * (not pads)
+    along = lengths.stretched * crank + PADS[1] * pads + 2.0 * PIN * crank * (not pads)
     return float(across), float(along)
 
 
 def _pushed(wish: Wish, lengths: Proportions) -> list[Candidate]:
     """Return parts and linkages of some proportions at all sizes that fit."""
-    pads = 2.0 * PAD
-    printed = min((wish.room[0] - pads) / lengths.offset, (wish.room[1] - pads - 0.003) / lengths.stretched)
+    printed = min((wish.room[0] - PADS[0]) / lengths.offset, (wish.room[1] - PADS[1]) / lengths.stretched)
     pinned = min(wish.room[0] / (lengths.offset + 2 * PIN), wish.room[1] / (lengths.stretched + 2 * PIN))
     found = []
     for size in SIZES:
@@ -172,7 +172,8 @@ def _pushed(wish: Wish, lengths: Proportions) -> list[Candidate]:
             travel = start * wish.travel, (1.0 + start) * wish.travel * (1.0 + 1e-6)
             if travel[1] <= lengths.reach * size * printed:
                 found += [_strip(wish, block, lengths, size * printed, travel) for block in _materials(wish)]
-                found += [_flexures(wish, block, lengths, size * printed, travel) for block in _materials(wish)]
+                if size in SIZES[:2]:
+                    found += [_flexures(wish, block, lengths, size * printed, travel) for block in _materials(wish)]
                 if start == STARTS[-1] and size in SIZES[:2]:
                     found += [_tapered(wish, block, lengths, size * printed, travel) for block in _materials(wish)]
             if travel[1] <= lengths.reach * size * pinned and wish.depth is None and start == STARTS[0]:

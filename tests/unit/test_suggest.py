@@ -1,0 +1,140 @@
+"""Wishes: what they may say, what families answer, and that only what does everything is shown."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+import cfmkit
+from cfmkit.cli.verbs.suggest import room, seconds
+from cfmkit.errors import SpecError, UsageError
+from cfmkit.families import family
+from cfmkit.families.base import Run, function_named
+from cfmkit.families.beam.propose import kept_shapes
+from cfmkit.runs.suggestions import exit_code, wish_of
+from cfmkit.stock.coils import SHEAR_MODULUS, SHEAR_STRESS, extension_spring
+from cfmkit.suggest.proposal import Job, made
+from cfmkit.suggest.search import ordered, suggest
+
+WISHES = Path(__file__).parents[1] / "wishes"
+
+POM = {"force": "10 N", "travel": "3 mm", "ripple": "3 %", "room": "[80 mm, 60 mm, 12 mm]", "material": "pom"}
+
+
+def wish(**keys):
+    return wish_of(None, POM | keys).wish()
+
+
+@pytest.mark.parametrize("path", sorted(WISHES.glob("contradiction-*.yaml")), ids=lambda path: path.stem)
+def test_a_wish_that_contradicts_itself_is_refused_in_one_line(path):
+    with pytest.raises(SpecError) as error:
+        wish_of(str(path), {})
+    assert len(error.value.problems) == 1
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("path", sorted((WISHES / "sources").glob("*.yaml")), ids=lambda path: path.stem)
+def test_a_feasible_wish_is_in_reach_of_its_own_family(path):
+    spec = cfmkit.load(path)
+    asked = wish_of(str(WISHES / path.name), {}).wish()
+    offer = function_named(family(spec.family).propose)(asked, Run())
+    assert offer.candidates, offer.reason
+
+
+def test_options_replace_keys_of_a_file(tmp_path):
+    file = tmp_path / "wish.yaml"
+    file.write_text("cfmkit: 1\nwish: {force: 10 N, travel: 3 mm, room: [80 mm, 60 mm]}\n")
+    block = wish_of(str(file), {"force": "[9 N, 11 N]"})
+    assert block.wish().banded
+    assert block.wish().low == pytest.approx(9.0)
+    assert block.wish().travel == pytest.approx(3e-3)
+
+
+def test_a_room_and_a_time_may_be_written_short():
+    assert room("80x60x6mm") == "[80 mm, 60 mm, 6 mm]"
+    assert room("8cm x 60 mm") == "[8 cm, 60 mm]"
+    assert seconds("90s") == 90.0
+    assert seconds("2 min") == 120.0
+    with pytest.raises(UsageError):
+        seconds("0s")
+
+
+def test_a_spring_of_wire_keeps_its_rate_and_its_stress():
+    coil = extension_spring(690.0, 0.132, 0.136)
+    mean = coil.outside - coil.wire
+    rate = SHEAR_MODULUS * coil.wire**4 / (8.0 * mean**3 * coil.turns)
+    assert rate == pytest.approx(690.0, rel=1e-9)
+    index = mean / coil.wire
+    stress = (index + 0.5) / (index - 0.75) * 8.0 * 690.0 * 0.132 * mean / (3.141592653589793 * coil.wire**3)
+    assert stress <= SHEAR_STRESS * (1 + 1e-9)
+    assert extension_spring(690.0, 0.132, 0.050) is None
+
+
+def test_a_proposal_keeps_the_wish_when_its_file_is_analysed():
+    asked = wish()
+    offer = function_named(family("cam").propose)(asked, Run())
+    found = [made(Job("cam", one, asked, 0, None)) for one in offer.candidates[:4]]
+    good = [one for one in found if one.good]
+    assert good
+    for one in good:
+        result = cfmkit.analyze(cfmkit.loads(one.text))
+        assert all(outcome.ok for outcome in cfmkit.check(result))
+        window = result.spec.analysis.window
+        assert float(window[1]) - float(window[0]) >= 3e-3 * (1 - 1e-9)
+        assert one.numbers["across"] <= 0.080
+        assert one.numbers["depth"] <= 0.012
+
+
+def test_what_misses_a_wish_says_which():
+    asked = wish()
+    offer = function_named(family("cam").propose)(asked, Run())
+    narrow = replace(asked, room=(0.010, 0.060, 0.012))
+    one = made(Job("cam", offer.candidates[0], narrow, 0, None))
+    assert not one.good
+    assert any("across the travel" in told for told in one.missed)
+
+
+def test_a_family_out_of_reach_says_what_it_would_need():
+    offer = function_named(family("vcfm").propose)(wish(force="2 kN"), Run())
+    assert not offer.candidates
+    assert "room" in offer.nearest
+    assert "N" in offer.nearest.get("force", "N")
+
+
+def test_kept_shapes_scale_as_beams_that_only_bend():
+    """Twice as large with twice the thickness: twice the force at twice the travel, the stress as before."""
+    from cfmkit.families.beam.model import analyze
+    from cfmkit.families.beam.propose import _written
+
+    shape = kept_shapes()[0]
+    own = shape.spec.mechanism
+    block = {"youngs_modulus": 2e9, "poisson_ratio": 0.35, "yield_strength": 76e6}
+    end = float(shape.motion[-1])
+    spec = _written(shape, 2.0, block, (2.0 * own.thickness, own.width), (end, 2.0 * end))
+    curve = analyze(spec.replace({"analysis.fidelity": "inextensible"}), Run()).curve
+    assert curve.effort[-1] == pytest.approx(2.0 * shape.force[-1], rel=1e-5)
+    assert curve.extra["max_stress"].values[-1] == pytest.approx(shape.stress[-1], rel=1e-4)
+
+
+def test_a_wish_beyond_energy_gets_nothing_and_ends_with_4():
+    found = suggest(wish_of(str(WISHES / "unreachable-grain-of-pla.yaml"), {}).wish(), Run())
+    assert not found.proposals
+    assert exit_code(found) == 4
+    assert all(one.offer.reason for one in found.answers if not one.offer.candidates)
+
+
+def test_the_order_follows_what_is_preferred():
+    asked = wish()
+    offer = function_named(family("cam").propose)(asked, Run())
+    found = [one for one in (made(Job("cam", each, asked, 0, None)) for each in offer.candidates[:5]) if one.good]
+    flat = ordered(found, asked, ("ripple",))
+    assert [one.numbers["ripple"] for one in flat] == sorted(one.numbers["ripple"] for one in found)
+
+
+def test_the_same_seed_gives_the_same_texts():
+    asked = wish()
+    offers = [function_named(family("cam").propose)(asked, Run(3)) for _ in range(2)]
+    texts = [[cfmkit.dumps(one.spec) for one in offer.candidates] for offer in offers]
+    assert texts[0] == texts[1]
