@@ -25,7 +25,7 @@ figure; numbers of equations and of the text where a result hangs on them. None 
 `cfmkit papers` computes all of it again and ends with 5 where a verdict does not hold; `--all` computes what takes a
 minute, too, and `cfmkit papers lan-2010 -v` shows the command behind each row. This page is made from the same rows
 (`docs/make_papers.py`, from `cfmkit/runs/printed_numbers.yaml`). The texts at hand have no page breaks: a place is a
-section, table, figure or equation.
+section, table, figure or equation. Models and settings of instruments are not listed.
 
 ```console
 $ cfmkit papers cam -q

@@ -6,7 +6,7 @@ verdict, and how to compute the same. `check` computes it again and says whether
 A row asks in a closed grammar, in SI: names of metrics (``force_mean[load]``), dotted paths of the specification
 (``mechanism.springs.stiffness[0]``), columns of the first curve at a place (``force("13.6 mm")``, a branch second),
 quantities in quotes, numbers, ``+ - * / **``, a few functions, and ``changed("path=value", ...)``: the rest of the
-question with one value changed.
+question with one value changed; ``varied("path")``: what the sweep of the specification gives to a value.
 """
 
 from __future__ import annotations
@@ -62,8 +62,8 @@ class Row:
         Name of the example; empty where nothing is computed from one.
     changes : tuple of str
         As ``--set`` takes them.
-    verb : {"analyze", "design"}
-        `design` asks the specification that it finds, and the analysis of that.
+    verb : {"analyze", "design", "sweep"}
+        `design` asks the specification that it finds, and the analysis of that; `sweep` what is varied.
     ask : tuple of str
         As many as `printed`, or one that has as many values; empty where nothing is computed.
     here : tuple of str
@@ -83,7 +83,7 @@ class Row:
     why: str = ""
     spec: str = ""
     changes: tuple[str, ...] = ()
-    verb: Literal["analyze", "design"] = "analyze"
+    verb: Literal["analyze", "design", "sweep"] = "analyze"
     ask: tuple[str, ...] = ()
     here: tuple[str, ...] = ()
     tolerance: str = ""
@@ -316,7 +316,7 @@ def _specification(name: str, changes: tuple[str, ...], verb: str) -> Spec:
     if not name:
         raise ValueError("no example is named")
     spec = api.load(example(name).path, changes)
-    if verb == "analyze":
+    if verb != "design":
         return spec
     found = api.design(spec).spec
     if found is None:
@@ -365,6 +365,8 @@ def _value(node: ast.expr, scope: _Scope) -> Any:
             return _TWO[type(op)](_value(left, scope), _value(right, scope))
         case ast.Call(func=ast.Name(id="changed"), args=[ast.Constant(value=str(change)), inner]):
             return _value(inner, scope.changed(change))
+        case ast.Call(func=ast.Name(id="varied"), args=[ast.Constant(value=str(path))]):
+            return _varied(scope.specification(), path)
         case ast.Call(func=ast.Name(id=name), args=args) if name in _FUNCTIONS:
             return _FUNCTIONS[name](*(_value(one, scope) for one in args))
         case ast.Call(func=ast.Name(id=column), args=[place, *branch]):
@@ -382,6 +384,17 @@ def _named(name: str, scope: _Scope) -> Any:
     if metric is None or metric.value is None:
         raise ValueError(f"{name} has no value")
     return metric.value
+
+
+def _varied(spec: Spec, path: str) -> tuple[float, ...]:
+    """Return the values that a sweep gives to something."""
+    from cfmkit.studies.plan import stepped
+    from cfmkit.studies.variation import axes, wishes
+
+    for axis in axes(spec, wishes(spec.sweep.vary)) if spec.sweep else ():
+        if axis.leaf.path == path:
+            return tuple(map(float, stepped(axis).values))
+    raise ValueError(f"no sweep varies {path}")
 
 
 def _on_curve(curve: Curve, column: str, place: float, branch: str | None = None) -> float:
