@@ -78,6 +78,8 @@ class Part:
     places : tuple of Place
     regions : tuple of ((n, 2) array, float)
         Polygons of another width [m].
+    largest : float
+        Side of an element where the part is thick, in those of its thinnest place.
     """
 
     rings: tuple[Ring, ...]
@@ -86,6 +88,7 @@ class Part:
     law: Law
     places: tuple[Place, ...]
     regions: tuple[tuple[FloatArray, float], ...] = ()
+    largest: float = 1.0
 
     def meshed(self, size: float) -> Meshed:
         """Return the part with elements of a size [m].
@@ -96,7 +99,9 @@ class Part:
             If the outline cannot be meshed so, or no node is where the part is held.
         """
         share = SHARE * size / (self.thinnest / ACROSS)
-        grid = mesh(self.rings, size, share, seams=[seam for place in self.places for seam in place.seams])
+        across = self.thinnest / size if self.largest > 1.0 else 2.0
+        seams = [seam for place in self.places for seam in place.seams]
+        grid = mesh(self.rings, self.largest * size, share, across, seams)
         groups, held = self._groups(grid.nodes)
         elements = Elements(grid, self.law, self._widths(grid)).without(held)
         return Meshed(Problem(elements, Supports(grid.nodes, groups)), held)

@@ -16,11 +16,14 @@ from cfmkit.families.slider_crank.springs.values import DEFINITIONS as OF_SPRING
 PRINTED = "cfmkit.families.slider_crank.printed.model:analyze"
 """One model for flexures and strips: the chain is another one."""
 
+SOLID = "cfmkit.families.slider_crank.printed.solid:analyze"
+"""The part as drawn, of flexures or a strip."""
+
 FAMILY = Family(
     name="slider-crank",
     summary="a crank, a coupler and a slider with a spring at each joint: constant torque or force",
     spec_type=SliderCrankSpec,
-    models={"prb": analyze, "lumped": PRINTED, "beam": PRINTED},
+    models={"prb": analyze, "lumped": PRINTED, "beam": PRINTED, "solid": SOLID},
     analyze_block=analyze_block,
     design=design,
     search=Search(findings=("near_optima", "spring_dropped", "window_not_proven")),

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from cfmkit.plots.moving import Moving
     from cfmkit.results import Design, Result
 
-ROOMS = {"prb": "springs", "lumped": "printed", "beam": "printed"}
+ROOMS = {"prb": "springs", "lumped": "printed", "beam": "printed", "solid": "printed"}
 """What each fidelity is a model of: flexures and a strip are one model, the chain is another one."""
 
 
@@ -47,9 +47,9 @@ def figures(result: Result) -> dict[str, Callable[[], Figure]]:
     return made
 
 
-def moving(result: Result) -> Moving:
-    """Return the linkage or the part over its motion, for a film."""
-    made: Moving = _in_room(ROOMS[str(result.spec.fidelity)], "draw:moving")(result)
+def moving(result: Result) -> Moving | None:
+    """Return the linkage or the part over its motion, for a film; None of a part solved as a solid."""
+    made: Moving | None = _in_room(ROOMS[str(result.spec.fidelity)], "draw:moving")(result)
     return made
 
 

@@ -47,6 +47,8 @@ FINDINGS = {
     "branch_begins_late": "the branch to which the kink does not lead exists only beyond some travel",
     "force_negative": "the chain pulls instead of pushing back",
     "overstressed": "the stress exceeds the allowable one within the travel",
+    "sharp_corners": "without fillets the stress in inside corners has no value",
+    "mesh_coarse": "results on two meshes of the part differ by more than the limit",
     "too_thin": "a thickness is below the thinnest wall of the process",
     "lateral_buckling": "the part bends out of its plane nearly as easily as in it",
     "side_force": "the slider is pushed across its way: friction in its guide adds to the force",

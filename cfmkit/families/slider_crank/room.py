@@ -22,7 +22,7 @@ PIN = 0.05
 
 def room(result: Result) -> Room | None:
     """Return the box of a solved mechanism, along the slider's way and across it; None where nothing was solved."""
-    if result.state is None:
+    if result.state is None or result.spec.fidelity == "solid":
         return None
     return _linkage(result) if result.spec.fidelity == "prb" else _part(result)
 

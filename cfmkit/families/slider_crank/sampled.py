@@ -30,7 +30,7 @@ def sampled(spec: SliderCrankSpec, places: FloatArray) -> Sampled | None:
     places : (p,) array
         Increasing travels [m].
     """
-    if spec.fidelity == "prb" or spec.analysis.side is not None or places[0] < 0:
+    if spec.fidelity in ("prb", "solid") or spec.analysis.side is not None or places[0] < 0:
         return None
     try:
         spec = resolve(spec)

@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 from cfmkit.families.slider_crank.printed.spec import Printed, PrintedAnalysis, PrintedDesign
 from cfmkit.families.slider_crank.springs.spec import Limits, PositiveLength, SpringDesign, Springs
 from cfmkit.metrics.material_laws import Durability
-from cfmkit.specs.spec import Spec, refuse
+from cfmkit.specs.spec import SolidAnalysis, Spec, refuse
 from cfmkit.specs.units import Angle, Length, Ratio
 from cfmkit.stock.spec import Guide, Pins, sheet_faults
 
@@ -86,9 +86,12 @@ class CrankAnalysis(PrintedAnalysis):
     reference_travel: Length | None = Field(
         None, description="where the constant band is taken when a force drives; default: half way"
     )
-    fidelity: Literal["prb", "lumped", "beam"] | None = Field(
-        None, description="rigid links with springs, flexures, or a strip; default: the last that the mechanism has"
+    fidelity: Literal["prb", "lumped", "beam", "solid"] | None = Field(
+        None,
+        description="rigid links with springs, flexures, or a strip; default: the last of these that the mechanism "
+        "has. Or that one as drawn, as a planar solid",
     )
+    solid: SolidAnalysis = Field(SolidAnalysis(), description="of fidelity 'solid'")
 
     @model_validator(mode="after")
     def _ranges_increase(self) -> Self:
@@ -118,9 +121,14 @@ class SliderCrankSpec(Spec):
         return "length" if self.analysis.drive == "force" or self.fidelity != "prb" else "angle"
 
     @property
-    def fidelity(self) -> Literal["prb", "lumped", "beam"]:
+    def fidelity(self) -> Literal["prb", "lumped", "beam", "solid"]:
         """The model that the analysis uses."""
         return self.analysis.fidelity or self.mechanism.finest
+
+    @property
+    def piece(self) -> Literal["prb", "lumped", "beam"]:
+        """What is made: links and springs, flexures or a strip; of a solid the finest that there is data for."""
+        return self.mechanism.finest if self.fidelity == "solid" else self.fidelity
 
     @model_validator(mode="after")
     def _is_cut_from_one_sheet(self) -> Self:
@@ -166,6 +174,12 @@ class SliderCrankSpec(Spec):
             raise ValueError(f"fidelity {asked!r} needs 'mechanism.{block}'")
         if asked == "prb" and part.finest != "prb" and not any(self.mechanism.springs.rates):
             raise ValueError("fidelity 'prb' needs the rates of 'mechanism.springs'")
+        if asked == "solid" and part.finest == "prb":
+            raise ValueError("fidelity 'solid' needs a part: 'mechanism.flexures' or 'mechanism.beam'")
+        if asked == "solid" and self.analysis.side is not None:
+            raise ValueError("fidelity 'solid' goes where its kink leads it: drop 'analysis.side'")
+        if asked == "solid" and self.analysis.travel is not None and self.analysis.travel[0] < 0:
+            raise ValueError("fidelity 'solid' is pressed, not pulled: 'analysis.travel' must not begin below 0")
         if self.fidelity != "prb" and self.analysis.drive != "force":
             raise ValueError("flexures and strips are pressed at the slider: set 'analysis.drive: force'")
         return self

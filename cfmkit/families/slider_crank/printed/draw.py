@@ -13,6 +13,7 @@ from cfmkit.plots.diagram import Diagram, Limit, Scale, Series, diagram_figure
 from cfmkit.plots.loop import loop_figure
 from cfmkit.plots.moving import Moving, chosen
 from cfmkit.plots.place import Label, place_labels
+from cfmkit.plots.stress_map import StressView, stress_map_figure
 from cfmkit.plots.style import BLUE, GREY, INK, OCHRE, PURPLE, VERMILLION, axes_mm, new_figure, styled
 from cfmkit.plots.text import Heading, value_text, write_heading
 
@@ -36,15 +37,27 @@ LINK = 2.4e-3
 
 def figures(result: Result) -> dict[str, Callable[[], Figure]]:
     """Return what draws each picture of a printed slider-crank, by file stem."""
+    if result.spec.at("analysis.fidelity") == "solid":
+        return {maker.__name__: partial(maker, result) for maker in (curve, stress_map)}
     return {maker.__name__: partial(maker, result) for maker in (curve, stress, guide, part)}
 
 
 @styled
 def curve(result: Result) -> Figure:
     """Return the force over the slider's travel, the band that it should keep enlarged."""
-    solution: Solution = result.state
-    what = "a strip" if solution.model == "beam" else "flexures and rigid links"
+    told = {"lumped": "flexures and rigid links", "beam": "a strip", "solid": "the part as drawn"}
+    what = told[str(result.spec.at("analysis.fidelity"))]
     return loop_figure(result, None, f"force over travel of the slider: {what}")
+
+
+def stress_map(result: Result) -> Figure:
+    """Return the stress of the part as drawn half way, where it is largest and at the end of its travel."""
+    solved = result.state.fine
+    poses = solved.course.poses
+    middle = int(np.abs(solved.course.travel - 0.5 * solved.course.travel[-1]).argmin())
+    shown = sorted({middle, int(solved.peaks[0].argmax()), len(poses) - 1})
+    views = [StressView(solved, pose, value_text(poses[pose].travel, "length")) for pose in shown]
+    return stress_map_figure(result, views, "stress of the part as drawn")
 
 
 @styled
@@ -155,8 +168,10 @@ def _length(points: FloatArray) -> float:
     return float(np.hypot(*np.diff(points, axis=0).T).sum())
 
 
-def moving(result: Result) -> Moving:
-    """Return the part over its travel, for a film."""
+def moving(result: Result) -> Moving | None:
+    """Return the part over its travel, for a film; None of a part solved as a solid."""
+    if result.spec.at("analysis.fidelity") == "solid":
+        return None
     solution: Solution = result.state
     points = chosen(len(solution.travel))
     shapes = [list(_shapes(solution, int(solution.pressed.path.at_requested[k]))) for k in points]

@@ -76,7 +76,7 @@ def analyze(spec: SliderCrankSpec, run: Run) -> Result:
         spec = resolve(spec)
         linkage = linkage_of(spec.mechanism)
         unloaded = unloaded_angle(spec.mechanism, linkage)
-        spec = _as_run(spec, linkage, unloaded)
+        spec = as_run(spec, linkage, unloaded)
         chain = chain_of(spec, linkage, unloaded)
     except CannotBuild as problem:
         return no_result(spec, problem.finding)
@@ -145,7 +145,7 @@ def slider_reach(linkage: Linkage, unloaded: float) -> float:
     return abs(float(linkage.slider_position(np.array(unloaded))))
 
 
-def _as_run(spec: SliderCrankSpec, linkage: Linkage, unloaded: float) -> SliderCrankSpec:
+def as_run(spec: SliderCrankSpec, linkage: Linkage, unloaded: float) -> SliderCrankSpec:
     """Return the spec with the defaults of the analysis made explicit."""
     travel = spec.analysis.travel or (0.0, DEFAULT_SHARE * slider_reach(linkage, unloaded))
     written = {"travel": travel, "fidelity": spec.fidelity}

@@ -41,7 +41,7 @@ def drawing(spec: SliderCrankSpec) -> Drawing:
     """Return the outline of one leg, with a table of its sections."""
     linkage = linkage_of(spec.mechanism)
     unloaded = unloaded_angle(spec.mechanism, linkage)
-    if spec.fidelity == "beam":
+    if spec.piece == "beam":
         beam = spec.mechanism.beam
         strip = strip_of(spec.mechanism, linkage, unloaded)
         drawn = _strip(strip, beam.offset if beam else 0, pad_of(spec))
@@ -72,6 +72,51 @@ def drawing(spec: SliderCrankSpec) -> Drawing:
     sheet = Sheet(widest, regions)
     drawn = Drawing("slider-crank", _piece(points[order], half, pad), (Curve2D("flexures", table),), (), sheet)
     return _cut(spec, replace(drawn, dimensions=tuple(_dimensions(points)), facts=tuple(_facts(spec, drawn))))
+
+
+@dataclass(frozen=True)
+class SolvedPiece:
+    """One leg as it is printed.
+
+    Attributes
+    ----------
+    contour, holes : Contour, tuple of Contour
+        The outline with its fillets, thicker than drawn where printing adds to it.
+    pads : two (4, 2) arrays
+        At the ground and at the slider: the face where the leg begins comes first [m].
+    sheet : Sheet
+        Widths.
+    thinnest : float
+        Of flexures or strip [m].
+    """
+
+    contour: Contour
+    holes: tuple[Contour, ...]
+    pads: tuple[FloatArray, FloatArray]
+    sheet: Sheet
+    thinnest: float
+
+
+def solved_piece(spec: SliderCrankSpec) -> SolvedPiece:
+    """Return one leg as it is solved as a solid."""
+    beam = spec.mechanism.beam
+    drawn = drawing(spec)
+    if spec.piece == "beam" and beam is not None and beam.offset:
+        linkage = linkage_of(spec.mechanism)
+        strip = strip_of(spec.mechanism, linkage, unloaded_angle(spec.mechanism, linkage))
+        drawn = _cut(spec, replace(_strip(strip, 0.0, pad_of(spec)), sheet=Sheet(beam.width)))
+    table = drawn.tables[0].columns
+    points = np.column_stack([table["x"][0], table["y"][0]])
+    depth, breadth = pad_of(spec)
+    ends = []
+    for k, sense in ((0, -1.0), (len(points) - 1, 1.0)):
+        way = sense * _direction(points, k)
+        side = 0.5 * breadth * np.array([-way[1], way[0]])
+        out = points[k] + depth * way
+        ends.append(np.array([points[k] + side, points[k] - side, out - side, out + side]))
+    outline, *others = (contour for contour in drawn.contours if contour.layer == "cut")
+    thinnest = float(table["thickness"][0].min())
+    return SolvedPiece(outline, tuple(others), (ends[0], ends[1]), drawn.sheet, thinnest)
 
 
 def pad_of(spec: SliderCrankSpec) -> tuple[float, float]:

@@ -1,0 +1,244 @@
+"""A printed slider-crank as it is drawn, as a planar solid: flexures with their fillets, links that bend, or a strip.
+
+The pad at the ground is held and that at the slider moved from their faces on; widths are those of the flexures where
+they are. Poses stand close where the travel begins: a nearly straight chain yields within a thousandth of it.
+
+Assumes: plane stress. No contact, no plasticity.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.arrays import read_only
+from cfmkit.curves import Column, Curve
+from cfmkit.errors import GeometryError, InputError
+from cfmkit.families.refusals import CannotBuild, no_result
+from cfmkit.families.slider_crank.build import linkage_of, resolve, unloaded_angle
+from cfmkit.families.slider_crank.findings import finding
+from cfmkit.families.slider_crank.printed.assembly import elasticity, pins_of, travel_direction
+from cfmkit.families.slider_crank.printed.chain import kink
+from cfmkit.families.slider_crank.printed.model import as_run
+from cfmkit.families.slider_crank.printed.outline import solved_piece
+from cfmkit.families.slider_crank.printed.solution import first_at
+from cfmkit.families.slider_crank.printed.values import DEFINITIONS
+from cfmkit.families.slider_crank.springs.values import DEFINITIONS as OF_SPRINGS
+from cfmkit.results import Quantity, Result, Status
+from cfmkit.specs.units import between, format_short
+from cfmkit.stock.spec import PaddedPart
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    from cfmkit.arrays import FloatArray
+    from cfmkit.families.base import Run
+    from cfmkit.families.slider_crank.spec import SliderCrankSpec
+    from cfmkit.results import Finding
+    from cfmkit.solid.part import MeshSolution, Part
+
+GATHERED = 3.0
+"""Poses stand at (k/n) to this power of the travel, and where the stiffness leaps."""
+LARGEST = 4.0
+"""Sides of elements in links, in those of flexures: links are stiff, and hardly bend."""
+FORCE_APART, STRESS_APART = 2e-3, 0.05
+"""Differences of two meshes from which on they are called coarse."""
+ELSEWHERE = "the model of the part as a solid does not compute it"
+
+
+@dataclass(frozen=True, eq=False)
+class SolidSolution:
+    """A part that was solved on two meshes.
+
+    Attributes
+    ----------
+    spec : SliderCrankSpec
+        With every default written out.
+    fine, coarse : MeshSolution
+        The finer mesh, whose values are reported, and the one that it is compared with.
+    travel : (n,) array
+        Of the slider, at the points of the curve [m].
+    pins : (3, 2) array
+        Pivot, crank pin, slider pin, unloaded [m].
+    """
+
+    spec: SliderCrankSpec
+    fine: MeshSolution
+    coarse: MeshSolution
+    travel: FloatArray
+    pins: FloatArray = field(default_factory=lambda: np.zeros((3, 2)))
+
+    @cached_property
+    def force(self) -> FloatArray:
+        """Of all legs, at the points of the curve [N]: cubics between the poses."""
+        return read_only(self.spec.mechanism.legs * self.fine.course.effort(self.travel))
+
+    @cached_property
+    def stress(self) -> FloatArray:
+        """Largest along a free edge [Pa]; between poses by cubics that stay between their values."""
+        from scipy.interpolate import PchipInterpolator
+
+        found = PchipInterpolator(self.fine.course.travel, self.fine.peaks[0])(self.travel)
+        return read_only(np.maximum(found, 0.0))
+
+    @cached_property
+    def differences(self) -> tuple[float, float]:
+        """Of force and of largest stress, between the meshes, in parts of the finer one's largest."""
+        return self.fine.differences(self.coarse)
+
+    @property
+    def window(self) -> tuple[float, float]:
+        """Where metrics are taken [m]."""
+        ends = self.spec.analysis.travel or (0.0, 0.0)
+        return ends if self.spec.analysis.window is None else between(self.spec.analysis.window, ends)
+
+    @cached_property
+    def level(self) -> float:
+        """Mean force in the window [N]."""
+        low, high = max(self.window[0], self.travel[0]), min(self.window[1], self.travel[-1])
+        places = np.linspace(low, high, 401)
+        return float(self.spec.mechanism.legs * self.fine.course.effort(places).mean())
+
+
+def analyze(spec: SliderCrankSpec, run: Run) -> Result:
+    """Return the force of the part as drawn over its slider's travel, with everything that is wrong with it.
+
+    PARTIAL if the path ends before the travel; NO_EQUILIBRIUM if it cannot be meshed or has no second pose.
+    """
+    from cfmkit.solid.course import Ending
+    from cfmkit.solid.part import ACROSS, COARSER
+
+    try:
+        spec = resolve(spec)
+        linkage = linkage_of(spec.mechanism)
+        unloaded = unloaded_angle(spec.mechanism, linkage)
+        spec = as_run(spec, linkage, unloaded)
+        part = part_of(spec)
+        size = spec.analysis.solid.mesh or part.thinnest / ACROSS
+        stops, own = _stops(spec), run.progress
+        second = [*stops[:-1:2], stops[-1]]
+        coarse = part.meshed(COARSER * size).followed(second, lambda share: own(0.3 * share, "coarser mesh"))
+        fine = part.meshed(size).followed(stops, lambda share: own(0.3 + 0.7 * share, "finer mesh"))
+    except CannotBuild as problem:
+        return no_result(spec, problem.finding)
+    except GeometryError as error:
+        message = f"the part cannot be meshed: {error}; look at analysis.solid.mesh and mechanism.part"
+        return Result(spec, Status.NO_EQUILIBRIUM, message)
+    except InputError as problem:
+        return Result(spec, Status.INVALID, str(problem))
+    low, high = spec.analysis.travel or (0.0, 0.0)
+    if min(len(one.course.poses) for one in (fine, coarse)) < 3:
+        why = next(one.course.ending.value for one in (coarse, fine) if len(one.course.poses) < 3)
+        return Result(spec, Status.NO_EQUILIBRIUM, f"no curve: {why}; look at analysis.solid.mesh")
+    asked = np.linspace(low, high, spec.analysis.points)
+    reached = read_only(asked[asked <= fine.course.travel[-1] * (1 + 1e-12)])
+    solution = SolidSolution(spec, fine, coarse, reached, pins_of(spec.mechanism, linkage, unloaded))
+    complete = fine.course.ending is Ending.COMPLETE
+    found = tuple(_findings(solution))
+    return Result(
+        spec=spec,
+        status=Status.COMPLETE if complete else Status.PARTIAL,
+        message="" if complete else found[0].message,
+        curves=(_curve(solution),),
+        values=_values(solution),
+        warnings=found,
+        travel=(low, high),
+        target=spec.design.force if spec.design else None,
+        reference=spec.analysis.reference_travel,
+        allowable_stress=elasticity(spec.mechanism).allowable_stress,
+        state=solution,
+    )
+
+
+def part_of(spec: SliderCrankSpec) -> Part:
+    """Return one leg as it is solved: its outline as printed, with its widths and both pads."""
+    from cfmkit.solid.law import LAWS
+    from cfmkit.solid.part import Part, Place, rings_of
+
+    piece = solved_piece(spec)
+    made_of = elasticity(spec.mechanism)
+    way = travel_direction(linkage_of(spec.mechanism))
+    driven = np.array([np.cos(way), np.sin(way), 0.0])
+    places = tuple(
+        Place(name, (pad,), pad.mean(axis=0), motion, seams=(pad[:2],))
+        for name, pad, motion in (("ground", piece.pads[0], np.zeros(3)), ("slider", piece.pads[1], driven))
+    )
+    law = LAWS[spec.analysis.solid.law](made_of.youngs_modulus, made_of.poisson_ratio)
+    regions = tuple((one.polygon, one.thickness) for one in piece.sheet.regions)
+    rings = rings_of((piece.contour, *piece.holes))
+    return Part(rings, piece.thinnest, float(piece.sheet.thickness or 0.0), law, places, regions, LARGEST)
+
+
+def _stops(spec: SliderCrankSpec) -> list[float]:
+    """Return the travels to solve for [m]: rest, closer ones where the travel begins, and the ends of every window."""
+    low, high = spec.analysis.travel or (0.0, 0.0)
+    own = high * np.linspace(0.0, 1.0, spec.analysis.solid.poses) ** GATHERED
+    windows = [spec.analysis.window, *(one.over for one in spec.requirements)]
+    ends = [low, *(place for window in windows if window is not None for place in between(window, (low, high)))]
+    found = np.unique(np.concatenate([own, [place for place in ends if 0.0 < place < high]]))
+    return [float(place) for place in np.delete(found, np.flatnonzero(np.diff(found) < 1e-9 * high) + 1)]
+
+
+def _curve(solution: SolidSolution) -> Curve:
+    course, travel = solution.fine.course, solution.travel
+    solved = np.isclose(travel[:, None], course.travel, rtol=0, atol=1e-9 * travel[-1]).any(axis=1)
+    stable = np.array([pose.unstable == 0 for pose in course.poses])
+    before = np.clip(np.searchsorted(course.travel, travel * (1 + 1e-12)) - 1, 0, None)
+    extra = {
+        "max_stress": Column(solution.stress, "stress"),
+        "solved": Column(read_only(np.where(solved, "yes", "between"), np.str_), "text"),
+    }
+    return Curve(travel, solution.force, np.repeat("load", len(travel)), stable[before], extra)
+
+
+def _values(solution: SolidSolution) -> Mapping[str, Quantity]:
+    """Return the scalar results by name; those that a solid does not know have no value."""
+    limit = elasticity(solution.spec.mechanism).allowable_stress
+    force, stress = solution.differences
+    known: dict[str, float | None] = {
+        "kink": kink(solution.pins),
+        "run_in_95": first_at(solution.travel, solution.force, 0.95 * solution.level),
+        "run_in_98": first_at(solution.travel, solution.force, 0.98 * solution.level),
+        "allowable_stress": limit,
+        "stress_stroke": None if limit is None else first_at(solution.travel, solution.stress, limit),
+        "mesh_force_difference": force,
+        "mesh_stress_difference": stress,
+    }
+    names = [*DEFINITIONS, "energy_max", "stiffness_class", "crank_pin_rotation_max"]
+    about = OF_SPRINGS | DEFINITIONS
+    return {
+        name: Quantity(known.get(name), *about[name], ELSEWHERE if known.get(name) is None else "") for name in names
+    }
+
+
+def _findings(solution: SolidSolution) -> Iterator[Finding]:
+    from cfmkit.solid.course import Ending
+
+    names = {Ending.LIMIT_POINT: "limit_point", Ending.UNSTABLE: "unstable"}
+    course, (force, stress) = solution.fine.course, solution.differences
+    if course.ending is not Ending.COMPLETE:
+        where = format_short(float(course.travel[-1]), "length")
+        yield finding(names.get(course.ending, "not_converged"), f"{course.ending.value}, at {where}")
+    if (solution.spec.mechanism.part or PaddedPart()).fillet == 0:
+        told = "without fillets the stress in inside corners has no value"
+        yield finding("sharp_corners", told, "mechanism.part.fillet=0.5 mm")
+    if force > FORCE_APART or stress > STRESS_APART:
+        yield finding(
+            "mesh_coarse",
+            f"two meshes of the part differ by {100 * force:.2g} % in force and {100 * stress:.2g} % in stress: give a "
+            "smaller analysis.solid.mesh",
+        )
+    limit = elasticity(solution.spec.mechanism).allowable_stress
+    peaks, places = solution.fine.peaks
+    if limit is not None and peaks.max() > limit:
+        worst = int(peaks.argmax())
+        at = ", ".join(format_short(one, "length") for one in places[worst].tolist())
+        yield finding(
+            "overstressed",
+            f"the stress reaches {format_short(float(peaks[worst]), 'stress')} at ({at}) of the drawing, at "
+            f"{format_short(float(course.travel[worst]), 'length')} of travel; allowed are "
+            f"{format_short(limit, 'stress')}",
+        )

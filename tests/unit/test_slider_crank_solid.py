@@ -1,0 +1,76 @@
+"""A printed slider-crank as drawn, as a planar solid: a strip is what beams say, flexures have links that bend."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import cfmkit
+from cfmkit import api
+from cfmkit.errors import SpecError
+from cfmkit.families.slider_crank.printed.solid import part_of
+from cfmkit.results import Status
+
+QUICK = ("analysis.fidelity=solid", "analysis.solid.poses=7", "analysis.points=41")
+
+
+def spec(name, *changes):
+    return cfmkit.load(f"configs/slider_crank_{name}.yaml", list(changes))
+
+
+@pytest.fixture(scope="module")
+def strip():
+    """Two meshes of a strip: two seconds, the least in which its numbers can be had; and the same as a beam."""
+    return {
+        "solid": api.analyze(spec("strip", *QUICK, "analysis.solid.mesh=0.6 mm")),
+        "beam": api.analyze(spec("strip", "analysis.points=41", "analysis.recheck=false")),
+    }
+
+
+def test_a_slender_strip_has_the_force_of_the_beam(strip):
+    solid, beam = (strip[name].curve for name in ("solid", "beam"))
+    assert strip["solid"].status is Status.COMPLETE
+    at = np.linspace(0.1, 1.0, 10) * beam.motion[-1]
+    ratio = np.interp(at, solid.motion, solid.effort) / np.interp(at, beam.motion, beam.effort)
+    assert ratio == pytest.approx(np.ones(10), abs=0.006)
+    assert solid.stable.all()
+
+
+def test_its_stress_is_in_a_fillet_and_larger_than_the_beams(strip):
+    largest = {name: float(one.curve.extra["max_stress"].values.max()) for name, one in strip.items()}
+    assert 1.0 < largest["solid"] / largest["beam"] < 1.4
+    (warning,) = (one for one in strip["solid"].warnings if one.name == "overstressed")
+    assert "of the drawing, at" in warning.message
+
+
+def test_the_stress_map_is_drawn_and_there_is_no_film(strip):
+    assert list(api.figures(strip["solid"])) == ["curve", "stress_map"]
+    assert api.figures(strip["solid"])["stress_map"]().axes
+
+
+def test_flexures_are_solved_with_their_own_widths():
+    part = part_of(spec("lumped", "analysis.fidelity=solid"))
+    assert part.width == pytest.approx(2.621e-3)
+    assert [width for _, width in part.regions] == pytest.approx([2.478e-3])
+    elements = part.meshed(0.5e-3).problem.elements
+    assert set(np.round(elements.width, 9)) == {2.621e-3, 2.478e-3}
+
+
+def test_printing_allowance_is_solved_but_not_drawn():
+    sizes = []
+    for offset in ("0 mm", "0.1 mm"):
+        part = part_of(spec("strip", "analysis.fidelity=solid", f"mechanism.beam.offset={offset}"))
+        sizes.append(part.thinnest)
+    assert sizes[1] - sizes[0] == pytest.approx(0.1e-3)
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "told"),
+    [
+        ("bilancia2019", "analysis.drive=force", "needs a part: 'mechanism.flexures' or 'mechanism.beam'"),
+        ("strip", "analysis.side=before", "goes where its kink leads it: drop 'analysis.side'"),
+    ],
+)
+def test_what_is_no_part_is_refused(name, change, told):
+    with pytest.raises(SpecError, match=told):
+        spec(name, "analysis.fidelity=solid", change)
