@@ -7,7 +7,7 @@ An option or argument is a field of the dataclass that a verb's `run` takes: its
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -80,6 +80,10 @@ Timeout = Annotated[
     float | None, option("--timeout-per-point", metavar="S", text="Give up on a point after S seconds.")
 ]
 Fresh = Annotated[bool, flag("--fresh", text="Reuse nothing of an earlier run.")]
+Animate = Annotated[
+    Literal["gif", "mp4"] | None,
+    option("--animate", text="Write the mechanism in motion beside its curve, figures/motion.gif; mp4 needs ffmpeg."),
+]
 WithReport = Annotated[bool, flag("--report", text="Write report.html, too: everything in one file to share.")]
 
 

@@ -40,7 +40,11 @@ def execute(verb: Verb, options: Computing, terminal: Terminal, page: bool = Fal
     """Run a verb over the spec that the options name and write the folder."""
     out = folder_of(options, verb.name)
     wanted = Request(options.spec, out, options.changes, options.fidelity, options.seed, not options.no_plots)
-    wanted = replace(wanted, page=page, form=options.form)
+    wanted = replace(wanted, page=page, form=options.form, animate=getattr(options, "animate", None))
+    if wanted.animate == "mp4":
+        from cfmkit.plots.animation import require_ffmpeg
+
+        require_ffmpeg()
     with terminal.progress() as progress:
         return answer(carry_out(verb, wanted, terminal.arguments, progress), everything=terminal.verbose > 0)
 

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from cfmkit.families.base import Family
+    from cfmkit.plots.moving import Moving
     from cfmkit.results import Result
 
 
@@ -33,3 +34,12 @@ def figures(family: Family, result: Result) -> Mapping[str, Callable[[], Figure]
         return {"curve": partial(loop_figure, result)}
     makers: Mapping[str, Callable[[], Figure]] = import_module(family.draw).figures(result)
     return makers
+
+
+def moving_of(family: Family, result: Result) -> Moving | None:
+    """Return a mechanism in motion; None where there is no curve, or its family has no film."""
+    if not family.draw or not result.curves:
+        return None
+    draw = getattr(import_module(family.draw), "moving", None)  # optional: a family may have figures without a film
+    found: Moving | None = draw(result) if draw else None
+    return found if found is not None and len(found.motion) > 1 else None

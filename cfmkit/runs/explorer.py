@@ -136,11 +136,13 @@ class Explorer:
 
     def drawing(self, changes: Sequence[str]) -> dict[str, Any]:
         """Return the mechanism in the middle of its travel as SVG; empty where its family draws none."""
+        from cfmkit.families import family
+        from cfmkit.plots.figures import moving_of
         from cfmkit.plots.moving import still
-        from cfmkit.runs.run_page import moving_of
 
         try:
-            moving = moving_of(api.analyze(self.spec(changes)))
+            result = api.analyze(self.spec(changes))
+            moving = moving_of(family(result.spec.family), result)
         except CfmError:
             moving = None
         drawn = "" if moving is None else still(moving, len(moving.motion) // 2, "the mechanism to scale, half way")

@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 from cfmkit import api
 from cfmkit.errors import SolutionError
+from cfmkit.families import family
+from cfmkit.plots.figures import moving_of
 from cfmkit.plots.form import PLAIN, FigureForm
 from cfmkit.tables.jsontext import json_bytes
 
@@ -25,7 +27,12 @@ if TYPE_CHECKING:
 
 
 def files(
-    report: Report, plots: bool = True, page: bool = False, command: str = "", form: FigureForm = PLAIN
+    report: Report,
+    plots: bool = True,
+    page: bool = False,
+    command: str = "",
+    form: FigureForm = PLAIN,
+    animate: str | None = None,
 ) -> Iterator[tuple[str, bytes]]:
     """Yield every file of a run as (name below the folder, content), each when it is needed.
 
@@ -41,6 +48,8 @@ def files(
         What the page says about how the run was started.
     form : FigureForm, optional
         How figures are written; default: as PNG, as they are drawn. The page has them as SVG.
+    animate : {"gif", "mp4"}, optional
+        Whether to write the mechanism in motion beside its curve, where its family draws it.
     """
     result, designed = report.result, report.design.spec if report.design else None
     if designed is not None:
@@ -65,6 +74,10 @@ def files(
     drawn = {stem: form.draw(make) for stem, make in makers.items()}
     for stem, figure in drawn.items() if plots else ():
         yield from form.write(figure, stem)
+    if animate is not None and (moving := moving_of(family(result.spec.family), result)) is not None:
+        from cfmkit.plots.animation import animation
+
+        yield f"figures/motion.{animate}", animation(result, moving, animate)
     if page:
         from cfmkit.runs import run_page
 

@@ -123,6 +123,8 @@ class Request:
         Whether to write ``report.html``.
     form : FigureForm
         How figures are written.
+    animate : {"gif", "mp4"}, optional
+        Whether to write the mechanism in motion, and as what.
     """
 
     spec: str
@@ -134,6 +136,7 @@ class Request:
     of_many: bool = False
     page: bool = False
     form: FigureForm = PLAIN
+    animate: str | None = None
 
 
 def carry_out(
@@ -160,7 +163,7 @@ def carry_out(
         with verb.running(folder, Run(wanted.seed, progress) if progress else Run(wanted.seed)) as run:
             found = _computed(verb, spec, run, document)
         command = shlex.join(["cfmkit", *arguments])
-        for name, data in files(found, wanted.plots, wanted.page, command, wanted.form):
+        for name, data in files(found, wanted.plots, wanted.page, command, wanted.form, wanted.animate):
             folder.write(name, data)
         origin = provenance(verb.name, spec, wanted.spec, arguments)
         manifest = folder.commit(origin | dict(verb.inputs) | {"seed": wanted.seed} | _ending(found))

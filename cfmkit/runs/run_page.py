@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
-from importlib import import_module
 from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +16,7 @@ import numpy as np
 from cfmkit import api
 from cfmkit.families import family
 from cfmkit.metrics import split_name
+from cfmkit.plots.figures import moving_of
 from cfmkit.specs.units import format_short, to_border
 
 if TYPE_CHECKING:
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 
     from matplotlib.figure import Figure
 
-    from cfmkit.plots.moving import Moving
     from cfmkit.results import Quantity, Result
     from cfmkit.runs.run_findings import Report
 
@@ -160,8 +159,8 @@ class Film:
 
 def _film(result: Result, drawn: Mapping[str, Figure], figures: dict[str, str]) -> Film | None:
     """Return the film of a result; None where its family has none. The figure beside it gets its cursors."""
-    moving = moving_of(result)
-    if moving is None or len(moving.motion) < 2 or not drawn:
+    moving = moving_of(family(result.spec.family), result)
+    if moving is None or not drawn:
         return None
     from cfmkit.plots.moving import film
 
@@ -175,16 +174,6 @@ def _film(result: Result, drawn: Mapping[str, Figure], figures: dict[str, str]) 
     data = escaped_json({"texts": texts, "cursors": [xs for xs, _, _ in spots]})
     drawing = film(moving, f"{result.spec.family} mechanism to scale over its travel")
     return Film(drawing, name, data, len(texts), texts[0])
-
-
-def moving_of(result: Result) -> Moving | None:
-    """Return a mechanism in motion; None where its family has no film."""
-    place = family(result.spec.family).draw
-    if not place or not result.curves:
-        return None
-    draw = getattr(import_module(place), "moving", None)  # optional: a family may have figures without a film
-    found: Moving | None = draw(result) if draw else None
-    return found
 
 
 def _cursors(figure: Figure, motion: Any) -> Iterator[tuple[list[float], float, float]]:

@@ -1,4 +1,6 @@
-"""``report.html`` of a sweep: its points as a table that sorts and filters, a slider for each varied value, its curves.
+"""``report.html`` of a sweep or a sensitivity study: its points as a table that sorts and filters, its curves.
+
+A slider stands for each varied value; a sensitivity study has its indices and the shares of good parts before them.
 
 Made from the study's own files, so it says what they say. A file has at most 500 curves and 4 MB of points: a study
 with more columns keeps those that were varied and those that its page shows first, and says so.
@@ -40,7 +42,7 @@ DIGITS = 6
 
 
 def page(spec: Spec, varied: Sequence[str], files: Mapping[str, bytes], command: str) -> bytes:
-    """Return the page of a sweep.
+    """Return the page of a study.
 
     Parameters
     ----------
@@ -72,6 +74,10 @@ def page(spec: Spec, varied: Sequence[str], files: Mapping[str, bytes], command:
         family=spec.family,
         status=summary.get("status", ""),
         message=summary.get("message", ""),
+        kind="a sensitivity study" if "indices.csv" in files else "a sweep",
+        requirements=[one for one in summary.get("requirements", ()) if "sentence" in one],
+        shares=_shares(summary),
+        indices=_indices(files.get("indices.csv")),
         best=best.get("values", {}),
         best_by=" ".join(str(best[key]) for key in ("sense", "by") if best.get(key)).replace("_", " "),
         ranges={name: _range(one) for name, one in summary.get("range", {}).items()},
@@ -93,6 +99,29 @@ def page(spec: Spec, varied: Sequence[str], files: Mapping[str, bytes], command:
         **references_of(spec.family),
     )
     return text.encode()
+
+
+def _shares(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Return in words what share of parts meets what, of a study of tolerances."""
+    named = [("every requirement", summary.get("yield"))]
+    named += [
+        (one["sentence"].rpartition(": ")[0], one.get("yield"))
+        for one in summary.get("requirements", ())
+        if "sentence" in one
+    ]
+    return [
+        (name, f"{100 * one['value']:.4g} % ({100 * one['wilson'][0]:.4g} ... {100 * one['wilson'][1]:.4g} %)")
+        for name, one in named
+        if one and one.get("value") is not None
+    ]
+
+
+def _indices(content: bytes | None) -> list[list[str]]:
+    """Return indices.csv as rows for reading, its head first; nothing where a study has none."""
+    if content is None:
+        return []
+    head, *rows = csv.reader(io.StringIO(content.decode()))
+    return [head, *([_short(cell) for cell in row] for row in rows)]
 
 
 def _fitting(

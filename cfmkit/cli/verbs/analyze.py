@@ -7,7 +7,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Annotated
 
 from cfmkit.cli.measuring import Measuring, data_record, read_measured, refuse_without_data
-from cfmkit.cli.options import Computing, WithReport, flag, option
+from cfmkit.cli.options import Animate, Computing, WithReport, flag, option
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -31,6 +31,7 @@ class AnalyzeOptions(Computing, Measuring):
     """Arguments and options."""
 
     report: WithReport = False
+    animate: Animate = None
     data: Annotated[
         str | None,
         option("--data", metavar="FILE.csv", text="Measured curve to overlay; reports the errors of the model."),

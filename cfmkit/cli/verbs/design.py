@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING
 
-from cfmkit.cli.options import Computing, Fresh, Jobs, WithReport
+from cfmkit.cli.options import Animate, Computing, Fresh, Jobs, WithReport
 
 if TYPE_CHECKING:
     from contextlib import AbstractContextManager
@@ -25,6 +25,7 @@ class DesignOptions(Computing):
     """Arguments and options."""
 
     report: WithReport = False
+    animate: Animate = None
     jobs: Jobs = None
     fresh: Fresh = False
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cfmkit.cli.answer import Answer
-from cfmkit.cli.options import Studying, flag, option
+from cfmkit.cli.options import Studying, WithReport, flag, option
 from cfmkit.cli.page_blocks import (
     BAD,
     BLANK,
@@ -61,6 +61,7 @@ MOST_PARAMETERS = 6
 class SensitivityOptions(Studying):
     """Arguments and options."""
 
+    report: WithReport = False
     method: Annotated[
         Literal["oat", "local", "morris", "sobol", "tolerance"] | None,
         option(
@@ -130,13 +131,36 @@ def run(options: SensitivityOptions, terminal: Terminal) -> Answer:
         found = replace(carry_out(setup, lambda work: studies.compute(work, options, place)), fresh=options.fresh)
         for piece in found.evaluator.pieces:
             studies.tracebacks(piece.records, terminal)
+        kept: dict[str, bytes] = {}
         for name, data in files(found, not options.no_plots, form):
+            if options.report:
+                kept[name] = data = data if isinstance(data, bytes) else b"".join(map(bytes, data))
             place.folder.write(name, data)
+        if options.report:
+            place.folder.write(*_report(found, kept, form, options, terminal))
         made = studies.Made("sensitivity", options.spec, setup.study.spec, setup.seed, found.evaluator.count)
         manifest = studies.commit(place, made, terminal, exit_code(found))
         studies.finish(place, [piece.records for piece in found.evaluator.pieces])
     written = Written(out, (*manifest.files, "manifest.json"), studies.now() - start)
     return _answer(found, written, terminal.verbose > 0)
+
+
+def _report(
+    found: Findings, kept: dict[str, bytes], form: FigureForm, options: SensitivityOptions, terminal: Terminal
+) -> tuple[str, bytes]:
+    """Return name and content of the page of the study."""
+    import shlex
+
+    from cfmkit.plots.form import PLAIN
+    from cfmkit.plots.sensitivity import figures
+    from cfmkit.runs import study_page
+
+    drawn = "png" in form.formats and form.on_screen
+    if not drawn and not options.no_plots and not found.interrupted:
+        kept = {name: data for name, data in kept.items() if not name.startswith("figures/")}
+        kept |= PLAIN.files(figures(found))
+    command = shlex.join(["cfmkit", *terminal.arguments])
+    return study_page.NAME, study_page.page(found.setup.study.spec, found.setup.paths, kept, command)
 
 
 def files(found: Findings, plots: bool, form: FigureForm) -> Iterator[tuple[str, Data]]:

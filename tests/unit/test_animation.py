@@ -1,0 +1,74 @@
+"""The mechanism in motion as a file for slides: frames, bytes that repeat, and what is said without ffmpeg."""
+
+import io
+import os
+import shutil
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import cfmkit
+from cfmkit.cli.main import main
+from cfmkit.families import family
+from cfmkit.plots.animation import MILLISECONDS, animation, frames
+from cfmkit.plots.figures import moving_of
+from cfmkit.plots.moving import POSES
+
+SPEC = "configs/slider_crank_li2019.yaml"
+
+
+@pytest.fixture(scope="module")
+def solved():
+    result = cfmkit.analyze(SPEC)
+    return result, moving_of(family(result.spec.family), result)
+
+
+def test_a_gif_goes_there_and_back_and_repeats_byte_by_byte(solved):
+    content = animation(*solved, "gif")
+    image = Image.open(io.BytesIO(content))
+    assert image.n_frames == 2 * POSES - 2
+    assert image.size == (960, 400)
+    assert image.info["duration"] == MILLISECONDS
+    assert image.info["loop"] == 0
+    assert animation(*solved, "gif") == content
+
+
+def test_mechanism_and_cursor_move_and_the_rest_stands_still(solved):
+    first, *rest = frames(*solved)
+    middle = rest[len(rest) // 2]
+    changed = (first != middle).any(axis=2)
+    assert changed[:, :480].any()
+    assert changed[:, 540:].any()
+    assert not changed[:, 480:535].any()
+    assert np.array_equal(first.shape, (400, 960, 3))
+
+
+def test_a_film_needs_ffmpeg_and_says_so_before_anything_is_computed(tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("PATH", str(tmp_path))
+    assert main(["analyze", SPEC, "--animate", "mp4", "-o", str(tmp_path / "out")]) == 2
+    assert "needs the program ffmpeg" in capsys.readouterr().err
+    assert not os.path.exists(tmp_path / "out")
+
+
+@pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="no ffmpeg")
+def test_a_film_is_an_mp4(solved):
+    content = animation(*solved, "mp4")
+    assert content[4:8] == b"ftyp"
+    assert len(content) > 10_000
+
+
+def test_the_option_writes_the_file(tmp_path):
+    assert main(["analyze", SPEC, "--animate", "gif", "--no-plots", "-o", str(tmp_path / "out"), "-q"]) == 0
+    assert sorted(path.name for path in (tmp_path / "out" / "figures").iterdir()) == ["motion.gif"]
+
+
+def test_a_sensitivity_study_has_a_page_with_indices_and_shares(tmp_path):
+    out = tmp_path / "out"
+    command = ["sensitivity", "configs/studies/cam_tolerance.yaml", "--samples", "20", "--report", "--no-plots"]
+    assert main([*command, "-j", "1", "-o", str(out), "-q"]) in (0, 5)
+    page = (out / "report.html").read_text()
+    assert "a sensitivity study" in page
+    assert "Share of parts that are good" in page
+    assert "variance_drop_when_halved" in page
+    assert " src=" not in page.replace('src="data:', "")
