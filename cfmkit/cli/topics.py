@@ -209,22 +209,23 @@ READ_FIRST = {name: place for place, name in enumerate(("mechanism", "design", "
 
 
 def _key_sections(known: Sequence[Record]) -> list[Section]:
-    """Return one table for the keys at the top and one for each block."""
+    """Return one table for the keys at the top and one for each block, those within a block after it."""
     blocks: dict[str, list[Record]] = {}
     for key in known:
-        head, dot, rest = key["path"].partition(".")
-        blocks.setdefault(head.removesuffix("[]") if dot else "", []).append(dict(key) | {"path": rest or head})
+        parent, _, name = key["path"].rpartition(".")
+        blocks.setdefault(parent, []).append(dict(key) | {"path": name})
     about = {key["path"]: key["description"] for key in known}
-    top = [key for key in blocks.pop("", []) if key["path"] not in blocks]
-    named = {f"{head}: {about.get(head, '')}": rows for head, rows in blocks.items()}
-    ordered = sorted(named.items(), key=lambda item: READ_FIRST.get(item[0].partition(":")[0], len(READ_FIRST)))
-    sections = [("spec", top), *((heading, sorted(rows, key=_is_nested)) for heading, rows in ordered)]
+    top = [key for key in blocks.pop("", []) if key["path"] not in {parent.removesuffix("[]") for parent in blocks}]
+    sections = [("spec", top)]
+    for parent in sorted(blocks, key=_when_read):
+        name = parent.removesuffix("[]").removesuffix(".NAME")
+        sections.append((f"{parent.removesuffix('[]')}: {about.get(name, '')}", blocks[parent]))
     return [(heading, rows, KEY_FIELDS) for heading, rows in sections]
 
 
-def _is_nested(key: Record) -> bool:
-    """Return whether a key is one of a block within its block: those come after what a block says itself."""
-    return "." in key["path"]
+def _when_read(block: str) -> int:
+    """Return the place of a block in the order in which a file is written."""
+    return READ_FIRST.get(block.partition(".")[0].removesuffix("[]"), len(READ_FIRST))
 
 
 def _number(value: float | None, size: float) -> str:
