@@ -30,6 +30,7 @@ COLUMNS: Mapping[str, tuple[str, str]] = {
     "along": ("length", "mm"),
     "depth": ("length", "mm"),
     "parts": ("count", ""),
+    "finer_deviation": ("ratio", "1"),
 }
 """What is told of each proposal: its dimension and the unit of the files."""
 
@@ -127,6 +128,9 @@ def message(found: Suggestions) -> str:
 def _reason(found: Suggestions, name: str, out_of_reach: str) -> str:
     if out_of_reach or any(one.family == name for one in found.proposals):
         return out_of_reach
+    untried = sum(len(one.offer.candidates) for one in found.answers if one.family == name and not one.made)
+    if untried:
+        return f"none of its {untried} candidates was tried in the time"
     near = [one.missed[0] for one in found.near if one.family == name]
     return (near or list(found.failed.get(name, ())) or [""])[0]
 

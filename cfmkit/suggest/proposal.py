@@ -53,7 +53,8 @@ class Proposal:
     message : str
         Why nothing came of it.
     numbers : mapping of str to float or None
-        In SI: ``mean``, ``ripple``, ``hysteresis``, ``safety_factor``, ``across``, ``along``, ``depth``, ``parts``.
+        In SI: ``mean``, ``ripple``, ``hysteresis``, ``safety_factor``, ``across``, ``along``, ``depth``, ``parts``,
+        ``finer_deviation`` (of the mean by a better model, over the one it was judged by, less 1).
     notes : tuple of str
         What a reader has to know: what was assumed, what no model here says.
     """
@@ -246,6 +247,7 @@ def numbers_of(result: Result, space: Room | None, wish: Wish) -> dict[str, floa
         "along": None if space is None else space.along,
         "depth": None if space is None else space.depth,
         "parts": None if space is None else float(space.parts),
+        "finer_deviation": None,
     }
 
 

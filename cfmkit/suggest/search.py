@@ -16,6 +16,7 @@ from cfmkit.families.base import Run, function_named
 from cfmkit.families.wishes import Offer
 from cfmkit.store.identity import code_stamp, stable_hash
 from cfmkit.suggest.proposal import Job, Proposal, made
+from cfmkit.suggest.verification import unverified, verified
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -32,7 +33,7 @@ LONGEST = 25.0
 """Seconds that one design may search."""
 
 RESERVE = 14.0
-"""Seconds of the budget that are kept for files and figures: a dozen proposals take about ten on two cores."""
+"""Seconds that figures of a dozen proposals take on two cores."""
 
 
 @dataclass(frozen=True)
@@ -74,7 +75,9 @@ class Suggestions:
     reused: int = 0
 
 
-def suggest(wish: Wish, run: Run, prefer: Sequence[str] = ("size", "ripple", "parts", "stress")) -> Suggestions:
+def suggest(
+    wish: Wish, run: Run, prefer: Sequence[str] = ("size", "ripple", "parts", "stress"), reserve: float = 0.0
+) -> Suggestions:
     """Return mechanisms that do what is wished, of every family that has any.
 
     Parameters
@@ -85,9 +88,11 @@ def suggest(wish: Wish, run: Run, prefer: Sequence[str] = ("size", "ripple", "pa
         Seed, progress, time budget, executor and notes.
     prefer : sequence of str
         What decides the order, most important first: ``size``, ``ripple``, ``parts``, ``stress``, ``depth``.
+    reserve : float
+        Of the time budget, kept for what comes after the search [s].
     """
     begun = time.monotonic()
-    deadline = None if run.time_budget is None else begun + max(run.time_budget - RESERVE, 0.5 * run.time_budget)
+    deadline = None if run.time_budget is None else begun + max(run.time_budget - reserve, 0.6 * run.time_budget)
     answers = [Answered(name, _asked(name, wish, run)) for name in names()]
     answers = [one for one in answers if one.offer.candidates or one.offer.reason]
     queues = {one.family: list(one.offer.candidates) for one in answers}
@@ -131,6 +136,29 @@ def suggest(wish: Wish, run: Run, prefer: Sequence[str] = ("size", "ripple", "pa
         late() and bool(list(_next(queues, done, 1))),
         reused,
     )
+
+
+def with_better_models(found: Suggestions, run: Run, solve: bool) -> Suggestions:
+    """Return suggestions whose proposals say what the next better model of their family makes of them.
+
+    Parameters
+    ----------
+    found : Suggestions
+    run : Run
+        Its executor does the work.
+    solve : bool
+        Whether to run those models; else it is said that they were not.
+    """
+    if not solve:
+        return replace(found, proposals=tuple(map(unverified, found.proposals)))
+    jobs = list(enumerate(found.proposals))
+    done = {index: one for (index, _), one in run.executor(_verified, iter(jobs), lambda: False)}
+    kept = [done[index] if isinstance(done[index], Proposal) else unverified(one) for index, one in jobs]
+    return replace(found, proposals=tuple(kept))
+
+
+def _verified(item: tuple[int, Proposal]) -> Proposal:
+    return verified(item[1])
 
 
 def _indexed(item: tuple[int, Job]) -> Proposal:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cfmkit.cli import completion
 from cfmkit.cli.answer import Answer
-from cfmkit.cli.options import Common, Fresh, Jobs, NoPlots, Out, Quiet, Seed, argument, option
+from cfmkit.cli.options import Common, Fresh, Jobs, NoPlots, Out, Quiet, Seed, argument, flag, option
 from cfmkit.cli.page_blocks import BAD, BLANK, LABEL, Grid, GridColumn, Paragraph, Span, TextLine, Written, line
 from cfmkit.errors import ExitCode, UsageError
 
@@ -62,6 +62,9 @@ class SuggestOptions(Common):
     time_budget: Annotated[
         str, option("--time-budget", metavar="TIME", shown=True, text="Time for everything: 60s, 10min.")
     ] = BUDGET
+    verify: Annotated[
+        bool, flag("--verify", text="Run the next better model of each proposal, which takes longer.")
+    ] = False
     out: Out = None
     seed: Seed = 0
     jobs: Jobs = None
@@ -91,7 +94,7 @@ def run(options: SuggestOptions, terminal: Terminal) -> Answer:
     from cfmkit.runs.run import long_run
     from cfmkit.store import RunFolder
     from cfmkit.studies.executors import cores
-    from cfmkit.suggest.search import suggest
+    from cfmkit.suggest.search import RESERVE, suggest, with_better_models
 
     start, begun = time.perf_counter(), time.time()
     budget = seconds(options.time_budget)
@@ -105,7 +108,8 @@ def run(options: SuggestOptions, terminal: Terminal) -> Answer:
         folder.check("metrics.json", "suggestions.csv")
         plain = Run(options.seed, progress, time_budget=budget - (time.perf_counter() - start))
         with long_run(options.jobs or cores(), options.fresh, folder, plain, noting) as working:
-            found = suggest(block.wish(), working, block.prefer)
+            found = suggest(block.wish(), working, block.prefer, SPARE if options.no_plots else RESERVE)
+            found = with_better_models(found, replace(working, time_budget=None), options.verify)
             drawing = replace(working, time_budget=None)
             for name, content in suggestions.files(found, block, drawing, not options.no_plots, ends - SPARE):
                 folder.write(name, content)
@@ -201,6 +205,9 @@ def _page(data: Mapping[str, Any], written: Written, everything: bool) -> Iterat
         yield line("misses one wish", LABEL)
         near = [[one["family"], f"{one['variant']}: {one['misses'][0]}"] for one in data["near_misses"]]
         yield Grid((GridColumn("", False), GridColumn()), near, gap=2, indented=True)
+    for number, one in enumerate(data["proposals"], 1):
+        if one["finer_deviation"] is not None:
+            yield Paragraph("verified" if number == 1 else "", f"{number} {one['family']}: {one['notes'][0]}")
     silent = [one for one in data["families"] if not one["proposals"]]
     if silent:
         yield BLANK

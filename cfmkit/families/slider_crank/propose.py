@@ -242,7 +242,8 @@ def _tapered(
     thick = (max(wish.thinnest, 0.005 * crank), 0.05 * crank)
     wide = plain.spec.design.beam.width  # type: ignore[attr-defined]
     shape = {"shape": "even", "nodes": NODES, "goal": "ripple", "width": wide, "thickness": thick}
-    return Candidate("tapered strip", plain.spec.replace({"design.beam": shape}), True, plain.finish, LATER)
+    spec = plain.spec.replace({"design.beam": shape})
+    return Candidate("tapered strip", spec, True, plain.finish, LATER + abs(crank / wish.room[1] - 0.35))
 
 
 def _flexures(
