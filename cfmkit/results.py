@@ -177,6 +177,8 @@ class Result:
         in ``stress_max``, ``safety_factor`` and ``usable_stroke``.
     closed : ClosedForm, optional
         The nominal curve at every place, where the model is so cheap.
+    ends : Curve, optional
+        Points of the nominal curve beside its own: where windows end between two of these.
     tables : mapping
         More files of a run, by stem: what makes the table of each, ``adjustability`` for adjustability.csv.
     state : Any
@@ -196,6 +198,7 @@ class Result:
     allowable_stress: float | None = None
     load_cases: tuple[Curve, ...] = ()
     closed: ClosedForm | None = None
+    ends: Curve | None = None
     tables: Mapping[str, Callable[[], Table]] = field(default_factory=dict)
     state: Any = None
 

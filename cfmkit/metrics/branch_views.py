@@ -15,7 +15,7 @@ import numpy as np
 from cfmkit.metrics import closed, many
 from cfmkit.metrics.many import ManyBranches
 from cfmkit.metrics.spread import Spread, level
-from cfmkit.metrics.traces import ROUNDING, BranchTrace, Undefined, Window, covers, restrict, traces
+from cfmkit.metrics.traces import ROUNDING, TOLERANCE, BranchTrace, Undefined, Window, covers, restrict, traces
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -61,6 +61,7 @@ class Frame:
     valid: tuple[tuple[float, float], ...] | None = None
     load_cases: tuple[Curve, ...] = ()
     closed: ClosedForm | None = field(default=None, compare=False)
+    ends: Curve | None = field(default=None, compare=False)
     durability: Durability | None = None
 
     def needed_target(self) -> float:
@@ -157,8 +158,10 @@ class Branch:
     def _asked(self, part: BranchTrace) -> BranchTrace:
         """Return a part whose ends, where they lie between two samples, have effort and stress of the model."""
         model, motion = self.frame.closed, self.trace.motion
-        if model is None or part is self.trace:
+        if part is self.trace:
             return part
+        if model is None:
+            return self._stated(part)
         ends = [end for end in (0, -1) if not (motion == part.motion[end]).any()]
         if not ends:
             return part
@@ -167,6 +170,21 @@ class Branch:
         if stress is not None:
             stress = stress.copy()
             stress[ends] = model.stress(self.name, part.motion[ends])
+        return replace(part, effort=effort, stress=stress)
+
+    def _stated(self, part: BranchTrace) -> BranchTrace:
+        """Return a part whose ends have effort and stress of the points that the model has there, if it has some."""
+        stated = self.frame.ends
+        if stated is None:
+            return part
+        effort, stress = part.effort.copy(), None if part.stress is None else part.stress.copy()
+        slack = TOLERANCE * (part.extent[1] - part.extent[0])
+        for end in (0, -1):
+            there = np.flatnonzero((np.abs(stated.motion - part.motion[end]) <= slack) & (stated.branch == self.name))
+            if len(there) == 1 and not (self.trace.motion == part.motion[end]).any():
+                effort[end] = stated.effort[there[0]]
+                if stress is not None and "max_stress" in stated.extra:
+                    stress[end] = stated.extra["max_stress"].values[there[0]]
         return replace(part, effort=effort, stress=stress)
 
     @cached_property

@@ -164,7 +164,8 @@ def frame_of(result: Result) -> Frame:
         result.valid,
         result.load_cases,
         result.closed,
-        getattr(result.spec, "durability", None),
+        durability=getattr(result.spec, "durability", None),
+        ends=result.ends,
     )
 
 

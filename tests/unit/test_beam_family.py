@@ -696,3 +696,22 @@ def test_what_cannot_be_reported_is_refused_at_its_place(outputs, place, told):
         solved("beam_lan2010", f"analysis.outputs={outputs}")
     assert place in str(caught.value)
     assert told in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("name", "window", "names"),
+    [
+        ("beam_lan2010", (6.33e-3, 13.1e-3), ("force_min", "stress_max")),
+        ("beam_design_arch", (6.11e-3, 11.9e-3), ("stress_max",)),
+    ],
+)
+def test_what_stands_at_the_end_of_a_window_does_not_depend_on_the_number_of_points(name, window, names):
+    found = []
+    for points in (17, 50):
+        spec = cfmkit.load(f"configs/{name}.yaml").replace({"analysis.points": points})
+        # The force is smallest, and the stress largest, at an end that lies between two points of the curve.
+        whole, inside = (cfmkit.analyze(spec.replace({"analysis.window": one})) for one in (None, window))
+        assert len(inside.curve) == len(whole.curve) == points
+        np.testing.assert_allclose(inside.curve.effort, whole.curve.effort, rtol=1e-6)
+        found.append([quantity.value for quantity in cfmkit.evaluate(inside, names).values()])
+    np.testing.assert_allclose(found[0], found[1], rtol=1e-7)

@@ -28,8 +28,12 @@ from cfmkit.elastica.model.beam import fit
 from cfmkit.elastica.model.network import FREE, Link, Network, Node
 from cfmkit.elastica.vibration.masses import Masses
 from cfmkit.families.beam.parts.spec import HELD
+from cfmkit.specs.units import between
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from cfmkit.arrays import FloatArray
     from cfmkit.elastica.model.beam import Beam
     from cfmkit.elastica.model.network import LoadOn, Spring
     from cfmkit.elastica.model.shapes import Shape
@@ -74,10 +78,32 @@ class Assembly:
             return asked
         return support.direction if math.cos(asked - support.direction) > 0 else support.direction + math.pi
 
+    @property
+    def _even(self) -> FloatArray:
+        return np.linspace(0.0, self.spec.extent, self.spec.analysis.points)
+
+    @property
+    def places(self) -> FloatArray:
+        """Motions that are requested, in the order of the drive: those of the curve, and ends of windows between."""
+        even, extent = self._even, self.spec.extent
+        if self.spec.analysis.through_folds:
+            return even
+        ends = np.array([end for _, window in self.spec.windows() for end in between(window, (0.0, extent))])
+        close = 1e-6 * abs(extent) / len(even)  # an end that all but meets a point needs none of its own
+        apart = np.abs(ends[:, None] - even).min(axis=1, initial=np.inf) > close
+        inside = apart & (ends * np.sign(extent) > 0) & (np.abs(ends) < abs(extent))
+        sense = float(np.sign(extent))
+        return np.asarray(sense * np.unique(sense * np.concatenate([even, ends[inside]])))
+
+    @property
+    def on_curve(self) -> NDArray[np.bool_]:
+        """Which of `places` are points of the curve."""
+        return np.isin(self.places, self._even)
+
     def drive(self) -> engine.Displacement | engine.Rotation | engine.Loading:
-        """Return what is done to the network, from rest to the end, at even steps."""
+        """Return what is done to the network, from rest to the end: at even steps, and where windows end between."""
         spec, drive = self.spec, self.spec.mechanism.drive
-        points = np.linspace(0.0, spec.extent, spec.analysis.points)
+        points = self.places if drive.kind in ("displacement", "rotation") else self._even
         if drive.kind == "displacement":
             return engine.Displacement(self.driven, self.direction, points, self._growing(spec.extent))
         if drive.kind == "rotation":

@@ -11,6 +11,7 @@ operations (2010), sec. 2.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -75,6 +76,7 @@ def analyze(spec: BeamSpec, run: Run) -> Result:
         target=_target(spec),
         reference=None if spec.analysis.reference is None else float(spec.analysis.reference),
         allowable_stress=solution.assembly.allowable_stress,
+        ends=_ends(solution),
         state=solution,
     )
 
@@ -84,7 +86,8 @@ def solve(spec: BeamSpec) -> Solution:
     assembly = assemble(spec)
     _refuse_tight_coils(assembly)
     path = trace(assembly.network, assembly.drive(), assembly.control())
-    return Solution(assembly, path, _kept(spec, path))
+    keep, ends = _kept(assembly, path)
+    return Solution(assembly, path, keep, ends)
 
 
 def _refuse_tight_coils(assembly: Assembly) -> None:
@@ -105,10 +108,17 @@ def _refuse_tight_coils(assembly: Assembly) -> None:
             )
 
 
-def _kept(spec: BeamSpec, path: Path) -> Any:
-    """Return which points make the curve: those requested, or all where folds may make it many-valued."""
-    keep = np.arange(len(path)) if spec.analysis.through_folds else path.at_requested
-    return read_only(keep, np.int64)
+def _kept(assembly: Assembly, path: Path) -> tuple[Any, Any]:
+    """Return which points make the curve, and those where windows end between them.
+
+    The curve has those requested, or all where folds may make it many-valued.
+    """
+    spec = assembly.spec
+    if spec.analysis.through_folds or spec.mechanism.drive.kind not in ("displacement", "rotation"):
+        keep = np.arange(len(path)) if spec.analysis.through_folds else path.at_requested
+        return read_only(keep, np.int64), read_only(np.empty(0), np.int64)
+    on_curve = assembly.on_curve[path.requested[path.at_requested]]
+    return read_only(path.at_requested[on_curve], np.int64), read_only(path.at_requested[~on_curve], np.int64)
 
 
 def _ending(solution: Solution) -> tuple[Status, str]:
@@ -142,6 +152,17 @@ def _curve(solution: Solution) -> Curve:
     extra |= _outputs(solution) | _frequencies(solution)
     kind: Kind = "torque" if solution.spec.mechanism.drive.kind in ("rotation", "moment") else "force"
     return Curve(solution.motion, solution.effort, np.repeat(["load"], len(keep)), solution.stable, extra, kind)
+
+
+def _ends(solution: Solution) -> Curve | None:
+    """Return the points at which windows end between those of the curve; None without any."""
+    if not len(solution.ends):
+        return None
+    there = replace(solution, keep=solution.ends)
+    stress = {"max_stress": Column(there.stress, "stress")}
+    kind: Kind = "torque" if solution.motion_dimension == "angle" else "force"
+    names = np.repeat(["load"], len(there.keep))
+    return Curve(there.motion, there.effort, names, np.array(there.accurate), stress, kind)
 
 
 def _outputs(solution: Solution) -> dict[str, Column]:

@@ -42,11 +42,14 @@ class Solution:
         Its equilibria.
     keep : (n,) int array
         Which points of the path make the curve: those requested, or all where the path is followed through folds.
+    ends : (m,) int array
+        Points of the path at which windows end between two points of the curve.
     """
 
     assembly: Assembly
     path: Path
     keep: Any
+    ends: Any = ()
 
     @property
     def spec(self) -> BeamSpec:
