@@ -19,6 +19,12 @@ if TYPE_CHECKING:
 NEED_STRESS = ("stress_max", "safety_factor")
 """Metrics of curves that have stresses; others leave these columns out unless asked."""
 
+NEED_FATIGUE = ("fatigue_life",)
+"""Metrics that need fatigue data of the material."""
+
+NEED_TIME = ("force_after", "torque_after")
+"""Metrics of a time, which their name says: without one there is nothing to note."""
+
 
 def metrics_of(spec: Spec, names: Iterable[str], sample: Curve | None = None) -> tuple[Metric, ...]:
     """Return the metrics with these names; without names, every one that such a curve can have.
@@ -44,12 +50,20 @@ def metrics_of(spec: Spec, names: Iterable[str], sample: Curve | None = None) ->
     own = values_of_family(record.values)
     asked = tuple(dict.fromkeys(names))
     if not asked:
-        stressed = sample is None or "max_stress" in sample.extra
+        left_out = _left_out(spec, sample)
         listed = (item.name for item in definitions(kind, own))
-        asked = tuple(name for name in dict.fromkeys(listed) if stressed or name not in NEED_STRESS)
+        asked = tuple(name for name in dict.fromkeys(listed) if name not in left_out)
     known = metrics_by_name(kind, own)
     meant = [(name, definition_of(name, known, record.branches)) for name in asked]
     return tuple(Metric(name, one.dimension, one.definition, words=record.words.get(name, ())) for name, one in meant)
+
+
+def _left_out(spec: Spec, sample: Curve | None) -> frozenset[str]:
+    """Return the metrics that no point of such a study can have: block models need not know them."""
+    stressed = sample is None or "max_stress" in sample.extra
+    lasting = getattr(spec, "durability", None)
+    lives = () if lasting is not None and lasting.fatigue is not None else NEED_FATIGUE
+    return frozenset((*(() if stressed else NEED_STRESS), *lives, *NEED_TIME))
 
 
 def sample_curve(spec: Spec, plan: Plan, design: bool) -> Curve | None:
