@@ -35,4 +35,4 @@ def effort_after(branch: Branch, time: float) -> float:
     known = branch.frame.durability
     if known is None or known.relaxation is None:
         raise Undefined("the material has no relaxation data: add 'relaxation' to it")
-    return branch.spread.mean * branch.spread.sign * known.relaxation.ratio(time)
+    return float(branch.spread.mean * branch.spread.sign * known.relaxation.ratio(time))
