@@ -19,8 +19,8 @@ RUN = ("analyze", "cam.yaml", "-o", "out", "--no-plots", "--set", "requirements.
 def test_a_page_keeps_to_the_width_of_the_terminal(cli, cam, columns):
     lines = cli(*RUN, COLUMNS=str(columns)).out.splitlines()
     commands = [line for line in lines if line.strip().startswith("cfmkit design")]
-    changed = "--set 'requirements.0.max=1 %' --set design.avoid_undercut=true"
-    assert commands == [f"         cfmkit design cam.yaml {changed}"]
+    changed = "         cfmkit design cam.yaml --set 'requirements.0.max=1 %' --set design."
+    assert commands == [f"{changed}choose=preload", f"{changed}avoid_undercut=true"]
     assert max(len(line) for line in lines if line not in commands) <= min(columns, 108)
 
 
