@@ -316,6 +316,9 @@ class Family:
     free : str, optional
         ``"module:function"`` with ``free(spec, designed) -> {path: (low, high)}``: which values of a designed
         specification may move, and in which ranges [SI], as its `design` block says it for the design itself.
+    errors : str, optional
+        ``"module:function"`` with ``errors(spec) -> {path: "thickness" or "position"}``: which values of a part the
+        process that makes it errs in, and in what.
     attribution : str, optional
         ``"module"`` with ``attribute(result, loop) -> quantities``: what a measured loop says about the causes
         of its departure from the model, by name, and their `DEFINITIONS`; imported when there is a measurement.
@@ -360,6 +363,7 @@ class Family:
     gradient: Callable[[Any, Sequence[str]], Any] | None = None
     sampled: str | None = None
     free: str | None = None
+    errors: str | None = None
     attribution: str | None = None
     draw: str | None = None
     scheme: str | None = None

@@ -244,7 +244,10 @@ def _of_many_parts(found: Report, given: Spec, run: Run) -> Report:
 
     yields = yields_of(found.result, given, run)
     if yields is None:
-        return found
+        from cfmkit.studies.process_tolerances import expected
+
+        told = expected(found.result, run)
+        return found.beside({}, run_findings.Supplement(lines=(("made", told),))) if told else found
     more = run_findings.Supplement(data={"yield": yields.as_json()}, lines=(("yield", yields.sentence()),))
     return found.beside(yields.quantities(), more).of_many_parts()
 

@@ -227,7 +227,7 @@ def _design_faults(document: Document, spec: Spec) -> Iterator[Problem]:
         for path, message in faults(spec, design):
             yield document.problem(path, message)
     asked = (one for one in enumerate(spec.requirements) if one[1].metric in OF_MANY_PARTS)
-    for index, one in asked if not getattr(design, "tolerances", None) else ():
+    for index, one in asked if not (getattr(design, "tolerances", None) or getattr(design, "process", None)) else ():
         message = f"{one.metric!r} is a share of made parts: say with 'design.tolerances' how they are made"
         yield document.problem(("requirements", index, "metric"), message)
 

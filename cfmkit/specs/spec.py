@@ -197,6 +197,9 @@ class DesignKeys(Model):
         min_length=1,
         description="how far values of made parts are off, as in `sensitivity.parameters`: {path: {normal: 0.02 mm}}",
     )
+    process: Literal["laser", "wire-edm", "fdm", "sls", "mill"] | None = Field(
+        None, description="how parts are made: its assumed tolerances, where none are given; default: by the material"
+    )
     correlated: tuple[Correlated, ...] = Field((), description="tolerances that deviate together, as in `sensitivity`")
     free: dict[str, tuple[MetricValue, MetricValue]] = Field(
         {},

@@ -22,7 +22,7 @@ from cfmkit.metrics import split_name
 from cfmkit.metrics.requirements import Bounds
 from cfmkit.results import Quantity, Result
 from cfmkit.specs.many_parts import OF_MANY_PARTS
-from cfmkit.specs.spec import Sensitivity
+from cfmkit.specs.spec import DesignKeys, Sensitivity
 from cfmkit.studies.engine import Silent, Work
 from cfmkit.studies.engine import run as computed
 from cfmkit.studies.journal import Journal
@@ -101,24 +101,32 @@ class Tolerances:
 
 
 def tolerances_of(spec: Spec, design: DesignBlock, seed: int) -> Tolerances | None:
-    """Return the tolerances of a `design` block on a specification; None where it has none.
+    """Return the tolerances of a `design` block on a specification, or those of its process; None where it has none.
 
     Raises
     ------
     cfmkit.errors.SpecError
         If a path is not in the specification, at ``design.tolerances`` and the path.
     """
-    if not design.tolerances:
+    stated = stated_tolerances(spec, design)
+    if not stated:
         return None
-    block = Sensitivity.model_construct(
-        method="tolerance", parameters=design.tolerances, correlated=design.correlated, metrics=()
-    )
+    block = Sensitivity.model_construct(method="tolerance", parameters=stated, correlated=design.correlated, metrics=())
     try:
         parameters = parameters_of(spec, block)
     except SpecError as error:
         raise SpecError([replace(one, path=_renamed(one.path)) for one in error.problems]) from None
     chosen = seed if design.seed is None else design.seed
     return Tolerances(spec, block, parameters, design.samples, chosen)
+
+
+def stated_tolerances(spec: Spec, design: DesignBlock) -> dict[str, Any]:
+    """Return the tolerances that a `design` block gives, else those assumed of the process that it names."""
+    if design.tolerances or design.process is None:
+        return dict(design.tolerances or {})
+    from cfmkit.studies.process_tolerances import tolerances
+
+    return tolerances(spec)
 
 
 def _renamed(path: str) -> str:
@@ -146,7 +154,8 @@ def faults(spec: Spec, design: DesignBlock) -> Iterator[tuple[tuple[str | int, .
             yield ("design", "free", path), str(problem)
     if design.robust is not None and getattr(design, "yield") is None:
         yield ("design", "robust"), "says how a yield is reached: give 'design.yield', too"
-    if getattr(design, "yield") is not None and not design.tolerances:
+    made = design.tolerances or design.process
+    if getattr(design, "yield") is not None and not made:
         yield ("design", "yield"), "a yield is a share of made parts: say with 'design.tolerances' how they are made"
     if design.tolerances and not spec.part_requirements:
         told = "whether a part is good is what 'requirements' decide: give at least one beside that on the yield"
@@ -459,7 +468,7 @@ def yields_of(design: Result, given: Spec | None, run: Run) -> Yields | None:
         If a tolerance is on a value that the design does not have.
     """
     block = getattr(design.spec, "design", None) or getattr(given, "design", None)
-    if block is None or not block.tolerances:
+    if not isinstance(block, DesignKeys):
         return None
     made = tolerances_of(design.spec, block, run.seed)
     if made is None:

@@ -346,22 +346,25 @@ class Sight:
 
     def __call__(self, x: FloatArray, errors: FloatArray) -> FloatArray | None:
         """Return the numbers of a part; None where it has none."""
-        rows = self.rows
         try:
-            spec = self.variant(x, errors)
-            found = sampled_of(spec, rows.places, self.run)
-            if found is None or tuple(found.effort) != rows.branches or len(found.stress) != rows.stresses:
-                return None
-            numbers = [*found.effort.values(), *found.stress]
-            if rows.metrics:
-                result = family(spec.family).analyze(spec, self.run)
-                if not result.curves:
-                    return None
-                values = Study(spec, (), rows.metrics).quantities(result)
-                numbers.append(np.array([np.nan if one.value is None else one.value for one in values]))
+            return numbers_of(self.variant(x, errors), self.rows, self.run)
         except CfmError:
             return None
-        return np.concatenate(numbers)
+
+
+def numbers_of(spec: Spec, rows: Rows, run: Run) -> FloatArray | None:
+    """Return what rows look at of a part, (q,); None where it has no such numbers."""
+    found = sampled_of(spec, rows.places, run)
+    if found is None or tuple(found.effort) != rows.branches or len(found.stress) != rows.stresses:
+        return None
+    numbers = [*found.effort.values(), *found.stress]
+    if rows.metrics:
+        result = family(spec.family).analyze(spec, run)
+        if not result.curves:
+            return None
+        values = Study(spec, (), rows.metrics).quantities(result)
+        numbers.append(np.array([np.nan if one.value is None else one.value for one in values]))
+    return np.concatenate(numbers)
 
 
 def free_of(given: Spec, designed: Spec) -> dict[str, tuple[float, float]]:
@@ -422,7 +425,7 @@ def with_design_margins(given: Spec, design: Design, run: Run) -> Design:
     """
     block = getattr(given, "design", None)
     wanted = getattr(block, "yield", None)
-    if design.spec is None or block is None or wanted is None or not getattr(block, "tolerances", None):
+    if design.spec is None or block is None or wanted is None:
         return design
     free = free_of(given, design.spec)
     if not free:

@@ -23,6 +23,7 @@ FAMILY = Family(
     search=Search(tables=("starts.csv",)),
     values=DEFINITIONS | SURFACE,
     resolve=resolve,
+    errors="cfmkit.families.beam.sampled:errors",
     sampled="cfmkit.families.beam.sampled:sampled",
     draw="cfmkit.families.beam.draw",
     scheme="cfmkit.families.beam.scheme",

@@ -41,3 +41,18 @@ def sampled(spec: BeamSpec, places: FloatArray) -> Sampled | None:
     axial = spec.stress == "total"
     stress = [path.beam_stress(name, axial)[0][at] for name in path.layout.network.beams]
     return Sampled({"load": assembly.effort_unit * path.effort[at]}, np.array(stress))
+
+
+def errors(spec: BeamSpec) -> dict[str, str]:
+    """Return which values a process errs in, and whether in thickness or in position: thicknesses and free nodes."""
+    mechanism = spec.mechanism
+    found = {}
+    if isinstance(mechanism.thickness, float) and any(one.thickness is None for one in mechanism.beams.values()):
+        found["mechanism.thickness"] = "thickness"
+    for name, beam in mechanism.beams.items():
+        if isinstance(beam.thickness, float):
+            found[f"mechanism.beams.{name}.thickness"] = "thickness"
+    for name, node in mechanism.nodes.items():
+        if node.support == "free":
+            found |= {f"mechanism.nodes.{name}.at.{axis}": "position" for axis in (0, 1)}
+    return found

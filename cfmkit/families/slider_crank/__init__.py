@@ -30,6 +30,7 @@ FAMILY = Family(
     values=OF_SPRINGS | OF_PARTS,
     words={"stiffness_class": CLASSES},
     resolve=resolve,
+    errors="cfmkit.families.slider_crank.sampled:errors",
     sampled="cfmkit.families.slider_crank.sampled:sampled",
     free="cfmkit.families.slider_crank.sampled:free",
     gradient=gradient,

@@ -62,3 +62,8 @@ def free(given: SliderCrankSpec, designed: SliderCrankSpec) -> dict[str, tuple[f
     if isinstance(wanted.width, tuple):
         found["mechanism.beam.width"] = wanted.width
     return {path: (float(low), float(high)) for path, (low, high) in found.items() if low < high}
+
+
+def errors(spec: SliderCrankSpec) -> dict[str, str]:
+    """Return which values of a strip a process errs in: how thick it comes out everywhere; nothing of springs."""
+    return {} if spec.mechanism.beam is None or spec.fidelity != "beam" else {"mechanism.beam.offset": "thickness"}

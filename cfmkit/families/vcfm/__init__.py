@@ -14,6 +14,7 @@ FAMILY = Family(
     name="vcfm",
     summary="V-beams that snap through beside a diamond spring, adjustable by the spring's preload",
     spec_type=VcfmSpec,
+    errors="cfmkit.families.vcfm.made:errors",
     models={
         "truss": analyze,
         "analytic": analyze,

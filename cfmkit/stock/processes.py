@@ -1,0 +1,78 @@
+"""Processes that mechanisms are made by, and how far parts are off: assumed values, each with its reason.
+
+No standard or machine stands behind these numbers: they are what a good workshop is assumed to hold on parts of some
+centimetres, for a first look at how many parts would be good. Measure some parts and give `design.tolerances` instead.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Literal
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+ProcessName = Literal["laser", "wire-edm", "fdm", "sls", "mill"]
+
+
+@dataclass(frozen=True)
+class Process:
+    """What a process is assumed to hold.
+
+    Attributes
+    ----------
+    name : str
+        How a specification calls it.
+    kerf : float
+        Width of the cut; 0 where nothing is cut [m].
+    thickness : float
+        Standard deviation of the thickness of a leaf between its two sides, the same all over a part [m].
+    position : float
+        Standard deviation of where a joint or an end lies [m].
+    least_feature, least_radius : float
+        Thinnest wall, and smallest inside radius [m].
+    reason : str
+        Why these.
+    """
+
+    name: ProcessName
+    kerf: float
+    thickness: float
+    position: float
+    least_feature: float
+    least_radius: float
+    reason: str
+
+
+_ALL = (
+    Process("laser", 0.2e-3, 0.03e-3, 0.05e-3, 0.5e-3, 0.1e-3,
+            "a leaf has two cut sides, and the kerf changes with focus, power and sheet"),
+    Process("wire-edm", 0.3e-3, 0.005e-3, 0.005e-3, 0.2e-3, 0.15e-3,
+            "the gap follows the generator; inside corners have the radius of a 0.25 mm wire and its gap"),
+    Process("fdm", 0.0, 0.05e-3, 0.1e-3, 0.4e-3, 0.2e-3,
+            "walls are whole strands of a 0.4 mm nozzle, whose width changes with flow and cooling"),
+    Process("sls", 0.0, 0.05e-3, 0.1e-3, 0.7e-3, 0.3e-3,
+            "powder sinters on to each side, and parts shrink with their place in the chamber"),
+    Process("mill", 2.0e-3, 0.02e-3, 0.02e-3, 0.5e-3, 1.0e-3,
+            "a thin leaf yields to the cutter; inside corners have the radius of a 2 mm one"),
+)  # fmt: skip
+
+PROCESSES: Mapping[str, Process] = MappingProxyType({one.name: one for one in _ALL})
+"""All by name."""
+
+PRINTED = {"pla": "fdm", "abs": "fdm", "petg": "fdm", "pa12-sls": "sls", "pa12-mjf": "sls"}
+METAL = 20e9
+"""Young's modulus above which a material is taken for a metal [Pa]: no plastic reaches it, no metal is as soft."""
+
+
+def usual(material: str | None, youngs_modulus: float) -> Process:
+    """Return the process that a material is usually made by: what it was named for, else wire for metals, else laser.
+
+    Examples
+    --------
+    >>> usual("pla", 3e9).name, usual(None, 200e9).name, usual(None, 2e9).name
+    ('fdm', 'wire-edm', 'laser')
+    """
+    name = PRINTED.get(material or "", "wire-edm" if youngs_modulus > METAL else "laser")
+    return PROCESSES[name]

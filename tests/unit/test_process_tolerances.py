@@ -1,0 +1,53 @@
+"""What yield is to be expected of a design that says nothing of its tolerances."""
+
+from __future__ import annotations
+
+import cfmkit
+from cfmkit.families.base import Run
+from cfmkit.runs.run import designed
+from cfmkit.specs.spec import Requirement
+from cfmkit.stock.processes import PROCESSES
+from cfmkit.studies.made_parts import judge, tolerances_of
+from cfmkit.studies.process_tolerances import _shares, assumed, expected
+
+STRIP = "configs/slider_crank_strip.yaml"
+
+
+def test_every_process_has_a_reason_and_a_size():
+    for one in PROCESSES.values():
+        assert one.reason
+        assert 0 < one.position < 1e-3
+        assert 0 < one.thickness < one.least_feature
+
+
+def test_the_estimate_is_near_the_yield_of_parts_that_are_analysed():
+    asked = (Requirement(metric="force_mean", min="1.4 N", max="1.6 N"), Requirement(metric="half_band", max="1.5 %"))
+    spec = cfmkit.load(STRIP).replace({"requirements": asked, "analysis.points": 17, "analysis.recheck": False})
+    spec = spec.replace({"design.process": "wire-edm", "design.samples": 20})
+    result = cfmkit.analyze(spec)
+    share, measured = _shares(result, assumed(spec), Run())
+    made = tolerances_of(spec, spec.design, 0)
+    assert made.paths == ("mechanism.beam.offset",)
+    judged = judge(made, made.drawn(), result, Run()).share()
+    assert share == measured
+    assert abs(share - judged.value) < 3 * (share * (1 - share) / judged.count) ** 0.5 + 0.02
+
+
+def test_the_band_of_a_named_material_is_the_spread_of_its_modulus():
+    asked = (Requirement(metric="force_mean", min="1 N", max="2 N"),)
+    spec = cfmkit.load(STRIP).replace({"requirements": asked, "analysis.points": 17, "analysis.recheck": False})
+    spec = spec.replace({"mechanism.material": "pla", "mechanism.beam.width": "3.083 mm"})
+    found = assumed(spec)
+    assert (found.process.name, found.modulus) == ("fdm", (1.6e9, 4.0e9))
+    told = expected(cfmkit.analyze(spec), Run())
+    assert "assumed" in told
+    assert "once the modulus is measured" in told
+    assert "design.process=fdm" in told
+
+
+def test_nothing_is_said_of_a_cam_and_of_a_design_with_tolerances():
+    cam = cfmkit.load("configs/cam.yaml")
+    assert expected(cfmkit.analyze(cam), Run()) == ""
+    toleranced = cam.replace({"design.tolerances": {"mechanism.springs.stiffness": {"normal": "1 %"}}})
+    found = designed(toleranced.replace({"design.samples": 20}), Run())
+    assert "made" not in dict(found.supplement.lines)
