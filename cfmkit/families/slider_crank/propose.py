@@ -7,8 +7,8 @@ the family's own design.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
-from math import radians
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,6 +18,7 @@ from cfmkit.families.slider_crank.room import PIN
 from cfmkit.families.slider_crank.spec import SliderCrankSpec
 from cfmkit.families.wishes import Candidate, Offer
 from cfmkit.specs.units import Place
+from cfmkit.stock.spec import MaterialSpec
 
 if TYPE_CHECKING:
     from cfmkit.families.base import Run
@@ -61,6 +62,12 @@ PADS = (0.031, 0.040)
 """What the pads at both ends of a printed part add across the slider's way and along it [m]: twice their length, and
 the corners of the inclined one."""
 
+DOUBT = 3.0
+"""So much wider than there is room for a part may seem: the estimate is of one proportion and one run-in."""
+
+FLEXURES_WIDER = 8.0
+"""About how much wider than a strip flexures of a tenth of its free length have to be."""
+
 NODES = 5
 """Thicknesses of a tapered strip: more of them take longer and are hardly flatter."""
 
@@ -99,8 +106,8 @@ def _of_torque(wish: Wish) -> Offer:
 
 def _turned(wish: Wish, crank: float, coupler: float, offset: float, unloaded: float) -> Candidate | None:
     """Return a linkage that turns as much as is wished around its stretched position, as large as the room allows."""
-    low = radians(unloaded)
-    span = max(3.0 * wish.travel, radians(20.0))
+    low = math.radians(unloaded)
+    span = max(3.0 * wish.travel, math.radians(20.0))
     angles = np.linspace(low, low + span, 181)
     y = crank * np.sin(angles)
     inside = coupler**2 - (offset - y) ** 2
@@ -145,6 +152,11 @@ def _of_force(wish: Wish) -> Offer:
     found = [one for lengths in PUSHED for one in _pushed(wish, lengths)]
     if found:
         return Offer(tuple(_varied(found)[:OFFERED]))
+    fits = [printed_size(wish, lengths) for lengths in PUSHED]
+    wide = min((strip_width(wish, block, one) for one in fits if one > 0 for block in _materials(wish)), default=0.0)
+    if wide > DOUBT * (wish.depth or max(wish.room)):
+        less = wish.target * (wish.depth or max(wish.room)) / wide
+        return Offer(reason=f"a strip would have to be {mm(wide)} wide", nearest={"force": f"about {less:.2g} N"})
     need = _room_for(wish, PUSHED[0], wish.travel * (1.0 + STARTS[0]) / PUSHED[0].reach, pads=wish.depth is not None)
     scale = max(need[0] / wish.room[0], need[1] / wish.room[1])
     longest = wish.travel / scale
@@ -162,23 +174,56 @@ def _room_for(wish: Wish, lengths: Proportions, crank: float, pads: bool) -> tup
     return float(across), float(along)
 
 
+def printed_size(wish: Wish, lengths: Proportions) -> float:
+    """Return the crank's length of the largest part that fits the room [m]; not above zero where the pads do not."""
+    return min((wish.room[0] - PADS[0]) / lengths.offset, (wish.room[1] - PADS[1]) / lengths.stretched)
+
+
 def _pushed(wish: Wish, lengths: Proportions) -> list[Candidate]:
     """Return parts and linkages of some proportions at all sizes that fit."""
-    printed = min((wish.room[0] - PADS[0]) / lengths.offset, (wish.room[1] - PADS[1]) / lengths.stretched)
+    printed = printed_size(wish, lengths)
     pinned = min(wish.room[0] / (lengths.offset + 2 * PIN), wish.room[1] / (lengths.stretched + 2 * PIN))
     found = []
     for size in SIZES:
         for start in STARTS:
             travel = start * wish.travel, (1.0 + start) * wish.travel * (1.0 + 1e-6)
             if travel[1] <= lengths.reach * size * printed:
-                found += [_strip(wish, block, lengths, size * printed, travel) for block in _materials(wish)]
-                if size in SIZES[:2]:
-                    found += [_flexures(wish, block, lengths, size * printed, travel) for block in _materials(wish)]
-                if start == STARTS[-1] and size in SIZES[:2]:
-                    found += [_tapered(wish, block, lengths, size * printed, travel) for block in _materials(wish)]
+                found += _parts(wish, lengths, size * printed, travel, (size in SIZES[:2], start == STARTS[-1]))
             if travel[1] <= lengths.reach * size * pinned and wish.depth is None and start == STARTS[0]:
                 found.append(_springs(wish, lengths, size * pinned, travel))
     return found
+
+
+def _parts(
+    wish: Wish, lengths: Proportions, crank: float, travel: tuple[float, float], more: tuple[bool, bool]
+) -> list[Candidate]:
+    """Return the parts of one size that are not much wider than there is room for; `more`: large ones, late starts."""
+    deep = wish.depth or max(wish.room)
+    found = []
+    for block in _materials(wish):
+        wide = strip_width(wish, block, crank)
+        if wide <= DOUBT * deep:
+            found.append(_strip(wish, block, lengths, crank, travel))
+        if more[0] and FLEXURES_WIDER * wide <= DOUBT * deep:
+            found.append(_flexures(wish, block, lengths, crank, travel))
+        if all(more) and wide <= DOUBT * deep:
+            found.append(_tapered(wish, block, lengths, crank, travel))
+    return found
+
+
+def strip_width(wish: Wish, block: dict[str, Any], crank: float) -> float:
+    """Return about how wide a strip has to be [m]: scaled from one of ABS, 1.5 N over 34 mm with a crank of 54 mm.
+
+    The curvature is as the travel over the square of the crank's length; the stress gives the thickness, and the force
+    is as width, modulus, cube of the thickness and curvature over the length.
+    """
+    material = MaterialSpec.model_validate(block)
+    if material.yield_strength is None:
+        return math.inf
+    size, way = crank / 0.054, wish.travel / 0.034
+    stiffer = material.modulus / 1.8e9
+    thicker = material.yield_strength / 42.5e6 / stiffer * size**2 / way
+    return 0.005138 * (wish.target / 1.5) * size**3 / (stiffer * thicker**3 * way)
 
 
 def _varied(found: list[Candidate]) -> list[Candidate]:
