@@ -202,8 +202,10 @@ def test_the_cure_that_a_warning_names_works(cli, cam):
 def test_the_cure_keeps_what_the_command_line_had_changed(cli, cam):
     changes = ("--set", "mechanism.roller_radius=20 mm", "--set", "design.avoid_undercut=false")
     page = cli("design", cam, *QUICK, *changes).out
-    cure = next(line.strip() for line in page.splitlines() if line.strip().startswith("cfmkit design "))
-    assert cure == "cfmkit design cam.yaml --set 'mechanism.roller_radius=20 mm' --set design.avoid_undercut=true"
+    tight, larger = (line.strip() for line in page.splitlines() if line.strip().startswith("cfmkit design "))
+    kept = "cfmkit design cam.yaml --set 'mechanism.roller_radius=20 mm' --set design."
+    assert tight == f"{kept}avoid_undercut=false --set design.choose=preload"
+    assert larger == f"{kept}avoid_undercut=true"
 
 
 def test_the_cure_of_a_spec_from_standard_input_says_where_to_write(cli, cam):
