@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from cfmkit.errors import UsageError
 from cfmkit.families import family, origin
-from cfmkit.families.base import Run
+from cfmkit.families.base import Run, function_named
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -28,6 +28,9 @@ if TYPE_CHECKING:
     from cfmkit.suggest.search import Suggestions
 
     AnySpec: TypeAlias = Spec | str | os.PathLike[str]
+
+DECK = "inp"
+"""Format of a deck of a finite-element solver: of elastic parts, which the drawing alone does not tell."""
 
 
 def load(path: str | os.PathLike[str], changes: Iterable[str] = ()) -> Spec:
@@ -411,18 +414,29 @@ def drawn_files(
         raise UsageError("--kerf makes a second DXF: add dxf to --format")
     width, near = _length(kerf, "--kerf"), _length(tolerance, "--tolerance")
     drawn = drawing(spec, near)
-    return files(drawn, width, near or TOLERANCE, wanted), drawn.notes
+    made = files(drawn, width, near or TOLERANCE, wanted)
+    return made | (_decks(spec) if DECK in wanted else {}), drawn.notes
+
+
+def _decks(spec: Spec) -> dict[str, bytes]:
+    """Return the elastic parts as decks of a finite-element solver."""
+    record = family(spec.family)
+    if record.decks is None:
+        raise UsageError(f"--format inp: {record.phrase} has no elastic part to be solved")
+    made: dict[str, bytes] = function_named(record.decks)(spec)
+    return made
 
 
 def _formats(given: str | Sequence[str] | None, usual: Sequence[str]) -> tuple[str, ...]:
     """Return the formats that are requested; of a text those between commas."""
-    from cfmkit.export import FORMATS
+    from cfmkit.export import FORMATS as DRAWN
 
+    known = (*DRAWN, DECK)
     words = usual if given is None else given.split(",") if isinstance(given, str) else given
     names = tuple(dict.fromkeys(word.strip().lower() for word in words))
     for name in names:
-        if name not in FORMATS:
-            raise UsageError(f"--format: {name!r} is not known; there are {', '.join(FORMATS)}")
+        if name not in known:
+            raise UsageError(f"--format: {name!r} is not known; there are {', '.join(known)}")
     return names
 
 

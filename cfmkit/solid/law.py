@@ -19,7 +19,15 @@ ROUNDS = 20
 
 
 class Law(Protocol):
-    """How a material answers to strain in its plane."""
+    """How a material answers to strain in its plane; at small strain it is that of Hooke."""
+
+    @property
+    def youngs_modulus(self) -> float:
+        """At no strain [Pa]."""
+
+    @property
+    def poisson_ratio(self) -> float:
+        """At no strain."""
 
     def __call__(self, strain: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return stress, tangent and stretch across the plane.

@@ -125,5 +125,5 @@ def test_without_its_library_step_is_one_line(monkeypatch):
 
 
 def test_an_unknown_format_is_one_line():
-    with pytest.raises(UsageError, match=r"--format: 'stp' is not known; there are dxf, svg, csv, stl, 3mf, step"):
+    with pytest.raises(UsageError, match=r"--format: 'stp' is not known; there are dxf, svg, csv, stl, 3mf, step, inp"):
         cfmkit.export("configs/vcfm_pla.yaml", format="stp")

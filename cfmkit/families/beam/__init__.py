@@ -28,6 +28,7 @@ FAMILY = Family(
     draw="cfmkit.families.beam.draw",
     scheme="cfmkit.families.beam.scheme",
     outline="cfmkit.families.beam.outline",
+    decks="cfmkit.families.beam.solid:decks",
     propose="cfmkit.families.beam.propose:propose",
     room="cfmkit.families.beam.room:room",
     headline=(

@@ -185,6 +185,18 @@ def part_of(spec: BeamSpec, assembly: Assembly) -> Part:
     return Part(rings_of(cut), _thinnest(assembly), width, law, tuple(places))
 
 
+def decks(spec: BeamSpec) -> dict[str, bytes]:
+    """Return the part as an input deck of a finite-element solver, by file name."""
+    from cfmkit.solid.deck import deck
+    from cfmkit.solid.part import ACROSS
+
+    spec = spec.replace({"analysis.fidelity": "solid"})
+    part = part_of(spec, assemble(spec))
+    about = spec.analysis.solid
+    meshed = part.meshed(about.mesh or part.thinnest / ACROSS)
+    return {"beams.inp": deck(spec.name, part, meshed, spec.extent, about.poses)}
+
+
 def _thinnest(assembly: Assembly) -> float:
     return min(thinnest_of(beam.section) for beam in assembly.network.beams.values())
 

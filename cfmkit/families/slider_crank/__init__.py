@@ -37,6 +37,7 @@ FAMILY = Family(
     draw="cfmkit.families.slider_crank.dispatch",
     scheme="cfmkit.families.slider_crank.scheme",
     outline="cfmkit.families.slider_crank.dispatch",
+    decks="cfmkit.families.slider_crank.printed.solid:decks",
     propose="cfmkit.families.slider_crank.propose:propose",
     room="cfmkit.families.slider_crank.room:room",
     headline=("stiffness_class", "band_range_05pct", "half_band", "energy_max", "crank_pin_rotation_max"),

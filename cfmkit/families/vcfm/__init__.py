@@ -26,6 +26,7 @@ FAMILY = Family(
     draw="cfmkit.families.vcfm.draw",
     scheme="cfmkit.families.vcfm.scheme",
     outline="cfmkit.families.vcfm.outline",
+    decks="cfmkit.families.vcfm.solid:decks",
     propose="cfmkit.families.vcfm.propose:propose",
     room="cfmkit.families.vcfm.room:room",
     analyze_block=analyze_block,

@@ -168,6 +168,22 @@ def part_of(spec: VcfmSpec, piece: SolvedPiece) -> Part:
     return Part(rings_of((piece.contour,)), about.thickness, about.width, law, (shuttle, *walls))
 
 
+def decks(spec: VcfmSpec) -> dict[str, bytes]:
+    """Return leaf and spring as input decks of a finite-element solver, by file name."""
+    from cfmkit.solid.deck import deck
+    from cfmkit.solid.part import ACROSS
+
+    spec = spec.replace({"analysis.fidelity": "solid"})
+    share = spring_chain(spec).travel
+    ends = {"leaf": spec.travel, "spring": share * (max(*spec.analysis.preloads, 0.0) + spec.travel)}
+    found = {}
+    for name, piece in (("leaf", solved_leaf(spec)), ("spring", solved_spring(spec))):
+        part = part_of(spec, piece)
+        meshed = part.meshed(spec.analysis.solid.mesh or part.thinnest / ACROSS)
+        found[f"vcfm-{name}.inp"] = deck(f"{spec.name} {name}", part, meshed, ends[name], spec.analysis.solid.poses)
+    return found
+
+
 def _seams(polygon: FloatArray) -> tuple[FloatArray, ...]:
     """Return the edges of a rigid block, where elements are to meet."""
     return tuple(np.array([a, b]) for a, b in zip(polygon, np.roll(polygon, -1, axis=0), strict=True))

@@ -172,6 +172,20 @@ def part_of(spec: SliderCrankSpec) -> Part:
     return Part(rings, piece.thinnest, float(piece.sheet.thickness or 0.0), law, places, regions, LARGEST)
 
 
+def decks(spec: SliderCrankSpec) -> dict[str, bytes]:
+    """Return one leg as an input deck of a finite-element solver, by file name."""
+    from cfmkit.solid.deck import deck
+    from cfmkit.solid.part import ACROSS
+
+    spec = resolve(spec.replace({"analysis.fidelity": "solid"}))
+    linkage = linkage_of(spec.mechanism)
+    spec = as_run(spec, linkage, unloaded_angle(spec.mechanism, linkage))
+    part, about = part_of(spec), spec.analysis.solid
+    meshed = part.meshed(about.mesh or part.thinnest / ACROSS)
+    travel = spec.analysis.travel or (0.0, 0.0)
+    return {"slider-crank.inp": deck(spec.name, part, meshed, travel[1], about.poses)}
+
+
 def _stops(spec: SliderCrankSpec) -> list[float]:
     """Return the travels to solve for [m]: rest, closer ones where the travel begins, and the ends of every window."""
     low, high = spec.analysis.travel or (0.0, 0.0)
