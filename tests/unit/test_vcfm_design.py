@@ -116,3 +116,23 @@ def test_the_sizes_of_a_design_follow_its_targets_without_jumps():
         spec = designed(f"design={{force: 11.15 N, adjustment: 5 N, stroke: 3.8 mm, preload: {preload!r} mm}}").spec
         found.append([spec.at(path) for path in paths])
     assert np.abs(np.diff(np.log(found), 2, axis=0)).max() < 1e-10
+
+
+def test_without_an_adjustment_there_is_no_preload_and_nothing_is_required_of_one(tmp_path):
+    block = "design: {force: 11.15 N, stroke: 3.8 mm, rise: 4.265 mm}\n"
+    (tmp_path / "bare.yaml").write_text(yaml.safe_dump(BARE) + block)
+    found = api.design(cfmkit.load(tmp_path / "bare.yaml"))
+    assert found.spec.analysis.preloads == (0.0,)
+    assert "force_change_max" not in {one.metric for one in found.spec.requirements}
+    made = api.analyze(found.spec)
+    assert made.status is Status.COMPLETE
+    low, high = (float(end) for end in found.spec.analysis.window)
+    inside = (made.curve.displacement >= low) & (made.curve.displacement <= high)
+    np.testing.assert_allclose(made.curve.force[inside], 11.15, rtol=0.02)
+
+
+def test_a_preload_without_what_it_is_to_give_is_refused(tmp_path):
+    block = "design: {force: 11.15 N, stroke: 3.8 mm, preload: 2 mm}\n"
+    (tmp_path / "bare.yaml").write_text(yaml.safe_dump(BARE) + block)
+    with pytest.raises(cfmkit.CfmError, match="'preload' needs the 'adjustment'"):
+        cfmkit.load(tmp_path / "bare.yaml")

@@ -176,19 +176,22 @@ def completed(spec: VcfmSpec, target: VcfmDesign, sizes: DesignSizes) -> VcfmSpe
     given = analysis.model_fields_set if "analysis" in spec.model_fields_set else set()
     changes: dict[str, object] = {}
     if "preloads" not in given:
-        changes["analysis.preloads"] = (0.0, target.preload_stroke)
+        changes["analysis.preloads"] = (0.0, target.preload_stroke) if target.adjustment else (0.0,)
     if analysis.window is None:
         changes["analysis.window"] = inside
     if analysis.travel is None:
         ends = [float(end) for end in analysis.window or () if not isinstance(end, Share)]
         changes["analysis.travel"] = max([inside[1], *ends])
     if "requirements" not in spec.model_fields_set:
-        most, least = (format_short(target.adjustment * (1.0 + share), "force", 6) for share in (flat, -flat))
         allowed = f"{100.0 * flat:.6g} %"
+        adjusted: list[dict[str, str]] = []
+        if target.adjustment:
+            most, least = (format_short(target.adjustment * (1.0 + share), "force", 6) for share in (flat, -flat))
+            adjusted.append({"metric": "force_change_max", "min": least, "max": most})
         changes["requirements"] = (
             {"metric": "deviation_from_target", "max": allowed},
             {"metric": "force_ripple", "max": allowed},
-            {"metric": "force_change_max", "min": least, "max": most},
+            *adjusted,
             {"metric": "safety_factor", "min": f"{floor(1e3 * (1.0 - overrated(sizes.leaf.angle))) / 1e3:.3f}"},
         )
     made = written(spec, sizes).replace(changes)
@@ -377,7 +380,9 @@ def fit_widths(spec: VcfmSpec, target: VcfmDesign, sizes: DesignSizes) -> tuple[
     middle, half = 0.5 * (first + last), 0.5 * MIDDLE * (last - first)
     places = np.linspace(middle - half, middle + half, 101)
     full = target.preload_stroke
-    made = written(spec, sizes).replace({"analysis.preloads": (0.0, full), "analysis.branch": "stable"})
+    made = written(spec, sizes).replace(
+        {"analysis.preloads": (0.0, full) if full else (0.0,), "analysis.branch": "stable"}
+    )
     back = -(rest_of(LawSampler(parts(made)), full, places) or 0.0)
     sampler = ExactSampler(made, last, 1.2 * back)
     if sampler.problem:
@@ -407,5 +412,7 @@ def _rest(sampler: ExactSampler, preload: float, factors: tuple[float, float]) -
         place = np.array([travel])
         return float((factors[0] * sampler.leaf_force(place) + factors[1] * sampler.spring(place + preload)[0])[0])
 
+    if not preload:
+        return 0.0
     farthest = max(-preload, sampler.pulled.edges[-1])
     return farthest if force(farthest) >= 0 else bracketed_root(force, farthest, 0.0)

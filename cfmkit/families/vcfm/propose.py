@@ -191,7 +191,7 @@ def finish(spec: VcfmSpec, wish: Wish) -> VcfmSpec:
 
     design = spec.design
     preloads: tuple[float, ...] = (0.0,)
-    if wish.adjustable is not None and design is not None:
+    if wish.adjustable is not None and design is not None and design.adjustment:
         per_force = design.preload_stroke / design.adjustment
         low, high = wish.adjustable
         preloads = (0.0, *(one for one in ((high - wish.target) * per_force, (low - wish.target) * per_force) if one))

@@ -155,7 +155,9 @@ class VcfmDesign(DesignBlock):
     """What `cfmkit design` is to reach. Angle and thickness of the spring, and the number of leaves, stay."""
 
     force: Annotated[Force, Field(gt=0)] = Field(description="constant force without preload")
-    adjustment: Annotated[Force, Field(gt=0)] = Field(description="by how much the preload raises it")
+    adjustment: Annotated[Force, Field(gt=0)] | None = Field(
+        None, description="by how much the preload raises it; default: no preload, then give 'rise'"
+    )
     stroke: PositiveLength = Field(description="travel over which it is constant")
     preload: PositiveLength | None = Field(None, description="preload that raises it by that much")
     rise: PositiveLength | None = Field(None, description="of the leaves, h; instead of 'preload'")
@@ -173,17 +175,21 @@ class VcfmDesign(DesignBlock):
             raise ValueError(
                 "give either 'preload' or 'rise': one follows from the other, rise = force/adjustment preload"
             )
+        if self.adjustment is None and self.preload is not None:
+            raise ValueError("'preload' needs the 'adjustment' that it gives; without one give the leaves' 'rise'")
         return self
 
     @property
     def height(self) -> float:
         """Rise of the leaves [m]."""
-        return self.rise or (self.preload or 0.0) * self.force / self.adjustment
+        if self.rise is not None or self.adjustment is None:
+            return self.rise or 0.0
+        return (self.preload or 0.0) * self.force / self.adjustment
 
     @property
     def preload_stroke(self) -> float:
-        """Preload for the whole adjustment [m]."""
-        return self.preload or (self.rise or 0.0) * self.adjustment / self.force
+        """Preload for the whole adjustment [m]; 0 where none is wanted."""
+        return self.preload or (self.rise or 0.0) * (self.adjustment or 0.0) / self.force
 
 
 class Measured(Model):
