@@ -466,8 +466,22 @@ def drawing(spec: Spec, tolerance: float | None = None) -> Drawing:
     return drawn
 
 
-def figures(result: Result) -> Mapping[str, Callable[[], Figure]]:
-    """Return what draws each picture of a result, by name; of a family that draws none, the curve alone."""
+def figures(result: Result | AnySpec) -> Mapping[str, Callable[[], Figure]]:
+    """Return what draws each picture of a result, by name; of a family that draws none, the curve alone.
+
+    Parameters
+    ----------
+    result : Result, Spec or path-like
+        A specification is analysed.
+
+    Examples
+    --------
+    >>> import cfmkit
+    >>> pictures = cfmkit.figures("configs/cam.yaml")
+    >>> sorted(pictures)[:2], len(pictures["loop"]().axes)
+    (['contact', 'curvature'], 2)
+    """
     from cfmkit.plots.figures import figures
 
+    result = _result_of(result)
     return figures(family(result.spec.family), result)

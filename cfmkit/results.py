@@ -238,6 +238,20 @@ class Result:
 
         return pd.DataFrame(dict(curve_table(self.curves).as_dict()))
 
+    def to_xarray(self) -> Any:
+        """Return the curves as an `xarray.Dataset` over the dimension ``point``, in border units, which it names."""
+        import numpy as np
+        import xarray
+
+        from cfmkit.tables import curve_table
+
+        table = curve_table(self.curves)
+        found = xarray.Dataset()
+        for column in table.columns:
+            attributes = {} if column.unit is None else {"units": column.unit}
+            found[column.name] = ("point", np.asarray(column.values), attributes)
+        return found
+
 
 @dataclass(frozen=True)
 class Design:

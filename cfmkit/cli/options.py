@@ -80,6 +80,15 @@ Timeout = Annotated[
     float | None, option("--timeout-per-point", metavar="S", text="Give up on a point after S seconds.")
 ]
 Fresh = Annotated[bool, flag("--fresh", text="Reuse nothing of an earlier run.")]
+Tables = Annotated[
+    str,
+    option(
+        "--table",
+        metavar="csv,parquet",
+        shown=True,
+        text="Formats of the table of points; results.csv is always written. Parquet needs cfmkit\\[table].",
+    ),
+]
 Animate = Annotated[
     Literal["gif", "mp4"] | None,
     option("--animate", text="Write the mechanism in motion beside its curve, figures/motion.gif; mp4 needs ffmpeg."),

@@ -99,6 +99,33 @@ def finish(place: Desk, pieces: Sequence[Records]) -> None:
         compact(place.journal, pieces)
 
 
+def wants_parquet(text: str) -> bool:
+    """Return whether ``--table`` names Parquet.
+
+    Raises
+    ------
+    cfmkit.errors.UsageError
+        If it names anything else than formats, or what is needed for one is not there.
+    """
+    wanted = names(text)
+    unknown = [name for name in wanted if name not in ("csv", "parquet")]
+    if unknown or not wanted:
+        raise UsageError(f"--table: there is no format {''.join(unknown[:1])!r}; there are csv, parquet")
+    if "parquet" in wanted:
+        from cfmkit.tables.parquet import require_pyarrow
+
+        require_pyarrow()
+    return "parquet" in wanted
+
+
+def as_parquet(results: bytes) -> bytes:
+    """Return results.csv as Parquet."""
+    from cfmkit.tables import read_csv
+    from cfmkit.tables.parquet import parquet
+
+    return parquet(read_csv(results))
+
+
 def names(text: str | None) -> tuple[str, ...]:
     """Return what an option lists with commas."""
     return tuple(name.strip() for name in (text or "").split(",") if name.strip())

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -36,6 +36,8 @@ class StudyResult:
         As curves.csv, of a sweep that keeps them.
     indices, convergence : Table, optional
         As indices.csv and convergence.csv, of a sensitivity study.
+    varied : tuple of str
+        Headers of the columns that were varied.
     """
 
     table: Table
@@ -43,6 +45,7 @@ class StudyResult:
     curves: Table | None = None
     indices: Table | None = None
     convergence: Table | None = None
+    varied: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         """Return the study in a line."""
@@ -62,6 +65,27 @@ class StudyResult:
 
         return pd.DataFrame(dict(self.table.as_dict()))
 
+    def to_xarray(self) -> Any:
+        """Return the points as an `xarray.Dataset`: one dimension per varied value where they are a grid.
+
+        Points that are no grid stand along the dimension ``point``. Units stand in the attribute ``units``.
+        """
+        import xarray
+
+        frame = self.to_pandas()
+        axes = list(self.varied)
+        size = int(np.prod([frame[name].nunique() for name in axes])) if axes else 0
+        if axes and size == len(frame) and not frame.duplicated(axes).any():
+            found = xarray.Dataset.from_dataframe(frame.set_index(axes))
+        else:
+            found = xarray.Dataset.from_dataframe(frame.rename_axis("point"))
+        units = {column.header: column.unit for column in self.table.columns}
+        found = found.rename({header: header.partition(" [")[0] for header in units if header in found.variables})
+        for header, unit in units.items():
+            if unit is not None:
+                found[header.partition(" [")[0]].attrs["units"] = unit
+        return found
+
 
 def swept(spec: Spec, jobs: int, block: Mapping[str, Any]) -> StudyResult:
     """Return a sweep; see `cfmkit.sweep`."""
@@ -78,7 +102,8 @@ def swept(spec: Spec, jobs: int, block: Mapping[str, Any]) -> StudyResult:
     work = prepare(spec, request)
     records = run(work, _executor(jobs))
     curves = spec.sweep is not None and spec.sweep.curves
-    return _read(outputs(records, summary_of(records), curves))
+    found = _read(outputs(records, summary_of(records), curves))
+    return replace(found, varied=tuple(found.table.headers[: len(work.plan.variables)]))
 
 
 def examined(spec: Spec, jobs: int, block: Mapping[str, Any]) -> StudyResult:
@@ -167,4 +192,5 @@ def _read(files: Any) -> StudyResult:
 
     found = {name: data if isinstance(data, bytes) else b"".join(data) for name, data in files}
     tables = {name.removesuffix(".csv"): read_csv(data) for name, data in found.items() if name.endswith(".csv")}
-    return StudyResult(tables.pop("results"), json.loads(found["metrics.json"]), **tables)
+    curves, indices, convergence = map(tables.get, ("curves", "indices", "convergence"))
+    return StudyResult(tables["results"], json.loads(found["metrics.json"]), curves, indices, convergence)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cfmkit.cli.answer import Answer
-from cfmkit.cli.options import Studying, WithReport, flag, option
+from cfmkit.cli.options import Studying, Tables, WithReport, flag, option
 from cfmkit.cli.page_blocks import (
     BAD,
     BLANK,
@@ -62,6 +62,7 @@ class SensitivityOptions(Studying):
     """Arguments and options."""
 
     report: WithReport = False
+    table: Tables = "csv"
     method: Annotated[
         Literal["oat", "local", "morris", "sobol", "tolerance"] | None,
         option(
@@ -124,7 +125,7 @@ def run(options: SensitivityOptions, terminal: Terminal) -> Answer:
     from cfmkit.studies.sensitivity.setup import prepare
 
     start = studies.now()
-    out, form = folder_of(options, "sensitivity"), options.form
+    out, form, in_parquet = folder_of(options, "sensitivity"), options.form, studies.wants_parquet(options.table)
     setup = prepare(spec_of(options), options.seed, options.max_points)
     with studies.desk(out, terminal, options.fresh) as place:
         place.folder.check("results.csv", "indices.csv", "metrics.json", "resolved.yaml")
@@ -133,9 +134,11 @@ def run(options: SensitivityOptions, terminal: Terminal) -> Answer:
             studies.tracebacks(piece.records, terminal)
         kept: dict[str, bytes] = {}
         for name, data in files(found, not options.no_plots, form):
-            if options.report:
+            if options.report or (in_parquet and name == "results.csv"):
                 kept[name] = data = data if isinstance(data, bytes) else b"".join(map(bytes, data))
             place.folder.write(name, data)
+        if in_parquet:
+            place.folder.write("results.parquet", studies.as_parquet(kept["results.csv"]))
         if options.report:
             place.folder.write(*_report(found, kept, form, options, terminal))
         made = studies.Made("sensitivity", options.spec, setup.study.spec, setup.seed, found.evaluator.count)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cfmkit.cli.answer import Answer
-from cfmkit.cli.options import Studying, WithReport, flag, option
+from cfmkit.cli.options import Studying, Tables, WithReport, flag, option
 from cfmkit.cli.page_blocks import (
     BAD,
     BLANK,
@@ -46,6 +46,7 @@ class SweepOptions(Studying):
     """Arguments and options."""
 
     report: WithReport = False
+    table: Tables = "csv"
     vary: Annotated[
         list[str] | None,
         option(
@@ -84,7 +85,7 @@ def run(options: SweepOptions, terminal: Terminal) -> Answer:
     from cfmkit.studies.sweep import outputs, prepare, summary_of, writes_curves
 
     start = studies.now()
-    out, form = folder_of(options, "sweep"), options.form
+    out, form, in_parquet = folder_of(options, "sweep"), options.form, studies.wants_parquet(options.table)
     spec, asked = spec_of(options), request(options)
     work = prepare(spec, asked)
     with studies.desk(out, terminal, options.fresh) as place:
@@ -94,9 +95,11 @@ def run(options: SweepOptions, terminal: Terminal) -> Answer:
         summary = summary_of(records)
         kept: dict[str, bytes] = {}
         for name, data in outputs(records, summary, writes_curves(spec, asked)):
-            if options.report:
+            if options.report or (in_parquet and name == "results.csv"):
                 kept[name] = data = data if isinstance(data, bytes) else b"".join(map(bytes, data))
             place.folder.write(name, data)
+        if in_parquet:
+            place.folder.write("results.parquet", studies.as_parquet(kept["results.csv"]))
         drawn = makers(records, summary) if not options.no_plots else {}
         for name, content in form.files(drawn):
             place.folder.write(name, content)

@@ -1,0 +1,55 @@
+"""Tables as Parquet, for studies with more points than a spreadsheet opens: a tenth of the bytes, and types kept.
+
+Needs pyarrow (``pip install 'cfmkit[table]'``).
+"""
+
+from __future__ import annotations
+
+import io
+from typing import TYPE_CHECKING, Any
+
+from cfmkit.errors import UsageError
+
+if TYPE_CHECKING:
+    from cfmkit.tables.table import Table
+
+
+def require_pyarrow() -> None:
+    """Refuse where pyarrow is not there.
+
+    Raises
+    ------
+    cfmkit.errors.UsageError
+        With the command that installs it.
+    """
+    from importlib.util import find_spec
+
+    if find_spec("pyarrow") is None:
+        raise UsageError("--table parquet needs pyarrow: pip install 'cfmkit[table]'")
+
+
+def parquet(table: Table) -> bytes:
+    """Return a table as Parquet, its columns headed as in the CSV, an empty cell as null.
+
+    Raises
+    ------
+    cfmkit.errors.UsageError
+        Without pyarrow.
+    """
+    require_pyarrow()
+    import pyarrow
+    from pyarrow import parquet as writer
+
+    columns: dict[str, Any] = {column.header: _cells(column.cells()) for column in table.columns}
+    into = io.BytesIO()
+    writer.write_table(pyarrow.table(columns), into, compression="zstd")
+    return into.getvalue()
+
+
+def _cells(cells: Any) -> list[Any]:
+    """Return the cells of a column, numbers that are not there as null; a column of texts and numbers as texts."""
+    values = [None if isinstance(cell, float) and cell != cell else cell for cell in cells]
+    kinds = {type(value) for value in values if value is not None}
+    if str in kinds and len(kinds) > 1:
+        return [None if value is None else str(value) for value in values]
+    return values
