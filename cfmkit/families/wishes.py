@@ -42,6 +42,8 @@ class Wish:
         Between which forces it is to be adjusted [N].
     hysteresis : float, optional
         Largest loss of a cycle over its work.
+    cycles : int, optional
+        Presses that it has to survive; judged where the material has fatigue data, whose allowable stress counts.
     thinnest : float
         Thinnest leaf that the process makes [m].
     """
@@ -57,6 +59,7 @@ class Wish:
     materials: tuple[MaterialBlock, ...] = ()
     adjustable: tuple[float, float] | None = None
     hysteresis: float | None = None
+    cycles: int | None = None
     thinnest: float = 2e-5
 
     @property

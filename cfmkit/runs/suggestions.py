@@ -30,6 +30,7 @@ COLUMNS: Mapping[str, tuple[str, str]] = {
     "along": ("length", "mm"),
     "depth": ("length", "mm"),
     "parts": ("count", ""),
+    "life": ("ratio", "1"),
     "finer_deviation": ("ratio", "1"),
 }
 """What is told of each proposal: its dimension and the unit of the files."""
@@ -143,10 +144,11 @@ def _warnings(found: Suggestions, block: WishBlock) -> Iterator[dict[str, str]]:
             "name": "yield_not_judged",
             "message": "the share of good parts was not judged: `cfmkit sensitivity` tells it of a design.yaml",
         }
-    if block.cycles is not None:
+    judged = all(one.numbers.get("life") is not None for one in found.proposals)
+    if block.cycles is not None and not judged:
         yield {
             "name": "cycles_not_judged",
-            "message": "the life was not judged: no material here has fatigue data; compare the safety factor",
+            "message": "the life of proposals without a number was not judged: give the material's 'fatigue' data",
         }
 
 

@@ -54,6 +54,7 @@ class Proposal:
         Why nothing came of it.
     numbers : mapping of str to float or None
         In SI: ``mean``, ``ripple``, ``hysteresis``, ``safety_factor``, ``across``, ``along``, ``depth``, ``parts``,
+        ``life`` (cycles),
         ``finer_deviation`` (of the mean by a better model, over the one it was judged by, less 1).
     notes : tuple of str
         What a reader has to know: what was assumed, what no model here says.
@@ -168,6 +169,9 @@ def demanded(wish: Wish, result: Result, values: Any) -> Iterator[dict[str, Any]
     if wish.hysteresis is not None and "unload" in result.curve.branches:
         lost = wish.hysteresis * wish.target * wish.travel
         yield {"metric": "hysteresis_area", "max": format_short(lost, "energy", 12)}
+    life = found.get("fatigue_life")
+    if wish.cycles is not None and life is not None and life.value is not None:
+        yield {"metric": "fatigue_life", "min": f"{wish.cycles}"}
     if wish.adjustable is not None and "force_change_max" in found:
         most = max(abs(end - wish.target) for end in wish.adjustable)
         yield {"metric": "force_change_max", "min": format_short(0.99 * most, "force", 12)}
@@ -247,6 +251,7 @@ def numbers_of(result: Result, space: Room | None, wish: Wish) -> dict[str, floa
         "along": None if space is None else space.along,
         "depth": None if space is None else space.depth,
         "parts": None if space is None else float(space.parts),
+        "life": None if (life := found.get("fatigue_life")) is None else life.value,
         "finer_deviation": None,
     }
 

@@ -29,7 +29,7 @@ ENOUGH = 3
 ROUNDS = (3, 4, 6, 12)
 """Candidates of a family in each round, the last again and again: every round waits for the one before it."""
 
-LONGEST = 25.0
+LONGEST = 15.0
 """Seconds that one design may search."""
 
 RESERVE = 14.0

@@ -66,7 +66,7 @@ class WishBlock(Model):
     )
     hysteresis: Share | None = Field(None, description="largest loss of a cycle, over its work")
     cycles: Annotated[int, Field(ge=1)] | None = Field(
-        None, description="presses that it has to survive; not judged yet"
+        None, description="presses that it has to survive; judged of a material with `fatigue` data"
     )
     made_well: Share | None = Field(
         None, alias="yield", description="share of made parts that is to be good; not judged yet"
@@ -117,6 +117,9 @@ class WishBlock(Model):
         thinnest, usual = PROCESSES[self.process] if self.process else (None, ())
         given = self.material if isinstance(self.material, tuple) else () if self.material is None else (self.material,)
         blocks: tuple[dict[str, Any], ...] = tuple(one.model_dump(exclude_unset=True) for one in given)
+        for block in blocks:
+            if self.cycles is not None and block.get("fatigue"):
+                block["fatigue"]["cycles"] = float(self.cycles)
         low, high = self.ends
         return Wish(
             kind="force" if self.force is not None else "torque",
@@ -130,6 +133,7 @@ class WishBlock(Model):
             materials=blocks or tuple({"name": name} for name in usual),
             adjustable=self.adjustable,
             hysteresis=self.hysteresis,
+            cycles=self.cycles,
             **({} if thinnest is None else {"thinnest": thinnest}),
         )
 

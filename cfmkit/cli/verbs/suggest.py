@@ -52,7 +52,9 @@ class SuggestOptions(Common):
     process: Annotated[str | None, _key("process", "NAME", "fdm, sls, laser, wire-edm or mill.")] = None
     adjustable: Annotated[str | None, _key("adjustable", "A,B", "Between which forces it is adjusted: 15N,25N.")] = None
     hysteresis: Annotated[str | None, _key("hysteresis", "SHARE", "Largest loss of a cycle, over its work.")] = None
-    cycles: Annotated[str | None, _key("cycles", "N", "Presses that it has to survive; not judged yet.")] = None
+    cycles: Annotated[
+        str | None, _key("cycles", "N", "Presses that it has to survive; judged of a material with fatigue data.")
+    ] = None
     made_well: Annotated[
         str | None, _key("yield", "SHARE", "Share of made parts that is to be good; not judged yet.")
     ] = None

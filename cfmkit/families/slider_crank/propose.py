@@ -218,11 +218,12 @@ def strip_width(wish: Wish, block: dict[str, Any], crank: float) -> float:
     is as width, modulus, cube of the thickness and curvature over the length.
     """
     material = MaterialSpec.model_validate(block)
-    if material.yield_strength is None:
+    strength = material.allowable(1.0)
+    if strength is None:
         return math.inf
     size, way = crank / 0.054, wish.travel / 0.034
     stiffer = material.modulus / 1.8e9
-    thicker = material.yield_strength / 42.5e6 / stiffer * size**2 / way
+    thicker = strength / 42.5e6 / stiffer * size**2 / way
     return 0.005138 * (wish.target / 1.5) * size**3 / (stiffer * thicker**3 * way)
 
 
