@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
     from cfmkit.cli.page_blocks import Block
+    from cfmkit.specs.keys import Key
 
     Record = Mapping[str, Any]
     Section = tuple[str, Sequence[Record], tuple[Field, ...]]
@@ -43,10 +44,14 @@ def explain(name: str | None) -> Answer:
         return family_page(name)
     if (known := found(name)) is not None:
         return known
+    from cfmkit.cli.commands import names as verbs
     from cfmkit.specs.yamlio import did_you_mean
 
     topics = [*TOPICS, *families.names()]
-    every = f"there are {', '.join(topics)}, and materials, metrics, values, warnings, units and papers by their names"
+    by_name = "keys, materials, metrics, values, warnings, units, papers and symbols by their names"
+    every = f"there are {', '.join(topics)}, and {by_name}"
+    if name in verbs():
+        raise UsageError(f"{name!r} is a command: `cfmkit {name} --help` explains it")
     hint = did_you_mean(name, [*topics, *names()]) or every
     raise UsageError(f"there is nothing to show about {name!r}; {hint}")
 
@@ -67,6 +72,8 @@ def _page(title: str, text: str, sections: Iterable[Section], data: Mapping[str,
 
 
 BY_NAME = {
+    "rolling_friction": "a key of the specification",
+    "theta2": "a symbol of the drawings",
     "force_ripple": "a metric",
     "pla": "a material",
     "MPa": "a unit",
@@ -247,17 +254,32 @@ def _default(key: Record) -> str:
 
 def found(name: str) -> Answer | None:
     """Return the page on everything that has a name; None if nothing has."""
-    sections = []
+    sections: list[Section] = []
     for kind, (records, fields) in _KINDS.items():
         every = records()
         if known := [one for key in _keys(kind, name) for one in every.get(key, ())]:
-            sections.append((kind, known, fields))
+            sections.append((kind, known, fields or SPEC_KEY_FIELDS))
+    if not sections and (drawn := _symbols(name)):
+        sections.append(("symbols", drawn, SYMBOL_FIELDS))
     return _page(name, "", sections, {kind: known for kind, known, _ in sections}) if sections else None
 
 
+def _symbols(name: str) -> list[Record]:
+    """Return what a symbol such as ``theta2`` is in the drawings of the families; they are imported for it."""
+    from cfmkit.runs.scheme import scheme
+
+    return [
+        {"name": one.symbol, "family": record.name, "key": one.key, "meaning": one.meaning}
+        for record in families.records()
+        if record.scheme
+        for one in scheme(record.name).dimensions
+        if name in re.split(r", | \.\.\. ", one.symbol)
+    ]
+
+
 def names() -> list[str]:
-    """Return every name that `found` knows."""
-    return [name for records, _ in _KINDS.values() for name in records()]
+    """Return every name that `found` knows, but for the paths of keys and symbols."""
+    return [name for records, _ in _KINDS.values() for name in records() if "." not in name]
 
 
 def references() -> list[dict[str, str]]:
@@ -327,6 +349,25 @@ def _values() -> Records:
     )
 
 
+def _spec_keys() -> Records:
+    """Return the keys of all specifications by path and by last name; equal ones of several families once."""
+    from cfmkit.specs.keys import keys
+
+    every = families.records()
+    known: dict[Key, list[str]] = {}
+    for record in every:
+        for key in keys(record.spec_type):
+            known.setdefault(key, []).append(record.name)
+
+    def named() -> Iterator[tuple[str, dict[str, Any]]]:
+        for key, of in known.items():
+            told = {"family": "every" if len(of) == len(every) else ", ".join(of)} | asdict(key)
+            for name in {key.path, key.path.rpartition(".")[2].removesuffix("[]")}:
+                yield name, told
+
+    return _gathered(named())
+
+
 def _findings() -> Records:
     return _gathered(
         (key, {"name": key, "family": record.name, "meaning": meaning})
@@ -383,6 +424,7 @@ _KINDS: Mapping[str, tuple[Callable[[], Records], tuple[Field, ...]]] = {
     ),
     "metrics": (_metrics, (field("name"), field("unit"), field("definition", wraps=True))),
     "values": (_values, _ABOUT),
+    "keys": (_spec_keys, ()),
     "findings": (_findings, (field("name"), field("family"), field("meaning", wraps=True))),
     "units": (
         _units,
@@ -407,6 +449,8 @@ KEY_FIELDS = (
     Field("default", _default),
     Field("meaning", lambda key: "; ".join(filter(None, (key["description"], key["allowed"]))), wraps=True),
 )
+SPEC_KEY_FIELDS = (field("path", "key"), field("family", wraps=True), *KEY_FIELDS[1:])
+SYMBOL_FIELDS = (field("name", "symbol"), field("family"), field("key", wraps=True), field("meaning", wraps=True))
 METRIC_FIELDS = (field("name", "metric"), field("unit"), field("definition", wraps=True))
 
 TOPICS: Mapping[str, tuple[str, Callable[[], Answer]]] = {

@@ -58,3 +58,27 @@ def test_what_the_overview_names_is_explained():
 
     for name in BY_NAME:
         assert explain(name).data
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "family"),
+    [
+        ("brace_length", "keys", "cam"),
+        ("mechanism.brace_length", "keys", "cam"),
+        ("window", "keys", "every"),
+        ("theta2", "symbols", "vcfm"),
+        ("r1", "symbols", "slider-crank"),
+    ],
+)
+def test_keys_and_symbols_are_explained_by_their_names(name, kind, family):
+    assert family in {one["family"] for one in explain(name).data[kind]}
+
+
+def test_a_command_is_no_topic_but_has_a_help(capsys):
+    assert main(["show", "papers"]) == 2
+    assert "`cfmkit papers --help`" in capsys.readouterr().err
+
+
+def test_a_key_that_is_misspelt_is_named(capsys):
+    assert main(["show", "brace_lenght"]) == 2
+    assert "'brace_length'" in capsys.readouterr().err

@@ -26,7 +26,7 @@ class ShowOptions(Common):
         str | None,
         argument(
             "FAMILY|units|metrics|materials|references|NAME",
-            "What to explain: a topic, or anything by its name: pla, force_ripple, MPa; default: list what there is.",
+            "What to explain: a topic, or anything by its name: brace_length, pla, MPa; default: list all.",
             completion.topics,
         ),
     ] = None
