@@ -237,9 +237,18 @@ def designed(spec: Spec, run: Run) -> Report:
 
 
 def _of_many_parts(found: Report, given: Spec, run: Run) -> Report:
-    """Return a report with what is known of many parts of its design, where their tolerances are given."""
+    """Return a report with what is known of many parts of its design, and what to do at the bench with one."""
     if found.result.status is not Status.COMPLETE:
         return found
+    from cfmkit.studies.bench import bench
+
+    found = _with_yield(found, given, run)
+    told = bench(found.result, run)
+    return found.beside({}, run_findings.Supplement(lines=(("bench", told),))) if told else found
+
+
+def _with_yield(found: Report, given: Spec, run: Run) -> Report:
+    """Return a report with what is known of many parts of its design, where their tolerances are given."""
     from cfmkit.studies.made_parts import yields_of
 
     yields = yields_of(found.result, given, run)

@@ -1,0 +1,132 @@
+"""The bench in one sentence: what to make, what to measure on it, and what force to expect where, for 95 % of parts.
+
+Forces are those of parts to first order, drawn from `design.tolerances` or from what the process is assumed to hold.
+The dimensions are those whose errors move the force most: what is worth measuring before the force is looked at.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.designing.robust import SIGMA_STEP
+from cfmkit.errors import CfmError
+from cfmkit.families import family
+from cfmkit.metrics import window_of
+from cfmkit.specs.spec import DesignKeys
+from cfmkit.specs.units import format_short
+from cfmkit.studies.made_parts import tolerances_of
+from cfmkit.studies.margins import sampled_of
+from cfmkit.studies.process_tolerances import MOST_ANALYSES, MOST_LOOKS, assumed, tolerances
+
+if TYPE_CHECKING:
+    from cfmkit.arrays import FloatArray
+    from cfmkit.families.base import Run
+    from cfmkit.results import Result
+    from cfmkit.studies.made_parts import Tolerances
+
+PARTS, SHARE = 4000, 0.95
+"""Parts that are drawn, and the share of them whose forces are named."""
+
+DIMENSIONS = 3
+"""How many dimensions are named: more are not measured."""
+
+
+def bench(result: Result, run: Run) -> str:
+    """Return the sentence; empty of a part of whose errors nothing is known, or that cannot be followed.
+
+    Parameters
+    ----------
+    result : Result
+        The analysis of the design.
+    run : Run
+        Seed of the parts.
+    """
+    if not result.curves:
+        return ""
+    try:
+        made, whence = _made(result, run)
+        if made is None:
+            return ""
+        places = _places(result)
+        moved = _moved(result, made, places, run)
+    except CfmError:
+        return ""
+    if moved is None:
+        return ""
+    nominal, by_error = moved
+    errors = made.drawn(PARTS) - made.nominal
+    forces = nominal + errors @ by_error.T
+    low, high = np.quantile(forces, ((1.0 - SHARE) / 2.0, (1.0 + SHARE) / 2.0), axis=0)
+    weight = (np.abs(by_error) * errors.std(axis=0)).sum(axis=0)
+    order = [int(k) for k in np.argsort(-weight)[:DIMENSIONS] if weight[k] > 0]
+    curve = result.curve
+    named = [_dimension(made, k) for k in order]
+    at = [format_short(place, curve.motion_dimension) for place in places]
+    ends = [[format_short(force, curve.kind, 3) for force in one] for one in zip(nominal, low, high, strict=True)]
+    expected = [f"{one[0]} ({one[1]} to {one[2]}) at {place}" for one, place in zip(ends, at, strict=True)]
+    make = "make the part in geometry/" if family(result.spec.family).outline else "make the part"
+    verb = "press" if curve.motion_dimension == "length" else "turn"
+    return (
+        f"{make}, measure {_listed(named)}, {verb} it to {_listed(at)}, and expect {_listed(expected)}: each range "
+        f"holds for {100 * SHARE:.0f} % of parts {whence}, to first order"
+    )
+
+
+def _dimension(made: Tolerances, k: int) -> str:
+    """Return a dimension with its drawn value, as ``bistable.thickness (1.01 mm)``."""
+    value = format_short(float(made.nominal[k]), made.parameters[k].dimension)
+    return f"{made.paths[k].removeprefix('mechanism.')} ({value} as drawn)"
+
+
+def _listed(items: list[str]) -> str:
+    return ", ".join(items[:-1]) + (" and " if len(items) > 1 else "") + items[-1]
+
+
+def _made(result: Result, run: Run) -> tuple[Tolerances | None, str]:
+    """Return the tolerances of a part, those that are given or those that are assumed, and whence they are."""
+    block = getattr(result.spec, "design", None)
+    if isinstance(block, DesignKeys) and block.tolerances:
+        return tolerances_of(result.spec, block, run.seed), "within design.tolerances"
+    found = assumed(result.spec)
+    if found is None or not isinstance(block, DesignKeys):
+        return None, ""
+    stated = block.model_copy(update={"tolerances": tolerances(result.spec), "correlated": ()})
+    return tolerances_of(result.spec, stated, run.seed), f"made by {found.process.name} (assumed tolerances)"
+
+
+def _places(result: Result) -> FloatArray:
+    """Return the two ends of the window, or the middle and the end of the travel."""
+    found = window_of(result)
+    motion = result.curve.motion
+    low, high = (found.lo, found.hi) if found else (0.5 * float(motion.max() + motion.min()), float(motion.max()))
+    return np.array([low, high])
+
+
+def _moved(result: Result, made: Tolerances, places: FloatArray, run: Run) -> tuple[FloatArray, FloatArray] | None:
+    """Return the force of the design at places (p,), on its first branch, and its derivatives by the errors (p, d)."""
+    spec = made.spec
+    quick = family(spec.family).sampled is not None
+    if 2 * len(made.paths) > (MOST_LOOKS if quick else MOST_ANALYSES):
+        return None
+    branch = result.curve.branches[0]
+
+    def force(changes: dict[str, float]) -> FloatArray | None:
+        found = sampled_of(spec.replace(changes) if changes else spec, places, run)
+        values = None if found is None else found.effort.get(branch)
+        return values if values is not None and np.isfinite(values).all() else None
+
+    nominal = force({})
+    if nominal is None:
+        return None
+    by_error = np.empty((len(places), len(made.paths)))
+    for k, one in enumerate(made.parameters):
+        spread = one.spread
+        sigma = spread.deviation if spread.kind == "normal" else (spread.high - spread.low) / 12.0**0.5
+        step = SIGMA_STEP * sigma
+        ends = force({one.path: spread.nominal + step}), force({one.path: spread.nominal - step})
+        if ends[0] is None or ends[1] is None:
+            return None
+        by_error[:, k] = (ends[0] - ends[1]) / (2.0 * step)
+    return nominal, by_error

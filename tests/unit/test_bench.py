@@ -1,0 +1,36 @@
+"""The sentence for the bench: the force at two places, for 95 % of parts."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+
+import cfmkit
+from cfmkit.families.base import Run
+from cfmkit.specs.spec import Requirement
+from cfmkit.studies.bench import bench
+
+MODULUS = "mechanism.material.youngs_modulus"
+
+
+def test_the_range_is_that_of_the_normal_law_where_the_force_is_proportional_to_the_error():
+    # without stretch the force is proportional to E: 95 % lie within 1.96 standard deviations of 3 %
+    asked = (Requirement(metric="force_mean", min="1 N"),)
+    spec = cfmkit.load("configs/beam_rescaled.yaml").replace({"requirements": asked})
+    spec = spec.replace({"design.tolerances": {MODULUS: {"normal": "3 %"}, "mechanism.width": {"normal": "0.1 %"}}})
+    result = cfmkit.analyze(spec)
+    told = bench(result, Run())
+    assert told.index("youngs_modulus") < told.index("width")
+    force, low, high = (
+        float(text) for text in re.search(r"expect ([\d.]+) N \(([\d.]+) N to ([\d.]+) N\)", told).groups()
+    )
+    window = spec.analysis.window or (0.5 * result.curve.motion.max(), 0.0)
+    assert force == pytest.approx(np.interp(window[0], result.curve.motion, result.curve.effort), rel=5e-3)
+    assert (high - force) / force == pytest.approx(1.96 * 0.03, rel=0.12)
+    assert (force - low) / force == pytest.approx(1.96 * 0.03, rel=0.12)
+
+
+def test_of_a_mechanism_whose_errors_nobody_knows_nothing_is_said():
+    assert bench(cfmkit.analyze("configs/cam.yaml"), Run()) == ""
