@@ -23,7 +23,7 @@ import cfmkit
 from cfmkit.families.base import Block, Measure
 from cfmkit.families.slider_crank.linkage import Linkage
 from cfmkit.families.slider_crank.springs.many_designs.model import analyze_block
-from cfmkit.families.slider_crank.springs.rates import Goal, minimax
+from cfmkit.families.slider_crank.springs.rates import RateGoal, minimax
 from cfmkit.families.slider_crank.unit_springs import along_crank, crank_efforts
 
 CONFIGS = Path(__file__).resolve().parent.parent / "configs"
@@ -73,7 +73,7 @@ def main() -> None:
     )
 
     window = np.linspace(0.866, 4.866, 101)
-    goal = Goal(along_crank(link, np.radians(-5.0), np.radians(window)).effort.T, np.ones(101), np.full(4, np.inf))
+    goal = RateGoal(along_crank(link, np.radians(-5.0), np.radians(window)).effort.T, np.ones(101), np.full(4, np.inf))
     print(f"minimax rates, 101 places    {1e3 * best(lambda: minimax(goal), 20):7.2f} ms")
 
     spec = cfmkit.load(CONFIGS / "slider_crank_li2019.yaml")

@@ -20,25 +20,25 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Part:
+class CompiledPart:
     """A part of the compiled code, and how long it took to get it [s]: hardly any time where it was there before."""
 
     name: str
     seconds: float
 
 
-def warm() -> Iterator[Part]:
+def warm() -> Iterator[CompiledPart]:
     """Load the engine's compiled code, part by part; what has not been compiled yet is, and is kept.
 
     Yields
     ------
-    Part
+    CompiledPart
         In the order in which a run needs them.
     """
     began = time.perf_counter()
     x = np.array([1e-3])
     path = trace(_pulled(x), Displacement("b", 0.0, np.array([1e-4])))
-    yield Part("equilibria and paths", time.perf_counter() - began)
+    yield CompiledPart("equilibria and paths", time.perf_counter() - began)
     for name, output in (
         ("states along beams", lambda: path.peak_stress()),
         ("derivatives of forces", lambda: gradient(path, _pulled, x).effort),
@@ -47,7 +47,7 @@ def warm() -> Iterator[Part]:
     ):
         began = time.perf_counter()
         output()
-        yield Part(name, time.perf_counter() - began)
+        yield CompiledPart(name, time.perf_counter() - began)
 
 
 def _pulled(x: Any) -> Network:

@@ -54,12 +54,12 @@ def family(name: str) -> Family:
     raise UsageError(f"unknown family {name!r}; known are {', '.join(names())}{hint}")
 
 
-def examined() -> tuple[tuple[installed.Offer | None, Family | str], ...]:
+def examined() -> tuple[tuple[installed.InstalledFamily | None, Family | str], ...]:
     """Return every family with the offer of the package it is from, or the reason why it cannot be used.
 
     Returns
     -------
-    tuple of (Offer or None, Family or str)
+    tuple of (InstalledFamily or None, Family or str)
         Those of this package come first, without an offer. All others are imported.
     """
     own = tuple((None, family(name)) for name in FAMILIES)
@@ -76,7 +76,7 @@ def skipped() -> tuple[str, ...]:
     return tuple(found for _, found in examined() if isinstance(found, str))
 
 
-def _tried(offer: installed.Offer) -> Family | str:
+def _tried(offer: installed.InstalledFamily) -> Family | str:
     try:
         return installed.record_of(offer, FAMILIES)
     except Unusable as problem:

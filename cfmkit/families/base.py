@@ -230,7 +230,7 @@ def article(word: str) -> str:
     return "an" if first[0] in "aeiou" else "a"
 
 
-SHARED = {WINDOW_OUTSIDE: "a window is not within the curve: what is measured over it has no value"}
+SHARED = {WINDOW_OUTSIDE: "a window extends beyond the curve: metrics over it have no value"}
 """Findings that are made of any family's result."""
 
 

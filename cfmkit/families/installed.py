@@ -38,7 +38,7 @@ class Unusable(UsageError):
 
 
 @dataclass(frozen=True)
-class Offer:
+class InstalledFamily:
     """A family that an installed package offers.
 
     Attributes
@@ -62,20 +62,20 @@ class Offer:
         return f"{self.package} {self.version}".rstrip()
 
 
-def offers() -> tuple[Offer, ...]:
+def offers() -> tuple[InstalledFamily, ...]:
     """Return what the packages on the path offer, in the order of the names."""
     return _offers_on(tuple(sys.path))
 
 
 @lru_cache(maxsize=8)
-def _offers_on(path: Sequence[str]) -> tuple[Offer, ...]:
-    found: list[Offer] = []
+def _offers_on(path: Sequence[str]) -> tuple[InstalledFamily, ...]:
+    found: list[InstalledFamily] = []
     seen: set[str] = set()
     for folder in path:
         for info, package, version in _installed_in(folder or "."):
             if package not in seen:
                 seen.add(package)
-                found += (Offer(name, target, package, version) for name, target in _entries(info))
+                found += (InstalledFamily(name, target, package, version) for name, target in _entries(info))
     return tuple(sorted(found, key=lambda one: (one.name, one.package)))
 
 
@@ -113,7 +113,7 @@ def usable_names(taken: Iterable[str]) -> tuple[str, ...]:
     return tuple(name for name in own if own.count(name) == 1 and name not in set(taken))
 
 
-def record_of(offer: Offer, taken: Iterable[str]) -> Family:
+def record_of(offer: InstalledFamily, taken: Iterable[str]) -> Family:
     """Return the family that a package offers; its code is imported.
 
     Raises
@@ -127,7 +127,7 @@ def record_of(offer: Offer, taken: Iterable[str]) -> Family:
     return found
 
 
-def _clash(offer: Offer, taken: Iterable[str]) -> str:
+def _clash(offer: InstalledFamily, taken: Iterable[str]) -> str:
     """Return why a name is not free; empty if it is."""
     if offer.name in taken:
         return "cfmkit itself has a family of this name"
@@ -136,7 +136,7 @@ def _clash(offer: Offer, taken: Iterable[str]) -> str:
 
 
 @lru_cache(maxsize=64)
-def _imported(offer: Offer) -> Family | str:
+def _imported(offer: InstalledFamily) -> Family | str:
     """Return the record, or why there is none."""
     from cfmkit.families.base import INTERFACE, Family, function_named
 
@@ -156,7 +156,7 @@ def _imported(offer: Offer) -> Family | str:
     return record
 
 
-def code_of(offer: Offer) -> dict[str, str]:
+def code_of(offer: InstalledFamily) -> dict[str, str]:
     """Return what computes a family of another package: the package, its version and the SHA-256 of its files."""
     from pathlib import Path
 

@@ -41,7 +41,7 @@ VERDICTS: Mapping[str, str] = {
 
 
 @dataclass(frozen=True)
-class Row:
+class PrintedRow:
     """What a paper prints at one place.
 
     Attributes
@@ -106,7 +106,7 @@ class Checked:
 
     Attributes
     ----------
-    row : Row
+    row : PrintedRow
         What the paper prints.
     computed : tuple of str
         In the units of the paper, with two digits more; empty where nothing was computed.
@@ -116,13 +116,13 @@ class Checked:
         Whether the row was left out because it takes long.
     """
 
-    row: Row
+    row: PrintedRow
     computed: tuple[str, ...] = ()
     trouble: str = ""
     skipped: bool = False
 
 
-def rows() -> tuple[Row, ...]:
+def rows() -> tuple[PrintedRow, ...]:
     """Return every row, paper by paper as they are in the file."""
     from cfmkit.specs.yamlio.plain import read_plain
 
@@ -131,18 +131,18 @@ def rows() -> tuple[Row, ...]:
     return tuple(_row(paper, item["family"], entry) for paper, item in papers.items() for entry in item["rows"])
 
 
-def _row(paper: str, family: str, entry: Mapping[str, Any]) -> Row:
+def _row(paper: str, family: str, entry: Mapping[str, Any]) -> PrintedRow:
     given: dict[str, Any] = dict(entry)
     for name in ("printed", "ask", "here"):
         given[name] = _texts(given.get(name, ()))
-    return Row(paper=paper, family=family, changes=_texts(given.pop("set", ())), **given)
+    return PrintedRow(paper=paper, family=family, changes=_texts(given.pop("set", ())), **given)
 
 
 def _texts(value: Any) -> tuple[str, ...]:
     return tuple(map(str, value)) if isinstance(value, list | tuple) else (str(value),)
 
 
-def chosen(name: str | None) -> tuple[Row, ...]:
+def chosen(name: str | None) -> tuple[PrintedRow, ...]:
     """Return the rows of one paper, or of a family's papers, or all.
 
     Raises
@@ -163,12 +163,12 @@ def chosen(name: str | None) -> tuple[Row, ...]:
     raise UsageError(f"there is no paper {visible(name)!r}; {hint}")
 
 
-def check(some: Sequence[Row], everything: bool = False) -> Iterator[Checked]:
+def check(some: Sequence[PrintedRow], everything: bool = False) -> Iterator[Checked]:
     """Compute rows again, one after the other.
 
     Parameters
     ----------
-    some : sequence of Row
+    some : sequence of PrintedRow
         What to compute.
     everything : bool
         Those that take long, too.
@@ -182,7 +182,7 @@ def check(some: Sequence[Row], everything: bool = False) -> Iterator[Checked]:
             yield _checked(row)
 
 
-def _checked(row: Row) -> Checked:
+def _checked(row: PrintedRow) -> Checked:
     try:
         values = _values(row)
     except (CfmError, ValueError, KeyError) as error:
@@ -191,7 +191,7 @@ def _checked(row: Row) -> Checked:
     return Checked(row, shown, "; ".join(_faults(row, values)))
 
 
-def _values(row: Row) -> tuple[float, ...]:
+def _values(row: PrintedRow) -> tuple[float, ...]:
     scope = _Scope(row.spec, row.changes, row.verb)
     found = [_evaluated(text, scope) for text in row.ask]
     values = tuple(float(one) for value in found for one in (value if isinstance(value, tuple | list) else (value,)))
@@ -200,7 +200,7 @@ def _values(row: Row) -> tuple[float, ...]:
     return values
 
 
-def _faults(row: Row, values: Sequence[float]) -> Iterator[str]:
+def _faults(row: PrintedRow, values: Sequence[float]) -> Iterator[str]:
     """Yield what speaks against the verdict of a row."""
     for value, printed in zip(values, row.printed, strict=True):
         if row.verdict in ("agrees", "given") and not _matches(value, printed, row.tolerance):

@@ -39,7 +39,7 @@ ENDS = {
 
 
 @dataclass(frozen=True)
-class Line:
+class MetricRow:
     """One row of the table of metrics, as text."""
 
     name: str
@@ -110,16 +110,16 @@ def _identifier(name: str) -> str:
     return "".join(char if char.isalnum() and char.isascii() else "-" for char in name)
 
 
-def _lines(metrics: Mapping[str, Quantity]) -> list[Line]:
+def _lines(metrics: Mapping[str, Quantity]) -> list[MetricRow]:
     """Return metrics as text; those without a value say why."""
     names = {name: split_name(name) for name in metrics}
     return [
-        Line(metric, branch or "", _value(metrics[name]), metrics[name].definition)
+        MetricRow(metric, branch or "", _value(metrics[name]), metrics[name].definition)
         for name, (metric, branch) in names.items()
     ]
 
 
-def _leads(report: Report, line: Line) -> bool:
+def _leads(report: Report, line: MetricRow) -> bool:
     first = line.name in family(report.result.spec.family).headline and not line.branch
     return first and report.metrics[line.name].value is not None
 

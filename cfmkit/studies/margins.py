@@ -92,7 +92,7 @@ class Rows:
     about: tuple[int, ...]
 
 
-class _Builder:
+class _RowsOfMargins:
     """Gathers rows over the numbers: each branch at all places, then each stress at all places, then metrics."""
 
     def __init__(self, nominal: Result, places: FloatArray, first: Sampled) -> None:
@@ -282,7 +282,7 @@ def places_of(nominal: Result) -> FloatArray:
 
 def rows_of(nominal: Result, first: Sampled, places: FloatArray) -> Rows:
     """Return the requirements on a result as rows of what is seen of its parts."""
-    builder = _Builder(nominal, places, first)
+    builder = _RowsOfMargins(nominal, places, first)
     for number, one in enumerate(nominal.spec.part_requirements):
         builder.add(one, number)
     return builder.rows_of()

@@ -28,6 +28,8 @@ def imported(folder: Path, *arguments: str) -> set[str]:
     return set(done.stderr.split())
 
 
+RADII = "mechanism.roller_radius=8 mm:16 mm:3"
+FEW = ("--samples", "10", "-j", "1")
 DRAWING = {"matplotlib", "PIL"}
 CUTTING = {"ezdxf", "shapely"}
 
@@ -43,6 +45,10 @@ CUTTING = {"ezdxf", "shapely"}
         (("analyze", str(CONFIGS / "cam.yaml"), "--no-plots", "-q"), {"scipy", "rich"} | DRAWING | CUTTING),
         (("analyze", str(CONFIGS / "cam.yaml"), "--no-plots", "--json"), {"scipy", "rich"} | DRAWING | CUTTING),
         (("design", str(CONFIGS / "cam.yaml"), "--no-plots"), {"scipy"} | DRAWING),
+        (("sweep", str(CONFIGS / "cam.yaml"), "--vary", RADII, "--no-plots"), {"scipy"} | DRAWING | CUTTING),
+        (("sensitivity", str(CONFIGS / "studies/cam_tolerance.yaml"), *FEW, "--no-plots"), DRAWING | CUTTING),
+        (("batch", str(CONFIGS / "cam.yaml"), "--verb", "analyze", "-j", "1", "--no-plots"), DRAWING | CUTTING),
+        (("measure", str(CONFIGS / "synthetic/cam_loop.csv"), "--no-plots"), DRAWING | CUTTING),
         (("new", "cam", "-o", "-"), {"scipy", "pint"} | DRAWING | CUTTING),
         (("schema",), {"scipy", "pint", "rich"} | DRAWING | CUTTING),
         (("show", "cam"), {"scipy", "pint"} | DRAWING | CUTTING),

@@ -15,7 +15,7 @@ from slider_crank import ALPHA, BILANCIA, TABLE_1, config, force
 import cfmkit
 from cfmkit import api
 from cfmkit.families.slider_crank.linkage import Linkage
-from cfmkit.families.slider_crank.springs.rates import Goal, least_squares
+from cfmkit.families.slider_crank.springs.rates import RateGoal, least_squares
 from cfmkit.families.slider_crank.unit_springs import along_slider
 from cfmkit.metrics import Window
 
@@ -155,7 +155,7 @@ def test_the_optimum_that_starts_stretched(spacing, wanted, error):
         end = float(along_slider(BILANCIA, ALPHA, 1, np.array([35.0])).angle[0])
         travel = 100.0 - BILANCIA.slider_position(ALPHA + (end - ALPHA) * share)
     units = along_slider(BILANCIA, ALPHA, 1, travel)
-    goal = Goal(units.effort[:3].T / 1.5, np.ones(100), np.full(3, np.inf))
+    goal = RateGoal(units.effort[:3].T / 1.5, np.ones(100), np.full(3, np.inf))
     rates = least_squares(goal)
     np.testing.assert_allclose(rates, wanted, atol=2e-5)
     assert 1.5 * goal.rms(rates) == pytest.approx(error, abs=6e-11)

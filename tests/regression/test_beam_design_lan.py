@@ -9,7 +9,7 @@ import cfmkit
 import cfmkit.metrics
 from cfmkit.families.base import Run
 from cfmkit.families.beam.findings import percent
-from cfmkit.families.beam.shaping.audit import Spread, audited, tolerated
+from cfmkit.families.beam.shaping.audit import NetworkScatter, audited, tolerated
 from cfmkit.families.beam.shaping.design import task_of
 from cfmkit.families.beam.shaping.infeasible import missed_by
 from cfmkit.families.beam.shaping.search import Found
@@ -33,7 +33,7 @@ def test_the_shapes_of_the_config_meet_all_limits_and_pass_the_audit() -> None:
     assert cfmkit.evaluate(result, ["stress_max"], window)["stress_max"].value < 76e6 / 1.58
     band = cfmkit.evaluate(stiff, ["half_band"], window)["half_band"].value
     assert band == pytest.approx(0.075, abs=2e-3)  # stretching and shear cost more than the band is wide
-    drawn = tolerated(variables, found, Spread(1e-4, 0.02, 40))
+    drawn = tolerated(variables, found, NetworkScatter(1e-4, 0.02, 40))
     assert float(np.median(drawn.ranges)) == pytest.approx(0.50, abs=0.15)
     assert float(np.median(drawn.bands)) == pytest.approx(0.053, abs=0.01)
 

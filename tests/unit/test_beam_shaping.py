@@ -15,7 +15,7 @@ from cfmkit.elastica import Polynomial, trace
 from cfmkit.elastica.model.beam import fit
 from cfmkit.families.base import Run
 from cfmkit.families.beam.findings import percent
-from cfmkit.families.beam.shaping.audit import Spread, audited, half_band, lines_cross, strict_share, tolerated
+from cfmkit.families.beam.shaping.audit import NetworkScatter, audited, half_band, lines_cross, strict_share, tolerated
 from cfmkit.families.beam.shaping.closer import looked_at
 from cfmkit.families.beam.shaping.design import shaped, task_of
 from cfmkit.families.beam.shaping.goals import Compared, Flattest, Widest
@@ -107,7 +107,7 @@ def test_table_3_has_the_half_band_that_its_range_says() -> None:
         0.0344, abs=2e-4
     )
     assert metric(design.spec, "stress_max") == pytest.approx(48.31e6, rel=3e-3)
-    assert (tolerated(variables, found, Spread(1e-4, 0.02, 4)).bands > 0.02).all()
+    assert (tolerated(variables, found, NetworkScatter(1e-4, 0.02, 4)).bands > 0.02).all()
 
 
 def metric(spec: Any, name: str) -> float | None:

@@ -12,7 +12,7 @@ from slider_crank import DEG, LI, START, config
 import cfmkit
 from cfmkit.families.slider_crank.linkage import Linkage
 from cfmkit.families.slider_crank.springs.assembly import assemble, reactions
-from cfmkit.families.slider_crank.springs.rates import Goal, minimax, preferred, ranges
+from cfmkit.families.slider_crank.springs.rates import RateGoal, minimax, preferred, ranges
 from cfmkit.families.slider_crank.unit_springs import along_crank, along_slider, crank_efforts
 from cfmkit.numerics.box_search import BoxAxis, lowest
 from cfmkit.numerics.turning_points import monotone, sharpened
@@ -322,7 +322,7 @@ def test_the_widest_force_window_is_found():
 def test_no_rates_do_better_than_the_linear_programme():
     """Random rates around the optimum, none negative, deviate more; and its residual alternates five times."""
     angle = np.linspace(1.0, 5.0, 301) * DEG
-    goal = Goal(along_crank(LI, START, angle).effort.T, np.ones(301), np.full(4, np.inf))
+    goal = RateGoal(along_crank(LI, START, angle).effort.T, np.ones(301), np.full(4, np.inf))
     best = minimax(goal)
     worst = goal.deviation(best)
     others = np.maximum(best * (1 + 0.05 * rng.normal(size=(2000, 4))) + 0.01 * rng.normal(size=(2000, 4)), 0.0)

@@ -57,11 +57,11 @@ DEFINITIONS = {
         "drive, its rotation as its support has it; without what guides it across, of all copies",
     ),
     "frequency_held_min": ("frequency", "lowest natural frequency in the window while the drive is held"),
-    "frequency_free_min": ("frequency", "lowest natural frequency in the window under the force that the drive has"),
-    "peak_stress_x": ("length", "of the largest stress in the window, in the part before any load, as drawn"),
-    "peak_stress_y": ("length", "of the same"),
-    "mesh_force_difference": ("ratio", "largest difference of the force between two meshes, of the largest force"),
-    "mesh_stress_difference": ("ratio", "difference of the largest stress between two meshes, of the finer one's"),
+    "frequency_free_min": ("frequency", "lowest natural frequency in the window while the drive is free to move"),
+    "peak_stress_x": ("length", "x of the place of the largest stress in the window, on the part before any load"),
+    "peak_stress_y": ("length", "y of that place"),
+    "mesh_force_difference": ("ratio", "largest difference of the force on two meshes over the largest force"),
+    "mesh_stress_difference": ("ratio", "difference of the largest stress on two meshes over that on the finer one"),
     "strain_energy_max": ("energy", "largest strain energy on the path, of all copies"),
 }
 

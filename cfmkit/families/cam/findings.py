@@ -55,7 +55,7 @@ FINDINGS = {
     "outside_profile": "the requested travel is longer than the cut profile allows",
     "inertia_mismatch": "a moment of inertia does not fit the mass and the size of its part",
     "symmetric_model": "the quasi-static model leaves out what makes the two sides differ",
-    "friction_left_out": "a model that has not the friction, or the weight across the way, that is specified",
+    "friction_left_out": "the model leaves out friction, or a weight across the travel, that is specified",
     "bearing_overloaded": "the load of a roller's bearing exceeds its static rating",
     "overwritten": "a value of the profile that the design replaces by its own",
     "plate_incomplete": "there is no room for the tab of the plate, or for its fixing holes",

@@ -48,10 +48,10 @@ BUILT_DEFINITIONS = {
     "rest_force_mean": ("force", "mean of what the springs' rest length adds to the force of the design"),
     "manufacturing_force_share": (
         "ratio",
-        "median over the cams that are drawn of the standard deviation of the force error along the travel, over the "
+        "median over the sampled cams of the standard deviation of the force error along the travel, over the "
         "mean force [SS, fig. 13: 0.8 %]",
     ),
-    "manufacturing_force_share_95": ("ratio", "what 95 % of the cams that are drawn stay below in that"),
+    "manufacturing_force_share_95": ("ratio", "the same for the 95th percentile of the sampled cams"),
     "loop_area_per_friction": (
         "energy",
         "area of the loop per unit of rolling friction, over the window: a measured area over it is the friction",

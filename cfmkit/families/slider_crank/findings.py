@@ -10,8 +10,8 @@ from cfmkit.families.findings import finder
 
 FINDINGS = {
     "not_assemblable": "crank and coupler do not reach the slider's way, or not in the unloaded position",
-    "coupler_dead_point": "the motion ends where the coupler stands across the slider's way",
-    "no_full_turn": "a full turn is requested, and the crank cannot go round",
+    "coupler_dead_point": "the motion ends where the coupler stands perpendicular to the slider's path",
+    "no_full_turn": "a full turn is requested, but the crank cannot make one",
     "out_of_reach": "the slider cannot travel as far as requested",
     "no_spring": "no spring acts on the mechanism",
     "spring_winds_up": "a torsion spring is wound up turn after turn: the torque does not repeat itself",
@@ -35,7 +35,7 @@ FINDINGS = {
     "spring_dropped": "the best rate of a spring is zero: the design does without it",
     "no_spring_fits": "no springs of the catalogue hold the target within the limits",
     "near_optima": "many designs are equally good: a secondary criterion chose among them",
-    "window_not_proven": "the widest window found is not proven to be the widest: a wider one may exist",
+    "window_not_proven": "no wider window was found, but a wider one is not ruled out",
     "straight_start": "the chain is exactly straight: it buckles, and only chance or a guide decides to which side",
     "kink_too_small": "the kink that sends the chain to one side is smaller than the process can make",
     "long_run_in": "the kink is so large that the force needs much of the travel to reach its level",

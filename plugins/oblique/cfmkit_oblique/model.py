@@ -52,7 +52,7 @@ FINDINGS = {
     "stiff": "the slope where the oblique springs lie flat is above zero: the oblique springs are too soft",
     "falling": "the slope where the oblique springs lie flat is below zero: the force falls, and may snap through",
     "coils_touch": "a spring is compressed to its solid length within the travel: the curve ends there",
-    "no_room": "the wanted range needs a slider that starts higher above the anchors than is allowed",
+    "no_room": "the requested range needs a slider that starts higher above the anchors than is allowed",
 }
 finding = finder(FINDINGS)
 

@@ -31,7 +31,7 @@ _JOINED = 1e-4  # of the chords: lines that end in a joint meet within the error
 
 
 @dataclass(frozen=True)
-class Spread:
+class NetworkScatter:
     """Standard deviations of node coordinates [m] and shape coefficients [rad], and how many networks are drawn."""
 
     nodes: float
@@ -115,7 +115,7 @@ def strict_share(at: FloatArray, force: FloatArray) -> float:
     return (count - 1) / (len(fine) - 1)
 
 
-def tolerated(variables: Variables, found: Found, spread: Spread) -> Drawn:
+def tolerated(variables: Variables, found: Found, spread: NetworkScatter) -> Drawn:
     """Return what is left of the constant force in networks within the tolerances."""
     task, rng = variables.task, np.random.default_rng([spread.seed, 1])
     places = len(task.coordinates)

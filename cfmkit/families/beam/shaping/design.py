@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from cfmkit.designing.starts import Clock, identity_of
 from cfmkit.families.beam.build import assemble
 from cfmkit.families.beam.findings import finding, percent
-from cfmkit.families.beam.shaping.audit import Spread, tolerated
+from cfmkit.families.beam.shaping.audit import NetworkScatter, tolerated
 from cfmkit.families.beam.shaping.infeasible import blocked, held_by
 from cfmkit.families.beam.shaping.multistart import Explored, explored, ranked
 from cfmkit.families.beam.shaping.report import Judged, judged, notes_of, search_of, starts_table
@@ -45,7 +45,9 @@ def shaped(spec: BeamSpec, wanted: Optimise, run: Run) -> Design:
     best = _best(spec, task, result, plan)
     if isinstance(best, Design):
         return replace(best, tables=tables)
-    spread = Spread(wanted.tolerances.nodes, wanted.tolerances.coefficients, wanted.tolerances.samples, run.seed)
+    spread = NetworkScatter(
+        wanted.tolerances.nodes, wanted.tolerances.coefficients, wanted.tolerances.samples, run.seed
+    )
     drawn = tolerated(Variables(task, best.found.order), best.found, spread)
     held = held_by(task, best.found)
     return Design(

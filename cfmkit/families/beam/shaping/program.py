@@ -11,7 +11,7 @@ from cfmkit.designing import program
 from cfmkit.designing.limits import worst
 from cfmkit.designing.program import Rows, Seen
 from cfmkit.families.beam.shaping.limits import LIMITS
-from cfmkit.families.beam.shaping.response import NoAnswer, Poses, View, poses_of, respond
+from cfmkit.families.beam.shaping.response import NoAnswer, PosePlan, View, poses_of, respond
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
@@ -41,7 +41,7 @@ class Shaping:
     _last: View | None = field(default=None, repr=False)
 
     @property
-    def poses(self) -> Poses:
+    def poses(self) -> PosePlan:
         """The poses for the window at the beginning."""
         return poses_of(self.variables.task, self.start)
 

@@ -33,7 +33,7 @@ _MIDDLE = 0.7  # of the end: a pose under load that stays where it is while the 
 
 
 @dataclass(frozen=True)
-class Poses:
+class PosePlan:
     """Displacements, and which of them are what.
 
     Attributes
@@ -57,7 +57,7 @@ class Poses:
     compared: Any
 
 
-def poses_of(task: Task, start: float) -> Poses:
+def poses_of(task: Task, start: float) -> PosePlan:
     """Return the poses for a window that begins at `start` [m]."""
     end = task.window[1]
     inside = start + 0.5 * (end - start) * (1 - np.cos(np.linspace(0, np.pi, task.points)))
@@ -70,7 +70,7 @@ def poses_of(task: Task, start: float) -> Poses:
     mean = np.zeros(len(at))
     mean[window] = clenshaw_curtis(task.points)
     shown = np.array([0, np.searchsorted(at, middle), window[-1]])
-    return Poses(read_only(at), window, shown, read_only(mean), np.searchsorted(at, also))
+    return PosePlan(read_only(at), window, shown, read_only(mean), np.searchsorted(at, also))
 
 
 # A design that loses stability in the window is no answer; the audit looks at branches.
@@ -82,7 +82,7 @@ class NoAnswer(Exception):
 
 
 @dataclass(frozen=True)
-class Line:
+class BeamAtPoses:
     """One beam at p poses, at r places along it.
 
     Attributes
@@ -117,11 +117,11 @@ class Line:
 
 
 @dataclass(frozen=True)
-class State:
+class NetworkAtPoses:
     """The network at p poses: the mechanism's force (p,) [N] and its beams by name."""
 
     force: FloatArray
-    lines: dict[str, Line]
+    lines: dict[str, BeamAtPoses]
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,11 +143,11 @@ class Response:
         return lengths(self.variables, self.x)
 
     @cached_property
-    def state(self) -> State:
+    def state(self) -> NetworkAtPoses:
         """Force and beams."""
         states = np.moveaxis(self.path.sampler.states[self.keep], 2, 0)
         axial = {name: self.path.sections(name).axial_stress[self.keep] for name in self._pulled}
-        return State(self.path.effort[self.keep] * self.variables.task.copies, self._lines(states, axial))
+        return NetworkAtPoses(self.path.effort[self.keep] * self.variables.task.copies, self._lines(states, axial))
 
     @property
     def _pulled(self) -> tuple[str, ...]:
@@ -156,7 +156,7 @@ class Response:
         return tuple(task.network.beams) if task.total_stress else ()
 
     @cached_property
-    def slopes(self) -> State:
+    def slopes(self) -> NetworkAtPoses:
         """Derivatives of everything in the state.
 
         Raises
@@ -170,9 +170,9 @@ class Response:
             axial = {name: found.sections(name).axial_stress for name in self._pulled}
         except (CfmError, np.linalg.LinAlgError):
             raise NoAnswer from None
-        return State(effort * self.variables.task.copies, self._lines(np.moveaxis(rows, 2, 0), axial))
+        return NetworkAtPoses(effort * self.variables.task.copies, self._lines(np.moveaxis(rows, 2, 0), axial))
 
-    def _lines(self, states: FloatArray, axial: dict[str, FloatArray]) -> dict[str, Line]:
+    def _lines(self, states: FloatArray, axial: dict[str, FloatArray]) -> dict[str, BeamAtPoses]:
         """Return the beams from dimensionless states (7, p, rows, ...) and axial stresses (p, rows, ...)."""
         from cfmkit.elastica.outcome.sections import MOMENT, X, Y
 
@@ -187,7 +187,7 @@ class Response:
             stress = stress.reshape(-1, *[1] * (states.ndim - 3))
             x, y, moment = (states[which][:, at] for which in (X, Y, MOMENT))
             pull = axial[name][:, once] if name in axial else None
-            lines[name] = Line(place[once], x * scales.length, y * scales.length, moment * stress, pull)
+            lines[name] = BeamAtPoses(place[once], x * scales.length, y * scales.length, moment * stress, pull)
         return lines
 
 
@@ -215,7 +215,7 @@ class View:
     """What the limits look at: the response at the poses of a window from `start`, with derivatives or without."""
 
     response: Response
-    poses: Poses
+    poses: PosePlan
     start: float
     sloped: bool = False
 

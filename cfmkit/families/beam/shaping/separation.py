@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.families.beam.build import thickest_of
-from cfmkit.families.beam.shaping.response import Line
+from cfmkit.families.beam.shaping.response import BeamAtPoses
 from cfmkit.numerics.sampled_extremes import soft_least
 
 if TYPE_CHECKING:
@@ -84,10 +84,10 @@ def separations(view: View, pair: Pair) -> tuple[FloatArray, Callable[[], FloatA
     return soft - 1.0, slopes
 
 
-def thinned(line: Line) -> Line:
+def thinned(line: BeamAtPoses) -> BeamAtPoses:
     """Return a line at about 17 of its places: a smooth bound must not depend on how finely the engine cut the beam."""
     step = max(1, (len(line.place) - 1) // _PLACES)
-    return Line(line.place[::step], line.x[:, ::step], line.y[:, ::step], line.stress[:, ::step])
+    return BeamAtPoses(line.place[::step], line.x[:, ::step], line.y[:, ::step], line.stress[:, ::step])
 
 
 def _compared(pair: Pair, way: FloatArray, count: int) -> Any:

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.cam.dynamics.solution import Moved
+    from cfmkit.families.cam.dynamics.solution import MotionSolution
     from cfmkit.results import Result
 
 
@@ -47,7 +47,7 @@ def figures(result: Result) -> dict[str, Callable[[], Figure]]:
 
 def motion(result: Result) -> Figure:
     """Return the force over time with that at rest in the same places, and their ratio."""
-    moved: Moved = result.state
+    moved: MotionSolution = result.state
     times, force = moved.history.times, moved.history.force
     constant = constant_force(moved.build.right)
     forces = [Series(force, "in motion", BLUE, prefer=0.3), Series(moved.static, "at rest", GREY, True, prefer=0.1)]
@@ -64,7 +64,7 @@ def motion(result: Result) -> Figure:
 @styled
 def motion_force(result: Result) -> Figure:
     """Return the force over the displacement with the requirement bands, and the quasi-static one."""
-    moved: Moved = result.state
+    moved: MotionSolution = result.state
     figure = loop_figure(result, CurveLook(), "force over displacement, in motion and at rest")
     over = to_border(moved.displacement, "length")
     points = np.column_stack([over, to_border(moved.static, "force")])
@@ -79,7 +79,7 @@ def motion_force(result: Result) -> Figure:
 
 def motion_contact(result: Result) -> Figure:
     """Return the forces of the cam on the rollers, and those in the braces, over time."""
-    moved: Moved = result.state
+    moved: MotionSolution = result.state
     history, found = moved.history, list(_regions(moved))
     contact = _sides(history.contact, "on a roller", (BLUE, VERMILLION))
     roller_end = _sides(history.brace, "brace, at the roller", (PURPLE, VERMILLION))
@@ -99,7 +99,7 @@ def motion_contact(result: Result) -> Figure:
 
 def motion_rollers(result: Result) -> Figure:
     """Return the speed of the slider and of the turning rollers over time."""
-    moved: Moved = result.state
+    moved: MotionSolution = result.state
     history = moved.history
     speed = [Series(history.moment.speed, "", BLUE)]
     spin = _sides(history.spin, "", (BLUE, VERMILLION))
@@ -121,7 +121,7 @@ def _sides(rows: FloatArray, name: str, colors: tuple[str, str]) -> list[Series]
     ]
 
 
-def _regions(moved: Moved) -> Iterator[Region]:
+def _regions(moved: MotionSolution) -> Iterator[Region]:
     """Yield the spans of time in which the roller lifts off, the cable is slack, or the roller is on the corner."""
     history = moved.history
     lost = (history.contact[0] <= 0) | (history.contact[1] <= 0)
@@ -140,11 +140,11 @@ def _unnamed(regions: list[Region]) -> list[Region]:
     return [Region(item.start, item.stop, "") for item in regions]
 
 
-def _constant_name(moved: Moved) -> str:
+def _constant_name(moved: MotionSolution) -> str:
     return "4KA + slider's weight" if moved.build.right.loads.slider_weight else "4KA"
 
 
-def _motion_text(moved: Moved) -> str:
+def _motion_text(moved: MotionSolution) -> str:
     plan = moved.build.motion
     way = "up" if plan.stroke > 0 else "down"
     return f"{value_text(abs(plan.stroke), 'length')} {way} in {value_text(plan.time, 'time')}"

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from cfmkit.families.cam.dynamics.solution import Build, Moved
+    from cfmkit.families.cam.dynamics.solution import Build, MotionSolution
     from cfmkit.families.cam.spec import CamSpec
     from cfmkit.results import Finding
 
@@ -31,7 +31,7 @@ BRACE_SHARE = (0.1, 3.0)
 """The same for a brace over a slender rod: 3 has all its mass at the ends."""
 
 
-def findings_of(moved: Moved) -> tuple[Finding, ...]:
+def findings_of(moved: MotionSolution) -> tuple[Finding, ...]:
     """Return every finding about a motion, the gravest first."""
     checks = (_pressure, _slack_cable, _held, _on_corner, _springs, _inertias, _friction, _sideways)
     return tuple(found for check in checks for found in check(moved))
@@ -70,7 +70,7 @@ def runs_on_corner(parts: Build) -> Finding:
     )
 
 
-def _pressure(moved: Moved) -> Iterator[Finding]:
+def _pressure(moved: MotionSolution) -> Iterator[Finding]:
     pressed = contact_pressure(moved)
     top = worst(pressed)
     told = None if top is None else overstressed(moved.spec.mechanism, float(pressed[top]), f"at {_moment(moved, top)}")
@@ -78,7 +78,7 @@ def _pressure(moved: Moved) -> Iterator[Finding]:
         yield told
 
 
-def _slack_cable(moved: Moved) -> Iterator[Finding]:
+def _slack_cable(moved: MotionSolution) -> Iterator[Finding]:
     force = moved.history.force
     lost = force <= 0
     if lost.any():
@@ -89,7 +89,7 @@ def _slack_cable(moved: Moved) -> Iterator[Finding]:
         )
 
 
-def _held(moved: Moved) -> Iterator[Finding]:
+def _held(moved: MotionSolution) -> Iterator[Finding]:
     lost = ~np.isfinite(moved.history.force)
     if not lost.any():
         return
@@ -101,13 +101,13 @@ def _held(moved: Moved) -> Iterator[Finding]:
         )
 
 
-def _on_corner(moved: Moved) -> Iterator[Finding]:
+def _on_corner(moved: MotionSolution) -> Iterator[Finding]:
     corner = moved.history.on_corner
     if corner.any():
         yield finding("undercut", f"a roller pivots on the corner of its cam {_when(moved, corner)}")
 
 
-def _springs(moved: Moved) -> Iterator[Finding]:
+def _springs(moved: MotionSolution) -> Iterator[Finding]:
     elongation, limit = moved.history.elongation, moved.spec.mechanism.springs.max_elongation
     slack = elongation < -1e-12
     if slack.any():
@@ -125,7 +125,7 @@ def _springs(moved: Moved) -> Iterator[Finding]:
         )
 
 
-def _inertias(moved: Moved) -> Iterator[Finding]:
+def _inertias(moved: MotionSolution) -> Iterator[Finding]:
     machine = moved.build.machine
     sides = ((machine.right, "right"), (machine.left, "left"))
     alike = machine.left.parts == machine.right.parts
@@ -155,7 +155,7 @@ def _mismatch(what: str, stated: float, expected: float, allowed: tuple[float, f
         )
 
 
-def _friction(moved: Moved) -> Iterator[Finding]:
+def _friction(moved: MotionSolution) -> Iterator[Finding]:
     dynamics = moved.spec.analysis.dynamics
     if dynamics and dynamics.method == "multibody" and moved.spec.mechanism.rolling_friction:
         yield finding(
@@ -165,7 +165,7 @@ def _friction(moved: Moved) -> Iterator[Finding]:
         )
 
 
-def _sideways(moved: Moved) -> Iterator[Finding]:
+def _sideways(moved: MotionSolution) -> Iterator[Finding]:
     dynamics, spec = moved.spec.analysis.dynamics, moved.spec
     if dynamics and dynamics.method == "multibody" and spec.gravity and directions(spec.mechanism.mounting)[1]:
         yield finding(
@@ -175,7 +175,7 @@ def _sideways(moved: Moved) -> Iterator[Finding]:
         )
 
 
-def _when(moved: Moved, where: NDArray[np.bool_]) -> str:
+def _when(moved: MotionSolution, where: NDArray[np.bool_]) -> str:
     """Return ``from 0.07 s (171.8 mm) to 0.09 s (195 mm)``: first and last of the marked points."""
     first, last = np.flatnonzero(where)[[0, -1]]
     ends = [_moment(moved, int(index)) for index in (first, last)]
@@ -183,5 +183,5 @@ def _when(moved: Moved, where: NDArray[np.bool_]) -> str:
     return f"at {ends[0]}" if first == last else f"from {ends[0]} to {ends[1]}{many}"
 
 
-def _moment(moved: Moved, index: int) -> str:
+def _moment(moved: MotionSolution, index: int) -> str:
     return f"{format_short(float(moved.history.times[index]), 'time')} ({mm(float(moved.displacement[index]))})"

@@ -23,7 +23,7 @@ from cfmkit.families.cam.dynamics.ending import ending
 from cfmkit.families.cam.dynamics.findings import findings_of, old_word, outside, runs_on_corner
 from cfmkit.families.cam.dynamics.inverse import respond, statics
 from cfmkit.families.cam.dynamics.multibody import CornerContact, NineCoordinates, reactions
-from cfmkit.families.cam.dynamics.solution import Build, History, Moved
+from cfmkit.families.cam.dynamics.solution import Build, History, MotionSolution
 from cfmkit.families.cam.dynamics.values import contact_pressure, slow_force, values_of
 from cfmkit.families.cam.findings import rubbing_left_out
 from cfmkit.families.cam.values import constant_force
@@ -111,14 +111,14 @@ def _displacement(parts: Build, position: Any) -> Any:
     return position + parts.lift - parts.right.track.start + displacement_origin(parts.right)
 
 
-def _moved(spec: CamSpec, parts: Build, times: FloatArray) -> Moved:
+def _moved(spec: CamSpec, parts: Build, times: FloatArray) -> MotionSolution:
     low, high = parts.machine.span
     upward = parts.motion.stroke > 0
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         history = _history(spec, parts, times)
         static = statics(parts.machine, np.clip(history.moment.position, low, high), upward).force
     displacement = _displacement(parts, history.moment.position)
-    return Moved(_as_run(spec, parts), parts, history, static, displacement)
+    return MotionSolution(_as_run(spec, parts), parts, history, static, displacement)
 
 
 def _requested(parts: Build) -> tuple[float, float]:
@@ -153,14 +153,14 @@ def _as_run(spec: CamSpec, parts: Build) -> CamSpec:
     return resolved.model_copy(update=changes)
 
 
-def _over_slow(moved: Moved) -> FloatArray:
+def _over_slow(moved: MotionSolution) -> FloatArray:
     """Return the force over that of the same motion within one second [SS, Fig. 14]; NaN where that is zero."""
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = moved.history.force / slow_force(moved)
     return np.where(np.isfinite(ratio), ratio, np.nan)
 
 
-def _curve(moved: Moved) -> Curve:
+def _curve(moved: MotionSolution) -> Curve:
     history, moment = moved.history, moved.history.moment
     extra = {
         "time": Column(history.times, "time"),

@@ -306,21 +306,21 @@ class Side:
         return value, self.rate(places)
 
     @cached_property
-    def _guides(self) -> dict[tuple[float, float], Guide]:
+    def _guides(self) -> dict[tuple[float, float], FirstGuess]:
         """First estimates on each stretch."""
         return {stretch.span: self._guide(stretch) for stretch in self.stretches}
 
-    def _guide(self, stretch: RisingStretch) -> Guide:
+    def _guide(self, stretch: RisingStretch) -> FirstGuess:
         low, high = stretch.ends
         knots = np.linspace(low, high, GUIDE_KNOTS)
         slider, rate = self._rise(stretch.piece, knots)
         foot = stretch.span[0] - _rise_before(knots[1] - low, slider[:3] - stretch.span[0])
         root = np.sqrt(np.maximum(slider - foot, 0.0))
-        return Guide.through(foot, root, knots, 2.0 * root / np.where(rate > 0, rate, np.inf))
+        return FirstGuess.through(foot, root, knots, 2.0 * root / np.where(rate > 0, rate, np.inf))
 
 
 @dataclass(frozen=True)
-class Guide:
+class FirstGuess:
     """Estimates of the curve's parameter from the slider's position: a cubic Hermite spline over a square root.
 
     Near a dead point the slider rises with the square of the parameter, so that the
@@ -332,7 +332,7 @@ class Guide:
     cubics: FloatArray
 
     @classmethod
-    def through(cls, foot: float, roots: FloatArray, parameters: FloatArray, slopes: FloatArray) -> Guide:
+    def through(cls, foot: float, roots: FloatArray, parameters: FloatArray, slopes: FloatArray) -> FirstGuess:
         """Return the spline through parameters with given slopes over increasing roots."""
         width = np.diff(roots)
         secant = np.diff(parameters) / np.where(width > 0, width, 1.0)

@@ -80,7 +80,7 @@ class Build:
 
 
 @dataclass(frozen=True)
-class Moved:
+class MotionSolution:
     """A mechanism that went through a motion, as checks, values and pictures need it.
 
     Attributes

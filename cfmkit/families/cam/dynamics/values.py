@@ -18,20 +18,20 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.families.cam.dynamics.machine import Machine
-    from cfmkit.families.cam.dynamics.solution import Moved
+    from cfmkit.families.cam.dynamics.solution import MotionSolution
 
 SLOW = 1.0
 """Duration of the motion that the paper compares with [s]."""
 
 
-def values_of(moved: Moved) -> Mapping[str, Quantity]:
+def values_of(moved: MotionSolution) -> Mapping[str, Quantity]:
     """Return the scalar results by name; None where a value does not exist."""
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         numbers = _shared(moved) | _own(moved)
     return {name: Quantity(_finite(value), *DEFINITIONS[name]) for name, value in numbers.items()}
 
 
-def _shared(moved: Moved) -> dict[str, float]:
+def _shared(moved: MotionSolution) -> dict[str, float]:
     """Return the values that the quasi-static analysis has, too."""
     right, history = moved.build.right, moved.history
     return {
@@ -43,7 +43,7 @@ def _shared(moved: Moved) -> dict[str, float]:
     }
 
 
-def _own(moved: Moved) -> dict[str, float]:
+def _own(moved: MotionSolution) -> dict[str, float]:
     history, machine = moved.history, moved.build.machine
     moving = respond(machine, history.moment)
     ratio = history.force / moved.static
@@ -64,7 +64,7 @@ def _own(moved: Moved) -> dict[str, float]:
     }
 
 
-def contact_pressure(moved: Moved) -> FloatArray:
+def contact_pressure(moved: MotionSolution) -> FloatArray:
     """Return the larger pressure of both contacts over the motion [Pa]; NaN on a corner, and without a contact.
 
     The axis of a roller with radius r runs at that distance from the cam: where its path has the curvature k
@@ -82,7 +82,7 @@ def contact_pressure(moved: Moved) -> FloatArray:
     return np.where(history.on_corner, np.nan, pressed)
 
 
-def slow_force(moved: Moved) -> FloatArray:
+def slow_force(moved: MotionSolution) -> FloatArray:
     """Return the force of the same motion within one second, at the same places [N]."""
     scale = moved.build.motion.time / SLOW
     position, speed, acceleration = moved.history.moment
@@ -90,7 +90,7 @@ def slow_force(moved: Moved) -> FloatArray:
     return respond(moved.build.machine, moment._replace(position=position)).force
 
 
-def _angle_effect(moved: Moved) -> float:
+def _angle_effect(moved: MotionSolution) -> float:
     """Return how much larger the force at the end is, at rest, than with flanks at the right angles."""
     machine, end = moved.build.machine, moved.history.moment.position[-1:]
     right = _upright(machine)

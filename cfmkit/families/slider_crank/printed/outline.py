@@ -198,7 +198,7 @@ def _direction(points: FloatArray, k: int) -> FloatArray:
 
 
 @dataclass(frozen=True)
-class _Side:
+class _ChainSide:
     """One side of a straight piece of a chain: its last point on the centre line, and both ends of the edge [m]."""
 
     along: FloatArray
@@ -218,13 +218,13 @@ def _edge(line: FloatArray, half: FloatArray) -> list[FloatArray]:
         if (length := np.hypot(*way)) > 0:
             normal = np.array([-way[1], way[0]]) / length
             sides.append(
-                _Side(way / length, line[k + 1], line[k] + half[k] * normal, line[k + 1] + half[k + 1] * normal)
+                _ChainSide(way / length, line[k + 1], line[k] + half[k] * normal, line[k + 1] + half[k + 1] * normal)
             )
     inner = [corner for one, other in itertools.pairwise(sides) for corner in _corner(one, other)]
     return [sides[0].first, *inner, sides[-1].last]
 
 
-def _corner(one: _Side, other: _Side) -> list[FloatArray]:
+def _corner(one: _ChainSide, other: _ChainSide) -> list[FloatArray]:
     """Return where two edges meet; where the width steps, both ends on the line that halves the angle."""
     if abs(_cross(one.along, other.along)) < STRAIGHT:
         return [one.last, other.first]

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.slider_crank.springs.rates import Goal
+    from cfmkit.families.slider_crank.springs.rates import RateGoal
     from cfmkit.families.slider_crank.springs.targets import Task
 
 PLACES = 41
@@ -80,7 +80,7 @@ class Chosen:
     deviation: float
 
 
-def choose(task: Task, goal: Goal, window: tuple[float, float]) -> Chosen:
+def choose(task: Task, goal: RateGoal, window: tuple[float, float]) -> Chosen:
     """Return the springs of the catalogue that hold the target best.
 
     Raises
@@ -154,7 +154,7 @@ def _thinned(options: list[Option]) -> list[Option]:
     return [found[k] for k in np.unique(np.linspace(0, len(found) - 1, MOST).round().astype(int))]
 
 
-def _best(few: Goal, goal: Goal, options: list[Option], cuts: tuple[tuple[Option, ...], ...]) -> Chosen | None:
+def _best(few: RateGoal, goal: RateGoal, options: list[Option], cuts: tuple[tuple[Option, ...], ...]) -> Chosen | None:
     """Return the set with the smallest largest deviation that is none of those cut off."""
     from scipy.optimize import Bounds, LinearConstraint, milp
 

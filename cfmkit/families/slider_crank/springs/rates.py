@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Goal:
+class RateGoal:
     """What the springs are to add up to, in units of the target.
 
     Attributes
@@ -67,7 +67,7 @@ class Goal:
         scales: FloatArray = np.where(size > 0.0, size, 1.0)
         return scales
 
-    def at(self, rows: Sequence[int] | FloatArray) -> Goal:
+    def at(self, rows: Sequence[int] | FloatArray) -> RateGoal:
         """Return the goal at some of the places."""
         index = np.asarray(rows)
         return replace(self, matrix=self.matrix[index], wanted=self.wanted[index])
@@ -77,7 +77,7 @@ ALL, FEW = 128, 25
 """So many places the linear programme takes at once; of more it starts with few, and adds those where it fails."""
 
 
-def minimax(goal: Goal) -> FloatArray | None:
+def minimax(goal: RateGoal) -> FloatArray | None:
     """Return the rates with the smallest largest deviation; None if `held` cannot be met.
 
     Solved on a few places, to which the worst of the others are added until none is worse.
@@ -104,7 +104,7 @@ def _peaks(residual: FloatArray, level: float) -> Any:
     return np.flatnonzero(top)
 
 
-def _minimax(goal: Goal) -> tuple[FloatArray, float] | None:
+def _minimax(goal: RateGoal) -> tuple[FloatArray, float] | None:
     count = goal.matrix.shape[1]
     cost = np.zeros(count + 1)
     cost[-1] = 1.0
@@ -112,12 +112,12 @@ def _minimax(goal: Goal) -> tuple[FloatArray, float] | None:
     return None if solved is None else (solved[:-1] / goal.scales(), float(solved[-1]))
 
 
-def _solved(goal: Goal, cost: FloatArray, worst: float | None) -> FloatArray | None:
+def _solved(goal: RateGoal, cost: FloatArray, worst: float | None) -> FloatArray | None:
     """Return scaled rates, then the deviation, that minimise a cost; None if there are none.
 
     Parameters
     ----------
-    goal : Goal
+    goal : RateGoal
         m springs.
     cost : (m + 1,) array
         Of scaled rates and of the deviation.
@@ -149,7 +149,7 @@ def _solved(goal: Goal, cost: FloatArray, worst: float | None) -> FloatArray | N
     return None if found.status != 0 or found.x is None else np.maximum(found.x, 0.0)
 
 
-def least_squares(goal: Goal) -> FloatArray | None:
+def least_squares(goal: RateGoal) -> FloatArray | None:
     """Return the rates with the smallest root mean square of the deviations; None if `held` cannot be met."""
     from scipy.optimize import lsq_linear, nnls
 
@@ -172,7 +172,7 @@ def least_squares(goal: Goal) -> FloatArray | None:
     return rates
 
 
-def _held_least_squares(goal: Goal) -> FloatArray | None:
+def _held_least_squares(goal: RateGoal) -> FloatArray | None:
     """Return the least squares among all ways to leave a rate free, at zero or at its largest: few springs."""
     assert goal.held is not None
     scales = goal.scales()
@@ -205,7 +205,7 @@ def _free_least_squares(
     return solved
 
 
-def ranges(goal: Goal, worst: float) -> FloatArray:
+def ranges(goal: RateGoal, worst: float) -> FloatArray:
     """Return the smallest and the largest rate of each spring, (m, 2), with no deviation above `worst`."""
     count = goal.matrix.shape[1]
     found = np.full((count, 2), np.nan)
@@ -219,12 +219,12 @@ def ranges(goal: Goal, worst: float) -> FloatArray:
     return found
 
 
-def preferred(goal: Goal, worst: float, rule: str) -> FloatArray | None:
+def preferred(goal: RateGoal, worst: float, rule: str) -> FloatArray | None:
     """Return one of the rates with no deviation above `worst`: the softest, or the most even ones.
 
     Parameters
     ----------
-    goal : Goal
+    goal : RateGoal
         m springs, the last of them the slider's if there are four.
     worst : float
         Largest deviation allowed.
@@ -239,7 +239,7 @@ def preferred(goal: Goal, worst: float, rule: str) -> FloatArray | None:
     return _most_even(goal, worst)
 
 
-def _most_even(goal: Goal, worst: float) -> FloatArray | None:
+def _most_even(goal: RateGoal, worst: float) -> FloatArray | None:
     """Return the rates whose torsion springs differ least: one more unknown above all, one below all."""
     from scipy.optimize import linprog
 

@@ -13,7 +13,7 @@ from cfmkit.families.refusals import Infeasible
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.springs.assembly import assemble
 from cfmkit.families.slider_crank.springs.friction import branch
-from cfmkit.families.slider_crank.springs.rates import Goal
+from cfmkit.families.slider_crank.springs.rates import RateGoal
 from cfmkit.families.slider_crank.unit_springs import JOINTS
 
 if TYPE_CHECKING:
@@ -124,14 +124,14 @@ class Task:
         other: FloatArray = link.branch * (start - (2.0 * link.crank * np.cos(angle) - own))
         return away if abs(away[-1] - last) <= abs(other[-1] - last) else other
 
-    def goal(self, window: tuple[float, float], count: int | None = None) -> Goal | None:
+    def goal(self, window: tuple[float, float], count: int | None = None) -> RateGoal | None:
         """Return the goal over a window; None where the linkage does not get there with finite efforts."""
         places = self.places(window, count)
         effort = self.assembly.units(places).effort
         if not np.isfinite(effort).all():
             return None
         legs, target = self.spec.mechanism.sets, self.wanted.target
-        goal = Goal(
+        goal = RateGoal(
             effort.T * (legs / target), np.ones(len(places)) - self._lost(places), self._upper(), lower=self._lower()
         )
         return goal if self.wanted.stiffness is None else self._sloping(goal, places)
@@ -158,7 +158,7 @@ class Task:
         least = wanted.adjustment / wanted.anchor_travel / self.spec.mechanism.sets
         return np.array([0.0, 0.0, 0.0, least])
 
-    def _sloping(self, goal: Goal, places: FloatArray) -> Goal:
+    def _sloping(self, goal: RateGoal, places: FloatArray) -> RateGoal:
         """Return a goal that is a line through the stretched position."""
         wanted, at = self.wanted, self.assembly.stretched
         slope = (wanted.stiffness or 0.0) / wanted.target

@@ -55,7 +55,7 @@ KEPT = 1.0 - 2e-5
 
 
 @dataclass(frozen=True)
-class Window:
+class FittedWindow:
     """A window, its springs and how far they are off.
 
     Attributes
@@ -79,7 +79,7 @@ class Window:
         return self.high - self.low
 
 
-def widest(task: Task, tolerance: float) -> Window | None:
+def widest(task: Task, tolerance: float) -> FittedWindow | None:
     """Return a wide window with no deviation above a tolerance, by the local search; None if that finds none."""
     first, last = task.searched
     if not last > first:
@@ -95,7 +95,7 @@ def widest(task: Task, tolerance: float) -> Window | None:
     return max((item for item in (best, found) if item is not None), key=lambda item: item.width, default=None)
 
 
-def widest_of_all(task: Task, tolerance: float) -> tuple[Window | None, bool]:
+def widest_of_all(task: Task, tolerance: float) -> tuple[FittedWindow | None, bool]:
     """Return the widest window of the whole motion, and whether all that are wider by `GAIN` are ruled out."""
     first, last = task.searched
     if not last > first:
@@ -169,10 +169,10 @@ def _flattest(task: Task, width: float) -> float | None:
     return None if best is None else 0.5 * (best.low + best.high)
 
 
-def _grown(task: Task, tolerance: float, width: float, middle: float, look: float) -> Window | None:
+def _grown(task: Task, tolerance: float, width: float, middle: float, look: float) -> FittedWindow | None:
     """Return the widest window found from a width and a middle on, looking aside by a share of the width."""
     first, last = task.searched
-    best: Window | None = None
+    best: FittedWindow | None = None
     low, high = 0.0, last - first
     for _ in range(STEPS):
         width = min(width, last - first)
@@ -203,7 +203,7 @@ def _first_guess(task: Task, tolerance: float) -> tuple[float, float]:
     return 0.1 * (last - first), first + 0.1 * (last - first)
 
 
-def _next_width(found: Window | None, tolerance: float, bracket: tuple[float, float], width: float) -> float:
+def _next_width(found: FittedWindow | None, tolerance: float, bracket: tuple[float, float], width: float) -> float:
     low, high = bracket
     if found is None or found.deviation <= 0.0:
         return 0.5 * (low + high)
@@ -212,7 +212,7 @@ def _next_width(found: Window | None, tolerance: float, bracket: tuple[float, fl
     return step if low < step < high else 0.5 * (low + high)
 
 
-def _best_place(task: Task, width: float, middle: float, look: float) -> Window | None:
+def _best_place(task: Task, width: float, middle: float, look: float) -> FittedWindow | None:
     """Return the window of a width with the smallest largest deviation near a place, by shares of the width."""
     from scipy.optimize import minimize_scalar
 
@@ -235,14 +235,14 @@ def _best_place(task: Task, width: float, middle: float, look: float) -> Window 
     return judged(task, low, low + width)
 
 
-def judged(task: Task, low: float, high: float) -> Window | None:
+def judged(task: Task, low: float, high: float) -> FittedWindow | None:
     """Return the best springs for a window, judged on many places; None where there are none."""
     return _solved(task, low, high, DENSE)
 
 
-def _solved(task: Task, low: float, high: float, count: int) -> Window | None:
+def _solved(task: Task, low: float, high: float, count: int) -> FittedWindow | None:
     goal = task.goal((low, high), count)
     rates = None if goal is None else minimax(goal)
     if goal is None or rates is None or not math.isfinite(goal.deviation(rates)):
         return None
-    return Window(low, high, rates, goal.deviation(rates))
+    return FittedWindow(low, high, rates, goal.deviation(rates))
