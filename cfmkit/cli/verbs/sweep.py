@@ -81,7 +81,6 @@ def run(options: SweepOptions, terminal: Terminal) -> Answer:
     from cfmkit.cli.run_answer import folder_of
     from cfmkit.plots.form import PLAIN
     from cfmkit.runs.run import spec_of
-    from cfmkit.studies.pictures import makers
     from cfmkit.studies.sweep import outputs, prepare, summary_of, writes_curves
 
     start = studies.now()
@@ -100,7 +99,7 @@ def run(options: SweepOptions, terminal: Terminal) -> Answer:
             place.folder.write(name, data)
         if in_parquet:
             place.folder.write("results.parquet", studies.as_parquet(kept["results.csv"]))
-        drawn = makers(records, summary) if not options.no_plots else {}
+        drawn = {} if options.no_plots else _pictures(records, summary)
         for name, content in form.files(drawn):
             place.folder.write(name, content)
             kept[name] = content
@@ -231,3 +230,9 @@ def _quantity(value: float | str, unit: str, dimension: str) -> str:
     if dimension == "ratio":
         return f"{100 * value:.4g} %"
     return f"{value:.5g}" if unit == "1" else f"{value:.5g} {unit}"
+
+
+def _pictures(records: Records, summary: Summary) -> dict[str, Any]:
+    from cfmkit.studies.pictures import makers  # imports matplotlib, which takes half a second
+
+    return makers(records, summary)
