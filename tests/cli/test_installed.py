@@ -46,12 +46,12 @@ OWN = ("manifest.json", ".cfmkit-journal.jsonl")
 """Files that hold the time, the first, and the hash of such a file, the second."""
 
 
-SERVES = {"explore"}
-"""Listens until it is stopped: tests/unit/test_explorer.py and tests/browser."""
+ELSEWHERE = {"explore", "suggest"}
+"""Listens until it is stopped (tests/unit/test_explorer.py, tests/browser); searches for seconds."""
 
 
 def test_every_verb_is_tried():
-    assert set(COMMANDS) | SERVES == set(names())
+    assert set(COMMANDS) | ELSEWHERE == set(names())
 
 
 @pytest.mark.parametrize("command", COMMANDS.values(), ids=COMMANDS)

@@ -224,7 +224,7 @@ def test_an_interrupted_study_exits_130_and_goes_on_where_it_stopped(cli, study)
         *RANGES,
         "--no-plots",
     )
-    slow = ("--set", "analysis.points=30000")
+    slow = ("--set", "analysis.points=100000")
     process = cli.start(*command, *slow, "-q")
     journal, deadline = cli.folder / "out" / ".cfmkit-journal.jsonl", time.monotonic() + 60
     while not journal.exists() or journal.stat().st_size < 500:

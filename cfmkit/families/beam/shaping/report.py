@@ -25,7 +25,7 @@ from cfmkit.specs.units import format_short
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
-    from cfmkit.families.beam.shaping.audit import Drawn, Spread
+    from cfmkit.families.beam.shaping.audit import Drawn, NetworkScatter
     from cfmkit.families.beam.shaping.multistart import Explored
     from cfmkit.families.beam.shaping.task import Task
     from cfmkit.families.beam.spec import BeamSpec
@@ -239,7 +239,7 @@ def _drawn(drawn: Drawn) -> dict[str, float | None]:
     }
 
 
-def notes_of(audit: Audit, spread: Spread, held: tuple[str, ...]) -> tuple[tuple[str, str], ...]:
+def notes_of(audit: Audit, spread: NetworkScatter, held: tuple[str, ...]) -> tuple[tuple[str, str], ...]:
     """Return the paragraphs of the page that hold no number of the block `search`."""
     drawn = (
         f"{spread.samples} networks with nodes off by {format_short(spread.nodes, 'length')} and coefficients by "

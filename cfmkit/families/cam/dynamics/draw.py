@@ -39,7 +39,7 @@ def figures(result: Result) -> dict[str, Callable[[], Figure]]:
     Parameters
     ----------
     result : Result
-        Of the dynamic model; its `state` is the `Moved`.
+        Of the dynamic model; its `state` is the `MotionSolution`.
     """
     makers = (motion, motion_force, motion_contact, motion_rollers)
     return {maker.__name__: partial(maker, result) for maker in makers}

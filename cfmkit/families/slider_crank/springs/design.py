@@ -50,7 +50,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.families.base import Run
     from cfmkit.families.slider_crank.spec import CrankDesign, SliderCrankSpec
-    from cfmkit.families.slider_crank.springs.rates import Goal
+    from cfmkit.families.slider_crank.springs.rates import RateGoal
     from cfmkit.families.slider_crank.springs.targets import Task
     from cfmkit.results import Finding
 
@@ -301,7 +301,7 @@ PLACES = 60
 """Places of the window for the programmes that say how far the rates may move."""
 
 
-def chosen_rates(goal: Goal, best: FloatArray, wanted: CrankDesign) -> FloatArray:
+def chosen_rates(goal: RateGoal, best: FloatArray, wanted: CrankDesign) -> FloatArray:
     """Return the rates preferred among those whose deviation is worse than the best by no more than the slack."""
     if wanted.prefer == "small-rotation":  # a matter of lengths only
         return best
