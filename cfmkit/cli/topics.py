@@ -44,14 +44,11 @@ def explain(name: str | None) -> Answer:
         return family_page(name)
     if (known := found(name)) is not None:
         return known
-    from cfmkit.cli.commands import names as verbs
     from cfmkit.specs.yamlio import did_you_mean
 
     topics = [*TOPICS, *families.names()]
     by_name = "keys, materials, metrics, values, warnings, units, papers and symbols by their names"
     every = f"there are {', '.join(topics)}, and {by_name}"
-    if name in verbs():
-        raise UsageError(f"{name!r} is a command: `cfmkit {name} --help` explains it")
     hint = did_you_mean(name, [*topics, *names()]) or every
     raise UsageError(f"there is nothing to show about {name!r}; {hint}")
 

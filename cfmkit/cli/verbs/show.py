@@ -9,7 +9,7 @@ from cfmkit.cli import completion
 from cfmkit.cli.answer import Answer, told_of
 from cfmkit.cli.options import Common, argument, option
 from cfmkit.cli.page_blocks import BLANK, GOOD, Paragraph, field, listed
-from cfmkit.errors import visible
+from cfmkit.errors import UsageError, visible
 
 if TYPE_CHECKING:
     from cfmkit.cli.terminal import Terminal
@@ -46,8 +46,26 @@ def run(options: ShowOptions, terminal: Terminal) -> Answer:
 
     if options.figure is not None:
         return _drawn(options.topic, options.figure)
-    found = explain(options.topic)
+    try:
+        found = explain(options.topic)
+    except UsageError:
+        _refer_to_help(options.topic)
+        raise
     return told_of(skipped(options.topic), replace(found, data={"show": options.topic, **found.data}))
+
+
+def _refer_to_help(name: str | None) -> None:
+    """Refuse the name of a command with the way to what is known of it.
+
+    Raises
+    ------
+    cfmkit.errors.UsageError
+        If it is one.
+    """
+    from cfmkit.cli.commands import names
+
+    if name in names():
+        raise UsageError(f"{name!r} is a command: `cfmkit {name} --help` explains it") from None
 
 
 def _drawn(name: str | None, given: str) -> Answer:
