@@ -34,7 +34,8 @@ def test_every_metric_of_the_table_has_a_value_on_a_complete_loop():
     loop = curve(([0, 1, 2], [10, 12, 14]), ([2, 1, 0], [13, 11, 9]), stress=[0, 1, 2, 2, 1, 0])
     found = measure(loop, Frame(target=12.0, allowable_stress=9.0))
     assert [name for name, item in found.items() if item.value is None] == []
-    assert {item.name for item in definitions("force")} <= set(found)
+    # what needs data of the material, or a time, is measured where these are given (test_metrics_longterm)
+    assert {item.name for item in definitions("force")} - {"fatigue_life", "force_after"} <= set(found)
 
 
 def test_rms_to_target_is_taken_at_places_uniform_in_displacement_without_the_start():
