@@ -9,6 +9,7 @@ from pydantic import Field, field_validator, model_validator
 from cfmkit.families.wishes import Wish
 from cfmkit.specs.spec import Model, refuse
 from cfmkit.specs.units import Angle, Force, Length, Ratio, Torque, format_short
+from cfmkit.stock.processes import PROCESSES, ProcessName
 from cfmkit.stock.spec import MaterialField  # noqa: TC001 - read by pydantic
 
 PositiveForce = Annotated[Force, Field(gt=0)]
@@ -22,15 +23,14 @@ MEAN = 0.025
 RIPPLE = 0.05
 """Ripple where none is wished."""
 
-PROCESSES: dict[str, tuple[float, tuple[str, ...]]] = {
-    "fdm": (0.4e-3, ("pla", "petg", "abs")),
-    "sls": (0.7e-3, ("pa12-sls",)),
-    "laser": (0.3e-3, ("pom",)),
-    "wire-edm": (0.1e-3, ("aluminium-7075-t6", "titanium-6al-4v", "steel-1.4310")),
-    "mill": (0.5e-3, ("pom", "aluminium-7075-t6")),
+USUAL: dict[str, tuple[str, ...]] = {
+    "fdm": ("pla", "petg", "abs"),
+    "sls": ("pa12-sls",),
+    "laser": ("pom",),
+    "wire-edm": ("aluminium-7075-t6", "titanium-6al-4v", "steel-1.4310"),
+    "mill": ("pom", "aluminium-7075-t6"),
 }
-"""Thinnest leaf [m] and materials of a process. Assumed: one line of a 0.4 mm nozzle, the wall that sintering services
-ask for, a few kerfs of a laser or a wire, the wall that a cutter leaves standing; a maker's own numbers go first."""
+"""What is made by a process where the wish names no material."""
 
 PREFERENCES = ("size", "ripple", "parts", "stress", "depth")
 
@@ -58,7 +58,7 @@ class WishBlock(Model):
     material: MaterialField | tuple[MaterialField, ...] | None = Field(
         None, description="what it may be made of: names from `show materials`, or values"
     )
-    process: Literal["fdm", "sls", "laser", "wire-edm", "mill"] | None = Field(
+    process: ProcessName | None = Field(
         None, description="how it is made: the thinnest leaf, and the materials unless they are given"
     )
     adjustable: tuple[PositiveForce, PositiveForce] | None = Field(
@@ -114,7 +114,8 @@ class WishBlock(Model):
     def wish(self) -> Wish:
         """Return the same as families know it."""
         value: Any = self.force if self.force is not None else self.torque
-        thinnest, usual = PROCESSES[self.process] if self.process else (None, ())
+        thinnest = PROCESSES[self.process].least_feature if self.process else None
+        usual = USUAL[self.process] if self.process else ()
         given = self.material if isinstance(self.material, tuple) else () if self.material is None else (self.material,)
         blocks: tuple[dict[str, Any], ...] = tuple(one.model_dump(exclude_unset=True) for one in given)
         for block in blocks:

@@ -14,7 +14,9 @@ from cfmkit.families import family
 from cfmkit.families.base import Run, function_named
 from cfmkit.families.beam.propose import kept_shapes
 from cfmkit.runs.suggestions import exit_code, wish_of
-from cfmkit.stock.coils import SHEAR_MODULUS, SHEAR_STRESS, extension_spring
+from cfmkit.stock.springs.catalogue import SHEAR_SHARE
+from cfmkit.stock.springs.to_measure import extension_spring, loaded_length
+from cfmkit.stock.springs.wound import tensile_strength
 from cfmkit.suggest.proposal import Job, made
 from cfmkit.suggest.search import ordered, suggest
 
@@ -62,13 +64,10 @@ def test_a_room_and_a_time_may_be_written_short():
 
 
 def test_a_spring_of_wire_keeps_its_rate_and_its_stress():
-    coil = extension_spring(690.0, 0.132, 0.136)
-    mean = coil.outside - coil.wire
-    rate = SHEAR_MODULUS * coil.wire**4 / (8.0 * mean**3 * coil.turns)
-    assert rate == pytest.approx(690.0, rel=1e-9)
-    index = mean / coil.wire
-    stress = (index + 0.5) / (index - 0.75) * 8.0 * 690.0 * 0.132 * mean / (3.141592653589793 * coil.wire**3)
-    assert stress <= SHEAR_STRESS * (1 + 1e-9)
+    spring = extension_spring(690.0, 0.132, 0.136)
+    assert spring.rate == pytest.approx(690.0, rel=1e-9)
+    assert spring.stress(690.0 * 0.132) == pytest.approx(SHEAR_SHARE * tensile_strength(spring.wire), rel=1e-9)
+    assert loaded_length(spring) <= 0.136
     assert extension_spring(690.0, 0.132, 0.050) is None
 
 

@@ -46,7 +46,7 @@ PLATE_MIN, LOAD = 0.002, 4.5
 ROLLER_MIN = 0.0015
 """Smallest radius of a roller [m]: that of the smallest usual ball bearings."""
 
-COUNTS = (1, 2, 4, 6, 8, 12, 20, 40)
+COUNTS = (2, 1, 4, 6, 8, 12, 20, 40)
 """Numbers of springs that are tried."""
 
 RESERVE, FLAT_RESERVE = 0.97, 0.9

@@ -9,7 +9,7 @@ import numpy as np
 from cfmkit.families.base import Room
 from cfmkit.families.cam.outline import plate_contours
 from cfmkit.families.cam.picture_parts import pose, roller_path
-from cfmkit.stock.coils import extension_spring
+from cfmkit.stock.springs.to_measure import extension_spring
 
 if TYPE_CHECKING:
     from cfmkit.families.cam.spec import Springs
@@ -63,7 +63,7 @@ def depth_of(thick: float, springs: Springs, stretch: float, half_width: float) 
     """
     count = count_of(springs)
     coil = extension_spring(springs.total / count, stretch, 2.0 * half_width)
-    return None if coil is None else thick + 2.0 * min(thick, BRACE) + min(count, 2) * coil.outside
+    return None if coil is None else thick + 2.0 * min(thick, BRACE) + min(count, 2) * coil.outer_diameter
 
 
 def count_of(springs: Springs) -> int:

@@ -1,0 +1,56 @@
+"""Extension springs wound to measure: the slimmest one of a rate that can be stretched so far, where no list has it.
+
+The formulas and the wire are those of `cfmkit.stock.springs.wound`, the share of the strength is that of the generic
+series. Wires above some 6 mm are not drawn as music wire: their strength is extrapolated. Bodies are close-wound, loops
+are as high as the inside of the coil.
+"""
+
+from __future__ import annotations
+
+from math import log2
+
+from cfmkit.stock.springs.catalogue import SHEAR_SHARE
+from cfmkit.stock.springs.wound import Wound, tensile_strength
+
+INDICES = (5.0, 6.0, 8.0, 10.0, 12.0, 16.0)
+"""Mean diameter of the coil over that of the wire: what is wound easily."""
+
+THINNEST = 0.2e-3
+"""Wire that springs are usually wound of [m]."""
+
+FEWEST = 3.0
+"""Turns below which the loops decide the rate."""
+
+
+def extension_spring(rate: float, stretch: float, room: float) -> Wound | None:
+    """Return the slimmest extension spring of a rate [N/m] that can be stretched so far [m] from at most a length [m].
+
+    None if there is none: the body would be longer than the room.
+
+    Examples
+    --------
+    >>> spring = extension_spring(690.0, 0.132, 0.136)
+    >>> round(spring.rate, 6), round(1e3 * spring.wire, 2), round(1e3 * spring.outer_diameter, 1), round(spring.turns)
+    (690.0, 1.71, 15.3, 43)
+    """
+    found = [_wound(index, rate, stretch) for index in INDICES]
+    fitting = [one for one in found if loaded_length(one) <= room]
+    return min(fitting, key=lambda one: one.outer_diameter, default=None)
+
+
+def loaded_length(spring: Wound) -> float:
+    """Return the length at rest with both loops [m]."""
+    return spring.body_length + 2.0 * (spring.coil - spring.wire)
+
+
+def _wound(index: float, rate: float, stretch: float) -> Wound:
+    """Return the spring of an index whose wire is at its allowed stress when stretched, or with the fewest turns."""
+    unit = Wound("extension", 1e-3, index * 1e-3, FEWEST)
+    # stress falls with the square of the wire, strength with its 0.163rd power: with 1 mm as the unit of the wire
+    exponent = 2.0 - log2(tensile_strength(1e-3) / tensile_strength(2e-3))
+    wire = 1e-3 * (unit.stress(rate * stretch) / (SHEAR_SHARE * tensile_strength(1e-3))) ** (1.0 / exponent)
+    wire = max(wire, THINNEST)
+    turns = unit.shear_modulus * wire / (8.0 * index**3 * rate)
+    if turns < FEWEST:
+        wire, turns = FEWEST * 8.0 * index**3 * rate / unit.shear_modulus, FEWEST
+    return Wound("extension", wire, index * wire, turns)
