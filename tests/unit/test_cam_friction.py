@@ -152,3 +152,81 @@ def test_the_life_of_a_bearing_under_a_constant_load_is_that_of_iso_281():
 def test_a_guide_too_short_for_its_offset_is_refused():
     with pytest.raises(Exception, match="jams like a drawer"):
         cam(guide={"friction": 0.5, "length": "10 mm", "offset": "10 mm"})
+
+
+SIZES = {"brace_width": "12 mm", "slider": ("40 mm", "20 mm"), "screw_head": "12 mm", "spring_diameter": "10 mm"}
+
+
+def test_a_lower_stop_keeps_the_roller_off_the_corner():
+    stopped = analyze(cam(stops={"lower": "1.2 mm", "upper": "200 mm"}))
+    assert stopped.state.travel[0] == pytest.approx(0.0012)
+    assert stopped.state.travel[-1] == pytest.approx(0.2)
+    np.testing.assert_allclose(stopped.curve.force, 4 * 1365 * 0.009058, rtol=1e-9)
+    assert "undercut" not in {one.name for one in stopped.warnings}
+    assert stopped.status.name == "COMPLETE"
+
+
+def test_a_travel_beyond_the_stop_is_told_and_partial():
+    found = analyze(cam(stops={"upper": "150 mm"}, analysis__travel="200 mm"))
+    assert found.status.name == "PARTIAL"
+    assert "stopped at 150 mm" in found.message
+    assert analyze(cam(stops={"lower": "300 mm"})).status.name == "NO_EQUILIBRIUM"
+
+
+def test_distances_are_those_of_points_on_the_parts():
+    """Brute force: many points on each part, against the gaps of the closed formulas."""
+    from cfmkit.families.cam.clearance import clearances
+
+    found = analyze(cam(roller_radius="10 mm", envelope=SIZES))
+    gaps = {}
+    for pair, gap in clearances(found.state):
+        gaps[pair] = np.minimum(gaps.get(pair, np.inf), gap)
+    states, at = found.state.states, 300
+    x, y = states.x[at], states.y[at]
+    pin = y + np.sqrt(0.2**2 - x**2)
+    assert gaps["roller and roller"][at] == pytest.approx(2 * x - 0.02)
+    side = np.linspace(-0.5, 0.5, 4001)
+    box = np.concatenate(
+        [
+            np.column_stack([0.04 * side, np.full(side.shape, pin - 0.01)]),
+            np.column_stack([np.full(side.shape, 0.02), pin + 0.02 * side]),
+        ]
+    )
+    assert gaps["slider and roller"][at] == pytest.approx(np.hypot(*(box - [x, y]).T).min() - 0.010, abs=1e-6)
+    share = np.linspace(0, 1, 20001)[:, None]
+    brace = share * [x, y] + (1 - share) * [0.0, pin]
+    from cfmkit.export.geometry import Arc
+    from cfmkit.families.cam.outline import drawing
+
+    holes = [
+        edge.center for one in drawing(found.spec).contours if one.hole for edge in one.edges if isinstance(edge, Arc)
+    ]
+    assert len(holes) == 4
+    nearest = min(np.hypot(*(brace - hole).T).min() for hole in holes)
+    assert gaps["brace and screw"][at] == pytest.approx(nearest - 0.012, abs=1e-6)
+    assert found.values["clearance_min"].value == pytest.approx(min(gap.min() for gap in gaps.values()))
+    touched = [one for one in found.warnings if one.name == "parts_touch"]
+    assert bool(touched) == (found.values["clearance_min"].value < 0)
+
+
+def test_inside_corners_have_the_radius_of_the_tool_where_there_is_room():
+    from cfmkit.export.geometry import Arc, polygons
+    from cfmkit.families.cam.outline import drawing
+
+    def outline(radius):
+        return drawing(cam(roller_radius="10 mm", plate={"tool_radius": radius, "base_width": "60 mm"}))
+
+    rounded, sharp = outline("3 mm"), outline("0 mm")
+    arcs = [edge for edge in rounded.contours[0].edges if isinstance(edge, Arc)]
+    assert [arc.radius for arc in arcs] == [0.003, 0.003]
+    ends = [edge.ends for edge in rounded.contours[0].edges]
+    for (_, last), (first, _) in zip(ends, [*ends[1:], ends[0]], strict=True):
+        assert abs(last - first) < 1e-12
+
+    def area(one):
+        x, y = polygons(one.contours[:1], "cut", 2000)[0].T
+        return 0.5 * abs(np.dot(x, np.roll(y, 1)) - np.dot(y, np.roll(x, 1)))
+
+    assert area(rounded) - area(sharp) == pytest.approx(2 * (1 - np.pi / 4) * 0.003**2, rel=1e-3)
+    told = " ".join(outline("300 mm").notes)
+    assert "room for a tool radius" in told

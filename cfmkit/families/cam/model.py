@@ -21,6 +21,7 @@ import numpy as np
 
 from cfmkit.curves import Column, Curve
 from cfmkit.families.cam.build import CLOSE, assemble, check_first_pose, check_springs, displacement_origin
+from cfmkit.families.cam.clearance import smallest, touching
 from cfmkit.families.cam.contact import allowable_stress, flank_pressure, stress
 from cfmkit.families.cam.findings import finding, findings_of, left_out
 from cfmkit.families.cam.parts import parts_of
@@ -70,7 +71,7 @@ def analyze(spec: CamSpec, run: Run) -> Result:
     solution = with_band(solution, run.seed)
     shortfalls = _shortfalls(assembly, solution)
     failed = int(np.isnan(solution.up.slider[1:]).sum() + np.isnan(solution.down.slider[1:]).sum())
-    warnings = (*shortfalls, *left_out(spec), *findings_of(solution))
+    warnings = (*shortfalls, *left_out(spec), *findings_of(solution), *touching(solution))
     status, message = Status.COMPLETE, ""
     if shortfalls:
         status, message = Status.PARTIAL, shortfalls[0].message
@@ -81,10 +82,15 @@ def analyze(spec: CamSpec, run: Run) -> Result:
         status=status,
         message=message,
         curves=(_curve(solution),),
-        values=values_of(solution),
+        values={**values_of(solution), **smallest(solution)},
         warnings=warnings,
-        travel=(solution.origin, solution.origin + _requested(solution, bool(shortfalls))),
-        valid=((solution.corner_travel + solution.origin, float(solution.travel[-1]) + solution.origin),),
+        travel=(solution.origin + float(solution.travel[0]), solution.origin + _requested(solution, bool(shortfalls))),
+        valid=(
+            (
+                max(solution.corner_travel, float(solution.travel[0])) + solution.origin,
+                float(solution.travel[-1]) + solution.origin,
+            ),
+        ),
         target=spec.design.force if spec.design else theoretical_force(solution),
         allowable_stress=allowable_stress(spec.mechanism),
         closed=DenseLoop(solution),
@@ -123,7 +129,12 @@ def solve(assembly: Assembly) -> Solution:
     spec, track = assembly.spec, assembly.track
     available = track.end - track.start
     asked = spec.analysis.travel or available
-    travel = np.linspace(0.0, min(asked, available), spec.analysis.points)
+    low, high = stopped(spec)
+    travel = np.linspace(low, min(asked, available, high), spec.analysis.points)
+    if travel[-1] <= low:
+        raise CannotBuild(
+            finding("end_stop", f"the lower stop at {mm(low)} leaves no travel ('mechanism.stops.lower')")
+        )
     states = track.states(track.start + travel)
     friction = spec.mechanism.rolling_friction
     up = forces(states, assembly.loads, friction)
@@ -131,12 +142,26 @@ def solve(assembly: Assembly) -> Solution:
     return Solution(assembly, travel, states, up, down, displacement_origin(assembly))
 
 
+def stopped(spec: CamSpec) -> tuple[float, float]:
+    """Return between which travels the stops let the slider move [m]."""
+    stops = spec.mechanism.stops
+    return (0.0, np.inf) if stops is None else (stops.lower, np.inf if stops.upper is None else stops.upper)
+
+
 def _shortfalls(assembly: Assembly, solution: Solution) -> tuple[Finding, ...]:
     """Return why the curve ends before what was requested, or before the flank does."""
     found = [assembly.shortfall] if assembly.shortfall else []
     asked, reached = assembly.spec.analysis.travel, float(solution.travel[-1])
     short = asked is not None and reached < asked * (1 - CLOSE)
-    if assembly.track.turns_back and (short or asked is None):
+    if asked is not None and short and stopped(assembly.spec)[1] <= reached * (1 + CLOSE):
+        found.append(
+            finding(
+                "end_stop",
+                f"the requested travel is {mm(asked)}, but the slider is stopped at {mm(reached)} "
+                "('mechanism.stops.upper')",
+            )
+        )
+    elif assembly.track.turns_back and (short or asked is None):
         found.append(
             finding(
                 "brace_too_short",
@@ -226,7 +251,8 @@ class DenseLoop:
     def places(self) -> FloatArray:
         """Increasing displacements [m]."""
         solution = self.solution
-        grid = nodes(solution.travel[-1:], np.array([solution.corner_travel]))[0]
+        low = float(solution.travel[0])
+        grid = low + nodes(solution.travel[-1:] - low, np.array([max(solution.corner_travel - low, 0.0)]))[0]
         return np.asarray(grid + solution.origin)
 
     @cached_property

@@ -145,8 +145,26 @@ def plate_contour(flanks: tuple[Smooth, Smooth], plate: Plate, profiles: Profile
     else:  # a slanted bottom could pass through the higher roller
         tab = [(0.0, left_low[1]), (0.0, low[1])] if left_low[1] != low[1] else []
     below = [(-left_low[0], left_low[1]), *tab, (low[0], low[1])]
-    edges: list[Edge] = [flanks[0], *_lines(above), flanks[1].mirrored().reversed(), *_lines(below)]
+    bottom: list[Edge] = list(_lines(below))
+    r = plate.tool_radius
+    if 0 < r <= _room_for_tool(flanks, plate, profiles):
+        (left, right), floor = (left_low[1], low[1]), min(low[1], left_low[1]) - plate.base_height
+        bottom = [
+            *_lines([(-left_low[0], left), (-half - r, left)]),
+            Arc((-half - r, float(left) - r), r, 0.5 * np.pi, 0.0),
+            *_lines([(-half, left - r), (-half, floor), (half, floor), (half, right - r)]),
+            Arc((half + r, float(right) - r), r, np.pi, 0.5 * np.pi),
+            *_lines([(half + r, right), (low[0], right)]),
+        ]
+    edges: list[Edge] = [flanks[0], *_lines(above), flanks[1].mirrored().reversed(), *bottom]
     return Contour(tuple(edges), "cut", closed=True)
+
+
+def _room_for_tool(flanks: tuple[Smooth, Smooth], plate: Plate, profiles: Profiles) -> float:
+    """Return the largest radius that the inside corners beside the tab have room for [m]; 0 without a tab."""
+    half = 0.5 * tab_width(plate, profiles)
+    beside = min(float(flank.points[0, 0]) for flank in flanks) - half
+    return min(beside, plate.base_height) if half > 0 else 0.0
 
 
 def _lines(corners: list[tuple[float, float]]) -> list[Line]:
@@ -205,6 +223,12 @@ def plate_notes(profiles: Profiles, plate: Plate) -> tuple[str, ...]:
             f"the two {mm(diameter)} holes of the tab are left out: they need a tab of {mm(6 * diameter)} by "
             f"{mm(2 * diameter)}, it is {mm(width)} by {mm(plate.base_height)} ('mechanism.plate.base_width', "
             "'.base_height', '.hole_diameter')"
+        )
+    room = _room_for_tool(flanks, plate, profiles)
+    if plate.tool_radius > room > 0:
+        found.append(
+            f"inside corners beside the tab have room for a tool radius of {mm(room)}, not {mm(plate.tool_radius)}: "
+            "they are drawn sharp ('mechanism.plate.tool_radius', '.base_width')"
         )
     if diameter and not _room_at_top(plate, top - bottom, across):
         found.append(

@@ -137,7 +137,8 @@ class Solution:
     def corner_travel(self) -> float:
         """Travel at which the roller leaves the corner [m]; 0 if there is none."""
         track = self.assembly.track
-        return max(track.corner_end - track.start, 0.0)
+        corner = max(track.corner_end - track.start, 0.0)
+        return corner if corner > float(self.travel[0]) else 0.0
 
     @cached_property
     def jams(self) -> tuple[tuple[float, float], ...]:

@@ -140,9 +140,37 @@ class Plate(Model):
     base_height: NonNegativeLength = Field(0.040, description="tab below the cam that carries it; 0 for none")
     base_width: PositiveLength | None = Field(None, description="width of the tab; default: what the rollers leave")
     hole_diameter: NonNegativeLength = Field(0.0066, description="fixing holes; 0 for none")
+    tool_radius: NonNegativeLength = Field(
+        0.0, description="of the tool that cuts it: inside corners beside the tab are rounded with it; 0: sharp"
+    )
     thickness: PositiveLength | None = Field(
         None, description="of the sheet, for bodies (STL, 3MF, STEP); default: width of the contact, if that is given"
     )
+
+
+class Stops(Model):
+    """Where the slider is stopped, as travel from the start of the roller path."""
+
+    lower: NonNegativeLength = Field(0.0, description="lowest place: the curve begins there")
+    upper: PositiveLength | None = Field(None, description="highest place; default: none but the end of the flank")
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Self:
+        if self.upper is not None and self.upper <= self.lower:
+            raise ValueError("'upper' must be above 'lower'")
+        return self
+
+
+class Envelope(Model):
+    """Sizes of the parts that move, for their distances from the plate, its screws and each other."""
+
+    brace_width: NonNegativeLength = Field(0.0, description="of a brace, across its length")
+    slider: tuple[PositiveLength, PositiveLength] | None = Field(
+        None, description="of the slider across and along its way, its pin in the middle"
+    )
+    screw_head: NonNegativeLength = Field(0.0, description="diameter of the screws' heads in the plate's holes")
+    spring_diameter: NonNegativeLength = Field(0.0, description="outer diameter of the springs")
+    gap: NonNegativeLength = Field(0.0, description="smallest distance wanted")
 
 
 class Contact(Model):
@@ -235,6 +263,8 @@ class Mechanism(Model):
     pins: Pins | None = Field(None, description="slider pin and spring hooks: their friction")
     bearings: Bearings | None = Field(None, description="of the rollers: their friction and life")
     guide: Guide | None = Field(None, description="of the slider: its friction")
+    stops: Stops | None = Field(None, description="where the slider's way ends")
+    envelope: Envelope | None = Field(None, description="sizes of the moving parts, for their distances")
     mounting: Annotated[Mounting, BeforeValidator(_mounting, json_schema_input_type=str | Mounting)] | None = Field(
         None,
         description="up | horizontal | down, the slider's elevation (30 deg), or {elevation, roll}; weight acts where "

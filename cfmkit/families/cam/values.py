@@ -102,6 +102,7 @@ DEFINITIONS = {
         "force",
         "smallest contact force beyond the first point; not positive where a roller leaves the cam",
     ),
+    "clearance_min": ("length", "smallest distance of the moving parts from plate, screws and each other"),
     "bearing_load_max": ("force", "largest radial load of one roller bearing"),
     "bearing_life": (
         "count",

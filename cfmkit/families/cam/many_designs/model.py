@@ -126,6 +126,7 @@ def _symmetric_closed(spec: CamSpec) -> bool:
     return (
         spec.fidelity == "quasi-static"
         and not spec.gravity
+        and not (mechanism.stops or mechanism.envelope)
         and not (mechanism.pins or mechanism.bearings or mechanism.guide)
         and not (mechanism.contact or mechanism.left or mechanism.errors or profile.file)
         and not (mechanism.preload or profile.preload)

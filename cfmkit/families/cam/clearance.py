@@ -1,0 +1,105 @@
+"""How far the moving parts of a cam mechanism stay from the plate, its screws and each other over the travel.
+
+Rollers run in the plane of the plate; braces, springs and slider move beside it, where only the heads of its screws
+stand out.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.arrays import FloatArray
+from cfmkit.export.geometry import Arc, Line
+from cfmkit.families.cam.findings import finding
+from cfmkit.families.cam.outline import plate_contours
+from cfmkit.families.cam.values import DEFINITIONS
+from cfmkit.families.findings import mm
+from cfmkit.results import Quantity
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from cfmkit.families.cam.solution import Solution
+    from cfmkit.results import Finding
+
+Place = tuple[FloatArray | float, FloatArray | float]
+
+
+def clearances(solution: Solution) -> Iterator[tuple[str, FloatArray]]:
+    """Yield (pair of parts, gap at every point of the solution [m]); negative where they overlap.
+
+    Only what `mechanism.envelope` gives a size is looked at. The cam's flank, on which the roller runs, is left out.
+    """
+    mechanism, states = solution.assembly.spec.mechanism, solution.states
+    sizes, radius = mechanism.envelope, mechanism.roller_radius
+    if sizes is None:
+        return
+    x, y, length = states.x, states.y, mechanism.brace_length
+    pin = y + np.sqrt((length - x) * (length + x))
+    profile = solution.assembly.profile
+    contours = plate_contours((profile, profile), mechanism.plate)
+    yield "roller and roller", 2.0 * (x - radius)
+    # The ends of the edges beside the flanks lie on the flanks, which the rollers touch: rounding is no overlap.
+    yield "roller and plate beside the flanks", _to_edges((x, y), contours[0].edges) - radius
+    half = 0.5 * sizes.brace_width
+    screws = [edge.center for contour in contours[1:] for edge in contour.edges if isinstance(edge, Arc)]
+    for place in screws if sizes.screw_head else ():
+        head = 0.5 * sizes.screw_head
+        if half:
+            yield "brace and screw", _to_segment(place, (x, y), (0.0 * pin, pin)) - half - head
+        if sizes.spring_diameter:
+            across = np.maximum(np.abs(place[0]) - x, 0.0)
+            yield "spring and screw", np.hypot(across, place[1] - y) - 0.5 * sizes.spring_diameter - head
+        if sizes.slider:
+            yield "slider and screw", _to_box(place, pin, sizes.slider) - head
+    if sizes.slider:
+        yield "slider and roller", _to_box((x, y), pin, sizes.slider) - radius
+        if sizes.spring_diameter:
+            yield "slider and spring", pin - 0.5 * sizes.slider[1] - y - 0.5 * sizes.spring_diameter
+
+
+def smallest(solution: Solution) -> dict[str, Quantity]:
+    """Return the smallest distance by name; nothing where no sizes are given."""
+    found = [float(gap.min()) for _, gap in clearances(solution)]
+    return {"clearance_min": Quantity(min(found), *DEFINITIONS["clearance_min"])} if found else {}
+
+
+def touching(solution: Solution) -> Iterator[Finding]:
+    """Yield which parts come nearer than wanted, the worst first."""
+    envelope, told = solution.assembly.spec.mechanism.envelope, set()
+    for pair, gap in sorted(clearances(solution), key=lambda item: float(item[1].min())):
+        least = int(np.argmin(gap))
+        if envelope is None or pair in told or gap[least] >= envelope.gap - 1e-9:
+            continue
+        told.add(pair)
+        by = f"overlap by {mm(-float(gap[least]))}" if gap[least] < 0 else f"come within {mm(float(gap[least]))}"
+        yield finding(
+            "parts_touch",
+            f"{pair} {by} at {mm(float(solution.travel[least]))} of travel ('mechanism.envelope', 'mechanism.plate')",
+        )
+
+
+def _to_segment(place: Place, start: Place, end: Place) -> FloatArray:
+    """Return the distance of points from straight pieces [m]."""
+    (px, py), (ax, ay), (bx, by) = place, start, end
+    dx, dy = bx - ax, by - ay
+    share = np.clip(((px - ax) * dx + (py - ay) * dy) / (dx * dx + dy * dy), 0.0, 1.0)
+    return np.asarray(np.hypot(px - ax - share * dx, py - ay - share * dy))
+
+
+def _to_edges(place: Place, edges: tuple[object, ...]) -> FloatArray:
+    """Return the distance from the straight edges and fillets of an outline [m]."""
+    gaps = [_to_segment(place, edge.start, edge.end) for edge in edges if isinstance(edge, Line)]
+    # A fillet lies within the corner of its tangents, of which the straight edges hold all but the corner itself.
+    arcs = [edge for edge in edges if isinstance(edge, Arc)]
+    gaps += [np.abs(np.hypot(place[0] - arc.center[0], place[1] - arc.center[1]) - arc.radius) for arc in arcs]
+    return np.asarray(np.min(gaps, axis=0))
+
+
+def _to_box(place: Place, height: FloatArray, size: tuple[float, float]) -> FloatArray:
+    """Return the distance of points from a box on the axis at some heights [m]; negative inside."""
+    across, along = np.abs(place[0]) - 0.5 * size[0], np.abs(place[1] - height) - 0.5 * size[1]
+    outside = np.hypot(np.maximum(across, 0.0), np.maximum(along, 0.0))
+    return np.asarray(outside + np.minimum(np.maximum(across, along), 0.0))
