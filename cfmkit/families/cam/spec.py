@@ -273,6 +273,14 @@ class Mechanism(Model):
     safety_factor: SafetyFactor = 1.0
 
     @model_validator(mode="after")
+    def _only_hanging_weights_help(self) -> Self:
+        hangs = self.mounting is not None and self.mounting.elevation < 0
+        if self.profile.slope_factor < 1 and not hangs:
+            told = "must be >= 1: only weights that hang down ('mounting') help the springs"
+            refuse("Mechanism", {("profile", "slope_factor"): told})
+        return self
+
+    @model_validator(mode="after")
     def _tab_passes_between_the_rollers(self) -> Self:
         if self.plate.base_width is None:
             return self
