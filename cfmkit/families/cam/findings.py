@@ -56,7 +56,6 @@ FINDINGS = {
     "inertia_mismatch": "a moment of inertia does not fit the mass and the size of its part",
     "symmetric_model": "the quasi-static model leaves out what makes the two sides differ",
     "friction_left_out": "the model leaves out friction, or a weight across the travel, that is specified",
-    "friction_left_out": "a model that has not the friction, or the weight across the way, that is specified",
     "end_stop": "the slider's stops leave less travel than requested",
     "parts_touch": "moving parts come nearer to each other, the plate or its screws than wanted",
     "bearing_overloaded": "the load of a roller's bearing exceeds its static rating",
