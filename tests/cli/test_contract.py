@@ -48,7 +48,7 @@ def test_a_config_is_analysed_and_designed_with_exit_0(cli, path):
     assert cli("analyze", str(path), "-o", "one", "-q", "--no-plots").code == 0
     if families.family(spec.family).design is None or spec.design is None:
         return
-    assert cli("design", str(path), "-o", "two", "-q", "--no-plots", timeout=1800).code == 0
+    assert cli("design", str(path), "-o", "two", "-q", "--no-plots").code == 0
     assert cli("analyze", "two/design.yaml", "-o", "three", "-q", "--no-plots").code == 0
     same_but_for(families.family(spec.family).search, cli.folder / "two", cli.folder / "three")
 
