@@ -413,7 +413,7 @@ def drawn(problem: Problem, found: Found, count: int, worst: bool = False, most:
         if new is None or not new_risk < risk - 1e-6 * (1.0 + abs(risk)):
             trust *= 0.35
             continue
-        small = risk - new_risk < 1e-3
+        small = risk - new_risk < 0.02  # of a standard deviation
         x, rows, risk, slopes, steps = there, new, new_risk, None, steps + 1
         trust = min(MOST_TRUST, 1.6 * trust)
         problem.tell(float((rows >= 0).all(axis=1).mean()), steps)

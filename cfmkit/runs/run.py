@@ -253,7 +253,7 @@ def _with_yield(found: Report, given: Spec, run: Run) -> Report:
 
     yields = yields_of(found.result, given, run)
     if yields is None:
-        from cfmkit.studies.process_tolerances import expected
+        from cfmkit.studies.expected_yield import expected
 
         told = expected(found.result, run)
         return found.beside({}, run_findings.Supplement(lines=(("made", told),))) if told else found

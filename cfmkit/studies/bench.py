@@ -16,9 +16,10 @@ from cfmkit.families import family
 from cfmkit.metrics import window_of
 from cfmkit.specs.spec import DesignKeys
 from cfmkit.specs.units import format_short
+from cfmkit.studies.expected_yield import MOST_ANALYSES, MOST_LOOKS
 from cfmkit.studies.made_parts import tolerances_of
 from cfmkit.studies.margins import sampled_of
-from cfmkit.studies.process_tolerances import MOST_ANALYSES, MOST_LOOKS, assumed, tolerances
+from cfmkit.studies.process_tolerances import assumed, tolerances
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray

@@ -1,0 +1,121 @@
+"""What yield is to be expected of a design without tolerances, by those that its process is assumed to hold.
+
+The estimate is of first order and takes a few solutions: it says whether a design is worth drawing parts of, no more.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.designing.robust import SIGMA_STEP
+from cfmkit.errors import CfmError
+from cfmkit.families import family
+from cfmkit.specs.units import format_short
+from cfmkit.studies.margins import numbers_of, places_of, rows_of, sampled_of
+from cfmkit.studies.process_tolerances import MODULUS, assumed
+
+if TYPE_CHECKING:
+    from cfmkit.arrays import FloatArray
+    from cfmkit.families.base import Run
+    from cfmkit.results import Result
+    from cfmkit.specs.spec import Spec
+    from cfmkit.studies.margins import Rows
+    from cfmkit.studies.process_tolerances import Assumed
+
+MOST_LOOKS, MOST_ANALYSES = 24, 8
+"""Parts that are looked at the quick way, or analysed, for an estimate: some tenths of a second on any machine."""
+
+PARTS = 4000
+
+
+def expected(result: Result, run: Run) -> str:
+    """Return in a sentence how many parts of a design would be good, or why that is not known; empty of no part.
+
+    Parameters
+    ----------
+    result : Result
+        The analysis of the design.
+    run : Run
+        Seed of the parts.
+    """
+    spec = result.spec
+    found = assumed(spec)
+    if found is None or not spec.part_requirements or not result.curves:
+        return ""
+    name = found.process.name
+    again = f"the same command with --set design.process={name}"
+    try:
+        shares = _shares(result, found, run)
+    except _NotKnown as why:
+        return f"no yield is estimated for the assumed tolerances of {name}: {why}; {again} draws parts"
+    free = "" if family(spec.family).free else " --set 'design.free={...}'"
+    cure = f"with margins: {again} --set 'design.yield=90 %'{free}"
+    return f"{_told(found, shares)}; {cure}"
+
+
+class _NotKnown(Exception):
+    """Why nothing is said of a yield."""
+
+
+def _told(found: Assumed, shares: tuple[float, float]) -> str:
+    process = found.process
+    kinds = {"thickness": process.thickness, "position": process.position}
+    used = {kind: sigma for kind, sigma in kinds.items() if sigma in found.deviations.values()}
+    told = [f"{kind} +- {format_short(sigma, 'length')}" for kind, sigma in used.items()]
+    if found.modulus is not None:
+        low, high = (format_short(end, "stress") for end in found.modulus)
+        told.append(f"modulus {low} to {high}")
+    text = f"about {100 * shares[0]:.2g} % of parts would meet the requirements if made by {process.name} "
+    text += f"({', '.join(told)}; assumed: {process.reason}; to first order)"
+    return text if found.modulus is None else f"{text}, {100 * shares[1]:.2g} % once the modulus is measured"
+
+
+def _shares(result: Result, found: Assumed, run: Run) -> tuple[float, float]:
+    """Return the share of good parts, and that of those whose modulus is as it should be.
+
+    Raises
+    ------
+    _NotKnown
+        If it would take long, or a part near the design has no curve.
+    """
+    spec = result.spec
+    paths = [*found.deviations, *([MODULUS] if found.modulus else [])]
+    places = places_of(result)
+    first = sampled_of(spec, places, run)
+    rows = None if first is None else rows_of(result, first, places)
+    middle = None if rows is None else _numbers(spec, rows, run)
+    if rows is None or middle is None:
+        raise _NotKnown("the design cannot be followed at a few poses")
+    quick = family(spec.family).sampled is not None and not rows.metrics
+    if 2 * len(paths) > (MOST_LOOKS if quick else MOST_ANALYSES):
+        raise _NotKnown(f"it needs {2 * len(paths)} {'parts' if quick else 'analyses'}, and takes a while")
+    generator = np.random.default_rng([run.seed, 17])
+    moved, by_modulus = np.zeros((PARTS, len(middle))), np.zeros((PARTS, len(middle)))
+    for path in paths:
+        nominal = float(spec.at(path))
+        if path == MODULUS and found.modulus is not None:
+            errors, step = generator.uniform(*found.modulus, PARTS) - nominal, 1e-3 * nominal
+        else:
+            sigma = found.deviations[path]
+            errors, step = sigma * generator.standard_normal(PARTS), SIGMA_STEP * sigma
+        ends = [_numbers(spec.replace({path: nominal + sign * step}), rows, run) for sign in (1.0, -1.0)]
+        change = np.outer(errors, (ends[0] - ends[1]) / (2.0 * step))
+        moved += change
+        by_modulus = change if path == MODULUS else by_modulus
+    limits = [(middle + part) @ rows.matrix.T + rows.constant for part in (moved, moved - by_modulus)]
+    slack = 1e-9 * np.abs(rows.constant)  # a design on its limit keeps it
+    share, measured = (float((one >= -slack).all(axis=1).mean()) for one in limits)
+    return share, measured
+
+
+def _numbers(spec: Spec, rows: Rows, run: Run) -> FloatArray:
+    """Return what rows look at of a part; a part without it ends the estimate."""
+    try:
+        found = numbers_of(spec, rows, run)
+    except CfmError as error:
+        raise _NotKnown(str(error)) from None
+    if found is None or not np.isfinite(found).all():
+        raise _NotKnown("a part near the design has no curve, or a metric of it no value")
+    return found
