@@ -176,7 +176,7 @@ def figures(found: Findings) -> dict[str, Callable[[], Figure]]:
     pictures: dict[str, Callable[[], Figure]] = {}
     if found.outputs is None:
         return pictures
-    if found.all_met is not None:
+    if found.all_met is not None and found.setup.method == "tolerance":
         pictures["yield_gain"] = lambda: draw_gains(found)
     for number, metric in enumerate(found.setup.study.metrics):
         stem = re.sub("[^a-z0-9]+", "_", metric.label.lower()).strip("_")
@@ -410,4 +410,5 @@ _OF_METHOD: dict[str, dict[str, Callable[[Findings, int], Figure]]] = {
     "morris": {"": draw_morris},
     "sobol": {"": draw_bars, "_convergence": draw_convergence},
     "tolerance": {"": draw_histogram},
+    "inverse": {"": draw_histogram},
 }

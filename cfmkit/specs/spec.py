@@ -168,8 +168,10 @@ class Correlated(Model):
 class Sensitivity(Model):
     """What `cfmkit sensitivity` varies, and how."""
 
-    method: Literal["oat", "local", "morris", "sobol", "tolerance"] = Field(
-        "oat", description="one at a time, gradients, Morris screening, Sobol indices, Monte Carlo over tolerances"
+    method: Literal["oat", "local", "morris", "sobol", "tolerance", "inverse"] = Field(
+        "oat",
+        description="one at a time, gradients, Morris screening, Sobol indices, Monte Carlo over tolerances, or the "
+        "tolerances that keep `min_yield`",
     )
     parameters: dict[str, tuple[MetricValue, MetricValue] | Tolerance] = Field(
         min_length=1, description="dotted path: a range [199 mm, 201 mm] or a tolerance {normal: 0.1 mm}"
@@ -186,6 +188,9 @@ class Sensitivity(Model):
         "intervals (bound)",
     )
     min_yield: Ratio | None = Field(None, gt=0, le=1, description="share of parts that must meet all requirements")
+    costs: dict[str, Annotated[float, Field(gt=0)]] = Field(
+        {}, description="inverse: what a tolerance costs, over its width, in any unit: {path: 2.0}; default: 1 each"
+    )
     design: bool = Field(False, description="redesign the mechanism at each point")
 
 

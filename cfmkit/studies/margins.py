@@ -16,12 +16,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.designing.audit import searched
-from cfmkit.designing.robust import Found, NoPart, Problem, costliest, drawn, with_margins
+from cfmkit.designing.robust import SIGMA_STEP, Found, NoPart, Problem, costliest, drawn, with_margins
 from cfmkit.designing.starts import Clock
-from cfmkit.errors import CfmError, SpecError
+from cfmkit.errors import CfmError, SolutionError, SpecError
 from cfmkit.errors import Problem as Fault
 from cfmkit.families import family
-from cfmkit.families.base import Sampled, function_named
+from cfmkit.families.base import Run, Sampled, function_named
 from cfmkit.metrics import split_name, window_of
 from cfmkit.metrics.requirements import Bounds
 from cfmkit.results import Design, Status
@@ -35,10 +35,10 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.base import Run
     from cfmkit.results import Result
     from cfmkit.specs.spec import Requirement, Spec
     from cfmkit.studies.made_parts import Tolerances
+    from cfmkit.studies.sensitivity.parameters import Parameter
     from cfmkit.studies.study import Metric
 
 POSES = 15
@@ -365,6 +365,38 @@ def numbers_of(spec: Spec, rows: Rows, run: Run) -> FloatArray | None:
         values = Study(spec, (), rows.metrics).quantities(result)
         numbers.append(np.array([np.nan if one.value is None else one.value for one in values]))
     return np.concatenate(numbers)
+
+
+def rows_by_errors(spec: Spec, nominal: Result, parameters: tuple[Parameter, ...]) -> tuple[FloatArray, FloatArray]:
+    """Return the rows of a specification's requirements (m,), and their derivatives by errors of parameters (m, d).
+
+    Raises
+    ------
+    cfmkit.errors.SolutionError
+        If it, or a part near it, cannot be followed at a few poses.
+    """
+    run, places = Run(), places_of(nominal)
+    first = sampled_of(spec, places, run)
+    if first is None:
+        raise SolutionError("the specification cannot be followed at a few poses: nothing is known to first order")
+    rows = rows_of(nominal, first, places)
+    middle, columns = numbers_of(spec, rows, run), []
+    for one in parameters:
+        step = SIGMA_STEP * deviation_of(one)
+        ends = [
+            numbers_of(spec.replace({one.path: one.spread.nominal + sign * step}), rows, run) for sign in (1.0, -1.0)
+        ]
+        if ends[0] is None or ends[1] is None or middle is None:
+            raise SolutionError(f"a part with another {one.path} cannot be followed at a few poses")
+        columns.append((ends[0] - ends[1]) / (2.0 * step))
+    assert middle is not None
+    return rows.matrix @ middle + rows.constant, rows.matrix @ np.array(columns).T
+
+
+def deviation_of(one: Parameter) -> float:
+    """Return the standard deviation of a parameter [SI]."""
+    spread = one.spread
+    return spread.deviation if spread.kind == "normal" else (spread.high - spread.low) / 12.0**0.5
 
 
 def free_of(given: Spec, designed: Spec) -> dict[str, tuple[float, float]]:

@@ -46,6 +46,7 @@ SHOWN = {
     "morris": ("mu_star", "sigma"),
     "sobol": ("total_order", "first_order"),
     "tolerance": ("yield_gain_when_halved", "variance_drop_when_halved"),
+    "inverse": ("tolerance_alone", "tolerance_together", "tolerance_allocated"),
 }
 """Indices on the page; the first says in which order."""
 
@@ -64,7 +65,7 @@ class SensitivityOptions(Studying):
     report: WithReport = False
     table: Tables = "csv"
     method: Annotated[
-        Literal["oat", "local", "morris", "sobol", "tolerance"] | None,
+        Literal["oat", "local", "morris", "sobol", "tolerance", "inverse"] | None,
         option(
             "--method",
             text="One at a time, gradients, Morris screening, Sobol indices, or Monte Carlo over tolerances; "
@@ -77,7 +78,7 @@ class SensitivityOptions(Studying):
             "--samples",
             metavar="N",
             low=2,
-            text="oat: points per parameter; morris: trajectories; sobol: base samples; tolerance: parts.",
+            text="oat: points per parameter; morris: trajectories; sobol: base samples; tolerance, inverse: parts.",
         ),
     ] = None
     seed: Annotated[

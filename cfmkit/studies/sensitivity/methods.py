@@ -9,7 +9,7 @@ import numpy as np
 
 from cfmkit.families import family
 from cfmkit.specs.units import border_unit, to_border
-from cfmkit.studies.sensitivity import local, morris, oat, sobol, tolerance
+from cfmkit.studies.sensitivity import inverse, local, morris, oat, sobol, tolerance
 from cfmkit.studies.sensitivity.evaluation import Evaluator, Interrupted
 from cfmkit.studies.sensitivity.failures import evaluated, nothing, stated
 from cfmkit.studies.sensitivity.findings import Findings, IndexLine, lines_of
@@ -27,6 +27,9 @@ if TYPE_CHECKING:
     from cfmkit.studies.sensitivity.failures import Analysis
     from cfmkit.studies.sensitivity.parameters import Parameter
     from cfmkit.studies.sensitivity.setup import Setup
+DEFAULT_YIELD, ESTIMATED = 0.95, 4000
+"""What `inverse` keeps where `min_yield` says nothing, and the parts of its estimate of first order."""
+
 DRAWN = "drawn"
 """The role of a sample of a Monte Carlo run."""
 
@@ -199,6 +202,49 @@ def _tolerance(setup: Setup, evaluator: Evaluator) -> Findings:
     return _with_yield(plain, names) if setup.study.spec.part_requirements else plain
 
 
+def _inverse(setup: Setup, evaluator: Evaluator) -> Findings:
+    """State which tolerances keep the yield, and draw parts within those that are allocated."""
+    from cfmkit.studies.margins import rows_by_errors
+
+    spec, wanted = setup.study.spec, setup.block.min_yield or DEFAULT_YIELD
+    spreads = [one.spread for one in setup.parameters]
+    rows, by_error = rows_by_errors(spec, setup.nominal.result, setup.parameters)
+    unit = draw(setup.correlation, ESTIMATED, np.random.default_rng([setup.seed, 3]))
+    errors = values_at(spreads, unit) - setup.values
+    costs = np.array([setup.block.costs.get(path, 1.0) for path in setup.paths])
+    answer = inverse.answered(rows, by_error, errors, costs, wanted)
+    found = list(_tolerance_lines(setup, answer))
+    factors = np.where(np.isfinite(answer.allocated), answer.allocated, 1.0)
+    tight = [one.tightened(float(factor)) for one, factor in zip(spreads, factors, strict=True)]
+
+    def drawn(start: int, number: int) -> FloatArray:
+        again = draw(setup.correlation, start + number, np.random.default_rng(setup.seed))[start:]
+        return values_at(tight, again)[:, None, :]
+
+    blocks = evaluated(drawn, lambda points: evaluator.outputs(points, [DRAWN]), setup.samples, setup.policy)
+    plain = Findings(
+        setup, evaluator, tuple(found), points=blocks.points, outputs=blocks.outputs, replaced=blocks.replaced
+    )
+    met = blocks.outputs[..., len(setup.study.metrics) :]
+    failed: NDArray[np.bool_] = np.asarray(np.isnan(blocks.outputs).any(axis=-1))[:, 0]
+    good: NDArray[np.bool_] = (~np.isnan(met) & (met > 0.5))[:, 0]
+    each = (tolerance.yield_of(good[:, k], failed, setup.policy) for k in range(good.shape[-1]))
+    whole: NDArray[np.bool_] = np.asarray(good.all(axis=-1))
+    return replace(plain, all_met=tolerance.yield_of(whole, failed, setup.policy), each_met=tuple(each))
+
+
+def _tolerance_lines(setup: Setup, answer: inverse.Answer) -> Iterator[IndexLine]:
+    """Yield what each tolerance may be, in its own unit: a standard deviation, or the half width of a range."""
+    for k, one in enumerate(setup.parameters):
+        spread = one.spread
+        stated_width = spread.deviation if spread.kind == "normal" else 0.5 * (spread.high - spread.low)
+        for name in ("alone", "together", "allocated"):
+            width = float(getattr(answer, name)[k]) * stated_width
+            value = told(float(to_border(width, one.dimension)), "ratio")
+            unit = border_unit(one.dimension)
+            yield IndexLine("yield", one.path, f"tolerance_{name}", value, None, None, unit, ESTIMATED)
+
+
 def _with_yield(found: Findings, names: tuple[str, ...]) -> Findings:
     """Return findings with the share of good parts, and what it gains from tighter tolerances."""
     setup, outputs = found.setup, found.outputs
@@ -234,6 +280,7 @@ METHODS: dict[str, Callable[[Setup, Evaluator], Findings]] = {
     "morris": _morris,
     "sobol": _sobol,
     "tolerance": _tolerance,
+    "inverse": _inverse,
 }
 
 __all__ = ["DRAWN", "METHODS", "carry_out"]

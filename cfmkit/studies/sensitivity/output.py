@@ -10,6 +10,7 @@ from cfmkit.families import family
 from cfmkit.metrics import metrics_json
 from cfmkit.results import Finding, Quantity, Status
 from cfmkit.studies.sensitivity.intervals import LEVEL
+from cfmkit.studies.sensitivity.setup import MADE
 from cfmkit.studies.tables import results_table
 from cfmkit.studies.variation import written
 from cfmkit.tables import Table, TableColumn, csv_chunks, to_csv
@@ -90,7 +91,7 @@ def exit_code(found: Findings) -> ExitCode:
 def yield_ok(found: Findings) -> bool:
     """Return whether the yield is what was requested; true if nothing was."""
     wanted = found.setup.block.min_yield
-    if wanted is None or found.setup.method != "tolerance":
+    if wanted is None or found.setup.method not in MADE:
         return True
     return found.all_met is not None and found.all_met.value >= wanted
 
@@ -222,5 +223,5 @@ def _parameter(one: Parameter) -> dict[str, Any]:
 def _correlated(setup: Setup) -> list[dict[str, Any]]:
     from cfmkit.studies.sensitivity.parameters import groups
 
-    pairs = groups(setup.block, setup.paths) if setup.method == "tolerance" else ()
+    pairs = groups(setup.block, setup.paths) if setup.method in MADE else ()
     return [{"parameters": [setup.paths[k] for k in members], "correlation": value} for members, value in pairs]

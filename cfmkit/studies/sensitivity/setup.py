@@ -32,9 +32,12 @@ if TYPE_CHECKING:
     from cfmkit.studies.sensitivity.parameters import Parameter
     from cfmkit.studies.study import Metric
 
-Method = Literal["oat", "local", "morris", "sobol", "tolerance"]
-SAMPLES = {"oat": 11, "local": 2, "morris": 20, "sobol": 256, "tolerance": 1000}
+Method = Literal["oat", "local", "morris", "sobol", "tolerance", "inverse"]
+SAMPLES = {"oat": 11, "local": 2, "morris": 20, "sobol": 256, "tolerance": 1000, "inverse": 200}
 """How many samples a method takes by default; `local` chooses its own steps."""
+
+MADE = ("tolerance", "inverse")
+"""Methods whose samples are made parts."""
 
 NOTHING = (
     "nothing to vary: add a block 'sensitivity: {parameters: {...}}' to the spec, "
@@ -141,7 +144,7 @@ def prepare(spec: Spec, seed: int | None = None, most: int = MOST_POINTS) -> Set
     if block is None:
         raise UsageError(NOTHING)
     parameters = parameters_of(spec, block)
-    _suits(block, parameters)
+    _suits(spec, block, parameters)
     chosen = seed if seed is not None else block.seed or 0
     samples = block.samples or SAMPLES[block.method]
     paths = tuple(one.path for one in parameters)
@@ -166,17 +169,26 @@ def points_of(method: Method, samples: int, parameters: int, groups: int) -> int
         "morris": samples * (parameters + 1),
         "sobol": samples * (parameters + 2),
         "tolerance": samples * (groups + 1),
+        "inverse": samples,
     }
     return counts[method]
 
 
-def _suits(block: Sensitivity, parameters: tuple[Parameter, ...]) -> None:
+def _suits(spec: Spec, block: Sensitivity, parameters: tuple[Parameter, ...]) -> None:
     """Raise if method, failure policy and parameters do not go together."""
     if block.method in ("oat", "local") and block.on_failure == "resample":
         told = f"{block.method!r} draws no samples that could be drawn again; take 'fail' or 'bound'"
         raise SpecError([Problem("", 0, 0, "sensitivity.on_failure", told)])
+    if block.method == "inverse" and not spec.part_requirements:
+        lacking = "asks which tolerances keep a yield: give 'requirements' that a part meets or misses"
+        raise SpecError([Problem("", 0, 0, "sensitivity.method", lacking)])
+    unknown = [path for path in block.costs if path not in {one.path for one in parameters}]
+    if unknown:
+        known = ", ".join(one.path for one in parameters)
+        missing = f"no such parameter; there are {known}"
+        raise SpecError([Problem("", 0, 0, f"sensitivity.costs.{path}", missing) for path in unknown])
     outside = [one for one in parameters if not one.spread.low <= one.spread.nominal <= one.spread.high]
-    if block.method == "tolerance" and outside:
+    if block.method in MADE and outside:
         told = "the nominal value lies outside the range; it is what a tolerance is tightened to"
         raise SpecError([Problem("", 0, 0, f"sensitivity.parameters.{one.path}", told) for one in outside])
 
@@ -250,12 +262,12 @@ def _valueless(study: Study, result: Result) -> Iterator[tuple[Metric, Quantity]
 
 
 def _cautions(spec: Spec, block: Sensitivity, parameters: tuple[Parameter, ...], samples: int) -> Iterator[Finding]:
-    if block.correlated and block.method != "tolerance":
+    if block.correlated and block.method not in MADE:
         told = f"{block.method} varies every parameter by itself: 'correlated' is for the method tolerance"
         yield Finding("correlation_not_used", told)
     if block.method == "sobol" and samples & (samples - 1):
         yield Finding("unbalanced", f"{samples} is no power of two: a Sobol sequence is balanced at 64, 128, 256, ...")
-    if block.method == "tolerance" and not spec.part_requirements:
+    if block.method in MADE and not spec.part_requirements:
         yield Finding("no_requirements", "without requirements there is no yield, only distributions")
     yield from _followers(spec, parameters)
 

@@ -1,0 +1,64 @@
+"""Which tolerances keep a yield: limits whose answer is known in closed form."""
+
+from __future__ import annotations
+
+from statistics import NormalDist
+
+import numpy as np
+import pytest
+
+import cfmkit
+from cfmkit.errors import SpecError
+from cfmkit.studies.sensitivity.inverse import WIDEST, answered
+
+TWO_SIDED = NormalDist().inv_cdf(0.975)
+ERRORS = np.random.default_rng(0).standard_normal((40_000, 2))
+
+
+def test_one_factor_for_all_is_the_quantile_of_the_normal_law():
+    # |e0 + e1| <= 4: together a factor f with 1.96 sqrt(2) f = 4
+    found = answered(np.array([4.0, 4.0]), np.array([[1.0, 1.0], [-1.0, -1.0]]), ERRORS, np.ones(2), 0.95)
+    assert found.together == pytest.approx([4 / (TWO_SIDED * 2**0.5)] * 2, rel=0.02)
+    assert found.alone == pytest.approx([((4 / TWO_SIDED) ** 2 - 1) ** 0.5] * 2, rel=0.03)
+    assert found.allocated == pytest.approx(found.together, rel=1e-2)
+
+
+def test_what_costs_eight_times_as_much_may_be_twice_as_wide():
+    by_error = np.array([[1.0, 1.0], [-1.0, -1.0]])
+    found = answered(np.array([4.0, 4.0]), by_error, ERRORS, np.array([8.0, 1.0]), 0.95)
+    assert found.allocated[0] / found.allocated[1] == pytest.approx(2.0, rel=1e-2)
+    assert np.hypot(*found.allocated) == pytest.approx(4 / TWO_SIDED, rel=0.02)
+    cost = (np.array([8.0, 1.0]) / found.allocated).sum()
+    assert cost < (np.array([8.0, 1.0]) / found.together).sum()
+
+
+def test_an_error_that_moves_nothing_may_be_as_wide_as_is_looked_at():
+    found = answered(np.array([3.0]), np.array([[1.0, 0.0]]), ERRORS, np.ones(2), 0.95)
+    assert found.alone[1] == WIDEST
+    assert found.alone[0] < WIDEST
+
+
+def test_no_tolerance_helps_where_a_perfect_part_is_bad_or_another_error_is_too_large():
+    assert np.isnan(answered(np.array([-1.0]), np.ones((1, 2)), ERRORS, np.ones(2), 0.9).together).all()
+    assert np.isnan(answered(np.array([0.1]), np.array([[0.0, 1.0]]), ERRORS, np.ones(2), 0.9).alone[0])
+
+
+def test_a_study_states_tolerances_and_judges_parts_within_them():
+    spec = cfmkit.load("configs/cam.yaml")
+    parameters = {"mechanism.springs.stiffness": {"normal": "2 %"}}
+    asked = ({"metric": "force_mean", "min": "48 N", "max": "52 N", "over": ("10 mm", "200 mm")},)
+    spec = spec.replace({"requirements": asked})
+    found = cfmkit.sensitivity(spec, method="inverse", parameters=parameters, samples=150, min_yield="95 %", seed=2)
+    widths = {one["index"]: one["value"] for one in found.summary["indices"]}
+    # up 50.7 N and down 49.3 N: 1.3 N each way, a share of 2.6 % at about 1.7 standard deviations on each side
+    assert widths["tolerance_alone"] == pytest.approx(widths["tolerance_together"], rel=1e-6)
+    assert 0.006 < widths["tolerance_alone"] / 0.69 < 0.02
+    assert found.summary["yield"]["value"] == pytest.approx(0.95, abs=0.05)
+
+
+def test_a_cost_of_no_parameter_is_refused():
+    spec = cfmkit.load("configs/cam.yaml")
+    parameters = {"mechanism.springs.stiffness": {"normal": "2 %"}}
+    with pytest.raises(SpecError) as error:
+        cfmkit.sensitivity(spec, method="inverse", parameters=parameters, costs={"mechanism.brace_length": 2.0})
+    assert "mechanism.springs.stiffness" in str(error.value)
