@@ -238,6 +238,9 @@ class ManyTracks:
     def poses(self, slider: FloatArray, rows: NDArray[np.intp]) -> Poses:
         """Return how rollers stand at slider positions on some of the tracks, (r, n)."""
         corner = slider < self.corner_end[rows]
+        if corner.all():
+            _, x, slope = self.on_corner(self.turn(slider, rows), rows)
+            return Poses(x, slope, np.full_like(x, self.profile.start), corner)
         u = self._flank_parameter(np.where(corner, self.corner_end[rows], slider), rows)
         slope = self.profile.path.law.slope(u)
         x = u + self.shift[rows] * (slope / (1.0 + slope * slope) ** 0.5)

@@ -345,10 +345,17 @@ class Slab:
     def inside(self, branch: str, window: Any) -> CutWindows:
         """Return the forces of one branch inside a window."""
         if (branch, window) not in self.cut_windows:
-            way, forces = (1.0, self.up) if branch == "load" else (-1.0, self.down)
-            sampled = Sampled(self.travel, forces.slider, partial(self.somewhere, way), self.peaks)
+            sampled = self._loading if branch == "load" else self._unloading
             self.cut_windows[branch, window] = CutWindows(sampled, window)
         return self.cut_windows[branch, window]
+
+    @cached_property
+    def _loading(self) -> Sampled:
+        return Sampled(self.travel, self.up.slider, partial(self.somewhere, 1.0), self.peaks)
+
+    @cached_property
+    def _unloading(self) -> Sampled:
+        return Sampled(self.travel, self.down.slider, partial(self.somewhere, -1.0), self.peaks)
 
 
 def force_at(cams: Designs, pose: Pose, way: float | FloatArray) -> FloatArray:

@@ -42,14 +42,26 @@ class Sampled:
     exact: Exact
     peaks: FloatArray | None = None
 
+    @cached_property
+    def heights(self) -> FloatArray:
+        """The values at the peaks, (d, k)."""
+        return self.exact(np.empty((len(self.values), 0)) if self.peaks is None else self.peaks, self._every)
+
+    @cached_property
+    def _every(self) -> NDArray[np.intp]:
+        return np.arange(len(self.values))
+
     def take(self, rows: NDArray[np.intp]) -> Sampled:
         """Return some of the cams."""
-        return Sampled(
+        taken = Sampled(
             self.travel[rows],
             self.values[rows],
             lambda travel, some: self.exact(travel, rows[some]),
             None if self.peaks is None else self.peaks[rows],
         )
+        if "heights" in self.__dict__:
+            taken.__dict__["heights"] = self.heights[rows]
+        return taken
 
 
 class CutWindows(ManyWindows):
@@ -119,7 +131,8 @@ def _ways(sampled: Sampled, window: tuple[float, float] | None) -> NDArray[np.in
     if sampled.peaks is None:
         return ways
     between = (sampled.peaks > low[:, None]) & (sampled.peaks < high[:, None])
-    between &= np.isfinite(sampled.exact(sampled.peaks, np.arange(count)))
+    if between.any():
+        between &= np.isfinite(sampled.heights)
     return np.column_stack([ways, between.astype(np.intp)])
 
 
@@ -147,8 +160,7 @@ def _extremes(
     rows, more = np.arange(len(force)), sampled.peaks
     known = np.isfinite(force.sum(axis=1))
     if more is not None and inside.any():
-        more = more[:, inside]
-        heights = sampled.exact(more, rows)
+        more, heights = more[:, inside], sampled.heights[:, inside]
         motion = np.concatenate([np.broadcast_to(motion, force.shape), more], axis=1)
         order = np.argsort(motion, axis=1, kind="stable")
         motion = np.take_along_axis(motion, order, axis=1)
