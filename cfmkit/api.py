@@ -308,7 +308,7 @@ def suggest(
     >>> len(found.proposals), len(found.answers)
     (0, 4)
     """
-    from cfmkit.runs.suggestions import wish_of
+    from cfmkit.runs.wish_file import wish_of
     from cfmkit.studies.executors import serial
     from cfmkit.studies.pool import Pool
     from cfmkit.suggest.search import suggest as searched

@@ -7,10 +7,7 @@ from time import time
 from typing import TYPE_CHECKING, Any
 
 from cfmkit.errors import ExitCode
-from cfmkit.runs.specfile import content
 from cfmkit.specs.units import to_border
-from cfmkit.specs.yamlio import read_document
-from cfmkit.suggest.spec import WishFile
 from cfmkit.tables.jsontext import json_bytes
 
 if TYPE_CHECKING:
@@ -34,32 +31,6 @@ COLUMNS: Mapping[str, tuple[str, str]] = {
     "finer_deviation": ("ratio", "1"),
 }
 """What is told of each proposal: its dimension and the unit of the files."""
-
-
-def wish_of(name: str | None, keys: Mapping[str, str]) -> WishBlock:
-    """Return the wish of a file, or of none, with keys replaced by what options say.
-
-    Parameters
-    ----------
-    name : str, optional
-        The file; ``-`` is standard input.
-    keys : mapping of str to str
-        Key of the wish -> its value as a file would have it.
-
-    Raises
-    ------
-    cfmkit.errors.SpecError
-        With everything that is wrong with it.
-    """
-    from cfmkit.runs.specfile import STDIN, standard_input
-
-    if name is None:
-        document = read_document("cfmkit: 1\nwish: {}\n", "options")
-    else:
-        document = read_document(standard_input() if name == STDIN else content(name), name)
-    for key, value in keys.items():
-        document = document.set(f"wish.{key}={value}")
-    return document.bind(WishFile).wish
 
 
 def told(proposal: Proposal) -> dict[str, Any]:

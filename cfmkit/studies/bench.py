@@ -18,8 +18,8 @@ from cfmkit.specs.spec import DesignKeys
 from cfmkit.specs.units import format_short
 from cfmkit.studies.expected_yield import MOST_ANALYSES, MOST_LOOKS
 from cfmkit.studies.made_parts import tolerances_of
-from cfmkit.studies.margins import sampled_of
 from cfmkit.studies.process_tolerances import assumed, tolerances
+from cfmkit.studies.requirement_rows import sampled_of
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray

@@ -13,16 +13,16 @@ from cfmkit.designing.robust import SIGMA_STEP
 from cfmkit.errors import CfmError
 from cfmkit.families import family
 from cfmkit.specs.units import format_short
-from cfmkit.studies.margins import numbers_of, places_of, rows_of, sampled_of
 from cfmkit.studies.process_tolerances import MODULUS, assumed
+from cfmkit.studies.requirement_rows import numbers_of, places_of, rows_of, sampled_of
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.families.base import Run
     from cfmkit.results import Result
     from cfmkit.specs.spec import Spec
-    from cfmkit.studies.margins import Rows
     from cfmkit.studies.process_tolerances import Assumed
+    from cfmkit.studies.requirement_rows import Rows
 
 MOST_LOOKS, MOST_ANALYSES = 24, 8
 """Parts that are looked at the quick way, or analysed, for an estimate: some tenths of a second on any machine."""

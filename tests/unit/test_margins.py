@@ -11,7 +11,8 @@ import cfmkit
 from cfmkit.cli.main import main
 from cfmkit.families.base import Run
 from cfmkit.studies import margins
-from cfmkit.studies.margins import places_of, rows_of, sampled_of, with_design_margins
+from cfmkit.studies.margins import with_design_margins
+from cfmkit.studies.requirement_rows import places_of, rows_of, sampled_of
 
 CRANK = "configs/studies/slider_crank_strip_yield.yaml"
 

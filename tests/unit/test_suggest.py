@@ -13,7 +13,8 @@ from cfmkit.errors import SpecError, UsageError
 from cfmkit.families import family
 from cfmkit.families.base import Run, function_named
 from cfmkit.families.beam.propose import kept_shapes
-from cfmkit.runs.suggestions import exit_code, wish_of
+from cfmkit.runs.suggestions import exit_code
+from cfmkit.runs.wish_file import wish_of
 from cfmkit.stock.springs.catalogue import SHEAR_SHARE
 from cfmkit.stock.springs.to_measure import extension_spring, loaded_length
 from cfmkit.stock.springs.wound import tensile_strength

@@ -94,6 +94,7 @@ def run(options: SuggestOptions, terminal: Terminal) -> Answer:
     from cfmkit.families.base import Run
     from cfmkit.runs import suggestions
     from cfmkit.runs.run import long_run
+    from cfmkit.runs.wish_file import wish_of
     from cfmkit.store import RunFolder
     from cfmkit.studies.executors import cores
     from cfmkit.suggest.search import RESERVE, suggest, with_better_models
@@ -104,7 +105,7 @@ def run(options: SuggestOptions, terminal: Terminal) -> Answer:
     if options.wish is None and not given:
         raise UsageError("a wish is missing: name a file, or say --force, --travel and --room")
     ends = begun + budget
-    block = suggestions.wish_of(options.wish, given)
+    block = wish_of(options.wish, given)
     out = _folder(options)
     with RunFolder(out) as folder, terminal.progress() as progress:
         folder.check("metrics.json", "suggestions.csv")

@@ -1,0 +1,298 @@
+"""Requirements on a part as rows of what is seen of it: effort and stress at a few poses, which are smooth.
+
+Metrics are largest and smallest values, which have corners; a requirement on one of them holds where rows of the force,
+or of the stress, at the poses of its window do. Any other metric is a number of its own.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.families import family
+from cfmkit.families.base import Run, Sampled, function_named
+from cfmkit.metrics import split_name, window_of
+from cfmkit.metrics.requirements import Bounds
+from cfmkit.results import Status
+from cfmkit.studies.noted_metrics import metrics_of
+from cfmkit.studies.study import Study
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from cfmkit.arrays import FloatArray
+    from cfmkit.results import Result
+    from cfmkit.specs.spec import Requirement, Spec
+    from cfmkit.studies.study import Metric
+
+POSES = 15
+"""Chebyshev-Lobatto poses in a window; between them the force of a mechanism that is worth making is smooth."""
+
+NARROW = 0.02
+"""A window that is a smaller share of the whole span has its ends only."""
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Requirements as rows of what is seen of a part.
+
+    Attributes
+    ----------
+    places : (p,) array
+        Poses at which effort and stress are looked at [m or rad].
+    branches : tuple of str
+        Of the curve.
+    stresses : int
+        Rows of stress.
+    matrix, constant : (m, q) and (m,) array
+        ``matrix @ numbers + constant`` is at least zero where all requirements hold.
+    metrics : tuple of Metric
+        Those that are numbers of their own: the last ones.
+    about : tuple of int
+        To which requirement each row belongs.
+    """
+
+    places: FloatArray
+    branches: tuple[str, ...]
+    stresses: int
+    matrix: FloatArray
+    constant: FloatArray
+    metrics: tuple[Metric, ...]
+    about: tuple[int, ...]
+
+
+class _RowsOfMargins:
+    """Gathers rows over the numbers: each branch at all places, then each stress at all places, then metrics."""
+
+    def __init__(self, nominal: Result, places: FloatArray, first: Sampled) -> None:
+        self.nominal, self.places = nominal, places
+        self.branches, self.stresses = tuple(first.effort), len(first.stress)
+        self.first = first
+        self.metrics: list[Metric] = []
+        self.rows: list[tuple[dict[int, float], float, int]] = []
+
+    def at(self, over: Any) -> Any:
+        """Return the numbers of the places in a window."""
+        low, high = _window(self.nominal, over)
+        slack = 1e-9 * (self.places[-1] - self.places[0])
+        return np.flatnonzero((self.places >= low - slack) & (self.places <= high + slack))
+
+    def add(self, one: Requirement, number: int) -> None:
+        """Add the rows of a requirement."""
+        name, branch = split_name(one.metric)
+        (metric,) = metrics_of(self.nominal.spec, [one.metric], self.nominal.curve)
+        limits = Bounds.of(one, metric.dimension)
+        plain = name.replace("torque_", "force_", 1)
+        if plain in _OF_STRESS and self.stresses and self._stress(plain, limits, one.over, number):
+            return
+        if plain in _OF_EFFORT:
+            found = [
+                rows
+                for k, each in enumerate(self.branches)
+                if branch in (None, each)
+                for rows in [self._effort(plain, limits, one.over, k)]
+            ]
+            if found and all(rows is not None for rows in found):
+                self.rows += [(row, constant, number) for rows in found for row, constant in rows or ()]
+                return
+        column = self._numbers + len(self.metrics)
+        self.metrics.append(replace(metric, over=one.over, label=str(number)))
+        if limits.min is not None:
+            self.rows.append(({column: 1.0}, -limits.min, number))
+        if limits.max is not None:
+            self.rows.append(({column: -1.0}, limits.max, number))
+
+    @property
+    def _numbers(self) -> int:
+        return (len(self.branches) + self.stresses) * len(self.places)
+
+    def _stress(self, name: str, limits: Bounds, over: Any, number: int) -> bool:
+        """Add rows of the stress; False where they would not say it."""
+        allowed = self.nominal.allowable_stress
+        most = limits.max if name == "stress_max" else None
+        if name == "safety_factor" and allowed is not None and limits.min and limits.max is None:
+            most = allowed / limits.min
+        if most is None or (limits.min is not None and name == "stress_max"):
+            return False
+        count, first = len(self.places), len(self.branches) * len(self.places)
+        for s in range(self.stresses):
+            self.rows += [({first + s * count + int(k): -1.0}, most, number) for k in self.at(over)]
+        return True
+
+    def _effort(self, name: str, limits: Bounds, over: Any, k: int) -> list[tuple[dict[int, float], float]] | None:
+        """Return rows of the effort on one branch; None where they would not say it."""
+        at, first = self.at(over), k * len(self.places)
+        values = self.first.effort[self.branches[k]][at]
+        if not len(at) or not np.isfinite(values).all():
+            return None
+        columns, sign = (first + at).tolist(), float(np.sign(values.mean())) or 1.0
+        return _OF_EFFORT[name](_View(columns, values, sign, self.places[at], self.nominal.target), limits)
+
+    def rows_of(self) -> Rows:
+        """Return all rows."""
+        size = self._numbers + len(self.metrics)
+        matrix = np.zeros((len(self.rows), size))
+        for r, (row, _, _) in enumerate(self.rows):
+            for column, weight in row.items():
+                matrix[r, column] += weight
+        constant = np.array([constant for _, constant, _ in self.rows])
+        about = tuple(number for _, _, number in self.rows)
+        return Rows(self.places, self.branches, self.stresses, matrix, constant, tuple(self.metrics), about)
+
+
+@dataclass(frozen=True)
+class _View:
+    """The effort on one branch in one window: its columns, its values in the design and its sign."""
+
+    columns: list[int]
+    values: FloatArray
+    sign: float
+    places: FloatArray
+    target: float | None
+
+    @cached_property
+    def weights(self) -> FloatArray:
+        """Weights of the mean over the window."""
+        if len(self.places) == 1:
+            return np.ones(1)
+        widths = np.diff(self.places)
+        found = np.zeros(len(self.places))
+        found[:-1] += 0.5 * widths
+        found[1:] += 0.5 * widths
+        return np.asarray(found / widths.sum())
+
+
+_Lines = list[tuple[dict[int, float], float]]
+
+
+def _pairs(view: _View, above: float, below: float) -> _Lines:
+    """Return sign (above F_j - below F_i) >= 0 for all pairs."""
+    return [({i: -view.sign * below, j: view.sign * above}, 0.0) for i in view.columns for j in view.columns if i != j]
+
+
+def _half_band(view: _View, limits: Bounds) -> _Lines | None:
+    return None if limits.max is None or limits.min else _pairs(view, 1.0 + limits.max, 1.0 - limits.max)
+
+
+def _ripple(view: _View, limits: Bounds) -> _Lines | None:
+    return None if limits.max is None or limits.min else _pairs(view, 1.0, 1.0 - limits.max)
+
+
+def _from_target(view: _View, limits: Bounds) -> _Lines | None:
+    if limits.max is None or limits.min or not view.target:
+        return None
+    reach, target = limits.max * abs(view.target), view.target
+    return [({i: -way}, reach + way * target) for i in view.columns for way in (1.0, -1.0)]
+
+
+def _from_mean(view: _View, limits: Bounds) -> _Lines | None:
+    if limits.max is None or limits.min:
+        return None
+    lines: _Lines = []
+    for i in view.columns:
+        for way in (1.0, -1.0):
+            row = {
+                j: view.sign * float(w) * (limits.max + way) for j, w in zip(view.columns, view.weights, strict=True)
+            }
+            row[i] -= way * view.sign
+            lines.append((row, 0.0))
+    return lines
+
+
+def _mean(view: _View, limits: Bounds) -> _Lines:
+    row = dict(zip(view.columns, view.weights.tolist(), strict=True))
+    lines: _Lines = [] if limits.min is None else [(row, -limits.min)]
+    return lines if limits.max is None else [*lines, ({j: -w for j, w in row.items()}, limits.max)]
+
+
+def _largest(view: _View, limits: Bounds) -> _Lines:
+    top = view.columns[int(view.values.argmax())]
+    lines: _Lines = [] if limits.max is None else [({i: -1.0}, limits.max) for i in view.columns]
+    return lines if limits.min is None else [*lines, ({top: 1.0}, -limits.min)]
+
+
+def _smallest(view: _View, limits: Bounds) -> _Lines:
+    bottom = view.columns[int(view.values.argmin())]
+    lines: _Lines = [] if limits.min is None else [({i: 1.0}, -limits.min) for i in view.columns]
+    return lines if limits.max is None else [*lines, ({bottom: -1.0}, limits.max)]
+
+
+_OF_EFFORT: Mapping[str, Callable[[_View, Bounds], _Lines | None]] = {
+    "half_band": _half_band,
+    "force_ripple": _ripple,
+    "deviation_from_target": _from_target,
+    "deviation_from_mean": _from_mean,
+    "force_mean": _mean,
+    "force_max": _largest,
+    "force_min": _smallest,
+}
+_OF_STRESS = ("stress_max", "safety_factor")
+
+
+def _window(nominal: Result, over: Any) -> tuple[float, float]:
+    found = window_of(nominal, over)
+    motion = nominal.curve.motion
+    return (found.lo, found.hi) if found else (float(motion.min()), float(motion.max()))
+
+
+def places_of(nominal: Result) -> FloatArray:
+    """Return the poses at which a part is looked at: those of the windows of all requirements."""
+    wanted: list[FloatArray] = []
+    spans = [_window(nominal, one.over) for one in nominal.spec.part_requirements]
+    whole = max(high for _, high in spans) - min(low for low, _ in spans)
+    for low, high in dict.fromkeys(spans):
+        share = 0.5 * (1.0 - np.cos(np.linspace(0.0, np.pi, POSES if high - low > NARROW * whole else 2)))
+        wanted.append(low + (high - low) * share)
+        wanted[-1][-1] = high
+    places = np.unique(np.concatenate(wanted))
+    near = np.append(True, np.diff(places) > 1e-9 * max(whole, 1e-12))
+    return np.asarray(places[near])
+
+
+def rows_of(nominal: Result, first: Sampled, places: FloatArray) -> Rows:
+    """Return the requirements on a result as rows of what is seen of its parts."""
+    builder = _RowsOfMargins(nominal, places, first)
+    for number, one in enumerate(nominal.spec.part_requirements):
+        builder.add(one, number)
+    return builder.rows_of()
+
+
+def sampled_of(spec: Spec, places: FloatArray, run: Run) -> Sampled | None:
+    """Return effort and stress of a part at places: by the family's quick way, else from its analysis."""
+    quick = family(spec.family).sampled
+    if quick is not None:
+        found: Sampled | None = function_named(quick)(spec, places)
+        if found is not None:
+            return found
+    result = family(spec.family).analyze(spec, run)
+    if result.status is not Status.COMPLETE or not result.curves:
+        return None
+    curve, effort, stress = result.curve, {}, []
+    for branch in curve.branches:
+        on = curve.branch == branch
+        motion, order = curve.motion[on], np.argsort(curve.motion[on], kind="stable")
+        if len(motion) < 2 or not (np.diff(motion[order]) > 0).all():
+            return None
+        effort[branch] = np.interp(places, motion[order], curve.effort[on][order])
+        if "max_stress" in curve.extra:
+            values = np.asarray(curve.extra["max_stress"].values, dtype=float)[on]
+            stress.append(np.interp(places, motion[order], values[order]))
+    return Sampled(effort, np.array(stress).reshape(-1, len(places)))
+
+
+def numbers_of(spec: Spec, rows: Rows, run: Run) -> FloatArray | None:
+    """Return what rows look at of a part, (q,); None where it has no such numbers."""
+    found = sampled_of(spec, rows.places, run)
+    if found is None or tuple(found.effort) != rows.branches or len(found.stress) != rows.stresses:
+        return None
+    numbers = [*found.effort.values(), *found.stress]
+    if rows.metrics:
+        result = family(spec.family).analyze(spec, run)
+        if not result.curves:
+            return None
+        values = Study(spec, (), rows.metrics).quantities(result)
+        numbers.append(np.array([np.nan if one.value is None else one.value for one in values]))
+    return np.concatenate(numbers)
