@@ -10,6 +10,8 @@
     Many starts, in this process or several, each noted when it is finished, within a time budget.
 `audit`
     What is reported of a design is what the analysis of its written specification measures.
+`robust`
+    Values for which made parts are good: margins from tolerances to first order, and drawn parts.
 
 What a design is to do, the start it begins with and the words for what blocks it belong to the family.
 """
