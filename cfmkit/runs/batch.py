@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import shlex
 import time
 import traceback
 from collections.abc import Iterable
@@ -14,11 +13,12 @@ from typing import TYPE_CHECKING, Any, Literal, Protocol
 from cfmkit.errors import CfmError, ExitCode, SpecError, UsageError, code_of, lines_of, visible
 from cfmkit.plots.form import PLAIN, FigureForm
 from cfmkit.results import Status
+from cfmkit.runs import batch_files
 from cfmkit.runs.run import Outcome, Request, Verb, analysed, designed, journal_of, long_run, spec_of
 from cfmkit.runs.run import carry_out as carried_out
 from cfmkit.runs.run_findings import worst
 from cfmkit.studies.batch import LEFT, Entry
-from cfmkit.studies.changes import TOLERANCE, Comparison, changes_table, earlier, gone
+from cfmkit.studies.changes import TOLERANCE, Comparison, earlier, gone
 from cfmkit.studies.changes import changes as changes_of
 
 if TYPE_CHECKING:
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 
     from cfmkit.runs.run import Noting
     from cfmkit.specs.spec import Spec
-    from cfmkit.store import RunFolder
     from cfmkit.studies.changes import Known
     from cfmkit.studies.executors import Executor, Lost
     from cfmkit.studies.finished_runs import KeptRuns
@@ -306,7 +305,7 @@ class BatchResult:
     @property
     def summary(self) -> Mapping[str, Any]:
         """What metrics.json says."""
-        return _data(self.entries, self.exit_code, self.compared)
+        return batch_files.data(self.entries, self.exit_code, self.compared)
 
     @property
     def table(self) -> Table:
@@ -444,7 +443,9 @@ def batch(
         code = exit_code(entries, watched.stopped)
         if compared is not None and compared.beyond and not watched.stopped:
             code = worst([code, ExitCode.REQUIREMENT_MISSED])
-        written = _write(folder, entries, _about(work, named, code), page, compared)
+        written = batch_files.write(
+            folder, entries, batch_files.about(work.arguments, work.common.seed, named, code), page, compared
+        )
     if report is not None:
         report(junit_of(entries))
     if told is not None:
@@ -479,50 +480,3 @@ def unreached(entries: Sequence[Entry], changes: Iterable[str]) -> Iterator[str]
         family, _ = addressed(change)
         if family is not None and family not in families:
             yield f"warning  --set {visible(change)}: no specification is of the family {family!r}"
-
-
-def _about(work: BatchWork, named: Sequence[str], code: ExitCode) -> dict[str, Any]:
-    """Return what the manifest says about the batch."""
-    return {
-        "command": "batch",
-        "arguments": list(work.arguments),
-        "seed": work.common.seed,
-        "spec": {"source": list(named)},
-        "status": code.name.lower(),
-        "exit_code": int(code),
-    }
-
-
-def _write(
-    folder: RunFolder, entries: Sequence[Entry], about: dict[str, Any], page: bool, compared: Comparison | None = None
-) -> tuple[str, ...]:
-    from cfmkit.studies.batch import message, requirements_table, results_table
-    from cfmkit.tables import to_csv
-    from cfmkit.tables.jsontext import json_bytes
-
-    folder.write("results.csv", to_csv(results_table(entries)))
-    folder.write("requirements.csv", to_csv(requirements_table(entries)))
-    folder.write("metrics.json", json_bytes(_data(entries, ExitCode(about["exit_code"]), compared)))
-    if compared is not None:
-        folder.write("changes.csv", to_csv(changes_table(compared.changes)))
-    if page:
-        from cfmkit.runs import batch_page
-
-        command = shlex.join(["cfmkit", *about["arguments"]])
-        folder.write(batch_page.NAME, batch_page.page(entries, message(entries), command))
-    return (*folder.commit(about).files, "manifest.json")
-
-
-def _data(entries: Sequence[Entry], code: ExitCode, compared: Comparison | None = None) -> dict[str, Any]:
-    from cfmkit.studies.batch import message
-
-    required = [{"spec": one.spec, **requirement} for one in entries for requirement in one.requirements]
-    return {
-        "status": "complete" if code is ExitCode.OK else code.name.lower(),
-        "message": message(entries),
-        "metrics": {},
-        "requirements": required,
-        "warnings": [{"spec": one.spec, **item} for one in entries for item in one.warnings],
-        "specs": [one.as_json() for one in entries],
-        **({"compared": compared.as_json()} if compared is not None else {}),
-    }

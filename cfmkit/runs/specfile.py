@@ -222,7 +222,7 @@ def _design_faults(document: Document, spec: Spec) -> Iterator[Problem]:
 
     design = getattr(spec, "design", None)  # a family need not have this block, nor another package's these keys
     if isinstance(design, DesignKeys):
-        from cfmkit.studies.made_parts import faults
+        from cfmkit.studies.design_tolerances import faults
 
         for path, message in faults(spec, design):
             yield document.problem(path, message)

@@ -16,8 +16,8 @@ from cfmkit.families import family
 from cfmkit.metrics import window_of
 from cfmkit.specs.spec import DesignKeys
 from cfmkit.specs.units import format_short
+from cfmkit.studies.design_tolerances import tolerances_of
 from cfmkit.studies.expected_yield import MOST_ANALYSES, MOST_LOOKS
-from cfmkit.studies.made_parts import tolerances_of
 from cfmkit.studies.process_tolerances import assumed, tolerances
 from cfmkit.studies.requirement_rows import sampled_of
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.families.base import Run
     from cfmkit.results import Result
-    from cfmkit.studies.made_parts import Tolerances
+    from cfmkit.studies.design_tolerances import Tolerances
 
 PARTS, SHARE = 4000, 0.95
 """Parts that are drawn, and the share of them whose forces are named."""

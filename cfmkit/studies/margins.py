@@ -22,7 +22,7 @@ from cfmkit.errors import Problem as Fault
 from cfmkit.families import family
 from cfmkit.families.base import Run, function_named
 from cfmkit.results import Design, Status
-from cfmkit.studies.made_parts import tolerances_of
+from cfmkit.studies.design_tolerances import tolerances_of
 from cfmkit.studies.requirement_rows import Rows, numbers_of, places_of, rows_of, sampled_of
 from cfmkit.studies.sensitivity.intervals import clopper_pearson
 from cfmkit.studies.spec_values import CannotVary, leaf
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.results import Result
     from cfmkit.specs.spec import Spec
-    from cfmkit.studies.made_parts import Tolerances
+    from cfmkit.studies.design_tolerances import Tolerances
     from cfmkit.studies.sensitivity.parameters import Parameter
 
 

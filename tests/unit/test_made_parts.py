@@ -12,7 +12,8 @@ from cfmkit.cli.main import main
 from cfmkit.errors import SpecError
 from cfmkit.families.base import Run
 from cfmkit.runs.run import analysed, designed
-from cfmkit.studies.made_parts import common, judge, tolerances_of
+from cfmkit.studies.design_tolerances import tolerances_of
+from cfmkit.studies.made_parts import common, judge
 
 TOLERANCES = {"mechanism.springs.stiffness": {"normal": "1.2 %"}, "mechanism.rolling_friction": {"normal": "10 %"}}
 

@@ -1,0 +1,130 @@
+"""The tolerances that a design block states, and the parts that are drawn from them.
+
+Parts are drawn as `cfmkit sensitivity --method tolerance` draws them, with the same grammar.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.errors import SpecError
+from cfmkit.specs.spec import Sensitivity
+from cfmkit.studies.sensitivity.parameters import correlations, groups, parameters_of
+from cfmkit.studies.sensitivity.spreads import draw, values_at
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from cfmkit.arrays import FloatArray
+    from cfmkit.specs.spec import DesignBlock, Spec
+    from cfmkit.studies.sensitivity.parameters import Parameter
+
+
+@dataclass(frozen=True)
+class Tolerances:
+    """The tolerances of a `design` block on one specification.
+
+    Attributes
+    ----------
+    spec : Spec
+        What is made.
+    block : Sensitivity
+        The tolerances in the block that studies know.
+    parameters : tuple of Parameter
+        What varies, lists taken apart.
+    samples, seed : int
+        How many parts are drawn, and from where.
+    """
+
+    spec: Spec
+    block: Sensitivity
+    parameters: tuple[Parameter, ...]
+    samples: int
+    seed: int
+
+    @property
+    def paths(self) -> tuple[str, ...]:
+        """What varies."""
+        return tuple(one.path for one in self.parameters)
+
+    @property
+    def nominal(self) -> FloatArray:
+        """The values of a perfect part [SI]."""
+        return np.array([one.spread.nominal for one in self.parameters])
+
+    def drawn(self, samples: int | None = None, seed: int | None = None) -> FloatArray:
+        """Return the values of made parts, (n, d) [SI]; of another seed those that no search has seen."""
+        generator = np.random.default_rng(self.seed if seed is None else seed)
+        unit = draw(correlations(self.block, self.paths), samples or self.samples, generator)
+        return values_at([one.spread for one in self.parameters], unit)
+
+    def joined(self) -> list[tuple[int, ...]]:
+        """Return the parameters that deviate as one: those correlated by 1 together, each other one alone."""
+        many = [members for members, correlation in groups(self.block, self.paths) if correlation == 1.0]
+        taken = {k for members in many for k in members}
+        return [*many, *((k,) for k in range(len(self.parameters)) if k not in taken)]
+
+
+def tolerances_of(spec: Spec, design: DesignBlock, seed: int) -> Tolerances | None:
+    """Return the tolerances of a `design` block on a specification, or those of its process; None where it has none.
+
+    Raises
+    ------
+    cfmkit.errors.SpecError
+        If a path is not in the specification, at ``design.tolerances`` and the path.
+    """
+    stated = stated_tolerances(spec, design)
+    if not stated:
+        return None
+    block = Sensitivity.model_construct(method="tolerance", parameters=stated, correlated=design.correlated, metrics=())
+    try:
+        parameters = parameters_of(spec, block)
+    except SpecError as error:
+        raise SpecError([replace(one, path=_renamed(one.path)) for one in error.problems]) from None
+    chosen = seed if design.seed is None else design.seed
+    return Tolerances(spec, block, parameters, design.samples, chosen)
+
+
+def stated_tolerances(spec: Spec, design: DesignBlock) -> dict[str, Any]:
+    """Return the tolerances that a `design` block gives, else those assumed of the process that it names."""
+    if design.tolerances or design.process is None:
+        return dict(design.tolerances or {})
+    from cfmkit.studies.process_tolerances import tolerances
+
+    return tolerances(spec)
+
+
+def _renamed(path: str) -> str:
+    """Return where a fault of a block `sensitivity` stands in a block `design`."""
+    head, _, rest = path.partition(".parameters.")
+    return f"design.tolerances.{rest}" if rest else head.replace("sensitivity", "design", 1)
+
+
+def faults(spec: Spec, design: DesignBlock) -> Iterator[tuple[tuple[str | int, ...], str]]:
+    """Yield what is wrong with a block's keys on made parts as far as that can be seen before anything is designed."""
+    from cfmkit.studies.spec_values import CannotVary, leaf
+
+    for path in design.tolerances or ():
+        try:
+            found = leaf(type(spec), path.replace(".*", ".0"))
+        except CannotVary as problem:
+            yield ("design", "tolerances", path), str(problem)
+            continue
+        if found.kind not in ("quantity", "number"):
+            yield ("design", "tolerances", path), f"{path!r} does not vary continuously"
+    for path in design.free:
+        try:
+            leaf(type(spec), path)
+        except CannotVary as problem:
+            yield ("design", "free", path), str(problem)
+    if design.robust is not None and getattr(design, "yield") is None:
+        yield ("design", "robust"), "says how a yield is reached: give 'design.yield', too"
+    made = design.tolerances or design.process
+    if getattr(design, "yield") is not None and not made:
+        yield ("design", "yield"), "a yield is a share of made parts: say with 'design.tolerances' how they are made"
+    if design.tolerances and not spec.part_requirements:
+        told = "whether a part is good is what 'requirements' decide: give at least one beside that on the yield"
+        yield ("design", "tolerances"), told
