@@ -58,9 +58,7 @@ def propose(wish: Wish, run: Run) -> Offer:
     if wish.kind == "torque":
         return Offer(reason="a cam with rollers gives a force at its slider, no torque")
     if wish.adjustable is not None:
-        return Offer(
-            reason="the force of a cam is fixed by its springs: nothing adjusts it", nearest={"adjustable": "none"}
-        )
+        return Offer(reason="the force of a cam is fixed by its springs: nothing adjusts it")
     draw = np.random.default_rng(run.seed).uniform(size=(DRAWN, 5)).T
     found = _sized(wish, draw)
     fitting = found["fits"] & found["flat"] & found["lossless"]

@@ -46,7 +46,7 @@ SAFETY = 1.03
 LITTLE = 0.02
 """Adjustment, over the force, where none is wished: every such mechanism has one."""
 
-OFFERED = 12
+OFFERED = 20
 
 
 def propose(wish: Wish, run: Run) -> Offer:
@@ -80,8 +80,10 @@ def _varied(found: list[Candidate]) -> list[Candidate]:
     """Return candidates, those of different numbers of Vs by turns."""
     kinds = list(dict.fromkeys(one.variant for one in found))
     rows = [[one for one in found if one.variant == kind] for kind in kinds]
-    longest = max(map(len, rows))
-    return [row[k] for k in range(longest) for row in rows if k < len(row)]
+    # the smallest first, then larger ones, which are flatter
+    turns = [[row[len(row) * part // 8] for part in (0, 4, 2, 6, 1, 7)] for row in rows]
+    mixed = [row[k] for k in range(6) for row in turns]
+    return [one for number, one in enumerate(mixed) if all(one is not other for other in mixed[:number])]
 
 
 def _designs(wish: Wish, material: dict[str, Any]) -> Any:
