@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from cfmkit.runs.specfile import STDIN, content, standard_input
+from cfmkit.errors import SpecError
+from cfmkit.runs.specfile import STDIN, content, renamed, standard_input
 from cfmkit.specs.yamlio import read_document
 from cfmkit.suggest.spec import WishFile
 
@@ -35,4 +36,10 @@ def wish_of(name: str | None, keys: Mapping[str, str]) -> WishBlock:
         document = read_document(standard_input() if name == STDIN else content(name), name)
     for key, value in keys.items():
         document = document.set(f"wish.{key}={value}")
-    return document.bind(WishFile).wish
+    try:
+        return document.bind(WishFile).wish
+    except SpecError as error:
+        told = error
+    for key in keys:
+        told = renamed(told, f"--set wish.{key}", f"--{key}")
+    raise told
