@@ -120,8 +120,10 @@ class Cli:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
 
-    def __call__(self, *arguments: str, stdin: str | bytes = "", **environment: str) -> Outcome:
-        """Run a command in this process."""
+    def __call__(
+        self, *arguments: str, stdin: str | bytes = "", timeout: float | None = None, **environment: str
+    ) -> Outcome:
+        """Run a command in this process; `timeout` is that of `program`, and nothing ends this process."""
         given = stdin.encode() if isinstance(stdin, str) else stdin
         with as_the_process(self.folder, self.environment(**environment), given) as (out, err):
             code = main(arguments)
