@@ -138,8 +138,9 @@ def place(point: complex) -> str:
 
 
 def flat_points(chain: ArcChain) -> Any:
-    """Return points (n, 2) on the chain [m], no farther than `SAGITTA` from it in between."""
-    points = chain.flattened(SAGITTA)
+    """Return points (n, 2) on the chain [m], no farther than `SAGITTA` from it in between, or 1e-8 of a large one."""
+    extent = float(np.ptp(chain.nodes.real) + np.ptp(chain.nodes.imag))
+    points = chain.flattened(max(SAGITTA, 1e-8 * extent))
     return np.column_stack([points.real, points.imag])
 
 
