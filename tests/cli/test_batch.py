@@ -41,6 +41,10 @@ def batch(cli, *arguments: str, quick: bool = True):
     return cli("batch", *arguments, "-o", "out", *(("--no-plots", "-j", "1") if quick else ()))
 
 
+STARTS = {"beam_lan2010_yield"}
+"""Studies of a published shape that misses its requirements as it stands, which is why it is to be moved."""
+
+
 @pytest.mark.parametrize(
     ("folder", "verb"),
     [
@@ -52,13 +56,17 @@ def batch(cli, *arguments: str, quick: bool = True):
 )
 def test_the_configurations_of_the_package_pass_as_a_batch(cli, folder, verb):
     done = cli("batch", str(CONFIGS / folder), "-o", "out", "--no-plots", "--junit", "reports/cfmkit.xml", *verb)
-    assert done.code == 0, done.out + done.err
-    found = rows(cli)
-    assert len(found) == len([path for path in (CONFIGS / folder).rglob("*.yaml") if path.name != "figure.yaml"])
+    start = STARTS if "analyze" in verb else set()
+    assert done.code == (5 if start else 0), done.out + done.err
+    found = [row for row in rows(cli) if Path(row["folder"]).name not in start]
+    assert len(found) == len(rows(cli)) - len(start)
+    passed = {path.stem for path in (CONFIGS / folder).rglob("*.yaml")} - {"figure"} - start
+    assert len(found) == len(passed)
     assert {row["status"] for row in found} == {"complete"}
     assert all(int(row["requirements"]) > 0 and row["missed"] == "0" for row in found)
     root = ElementTree.parse(cli.folder / "reports" / "cfmkit.xml").getroot()
-    assert root.get("failures") == root.get("errors") == root.get("skipped") == "0"
+    assert int(root.get("failures")) == sum(int(row["missed"]) for row in rows(cli))
+    assert root.get("errors") == root.get("skipped") == "0"
     for row in found:
         assert (cli.folder / "out" / row["folder"] / "manifest.json").exists()
         assert (cli.folder / "out" / row["folder"] / "design.yaml").exists() == (row["verb"] == "design")
@@ -262,7 +270,8 @@ def test_ctrl_c_writes_what_there_is_and_exits_130(cli):
 
 def test_the_workflows_to_copy_are_yaml_and_their_command_works(cli):
     text = (CONFIGS.parent / "docs" / "ci.md").read_text()
-    github, gitlab = (yaml.safe_load(block) for block in re.findall("^```yaml\n(.*?)^```", text, re.M | re.S))
+    blocks = [yaml.safe_load(block) for block in re.findall("^```yaml\n(.*?)^```", text, re.M | re.S)]
+    github, gitlab = (next(block for block in blocks if key in block) for key in ("jobs", "mechanisms"))
     steps = [step["run"] for step in github["jobs"]["requirements"]["steps"] if "run" in step]
     commands = [line for line in (*steps, *gitlab["mechanisms"]["script"]) if line.startswith("cfmkit")]
     assert len(commands) == 2
