@@ -54,6 +54,15 @@ class Seen(Protocol):
         """Return the numbers of a part (q,) whose design has the values x (n,) and whose errors are (d,); or None."""
 
 
+def never() -> bool:
+    """Return that there is time enough: no search is late."""
+    return False
+
+
+def unheard(_share: float, _steps: int) -> None:
+    """Take how far a search is, and tell nobody."""
+
+
 @dataclass(frozen=True)
 class Problem:
     """What may vary, what errors there are, and what must hold.
@@ -88,8 +97,8 @@ class Problem:
     constant: FloatArray
     about: NDArray[np.int64]
     share: float
-    late: Callable[[], bool] = lambda: False
-    tell: Callable[[float, int], None] = lambda _share, _steps: None
+    late: Callable[[], bool] = never
+    tell: Callable[[float, int], None] = unheard
 
     @property
     def reach(self) -> FloatArray:

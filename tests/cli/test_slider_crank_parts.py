@@ -39,10 +39,11 @@ def test_springs_flexures_and_strip_stand_side_by_side_with_their_differences(cl
     assert (cli.folder / "out/figures/fidelity.png").read_bytes().startswith(b"\x89PNG")
     table = read_csv((cli.folder / "out/curve.csv").read_bytes())
     names = np.array(table["fidelity"])
-    assert list(dict.fromkeys(names.tolist())) == ["beam", "prb", "lumped"]
+    assert list(dict.fromkeys(names.tolist())) == ["beam", "prb", "lumped", "solid"]
     force = {name: np.array(table["force [N]"], dtype=float)[names == name][-1] for name in set(names.tolist())}
     assert abs(force["prb"] / force["lumped"] - 1) < 5e-3
     assert 0.27 < force["beam"] - force["lumped"] < 0.31
+    assert abs(force["solid"] / force["beam"] - 1) < 0.02
     told = json.loads((cli.folder / "out/metrics.json").read_text())["metrics"]
     assert told["fidelity_mean[lumped]"]["value"] < -0.28
 

@@ -635,3 +635,10 @@ def test_the_stress_stroke_is_where_the_pressed_chain_has_the_allowable_stress()
     place = one.values["stress_stroke"].value
     path = one.state.chain.press(np.array([place])).path
     assert path.peak_stress().value[path.at_requested[0]] == pytest.approx(42.5e6, rel=1e-6)
+
+
+@pytest.mark.parametrize("name", ["lumped", "strip"])
+def test_friction_that_a_part_of_one_piece_leaves_out_is_said(name: str) -> None:
+    spec = cfmkit.load(CONFIGS / f"slider_crank_{name}.yaml").replace({"mechanism.guide": {"friction": 0.1}})
+    found = {warning.name: warning.message for warning in cfmkit.analyze(spec).warnings}
+    assert "'mechanism.guide' counts in the model with springs only" in found["friction_left_out"]

@@ -10,6 +10,7 @@ from vcfm_support import CONFIGS, MM, analyzed, leaf, table_i
 
 import cfmkit
 from cfmkit import api
+from cfmkit.errors import GeometryError
 from cfmkit.export import files
 from cfmkit.families.base import Block, Measure
 from cfmkit.families.vcfm.build import parts
@@ -450,3 +451,9 @@ def test_the_ends_of_a_window_have_the_force_of_the_model(points):
     wanted = solution.sampler.leaf_force(np.array([low, high])) + solution.sampler.spring(np.array([low, high]))[0]
     assert inside[[0, -1]] == pytest.approx(wanted, rel=1e-14)
     assert np.isnan(solution.force_at(solution.nominal, np.array([-1e-3, 1.0]))).all()
+
+
+def test_a_bend_that_is_tighter_than_its_leaf_is_thick_is_not_drawn():
+    spec = cfmkit.load(CONFIGS / "vcfm_u_shape.yaml").replace({"mechanism.positive.radius": 1e-6})
+    with pytest.raises(GeometryError, match="use a radius above 0.75 mm"):
+        cfmkit.export(spec)

@@ -23,6 +23,7 @@ FINDINGS = {
     "reference_zero": "the effort at the reference is zero: no band around it exists",
     "reference_outside": "the reference is outside the motion",
     "stretched_outside_window": "the window does not contain the stretched position, around which efforts are constant",
+    "friction_left_out": "the model of a one-piece part leaves out friction that is specified",
     "self_locks": "friction holds the mechanism: no force, however large, moves it",
     "force_unbounded": "towards the stretched position the force grows without bound",
     "stretched_start": "the slider starts stretched: a column that gives way at once, to either side",

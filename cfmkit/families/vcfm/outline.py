@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.errors import GeometryError
 from cfmkit.export.fillets import filleted, sharp_notes
 from cfmkit.export.geometry import (
     TOLERANCE,
@@ -262,6 +263,11 @@ def _bend(spec: VcfmSpec, top: float) -> tuple[list[Item], list[Item], float]:
     """Return the same of a U-shaped chain."""
     about, frame = spec.mechanism.positive, spec.mechanism.frame
     half, v, radius = 0.5 * frame.block, 0.5 * about.thickness, float(about.radius or 0.0)
+    if radius <= v:
+        raise GeometryError(
+            f"a bend of radius {mm(radius)} cannot be cut in a leaf of {mm(about.thickness)}: its inside would cross "
+            f"itself; use a radius above {mm(v)} ('mechanism.positive.radius')"
+        )
     high, x = top - frame.block, 0.5 * frame.block + about.length
     center, base = (x, high - radius), high - 2.0 * radius
     edges: list[list[Item]] = []

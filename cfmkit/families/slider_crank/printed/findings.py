@@ -41,9 +41,21 @@ def findings_of(spec: SliderCrankSpec, solution: Solution) -> tuple[Finding, ...
             *_kink(spec, solution),
             *_making(spec, solution),
             *_guide(solution),
+            *friction_left_out(spec),
             *_opinion(solution),
         )
     )
+
+
+def friction_left_out(spec: SliderCrankSpec) -> Iterator[Finding]:
+    """Yield what to say of friction that is specified: a part of one piece has no pins, and its guide is ideal here."""
+    stated = [f"'mechanism.{name}'" for name in ("pins", "guide") if getattr(spec.mechanism, name) is not None]
+    if stated:
+        yield finding(
+            "friction_left_out",
+            f"{' and '.join(stated)} {'counts' if len(stated) == 1 else 'count'} in the model with springs only: the "
+            "force of the part of one piece is that without friction",
+        )
 
 
 def _strength(solution: Solution) -> Iterator[Finding]:

@@ -22,6 +22,7 @@ from cfmkit.families.slider_crank.build import linkage_of, resolve, unloaded_ang
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.printed.assembly import elasticity, pins_of, travel_direction
 from cfmkit.families.slider_crank.printed.chain import kink
+from cfmkit.families.slider_crank.printed.findings import friction_left_out
 from cfmkit.families.slider_crank.printed.model import as_run
 from cfmkit.families.slider_crank.printed.outline import solved_piece
 from cfmkit.families.slider_crank.printed.solution import first_at
@@ -137,7 +138,7 @@ def analyze(spec: SliderCrankSpec, run: Run) -> Result:
     reached = read_only(asked[asked <= fine.course.travel[-1] * (1 + 1e-12)])
     solution = SolidSolution(spec, fine, coarse, reached, pins_of(spec.mechanism, linkage, unloaded))
     complete = fine.course.ending is Ending.COMPLETE
-    found = tuple(_findings(solution))
+    found = (*_findings(solution), *friction_left_out(spec))
     return Result(
         spec=spec,
         status=Status.COMPLETE if complete else Status.PARTIAL,
