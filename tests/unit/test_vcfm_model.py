@@ -455,5 +455,5 @@ def test_the_ends_of_a_window_have_the_force_of_the_model(points):
 
 def test_a_bend_that_is_tighter_than_its_leaf_is_thick_is_not_drawn():
     spec = cfmkit.load(CONFIGS / "vcfm_u_shape.yaml").replace({"mechanism.positive.radius": 1e-6})
-    with pytest.raises(GeometryError, match="use a radius above 0.75 mm"):
+    with pytest.raises(GeometryError, match="use a radius above 0"):
         cfmkit.export(spec)
