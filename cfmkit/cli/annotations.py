@@ -10,7 +10,7 @@ from cfmkit.errors import CfmError
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
-    from cfmkit.studies.batch import Entry
+    from cfmkit.studies.batch_entries import Entry
     from cfmkit.studies.changes import Change
 
 PLACED = re.compile(r"(?P<file>.*?):(?P<line>\d+):(?P<col>\d+): (?P<told>.*)", re.DOTALL)

@@ -8,8 +8,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from cfmkit.export.arc_outlines import outlines
+from cfmkit.export.contours import TOLERANCE
 from cfmkit.export.dxf import dxf_bytes, write_dxf
-from cfmkit.export.geometry import TOLERANCE
 from cfmkit.export.kerf import with_kerf
 from cfmkit.export.layers import check_name
 from cfmkit.export.points import write_points
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from cfmkit.export.arc_outlines import Outline
-    from cfmkit.export.geometry import Drawing
+    from cfmkit.export.contours import Drawing
 
 __all__ = ["FORMATS", "TOLERANCE", "USUAL", "files", "write_dxf", "write_points", "write_svg"]
 

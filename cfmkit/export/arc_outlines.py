@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.errors import GeometryError
-from cfmkit.export.geometry import TOLERANCE, Arc, Contour, Drawing, Edge, Line
+from cfmkit.export.contours import TOLERANCE, Arc, Contour, Drawing, Edge, Line
 from cfmkit.numerics.arc_chain import ArcChain
 from cfmkit.numerics.biarcs import CoarseDataError, fit_arcs
 from cfmkit.specs.units import format_short, to_border

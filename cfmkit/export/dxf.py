@@ -20,7 +20,7 @@ import numpy as np
 
 from cfmkit.errors import OutputError
 from cfmkit.export.arc_outlines import Outline, flat_points, outlines
-from cfmkit.export.geometry import TOLERANCE
+from cfmkit.export.contours import TOLERANCE
 from cfmkit.export.layers import LayerLook, looks
 from cfmkit.specs.units import to_border
 
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
     from types import ModuleType
 
-    from cfmkit.export.geometry import Drawing
+    from cfmkit.export.contours import Drawing
 
 _MILLIMETRES, _METRIC = 4, 1
 _DIGITS = 9  # of coordinates [mm]: a picometre, the scale of rounding errors

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cfmkit.export.arc_outlines import Outline
-    from cfmkit.export.geometry import Sheet
+    from cfmkit.export.contours import Sheet
 
 SPECK = 1e-13
 """Faces smaller than this are rounding, where the edge of a region runs along the edge of the part [m2]."""

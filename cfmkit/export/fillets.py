@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.export.geometry import Arc, Contour, Line, Smooth
+from cfmkit.export.contours import Arc, Contour, Line, Smooth
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.export.geometry import Edge
+    from cfmkit.export.contours import Edge
 
 SMOOTH = math.radians(0.5)
 """Where the direction turns by less than this the edges are tangent: nothing to round [rad]."""

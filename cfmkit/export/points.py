@@ -8,7 +8,7 @@ from cfmkit.errors import GeometryError
 from cfmkit.export.layers import check_name
 
 if TYPE_CHECKING:
-    from cfmkit.export.geometry import Drawing
+    from cfmkit.export.contours import Drawing
 
 
 def write_points(drawing: Drawing) -> dict[str, bytes]:

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from types import ModuleType
 
     from cfmkit.export.arc_outlines import Outline
-    from cfmkit.export.geometry import Region, Sheet
+    from cfmkit.export.contours import Region, Sheet
 
 STRAIGHT = 1e-6
 """Arcs that rise less over their chord are lines: less than a CAD kernel can tell [mm]."""

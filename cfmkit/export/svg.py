@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.export.arc_outlines import Outline, flat_points, outlines
-from cfmkit.export.geometry import TOLERANCE
+from cfmkit.export.contours import TOLERANCE
 from cfmkit.export.layers import LayerLook, check_name, looks
 from cfmkit.specs.units import to_border
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from cfmkit.export.geometry import Drawing
+    from cfmkit.export.contours import Drawing
 
 _MARGIN = 5.0  # around the drawing [mm]
 _STROKE = 0.25  # width of every line [mm]

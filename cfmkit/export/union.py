@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.errors import GeometryError
-from cfmkit.export.geometry import Contour, Line
+from cfmkit.export.contours import Contour, Line
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

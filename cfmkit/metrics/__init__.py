@@ -2,7 +2,7 @@
 
 `table` lists what there is, `known` what a name may mean, `flatness` and `ranges` compute it, `traces` cuts
 windows, `branch_views` is what a metric looks at, `evaluation` runs the table over a
-curve, `requirements` compares with bounds, `report` writes border units.
+curve, `requirements` compares with bounds, `metrics_json` writes border units.
 """
 
 from cfmkit.metrics.branch_views import Branch, Cycle, Frame
@@ -18,7 +18,7 @@ from cfmkit.metrics.evaluation import (
     window_of,
     windows_judged,
 )
-from cfmkit.metrics.report import as_json, metrics_json, search_json
+from cfmkit.metrics.metrics_json import as_json, metrics_json, search_json
 from cfmkit.metrics.requirements import Outcome, check, requirement_problems, validate_requirements
 from cfmkit.metrics.table import (
     TABLE,

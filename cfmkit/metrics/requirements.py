@@ -11,7 +11,7 @@ import numpy as np
 from cfmkit.errors import Problem, QuantityError, SpecError
 from cfmkit.metrics.branch_views import span_text
 from cfmkit.metrics.evaluation import Survey, Surveys, Value, kind_of, survey_of, window_of
-from cfmkit.metrics.report import finite_border
+from cfmkit.metrics.metrics_json import finite_border
 from cfmkit.metrics.table import Definition, branch_fault, known_metrics, split_name, unknown_metric
 from cfmkit.specs.many_parts import OF_MANY_PARTS
 from cfmkit.specs.units import DIMENSIONS, SHARE, border_unit, format_short, read_one_of, to_border

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from cfmkit.plots.layout import laid_out, noted
+from cfmkit.plots.box_stretching import laid_out, noted
 from cfmkit.plots.style import MM, NORMAL, is_to_scale, size_mm, styled, with_settings
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.export.geometry import Arc, Dimension, Line, Smooth
+from cfmkit.export.contours import Arc, Dimension, Line, Smooth
 from cfmkit.plots.parts import mm
 from cfmkit.plots.style import GREY, INK, NORMAL, SMALL, VERMILLION, axes_mm, new_figure, styled
 from cfmkit.specs.units import format_short
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.export.geometry import Contour, Drawing, Edge
+    from cfmkit.export.contours import Contour, Drawing, Edge
 
 PAPER = (240.0, 165.0)
 """Of the figure [mm]: a landscape A4 sheet within its margins, less a caption."""

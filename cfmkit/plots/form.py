@@ -56,7 +56,7 @@ class FigureForm:
 
     def draw(self, make: Callable[[], Figure]) -> Figure:
         """Return a figure in this form."""
-        from cfmkit.plots.layout import laid_out, noted
+        from cfmkit.plots.box_stretching import laid_out, noted
         from cfmkit.plots.style import is_to_scale, with_settings
 
         with with_settings(self.settings, self.titles):

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.results import Result
-    from cfmkit.solid.part import MeshSolution
+    from cfmkit.solid.meshed_part import MeshSolution
 
 WIDE, BESIDE, ABOVE = 140.0, 110.0, 62.0
 """Room for the parts: across, and in height where they stand beside or above each other [mm]."""

@@ -17,7 +17,7 @@ from cfmkit.runs import batch_files
 from cfmkit.runs.run import Outcome, Request, Verb, analysed, designed, journal_of, long_run, spec_of
 from cfmkit.runs.run import carry_out as carried_out
 from cfmkit.runs.run_findings import worst
-from cfmkit.studies.batch import LEFT, Entry
+from cfmkit.studies.batch_entries import LEFT, Entry
 from cfmkit.studies.changes import TOLERANCE, Comparison, earlier, gone
 from cfmkit.studies.changes import changes as changes_of
 
@@ -310,14 +310,14 @@ class BatchResult:
     @property
     def table(self) -> Table:
         """What results.csv says: one row per specification."""
-        from cfmkit.studies.batch import results_table
+        from cfmkit.studies.batch_entries import results_table
 
         return results_table(self.entries)
 
     @property
     def requirements(self) -> Table:
         """What requirements.csv says: one row per requirement."""
-        from cfmkit.studies.batch import requirements_table
+        from cfmkit.studies.batch_entries import requirements_table
 
         return requirements_table(self.entries)
 
@@ -409,7 +409,7 @@ def batch(
     """
     from cfmkit.runs.specfile import addressed
     from cfmkit.store import RunFolder
-    from cfmkit.studies.batch import folders, sources
+    from cfmkit.studies.batch_entries import folders, sources
     from cfmkit.studies.finished_runs import KeptRuns
     from cfmkit.studies.junit import junit as junit_of
     from cfmkit.studies.junit import prepared

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from cfmkit.store import RunFolder
-    from cfmkit.studies.batch import Entry
+    from cfmkit.studies.batch_entries import Entry
     from cfmkit.studies.changes import Comparison
 
 
@@ -32,7 +32,7 @@ def write(
     folder: RunFolder, entries: Sequence[Entry], about: dict[str, Any], page: bool, compared: Comparison | None = None
 ) -> tuple[str, ...]:
     """Write what a batch found out, and return the names of the files."""
-    from cfmkit.studies.batch import message, requirements_table, results_table
+    from cfmkit.studies.batch_entries import message, requirements_table, results_table
     from cfmkit.tables import to_csv
     from cfmkit.tables.jsontext import json_bytes
 
@@ -51,7 +51,7 @@ def write(
 
 def data(entries: Sequence[Entry], code: ExitCode, compared: Comparison | None = None) -> dict[str, Any]:
     """Return what metrics.json says."""
-    from cfmkit.studies.batch import message
+    from cfmkit.studies.batch_entries import message
 
     required = [{"spec": one.spec, **requirement} for one in entries for requirement in one.requirements]
     return {

@@ -12,7 +12,7 @@ from cfmkit.runs.run_page import ENDS, NAME, part, template
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from cfmkit.studies.batch import Entry
+    from cfmkit.studies.batch_entries import Entry
 
 
 def page(entries: Sequence[Entry], message: str, command: str) -> bytes:

@@ -6,12 +6,12 @@ import re
 from typing import TYPE_CHECKING
 
 from cfmkit.errors import ExitCode
-from cfmkit.studies.batch import message, outcome
+from cfmkit.studies.batch_entries import message, outcome
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from cfmkit.studies.batch import Entry
+    from cfmkit.studies.batch_entries import Entry
     from cfmkit.studies.changes import Comparison
 
 MOST_CHANGES = 50

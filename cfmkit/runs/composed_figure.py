@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from cfmkit.plots.composed import DrawnPanel
-    from cfmkit.specs.figure import ComposedFigure, Panel
+    from cfmkit.specs.composed_figure import ComposedFigure, Panel
     from cfmkit.specs.spec import Spec
     from cfmkit.studies.executors import Executor
 
@@ -34,7 +34,7 @@ def read(name: str, changes: tuple[str, ...] = ()) -> ComposedFigure:
     cfmkit.errors.SpecError
         With every problem in it.
     """
-    from cfmkit.specs.figure import ComposedFigure
+    from cfmkit.specs.composed_figure import ComposedFigure
 
     return read_spec(name, changes).bind(ComposedFigure)
 

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.solid.part import Meshed, Part
-    from cfmkit.solid.supports import Group
+    from cfmkit.solid.meshed_part import Meshed, Part
+    from cfmkit.solid.rigid_groups import Group
 
 THIN = 0.1
 """Width of the deck's elements, in the thinnest place of the part at most: within 6e-4 of plane stress then."""

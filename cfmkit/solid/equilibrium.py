@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.solid.elements import Elements
-    from cfmkit.solid.supports import Supports
+    from cfmkit.solid.rigid_groups import Supports
 
 CLOSE = 1e-9
 """Largest force out of balance, in parts of the largest nodal force: Newton's last step is then below 1e-9, too."""

@@ -19,7 +19,7 @@ from cfmkit.store import Manifest, file_hash, origin, stable_hash
 from cfmkit.store.lock import LOCK
 from cfmkit.store.names import MANIFEST
 from cfmkit.store.transaction import RUN
-from cfmkit.studies.batch import Entry
+from cfmkit.studies.batch_entries import Entry
 
 if TYPE_CHECKING:
     from cfmkit.families.base import Notes

@@ -17,7 +17,7 @@ import cfmkit
 from cfmkit import api, families
 from cfmkit.cli.main import main
 from cfmkit.cli.verbs.new import template
-from cfmkit.export.geometry import Drawing
+from cfmkit.export.contours import Drawing
 from cfmkit.results import Status
 from cfmkit.runs import run_findings
 from cfmkit.runs.files import files

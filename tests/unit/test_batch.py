@@ -12,7 +12,7 @@ import pytest
 import cfmkit
 from cfmkit.errors import ExitCode, UsageError
 from cfmkit.store import RunFolder, file_hash, origin
-from cfmkit.studies.batch import Entry, folders, message, requirements_table, results_table, sources
+from cfmkit.studies.batch_entries import Entry, folders, message, requirements_table, results_table, sources
 from cfmkit.studies.finished_runs import KeptRuns
 from cfmkit.studies.journal import Journal
 from cfmkit.studies.junit import junit

@@ -16,7 +16,7 @@ from cfmkit.cli.annotations import github
 from cfmkit.cli.main import main
 from cfmkit.errors import ExitCode, UsageError
 from cfmkit.runs.batch_summary import summary
-from cfmkit.studies.batch import Entry
+from cfmkit.studies.batch_entries import Entry
 from cfmkit.studies.changes import Earlier, changes
 
 ROOT = Path(__file__).parents[2]

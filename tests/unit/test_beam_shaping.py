@@ -16,10 +16,10 @@ from cfmkit.elastica.model.beam import fit
 from cfmkit.families.base import Run
 from cfmkit.families.beam.findings import percent
 from cfmkit.families.beam.shaping.audit import NetworkScatter, audited, half_band, lines_cross, strict_share, tolerated
+from cfmkit.families.beam.shaping.blocking_limits import blocked, missed_by
 from cfmkit.families.beam.shaping.closer import looked_at
 from cfmkit.families.beam.shaping.design import shaped, task_of
 from cfmkit.families.beam.shaping.goals import Compared, Flattest, Widest
-from cfmkit.families.beam.shaping.infeasible import blocked, missed_by
 from cfmkit.families.beam.shaping.multistart import explored
 from cfmkit.families.beam.shaping.program import Shaping
 from cfmkit.families.beam.shaping.report import judged, written

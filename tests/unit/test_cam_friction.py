@@ -195,7 +195,7 @@ def test_distances_are_those_of_points_on_the_parts():
     assert gaps["slider and roller"][at] == pytest.approx(np.hypot(*(box - [x, y]).T).min() - 0.010, abs=1e-6)
     share = np.linspace(0, 1, 20001)[:, None]
     brace = share * [x, y] + (1 - share) * [0.0, pin]
-    from cfmkit.export.geometry import Arc
+    from cfmkit.export.contours import Arc
     from cfmkit.families.cam.outline import drawing
 
     holes = [
@@ -210,7 +210,7 @@ def test_distances_are_those_of_points_on_the_parts():
 
 
 def test_inside_corners_have_the_radius_of_the_tool_where_there_is_room():
-    from cfmkit.export.geometry import Arc, polygons
+    from cfmkit.export.contours import Arc, polygons
     from cfmkit.families.cam.outline import drawing
 
     def outline(radius):

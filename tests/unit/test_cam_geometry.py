@@ -17,7 +17,7 @@ from cfmkit.families.cam.geometry.path import reach
 from cfmkit.families.cam.geometry.profile import SlopeLaw, brace_tangent
 from cfmkit.families.cam.geometry.track import Track
 from cfmkit.families.cam.geometry.track_records import NoTrack
-from cfmkit.families.refusals import CannotBuild
+from cfmkit.families.no_mechanism import CannotBuild
 
 SLOW = settings(deadline=None, max_examples=25)
 FAST = settings(deadline=None, max_examples=200)

@@ -9,9 +9,9 @@ from cam_support import cam, fixed
 import cfmkit
 from cfmkit.errors import SpecError
 from cfmkit.export.arc_outlines import outlines
-from cfmkit.export.geometry import Smooth
+from cfmkit.export.contours import Smooth
 from cfmkit.families import family
-from cfmkit.families.refusals import CannotBuild
+from cfmkit.families.no_mechanism import CannotBuild
 
 TURNS_AT_ONCE = {
     "brace_length": "1647.65 mm",

@@ -13,7 +13,7 @@ from cfmkit.plots.composed import composed
 from cfmkit.plots.form import FigureForm
 from cfmkit.plots.style import MM, size_mm
 from cfmkit.runs.composed_figure import panels, read
-from cfmkit.studies.batch import files_below
+from cfmkit.studies.batch_entries import files_below
 from cfmkit.studies.executors import serial
 
 STUDIES = Path("configs/studies")

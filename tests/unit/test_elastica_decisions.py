@@ -9,7 +9,14 @@ import numpy as np
 import pytest
 
 from cfmkit.elastica import CLAMPED, Beam, Control, Displacement, Event, Network, Node, PathStatus, Section, guided
-from cfmkit.elastica.continuation import at_bifurcation, bifurcation, branch_end, ending, joined_marches, limit_point
+from cfmkit.elastica.continuation import (
+    bifurcation,
+    branch_end,
+    ending,
+    joined_marches,
+    limit_point,
+    points_at_bifurcation,
+)
 from cfmkit.elastica.continuation.decisions import decided
 from cfmkit.elastica.continuation.state import BranchEnd, Leg, Problem, Resume, Stop, Stretch, Trail
 from cfmkit.elastica.equilibrium.mesh import Mesh
@@ -140,15 +147,15 @@ def test_a_branch_that_passes_the_end_at_a_distance_stays_a_branch():
 def test_points_at_a_bifurcation_count_as_reached_by_way_of_it():
     of = problem((1e-3, 2e-3, 2e-3 + 1e-9, 3e-3))
     path = trail(of, (0.01, 0, 0))
-    assert at_bifurcation.count(of, path, 0.02, 0.01) == 2
-    assert at_bifurcation.count(of, path, 0.015, 0.01) == 0
+    assert points_at_bifurcation.count(of, path, 0.02, 0.01) == 2
+    assert points_at_bifurcation.count(of, path, 0.015, 0.01) == 0
 
 
 def test_what_changes_the_inertia_and_is_not_found_is_looked_at_with_shorter_steps_then_told(monkeypatch):
     of = problem()
     path = trail(of, (0.01, 0, 0), (0.0101, -1, 1))
     monkeypatch.setattr(bifurcation, "fine_spot", lambda *_: None)
-    monkeypatch.setattr(bifurcation.at_bifurcation, "passed", lambda *_: None)
+    monkeypatch.setattr(bifurcation.points_at_bifurcation, "passed", lambda *_: None)
     monkeypatch.setattr(bifurcation, "uncondensed", lambda *_: None)
     for _ in range(2):
         move = bifurcation.crossed(of, path)

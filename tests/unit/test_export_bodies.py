@@ -12,8 +12,8 @@ import cfmkit
 from cfmkit.errors import GeometryError, UsageError
 from cfmkit.export import files
 from cfmkit.export.arc_outlines import outlines
+from cfmkit.export.contours import Drawing, Region, Sheet, circle, polygon
 from cfmkit.export.extrusion import bodies, plates
-from cfmkit.export.geometry import Drawing, Region, Sheet, circle, polygon
 
 SQUARE = polygon([(0, 0), (0.04, 0), (0.04, 0.02), (0, 0.02)], "cut")
 HOLE = circle((0.03, 0.01), 0.004, "cut", hole=True)

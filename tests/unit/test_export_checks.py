@@ -7,7 +7,7 @@ import pytest
 
 from cfmkit.errors import GeometryError, InputError
 from cfmkit.export.arc_outlines import outlines
-from cfmkit.export.geometry import Arc, Contour, Drawing, Line, Smooth, circle, polygon
+from cfmkit.export.contours import Arc, Contour, Drawing, Line, Smooth, circle, polygon
 
 SQUARE = polygon([(0, 0), (0.1, 0), (0.1, 0.1), (0, 0.1)], "cut")
 

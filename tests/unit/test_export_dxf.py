@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 
 from cfmkit.errors import GeometryError
 from cfmkit.export import files, write_dxf
-from cfmkit.export.geometry import Arc, Contour, Curve2D, Drawing, Line, Smooth, circle, polygon, reference_square
+from cfmkit.export.contours import Arc, Contour, Curve2D, Drawing, Line, Smooth, circle, polygon, reference_square
 
 BRACE, REST, CONSTANT, ROLLER = 0.2, 0.068, 0.015, 0.012
 

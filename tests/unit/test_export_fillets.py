@@ -12,8 +12,8 @@ import cfmkit
 from cfmkit import api
 from cfmkit.errors import SpecError
 from cfmkit.export.arc_outlines import outlines
+from cfmkit.export.contours import Arc, Contour, Drawing, Line, Smooth, polygon
 from cfmkit.export.fillets import filleted
-from cfmkit.export.geometry import Arc, Contour, Drawing, Line, Smooth, polygon
 
 ELL = [(0, 0), (0.04, 0), (0.04, 0.01), (0.01, 0.01), (0.01, 0.03), (0, 0.03)]
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from cfmkit.errors import GeometryError
 from cfmkit.export import files
 from cfmkit.export.arc_outlines import outlines
-from cfmkit.export.geometry import Arc, Contour, Drawing, Line, Smooth, circle, polygon
+from cfmkit.export.contours import Arc, Contour, Drawing, Line, Smooth, circle, polygon
 from cfmkit.export.kerf import with_kerf
 from cfmkit.numerics.arc_chain import ArcChain
 from cfmkit.numerics.parallel_curve import parallel

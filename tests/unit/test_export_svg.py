@@ -9,7 +9,7 @@ import pytest
 from cfmkit.errors import GeometryError
 from cfmkit.export import files, write_points, write_svg
 from cfmkit.export.arc_outlines import outlines
-from cfmkit.export.geometry import Arc, Contour, Curve2D, Drawing, Line, Smooth, circle, polygon
+from cfmkit.export.contours import Arc, Contour, Curve2D, Drawing, Line, Smooth, circle, polygon
 
 SVG = "{http://www.w3.org/2000/svg}"
 

@@ -60,7 +60,7 @@ def test_without_titles_the_heading_and_its_room_are_gone():
 
 
 def style_heading():
-    from cfmkit.plots.layout import HEADING
+    from cfmkit.plots.box_stretching import HEADING
 
     return HEADING
 

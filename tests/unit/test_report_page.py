@@ -17,7 +17,7 @@ from cfmkit.errors import ExitCode
 from cfmkit.families.slider_crank.dispatch import moving
 from cfmkit.results import Finding, Result, Status
 from cfmkit.runs import batch_page, run_findings, run_page, study_page
-from cfmkit.studies.batch import Entry
+from cfmkit.studies.batch_entries import Entry
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 HOSTILE = "</script><img src=x onerror=alert(1)> \"quoted\" & 'more'"

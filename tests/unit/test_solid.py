@@ -16,7 +16,7 @@ from cfmkit.solid.elements import Elements, equivalent
 from cfmkit.solid.equilibrium import Problem
 from cfmkit.solid.law import NeoHookean, SaintVenantKirchhoff
 from cfmkit.solid.mesh import Mesh, mesh
-from cfmkit.solid.supports import Group, Supports
+from cfmkit.solid.rigid_groups import Group, Supports
 
 E, NU = 2e9, 0.35
 HOOKE = SaintVenantKirchhoff(E, NU)

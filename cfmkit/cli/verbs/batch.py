@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from cfmkit.cli.page_blocks import Block
     from cfmkit.cli.terminal import Terminal
     from cfmkit.runs.batch import BatchResult
-    from cfmkit.studies.batch import Entry
+    from cfmkit.studies.batch_entries import Entry
     from cfmkit.studies.changes import Comparison
 
 PLACE = 26
@@ -95,7 +95,7 @@ def run(options: BatchOptions, terminal: Terminal) -> Answer:
     from cfmkit.cli import studies
     from cfmkit.cli.progress import watching
     from cfmkit.runs.batch import batch, unreached
-    from cfmkit.studies.batch import message
+    from cfmkit.studies.batch_entries import message
 
     start = studies.now()
     with watching(terminal, "specs") as progress:
@@ -176,7 +176,7 @@ MOST_CHANGES = 8
 
 def _page(found: BatchResult, written: Written, more: Sequence[str], everything: bool) -> Iterator[Block]:
     """Yield one line per specification, and what is wrong below it."""
-    from cfmkit.studies.batch import message
+    from cfmkit.studies.batch_entries import message
 
     entries = found.entries
     count = _reused(entries)
@@ -211,7 +211,7 @@ def _changes(compared: Comparison, everything: bool) -> Iterator[Block]:
 
 
 def _row(one: Entry) -> tuple[str | Span, ...]:
-    from cfmkit.studies.batch import outcome
+    from cfmkit.studies.batch_entries import outcome
 
     word = outcome(one)
     good = word == "ok"

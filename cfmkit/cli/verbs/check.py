@@ -60,7 +60,7 @@ def run(options: CheckOptions, terminal: Terminal) -> Answer:
 
 def _files(named: list[str]) -> list[str]:
     """Return the files to check: a folder stands for all YAML files in it and below, as in a batch."""
-    from cfmkit.studies.batch import files_below
+    from cfmkit.studies.batch_entries import files_below
 
     found: list[str] = []
     for name in named:

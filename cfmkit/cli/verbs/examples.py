@@ -12,7 +12,7 @@ from cfmkit.errors import UsageError, visible
 
 if TYPE_CHECKING:
     from cfmkit.cli.terminal import Terminal
-    from cfmkit.studies.batch import Entry
+    from cfmkit.studies.batch_entries import Entry
 
 PLACE = 52
 EXAMPLE = "cfmkit examples cam"

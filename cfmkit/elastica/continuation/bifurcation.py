@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.elastica.continuation import at_bifurcation, limit_point
-from cfmkit.elastica.continuation.at_bifurcation import NEAR_BIFURCATION
+from cfmkit.elastica.continuation import limit_point, points_at_bifurcation
 from cfmkit.elastica.continuation.branch_end import end_at, predicted_end
+from cfmkit.elastica.continuation.points_at_bifurcation import NEAR_BIFURCATION
 from cfmkit.elastica.continuation.state import Resume, Stop, fine_spot
 from cfmkit.elastica.continuation.switching import first_of_several, switched, well_before
 from cfmkit.elastica.continuation.uncondensed import uncondensed
@@ -52,7 +52,7 @@ def crossed(problem: Problem, trail: Trail) -> Move:
         if back is not None:
             trail, one = back, fine_spot(problem, back, -2)
     if natural and _at_it(problem, trail, -1, beyond, one):
-        behind = at_bifurcation.passed(problem, trail.up_to(-1), trail.drive)
+        behind = points_at_bifurcation.passed(problem, trail.up_to(-1), trail.drive)
         trail, beyond = (trail, None) if behind is None else (behind, fine_spot(problem, behind, -1))
         again = None if beyond is not None else uncondensed(problem, trail, 1)
         if again is not None:
@@ -62,7 +62,7 @@ def crossed(problem: Problem, trail: Trail) -> Move:
     fold = not natural and bool(senses[0] != senses[1])
     found = None
     if one is not None and beyond is not None:
-        found = at_bifurcation.located(problem, trail, one, beyond, fold)
+        found = points_at_bifurcation.located(problem, trail, one, beyond, fold)
         if found is not None and natural and _may_be_shorter(problem, trail):
             found = found if _on_one_path(problem, found, one, beyond) else None
     if found is None or one is None:
@@ -167,7 +167,7 @@ def _parted(problem: Problem, trail: Trail, found: Singular, one: Spot, other: S
     trail = trail.up_to(-1)
     trail = replace(trail, events=(*trail.events[:-1], replace(trail.events[-1], after=found.after)))
     name = f"bifurcated at {found.spot.drive * problem.unit:.6g}, sign {control.sign:+d}"
-    trail = at_bifurcation.opening(problem, trail, found, one, wide, name)
+    trail = points_at_bifurcation.opening(problem, trail, found, one, wide, name)
     left = _not_beyond(problem, trail, found, left, forward)
     trail = replace(trail, branch=name, closed=False).with_spot(left, -1)
     ending, closed = predicted_end(problem, trail, clear, found.before, forward, onto)
@@ -179,7 +179,7 @@ def _parted(problem: Problem, trail: Trail, found: Singular, one: Spot, other: S
 def _past(problem: Problem, trail: Trail, found: Singular, one: Spot, clear: Spot) -> Resume:
     """Stay on the path behind a bifurcation between `one` and the last point; go on from `clear`, there or beyond."""
     last = trail.points.take([-1])
-    trail = at_bifurcation.opening(problem, trail.up_to(-1), found, one, None, trail.branch)
+    trail = points_at_bifurcation.opening(problem, trail.up_to(-1), found, one, None, trail.branch)
     if last.requested[0] < trail.requested:
         last.requested[0] = -1.0  # it has just been added
     trail = trail.with_points(last)
@@ -299,7 +299,7 @@ def _taken_back(problem: Problem, trail: Trail, place: float) -> Trail | None:
         if names[last - 1] != names[-1]:
             break
         last -= 1
-    behind = at_bifurcation.passed(problem, trail.up_to(last + 1), place)
+    behind = points_at_bifurcation.passed(problem, trail.up_to(last + 1), place)
     if behind is None:
         return None
     far, here = behind.points.drive[[-1, last]] * problem.unit

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.elastica.continuation import at_bifurcation
+from cfmkit.elastica.continuation import points_at_bifurcation
 from cfmkit.elastica.continuation.state import PRIMARY, BranchEnd, Resume, Stop
 from cfmkit.elastica.equilibrium.meshed_network import Points
 from cfmkit.elastica.kernels.codes import DONE, INERTIA
@@ -45,7 +45,7 @@ def predicted_end(
         if not len(ahead):
             return None, True
         margin = 2.0 * max(
-            at_bifurcation.NEAR_BIFURCATION, min(problem.control.tolerance, _CLEAR)
+            points_at_bifurcation.NEAR_BIFURCATION, min(problem.control.tolerance, _CLEAR)
         )  # it may lie behind here
         step, behind = 0.02 * sense * span, ahead[-1] + margin * sense * span
         wide = np.abs(np.diff(ahead)) > margin * span  # requested points, even several, may lie at the end
@@ -84,13 +84,13 @@ def _fine_before(problem: Problem, points: Points) -> Spot | None:
 
 def _place(problem: Problem, trail: Trail, one: Spot, other: Spot) -> Singular | None:
     """Return the singular point between two equilibria, without its null vector."""
-    return at_bifurcation.located(problem, trail, one, other, vector=False)
+    return points_at_bifurcation.located(problem, trail, one, other, vector=False)
 
 
 def _room(problem: Problem, trail: Trail, place: float, sense: float) -> float:
     """Return how far from a bifurcation to go on, in one sense: not beyond the next requested point away from it."""
     ahead, span = (trail.stretch.targets - place) * sense, problem.span
-    nearest = ahead[ahead > at_bifurcation.NEAR_BIFURCATION * span].min(initial=np.inf)
+    nearest = ahead[ahead > points_at_bifurcation.NEAR_BIFURCATION * span].min(initial=np.inf)
     return 0.5 * float(min(2.0 * BEFORE_END * span, nearest))
 
 
@@ -125,16 +125,16 @@ def rejoined(problem: Problem, trail: Trail, spot: Spot, end: BranchEnd | None) 
     if solver.pose_change(spot.y, end.y) > 0.5 * apart:
         return Resume(replace(trail, ends=tuple(one for one in trail.ends if one is not end)), spot)
     sense = float(np.sign(end.drive - spot.drive))
-    near = at_bifurcation.count(problem, trail, end.drive, spot.drive)
+    near = points_at_bifurcation.count(problem, trail, end.drive, spot.drive)
     turn = trail.ahead[: near + 1]
     if near < len(turn) and ((turn - end.drive) * sense <= _ROUNDING * span).all():
-        return Resume(replace(at_bifurcation.closing(problem, trail, end, spot), branch=trail.branch), spot)
+        return Resume(replace(points_at_bifurcation.closing(problem, trail, end, spot), branch=trail.branch), spot)
     trail = replace(trail, closed=True, ends=())
     start = solver.solve(end.beyond.y, end.drive + sense * _room(problem, trail, end.drive, sense))
     if start is None or start.unstable > end.after:
         start = trail.settled_or_given(end.beyond)
     trail = trail.with_event(Event("bifurcation", end.drive * problem.unit, end.before, end.after))
-    trail = replace(at_bifurcation.closing(problem, trail, end, spot), branch=end.onto)
+    trail = replace(points_at_bifurcation.closing(problem, trail, end, spot), branch=end.onto)
     return Resume(trail.with_spot(start, -1), start)
 
 

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.elastica.continuation import (
-    at_bifurcation,
     bifurcation,
     branch_end,
     critical_start,
     ending,
     limit_point,
+    points_at_bifurcation,
 )
 from cfmkit.elastica.continuation.state import PRIMARY, Leg, Resume, Stop
 from cfmkit.elastica.continuation.uncondensed import uncondensed
@@ -57,7 +57,7 @@ def _after(problem: Problem, leg: Leg, requested: int) -> Move:
     if code == DONE:
         return branch_end.rejoined(problem, trail, spot, leg.toward)
     if code == DENIED:
-        behind = at_bifurcation.passed(problem, trail, float(trail.stretch.targets[requested]))
+        behind = points_at_bifurcation.passed(problem, trail, float(trail.stretch.targets[requested]))
         return Resume(trail, spot, patient=True) if behind is None else bifurcation.crossed(problem, behind)
     if code == STALLED and trail.stretch.natural and len(trail.points):
         return _got_over(problem, trail, spot, requested)

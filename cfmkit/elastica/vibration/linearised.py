@@ -2,7 +2,7 @@
 
 The stiffness is the second variation of the energy about the exact pose: elastic energy, section forces, springs, arms
 and dead loads, symmetric; what loads that turn with their node add is kept apart, and is not. The unknowns are all
-degrees of freedom of the layout, held ones included, then the inner ones of the beams (`fields`).
+degrees of freedom of the layout, held ones included, then the inner ones of the beams (`beam_basis`).
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 
 from cfmkit.elastica.model.drive import Loading
 from cfmkit.elastica.model.numbering import SLIDE, TURN
-from cfmkit.elastica.vibration.fields import ENDS, panels, quadratic, states_at
+from cfmkit.elastica.vibration.beam_basis import ENDS, panels, quadratic, states_at
 from cfmkit.errors import InputError
 
 if TYPE_CHECKING:

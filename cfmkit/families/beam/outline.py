@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.elastica.model.layout import Layout
-from cfmkit.export.geometry import TOLERANCE, Contour, Curve2D, Dimension, Drawing, Region, Sheet, Smooth, circle
+from cfmkit.export.contours import TOLERANCE, Contour, Curve2D, Dimension, Drawing, Region, Sheet, Smooth, circle
 from cfmkit.export.union import quarter_pieces
 from cfmkit.families.beam.build import assemble, mirror_axis, thickest
 from cfmkit.families.beam.parts.spec import PartSpec

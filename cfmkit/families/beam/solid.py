@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from cfmkit.families.beam.outline import HeldPlace
     from cfmkit.families.beam.spec import BeamSpec
     from cfmkit.results import Finding
-    from cfmkit.solid.part import MeshSolution, Part
+    from cfmkit.solid.meshed_part import MeshSolution, Part
 
 FORCE_APART, STRESS_APART = 2e-3, 0.05
 """Differences of two meshes from which on they are called coarse: a tenth of what parts differ from beams by."""
@@ -133,7 +133,7 @@ def analyze(spec: BeamSpec, run: Run) -> Result:
         PARTIAL if the path ends before the travel, NO_EQUILIBRIUM if there is no first pose.
     """
     from cfmkit.solid.course import Ending
-    from cfmkit.solid.part import ACROSS, COARSER
+    from cfmkit.solid.meshed_part import ACROSS, COARSER
 
     assembly = assemble(spec)
     size = spec.analysis.solid.mesh or _thinnest(assembly) / ACROSS
@@ -175,7 +175,7 @@ def analyze(spec: BeamSpec, run: Run) -> Result:
 def part_of(spec: BeamSpec, assembly: Assembly) -> Part:
     """Return the part as it is solved: its outline, with what is held and driven."""
     from cfmkit.solid.law import LAWS
-    from cfmkit.solid.part import Part, Place, rings_of
+    from cfmkit.solid.meshed_part import Part, Place, rings_of
 
     cut = [contour for contour in drawing(spec).contours if contour.layer == "cut"]
     beam = next(iter(spec.mechanism.beams.values()))
@@ -188,7 +188,7 @@ def part_of(spec: BeamSpec, assembly: Assembly) -> Part:
 def decks(spec: BeamSpec) -> dict[str, bytes]:
     """Return the part as an input deck of a finite-element solver, by file name."""
     from cfmkit.solid.deck import deck
-    from cfmkit.solid.part import ACROSS
+    from cfmkit.solid.meshed_part import ACROSS
 
     spec = spec.replace({"analysis.fidelity": "solid"})
     part = part_of(spec, assemble(spec))

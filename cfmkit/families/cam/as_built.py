@@ -34,7 +34,7 @@ from cfmkit.families.cam.values import (
     values_of_built,
 )
 from cfmkit.families.findings import mm
-from cfmkit.families.refusals import CannotBuild, no_result
+from cfmkit.families.no_mechanism import CannotBuild, no_result
 from cfmkit.numerics.registration import Registration, gaps_across, register, registered_where_it_is
 from cfmkit.results import Quantity, Result, Status
 from cfmkit.tables.labpoints import read_sides

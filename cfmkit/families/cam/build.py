@@ -22,7 +22,7 @@ from cfmkit.families.cam.geometry.track_records import NoTrack
 from cfmkit.families.cam.solution import Assembly
 from cfmkit.families.cam.statics import GRAVITY, Loads, Losses
 from cfmkit.families.findings import mm
-from cfmkit.families.refusals import CannotBuild
+from cfmkit.families.no_mechanism import CannotBuild
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.arrays import FloatArray
-from cfmkit.export.geometry import Arc, Line
+from cfmkit.export.contours import Arc, Line
 from cfmkit.families.cam.findings import finding
 from cfmkit.families.cam.outline import plate_contours
 from cfmkit.families.cam.values import DEFINITIONS

@@ -25,7 +25,7 @@ from cfmkit.families.cam.geometry.path import reach
 from cfmkit.families.cam.geometry.profile import SlopeLaw, brace_tangent
 from cfmkit.families.cam.outline import plate_notes
 from cfmkit.families.findings import at_least, at_most, mm, newton, rate
-from cfmkit.families.refusals import CannotBuild, Infeasible, no_design
+from cfmkit.families.no_mechanism import CannotBuild, Infeasible, no_design
 from cfmkit.results import Design, Status
 from cfmkit.stock.springs.catalogue import Miss, nearest
 from cfmkit.stock.springs.spec import offers

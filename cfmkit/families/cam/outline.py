@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.export.geometry import TOLERANCE, Arc, Contour, Curve2D, Dimension, Drawing, Edge, Line, Sheet, Smooth
+from cfmkit.export.contours import TOLERANCE, Arc, Contour, Curve2D, Dimension, Drawing, Edge, Line, Sheet, Smooth
 from cfmkit.families.cam.build import assemble_sides, flanks_crossing
 from cfmkit.families.findings import mm, rate
-from cfmkit.families.refusals import CannotBuild
+from cfmkit.families.no_mechanism import CannotBuild
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -37,7 +37,7 @@ def drawing(spec: CamSpec, tolerance: float = TOLERANCE) -> Drawing:
 
     Raises
     ------
-    cfmkit.families.refusals.CannotBuild
+    cfmkit.families.no_mechanism.CannotBuild
         If there is no cam to draw.
     """
     sides = assemble_sides(spec)

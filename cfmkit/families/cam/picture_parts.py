@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.curves import Curve
-from cfmkit.export.geometry import polygons
+from cfmkit.export.contours import polygons
 from cfmkit.families.cam.outline import plate_contours
 from cfmkit.families.cam.statics import forces
 from cfmkit.specs.units import format_short

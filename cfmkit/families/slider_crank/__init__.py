@@ -10,7 +10,7 @@ from cfmkit.families.slider_crank.printed.values import DEFINITIONS as OF_PARTS
 from cfmkit.families.slider_crank.spec import SliderCrankSpec
 from cfmkit.families.slider_crank.springs.many_designs.model import analyze_block
 from cfmkit.families.slider_crank.springs.model import analyze, gradient
-from cfmkit.families.slider_crank.springs.stiffness import CLASSES
+from cfmkit.families.slider_crank.springs.stiffness_classes import CLASSES
 from cfmkit.families.slider_crank.springs.values import DEFINITIONS as OF_SPRINGS
 
 PRINTED = "cfmkit.families.slider_crank.printed.model:analyze"
@@ -35,7 +35,7 @@ FAMILY = Family(
     free="cfmkit.families.slider_crank.sampled:free",
     gradient=gradient,
     draw="cfmkit.families.slider_crank.dispatch",
-    scheme="cfmkit.families.slider_crank.scheme",
+    scheme="cfmkit.families.slider_crank.dimension_drawing",
     outline="cfmkit.families.slider_crank.dispatch",
     decks="cfmkit.families.slider_crank.printed.solid:decks",
     propose="cfmkit.families.slider_crank.propose:propose",

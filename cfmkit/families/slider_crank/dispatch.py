@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.export.geometry import TOLERANCE, Arc, Line, Smooth, polygons
+from cfmkit.export.contours import TOLERANCE, Arc, Line, Smooth, polygons
 from cfmkit.families.base import function_named
 from cfmkit.families.slider_crank.build import resolve
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from matplotlib.figure import Figure
 
-    from cfmkit.export.geometry import Contour, Drawing, Edge
+    from cfmkit.export.contours import Contour, Drawing, Edge
     from cfmkit.families.base import Run
     from cfmkit.families.slider_crank.spec import SliderCrankSpec
     from cfmkit.plots.moving import Moving
@@ -58,7 +58,7 @@ def drawing(spec: SliderCrankSpec, tolerance: float = TOLERANCE) -> Drawing:
 
     Raises
     ------
-    cfmkit.families.refusals.CannotBuild
+    cfmkit.families.no_mechanism.CannotBuild
         If it cannot be assembled.
     """
     made: Drawing = _in_room(ROOMS[spec.fidelity], "outline:drawing")(resolve(spec))

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.families.base import Sampled
-from cfmkit.families.refusals import CannotBuild
+from cfmkit.families.no_mechanism import CannotBuild
 from cfmkit.families.slider_crank.build import linkage_of, resolve, unloaded_angle
 from cfmkit.families.slider_crank.printed.assembly import elasticity
 from cfmkit.families.slider_crank.printed.design import DEFAULT_THICKNESS

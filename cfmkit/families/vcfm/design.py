@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.families.findings import at_least, at_most, mm, mpa
-from cfmkit.families.refusals import Infeasible, no_design
+from cfmkit.families.no_mechanism import Infeasible, no_design
 from cfmkit.families.vcfm.build import parts, share_of, spring_room
 from cfmkit.families.vcfm.findings import finding
 from cfmkit.families.vcfm.leaves.springs import Diamond

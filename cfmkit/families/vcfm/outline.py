@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.errors import GeometryError
-from cfmkit.export.fillets import filleted, sharp_notes
-from cfmkit.export.geometry import (
+from cfmkit.export.contours import (
     TOLERANCE,
     Arc,
     Contour,
@@ -28,6 +27,7 @@ from cfmkit.export.geometry import (
     Smooth,
     circle,
 )
+from cfmkit.export.fillets import filleted, sharp_notes
 from cfmkit.families.findings import mm
 from cfmkit.families.vcfm.build import RIM, strip_of
 from cfmkit.specs.units import format_short

@@ -11,7 +11,7 @@ from math import pi, sqrt
 from typing import TYPE_CHECKING, Any
 
 from cfmkit.families.findings import mm
-from cfmkit.families.refusals import Infeasible
+from cfmkit.families.no_mechanism import Infeasible
 from cfmkit.families.vcfm.design import closed_form
 from cfmkit.families.vcfm.spec import VcfmSpec
 from cfmkit.families.wishes import Candidate, Offer

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from cfmkit.families.vcfm.outline import SolvedPiece
     from cfmkit.families.vcfm.spec import VcfmSpec
     from cfmkit.results import Finding
-    from cfmkit.solid.part import MeshSolution, Part
+    from cfmkit.solid.meshed_part import MeshSolution, Part
 
 GATHERED = 1.5
 """Poses stand at (k/n) to this power of the travel: the peak of thin leaves is within its first twentieth."""
@@ -150,7 +150,7 @@ class SolidSampler(ExactSampler):
 def part_of(spec: VcfmSpec, piece: SolvedPiece) -> Part:
     """Return a piece of the drawing as it is solved."""
     from cfmkit.solid.law import LAWS
-    from cfmkit.solid.part import Part, Place, rings_of
+    from cfmkit.solid.meshed_part import Part, Place, rings_of
 
     mechanism = spec.mechanism
     about = mechanism.bistable if piece.of_leaf else mechanism.positive
@@ -171,7 +171,7 @@ def part_of(spec: VcfmSpec, piece: SolvedPiece) -> Part:
 def decks(spec: VcfmSpec) -> dict[str, bytes]:
     """Return leaf and spring as input decks of a finite-element solver, by file name."""
     from cfmkit.solid.deck import deck
-    from cfmkit.solid.part import ACROSS
+    from cfmkit.solid.meshed_part import ACROSS
 
     spec = spec.replace({"analysis.fidelity": "solid"})
     share = spring_chain(spec).travel
@@ -191,7 +191,7 @@ def _seams(polygon: FloatArray) -> tuple[FloatArray, ...]:
 
 def followed(spec: VcfmSpec, part: Part, end: float, twice: bool, report: Any) -> SolidPath:
     """Return a part that is followed to a travel [m]: on two meshes, or on one and with a quarter of the poses."""
-    from cfmkit.solid.part import ACROSS, COARSER
+    from cfmkit.solid.meshed_part import ACROSS, COARSER
 
     about = spec.analysis.solid
     size = about.mesh or part.thinnest / ACROSS

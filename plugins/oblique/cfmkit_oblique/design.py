@@ -13,7 +13,7 @@ from math import hypot, sqrt
 from typing import TYPE_CHECKING
 
 from cfmkit.families.findings import at_least, at_most, mm
-from cfmkit.families.refusals import Infeasible, no_design
+from cfmkit.families.no_mechanism import Infeasible, no_design
 from cfmkit.numerics.roots import bracketed_root
 from cfmkit.results import Design, Status
 from cfmkit_oblique.model import finding

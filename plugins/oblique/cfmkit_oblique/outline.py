@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from cfmkit.export.geometry import TOLERANCE, Contour, Drawing, Line, circle, polygon
+from cfmkit.export.contours import TOLERANCE, Contour, Drawing, Line, circle, polygon
 from cfmkit_oblique.model import Solution
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ from cfmkit.designing.starts import Clock, identity_of
 from cfmkit.families.beam.build import assemble
 from cfmkit.families.beam.findings import finding, percent
 from cfmkit.families.beam.shaping.audit import NetworkScatter, tolerated
-from cfmkit.families.beam.shaping.infeasible import blocked, held_by
+from cfmkit.families.beam.shaping.blocking_limits import blocked, held_by
 from cfmkit.families.beam.shaping.multistart import Explored, explored, ranked
 from cfmkit.families.beam.shaping.report import Judged, judged, notes_of, search_of, starts_table
 from cfmkit.families.beam.shaping.search import Plan, finished, widened

@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING
 
 from cfmkit.families.cam.build import assemble_sides, cam_start_height, directions
 from cfmkit.families.cam.dynamics.machine import Cycloid, Machine
-from cfmkit.families.cam.dynamics.side import NoRise, Side, SideParts, pieces_of
+from cfmkit.families.cam.dynamics.side_kinematics import NoRise, Side, SideParts, pieces_of
 from cfmkit.families.cam.dynamics.solution import Build
 from cfmkit.families.cam.findings import finding
 from cfmkit.families.cam.statics import GRAVITY
-from cfmkit.families.refusals import CannotBuild
+from cfmkit.families.no_mechanism import CannotBuild
 
 if TYPE_CHECKING:
     from cfmkit.families.cam.solution import Assembly

@@ -15,7 +15,7 @@ from cfmkit.families.cam.build import flanks_cross, rollers_overlap
 from cfmkit.families.cam.dynamics.inverse import respond
 from cfmkit.families.cam.findings import finding
 from cfmkit.families.findings import mm, newton
-from cfmkit.families.refusals import CannotBuild
+from cfmkit.families.no_mechanism import CannotBuild
 from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:

@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.families.cam.dynamics.machine import Constants, Machine
-    from cfmkit.families.cam.dynamics.side import Stance
+    from cfmkit.families.cam.dynamics.side_kinematics import Stance
 
     ComplexArray = NDArray[np.complex128]
 

@@ -10,7 +10,7 @@ import numpy as np
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.cam.dynamics.side import Side, Stance
+    from cfmkit.families.cam.dynamics.side_kinematics import Side, Stance
 
 
 class Constants(NamedTuple):

@@ -27,7 +27,7 @@ from cfmkit.families.cam.dynamics.solution import Build, History, MotionSolution
 from cfmkit.families.cam.dynamics.values import contact_pressure, slow_force, values_of
 from cfmkit.families.cam.findings import rubbing_left_out
 from cfmkit.families.cam.values import constant_force
-from cfmkit.families.refusals import CannotBuild, no_result
+from cfmkit.families.no_mechanism import CannotBuild, no_result
 from cfmkit.results import Result, Status
 
 if TYPE_CHECKING:

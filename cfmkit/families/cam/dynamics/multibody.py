@@ -34,7 +34,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from cfmkit.families.cam.dynamics.flankline import FlankLine
-from cfmkit.families.cam.dynamics.side import Flank
+from cfmkit.families.cam.dynamics.side_kinematics import Flank
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -44,7 +44,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.families.cam.dynamics.flankline import FlankPoint
     from cfmkit.families.cam.dynamics.machine import Cycloid, Machine
-    from cfmkit.families.cam.dynamics.side import Side, SideParts
+    from cfmkit.families.cam.dynamics.side_kinematics import Side, SideParts
 
     ComplexArray = NDArray[np.complex128]
 

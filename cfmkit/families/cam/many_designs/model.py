@@ -31,7 +31,7 @@ from cfmkit.families.cam.many_designs.measures import (
     measured,
 )
 from cfmkit.families.cam.many_designs.undercut import CornerSlab, shapes
-from cfmkit.families.refusals import CannotBuild
+from cfmkit.families.no_mechanism import CannotBuild
 from cfmkit.specs.units import Share
 
 if TYPE_CHECKING:

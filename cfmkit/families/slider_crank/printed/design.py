@@ -20,7 +20,7 @@ from cfmkit.designing.starts import Clock, identity_of
 from cfmkit.designing.variables import rounded
 from cfmkit.errors import InputError
 from cfmkit.families.findings import mm, newton, percent
-from cfmkit.families.refusals import CannotBuild, no_design
+from cfmkit.families.no_mechanism import CannotBuild, no_design
 from cfmkit.families.slider_crank.build import linkage_of, resolve, unloaded_angle
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.printed.assembly import corners, elasticity, pins_of, travel_direction

@@ -13,7 +13,7 @@ import numpy as np
 
 from cfmkit.curves import Column, Curve
 from cfmkit.errors import InputError
-from cfmkit.families.refusals import CannotBuild, no_result
+from cfmkit.families.no_mechanism import CannotBuild, no_result
 from cfmkit.families.slider_crank.build import linkage_of, resolve, side_of, unloaded_angle
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.printed.assembly import (

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.export.contours import Contour, Curve2D, Dimension, Drawing, Line, Region, Sheet, circle, polygon
 from cfmkit.export.fillets import filleted, sharp_notes
-from cfmkit.export.geometry import Contour, Curve2D, Dimension, Drawing, Line, Region, Sheet, circle, polygon
 from cfmkit.families.slider_crank.build import linkage_of, unloaded_angle
 from cfmkit.families.slider_crank.printed.assembly import corners, flexures_of, strip_of
 from cfmkit.specs.units import format_short

@@ -20,7 +20,7 @@ import numpy as np
 from cfmkit.designing.audit import searched
 from cfmkit.errors import InputError
 from cfmkit.families.findings import mm
-from cfmkit.families.refusals import no_design
+from cfmkit.families.no_mechanism import no_design
 from cfmkit.families.slider_crank.build import side_of
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.printed.assembly import FLEXURE_SHARE, chain_of_flexures, elasticity, flexures_of

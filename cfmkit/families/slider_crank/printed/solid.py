@@ -17,7 +17,7 @@ import numpy as np
 from cfmkit.arrays import read_only
 from cfmkit.curves import Column, Curve
 from cfmkit.errors import GeometryError, InputError
-from cfmkit.families.refusals import CannotBuild, no_result
+from cfmkit.families.no_mechanism import CannotBuild, no_result
 from cfmkit.families.slider_crank.build import linkage_of, resolve, unloaded_angle
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.printed.assembly import elasticity, pins_of, travel_direction
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from cfmkit.families.base import Run
     from cfmkit.families.slider_crank.spec import SliderCrankSpec
     from cfmkit.results import Finding
-    from cfmkit.solid.part import MeshSolution, Part
+    from cfmkit.solid.meshed_part import MeshSolution, Part
 
 GATHERED = 3.0
 """Poses stand at (k/n) to this power of the travel, and where the stiffness leaps."""
@@ -110,7 +110,7 @@ def analyze(spec: SliderCrankSpec, run: Run) -> Result:
     PARTIAL if the path ends before the travel; NO_EQUILIBRIUM if it cannot be meshed or has no second pose.
     """
     from cfmkit.solid.course import Ending
-    from cfmkit.solid.part import ACROSS, COARSER
+    from cfmkit.solid.meshed_part import ACROSS, COARSER
 
     try:
         spec = resolve(spec)
@@ -157,7 +157,7 @@ def analyze(spec: SliderCrankSpec, run: Run) -> Result:
 def part_of(spec: SliderCrankSpec) -> Part:
     """Return one leg as it is solved: its outline as printed, with its widths and both pads."""
     from cfmkit.solid.law import LAWS
-    from cfmkit.solid.part import Part, Place, rings_of
+    from cfmkit.solid.meshed_part import Part, Place, rings_of
 
     piece = solved_piece(spec)
     made_of = elasticity(spec.mechanism)
@@ -176,7 +176,7 @@ def part_of(spec: SliderCrankSpec) -> Part:
 def decks(spec: SliderCrankSpec) -> dict[str, bytes]:
     """Return one leg as an input deck of a finite-element solver, by file name."""
     from cfmkit.solid.deck import deck
-    from cfmkit.solid.part import ACROSS
+    from cfmkit.solid.meshed_part import ACROSS
 
     spec = resolve(spec.replace({"analysis.fidelity": "solid"}))
     linkage = linkage_of(spec.mechanism)

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.refusals import CannotBuild, Infeasible, no_design
+from cfmkit.families.no_mechanism import CannotBuild, Infeasible, no_design
 from cfmkit.families.slider_crank.build import resolve
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.springs.assembly import TURN, default_motion

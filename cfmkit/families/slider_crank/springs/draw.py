@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.slider_crank.springs.stiffness import NEGATIVE
+from cfmkit.families.slider_crank.springs.stiffness_classes import NEGATIVE
 from cfmkit.families.slider_crank.unit_springs import JOINTS
 from cfmkit.plots import parts
 from cfmkit.plots.bands import limits_on

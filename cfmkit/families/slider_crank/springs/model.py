@@ -20,7 +20,7 @@ import numpy as np
 
 from cfmkit.curves import Column, Curve
 from cfmkit.families.findings import deg, mm
-from cfmkit.families.refusals import CannotBuild, no_result
+from cfmkit.families.no_mechanism import CannotBuild, no_result
 from cfmkit.families.slider_crank.build import resolve
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.springs.assembly import TURN, assemble, default_motion

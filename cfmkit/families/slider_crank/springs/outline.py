@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.export.geometry import Arc, Contour, Dimension, Drawing, Line, Sheet, circle
+from cfmkit.export.contours import Arc, Contour, Dimension, Drawing, Line, Sheet, circle
 from cfmkit.families.slider_crank.build import linkage_of
 from cfmkit.specs.units import format_short
 

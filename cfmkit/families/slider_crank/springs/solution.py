@@ -18,7 +18,7 @@ import numpy as np
 
 from cfmkit.families.slider_crank.springs.assembly import reactions
 from cfmkit.families.slider_crank.springs.friction import Branch, branch
-from cfmkit.families.slider_crank.springs.stiffness import CLASSES, Classified, classify, signs
+from cfmkit.families.slider_crank.springs.stiffness_classes import CLASSES, Classified, classify, signs
 from cfmkit.numerics.roots import bracketed_root
 from cfmkit.numerics.turning_points import Monotone, monotone
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.slider_crank.springs.stiffness import CLASSES, scale_factors, small_angle_number
+from cfmkit.families.slider_crank.springs.stiffness_classes import CLASSES, scale_factors, small_angle_number
 from cfmkit.results import Quantity
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.families.base import BlockAnswer
-from cfmkit.families.refusals import CannotBuild
+from cfmkit.families.no_mechanism import CannotBuild
 from cfmkit.families.slider_crank.build import resolve
 from cfmkit.families.slider_crank.springs.assembly import TURN, assemble
 from cfmkit.families.slider_crank.springs.findings import findings_of
@@ -24,7 +24,7 @@ from cfmkit.families.slider_crank.springs.model import (
     window_of,
 )
 from cfmkit.families.slider_crank.springs.solution import GRID
-from cfmkit.families.slider_crank.springs.stiffness import (
+from cfmkit.families.slider_crank.springs.stiffness_classes import (
     BOUNDARY,
     SNAPS,
 )

@@ -23,7 +23,12 @@ from cfmkit.families.slider_crank.springs.model import (
     window_of,
 )
 from cfmkit.families.slider_crank.springs.solution import Character, Solution, grid_over
-from cfmkit.families.slider_crank.springs.stiffness import Classified, classify, scale_factors, small_angle_number
+from cfmkit.families.slider_crank.springs.stiffness_classes import (
+    Classified,
+    classify,
+    scale_factors,
+    small_angle_number,
+)
 from cfmkit.families.slider_crank.springs.values import DEFINITIONS
 from cfmkit.metrics.branch_views import Frame
 from cfmkit.metrics.closed import extremes, mean

@@ -15,14 +15,14 @@ from cfmkit.solid.course import follow
 from cfmkit.solid.elements import Elements
 from cfmkit.solid.equilibrium import Problem
 from cfmkit.solid.mesh import mesh
-from cfmkit.solid.supports import Group, Supports, within
+from cfmkit.solid.rigid_groups import Group, Supports, within
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
 
-    from cfmkit.export.geometry import Contour
+    from cfmkit.export.contours import Contour
     from cfmkit.solid.course import Course
     from cfmkit.solid.law import Law
     from cfmkit.solid.mesh import Mesh
