@@ -48,7 +48,14 @@ def comparable(path):
         return None
 
 
-@pytest.mark.parametrize("path", CONFIGS, ids=lambda path: path.stem)
+LONG = ("beam_williams_toggle", "beam_v_bifurcation")
+"""Configurations of slender beams, which as solids have more elements than all others together."""
+
+
+@pytest.mark.parametrize(
+    "path",
+    [pytest.param(path, id=path.stem, marks=[pytest.mark.slow] if path.stem in LONG else []) for path in CONFIGS],
+)
 def test_models_are_compared_or_one_sentence_says_why_not(path):
     spec = quick(path)
     choices = comparable(path)

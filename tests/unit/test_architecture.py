@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -47,9 +48,16 @@ def type_checking_lines(tree: ast.Module) -> set[int]:
     return {line for block in blocks for line in range(block.lineno, (block.end_lineno or block.lineno) + 1)}
 
 
+@cache
+def parsed(path: Path) -> ast.Module:
+    """Return the tree of a file, which many tests walk."""
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
+@cache
 def imports(path: Path, types: bool = False) -> list[str]:
     """Return the dotted names that a file imports at run time (or also for types only)."""
-    tree = ast.parse(path.read_text(encoding="utf-8"))
+    tree = parsed(path)
     skipped = set() if types else type_checking_lines(tree)
     found = []
     for node in ast.walk(tree):
@@ -61,9 +69,10 @@ def imports(path: Path, types: bool = False) -> list[str]:
     return found
 
 
+@cache
 def top_level_imports(path: Path) -> list[str]:
     """Return what is imported when a file is, not inside a function."""
-    body = ast.parse(path.read_text(encoding="utf-8")).body
+    body = parsed(path).body
     found = []
     for node in body:
         if isinstance(node, ast.Import):
@@ -155,7 +164,7 @@ def test_the_command_line_starts_without_numpy_and_pydantic():
 
 def test_no_one_asks_which_family_it_is():
     for path in SOURCES:
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        for node in ast.walk(parsed(path)):
             if isinstance(node, ast.Compare):
                 sides = [node.left, *node.comparators]
                 named = any(
@@ -168,7 +177,7 @@ def test_no_one_asks_which_family_it_is():
 def longest_function(path: Path) -> tuple[int, str]:
     """Return (lines of code, name) of the longest function in a file, docstring left out."""
     sizes = [(0, "")]
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in ast.walk(parsed(path)):
         if isinstance(node, ast.FunctionDef):
             first = node.body[0]
             documented = isinstance(first, ast.Expr) and isinstance(first.value, ast.Constant)

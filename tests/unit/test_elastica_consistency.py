@@ -53,7 +53,13 @@ def arch(rng: Any) -> tuple[Network, Any]:
     return Network(nodes, beams), Loading((PointLoad("t", fy=-rng.uniform(0.1, 3)),), points)
 
 
-@pytest.mark.parametrize("seed", range(100))
+LONG = (9, 91)
+"""Seeds whose arches wind up and take eight seconds and more."""
+
+
+@pytest.mark.parametrize(
+    "seed", [pytest.param(seed, marks=pytest.mark.slow) if seed in LONG else seed for seed in range(100)]
+)
 def test_an_arch_fares_alike_at_every_tolerance(seed: int) -> None:
     rng = np.random.default_rng(seed)
     network, drive = arch(rng)

@@ -414,7 +414,7 @@ def test_a_band_that_no_strip_keeps_is_infeasible() -> None:
     assert {item.name for item in found.warnings} == {"target_unreachable"}
 
 
-@pytest.mark.parametrize("force", ["1.5e-9 N", "1.1 N", "15 N"])
+@pytest.mark.parametrize("force", ["1.5e-9 N", pytest.param("1.1 N", marks=pytest.mark.slow), "15 N"])
 def test_a_force_out_of_reach_is_refused_after_a_few_evaluations(monkeypatch: pytest.MonkeyPatch, force: str) -> None:
     """Two to four seconds each: every derivative is one by 23 numbers."""
     asked, states = [], StripProgram.state
