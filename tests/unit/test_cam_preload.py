@@ -123,3 +123,14 @@ def test_springs_that_cannot_be_are_refused_in_one_line(springs, words):
     spec = cfmkit.load(CONFIGS / "cam_preloaded.yaml")
     with pytest.raises(SpecError, match=words):
         spec.replace({"mechanism.springs": {"stiffness": "0.69 N/mm", **springs}})
+
+
+@pytest.mark.parametrize("given", [{"preload": "6.44 mm"}, {"rest_length": "130 mm"}])
+def test_where_no_preload_is_needed_none_is_written(given):
+    spec = cfmkit.load(CONFIGS / "cam_preloaded.yaml").replace(
+        {"mechanism.roller_radius": 0.009, "mechanism.springs": {"stiffness": "0.69 N/mm", "count": 2, **given}}
+    )
+    found = cfmkit.design(spec)
+    assert "no preload is needed" in found.message
+    assert found.spec.mechanism.preload == 0
+    assert found.spec.mechanism.profile.preload is None

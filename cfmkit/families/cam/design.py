@@ -412,8 +412,8 @@ def _written(spec: CamSpec, target: CamDesign, choice: Choice, factor: float) ->
         "roller_radius": mechanism.roller_radius,
     }
     springs = choice.springs.model_dump(exclude_none=True)
+    for stated in ("preload", "rest_length"):  # what the file says is replaced by what was chosen, nothing included
+        springs.pop(stated, None)
     if choice.preload:
-        profile["preload"] = choice.preload
-        springs.pop("rest_length", None)
-        springs["preload"] = choice.preload
+        profile["preload"] = springs["preload"] = choice.preload
     return spec.replace({"mechanism.profile": profile, "mechanism.springs": springs})
