@@ -119,11 +119,16 @@ def _area(branch: Branch, window: Window) -> float:
 def stress_max(branch: Branch) -> float:
     """Return the largest stress in the window, in whatever load case it is; of a model, next to the points, too."""
     beside = [float(one.stress.max()) for one in branch.inside_beside if one.stress is not None]
+    return max([stress_range(branch)[1], *beside])
+
+
+def stress_range(branch: Branch) -> tuple[float, float]:
+    """Return the least and the largest stress of a branch in the window, its own load case only [Pa]."""
     own, model = _stress(branch.inside), branch.frame.closed
     if model is None:
-        return max([float(own.max()), *beside])
-    top, _ = extremes(partial(model.stress, branch.name), branch.inside.motion[None, :], own[None, :])
-    return max([float(top[0]), *beside])
+        return float(own.min()), float(own.max())
+    top, bottom = extremes(partial(model.stress, branch.name), branch.inside.motion[None, :], own[None, :])
+    return float(bottom[0]), float(top[0])
 
 
 def safety_factor(branch: Branch) -> float:

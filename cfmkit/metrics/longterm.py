@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.metrics.flatness import stress_range
 from cfmkit.metrics.traces import Undefined
 
 if TYPE_CHECKING:
@@ -20,14 +21,12 @@ def fatigue_life(branch: Branch) -> float:
     known = branch.frame.durability
     if known is None or known.fatigue is None:
         raise Undefined("the material has no fatigue data: add 'fatigue' to it")
-    lives = []
-    for part in (branch.inside, *branch.inside_beside):
-        if part.stress is None:
-            raise Undefined("the curve has no column 'max_stress'")
-        if np.isnan(part.stress).any():
-            raise Undefined("the stress is unbounded in the window")
-        lives.append(known.fatigue.life(float(part.stress.max()), float(part.stress.min())))
-    return min(lives)
+    ranges = [stress_range(branch)]
+    for part in branch.inside_beside:
+        if part.stress is None or np.isnan(part.stress).any():
+            raise Undefined("the stress of another load case is not known everywhere in the window")
+        ranges.append((float(part.stress.min()), float(part.stress.max())))
+    return min(known.fatigue.life(largest, least) for least, largest in ranges)
 
 
 def effort_after(branch: Branch, time: float) -> float:

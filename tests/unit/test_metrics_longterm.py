@@ -140,3 +140,14 @@ def test_other_families_have_them_too(name):
     )
     assert found["fatigue_life"].value > 0
     assert 0 < found["force_after[1000 h]"].value < found["force_mean"].value
+
+
+@pytest.mark.parametrize("points", [25, 201])
+def test_a_life_is_that_of_the_stress_that_the_page_states(points):
+    spec = cfmkit.load(CONFIGS / "vcfm_ding2022.yaml").replace(
+        {"mechanism.material": {"youngs_modulus": "1.477 GPa", "yield_strength": "30 MPa", "fatigue": FATIGUE}}
+    )
+    spec = spec.replace({"analysis.points": points, "analysis.preloads": ["0 mm"], "analysis.window": ["0 mm", "4 mm"]})
+    found = cfmkit.analyze(spec).metrics
+    law = FatigueLaw(POINTS, None, 45e6)
+    assert found["fatigue_life"].value == pytest.approx(law.life(found["stress_max"].value), rel=1e-6)
