@@ -160,7 +160,7 @@ def __getattr__(name: str) -> Any:
 
 
 class _Package(ModuleType):
-    """The package `cfmkit`, whose `export` and `suggest` stay functions when packages so called are imported."""
+    """The package `cfmkit`, whose `export` stays a function when the package of that name is imported."""
 
     @property
     def export(self) -> Any:
@@ -170,15 +170,6 @@ class _Package(ModuleType):
     @export.setter
     def export(self, package: ModuleType) -> None:
         """Leave it at that: the import system sets packages as attributes, and this one is found without."""
-
-    @property
-    def suggest(self) -> Any:
-        """The function `cfmkit.api.suggest`."""
-        return import_module("cfmkit.api").suggest
-
-    @suggest.setter
-    def suggest(self, package: ModuleType) -> None:
-        """Leave it at that, as above."""
 
 
 sys.modules[__name__].__class__ = _Package

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from cfmkit.runs.notebook import Analysis
     from cfmkit.specs.spec import Spec
     from cfmkit.studies.outcome import StudyResult
-    from cfmkit.suggest.search import Suggestions
+    from cfmkit.studies.suggest.search import Suggestions
 
     AnySpec: TypeAlias = Spec | str | os.PathLike[str]
 
@@ -311,7 +311,7 @@ def suggest(
     from cfmkit.runs.wish_file import wish_of
     from cfmkit.studies.executors import serial
     from cfmkit.studies.pool import Pool
-    from cfmkit.suggest.search import suggest as searched
+    from cfmkit.studies.suggest.search import suggest as searched
 
     def written(value: Any) -> str:
         return "[" + ", ".join(map(written, value)) + "]" if isinstance(value, list | tuple) else str(value)

@@ -14,9 +14,9 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
     from cfmkit.families.base import Run
-    from cfmkit.suggest.proposal import Proposal
-    from cfmkit.suggest.search import Suggestions
-    from cfmkit.suggest.spec import WishBlock
+    from cfmkit.studies.suggest.proposal import Proposal
+    from cfmkit.studies.suggest.search import Suggestions
+    from cfmkit.studies.suggest.spec import WishBlock
 
 COLUMNS: Mapping[str, tuple[str, str]] = {
     "mean": ("", ""),
@@ -147,7 +147,7 @@ def files(found: Suggestions, block: WishBlock, run: Run, plots: bool, deadline:
     yield "suggestions.csv", table(found)
     if plots and found.proposals:
         from cfmkit.plots.style import png
-        from cfmkit.suggest import draw
+        from cfmkit.studies.suggest import draw
 
         yield "figures/pareto.png", png(draw.pareto(found.proposals, found.wish))
         yield "figures/proposals.png", png(draw.to_one_scale(found.proposals, found.wish))

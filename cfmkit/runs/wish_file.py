@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 from cfmkit.errors import SpecError
 from cfmkit.runs.specfile import STDIN, content, renamed, standard_input
 from cfmkit.specs.yamlio import read_document
-from cfmkit.suggest.spec import WishFile
+from cfmkit.studies.suggest.spec import WishFile
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from cfmkit.suggest.spec import WishBlock
+    from cfmkit.studies.suggest.spec import WishBlock
 
 
 def wish_of(name: str | None, keys: Mapping[str, str]) -> WishBlock:

@@ -18,8 +18,8 @@ from cfmkit.runs.wish_file import wish_of
 from cfmkit.stock.springs.catalogue import SHEAR_SHARE
 from cfmkit.stock.springs.to_measure import extension_spring, loaded_length
 from cfmkit.stock.springs.wound import tensile_strength
-from cfmkit.suggest.proposal import Job, made
-from cfmkit.suggest.search import ordered, suggest
+from cfmkit.studies.suggest.proposal import Job, made
+from cfmkit.studies.suggest.search import ordered, suggest
 
 WISHES = Path(__file__).parents[1] / "wishes"
 

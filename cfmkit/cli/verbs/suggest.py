@@ -97,7 +97,7 @@ def run(options: SuggestOptions, terminal: Terminal) -> Answer:
     from cfmkit.runs.wish_file import wish_of
     from cfmkit.store import RunFolder
     from cfmkit.studies.executors import cores
-    from cfmkit.suggest.search import RESERVE, suggest, with_better_models
+    from cfmkit.studies.suggest.search import RESERVE, suggest, with_better_models
 
     start, begun = time.perf_counter(), time.time()
     budget = seconds(options.time_budget)

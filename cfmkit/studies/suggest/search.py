@@ -15,8 +15,8 @@ from cfmkit.families import family, names
 from cfmkit.families.base import Run, function_named
 from cfmkit.families.wishes import Offer
 from cfmkit.store.identity import code_stamp, stable_hash
-from cfmkit.suggest.proposal import Job, Proposal, made
-from cfmkit.suggest.verification import unverified, verified
+from cfmkit.studies.suggest.proposal import Job, Proposal, made
+from cfmkit.studies.suggest.verification import unverified, verified
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from cfmkit.families.wishes import Wish
-    from cfmkit.suggest.proposal import Proposal
+    from cfmkit.studies.suggest.proposal import Proposal
 
 COLUMNS = 3
 

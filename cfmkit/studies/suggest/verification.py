@@ -14,7 +14,7 @@ from cfmkit.families.base import Run
 if TYPE_CHECKING:
     from cfmkit.results import Result
     from cfmkit.specs.spec import Spec
-    from cfmkit.suggest.proposal import Proposal
+    from cfmkit.studies.suggest.proposal import Proposal
 
 AGREES = 0.05
 """Difference of the means up to which two models say the same."""
