@@ -130,7 +130,7 @@ def files(report: MeasureReport, plots: bool = True, form: FigureForm | None = N
     yield "cycles.csv", to_csv(cycles_table(report))
     yield "metrics.json", json_bytes(report.data)
     if plots:
-        from cfmkit.experiment.draw import figures
+        from cfmkit.experiment.figures import figures
         from cfmkit.plots.form import PLAIN
 
         yield from (form or PLAIN).files(figures(report.source, report.numbers))

@@ -78,7 +78,7 @@ def comparison_figures(
 
 
 def _overlay(comparison: Comparison, before: Comparison | None, name: str) -> Figure:
-    from cfmkit.experiment.draw import overlay
+    from cfmkit.experiment.figures import overlay
 
     subject = "fitted model and measurement" if before else "model and measurement"
     return overlay(comparison, before, (name, subject))

@@ -147,10 +147,10 @@ def files(found: Suggestions, block: WishBlock, run: Run, plots: bool, deadline:
     yield "suggestions.csv", table(found)
     if plots and found.proposals:
         from cfmkit.plots.style import png
-        from cfmkit.studies.suggest import draw
+        from cfmkit.studies.suggest import figures
 
-        yield "figures/pareto.png", png(draw.pareto(found.proposals, found.wish))
-        yield "figures/proposals.png", png(draw.to_one_scale(found.proposals, found.wish))
+        yield "figures/pareto.png", png(figures.pareto(found.proposals, found.wish))
+        yield "figures/proposals.png", png(figures.to_one_scale(found.proposals, found.wish))
     jobs = list(enumerate(found.proposals, 1))
     made = {
         number: files for (number, _), files in run.executor(partial(_made, plots, deadline), iter(jobs), lambda: False)

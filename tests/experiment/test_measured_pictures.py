@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from experiment_support import triangle
 
-from cfmkit.experiment.draw import figures
 from cfmkit.experiment.evaluation import measured
+from cfmkit.experiment.figures import figures
 from cfmkit.experiment.reading import Recording
 from cfmkit.experiment.report import report_on
 from cfmkit.metrics import Window

@@ -7,7 +7,7 @@ import pytest
 from beam_support import CANTILEVER, MM, cantilever, config
 
 import cfmkit
-from cfmkit.families.beam.draw import bent, figures, rigid_parts
+from cfmkit.families.beam.figures import bent, figures, rigid_parts
 
 ARMED = CANTILEVER.replace(
     "  beams:",

@@ -8,7 +8,7 @@ from beam_support import cantilever, solved, value
 
 import cfmkit
 from cfmkit.errors import SpecError
-from cfmkit.families.beam.draw import figures
+from cfmkit.families.beam.figures import figures
 
 DENSITY = 1200.0
 WEIGHS = ("yield_strength: 50 MPa", "yield_strength: 50 MPa, density: 1200 kg/m^3")

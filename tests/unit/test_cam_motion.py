@@ -409,7 +409,7 @@ def test_friction_that_holds_a_roller_leaves_gaps_and_says_so():
 
 @pytest.mark.parametrize("changes", [{}, UNLIKE], ids=["prototype", "unlike sides"])
 def test_every_picture_is_drawn_twice_with_the_same_bytes(changes):
-    from cfmkit.families.cam.draw import figures
+    from cfmkit.families.cam.figures import figures
     from cfmkit.plots.style import png
 
     result = analyze(moving(**changes))

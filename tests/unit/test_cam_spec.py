@@ -10,7 +10,7 @@ from cam_support import MM, analyze, at, cam, fixed
 
 from cfmkit.errors import SpecError
 from cfmkit.families.cam.build import resolve
-from cfmkit.families.cam.values import contact_pressure
+from cfmkit.families.cam.scalar_results import contact_pressure
 from cfmkit.stock import material
 
 FITS = {"roller_radius": "10 mm"}

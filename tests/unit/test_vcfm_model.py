@@ -21,9 +21,9 @@ from cfmkit.families.vcfm.leaves.strip import Strip
 from cfmkit.families.vcfm.leaves.v_beam import VBeam
 from cfmkit.families.vcfm.many_designs import METRICS, SCALARS, VARIED, analyze_block
 from cfmkit.families.vcfm.model import rest_of, rests_of
+from cfmkit.families.vcfm.scalar_results import forces, spread
 from cfmkit.families.vcfm.scene import centre_line
 from cfmkit.families.vcfm.solution import force_of
-from cfmkit.families.vcfm.values import forces, spread
 from cfmkit.families.vcfm.windows import longest_window
 from cfmkit.metrics import Window, evaluate
 from cfmkit.results import Status

@@ -7,9 +7,9 @@ from cfmkit.families.beam.build import resolve
 from cfmkit.families.beam.design import design
 from cfmkit.families.beam.findings import FINDINGS
 from cfmkit.families.beam.model import analyze
+from cfmkit.families.beam.scalar_results import DEFINITIONS
 from cfmkit.families.beam.spec import BeamSpec
 from cfmkit.families.beam.surface_following import DEFINITIONS as SURFACE
-from cfmkit.families.beam.values import DEFINITIONS
 
 FAMILY = Family(
     name="beam",
@@ -25,7 +25,7 @@ FAMILY = Family(
     resolve=resolve,
     errors="cfmkit.families.beam.sampled:errors",
     sampled="cfmkit.families.beam.sampled:sampled",
-    draw="cfmkit.families.beam.draw",
+    draw="cfmkit.families.beam.figures",
     scheme="cfmkit.families.beam.dimension_drawing",
     outline="cfmkit.families.beam.outline",
     decks="cfmkit.families.beam.solid:decks",

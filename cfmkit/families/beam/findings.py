@@ -14,7 +14,7 @@ import numpy as np
 
 from cfmkit.elastica import PathStatus
 from cfmkit.families.beam.build import thickest_of, thinnest_of
-from cfmkit.families.beam.values import window_of, within
+from cfmkit.families.beam.scalar_results import window_of, within
 from cfmkit.families.findings import finder
 from cfmkit.specs.units import format_short
 

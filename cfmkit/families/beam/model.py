@@ -24,9 +24,9 @@ from cfmkit.elastica.model.layout import Layout
 from cfmkit.errors import InputError
 from cfmkit.families.beam.build import Assembly, assemble, resolve, thickest_of
 from cfmkit.families.beam.findings import ending_of, findings_of, in_units
+from cfmkit.families.beam.scalar_results import natural, travel_of, values_of
 from cfmkit.families.beam.solution import Solution
 from cfmkit.families.beam.surface_following import curve_of, findings_along, ride, values_along
-from cfmkit.families.beam.values import natural, travel_of, values_of
 from cfmkit.results import Result, Status
 from cfmkit.specs.units import format_short
 

@@ -19,7 +19,7 @@ from cfmkit.families.beam.build import assemble, mirror_axis, resolve, thinnest_
 from cfmkit.families.beam.findings import finding
 from cfmkit.families.beam.outline import drawing, regions
 from cfmkit.families.beam.parts.spec import PartSpec
-from cfmkit.families.beam.values import DEFINITIONS, extremes, ranges
+from cfmkit.families.beam.scalar_results import DEFINITIONS, extremes, ranges
 from cfmkit.results import Quantity, Result, Status
 from cfmkit.specs.units import between, format_short
 

@@ -8,8 +8,8 @@ from cfmkit.families.cam.design import design
 from cfmkit.families.cam.findings import FINDINGS
 from cfmkit.families.cam.many_designs.model import analyze_block
 from cfmkit.families.cam.model import analyze
+from cfmkit.families.cam.scalar_results import DEFINITIONS
 from cfmkit.families.cam.spec import CamSpec
-from cfmkit.families.cam.values import DEFINITIONS
 
 FAMILY = Family(
     name="cam",
@@ -21,7 +21,7 @@ FAMILY = Family(
     values=DEFINITIONS,
     resolve=resolve,
     attribution="cfmkit.families.cam.attribution",
-    draw="cfmkit.families.cam.draw",
+    draw="cfmkit.families.cam.figures",
     scheme="cfmkit.families.cam.dimension_drawing",
     analyze_block=analyze_block,
     outline="cfmkit.families.cam.outline",

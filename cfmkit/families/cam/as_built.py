@@ -24,8 +24,7 @@ from cfmkit.families.cam.contact import allowable_stress, stress
 from cfmkit.families.cam.findings import finding, findings_of_built, left_out, rubbing_left_out
 from cfmkit.families.cam.geometry.built_track import BuiltTrack, built_flank, built_track
 from cfmkit.families.cam.geometry.flank import DesignFlank
-from cfmkit.families.cam.solution import Assembly, Built, Sides
-from cfmkit.families.cam.values import (
+from cfmkit.families.cam.scalar_results import (
     DEFINITIONS,
     design_values,
     largest,
@@ -33,6 +32,7 @@ from cfmkit.families.cam.values import (
     requested_travel,
     values_of_built,
 )
+from cfmkit.families.cam.solution import Assembly, Built, Sides
 from cfmkit.families.findings import mm
 from cfmkit.families.no_mechanism import CannotBuild, no_result
 from cfmkit.numerics.registration import Registration, gaps_across, register, registered_where_it_is

@@ -14,7 +14,7 @@ from cfmkit.arrays import FloatArray
 from cfmkit.export.contours import Arc, Line
 from cfmkit.families.cam.findings import finding
 from cfmkit.families.cam.outline import plate_contours
-from cfmkit.families.cam.values import DEFINITIONS
+from cfmkit.families.cam.scalar_results import DEFINITIONS
 from cfmkit.families.findings import mm
 from cfmkit.results import Quantity
 

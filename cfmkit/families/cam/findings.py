@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.families.cam.contact import YIELD_PRESSURE, allowable_stress, worst
-from cfmkit.families.cam.statics import spring_force
-from cfmkit.families.cam.values import (
+from cfmkit.families.cam.scalar_results import (
     FlankSamples,
     errors_used,
     half_extent,
@@ -21,6 +20,7 @@ from cfmkit.families.cam.values import (
     pressure_of,
     root_mean_square,
 )
+from cfmkit.families.cam.statics import spring_force
 from cfmkit.families.findings import finder, mm, mpa, newton
 from cfmkit.numerics.robust import neighbour_noise
 

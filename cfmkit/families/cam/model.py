@@ -25,9 +25,9 @@ from cfmkit.families.cam.build import CLOSE, assemble, check_first_pose, check_s
 from cfmkit.families.cam.clearance import smallest, touching
 from cfmkit.families.cam.contact import allowable_stress, flank_pressure, stress
 from cfmkit.families.cam.findings import finding, findings_of, left_out
+from cfmkit.families.cam.scalar_results import contact_pressure, theoretical_force, values_of
 from cfmkit.families.cam.solution import ON_CORNER, Assembly, Solution
 from cfmkit.families.cam.statics import Forces, forces
-from cfmkit.families.cam.values import contact_pressure, theoretical_force, values_of
 from cfmkit.families.findings import mm
 from cfmkit.families.no_mechanism import CannotBuild, no_result
 from cfmkit.results import Result, Status

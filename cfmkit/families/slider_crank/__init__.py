@@ -6,12 +6,12 @@ from cfmkit.families.base import Family, Search
 from cfmkit.families.slider_crank.build import resolve
 from cfmkit.families.slider_crank.dispatch import design
 from cfmkit.families.slider_crank.findings import FINDINGS
-from cfmkit.families.slider_crank.printed.values import DEFINITIONS as OF_PARTS
+from cfmkit.families.slider_crank.printed.scalar_results import DEFINITIONS as OF_PARTS
 from cfmkit.families.slider_crank.spec import SliderCrankSpec
 from cfmkit.families.slider_crank.springs.many_designs.model import analyze_block
 from cfmkit.families.slider_crank.springs.model import analyze, gradient
+from cfmkit.families.slider_crank.springs.scalar_results import DEFINITIONS as OF_SPRINGS
 from cfmkit.families.slider_crank.springs.stiffness_classes import CLASSES
-from cfmkit.families.slider_crank.springs.values import DEFINITIONS as OF_SPRINGS
 
 PRINTED = "cfmkit.families.slider_crank.printed.model:analyze"
 """One model for flexures and strips: the chain is another one."""

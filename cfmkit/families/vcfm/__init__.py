@@ -7,8 +7,8 @@ from cfmkit.families.vcfm.design import design
 from cfmkit.families.vcfm.findings import FINDINGS
 from cfmkit.families.vcfm.many_designs import analyze_block
 from cfmkit.families.vcfm.model import analyze
+from cfmkit.families.vcfm.scalar_results import DEFINITIONS
 from cfmkit.families.vcfm.spec import VcfmSpec
-from cfmkit.families.vcfm.values import DEFINITIONS
 
 FAMILY = Family(
     name="vcfm",
@@ -23,7 +23,7 @@ FAMILY = Family(
     },
     design=design,
     values=DEFINITIONS,
-    draw="cfmkit.families.vcfm.draw",
+    draw="cfmkit.families.vcfm.figures",
     scheme="cfmkit.families.vcfm.dimension_drawing",
     outline="cfmkit.families.vcfm.outline",
     decks="cfmkit.families.vcfm.solid:decks",

@@ -17,8 +17,8 @@ from cfmkit.curves import Column, Curve
 from cfmkit.families.vcfm.build import parts, spring_room
 from cfmkit.families.vcfm.findings import findings_of, spring_closed
 from cfmkit.families.vcfm.leaves.v_beam import VBeam
+from cfmkit.families.vcfm.scalar_results import adjustability, readings, values_of
 from cfmkit.families.vcfm.solution import Characteristics, LeafSamples, Push, Solution
-from cfmkit.families.vcfm.values import adjustability, readings, values_of
 from cfmkit.numerics.last_places import last_places
 from cfmkit.numerics.roots import bracketed_root
 from cfmkit.results import Result, Status

@@ -9,7 +9,7 @@ import numpy as np
 from cfmkit.families.cam.build import directions
 from cfmkit.families.cam.contact import worst
 from cfmkit.families.cam.dynamics.build import slender_rod, solid_cylinder
-from cfmkit.families.cam.dynamics.values import contact_pressure
+from cfmkit.families.cam.dynamics.scalar_results import contact_pressure
 from cfmkit.families.cam.findings import finding, overstressed
 from cfmkit.families.findings import mm, newton
 from cfmkit.specs.units import format_short

@@ -23,10 +23,10 @@ from cfmkit.families.cam.dynamics.ending import ending
 from cfmkit.families.cam.dynamics.findings import findings_of, old_word, outside, runs_on_corner
 from cfmkit.families.cam.dynamics.inverse import respond, statics
 from cfmkit.families.cam.dynamics.multibody import CornerContact, NineCoordinates, reactions
+from cfmkit.families.cam.dynamics.scalar_results import contact_pressure, slow_force, values_of
 from cfmkit.families.cam.dynamics.solution import Build, History, MotionSolution
-from cfmkit.families.cam.dynamics.values import contact_pressure, slow_force, values_of
 from cfmkit.families.cam.findings import rubbing_left_out
-from cfmkit.families.cam.values import constant_force
+from cfmkit.families.cam.scalar_results import constant_force
 from cfmkit.families.no_mechanism import CannotBuild, no_result
 from cfmkit.results import Result, Status
 

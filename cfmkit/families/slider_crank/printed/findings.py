@@ -9,7 +9,7 @@ import numpy as np
 from cfmkit.families.findings import mm, mpa, newton
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.printed.chain import kink
-from cfmkit.families.slider_crank.printed.values import stress_stroke
+from cfmkit.families.slider_crank.printed.scalar_results import stress_stroke
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

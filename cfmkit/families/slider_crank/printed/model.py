@@ -26,9 +26,9 @@ from cfmkit.families.slider_crank.printed.assembly import (
 )
 from cfmkit.families.slider_crank.printed.findings import findings_of
 from cfmkit.families.slider_crank.printed.pressing import Ending, kept_clear
+from cfmkit.families.slider_crank.printed.scalar_results import DEFINITIONS, numbers
 from cfmkit.families.slider_crank.printed.solution import Solution
-from cfmkit.families.slider_crank.printed.values import DEFINITIONS, numbers
-from cfmkit.families.slider_crank.springs.values import DEFINITIONS as OF_SPRINGS
+from cfmkit.families.slider_crank.springs.scalar_results import DEFINITIONS as OF_SPRINGS
 from cfmkit.results import Quantity, Result, Status
 from cfmkit.specs.units import between
 

@@ -25,9 +25,9 @@ from cfmkit.families.slider_crank.printed.chain import kink
 from cfmkit.families.slider_crank.printed.findings import friction_left_out
 from cfmkit.families.slider_crank.printed.model import as_run
 from cfmkit.families.slider_crank.printed.outline import solved_piece
+from cfmkit.families.slider_crank.printed.scalar_results import DEFINITIONS
 from cfmkit.families.slider_crank.printed.solution import first_at
-from cfmkit.families.slider_crank.printed.values import DEFINITIONS
-from cfmkit.families.slider_crank.springs.values import DEFINITIONS as OF_SPRINGS
+from cfmkit.families.slider_crank.springs.scalar_results import DEFINITIONS as OF_SPRINGS
 from cfmkit.results import Quantity, Result, Status
 from cfmkit.specs.units import between, format_short
 from cfmkit.stock.spec import PaddedPart

@@ -25,8 +25,8 @@ from cfmkit.families.slider_crank.build import resolve
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.springs.assembly import TURN, assemble, default_motion
 from cfmkit.families.slider_crank.springs.findings import findings_of
+from cfmkit.families.slider_crank.springs.scalar_results import values_of
 from cfmkit.families.slider_crank.springs.solution import Character, ClosedForm, Solution
-from cfmkit.families.slider_crank.springs.values import values_of
 from cfmkit.families.slider_crank.unit_springs import JOINTS
 from cfmkit.results import Result, Status
 from cfmkit.specs.units import between, format_short

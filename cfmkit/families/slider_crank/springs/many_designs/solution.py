@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.families.slider_crank.printed.values import DEFINITIONS as OF_PARTS
+from cfmkit.families.slider_crank.printed.scalar_results import DEFINITIONS as OF_PARTS
 from cfmkit.families.slider_crank.springs.many_designs.bands import edges
 from cfmkit.families.slider_crank.springs.model import (
     efforts_inside,
@@ -22,6 +22,7 @@ from cfmkit.families.slider_crank.springs.model import (
     target_of,
     window_of,
 )
+from cfmkit.families.slider_crank.springs.scalar_results import DEFINITIONS
 from cfmkit.families.slider_crank.springs.solution import Character, Solution, grid_over
 from cfmkit.families.slider_crank.springs.stiffness_classes import (
     Classified,
@@ -29,7 +30,6 @@ from cfmkit.families.slider_crank.springs.stiffness_classes import (
     scale_factors,
     small_angle_number,
 )
-from cfmkit.families.slider_crank.springs.values import DEFINITIONS
 from cfmkit.metrics.branch_views import Frame
 from cfmkit.metrics.closed import extremes, mean
 from cfmkit.metrics.many import UNIFORM_POINTS, ManyBranches, range_95, range_95_fraction, usable_interval

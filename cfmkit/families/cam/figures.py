@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.families.cam.picture_parts import moment, pivoting, pose, scene, spring_count, start_curve, swallowtail
-from cfmkit.families.cam.values import theoretical_force
+from cfmkit.families.cam.scalar_results import theoretical_force
 from cfmkit.plots import parts
 from cfmkit.plots.bands import limits_on
 from cfmkit.plots.curves import CurveLook, plot_curve
@@ -46,7 +46,7 @@ def figures(result: Result) -> dict[str, Callable[[], Figure]]:
     if solution is None or not result.curves:
         return {}
     if result.spec.at("analysis.fidelity") == "dynamic":
-        from cfmkit.families.cam.dynamics import draw as draw_dynamics
+        from cfmkit.families.cam.dynamics import figures as draw_dynamics
 
         return draw_dynamics.figures(result)
     if result.spec.at("mechanism.profile.file"):

@@ -11,9 +11,9 @@ import numpy as np
 from cfmkit.elastica.model.network import LineSpring
 from cfmkit.elastica.outcome.sections import TURN
 from cfmkit.families.beam.build import mirror_axis
+from cfmkit.families.beam.scalar_results import natural, window_of
 from cfmkit.families.beam.strips import mirrored, strips
 from cfmkit.families.beam.surface_following import ride
-from cfmkit.families.beam.values import natural, window_of
 from cfmkit.plots import parts
 from cfmkit.plots.bands import limits_on
 from cfmkit.plots.curves import CurveLook

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.cam.values import constant_force
+from cfmkit.families.cam.scalar_results import constant_force
 from cfmkit.plots.bands import limits_on
 from cfmkit.plots.curves import CurveLook
 from cfmkit.plots.diagram import Diagram, Limit, Region, Scale, Series, diagram_figure

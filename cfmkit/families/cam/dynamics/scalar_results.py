@@ -9,8 +9,8 @@ import numpy as np
 
 from cfmkit.families.cam.contact import pressure
 from cfmkit.families.cam.dynamics.inverse import respond, statics
+from cfmkit.families.cam.scalar_results import DEFINITIONS, constant_force
 from cfmkit.families.cam.statics import GRAVITY
-from cfmkit.families.cam.values import DEFINITIONS, constant_force
 from cfmkit.results import Quantity
 
 if TYPE_CHECKING:
