@@ -64,6 +64,14 @@ class Fatigue(Model):
         line = None if self.coefficient is None or self.exponent is None else (self.coefficient, self.exponent)
         return FatigueLaw(self.points or (), line, self.ultimate_strength)
 
+    @classmethod
+    def of(cls, law: FatigueLaw) -> Self:
+        """Return a law as a specification says it."""
+        coefficient, exponent = law.basquin or (None, None)
+        return cls(
+            points=law.points or None, coefficient=coefficient, exponent=exponent, ultimate_strength=law.ultimate
+        )
+
 
 class Relaxation(Model):
     """How the modulus falls while a strain is held: Prony terms, or the modulus at some times."""

@@ -22,7 +22,7 @@ def _parts(spec: CamSpec) -> Iterator[Part]:
     mechanism, springs = spec.mechanism, spec.mechanism.springs
     if not (springs.name or mechanism.bearings or mechanism.pins):
         return
-    rates = springs.stiffness if isinstance(springs.stiffness, tuple) else (springs.stiffness,)
+    rates = springs.each if isinstance(springs.each, tuple) else (springs.each,)
     count = len(rates) if len(rates) > 1 else springs.count or 1
     limit = f", up to {mm(springs.max_elongation)}" if springs.max_elongation else ""
     tight = f", stretched by {mm(mechanism.preload)} at the start" if mechanism.preload else ""

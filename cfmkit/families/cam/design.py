@@ -28,7 +28,8 @@ from cfmkit.families.findings import at_least, at_most, mm, newton, rate
 from cfmkit.families.no_mechanism import CannotBuild, Infeasible, no_design
 from cfmkit.results import Design, Status
 from cfmkit.stock.springs.catalogue import Miss, nearest
-from cfmkit.stock.springs.spec import offers
+from cfmkit.stock.springs.in_use import SpringInUse
+from cfmkit.stock.springs.spec import offers, wire_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -266,7 +267,9 @@ def _with_spring(
             return Miss(label, item.free_length / room - 1.0, text)
         preload = room - item.free_length + reserve
     largest = None if item.largest is None else item.largest + reserve
-    springs = Springs(stiffness=item.rate, count=count, max_elongation=largest, name=item.name)
+    springs = Springs(
+        stiffness=item.rate, count=count, max_elongation=largest, name=item.name, wound=wire_of(item), life=item.life
+    )
     constant = pull / (4.0 * springs.total)
     law = _law(spec, target, constant, factor, preload)
     if smallest is not None and _undercuts(spec, law, smallest):
@@ -278,6 +281,10 @@ def _with_spring(
         reached = _stroke_of(law, target, springs)
         text = f"{problem.finding.name.replace('_', ' ')} (for a stroke of {mm(reached)})"
         return Miss(label, target.stroke / max(reached, 1e-9) - 1.0, text)
+    if target.spring_life is not None:
+        most = 2.0 * (reach(law, target.stroke)[1] - law.rest_half_width) + preload
+        if missed := SpringInUse.of(item, preload - reserve, most - reserve).misses_life(target.spring_life):
+            return Miss(label, *missed)
     gap = two_way_gap(law, target, spec.mechanism.rolling_friction)
     if gap == float("inf"):
         return Miss(label, float("inf"), "friction holds the roller")

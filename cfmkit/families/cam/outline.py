@@ -80,7 +80,7 @@ def _facts(spec: CamSpec) -> Iterator[tuple[str, str]]:
     yield "material", mechanism.contact.material.words if mechanism.contact else "not stated"
     yield "rollers", f"2, diameter {mm(2.0 * mechanism.roller_radius)}"
     yield "braces", f"2, {mm(mechanism.brace_length)} between pin and roller axis"
-    given, count = mechanism.springs.stiffness, mechanism.springs.count or 1
+    given, count = mechanism.springs.each, mechanism.springs.count or 1
     each = given if isinstance(given, tuple) else (given,) * count
     same = len(set(each)) == 1
     yield "springs", f"{len(each)} of {rate(each[0])}" if same else f"{len(each)}: {', '.join(map(rate, each))}"

@@ -146,4 +146,4 @@ def moment(solution: Solution, index: int) -> str:
 def spring_count(solution: Solution) -> int:
     """Return the number of springs in parallel."""
     springs = solution.assembly.spec.mechanism.springs
-    return len(springs.stiffness) if isinstance(springs.stiffness, tuple) else springs.count or 1
+    return len(springs.each) if isinstance(springs.each, tuple) else springs.count or 1

@@ -68,4 +68,4 @@ def depth_of(thick: float, springs: Springs, stretch: float, half_width: float) 
 
 def count_of(springs: Springs) -> int:
     """Return how many springs there are."""
-    return len(springs.stiffness) if isinstance(springs.stiffness, tuple) else springs.count or 1
+    return len(springs.each) if isinstance(springs.each, tuple) else springs.count or 1

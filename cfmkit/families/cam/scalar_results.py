@@ -14,6 +14,7 @@ from cfmkit.families.cam.statics import Forces, Losses, forces, normal_turn
 from cfmkit.metrics.closed import extremes
 from cfmkit.results import Quantity
 from cfmkit.specs.units import between
+from cfmkit.stock.springs.in_use import WIRE_DEFINITIONS, SpringInUse, wire_quantities
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -128,6 +129,7 @@ DEFINITIONS = {
         "ratio",
         "static force at the end of the motion over that with flanks at the right angles, less 1 [SS, Fig. 15 and 16]",
     ),
+    **WIRE_DEFINITIONS,
 } | BUILT_DEFINITIONS
 
 
@@ -163,7 +165,18 @@ def values_of(solution: Solution) -> Mapping[str, Quantity]:
         shares = solution.band.deviations()
         numbers["manufacturing_force_share"] = float(np.median(shares))
         numbers["manufacturing_force_share_95"] = float(np.quantile(shares, 0.95))
-    return {name: Quantity(value, *DEFINITIONS[name]) for name, value in numbers.items()}
+    return {name: Quantity(value, *DEFINITIONS[name]) for name, value in numbers.items()} | _wire(solution)
+
+
+def _wire(solution: Solution) -> dict[str, Quantity]:
+    """Return what the springs' wire bears, where it is known; of unequal springs the stiffest."""
+    springs, ends = solution.assembly.spec.mechanism.springs, solution.elongation
+    stiffest = max(springs.each) if isinstance(springs.each, tuple) else springs.each
+    wire = springs.wound
+    wound = None if wire is None else wire.wound("extension")
+    fatigue = None if wire is None or wire.fatigue is None else wire.fatigue.law
+    least, most = (stiffest * max(float(end), 0.0) for end in (ends.min(), ends.max()))
+    return wire_quantities([SpringInUse(wound, least, most, fatigue, springs.life)])
 
 
 def design_values(assembly: Assembly) -> dict[str, float]:

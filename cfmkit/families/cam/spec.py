@@ -10,7 +10,7 @@ from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, mo
 from cfmkit.specs.spec import Analysis, DesignBlock, Model, OldWords, Spec, refuse
 from cfmkit.specs.units import Angle, Force, Inertia, Length, Mass, Ratio, Stiffness, Time, format_short
 from cfmkit.stock.spec import Friction, Guide, MaterialField, MaterialSpec, Pins, SafetyFactor
-from cfmkit.stock.springs.spec import Catalogue
+from cfmkit.stock.springs.spec import Catalogue, Life, SpringWire
 from cfmkit.tables.source import DataSource
 
 Positive = Field(gt=0)
@@ -25,8 +25,8 @@ DesignFriction = Annotated[Ratio, Field(gt=-1, lt=1)]
 class Springs(Model):
     """Springs in parallel between the two roller axes."""
 
-    stiffness: PositiveStiffness | tuple[PositiveStiffness, ...] = Field(
-        description="of one spring, or a list with the measured value of each"
+    stiffness: PositiveStiffness | tuple[PositiveStiffness, ...] | None = Field(
+        None, description="of one spring, or a list with the measured value of each; default: from 'wound'"
     )
     count: int | None = Field(
         None, ge=1, le=1000, description="number of equal springs; default 1, or the list's length"
@@ -39,6 +39,23 @@ class Springs(Model):
     )
     max_elongation: PositiveLength | None = Field(None, description="largest elongation that a spring may see")
     name: str | None = Field(None, min_length=1, description="of the spring as it is bought, for the list of parts")
+    wound: SpringWire | None = Field(
+        None, description="its wire, coil and turns: gives the stress in the wire, and the rate where none is stated"
+    )
+    life: Life | None = None
+
+    @model_validator(mode="after")
+    def _rate_is_known(self) -> Self:
+        if self.stiffness is None:
+            if self.wound is None:
+                refuse("Springs", {("stiffness",): "missing: give it, or 'wound' from which it follows"})
+            else:
+                # past the frozen model, and not counted as set: another wire then has another rate
+                object.__setattr__(self, "stiffness", self.wound.wound("extension").rate)
+        elif self.wound is not None:
+            for one in self.stiffness if isinstance(self.stiffness, tuple) else (self.stiffness,):
+                self.wound.check_rate("extension", one)
+        return self
 
     @model_validator(mode="after")
     def _one_way_to_say_preload(self) -> Self:
@@ -56,18 +73,24 @@ class Springs(Model):
         return self
 
     @property
+    def each(self) -> float | tuple[float, ...]:
+        """Stiffness of one spring, or of each, [N/m]."""
+        return 0.0 if self.stiffness is None else self.stiffness
+
+    @property
     def total(self) -> float:
         """K, the sum of all parallel springs [N/m]."""
-        if isinstance(self.stiffness, tuple):
-            return sum(self.stiffness)
-        return self.stiffness * (self.count or 1)
+        if isinstance(self.each, tuple):
+            return sum(self.each)
+        return self.each * (self.count or 1)
 
     def scaled_to(self, total: float) -> Springs:
-        """Return springs of the same number whose stiffness adds up to `total` [N/m]."""
+        """Return springs of the same number whose stiffness adds up to `total` [N/m]: of another wire, if of any."""
+        made = {} if self.wound is None else {"wound": None, "name": None, "life": None}
         if isinstance(self.stiffness, tuple):
             values = tuple(value * total / self.total for value in self.stiffness)
-            return self.model_copy(update={"stiffness": values})
-        return self.model_copy(update={"stiffness": total / (self.count or 1)})
+            return self.model_copy(update={"stiffness": values} | made)
+        return self.model_copy(update={"stiffness": total / (self.count or 1)} | made)
 
 
 class Masses(Model):
@@ -348,6 +371,9 @@ class CamDesign(DesignBlock):
     catalogue: Catalogue = Field(
         (), description="springs to pick from: a list, a CSV file beside the specification, or `generic`"
     )
+    spring_life: Life | None = Field(
+        None, description="cycles that a spring of the catalogue must last; one whose life is not known is not taken"
+    )
     friction: DesignFriction = Field(
         0.0, description="rolling friction to cut for; positive: exact on the way up, negative: on the way down"
     )
@@ -358,6 +384,8 @@ class CamDesign(DesignBlock):
     def _catalogue_where_needed(self) -> Self:
         if (self.choose == "catalogue") != bool(self.catalogue):
             raise ValueError("'catalogue' and 'choose: catalogue' belong together: give both or neither")
+        if self.spring_life is not None and not self.catalogue:
+            raise ValueError("'spring_life' is of springs that are picked: it needs a 'catalogue'")
         return self
 
 

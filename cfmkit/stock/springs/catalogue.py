@@ -19,6 +19,8 @@ from cfmkit.stock.springs.wound import Kind, Wound, tensile_strength
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from cfmkit.metrics.material_laws import FatigueLaw
+
 GENERIC = "generic"
 """The word for the series that ships with the package."""
 
@@ -60,6 +62,12 @@ class Offer:
         Its wire, coil and turns, where they are known.
     counts : tuple of int
         Numbers in parallel to try.
+    max_stress : float or None
+        Largest stress allowed in the wire [Pa]; None: not stated.
+    fatigue : FatigueLaw or None
+        Of the wire.
+    life : float or None
+        Cycles that its maker states.
     """
 
     name: str
@@ -72,6 +80,9 @@ class Offer:
     outer_diameter: float | None = None
     wound: Wound | None = None
     counts: tuple[int, ...] = (1,)
+    max_stress: float | None = None
+    fatigue: FatigueLaw | None = None
+    life: float | None = None
 
     def stress(self, deflection: float) -> float | None:
         """Return the stress in the wire at a deflection [Pa]; None where the wire is not known."""
@@ -91,7 +102,8 @@ def generic(kind: Kind) -> tuple[Offer, ...]:
     for wire in WIRES:
         for index in INDICES:
             for turns in TORSION_TURNS if kind == "torsion" else COILS:
-                found.append(_generic(Wound(kind, wire * 1e-3, index * wire * 1e-3, float(turns))))
+                coil = round(index * wire, 6)  # 4.8, not 4.800000000000001, in what is written of it
+                found.append(_generic(Wound(kind, wire * 1e-3, coil * 1e-3, float(turns))))
     return tuple(found)
 
 

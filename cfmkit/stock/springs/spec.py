@@ -11,6 +11,7 @@ from pydantic import Field, ValidationError, ValidationInfo, WrapValidator, mode
 from cfmkit.errors import DataError
 from cfmkit.specs.spec import Model
 from cfmkit.specs.units import Angle, Force, Length, Ratio, RotationalStiffness, Stiffness, Stress, Torque
+from cfmkit.stock.spec import Fatigue
 from cfmkit.stock.springs.catalogue import GENERIC, Offer, generic
 from cfmkit.stock.springs.wound import SHEAR_MODULUS, YOUNGS_MODULUS, Wound
 from cfmkit.tables.source import DataSource
@@ -25,7 +26,60 @@ AGREE = 0.1
 """A stated rate may be off by so much from that of wire, coil and turns: makers' tolerance."""
 
 
-class CatalogueSpring(Model):
+class WireLimits(Model):
+    """What is known of the strength of a spring's wire; nothing of it is assumed."""
+
+    max_stress: Annotated[Stress, Positive] | None = Field(
+        None,
+        description="largest stress allowed in the wire, with the factor of its curvature; needs wire, coil, turns",
+    )
+    fatigue: Fatigue | None = Field(
+        None, description="S-N points or Basquin's line of the wire in that stress, for the life; needs the same"
+    )
+
+
+Life = Annotated[float, Field(gt=0, description="cycles that the maker states up to the largest deflection")]
+
+
+def _is_a_coil(wire: float | None, coil: float | None) -> None:
+    if wire and coil and coil < 2.0 * wire:
+        raise ValueError("'coil' is the mean diameter: at least twice the wire's")
+
+
+class SpringWire(WireLimits):
+    """The wire of a spring that is built in: its rate, its stress and its life follow from it."""
+
+    wire: Annotated[Length, Positive] = Field(description="diameter of the wire")
+    coil: Annotated[Length, Positive] = Field(description="mean diameter of the coil")
+    turns: Annotated[Ratio, Positive] = Field(description="active turns")
+    shear_modulus: Annotated[Stress, Positive] = Field(SHEAR_MODULUS, description="of the wire; default: music wire")
+    youngs_modulus: Annotated[Stress, Positive] = Field(
+        YOUNGS_MODULUS, description="of a torsion spring's wire; default: music wire"
+    )
+
+    @model_validator(mode="after")
+    def _winds_around(self) -> Self:
+        _is_a_coil(self.wire, self.coil)
+        return self
+
+    def wound(self, kind: Kind) -> Wound:
+        """Return the wire, loaded as a kind of spring."""
+        return Wound(kind, self.wire, self.coil, self.turns, self.shear_modulus, self.youngs_modulus)
+
+    def check_rate(self, kind: Kind, stated: float | None) -> None:
+        """Raise if a stated rate [N/m or N m/rad] is not that of the wire."""
+        if stated is not None and abs(stated / self.wound(kind).rate - 1.0) > AGREE:
+            raise ValueError(_disagree(self.wound(kind).rate / stated))
+
+
+def _disagree(times: float) -> str:
+    return (
+        f"wire, coil and turns give {times:.3g} times the rate that is stated: leave one of them out, or give the "
+        "wire's modulus"
+    )
+
+
+class CatalogueSpring(WireLimits):
     """A spring that can be bought."""
 
     name: str = Field(min_length=1, description="part number")
@@ -56,6 +110,7 @@ class CatalogueSpring(Model):
     )
     max_angle: Annotated[Angle, Positive] | None = Field(None, description="largest angle of a torsion spring")
     max_torque: Annotated[Torque, Positive] | None = Field(None, description="the same as its largest couple")
+    life: Life | None = None
     counts: tuple[Annotated[int, Field(ge=1, le=1000)], ...] = Field((2,), description="numbers in parallel to try")
 
     @model_validator(mode="after")
@@ -67,16 +122,16 @@ class CatalogueSpring(Model):
         given = [self.wire, self.coil, self.turns]
         if any(item is not None for item in given) and None in given:
             raise ValueError("'wire', 'coil' and 'turns' belong together: a rate follows from all three")
-        if self.wire and self.coil and self.coil < 2.0 * self.wire:
-            raise ValueError("'coil' is the mean diameter: at least twice the wire's")
+        _is_a_coil(self.wire, self.coil)
+        if (self.max_stress or self.fatigue) and self.wound is None:
+            raise ValueError(
+                "'max_stress' and 'fatigue' are of the stress in the wire: give 'wire', 'coil' and 'turns'"
+            )
         if stated is None and self.wound is None:
             word = "rate" if self.kind == "torsion" else "stiffness"
             raise ValueError(f"needs {word!r}, or 'wire', 'coil' and 'turns', from which it follows")
         if stated is not None and self.wound is not None and abs(stated / self.wound.rate - 1.0) > AGREE:
-            raise ValueError(
-                f"wire, coil and turns give {self.wound.rate / stated:.3g} times the rate that is stated: "
-                "leave one of them out, or give the wire's modulus"
-            )
+            raise ValueError(_disagree(self.wound.rate / stated))
         return self
 
     @property
@@ -92,21 +147,25 @@ class CatalogueSpring(Model):
         wound = self.wound
         stated = self.rate if self.kind == "torsion" else self.stiffness
         rate = stated if stated is not None else wound.rate if wound is not None else 0.0
-        largest = self.max_elongation
+        ends = [self.max_elongation]
         if self.kind == "torsion":
             ends = [self.max_angle, self.max_torque / rate if self.max_torque else None]
-            largest = min((end for end in ends if end is not None), default=None)
+        if wound is not None and self.max_stress is not None:
+            ends.append(max(self.max_stress / wound.stress(1.0) - self.initial_tension, 0.0) / rate)
         return Offer(
             name=self.name,
             kind=self.kind,
             rate=rate,
-            largest=largest,
+            largest=min((end for end in ends if end is not None), default=None),
             free_length=self.free_length,
             body_length=self.body_length or (wound.body_length if wound else None),
             initial_tension=self.initial_tension,
             outer_diameter=self.outer_diameter or (wound.outer_diameter if wound else None),
             wound=wound,
             counts=self.counts,
+            max_stress=self.max_stress,
+            fatigue=None if self.fatigue is None else self.fatigue.law,
+            life=self.life,
         )
 
 
@@ -117,6 +176,22 @@ def _named(value: Any, handler: Any, info: ValidationInfo) -> Any:
         return found
     folder = getattr(value, "folder", None) or (info.context or {}).get("folder") or "."
     return DataSource(found, folder)
+
+
+def wire_of(offer: Offer) -> SpringWire | None:
+    """Return the wire of a spring on offer as a specification has it; None where it is not known."""
+    wound = offer.wound
+    if wound is None:
+        return None
+    return SpringWire(
+        wire=wound.wire,
+        coil=wound.coil,
+        turns=wound.turns,
+        shear_modulus=wound.shear_modulus,
+        youngs_modulus=wound.youngs_modulus,
+        max_stress=offer.max_stress,
+        fatigue=None if offer.fatigue is None else Fatigue.of(offer.fatigue),
+    )
 
 
 Catalogue = Annotated[tuple[CatalogueSpring, ...] | str, WrapValidator(_named)]

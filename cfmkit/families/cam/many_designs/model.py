@@ -145,7 +145,7 @@ def _applies(spec: CamSpec, block: Block) -> bool:
     plain = _symmetric_closed(spec) and spec.analysis.travel is None
     if not plain or not set(block.values) <= set(VARIED):
         return False
-    if isinstance(mechanism.springs.stiffness, tuple) or (spec.design is None and "design.force" in block.values):
+    if isinstance(mechanism.springs.each, tuple) or (spec.design is None and "design.force" in block.values):
         return False
     # A window cuts every curve at the same samples only if all have the same travel.
     windowed = any(measure.window for measure in block.measures if measure.name in WINDOWED)
@@ -166,7 +166,7 @@ def _designs(spec: CamSpec, block: Block) -> Designs:
         "x0": mechanism.rest_half_width,
         "radius": mechanism.roller_radius,
         "friction": mechanism.rolling_friction,
-        "stiffness": mechanism.springs.stiffness,
+        "stiffness": mechanism.springs.each,
         "count": mechanism.springs.count or 1,
         "constant": profile.force_constant,
         "stroke": profile.stroke,
@@ -213,7 +213,7 @@ def _one_cam(spec: CamSpec, block: Block) -> bool:
         return False
     if spec.fidelity != "quasi-static" or analysis.manufacturing or analysis.path_method != "quadrature":
         return False
-    listed = isinstance(mechanism.springs.stiffness, tuple)
+    listed = isinstance(mechanism.springs.each, tuple)
     if analysis.origin != "path-start" or (listed and "mechanism.springs.count" in block.values):
         return False
     for path in block.values:
@@ -238,11 +238,11 @@ def _values_around(spec: CamSpec, block: Block) -> dict[str, FloatArray]:
         "brace_mass": masses.brace if masses else 0.0,
         "roller": masses.roller if masses else 0.0,
         "width": mechanism.contact.width if mechanism.contact else 1.0,
-        "count": 1 if isinstance(mechanism.springs.stiffness, tuple) else mechanism.springs.count or 1,
+        "count": 1 if isinstance(mechanism.springs.each, tuple) else mechanism.springs.count or 1,
     }
     given = {_AROUND[path]: np.asarray(found, float) for path, found in block.values.items() if path in _AROUND}
     full = {name: np.broadcast_to(np.float64(value), block.size) for name, value in values.items()} | given
-    springs = mechanism.springs.stiffness
+    springs = mechanism.springs.each
     total = np.zeros(block.size)
     for index, stated in enumerate(springs if isinstance(springs, tuple) else (springs,)):
         one = block.values.get(f"mechanism.springs.stiffness.{index}", given.get("stiffness", stated))

@@ -18,7 +18,8 @@ from cfmkit.families.slider_crank.springs.spec import Bought
 from cfmkit.families.slider_crank.unit_springs import JOINTS
 from cfmkit.specs.units import format_short
 from cfmkit.stock.springs.catalogue import Miss, Offer, nearest
-from cfmkit.stock.springs.spec import offers
+from cfmkit.stock.springs.in_use import SpringInUse
+from cfmkit.stock.springs.spec import offers, wire_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -58,7 +59,11 @@ class Option:
     @property
     def written(self) -> Bought:
         """The same as a specification has it."""
-        return Bought.model_validate({"at": JOINTS[self.joint], "name": self.offer.name, "count": self.count})
+        about = {"wound": wire_of(self.offer), "life": self.offer.life}
+        return Bought.model_validate(
+            {"at": JOINTS[self.joint], "name": self.offer.name, "count": self.count}
+            | {key: value for key, value in about.items() if value is not None}
+        )
 
     @property
     def rate(self) -> float:
@@ -123,6 +128,8 @@ def _options(task: Task, window: tuple[float, float]) -> tuple[list[Option], lis
         own = []
         for offer in offers(wanted.catalogue or (), *kinds):
             reason = _why_not(offer, float(moved[joint]), joint)
+            if reason is None and wanted.spring_life is not None:
+                reason = SpringInUse.of(offer, 0.0, float(moved[joint])).misses_life(wanted.spring_life)
             if reason is not None:
                 refused.append(Miss(f"{offer.name} at the {name.replace('_', ' ')}", *reason))
                 continue

@@ -25,7 +25,7 @@ from cfmkit.families.slider_crank.build import resolve
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.springs.assembly import TURN, assemble, default_motion
 from cfmkit.families.slider_crank.springs.findings import findings_of
-from cfmkit.families.slider_crank.springs.scalar_results import values_of
+from cfmkit.families.slider_crank.springs.scalar_results import values_of, values_of_wires
 from cfmkit.families.slider_crank.springs.solution import Character, ClosedForm, Solution
 from cfmkit.families.slider_crank.unit_springs import JOINTS
 from cfmkit.results import Result, Status
@@ -78,7 +78,7 @@ def analyze(spec: SliderCrankSpec, run: Run) -> Result:
         status=status,
         message=shortfalls[0].message if shortfalls else stuck,
         curves=(_curve(solution),),
-        values=values_of(solution),
+        values={**values_of(solution), **values_of_wires(spec.mechanism.springs, solution)},
         warnings=(*shortfalls, *(item for item in findings_of(spec, solution) if item.name not in said)),
         travel=asked_motion(spec, assembly),
         target=target_of(spec),

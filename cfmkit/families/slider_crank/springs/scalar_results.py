@@ -7,12 +7,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.families.slider_crank.springs.stiffness_classes import CLASSES, scale_factors, small_angle_number
+from cfmkit.families.slider_crank.unit_springs import JOINTS
 from cfmkit.results import Quantity
+from cfmkit.stock.springs.in_use import WIRE_DEFINITIONS, SpringInUse, wire_quantities
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
     from cfmkit.families.slider_crank.springs.solution import Solution
+    from cfmkit.families.slider_crank.springs.spec import Springs
 
 
 _AT = "the reference (`analysis.reference_angle` or `reference_travel`)"
@@ -76,6 +79,7 @@ DEFINITIONS = {
     "slider_travel_max": ("length", "largest travel of the slider from the unloaded position"),
     "coupler_compression_max": ("force", "largest compression of the coupler of one leg; negative: only tension"),
     "guide_force_max": ("force", "largest force of the slider of one leg on its guide, across its way"),
+    **WIRE_DEFINITIONS,
 }
 
 
@@ -85,6 +89,25 @@ def values_of(solution: Solution) -> Mapping[str, Quantity]:
     return {name: Quantity(value, *DEFINITIONS[name], reason) for name, (value, reason) in found.items()} | {
         "stiffness_class": Quantity(float(solution.character.kind), *DEFINITIONS["stiffness_class"], words=CLASSES)
     }
+
+
+def values_of_wires(springs: Springs, solution: Solution) -> Mapping[str, Quantity]:
+    """Return what the wires of bought springs bear over the motion; nothing where they are not known."""
+    return wire_quantities(list(_in_use(springs, solution)))
+
+
+def _in_use(springs: Springs, solution: Solution) -> Iterator[SpringInUse]:
+    """Yield the springs that are bought between their smallest and their largest load over the motion."""
+    for one in springs.bought:
+        joint = JOINTS.index(one.at)
+        turn = solution.units.turn[joint] + ((springs.anchor or 0.0) if one.at == "slider" else 0.0)
+        sizes = np.abs(turn)
+        least = 0.0 if turn.min() < 0 < turn.max() else float(sizes.min())
+        # springs of a joint turn alike: each bears its rate's share
+        wound = None if one.wound is None else one.wound.wound(one.kind)
+        each = wound.rate if wound is not None else 0.0
+        fatigue = None if one.wound is None or one.wound.fatigue is None else one.wound.fatigue.law
+        yield SpringInUse(wound, each * least, each * float(sizes.max()), fatigue, one.life)
 
 
 def _loop(solution: Solution) -> Iterator[tuple[str, float | None]]:

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from cfmkit.specs.spec import DesignBlock, Model
+from cfmkit.specs.spec import DesignBlock, Model, refuse
 from cfmkit.specs.units import Angle, Force, Length, Ratio, RotationalStiffness, Stiffness, Torque
-from cfmkit.stock.springs.spec import Catalogue
+from cfmkit.stock.springs.spec import AGREE, Catalogue, Life, SpringWire
+
+if TYPE_CHECKING:
+    from cfmkit.stock.springs.wound import Kind
 
 PositiveLength = Annotated[Length, Field(gt=0)]
 PositiveAngle = Annotated[Angle, Field(gt=0)]
@@ -25,6 +28,20 @@ class Bought(Model):
     at: JointName = Field(description="where it is")
     name: str = Field(min_length=1, description="part number")
     count: int = Field(1, ge=1, le=1000, description="how many in parallel in one leg")
+    wound: SpringWire | None = Field(
+        None, description="wire, coil and turns of one: gives the stress in its wire, and the rate where none is stated"
+    )
+    life: Life | None = None
+
+    @property
+    def kind(self) -> Kind:
+        """What it is loaded by."""
+        return "extension" if self.at == "slider" else "torsion"
+
+    @property
+    def rate(self) -> float | None:
+        """Of all of them, from their wire [N m/rad or N/m]; None where that is not known."""
+        return None if self.wound is None else self.count * self.wound.wound(self.kind).rate
 
 
 class Springs(Model):
@@ -41,6 +58,27 @@ class Springs(Model):
     )
 
     bought: tuple[Bought, ...] = Field((), description="springs as they are bought, for the list of parts")
+
+    @model_validator(mode="after")
+    def _rates_are_those_of_the_wires(self) -> Self:
+        """Take rates from the wires where none are stated, and refuse stated ones that contradict them."""
+        for joint in dict.fromkeys(one.at for one in self.bought):
+            parts = [one.rate for one in self.bought if one.at == joint]
+            if None in parts:
+                continue
+            total = sum(rate for rate in parts if rate is not None)
+            if joint not in self.model_fields_set:
+                # past the frozen model, and not counted as set: another wire then has another rate
+                object.__setattr__(self, joint, total)
+            elif abs(total / getattr(self, joint) - 1.0 if getattr(self, joint) else 1.0) > AGREE:
+                refuse(
+                    "Springs",
+                    {
+                        (joint,): f"wires of 'bought' give {total / max(getattr(self, joint), 1e-300):.3g} "
+                        "times that: leave one of them out, or give the wire's modulus"
+                    },
+                )
+        return self
 
     @property
     def rates(self) -> tuple[float, float, float, float]:
@@ -106,6 +144,9 @@ class SpringDesign(DesignBlock):
         description="springs to pick from, at most one kind per joint: a list, a CSV file beside the specification, "
         "or `generic`; default: any rate",
     )
+    spring_life: Life | None = Field(
+        None, description="cycles that springs of the catalogue must last; one whose life is not known is not taken"
+    )
     max_rates: MaxRates | None = Field(None, description="largest rates; no limit unless given")
     crank_length: tuple[PositiveLength, PositiveLength] | None = Field(
         None, description="range in which it may be chosen; as the mechanism has it unless given"
@@ -141,6 +182,12 @@ class SpringDesign(DesignBlock):
             raise ValueError("'adjustment' and 'anchor_travel' belong together: give both or neither")
         if self.adjustment is not None and (self.torque is not None or "slider" not in self.springs):
             raise ValueError("'adjustment' is that of the force by the slider's spring: it needs 'force' and 'slider'")
+        return self
+
+    @model_validator(mode="after")
+    def _life_is_of_what_is_picked(self) -> Self:
+        if self.spring_life is not None and not self.catalogue:
+            raise ValueError("'spring_life' is of springs that are picked: it needs a 'catalogue'")
         return self
 
     @model_validator(mode="after")

@@ -1,0 +1,110 @@
+"""What a bought spring is put through by the mechanism that it is built into: the stress in its wire, and its life.
+
+The life follows from the S-N data of the wire where they are given, between the smallest and the largest load of the
+travel [W, ch. 4: stress with the factor of curvature]; else it is what the maker states. Nothing is assumed.
+
+Reference
+---------
+[W] A. M. Wahl, Mechanical Springs, 2nd ed., McGraw-Hill (1963).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from cfmkit.metrics.traces import Undefined
+from cfmkit.results import Quantity
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from cfmkit.metrics.material_laws import FatigueLaw
+    from cfmkit.stock.springs.catalogue import Offer
+    from cfmkit.stock.springs.wound import Wound
+
+WIRE_DEFINITIONS = {
+    "wire_stress_max": (
+        "stress",
+        "largest stress in the wire of a bought spring over the travel, with the factor of its curvature (Wahl): "
+        "shear, in a torsion spring bending",
+    ),
+    "spring_life": (
+        "count",
+        "cycles of the whole travel that a bought spring lasts: by the S-N data of its wire and Goodman's line, else "
+        "as its maker states",
+    ),
+}
+
+
+@dataclass(frozen=True)
+class SpringInUse:
+    """A spring between two loads.
+
+    Attributes
+    ----------
+    wound : Wound or None
+        Its wire, coil and turns; None where they are not known.
+    least, largest : float
+        Load of one spring, over the travel [N or N m].
+    fatigue : FatigueLaw or None
+        Of the wire.
+    stated_life : float or None
+        Cycles that its maker states.
+    """
+
+    wound: Wound | None
+    least: float
+    largest: float
+    fatigue: FatigueLaw | None = None
+    stated_life: float | None = None
+
+    @classmethod
+    def of(cls, offer: Offer, least: float, largest: float) -> SpringInUse:
+        """Return a spring on offer between two deflections [m or rad]."""
+        low, high = (offer.initial_tension + offer.rate * one for one in (least, largest))
+        return cls(offer.wound, low, high, offer.fatigue, offer.life)
+
+    def misses_life(self, wanted: float) -> tuple[float, str] | None:
+        """Return by what share of it the spring misses a life in cycles, and why; None where it lasts."""
+        try:
+            life = self.life()
+        except Undefined as error:
+            return 1.0, str(error)
+        if life is None:
+            return 1.0, "its life is not known: give its 'life', or 'fatigue' of its wire"
+        return (
+            None if life >= wanted * (1 - 1e-9) else (1.0 - life / wanted, f"lasts {life:.3g} of {wanted:.3g} cycles")
+        )
+
+    @property
+    def stress(self) -> float | None:
+        """Largest stress in the wire [Pa]."""
+        return None if self.wound is None else self.wound.stress(self.largest)
+
+    def life(self) -> float | None:
+        """Return the cycles that it lasts; None where nothing is known of it.
+
+        Raises
+        ------
+        Undefined
+            If the S-N data have no number for these stresses.
+        """
+        if self.wound is None or self.fatigue is None:
+            return self.stated_life
+        return self.fatigue.life(self.wound.stress(self.largest), self.wound.stress(self.least))
+
+
+def wire_quantities(springs: Sequence[SpringInUse]) -> dict[str, Quantity]:
+    """Return the largest stress and the shortest life of some springs by name; what nothing is known of is left out."""
+    found: dict[str, Quantity] = {}
+    stresses = [one.stress for one in springs if one.stress is not None]
+    if stresses:
+        found["wire_stress_max"] = Quantity(max(stresses), *WIRE_DEFINITIONS["wire_stress_max"])
+    try:
+        lives = [life for life in (one.life() for one in springs) if life is not None]
+    except Undefined as error:
+        return found | {"spring_life": Quantity(None, *WIRE_DEFINITIONS["spring_life"], reason=str(error))}
+    if lives:
+        found["spring_life"] = Quantity(min(lives), *WIRE_DEFINITIONS["spring_life"])
+    return found
