@@ -17,7 +17,7 @@ from timing import best
 import cfmkit
 from cfmkit import api
 from cfmkit.elastica import Displacement, trace
-from cfmkit.families.vcfm.exact import DOWN, leaf_network
+from cfmkit.families.vcfm.exact_model import DOWN, leaf_network
 from cfmkit.families.vcfm.leaves.springs import Diamond
 from cfmkit.families.vcfm.leaves.strip import Strip
 from cfmkit.families.vcfm.leaves.v_beam import VBeam

@@ -1,6 +1,6 @@
 """The kit that optimised designs are made with, whatever the mechanism: it knows no family.
 
-`program`
+`sqp_program`
     What a family sees at a point, an objective and limits by name, becomes a program of `cfmkit.numerics.sqp`.
 `limits`
     Which limits a point misses, and which of them hold it.
@@ -10,7 +10,7 @@
     Many starts, in this process or several, each noted when it is finished, within a time budget.
 `audit`
     What is reported of a design is what the analysis of its written specification measures.
-`robust`
+`robust_design`
     Values for which made parts are good: margins from tolerances to first order, and drawn parts.
 
 What a design is to do, the start it begins with and the words for what blocks it belong to the family.

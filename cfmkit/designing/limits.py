@@ -10,7 +10,7 @@ import numpy as np
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
-    from cfmkit.designing.program import Rows
+    from cfmkit.designing.sqp_program import Rows
 
 STILL = 1e-9
 """A row that no variable moves by more than this is met or missed whatever the design: it holds nothing."""

@@ -14,7 +14,7 @@ import numpy as np
 
 from cfmkit.errors import CfmError, SolutionError, UsageError
 from cfmkit.experiment.comparison import Comparison, Samples, Zeros, compare
-from cfmkit.experiment.parameters import DATA, ZEROS
+from cfmkit.experiment.fitted_parameters import DATA, ZEROS
 from cfmkit.families import family
 from cfmkit.families.base import Run
 from cfmkit.metrics import Window
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.experiment.evaluation import MeasuredCurves
-    from cfmkit.experiment.parameters import FitParameter
+    from cfmkit.experiment.fitted_parameters import FitParameter
     from cfmkit.results import Result
     from cfmkit.specs.spec import Spec
 

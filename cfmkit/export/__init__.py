@@ -12,7 +12,7 @@ from cfmkit.export.contours import TOLERANCE
 from cfmkit.export.dxf import dxf_bytes, write_dxf
 from cfmkit.export.kerf import with_kerf
 from cfmkit.export.layers import check_name
-from cfmkit.export.points import write_points
+from cfmkit.export.points_csv import write_points
 from cfmkit.export.svg import svg_bytes, write_svg
 
 if TYPE_CHECKING:
@@ -75,7 +75,7 @@ def _bodies(drawing: Drawing, drawn: Sequence[Outline], tolerance: float, format
     if {"stl", "3mf"} & set(formats):
         from cfmkit.export.extrusion import bodies, plates
         from cfmkit.export.stl import stl_bytes
-        from cfmkit.export.threemf import threemf_bytes
+        from cfmkit.export.three_mf import threemf_bytes
 
         extruded = bodies(plates(drawn, drawing.sheet, tolerance))
         writers = {"stl": stl_bytes, "3mf": threemf_bytes}

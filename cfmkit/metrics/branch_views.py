@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from cfmkit.metrics import closed, many
-from cfmkit.metrics.many import ManyBranches
+from cfmkit.metrics import continuous_curves, ranges_many
+from cfmkit.metrics.ranges_many import ManyBranches
 from cfmkit.metrics.spread import Spread, level
 from cfmkit.metrics.traces import ROUNDING, TOLERANCE, BranchTrace, Undefined, Window, covers, restrict, traces
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.curves import Curve, Kind
-    from cfmkit.metrics.material_laws import Durability
+    from cfmkit.metrics.fatigue_and_relaxation import Durability
     from cfmkit.results import ClosedForm
 
 
@@ -216,8 +216,10 @@ class Branch:
             )
             motion, chosen = np.unique(motion, return_index=True)
             motion, effort = motion[np.isfinite(effort[chosen])], effort[chosen][np.isfinite(effort[chosen])]
-        uneven = bool(between.any()) and len(peaks) < closed.FEW
-        top, bottom = closed.extremes(partial(model.effort, self.name), motion[None, :], effort[None, :], uneven)
+        uneven = bool(between.any()) and len(peaks) < continuous_curves.FEW
+        top, bottom = continuous_curves.extremes(
+            partial(model.effort, self.name), motion[None, :], effort[None, :], uneven
+        )
         return float(top[0]), float(bottom[0])
 
     @cached_property
@@ -233,7 +235,7 @@ class Branch:
         if model is None:
             return float(level(self.spread))
         self.inside  # noqa: B018  (raises where the window is not covered)
-        return closed.mean(partial(model.effort, self.name), model.places, *self.ends)
+        return continuous_curves.mean(partial(model.effort, self.name), model.places, *self.ends)
 
     @cached_property
     def function(self) -> Function:
@@ -368,7 +370,7 @@ def usable_interval(cycle: Cycle) -> Interval | None:
 
 def _solved_interval(cycle: Cycle, reference: float, valid: float) -> Interval | None:
     """Return `usable_interval` of branches that are known at every place, from where the mechanism works on."""
-    start, end = many.usable_interval(cycle.closed, np.array([reference]), cycle.frame.band, np.array([valid]))
+    start, end = ranges_many.usable_interval(cycle.closed, np.array([reference]), cycle.frame.band, np.array([valid]))
     return None if np.isnan(start[0]) else (float(start[0]), float(end[0]))
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from cfmkit.errors import UsageError
 from cfmkit.metrics.branch_views import Cycle, Frame, cycle, span_text
-from cfmkit.metrics.material_laws import hold_text
+from cfmkit.metrics.fatigue_and_relaxation import hold_text
 from cfmkit.metrics.table import Definition, definitions, metrics_by_name, split_name, time_of, unknown_metric
 from cfmkit.metrics.traces import Undefined, Window, covers, traces
 from cfmkit.results import WINDOW_OUTSIDE, Finding, Quantity, Status

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.metrics import spread
-from cfmkit.metrics.closed import extremes
-from cfmkit.metrics.many import UNIFORM_POINTS
+from cfmkit.metrics.continuous_curves import extremes
+from cfmkit.metrics.ranges_many import UNIFORM_POINTS
 from cfmkit.metrics.traces import BranchTrace, Undefined, Window
 
 if TYPE_CHECKING:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.metrics import many
+from cfmkit.metrics import ranges_many
 from cfmkit.metrics.traces import ROUNDING, Undefined
 
 if TYPE_CHECKING:
@@ -63,7 +63,7 @@ def band_range(branch: Branch, tolerance: float) -> float:
     """Return the widest interval around the reference pose in which ``|F / F_ref - 1|`` is within the tolerance."""
     motion, offset, here = branch.around
     if branch.closed is not None:
-        return _known(float(many.band_range(branch.closed, tolerance)[0]))
+        return _known(float(ranges_many.band_range(branch.closed, tolerance)[0]))
     outside = ~(np.abs(offset) <= tolerance * (1 + ROUNDING))
     left, right = outside[:here].nonzero()[0], outside[here:].nonzero()[0]
     low = _edge(motion, offset, int(left[-1]), 1, tolerance) if len(left) else float(motion[0])

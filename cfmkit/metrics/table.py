@@ -22,7 +22,7 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Literal
 
 from cfmkit.errors import QuantityError, UsageError
-from cfmkit.metrics import flatness, longterm, ranges
+from cfmkit.metrics import durability, flatness, ranges
 from cfmkit.specs.units import read_quantity
 
 if TYPE_CHECKING:
@@ -209,7 +209,7 @@ _LONG_TERM = (
         "count",
         "cycles to failure between the least and the largest stress in the window, of all load cases, by the "
         "material's `fatigue` with Goodman's line",
-        longterm.fatigue_life,
+        durability.fatigue_life,
         "smallest",
         of_material=True,
     ),
@@ -218,7 +218,7 @@ _LONG_TERM = (
         "effort",
         "mean {effort} in the window after a hold of the time in brackets, as in `force_after[1000 h]`: it follows "
         "the material's `relaxation`",
-        longterm.effort_after,
+        durability.effort_after,
         "smallest",
         argument="time",
         of_material=True,

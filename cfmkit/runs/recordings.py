@@ -72,7 +72,7 @@ def measure(
     from cfmkit.experiment.corrections import corrected
     from cfmkit.experiment.evaluation import LEFT_OUT, measured, require_loop
     from cfmkit.experiment.low_pass import read_filter
-    from cfmkit.experiment.options import read_target, read_window
+    from cfmkit.experiment.measurement_options import read_target, read_window
     from cfmkit.experiment.reading import Recording, read_recording
     from cfmkit.experiment.report import report_on
     from cfmkit.metrics import Frame
@@ -152,7 +152,7 @@ def calibrate(
     from cfmkit.experiment.calibration import calibrate as fitted
     from cfmkit.experiment.corrections import corrected
     from cfmkit.experiment.evaluation import LEFT_OUT, MeasuredCurves, measured, read_measured
-    from cfmkit.experiment.parameters import parameters, read_bounds
+    from cfmkit.experiment.fitted_parameters import parameters, read_bounds
     from cfmkit.experiment.reading import Recording
     from cfmkit.metrics import Window
     from cfmkit.numerics.least_squares import LOSSES

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Self
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from cfmkit.metrics.material_laws import Durability, FatigueLaw, RelaxationLaw
+from cfmkit.metrics.fatigue_and_relaxation import Durability, FatigueLaw, RelaxationLaw
 from cfmkit.specs.spec import Model, refuse
 from cfmkit.specs.units import Force, Length, Ratio, Stress, Time, format_short
 from cfmkit.specs.units.fields import described

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.designing.robust import SIGMA_STEP
+from cfmkit.designing.robust_design import SIGMA_STEP
 from cfmkit.errors import CfmError
 from cfmkit.families import family
 from cfmkit.metrics import window_of

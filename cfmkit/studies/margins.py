@@ -4,7 +4,8 @@ What may move is what `design.free` names, or what the family says that its desi
 say `design.tolerances`; what must hold say the requirements. Requirements on forces and stresses become rows of the
 force and the stress at a few poses, which are smooth where the metrics, largest and smallest values, are not:
 (max - min)/(max + min) <= b holds if (1 + b) F_j - (1 - b) F_i >= 0 for every pair of poses. Any other metric is a
-number of its own. How limits are drawn in is `designing.robust`'s; the yield is judged afterwards, on parts drawn anew.
+number of its own. How limits are drawn in is `designing.robust_design`'s; the yield is judged afterwards, on parts drawn
+anew.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.designing.audit import searched
-from cfmkit.designing.robust import SIGMA_STEP, Found, NoPart, Problem, costliest, drawn, with_margins
+from cfmkit.designing.robust_design import SIGMA_STEP, Found, NoPart, Problem, costliest, drawn, with_margins
 from cfmkit.designing.starts import Clock
 from cfmkit.errors import CfmError, SolutionError, SpecError
 from cfmkit.errors import Problem as Fault

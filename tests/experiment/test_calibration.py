@@ -12,7 +12,7 @@ from cfmkit.errors import DataError, SolutionError, UsageError
 from cfmkit.experiment.calibration import calibrate, resolved
 from cfmkit.experiment.comparison import compare
 from cfmkit.experiment.evaluation import measured
-from cfmkit.experiment.parameters import parameters, read_bounds
+from cfmkit.experiment.fitted_parameters import parameters, read_bounds
 from cfmkit.experiment.reading import Recording
 from cfmkit.metrics import Window
 

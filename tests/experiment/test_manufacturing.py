@@ -11,7 +11,7 @@ import cfmkit
 from cfmkit.families.base import Run
 from cfmkit.families.cam.build import assemble
 from cfmkit.families.cam.geometry.flank import BuiltFlank, arc_lengths
-from cfmkit.families.cam.manufacturing import DrawnError, _track, force_band
+from cfmkit.families.cam.manufacturing_scatter import DrawnError, _track, force_band
 from cfmkit.families.cam.solution import Sides
 from cfmkit.families.cam.spec import Manufacturing
 
@@ -57,7 +57,7 @@ def test_the_error_grows_with_the_waviness():
 
 
 def test_the_drawn_waviness_has_the_stated_deviation():
-    from cfmkit.families.cam.manufacturing import _drawn
+    from cfmkit.families.cam.manufacturing_scatter import _drawn
 
     places = np.linspace(0, 0.27, 1600)
     flank = flanks()[0]

@@ -11,7 +11,7 @@ import pytest
 import cfmkit
 from cfmkit.experiment.calibration import calibrate, resolved
 from cfmkit.experiment.evaluation import measured
-from cfmkit.experiment.parameters import parameters
+from cfmkit.experiment.fitted_parameters import parameters
 from cfmkit.experiment.reading import read_recording
 
 CONFIGS = Path(__file__).parents[2] / "configs"

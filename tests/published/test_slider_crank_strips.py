@@ -18,7 +18,6 @@ from flexure_support import ABS, LINKAGE, MM, SHARES, THICKNESS, UNLOADED, WIDTH
 from cfmkit.families.base import Run
 from cfmkit.families.slider_crank.printed.chain import Elasticity, joints
 from cfmkit.families.slider_crank.printed.chain import kink as offset
-from cfmkit.families.slider_crank.printed.program import Form, StripProgram, Task
 from cfmkit.families.slider_crank.printed.search import (
     Found,
     Ranges,
@@ -28,6 +27,7 @@ from cfmkit.families.slider_crank.printed.search import (
     uniform_thickness,
 )
 from cfmkit.families.slider_crank.printed.solution import first_at
+from cfmkit.families.slider_crank.printed.sqp_program import Form, StripProgram, Task
 from cfmkit.numerics.sqp import SearchEnding
 
 TASK = Task(corners(), np.pi, ABS, 1.5, 1 * MM, 20 * MM, 0.01, "stroke", 60 * MM)

@@ -12,7 +12,7 @@ from cam_support import analyze
 
 from cfmkit.families.cam.dynamics.build import build
 from cfmkit.families.cam.dynamics.inverse import respond, statics
-from cfmkit.families.cam.dynamics.machine import Moment
+from cfmkit.families.cam.dynamics.moving_parts import Moment
 
 WIDE_ROLLER = {"masses__roller_inertia": 4.61e-5}
 FROM_CAM = {"analysis__dynamics__origin": "cam-start"}

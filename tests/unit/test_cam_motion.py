@@ -14,8 +14,8 @@ from cfmkit.errors import SpecError
 from cfmkit.families.cam.build import assemble
 from cfmkit.families.cam.dynamics.build import build
 from cfmkit.families.cam.dynamics.inverse import respond, statics
-from cfmkit.families.cam.dynamics.machine import Cycloid, Moment
 from cfmkit.families.cam.dynamics.model import inverse_history, multibody_history
+from cfmkit.families.cam.dynamics.moving_parts import Cycloid, Moment
 from cfmkit.families.cam.dynamics.multibody import CornerContact, NineCoordinates, Scheme
 from cfmkit.families.cam.statics import forces
 from cfmkit.metrics import Window, evaluate

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cfmkit.designing import limits, program
-from cfmkit.designing.program import Rows, Seen
+from cfmkit.designing import limits, sqp_program
+from cfmkit.designing.sqp_program import Rows, Seen
 from cfmkit.designing.starts import NEVER, Clock, Stage, done
 from cfmkit.designing.variables import at_bounds, rounded
 from cfmkit.families.base import Run
@@ -40,10 +40,10 @@ class Disc:
         )
 
     def values(self, z: np.ndarray) -> Any:
-        return program.values(self, z, self.elastic)
+        return sqp_program.values(self, z, self.elastic)
 
     def slopes(self, z: np.ndarray) -> Any:
-        return program.slopes(self, z, self.elastic)
+        return sqp_program.slopes(self, z, self.elastic)
 
 
 @pytest.mark.parametrize("elastic", [(), ("disc",), ("disc", "line")])

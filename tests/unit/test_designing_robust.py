@@ -8,7 +8,7 @@ from statistics import NormalDist
 import numpy as np
 import pytest
 
-from cfmkit.designing.robust import NoPart, Problem, costliest, drawn, linear, with_margins
+from cfmkit.designing.robust_design import NoPart, Problem, costliest, drawn, linear, with_margins
 
 PHI = NormalDist().cdf
 

@@ -21,9 +21,9 @@ from cfmkit.elastica import (
     guided,
     trace,
 )
-from cfmkit.elastica.equilibrium.expanded import UncondensedSolver
 from cfmkit.elastica.equilibrium.mesh import Mesh
 from cfmkit.elastica.equilibrium.meshed_network import MarchOptions, Solver
+from cfmkit.elastica.equilibrium.uncondensed_system import UncondensedSolver
 from cfmkit.elastica.model.layout import Layout
 from cfmkit.errors import InputError
 

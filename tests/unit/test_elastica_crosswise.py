@@ -26,8 +26,8 @@ from cfmkit.elastica import (
     guided,
     trace,
 )
-from cfmkit.elastica.outcome import crosswise
-from cfmkit.elastica.outcome.crosswise import cross_stiffness
+from cfmkit.elastica.outcome import crosswise_stiffness
+from cfmkit.elastica.outcome.crosswise_stiffness import cross_stiffness
 
 MODULUS, WIDTH, THICKNESS, LENGTH = 200e9, 10e-3, 1e-3, 0.1
 RIGIDITY = MODULUS * WIDTH * THICKNESS**3 / 12
@@ -111,7 +111,7 @@ def test_large_networks_are_condensed_by_sparse_factors(monkeypatch: pytest.Monk
     path, dense = eighty_beams(), np.linalg.solve
 
     def small(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
-        assert matrix.shape[-1] < crosswise._MANY
+        assert matrix.shape[-1] < crosswise_stiffness._MANY
         return dense(matrix, right)
 
     monkeypatch.setattr(np.linalg, "solve", small)
@@ -121,7 +121,7 @@ def test_large_networks_are_condensed_by_sparse_factors(monkeypatch: pytest.Monk
 @pytest.mark.parametrize("many", [0, 150], ids=["sparse", "dense"])
 def test_there_is_none_where_nothing_gives_way(monkeypatch: pytest.MonkeyPatch, many: int) -> None:
     """A straight beam that does not stretch, pushed sideways by nothing yet: along itself it is rigid."""
-    monkeypatch.setattr(crosswise, "_MANY", many)
+    monkeypatch.setattr(crosswise_stiffness, "_MANY", many)
     path = trace(straight(axial=False), Loading((PointLoad("tip", fy=1e-3),), np.array([0.0, 1.0])))
     found = cross_stiffness(path, "tip", np.pi / 2)
     assert path.drive[0] == 0.0

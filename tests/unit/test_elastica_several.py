@@ -25,8 +25,8 @@ from cfmkit.elastica import (
 )
 from cfmkit.elastica.continuation.singular import Curvature, eigenvalues
 from cfmkit.elastica.continuation.switching import descend
-from cfmkit.elastica.equilibrium.expanded import ExpandedSolver
 from cfmkit.elastica.equilibrium.mesh import Mesh
+from cfmkit.elastica.equilibrium.uncondensed_system import ExpandedSolver
 from cfmkit.elastica.model.layout import Layout
 
 LENGTH, SHUTTLE = 35e-3, guided(np.pi / 2)

@@ -33,9 +33,9 @@ from cfmkit.elastica import (
     guided,
     trace,
 )
-from cfmkit.elastica.equilibrium.expanded import ExpandedSolver
 from cfmkit.elastica.equilibrium.mesh import Mesh
 from cfmkit.elastica.equilibrium.meshed_network import Solver
+from cfmkit.elastica.equilibrium.uncondensed_system import ExpandedSolver
 from cfmkit.elastica.kernels import entry
 from cfmkit.elastica.kernels.splitting import DRIFTS, KICKS, NODES
 from cfmkit.elastica.model.layout import Layout

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 import cfmkit
 from cfmkit.errors import SpecError
-from cfmkit.metrics.material_laws import FatigueLaw, RelaxationLaw
+from cfmkit.metrics.fatigue_and_relaxation import FatigueLaw, RelaxationLaw
 from cfmkit.metrics.traces import Undefined
 from cfmkit.runs.run_findings import report_on
 

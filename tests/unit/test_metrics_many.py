@@ -6,7 +6,7 @@ import pytest
 from cfmkit.curves import Curve
 from cfmkit.metrics import Frame, Window
 from cfmkit.metrics.evaluation import survey
-from cfmkit.metrics.many import RANGES, ManyBranches, rms_to_target, usable_interval
+from cfmkit.metrics.ranges_many import RANGES, ManyBranches, rms_to_target, usable_interval
 from cfmkit.metrics.spread import ManyWindows, Spread, metric_of, metrics_of
 from cfmkit.metrics.table import TABLE
 

@@ -30,10 +30,10 @@ from cfmkit.families.base import Run
 from cfmkit.families.slider_crank.printed import search
 from cfmkit.families.slider_crank.printed.chain import Elasticity, Flexure, joints, kink, mirrored, spread
 from cfmkit.families.slider_crank.printed.pressing import Ending
-from cfmkit.families.slider_crank.printed.program import Form, StripProgram, Task
 from cfmkit.families.slider_crank.printed.search import Ranges
 from cfmkit.families.slider_crank.printed.sizing import rotations, sized
 from cfmkit.families.slider_crank.printed.solution import first_at
+from cfmkit.families.slider_crank.printed.sqp_program import Form, StripProgram, Task
 from cfmkit.numerics import sqp
 from cfmkit.numerics.barycentric import differentiation, interpolation
 from cfmkit.results import Status

@@ -55,7 +55,7 @@ def test_least_squares_holds_a_slope_too(caps, slope):
     """Equal to the best of a general solver, slope included."""
     from scipy.optimize import minimize
 
-    from cfmkit.families.slider_crank.springs.rates import least_squares
+    from cfmkit.families.slider_crank.springs.fit_rates import least_squares
     from cfmkit.families.slider_crank.springs.targets import task_of
 
     design = {
@@ -170,7 +170,7 @@ def test_a_window_may_end_exactly_where_a_joint_reaches_its_limit(force):
 @pytest.mark.parametrize("seed", range(6))
 def test_no_window_anywhere_is_wider_than_the_widest(seed):
     from cfmkit.families.slider_crank.springs.targets import task_of
-    from cfmkit.families.slider_crank.springs.windows import judged, widest_of_all
+    from cfmkit.families.slider_crank.springs.widest_window import judged, widest_of_all
 
     random = np.random.default_rng(seed)
     about = {

@@ -11,8 +11,8 @@ from vcfm_support import CONFIGS, MM, analyzed, message, names, table_i
 import cfmkit
 from cfmkit import api
 from cfmkit.errors import SpecError
-from cfmkit.families.vcfm import exact
-from cfmkit.families.vcfm.exact import ExactSampler
+from cfmkit.families.vcfm import exact_model
+from cfmkit.families.vcfm.exact_model import ExactSampler
 from cfmkit.families.vcfm.findings import FINDINGS, finding
 from cfmkit.results import Status
 
@@ -393,7 +393,7 @@ def test_a_design_whose_exact_leaves_cannot_be_followed_is_refused_with_a_longer
             if about.length * np.sin(about.angle) < 3.19 * about.thickness:
                 self.problem = "the leaves jump"
 
-    monkeypatch.setattr(exact, "ExactSampler", Jumping)
+    monkeypatch.setattr(exact_model, "ExactSampler", Jumping)
     found = designed("design.stroke=0.1 mm", "design.leaf_length=40 mm")
     assert found.warnings[0].name == "no_linear_region"
     assert "the leaves jump" in found.message

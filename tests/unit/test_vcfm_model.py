@@ -19,12 +19,12 @@ from cfmkit.families.vcfm.leaves.s_form import POLE, axial_root, compliance, end
 from cfmkit.families.vcfm.leaves.springs import Diamond
 from cfmkit.families.vcfm.leaves.strip import Strip
 from cfmkit.families.vcfm.leaves.v_beam import VBeam
+from cfmkit.families.vcfm.longest_window import longest_window
 from cfmkit.families.vcfm.many_designs import METRICS, SCALARS, VARIED, analyze_block
 from cfmkit.families.vcfm.model import rest_of, rests_of
+from cfmkit.families.vcfm.pose_outlines import centre_line
 from cfmkit.families.vcfm.scalar_results import forces, spread
-from cfmkit.families.vcfm.scene import centre_line
 from cfmkit.families.vcfm.solution import force_of
-from cfmkit.families.vcfm.windows import longest_window
 from cfmkit.metrics import Window, evaluate
 from cfmkit.results import Status
 from cfmkit.studies.engine import Work, run
@@ -315,8 +315,8 @@ def test_exact_forces_do_not_depend_on_the_number_of_points():
 def test_exact_leaves_are_those_of_a_path_through_the_very_points(structure, slenderness, top):
     """Before thin leaves buckle, too: 1/500 of the rise at Q = 40. To 1e-6 of the peak, up to three times the rise."""
     from cfmkit.elastica import Control, Displacement, trace
-    from cfmkit.families.vcfm.exact import DOWN, leaf_network
-    from cfmkit.families.vcfm.traced import traced
+    from cfmkit.families.vcfm.exact_model import DOWN, leaf_network
+    from cfmkit.families.vcfm.traced_network import traced
 
     rise = 4.265427 * MM
     spec = table_i(
@@ -368,7 +368,7 @@ def test_exact_leaves_have_their_force_where_a_coarse_sampling_cut_the_peak_off(
 @pytest.mark.parametrize("travel", [-1.0, 0.5, 2.0, 4.0])
 def test_drawn_leaves_have_the_shape_of_exact_ones(stem, error, travel):
     from cfmkit.elastica import Control, Displacement, trace
-    from cfmkit.families.vcfm.exact import DOWN, leaf_network
+    from cfmkit.families.vcfm.exact_model import DOWN, leaf_network
 
     spec = cfmkit.load(CONFIGS / f"vcfm_{stem}.yaml")
     drawn = centre_line(parts(spec).leaf, travel * MM)

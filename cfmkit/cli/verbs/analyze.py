@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Annotated
 
-from cfmkit.cli.measuring import Measuring, data_record, read_measured, refuse_without_data
+from cfmkit.cli.measured_data_options import Measuring, data_record, read_measured, refuse_without_data
 from cfmkit.cli.options import Animate, Computing, WithReport, flag, option
 
 if TYPE_CHECKING:
@@ -59,14 +59,14 @@ def run(options: AnalyzeOptions, terminal: Terminal) -> Answer:
 
 def compute_beside(source: MeasuredCurves, spec: Spec, run: Run) -> Report:
     """Return the report on a mechanism beside its measured curve."""
-    from cfmkit.experiment.comparison import compare
-    from cfmkit.experiment.supplements import (
+    from cfmkit.experiment.additions_to_run import (
         causes_lines,
         comparison_data,
         comparison_figures,
         comparison_files,
         comparison_lines,
     )
+    from cfmkit.experiment.comparison import compare
     from cfmkit.runs.run import analysed
     from cfmkit.runs.run_findings import Supplement
 

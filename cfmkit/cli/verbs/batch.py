@@ -92,12 +92,12 @@ def run(options: BatchOptions, terminal: Terminal) -> Answer:
     A spec that an earlier batch has finished is reused as long as nothing has changed: neither spec nor options, nor
     cfmkit, nor a file that was written.
     """
-    from cfmkit.cli import studies
+    from cfmkit.cli import study_verbs
     from cfmkit.cli.progress import watching
     from cfmkit.runs.batch import batch, unreached
     from cfmkit.studies.batch_entries import message
 
-    start = studies.now()
+    start = study_verbs.now()
     with watching(terminal, "specs") as progress:
         found = batch(
             options.specs,
@@ -119,9 +119,9 @@ def run(options: BatchOptions, terminal: Terminal) -> Answer:
             form=options.form,
             arguments=terminal.arguments,
             monitor=progress,
-            noting=studies.noting,
+            noting=study_verbs.noting,
         )
-    written = Written(found.folder, found.files, studies.now() - start)
+    written = Written(found.folder, found.files, study_verbs.now() - start)
     return Answer(
         dict(found.summary) | written.data | {"junit": options.junit, "reused": _reused(found.entries)},
         _page(found, written, tuple(filter(None, (options.junit, options.summary))), terminal.verbose > 0),

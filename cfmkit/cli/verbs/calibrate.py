@@ -7,7 +7,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Annotated
 
 from cfmkit.cli import completion
-from cfmkit.cli.measuring import Measuring, data_record, read_measured
+from cfmkit.cli.measured_data_options import Measuring, data_record, read_measured
 from cfmkit.cli.options import Computing, argument, option
 
 if TYPE_CHECKING:
@@ -64,7 +64,7 @@ def run(options: CalibrateOptions, terminal: Terminal) -> Answer:
 
 def compute(options: CalibrateOptions, source: MeasuredCurves, spec: Spec, run: Run) -> Report:
     """Return the report on the fitted mechanism."""
-    from cfmkit.experiment.parameters import split_bounds
+    from cfmkit.experiment.fitted_parameters import split_bounds
     from cfmkit.numerics.least_squares import LOSSES
     from cfmkit.runs.recordings import calibrate
 
@@ -78,7 +78,7 @@ def report(calibration: Calibration, source: MeasuredCurves) -> Report:
     from dataclasses import replace
 
     from cfmkit import api
-    from cfmkit.experiment import supplements as add
+    from cfmkit.experiment import additions_to_run as add
     from cfmkit.runs.run_findings import Supplement, report_on
     from cfmkit.tables import to_csv
 

@@ -44,7 +44,7 @@ def run(options: DesignOptions, terminal: Terminal) -> Answer:
 
 def long_run(jobs: int, fresh: bool, folder: RunFolder, plain: Run) -> AbstractContextManager[Run]:
     """Return a run in several processes that says on a signal whether the same command goes on."""
-    from cfmkit.cli.studies import noting
+    from cfmkit.cli.study_verbs import noting
     from cfmkit.runs import run
 
     return run.long_run(jobs, fresh, folder, plain, noting)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cfmkit.cli import completion
 from cfmkit.cli.answer import Answer
-from cfmkit.cli.measuring import Measuring, data_record
+from cfmkit.cli.measured_data_options import Measuring, data_record
 from cfmkit.cli.options import Drawing, Quiet, argument, flag, option
 from cfmkit.cli.page_blocks import BAD, BLANK, LABEL, Grid, GridColumn, Paragraph, Span, TextLine, Written
 

@@ -119,33 +119,33 @@ def run(options: SensitivityOptions, terminal: Terminal) -> Answer:
     The spec's block `sensitivity` says what is uncertain. Finished samples are kept in the folder: after an
     interruption, run the same command again to continue.
     """
-    from cfmkit.cli import studies
+    from cfmkit.cli import study_verbs
     from cfmkit.cli.run_answer import folder_of
     from cfmkit.studies.sensitivity.methods import carry_out
     from cfmkit.studies.sensitivity.output import exit_code
     from cfmkit.studies.sensitivity.setup import prepare
 
-    start = studies.now()
-    out, form, in_parquet = folder_of(options, "sensitivity"), options.form, studies.wants_parquet(options.table)
+    start = study_verbs.now()
+    out, form, in_parquet = folder_of(options, "sensitivity"), options.form, study_verbs.wants_parquet(options.table)
     setup = prepare(spec_of(options), options.seed, options.max_points)
-    with studies.desk(out, terminal, options.fresh) as place:
+    with study_verbs.desk(out, terminal, options.fresh) as place:
         place.folder.check("results.csv", "indices.csv", "metrics.json", "resolved.yaml")
-        found = replace(carry_out(setup, lambda work: studies.compute(work, options, place)), fresh=options.fresh)
+        found = replace(carry_out(setup, lambda work: study_verbs.compute(work, options, place)), fresh=options.fresh)
         for piece in found.evaluator.pieces:
-            studies.tracebacks(piece.records, terminal)
+            study_verbs.tracebacks(piece.records, terminal)
         kept: dict[str, bytes] = {}
         for name, data in files(found, not options.no_plots, form):
             if options.report or (in_parquet and name == "results.csv"):
                 kept[name] = data = data if isinstance(data, bytes) else b"".join(map(bytes, data))
             place.folder.write(name, data)
         if in_parquet:
-            place.folder.write("results.parquet", studies.as_parquet(kept["results.csv"]))
+            place.folder.write("results.parquet", study_verbs.as_parquet(kept["results.csv"]))
         if options.report:
             place.folder.write(*_report(found, kept, form, options, terminal))
-        made = studies.Made("sensitivity", options.spec, setup.study.spec, setup.seed, found.evaluator.count)
-        manifest = studies.commit(place, made, terminal, exit_code(found))
-        studies.finish(place, [piece.records for piece in found.evaluator.pieces])
-    written = Written(out, (*manifest.files, "manifest.json"), studies.now() - start)
+        made = study_verbs.Made("sensitivity", options.spec, setup.study.spec, setup.seed, found.evaluator.count)
+        manifest = study_verbs.commit(place, made, terminal, exit_code(found))
+        study_verbs.finish(place, [piece.records for piece in found.evaluator.pieces])
+    written = Written(out, (*manifest.files, "manifest.json"), study_verbs.now() - start)
     return _answer(found, written, terminal.verbose > 0)
 
 
@@ -200,7 +200,7 @@ def spec_of(options: SensitivityOptions) -> Spec:
 
 def changes_of(options: SensitivityOptions) -> dict[str, Any]:
     """Return what the options say, by key of the block."""
-    from cfmkit.cli.studies import names
+    from cfmkit.cli.study_verbs import names
 
     said = {
         "method": options.method,

@@ -90,7 +90,7 @@ def run(options: SuggestOptions, terminal: Terminal) -> Answer:
     Every family is asked; what it names is designed, analysed with its exact model from the file that is written, and
     shown only if it does everything that is wished.
     """
-    from cfmkit.cli.studies import noting
+    from cfmkit.cli.study_verbs import noting
     from cfmkit.families.base import Run
     from cfmkit.runs import suggestions
     from cfmkit.runs.run import long_run

@@ -77,20 +77,20 @@ def run(options: SweepOptions, terminal: Terminal) -> Answer:
 
     Finished points are kept in the folder: after an interruption, run the same command again to continue.
     """
-    from cfmkit.cli import studies
+    from cfmkit.cli import study_verbs
     from cfmkit.cli.run_answer import folder_of
     from cfmkit.plots.form import PLAIN
     from cfmkit.runs.run import spec_of
     from cfmkit.studies.sweep import outputs, prepare, summary_of, writes_curves
 
-    start = studies.now()
-    out, form, in_parquet = folder_of(options, "sweep"), options.form, studies.wants_parquet(options.table)
+    start = study_verbs.now()
+    out, form, in_parquet = folder_of(options, "sweep"), options.form, study_verbs.wants_parquet(options.table)
     spec, asked = spec_of(options), request(options)
     work = prepare(spec, asked)
-    with studies.desk(out, terminal, options.fresh) as place:
+    with study_verbs.desk(out, terminal, options.fresh) as place:
         place.folder.check("results.csv", "metrics.json", "resolved.yaml")
-        records = studies.compute(work, options, place)
-        studies.tracebacks(records, terminal)
+        records = study_verbs.compute(work, options, place)
+        study_verbs.tracebacks(records, terminal)
         summary = summary_of(records)
         kept: dict[str, bytes] = {}
         for name, data in outputs(records, summary, writes_curves(spec, asked)):
@@ -98,7 +98,7 @@ def run(options: SweepOptions, terminal: Terminal) -> Answer:
                 kept[name] = data = data if isinstance(data, bytes) else b"".join(map(bytes, data))
             place.folder.write(name, data)
         if in_parquet:
-            place.folder.write("results.parquet", studies.as_parquet(kept["results.csv"]))
+            place.folder.write("results.parquet", study_verbs.as_parquet(kept["results.csv"]))
         drawn = {} if options.no_plots else _pictures(records, summary)
         for name, content in form.files(drawn):
             place.folder.write(name, content)
@@ -113,11 +113,11 @@ def run(options: SweepOptions, terminal: Terminal) -> Answer:
             command = shlex.join(["cfmkit", *terminal.arguments])
             place.folder.write(study_page.NAME, study_page.page(spec, varied, kept, command))
         code = exit_code(records, summary)
-        made = studies.Made("sweep", options.spec, work.study.spec, options.seed, len(work.plan))
-        manifest = studies.commit(place, made, terminal, code)
-        studies.finish(place, [records])
+        made = study_verbs.Made("sweep", options.spec, work.study.spec, options.seed, len(work.plan))
+        manifest = study_verbs.commit(place, made, terminal, code)
+        study_verbs.finish(place, [records])
         told = summary.as_json(records)
-    written = Written(out, (*manifest.files, "manifest.json"), studies.now() - start)
+    written = Written(out, (*manifest.files, "manifest.json"), study_verbs.now() - start)
     about = {"family": spec.family, "name": spec.name} | written.data | {"reused": records.reused}
     page = _page(records, told, code, written, terminal.verbose > 0)
     return Answer(told | about, page, code, tuple(_complaints(records, code, options)))
@@ -131,7 +131,7 @@ def request(options: SweepOptions) -> SweepRequest:
     cfmkit.errors.UsageError
         If one is malformed, or two contradict each other.
     """
-    from cfmkit.cli.studies import names
+    from cfmkit.cli.study_verbs import names
     from cfmkit.studies.sweep import SweepRequest
     from cfmkit.studies.variation import wish
 

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.elastica.equilibrium.expanded import ExpandedSolver
 from cfmkit.elastica.equilibrium.mesh import Mesh
+from cfmkit.elastica.equilibrium.uncondensed_system import ExpandedSolver
 from cfmkit.elastica.model.network import Network
 from cfmkit.elastica.model.shapes import Bent
 

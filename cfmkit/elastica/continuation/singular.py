@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.elastica.equilibrium.expanded import ExpandedSolver
+    from cfmkit.elastica.equilibrium.uncondensed_system import ExpandedSolver
 
 _SEARCHES = 40  # solutions in which a bracket is closed at most: halving alone would take forty to 1e-12 of it
 _CLOSE = 1e-4  # share of the determinant at the ends that is near enough to interpolate the rest: the smallest,

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.elastica.equilibrium.expanded import ExpandedSolver
 from cfmkit.elastica.equilibrium.mesh import Mesh
 from cfmkit.elastica.equilibrium.meshed_network import MarchOptions, Points, Solver, Spot
+from cfmkit.elastica.equilibrium.uncondensed_system import ExpandedSolver
 from cfmkit.elastica.outcome.path import Event, PathStatus
 
 if TYPE_CHECKING:

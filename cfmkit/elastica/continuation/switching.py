@@ -19,8 +19,8 @@ from cfmkit.elastica.continuation.state import fine_spot
 if TYPE_CHECKING:
     from cfmkit.elastica.continuation.singular import Singular
     from cfmkit.elastica.continuation.state import Problem, Trail
-    from cfmkit.elastica.equilibrium.expanded import ExpandedSolver
     from cfmkit.elastica.equilibrium.meshed_network import Spot
+    from cfmkit.elastica.equilibrium.uncondensed_system import ExpandedSolver
 
 _STEPS = 100  # on the way down at most: ten of the longest go as far as is near, the first ones are short
 _KICK, _LONGEST = 1e-3, 0.05  # first and longest step along one mode [rad]

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.elastica.continuation.state import Resume
-from cfmkit.elastica.equilibrium.expanded import UncondensedSolver
+from cfmkit.elastica.equilibrium.uncondensed_system import UncondensedSolver
 
 if TYPE_CHECKING:
     from cfmkit.elastica.continuation.state import Problem, Trail

@@ -20,8 +20,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.families.base import Run
+from cfmkit.families.beam.bounding_box import room
 from cfmkit.families.beam.model import analyze
-from cfmkit.families.beam.room import room
 from cfmkit.families.beam.spec import BeamSpec
 from cfmkit.families.findings import mm, percent
 from cfmkit.families.flattest_window import flattest, ripples

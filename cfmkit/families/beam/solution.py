@@ -140,7 +140,7 @@ class Solution:
         """
         if self.spec.mechanism.drive.kind in ("rotation", "moment") or not len(self.keep):
             return read_only(np.full(len(self.keep), np.nan))
-        from cfmkit.elastica.outcome.crosswise import cross_stiffness
+        from cfmkit.elastica.outcome.crosswise_stiffness import cross_stiffness
 
         found = cross_stiffness(self.path, self.assembly.driven, self.assembly.direction, self.keep)
         known = self.accurate & np.isfinite(found)

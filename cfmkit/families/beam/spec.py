@@ -14,7 +14,7 @@ from cfmkit.families.beam.parts.spec import (
     PositiveLength,
 )
 from cfmkit.families.beam.shaping.spec import Optimise, optimise_faults
-from cfmkit.metrics.material_laws import Durability
+from cfmkit.metrics.fatigue_and_relaxation import Durability
 from cfmkit.specs.formula import formula
 from cfmkit.specs.spec import Analysis, DesignBlock, Displacement, Model, SolidAnalysis, Spec, refuse
 from cfmkit.specs.units import DIMENSIONS, Factor, Force, Length, Ratio, Torque

@@ -20,7 +20,7 @@ import numpy as np
 from cfmkit.curves import Column, Curve
 from cfmkit.errors import DataError
 from cfmkit.families.cam.build import assemble, check_first_pose, check_springs, displacement_origin, until_overlap
-from cfmkit.families.cam.contact import allowable_stress, stress
+from cfmkit.families.cam.contact_pressure import allowable_stress, stress
 from cfmkit.families.cam.findings import finding, findings_of_built, left_out, rubbing_left_out
 from cfmkit.families.cam.geometry.built_track import BuiltTrack, built_flank, built_track
 from cfmkit.families.cam.geometry.flank import DesignFlank

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.cam.contact import YIELD_PRESSURE, allowable_stress, worst
+from cfmkit.families.cam.contact_pressure import YIELD_PRESSURE, allowable_stress, worst
 from cfmkit.families.cam.scalar_results import (
     FlankSamples,
     errors_used,

@@ -23,7 +23,7 @@ from cfmkit.curves import Column, Curve
 from cfmkit.families.cam.bought_parts import parts_of
 from cfmkit.families.cam.build import CLOSE, assemble, check_first_pose, check_springs, displacement_origin
 from cfmkit.families.cam.clearance import smallest, touching
-from cfmkit.families.cam.contact import allowable_stress, flank_pressure, stress
+from cfmkit.families.cam.contact_pressure import allowable_stress, flank_pressure, stress
 from cfmkit.families.cam.findings import finding, findings_of, left_out
 from cfmkit.families.cam.scalar_results import contact_pressure, theoretical_force, values_of
 from cfmkit.families.cam.solution import ON_CORNER, Assembly, Solution
@@ -104,7 +104,7 @@ def with_band(solution: Solution, seed: int) -> Solution:
     tolerance = solution.assembly.spec.analysis.manufacturing
     if tolerance is None:
         return solution
-    from cfmkit.families.cam.manufacturing import force_band
+    from cfmkit.families.cam.manufacturing_scatter import force_band
 
     return replace(solution, band=force_band(solution.assembly, tolerance, solution.travel, seed))
 

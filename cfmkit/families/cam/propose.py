@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.families.cam.contact import YIELD_PRESSURE
-from cfmkit.families.cam.room import depth_of
+from cfmkit.families.cam.bounding_box import depth_of
+from cfmkit.families.cam.contact_pressure import YIELD_PRESSURE
 from cfmkit.families.cam.spec import CamSpec, Springs
 from cfmkit.families.findings import mm, percent
 from cfmkit.families.wishes import Candidate, Offer

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.cam.contact import flank_pressure
+from cfmkit.families.cam.contact_pressure import flank_pressure
 from cfmkit.families.cam.geometry.track_records import TrackStates
 from cfmkit.families.cam.solution import ON_CORNER, pressure_angle
 from cfmkit.families.cam.statics import Forces, Losses, forces, normal_turn
-from cfmkit.metrics.closed import extremes
+from cfmkit.metrics.continuous_curves import extremes
 from cfmkit.results import Quantity
 from cfmkit.specs.units import between
 from cfmkit.stock.springs.in_use import WIRE_DEFINITIONS, SpringInUse, wire_quantities

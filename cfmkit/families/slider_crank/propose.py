@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.families.findings import mm
-from cfmkit.families.slider_crank.room import PIN
+from cfmkit.families.slider_crank.bounding_box import PIN
 from cfmkit.families.slider_crank.spec import SliderCrankSpec
 from cfmkit.families.wishes import Candidate, Offer
 from cfmkit.specs.units import Place

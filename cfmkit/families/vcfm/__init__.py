@@ -14,11 +14,11 @@ FAMILY = Family(
     name="vcfm",
     summary="V-beams that snap through beside a diamond spring, adjustable by the spring's preload",
     spec_type=VcfmSpec,
-    errors="cfmkit.families.vcfm.made:errors",
+    errors="cfmkit.families.vcfm.process_errors:errors",
     models={
         "truss": analyze,
         "analytic": analyze,
-        "exact": "cfmkit.families.vcfm.exact:analyze",
+        "exact": "cfmkit.families.vcfm.exact_model:analyze",
         "solid": "cfmkit.families.vcfm.solid:analyze",
     },
     design=design,
@@ -28,7 +28,7 @@ FAMILY = Family(
     outline="cfmkit.families.vcfm.outline",
     decks="cfmkit.families.vcfm.solid:decks",
     propose="cfmkit.families.vcfm.propose:propose",
-    room="cfmkit.families.vcfm.room:room",
+    room="cfmkit.families.vcfm.bounding_box:room",
     analyze_block=analyze_block,
     headline=(
         "constant_force",

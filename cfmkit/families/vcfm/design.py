@@ -29,7 +29,7 @@ from cfmkit.specs.units.windows import Share
 
 if TYPE_CHECKING:
     from cfmkit.families.base import Run
-    from cfmkit.families.vcfm.exact import ExactSampler
+    from cfmkit.families.vcfm.exact_model import ExactSampler
     from cfmkit.families.vcfm.spec import VcfmDesign, VcfmSpec
 
 
@@ -374,7 +374,7 @@ def fit_widths(spec: VcfmSpec, target: VcfmDesign, sizes: DesignSizes) -> tuple[
     Infeasible
         If the exact leaves cannot be followed that far.
     """
-    from cfmkit.families.vcfm.exact import ExactSampler
+    from cfmkit.families.vcfm.exact_model import ExactSampler
 
     first, last = sizes.linear
     middle, half = 0.5 * (first + last), 0.5 * MIDDLE * (last - first)

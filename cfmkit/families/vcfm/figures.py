@@ -11,10 +11,10 @@ import numpy as np
 from cfmkit.curves import Curve
 from cfmkit.families.vcfm.leaves.springs import force_change, rest_shift
 from cfmkit.families.vcfm.leaves.truss import TrussLeaf
+from cfmkit.families.vcfm.longest_window import flat_window
 from cfmkit.families.vcfm.model import rest_of
-from cfmkit.families.vcfm.scene import scene
+from cfmkit.families.vcfm.pose_outlines import scene
 from cfmkit.families.vcfm.solution import force_of
-from cfmkit.families.vcfm.windows import flat_window
 from cfmkit.plots import parts
 from cfmkit.plots.curves import CurveLook, plot_curve
 from cfmkit.plots.diagram import Diagram, Limit, Region, Scale, Series, diagram_figure
@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.vcfm.scene import Scene
+    from cfmkit.families.vcfm.pose_outlines import Scene
     from cfmkit.families.vcfm.solution import Push, Solution
     from cfmkit.results import Result
 

@@ -28,8 +28,8 @@ from cfmkit.families.vcfm.leaves.v_beam import (
     VBeam,
     overrated,
 )
-from cfmkit.families.vcfm.windows import extremes, flat_window
-from cfmkit.metrics.closed import extremes as extremes_next_to
+from cfmkit.families.vcfm.longest_window import extremes, flat_window
+from cfmkit.metrics.continuous_curves import extremes as extremes_next_to
 from cfmkit.metrics.spread import ManyWindows, metric_of, metrics_of
 
 if TYPE_CHECKING:

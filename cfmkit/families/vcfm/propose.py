@@ -189,7 +189,7 @@ def finish(spec: VcfmSpec, wish: Wish) -> VcfmSpec:
     from cfmkit.families.base import Run
     from cfmkit.families.flattest_window import flattest
     from cfmkit.families.vcfm.build import spring_room
-    from cfmkit.families.vcfm.exact import analyze
+    from cfmkit.families.vcfm.exact_model import analyze
 
     design = spec.design
     preloads: tuple[float, ...] = (0.0,)

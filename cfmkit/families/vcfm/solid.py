@@ -17,7 +17,7 @@ import numpy as np
 
 from cfmkit.errors import GeometryError
 from cfmkit.families.vcfm.build import parts
-from cfmkit.families.vcfm.exact import ExactSampler, problem_of, spring_chain
+from cfmkit.families.vcfm.exact_model import ExactSampler, problem_of, spring_chain
 from cfmkit.families.vcfm.findings import finding
 from cfmkit.families.vcfm.model import LawSampler, rest_of, result_of, solve, travel_grid
 from cfmkit.families.vcfm.outline import solved_leaf, solved_spring
@@ -205,7 +205,7 @@ def followed(spec: VcfmSpec, part: Part, end: float, twice: bool, report: Any) -
 def analyze(spec: VcfmSpec, run: Run) -> Result:
     """Return the curves of a mechanism as drawn, with everything that is wrong with it.
 
-    As `cfmkit.families.vcfm.exact.analyze`; NO_EQUILIBRIUM if a part cannot be meshed.
+    As `cfmkit.families.vcfm.exact_model.analyze`; NO_EQUILIBRIUM if a part cannot be meshed.
     """
     made = parts(spec)
     rests = [rest_of(LawSampler(made), preload, travel_grid(spec)) for preload in spec.analysis.preloads]

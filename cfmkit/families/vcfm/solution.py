@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from cfmkit.families.vcfm.windows import extreme, flat_window
+from cfmkit.families.vcfm.longest_window import extreme, flat_window
 from cfmkit.specs.units import between
 
 if TYPE_CHECKING:

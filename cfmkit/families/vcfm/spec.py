@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
-from cfmkit.metrics.material_laws import Durability
+from cfmkit.metrics.fatigue_and_relaxation import Durability
 from cfmkit.specs.spec import Analysis, DesignBlock, Model, SolidAnalysis, Spec, refuse
 from cfmkit.specs.units import Angle, Force, Length, Ratio, Stiffness
 from cfmkit.stock.spec import CutPart, MaterialSpec, PositiveStress, SafetyFactor, material_input, sheet_faults

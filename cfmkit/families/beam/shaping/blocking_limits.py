@@ -10,8 +10,8 @@ from cfmkit.designing.variables import at_bounds
 from cfmkit.families.beam.build import thickest_of
 from cfmkit.families.beam.findings import percent
 from cfmkit.families.beam.shaping.goals import Flattest
-from cfmkit.families.beam.shaping.program import Shaping
 from cfmkit.families.beam.shaping.search import VIOLATION, Found, Plan, met
+from cfmkit.families.beam.shaping.sqp_program import Shaping
 from cfmkit.families.beam.shaping.variables import Variables
 from cfmkit.specs.units import format_short
 

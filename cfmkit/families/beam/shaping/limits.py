@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.designing.program import Rows
+    from cfmkit.designing.sqp_program import Rows
     from cfmkit.families.beam.shaping.response import View
 
 

@@ -18,10 +18,10 @@ import numpy as np
 from cfmkit.designing.limits import worst
 from cfmkit.designing.starts import Clock
 from cfmkit.designing.variables import rounded as rounded_within
-from cfmkit.families.beam.shaping.closer import CloseView, looked_at
+from cfmkit.families.beam.shaping.check_between_poses import CloseView, looked_at
 from cfmkit.families.beam.shaping.goals import Compared, Flattest, Widest, window_force
 from cfmkit.families.beam.shaping.limits import LIMITS
-from cfmkit.families.beam.shaping.program import Shaping
+from cfmkit.families.beam.shaping.sqp_program import Shaping
 from cfmkit.families.beam.shaping.variables import Variables, candidates
 from cfmkit.numerics.sqp import Effort, Optimum, minimize
 

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.cam.dynamics.machine import Machine
+    from cfmkit.families.cam.dynamics.moving_parts import Machine
     from cfmkit.families.cam.dynamics.solution import Build
     from cfmkit.results import Finding
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.families.cam.build import directions
-from cfmkit.families.cam.contact import worst
+from cfmkit.families.cam.contact_pressure import worst
 from cfmkit.families.cam.dynamics.build import slender_rod, solid_cylinder
 from cfmkit.families.cam.dynamics.scalar_results import contact_pressure
 from cfmkit.families.cam.findings import finding, overstressed

@@ -31,13 +31,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from cfmkit.families.cam.dynamics.machine import Moment
+from cfmkit.families.cam.dynamics.moving_parts import Moment
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.cam.dynamics.machine import Constants, Machine
+    from cfmkit.families.cam.dynamics.moving_parts import Constants, Machine
     from cfmkit.families.cam.dynamics.side_kinematics import Stance
 
     ComplexArray = NDArray[np.complex128]

@@ -17,7 +17,7 @@ import numpy as np
 
 from cfmkit.curves import Column, Curve
 from cfmkit.families.cam.build import displacement_origin
-from cfmkit.families.cam.contact import allowable_stress, stress
+from cfmkit.families.cam.contact_pressure import allowable_stress, stress
 from cfmkit.families.cam.dynamics.build import build, stated_motion
 from cfmkit.families.cam.dynamics.ending import ending
 from cfmkit.families.cam.dynamics.findings import findings_of, old_word, outside, runs_on_corner
@@ -33,7 +33,7 @@ from cfmkit.results import Result, Status
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.families.base import Run
-    from cfmkit.families.cam.dynamics.machine import Cycloid, Machine
+    from cfmkit.families.cam.dynamics.moving_parts import Cycloid, Machine
     from cfmkit.families.cam.dynamics.multibody import Scheme
     from cfmkit.families.cam.spec import CamSpec
     from cfmkit.results import Finding

@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.families.cam.dynamics.flankline import FlankPoint
-    from cfmkit.families.cam.dynamics.machine import Cycloid, Machine
+    from cfmkit.families.cam.dynamics.moving_parts import Cycloid, Machine
     from cfmkit.families.cam.dynamics.side_kinematics import Side, SideParts
 
     ComplexArray = NDArray[np.complex128]

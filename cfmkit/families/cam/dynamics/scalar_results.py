@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.cam.contact import pressure
+from cfmkit.families.cam.contact_pressure import pressure
 from cfmkit.families.cam.dynamics.inverse import respond, statics
 from cfmkit.families.cam.scalar_results import DEFINITIONS, constant_force
 from cfmkit.families.cam.statics import GRAVITY
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.cam.dynamics.machine import Machine
+    from cfmkit.families.cam.dynamics.moving_parts import Machine
     from cfmkit.families.cam.dynamics.solution import MotionSolution
 
 SLOW = 1.0

@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from cfmkit.families.cam.contact import YIELD_PRESSURE, allowable_stress, pressure_between
+from cfmkit.families.cam.contact_pressure import YIELD_PRESSURE, allowable_stress, pressure_between
 from cfmkit.families.cam.geometry.many_tracks import sign_changes, tangents
 from cfmkit.families.cam.many_designs.forces import Forces, Pose, Slab
 from cfmkit.families.cam.many_designs.windows import CutWindows, Sampled
 from cfmkit.families.cam.model import nodes
 from cfmkit.families.cam.statics import JAM_SHARES, at_dead_point
-from cfmkit.metrics.closed import extremes
+from cfmkit.metrics.continuous_curves import extremes
 from cfmkit.metrics.traces import ROUNDING, TOLERANCE
 from cfmkit.results import WINDOW_OUTSIDE
 

@@ -16,7 +16,7 @@ from cfmkit.families.cam.geometry.many_tracks import tangents
 from cfmkit.families.cam.many_designs.windows import CutWindows, Sampled
 from cfmkit.families.cam.model import nodes
 from cfmkit.families.cam.solution import ON_CORNER
-from cfmkit.metrics.closed import extremes
+from cfmkit.metrics.continuous_curves import extremes
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.metrics.many import ManyBranches
+    from cfmkit.metrics.ranges_many import ManyBranches
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ import numpy as np
 
 from cfmkit.families.cam.geometry.many_tracks import tangents
 from cfmkit.families.cam.scalar_results import DEFINITIONS
-from cfmkit.metrics.many import RANGES, ManyBranches, rms_to_target, usable_interval
+from cfmkit.metrics.ranges_many import RANGES, ManyBranches, rms_to_target, usable_interval
 from cfmkit.metrics.spread import metric_of, metrics_of
 
 if TYPE_CHECKING:

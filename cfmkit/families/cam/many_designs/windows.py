@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.metrics.closed import extremes
+from cfmkit.metrics.continuous_curves import extremes
 from cfmkit.metrics.spread import ManyWindows
 
 if TYPE_CHECKING:

@@ -17,8 +17,8 @@ from cfmkit.families.slider_crank.printed.solution import SecondOpinion, Solutio
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.families.slider_crank.printed.chain import Strip
-    from cfmkit.families.slider_crank.printed.program import Form
     from cfmkit.families.slider_crank.printed.search import Found
+    from cfmkit.families.slider_crank.printed.sqp_program import Form
 
 
 PLACES = 240

@@ -26,7 +26,6 @@ from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.printed.assembly import corners, elasticity, pins_of, travel_direction
 from cfmkit.families.slider_crank.printed.audit import Judged, judge
 from cfmkit.families.slider_crank.printed.model import analyze, slider_reach
-from cfmkit.families.slider_crank.printed.program import Form, Task
 from cfmkit.families.slider_crank.printed.search import (
     LOOSE,
     SHORTEST,
@@ -38,6 +37,7 @@ from cfmkit.families.slider_crank.printed.search import (
 )
 from cfmkit.families.slider_crank.printed.sizing import design_flexures
 from cfmkit.families.slider_crank.printed.spec import StripSpec
+from cfmkit.families.slider_crank.printed.sqp_program import Form, Task
 from cfmkit.numerics.sqp import SearchEnding
 from cfmkit.results import Design, Finding, Searched, Status
 

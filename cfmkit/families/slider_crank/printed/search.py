@@ -12,7 +12,7 @@ from cfmkit.families.base import Run
 from cfmkit.families.findings import mm, mpa, newton, percent
 from cfmkit.families.no_mechanism import no_design
 from cfmkit.families.slider_crank.findings import finding
-from cfmkit.families.slider_crank.printed.program import SMALL, Form, StripProgram
+from cfmkit.families.slider_crank.printed.sqp_program import SMALL, Form, StripProgram
 from cfmkit.numerics.sqp import Effort, Optimum, SearchEnding, minimize
 from cfmkit.results import Design, Status
 from cfmkit.specs.units import format_short
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.slider_crank.printed.program import Task
+    from cfmkit.families.slider_crank.printed.sqp_program import Task
 
 
 VIOLATION = 5e-3

@@ -17,7 +17,7 @@ import numpy as np
 from cfmkit.elastica.verification.corotational import recheck as by_elements
 from cfmkit.families.slider_crank.printed.chain import SLIDER, STRIP
 from cfmkit.families.slider_crank.printed.pressing import Ending
-from cfmkit.metrics.closed import mean
+from cfmkit.metrics.continuous_curves import mean
 from cfmkit.numerics.chebyshev_panels import nodes_of, resolved
 from cfmkit.numerics.roots import bracketed_root
 

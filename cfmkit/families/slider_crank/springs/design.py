@@ -22,8 +22,8 @@ from cfmkit.families.no_mechanism import CannotBuild, Infeasible, no_design
 from cfmkit.families.slider_crank.build import resolve
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.springs.assembly import TURN, default_motion
-from cfmkit.families.slider_crank.springs.bought import choose
-from cfmkit.families.slider_crank.springs.outcome import (
+from cfmkit.families.slider_crank.springs.bought_springs import choose
+from cfmkit.families.slider_crank.springs.design_outcome import (
     Solved,
     about_springs,
     active_bounds,
@@ -37,10 +37,10 @@ from cfmkit.families.slider_crank.springs.outcome import (
     search_of,
     too_far,
 )
-from cfmkit.families.slider_crank.springs.rates import least_squares, minimax, preferred, ranges
+from cfmkit.families.slider_crank.springs.fit_rates import least_squares, minimax, preferred, ranges
 from cfmkit.families.slider_crank.springs.solution import EDGE
 from cfmkit.families.slider_crank.springs.targets import DENSE, FREE, task_of, with_lengths
-from cfmkit.families.slider_crank.springs.windows import widest, widest_of_all
+from cfmkit.families.slider_crank.springs.widest_window import widest, widest_of_all
 from cfmkit.families.slider_crank.unit_springs import JOINTS
 from cfmkit.numerics.box_search import BoxAxis, Lowest, lowest
 from cfmkit.results import Design, Status
@@ -50,7 +50,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.families.base import Run
     from cfmkit.families.slider_crank.spec import CrankDesign, SliderCrankSpec
-    from cfmkit.families.slider_crank.springs.rates import RateGoal
+    from cfmkit.families.slider_crank.springs.fit_rates import RateGoal
     from cfmkit.families.slider_crank.springs.targets import Task
     from cfmkit.results import Finding
 

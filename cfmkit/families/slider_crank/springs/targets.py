@@ -12,8 +12,8 @@ import numpy as np
 from cfmkit.families.no_mechanism import Infeasible
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.springs.assembly import assemble
+from cfmkit.families.slider_crank.springs.fit_rates import RateGoal
 from cfmkit.families.slider_crank.springs.friction import branch
-from cfmkit.families.slider_crank.springs.rates import RateGoal
 from cfmkit.families.slider_crank.unit_springs import JOINTS
 
 if TYPE_CHECKING:

@@ -31,8 +31,14 @@ from cfmkit.families.slider_crank.springs.stiffness_classes import (
     small_angle_number,
 )
 from cfmkit.metrics.branch_views import Frame
-from cfmkit.metrics.closed import extremes, mean
-from cfmkit.metrics.many import UNIFORM_POINTS, ManyBranches, range_95, range_95_fraction, usable_interval
+from cfmkit.metrics.continuous_curves import extremes, mean
+from cfmkit.metrics.ranges_many import (
+    UNIFORM_POINTS,
+    ManyBranches,
+    range_95,
+    range_95_fraction,
+    usable_interval,
+)
 from cfmkit.metrics.spread import ManyWindows, metric_of, metrics_of
 from cfmkit.numerics.turning_points import Monotone, monotone, sharpened
 

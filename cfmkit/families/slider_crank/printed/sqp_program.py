@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from cfmkit.designing import program
-from cfmkit.designing.program import Rows, Seen
+from cfmkit.designing import sqp_program
+from cfmkit.designing.sqp_program import Rows, Seen
 from cfmkit.elastica import Control, Displacement, PathStatus, gradient, trace
 from cfmkit.elastica.sensitivity.neighbour import drive_slope, neighbouring
 from cfmkit.errors import InputError
@@ -163,7 +163,7 @@ class State:
 
 @dataclass
 class StripProgram:
-    """Objective and constraints of a task over a form, as `cfmkit.designing.program` wants them.
+    """Objective and constraints of a task over a form, as `cfmkit.designing.sqp_program` wants them.
 
     The variables are those of the form, then the stroke [cm] or the ripple [%] where that is the goal.
     """
@@ -235,11 +235,11 @@ class StripProgram:
 
     def values(self, z: FloatArray) -> tuple[float, FloatArray] | None:
         """Return the objective and the constraints, at least zero where they hold."""
-        return program.values(self, z)
+        return sqp_program.values(self, z)
 
     def slopes(self, z: FloatArray) -> tuple[FloatArray, FloatArray] | None:
         """Return the derivatives of objective and constraints."""
-        return program.slopes(self, z)
+        return sqp_program.slopes(self, z)
 
     def seen(self, z: FloatArray, sloped: bool) -> Seen | None:
         """Return the objective, the rows of the band, and those of the stress."""

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.families.slider_crank.springs.rates import RateGoal
+    from cfmkit.families.slider_crank.springs.fit_rates import RateGoal
     from cfmkit.families.slider_crank.springs.targets import Task
 
 PLACES = 41

@@ -12,14 +12,14 @@ from cfmkit.families.no_mechanism import Infeasible
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.springs.model import analyze
 from cfmkit.families.slider_crank.springs.targets import FREE
-from cfmkit.families.slider_crank.springs.windows import widest
+from cfmkit.families.slider_crank.springs.widest_window import widest
 from cfmkit.families.slider_crank.unit_springs import JOINTS
 from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.families.slider_crank.spec import CrankDesign, SliderCrankSpec
-    from cfmkit.families.slider_crank.springs.bought import Option
+    from cfmkit.families.slider_crank.springs.bought_springs import Option
     from cfmkit.families.slider_crank.springs.targets import Task
     from cfmkit.results import Finding, Searched
 

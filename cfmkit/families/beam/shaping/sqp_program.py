@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.designing import program
+from cfmkit.designing import sqp_program
 from cfmkit.designing.limits import worst
-from cfmkit.designing.program import Rows, Seen
+from cfmkit.designing.sqp_program import Rows, Seen
 from cfmkit.families.beam.shaping.limits import LIMITS
 from cfmkit.families.beam.shaping.response import NoAnswer, PosePlan, View, poses_of, respond
 
@@ -77,11 +77,11 @@ class Shaping:
 
     def values(self, z: FloatArray) -> tuple[float, FloatArray] | None:
         """Return objective and constraints."""
-        return program.values(self, z, self.elastic)
+        return sqp_program.values(self, z, self.elastic)
 
     def slopes(self, z: FloatArray) -> tuple[FloatArray, FloatArray] | None:
         """Return their derivatives."""
-        return program.slopes(self, z, self.elastic)
+        return sqp_program.slopes(self, z, self.elastic)
 
     def seen(self, z: FloatArray, sloped: bool) -> Seen | None:
         """Return the goal, its rows and those of all limits at the design and the goal's own variables."""

@@ -1,7 +1,7 @@
 """The leaves as beams in large deflection: bending, stretching and shear, with the branch that they really take.
 
 One half-beam is traced and counted `half_beams` times; a shuttle that can turn needs both leaves of a V. Of the spring
-one leaf or one chain is traced, by symmetry. How that is interpolated, `traced` says.
+one leaf or one chain is traced, by symmetry. How that is interpolated, `traced_network` says.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from cfmkit.families.findings import mm
 from cfmkit.families.vcfm.build import parts, share_of, strip_of
 from cfmkit.families.vcfm.model import LawSampler, rest_of, result_of, solve, travel_grid
 from cfmkit.families.vcfm.solution import Characteristics, LeafSamples
-from cfmkit.families.vcfm.traced import traced
+from cfmkit.families.vcfm.traced_network import traced
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -1,6 +1,6 @@
 """Metrics of a mechanism in use: cycles to failure, and the effort that is left after a hold.
 
-The laws are those of the material (`cfmkit.metrics.material_laws`); here they meet a curve and its window.
+The laws are those of the material (`cfmkit.metrics.fatigue_and_relaxation`); here they meet a curve and its window.
 """
 
 from __future__ import annotations

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.families.base import Room
-from cfmkit.families.vcfm.scene import scene
+from cfmkit.families.vcfm.pose_outlines import scene
 
 if TYPE_CHECKING:
     from cfmkit.families.vcfm.solution import Solution
