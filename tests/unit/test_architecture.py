@@ -145,7 +145,16 @@ def test_the_command_line_starts_without_numpy_and_pydantic():
     light = [path for path in (ROOT / "cli").rglob("*.py") if path.parent.name == "verbs"]
     light += [
         ROOT / "cli" / f"{name}.py"
-        for name in ("main", "commands", "options", "measuring", "answer", "failures", "page_blocks", "terminal")
+        for name in (
+            "main",
+            "commands",
+            "options",
+            "measured_data_options",
+            "answer",
+            "failures",
+            "page_blocks",
+            "terminal",
+        )
     ]
     heavy = (
         "numpy",
