@@ -19,7 +19,7 @@ from cfmkit.stock.springs.wound import Kind, Wound, tensile_strength
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from cfmkit.metrics.material_laws import FatigueLaw
+    from cfmkit.metrics.fatigue_and_relaxation import FatigueLaw
 
 GENERIC = "generic"
 """The word for the series that ships with the package."""

@@ -19,7 +19,7 @@ from cfmkit.results import Quantity
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from cfmkit.metrics.material_laws import FatigueLaw
+    from cfmkit.metrics.fatigue_and_relaxation import FatigueLaw
     from cfmkit.stock.springs.catalogue import Offer
     from cfmkit.stock.springs.wound import Wound
 
