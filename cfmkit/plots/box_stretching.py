@@ -42,12 +42,15 @@ class Layout:
         What it gets instead.
     host : Figure, optional
         Where it draws, if not in a figure of its own.
+    above : float
+        Room at the top that it is to leave free, for the letter of a panel [mm].
     """
 
     size: tuple[float, float] = (0.0, 0.0)
     asked: list[Box] = dataclasses.field(default_factory=list)
     boxes: Sequence[Box] = ()
     host: Any = None
+    above: float = 0.0
 
     def sized(self, width: float, height: float) -> tuple[float, float]:
         """Return the size of the figure, and note it where none is set."""

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from cfmkit.errors import UsageError
 from cfmkit.plots.box_stretching import laid_out, noted
 from cfmkit.plots.style import MM, NORMAL, is_to_scale, size_mm, styled, with_settings
 
@@ -21,6 +22,9 @@ GAP = 4.0
 
 STRIP = 5.0
 """Above each panel, for its letter [mm]: a line of text."""
+
+NARROWEST = 50.0
+"""Of a panel [mm]: in less, the numbers of a map's axis stand on each other (looked at from 40 to 85 mm)."""
 
 
 @dataclass(frozen=True)
@@ -42,10 +46,21 @@ def composed(panels: Sequence[DrawnPanel], columns: int, form: FigureForm) -> Fi
         Beside each other.
     form : FigureForm
         With the width of the whole.
+
+    Raises
+    ------
+    cfmkit.errors.UsageError
+        If panels would be too narrow to read.
     """
     columns = min(columns, len(panels))
     width = (form.width or 0.174) * 1e3
     cell = (width - GAP * (columns - 1)) / columns
+    if cell < NARROWEST:
+        fitting = int((width + GAP) // (NARROWEST + GAP))
+        raise UsageError(
+            f"columns: {columns} panels beside each other in {width:g} mm are {cell:.0f} mm wide each, and one needs "
+            f"{NARROWEST:g} mm; allowed are at most {fitting}, or a larger width"
+        )
     with with_settings(form.settings, titles=False):
         return _composed(panels, columns, cell)
 
@@ -65,7 +80,7 @@ def _composed(panels: Sequence[DrawnPanel], columns: int, cell: float) -> Figure
     for number, row in enumerate(rows):
         for place, k in enumerate(row):
             part = whole.add_subfigure(grid[number, 2 * place])
-            layouts[k].host = part
+            layouts[k].host, layouts[k].above = part, STRIP
             laid_out(panels[k].make, layouts[k])
             across, up = size_mm(part)
             letter = f"({chr(ord('a') + k)})"

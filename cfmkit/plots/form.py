@@ -83,6 +83,18 @@ class FigureForm:
         for stem, make in makers.items():
             yield from self.write(self.draw(make), stem)
 
+    def for_page(self, makers: Mapping[str, Callable[[], Figure]], drawn: Mapping[str, Figure]) -> dict[str, Figure]:
+        """Return figures as a page shows them: with its own headings and width, whatever is drawn for print.
+
+        Parameters
+        ----------
+        makers : mapping of str to callable
+            What draws each of them.
+        drawn : mapping of str to Figure
+            Those that were drawn in this form already; they serve where it is no other than a page's.
+        """
+        return {stem: drawn[stem] if self.on_screen and stem in drawn else make() for stem, make in makers.items()}
+
 
 PLAIN = FigureForm()
 """PNG, as each figure is drawn."""

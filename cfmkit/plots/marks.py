@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.plots.style import GREY, SMALL, VERMILLION, has_titles, size_mm, styled
+from cfmkit.plots.style import GREY, SMALL, VERMILLION, has_titles, room_above, size_mm, styled
 from cfmkit.plots.text import LEFT, Heading, write_heading
 
 if TYPE_CHECKING:
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.legend import Legend
 
     from cfmkit.arrays import FloatArray
     from cfmkit.plots.findings import DrawnScale, StudyMarks
@@ -35,20 +36,27 @@ HEAD = 12.0
 def head(figure: Figure, found: StudyMarks, subject: str, key: Sequence[Artist] = ()) -> None:
     """Write above a picture whose study it is, what it shows, and what its marks mean."""
     write_heading(figure, Heading(found.name, subject) if found.name else Heading(subject, "all points"))
-    if key:
-        width, height = size_mm(figure)
-        figure.legend(
-            handles=list(key),
-            loc="upper left",
-            bbox_to_anchor=((LEFT - 1.0) / width, 1.0 - (6.0 if has_titles() else 1.0) / height),
-            ncols=len(key),
-            frameon=False,
-            fontsize=SMALL,
-            borderpad=0.0,
-            borderaxespad=0.0,
-            handletextpad=0.4,
-            columnspacing=1.2,
-        )
+    if key and _key(figure, key, len(key)).get_window_extent().x1 > figure.bbox.x1:
+        figure.legends[-1].remove()
+        _key(figure, key, 1)
+
+
+def _key(figure: Figure, entries: Sequence[Artist], columns: int) -> Legend:
+    """Write the key below the heading, or at the top where there is none."""
+    width, height = size_mm(figure)
+    down = (6.0 if has_titles() else 1.0) + room_above()
+    return figure.legend(
+        handles=list(entries),
+        loc="upper left",
+        bbox_to_anchor=((LEFT - 1.0) / width, 1.0 - down / height),
+        ncols=columns,
+        frameon=False,
+        fontsize=SMALL,
+        borderpad=0.0,
+        borderaxespad=0.0,
+        handletextpad=0.4,
+        columnspacing=1.2,
+    )
 
 
 def key_of(found: StudyMarks, starred: bool, hatched: bool, empty: bool = False) -> list[Artist]:

@@ -164,6 +164,12 @@ def has_titles() -> bool:
     return _TITLES.get()
 
 
+def room_above() -> float:
+    """Return the room at the top of the figure that belongs to the letter of a panel [mm]."""
+    layout = current()
+    return 0.0 if layout is None else layout.above
+
+
 @contextmanager
 def with_settings(settings: tuple[tuple[str, Any], ...], titles: bool) -> Iterator[None]:
     """Apply more settings of matplotlib, and whether headings are written, inside a ``with`` block."""

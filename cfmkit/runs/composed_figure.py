@@ -93,17 +93,21 @@ def makers(place: Path, panel: Panel, executor: Executor) -> Makers:
 
 
 def _of_folder(place: Path, panel: Panel) -> Makers:
-    """Return the pictures of a run from its folder: the mechanism that it wrote out is analysed again."""
+    """Return the pictures of a run from its folder: a mechanism is analysed again, a sweep drawn from its files."""
     import json
 
     try:
         command = json.loads((place / "manifest.json").read_bytes())["command"]
     except (OSError, ValueError, KeyError, TypeError):
         raise UsageError(f"{visible(str(place))} is not the folder of a run: it has no manifest.json") from None
+    if command == "sweep" and panel.verb in (None, "sweep"):
+        from cfmkit.studies.finished_sweep import makers_of
+
+        return makers_of(place, api.load(str(place / "resolved.yaml")))
     if command not in ("analyze", "design", "calibrate") or panel.verb not in (None, "analyze", command):
         raise UsageError(
-            f"{visible(str(place))} holds a run of {visible(str(command))!r}; only those of analyze, design and "
-            "calibrate can be drawn from their folder: name the specification instead"
+            f"{visible(str(place))} holds a run of {visible(str(command))!r}; only those of analyze, design, "
+            "calibrate and sweep can be drawn from their folder, as what they are: name the specification instead"
         )
     return _solved(api.load(str(place / "resolved.yaml")), "analyze")
 

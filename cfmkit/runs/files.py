@@ -81,9 +81,7 @@ def files(
     if page:
         from cfmkit.runs import run_page
 
-        # the page has its own headings and its own width, and a style file is for print
-        shown = drawn if form.on_screen else {stem: make() for stem, make in makers.items()}
-        yield run_page.NAME, run_page.page(report, shown, command)
+        yield run_page.NAME, run_page.page(report, form.for_page(makers, drawn), command)
 
 
 def sources(spec: Spec) -> Iterator[tuple[str, bytes]]:

@@ -64,7 +64,7 @@ def page(report: Report, drawn: Mapping[str, Figure], command: str = "") -> byte
 
     result = report.result
     record = family(result.spec.family)
-    figures = {name: inline(svg(figure), _identifier(name)) for name, figure in drawn.items()}
+    figures = {name: inline(svg(figure), identifier(name)) for name, figure in drawn.items()}
     tone, words = ENDS.get(int(report.exit_code), ("warn", "the run ended early"))
     if tone == "good" and not report.requirements:
         words = "solved; nothing was required"
@@ -106,7 +106,8 @@ def part(name: str) -> str:
     return files("cfmkit.runs").joinpath(name).read_text(encoding="utf-8")
 
 
-def _identifier(name: str) -> str:
+def identifier(name: str) -> str:
+    """Return a name for parts of a page: letters, digits and ``-``."""
     return "".join(char if char.isalnum() and char.isascii() else "-" for char in name)
 
 

@@ -12,13 +12,15 @@ import csv
 import io
 import json
 import math
-from base64 import b64encode
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
-from cfmkit.runs.run_page import NAME, escaped_json, part, references_of, template
+from cfmkit.runs.run_page import NAME, escaped_json, identifier, part, references_of, template
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
+
+    from matplotlib.figure import Figure
 
     from cfmkit.specs.spec import Spec
 
@@ -41,7 +43,13 @@ DIGITS = 6
 """Of a number in the page: more are in results.csv."""
 
 
-def page(spec: Spec, varied: Sequence[str], files: Mapping[str, bytes], command: str) -> bytes:
+def page(
+    spec: Spec,
+    varied: Sequence[str],
+    files: Mapping[str, bytes],
+    command: str,
+    drawn: Mapping[str, Figure] = MappingProxyType({}),
+) -> bytes:
     """Return the page of a study.
 
     Parameters
@@ -54,7 +62,11 @@ def page(spec: Spec, varied: Sequence[str], files: Mapping[str, bytes], command:
         Name -> content of the study's files: results.csv and metrics.json at least.
     command : str
         How the study was started.
+    drawn : mapping of str to Figure
+        The pictures of the study, by their names.
     """
+    from cfmkit.plots.formats import inline, svg
+
     summary = json.loads(files["metrics.json"])
     head, *points = csv.reader(io.StringIO(files["results.csv"].decode()))
     rows = points[:MOST_POINTS]
@@ -87,11 +99,7 @@ def page(spec: Spec, varied: Sequence[str], files: Mapping[str, bytes], command:
         rows=[[_short(column[at]) for column in columns] for at in range(min(SHOWN, len(rows)))],
         total=len(points),
         points_left_out=len(points) - len(rows),
-        pictures={
-            name.removeprefix("figures/").removesuffix(".png"): b64encode(content).decode()
-            for name, content in files.items()
-            if name.startswith("figures/")
-        },
+        pictures={name: inline(svg(figure), identifier(name)) for name, figure in drawn.items()},
         data=escaped_json(data),
         command=command,
         style=part("report.css"),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,13 +13,14 @@ from cfmkit.specs.keys import keys
 from cfmkit.tables import Table, TableColumn, border_values, read_csv
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from matplotlib.figure import Figure
 
     from cfmkit.arrays import FloatArray
+    from cfmkit.specs.spec import Spec
     from cfmkit.studies.engine import Records
-    from cfmkit.studies.plan import Plan, Variable
+    from cfmkit.studies.plan import Plan
     from cfmkit.studies.study import Metric
     from cfmkit.studies.summary import Summary
 
@@ -40,31 +41,53 @@ def findings(records: Records, summary: Summary) -> StudyMarks:
     meets = np.concatenate([meets for _, _, meets in summary.kept])
     metrics = [_drawn(study.metrics[column], values[:, k]) for k, column in enumerate(summary.shown)]
     drawn = [metric for metric in metrics if np.isfinite(metric.values).any()]
-    names = short_names([item.path for item in plan.variables])
-    about = {key.path: key.description for key in keys(type(study.spec))}
-    varied = [
-        _scale(item, shown, name, about.get(_place(item.path), ""))
-        for item, shown, name in zip(plan.variables, plan.shown(0, len(plan)), names, strict=True)
-    ]
-    return StudyMarks(tuple(varied), tuple(drawn), _shape(plan), meets, summary.best, study.spec.name, _best(summary))
+    kinds = [(item.path, item.dimension) for item in plan.variables]
+    varied = scales(study.spec, kinds, [*plan.shown(0, len(plan))], [[*map(str, one.shown)] for one in plan.variables])
+    best = "" if summary.best_by is None else best_words(*summary.best_by, summary.ties)
+    return StudyMarks(varied, tuple(drawn), shape_of(plan), meets, summary.best, study.spec.name, best)
 
 
-def _best(summary: Summary) -> str:
+def scales(
+    spec: Spec, varied: Sequence[tuple[str, str]], shown: Sequence[Any], words: Sequence[Sequence[str]]
+) -> tuple[DrawnScale, ...]:
+    """Return what varied as it is drawn.
+
+    Parameters
+    ----------
+    spec : Spec
+        Whose keys they are.
+    varied : sequence of (str, str)
+        Path and dimension of each.
+    shown : sequence of (n,) sequence
+        Their values at every point, in border units.
+    words : sequence of sequence of str
+        Of those that are no numbers: what they may be, in order.
+    """
+    about = {key.path: key.description for key in keys(type(spec))}
+    names = short_names([path for path, _ in varied])
+    return tuple(
+        _scale(kind, values, tuple(dict.fromkeys(known)), (name, about.get(_place(kind[0]), "")))
+        for kind, values, known, name in zip(varied, shown, words, names, strict=True)
+    )
+
+
+def best_words(name: str, sense: str, ties: int) -> str:
     """Return what makes the best point the best, for the key."""
-    told = summary.best_by
-    if told is None:
-        return ""
-    name, sense = told
-    more = f", first of {summary.ties} as good" if summary.ties > 1 else ""
+    more = f", first of {ties} as good" if ties > 1 else ""
     return f"best: {sense} {name.replace('_', ' ')}{more}"
 
 
 def _drawn(metric: Metric, values: FloatArray) -> DrawnScale:
     if metric.words:
         return DrawnScale(metric.name, metric.dimension, values, metric.words)
-    if metric.dimension == "ratio":  # as the page says it
-        return DrawnScale(metric.name, PERCENT, 100.0 * values)
-    return DrawnScale(metric.name, metric.dimension, border_values(values, metric.dimension))
+    return measured_scale(metric.name, metric.dimension, border_values(values, metric.dimension))
+
+
+def measured_scale(name: str, dimension: str, values: FloatArray) -> DrawnScale:
+    """Return a metric in border units as it is drawn: shares in per cent, as the page says them."""
+    if dimension == "ratio":
+        return DrawnScale(name, PERCENT, 100.0 * values)
+    return DrawnScale(name, dimension, values)
 
 
 def _place(path: str) -> str:
@@ -72,16 +95,16 @@ def _place(path: str) -> str:
     return re.sub(r"\.\d+", "[]", path)
 
 
-def _scale(item: Variable, shown: np.ndarray, name: str, about: str) -> DrawnScale:
-    if item.dimension != "text":
-        return DrawnScale(item.path, item.dimension, shown.astype(np.float64), short=name, about=about)
-    words = tuple(dict.fromkeys(map(str, item.shown)))
-    return DrawnScale(
-        item.path, item.dimension, np.array([float(words.index(str(one))) for one in shown]), words, name, about
-    )
+def _scale(kind: tuple[str, str], shown: Any, words: tuple[str, ...], told: tuple[str, str]) -> DrawnScale:
+    path, dimension = kind
+    name, about = told
+    if dimension != "text":
+        return DrawnScale(path, dimension, np.asarray(shown, dtype=np.float64), short=name, about=about)
+    return DrawnScale(path, dimension, np.array([float(words.index(str(one))) for one in shown]), words, name, about)
 
 
-def _shape(plan: Plan) -> tuple[int, ...]:
+def shape_of(plan: Plan) -> tuple[int, ...]:
+    """Return the numbers of values of the parameters of a grid; nothing where the points are no grid."""
     return () if plan.joint else tuple(len(item.values) for item in plan.variables)
 
 
@@ -91,12 +114,17 @@ def curves(records: Records, found: StudyMarks) -> tuple[list[StudyCurve], tuple
     labels = ("", "")
     for indices, rows in records.batches():
         for k, text in rows.curves.items():
-            table = _nominal(read_csv(text))
-            motion, effort = table.columns[1], table.columns[2]
-            labels = (motion.header.replace("_", " "), effort.header.replace("_", " "))
-            *panel, parameter = (float(one.values[int(indices[k])]) for one in found.varied)
-            lines.append(StudyCurve(parameter, _branches(table), *panel))
+            line, labels = study_curve(read_csv(text), found, int(indices[k]))
+            lines.append(line)
     return lines, labels
+
+
+def study_curve(curve: Table, found: StudyMarks, point: int) -> tuple[StudyCurve, tuple[str, str]]:
+    """Return the curve of one point of a study, with the labels of its axes."""
+    table = _nominal(curve)
+    motion, effort = (column.header.replace("_", " ") for column in table.columns[1:3])
+    *panel, parameter = (float(one.values[point]) for one in found.varied)
+    return StudyCurve(parameter, _branches(table), *panel), (motion, effort)
 
 
 def _nominal(table: Table) -> Table:

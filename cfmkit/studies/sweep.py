@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from cfmkit.errors import UsageError
 from cfmkit.families import family
@@ -135,7 +135,28 @@ def outputs(records: Records, summary: Summary, curves: bool = False) -> Iterato
     yield "results.csv", results_csv(records, summary.add)
     if curves:
         yield "curves.csv", curves_csv(records)
-    yield "metrics.json", json_bytes(summary.as_json(records))
+    yield "metrics.json", json_bytes(summary.as_json(records) | {"drawn": _drawn(records, summary)})
     resolve = family(study.spec.family).resolve
     resolved = resolve(study.spec) if resolve else study.spec
     yield "resolved.yaml", dump(resolved, complete=True).encode()
+
+
+def _drawn(records: Records, summary: Summary) -> dict[str, Any]:
+    """Return what the pictures of a sweep show: so they can be drawn again from its files, in a figure of several."""
+    study, plan = records.work.study, records.work.plan
+    shown = [study.metrics[column] for column in summary.shown]
+    return {
+        "varied": [
+            {
+                "path": one.path,
+                "dimension": one.dimension,
+                "words": [*map(str, one.shown)] if one.dimension == "text" else [],
+            }
+            for one in plan.variables
+        ],
+        "grid": [] if plan.joint else [len(one.values) for one in plan.variables],
+        "metrics": [
+            {"name": one.name, "column": one.label, "dimension": one.dimension, "words": list(one.words)}
+            for one in shown
+        ],
+    }

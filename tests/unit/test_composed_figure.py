@@ -8,9 +8,10 @@ import pytest
 
 import cfmkit
 from cfmkit.cli.main import main
-from cfmkit.errors import SpecError
+from cfmkit.errors import SpecError, UsageError
 from cfmkit.plots.composed import composed
 from cfmkit.plots.form import FigureForm
+from cfmkit.plots.formats import svg
 from cfmkit.plots.style import MM, size_mm
 from cfmkit.runs.composed_figure import panels, read
 from cfmkit.studies.batch_entries import files_below
@@ -59,6 +60,39 @@ def test_a_panel_may_be_the_folder_of_a_run(file, tmp_path):
     for panel, stem in ((loop, "loop"), (springs, "springs")):
         drawn, expected = panel.make().axes[0], direct[stem]().axes[0]
         assert np.array_equal(drawn.lines[0].get_xydata(), expected.lines[0].get_xydata())
+
+
+def test_the_folder_of_a_sweep_is_drawn_from_its_files_as_the_sweep_drew_it(file, tmp_path):
+    vary = ("mechanism.roller_radius=8 mm:12 mm:3", "mechanism.springs.stiffness=[0.5 N/mm, 0.7 N/mm]")
+    options = ("--metrics", "force_mean,force_ripple", "--curves", "-q", "--figures", "svg", "-j", "1")
+    swept = ["sweep", "configs/cam.yaml", "--vary", vary[0], "--vary", vary[1], "-o", str(tmp_path / "run"), *options]
+    assert main(swept) == 5
+    name = file("panels: [{run: run, plot: curves}, {run: run, plot: force_mean}, {run: run, plot: force_ripple}]")
+    for panel, stem in zip(panels(name, read(name), serial), ("curves", "force_mean", "force_ripple"), strict=True):
+        assert svg(panel.make()) == (tmp_path / "run" / "figures" / f"{stem}.svg").read_bytes()
+    (tmp_path / "run" / "results.csv").write_text("nothing\n")
+    with pytest.raises(SpecError, match="cannot be drawn from its files: run it again"):
+        panels(name, read(name), serial)
+
+
+def test_the_key_of_a_panel_stands_below_its_letter_and_inside_the_panel(file, tmp_path):
+    vary = ("--vary", "mechanism.roller_radius=8 mm:12 mm:3", "--vary", "mechanism.springs.count=[2, 4]")
+    run = str(tmp_path / "run")
+    assert main(["sweep", "configs/cam.yaml", *vary, "--metrics", "force_mean", "-q", "--no-plots", "-o", run]) == 0
+    name = file("panels: [{run: run, plot: force_mean}, {run: run, plot: force_mean}]")
+    figure = composed(panels(name, read(name), serial), 2, FigureForm(width=0.174))
+    for part in figure.subfigs:
+        letter, key = part.texts[0].get_window_extent(), part.legends[0].get_window_extent()
+        assert key.y1 < letter.y0
+        assert part.bbox.x0 < key.x0 < key.x1 <= part.bbox.x1
+        assert key.y0 > part.axes[0].get_window_extent().y1
+
+
+def test_panels_too_narrow_to_read_are_refused(file):
+    name = file("panels: [{run: a, plot: b}, {run: a, plot: b}]\nwidth: 84 mm")
+    asked = read(name)
+    with pytest.raises(UsageError, match="are 40 mm wide each, and one needs 50 mm; allowed are at most 1"):
+        composed([None, None], asked.columns, FigureForm(width=asked.width))
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections import defaultdict
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -27,13 +28,13 @@ from cfmkit.cli.page_blocks import (
 from cfmkit.errors import ExitCode, UsageError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Callable, Iterator, Mapping
+
+    from matplotlib.figure import Figure
 
     from cfmkit.cli.page_blocks import Block
     from cfmkit.cli.terminal import Terminal
-    from cfmkit.plots.form import FigureForm
     from cfmkit.specs.spec import Spec
-    from cfmkit.store.disk import Data
     from cfmkit.studies.sensitivity.findings import Findings, IndexLine
     from cfmkit.studies.sensitivity.tolerance import Yield
 
@@ -121,8 +122,9 @@ def run(options: SensitivityOptions, terminal: Terminal) -> Answer:
     """
     from cfmkit.cli import study_verbs
     from cfmkit.cli.run_answer import folder_of
+    from cfmkit.runs import study_page
     from cfmkit.studies.sensitivity.methods import carry_out
-    from cfmkit.studies.sensitivity.output import exit_code
+    from cfmkit.studies.sensitivity.output import exit_code, outputs
     from cfmkit.studies.sensitivity.setup import prepare
 
     start = study_verbs.now()
@@ -134,14 +136,22 @@ def run(options: SensitivityOptions, terminal: Terminal) -> Answer:
         for piece in found.evaluator.pieces:
             study_verbs.tracebacks(piece.records, terminal)
         kept: dict[str, bytes] = {}
-        for name, data in files(found, not options.no_plots, form):
+        for name, data in outputs(found):
             if options.report or (in_parquet and name == "results.csv"):
                 kept[name] = data = data if isinstance(data, bytes) else b"".join(map(bytes, data))
             place.folder.write(name, data)
         if in_parquet:
             place.folder.write("results.parquet", study_verbs.as_parquet(kept["results.csv"]))
+        makers = _pictures(found) if options.report or not options.no_plots else {}
+        drawn = {} if options.no_plots else {stem: form.draw(make) for stem, make in makers.items()}
+        for stem, figure in drawn.items():
+            for name, content in form.write(figure, stem):
+                place.folder.write(name, content)
         if options.report:
-            place.folder.write(*_report(found, kept, form, options, terminal))
+            command = shlex.join(["cfmkit", *terminal.arguments])
+            shown = form.for_page(makers, drawn)
+            page = study_page.page(found.setup.study.spec, found.setup.paths, kept, command, shown)
+            place.folder.write(study_page.NAME, page)
         made = study_verbs.Made("sensitivity", options.spec, setup.study.spec, setup.seed, found.evaluator.count)
         manifest = study_verbs.commit(place, made, terminal, exit_code(found))
         study_verbs.finish(place, [piece.records for piece in found.evaluator.pieces])
@@ -149,33 +159,11 @@ def run(options: SensitivityOptions, terminal: Terminal) -> Answer:
     return _answer(found, written, terminal.verbose > 0)
 
 
-def _report(
-    found: Findings, kept: dict[str, bytes], form: FigureForm, options: SensitivityOptions, terminal: Terminal
-) -> tuple[str, bytes]:
-    """Return name and content of the page of the study."""
-    import shlex
-
-    from cfmkit.plots.form import PLAIN
+def _pictures(found: Findings) -> Mapping[str, Callable[[], Figure]]:
+    """Return what draws the pictures of a study; nothing of one that was not finished."""
     from cfmkit.plots.sensitivity import figures
-    from cfmkit.runs import study_page
 
-    drawn = "png" in form.formats and form.on_screen
-    if not drawn and not options.no_plots and not found.interrupted:
-        kept = {name: data for name, data in kept.items() if not name.startswith("figures/")}
-        kept |= PLAIN.files(figures(found))
-    command = shlex.join(["cfmkit", *terminal.arguments])
-    return study_page.NAME, study_page.page(found.setup.study.spec, found.setup.paths, kept, command)
-
-
-def files(found: Findings, plots: bool, form: FigureForm) -> Iterator[tuple[str, Data]]:
-    """Yield every file of the study; the pictures last."""
-    from cfmkit.studies.sensitivity.output import outputs
-
-    yield from outputs(found)
-    if plots and not found.interrupted:
-        from cfmkit.plots.sensitivity import figures
-
-        yield from form.files(figures(found))
+    return {} if found.interrupted else figures(found)
 
 
 def spec_of(options: SensitivityOptions) -> Spec:

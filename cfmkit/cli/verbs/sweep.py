@@ -28,6 +28,8 @@ from cfmkit.errors import ExitCode, UsageError
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
+    from matplotlib.figure import Figure
+
     from cfmkit.cli.page_blocks import Block
     from cfmkit.cli.terminal import Terminal
     from cfmkit.studies.engine import Records
@@ -79,7 +81,6 @@ def run(options: SweepOptions, terminal: Terminal) -> Answer:
     """
     from cfmkit.cli import study_verbs
     from cfmkit.cli.run_answer import folder_of
-    from cfmkit.plots.form import PLAIN
     from cfmkit.runs.run import spec_of
     from cfmkit.studies.sweep import outputs, prepare, summary_of, writes_curves
 
@@ -99,19 +100,20 @@ def run(options: SweepOptions, terminal: Terminal) -> Answer:
             place.folder.write(name, data)
         if in_parquet:
             place.folder.write("results.parquet", study_verbs.as_parquet(kept["results.csv"]))
-        drawn = {} if options.no_plots else _pictures(records, summary)
-        for name, content in form.files(drawn):
-            place.folder.write(name, content)
-            kept[name] = content
-        if options.report and not (form.on_screen and "png" in form.formats):
-            kept = {name: data for name, data in kept.items() if not name.startswith("figures/")}
-            kept |= PLAIN.files(drawn)
+        makers = {} if options.no_plots and not options.report else _pictures(records, summary)
+        drawn: dict[str, Figure] = {}
+        for stem, make in makers.items() if not options.no_plots else ():
+            figure = form.draw(make)
+            drawn |= {stem: figure} if options.report else {}
+            for name, content in form.write(figure, stem):
+                place.folder.write(name, content)
         if options.report:
             from cfmkit.runs import study_page
 
             varied = [item.path for item in work.plan.variables]
             command = shlex.join(["cfmkit", *terminal.arguments])
-            place.folder.write(study_page.NAME, study_page.page(spec, varied, kept, command))
+            shown = form.for_page(makers, drawn)
+            place.folder.write(study_page.NAME, study_page.page(spec, varied, kept, command, shown))
         code = exit_code(records, summary)
         made = study_verbs.Made("sweep", options.spec, work.study.spec, options.seed, len(work.plan))
         manifest = study_verbs.commit(place, made, terminal, code)
@@ -147,7 +149,7 @@ def request(options: SweepOptions) -> SweepRequest:
         metrics=names(options.metrics),
         seed=options.seed,
         most=options.max_points,
-        pictures=not options.no_plots,
+        pictures=options.report or not options.no_plots,
     )
 
 
