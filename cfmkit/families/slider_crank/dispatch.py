@@ -43,13 +43,13 @@ def figures(result: Result) -> dict[str, Callable[[], Figure]]:
     """Return what draws each picture of a result of the family, by file stem; empty if nothing was solved."""
     if result.state is None or not result.curves:
         return {}
-    made: dict[str, Callable[[], Figure]] = _in_room(ROOMS[str(result.spec.fidelity)], "draw:figures")(result)
+    made: dict[str, Callable[[], Figure]] = _in_room(ROOMS[str(result.spec.fidelity)], "figures:figures")(result)
     return made
 
 
 def moving(result: Result) -> Moving | None:
     """Return the linkage or the part over its motion, for a film; None of a part solved as a solid."""
-    made: Moving | None = _in_room(ROOMS[str(result.spec.fidelity)], "draw:moving")(result)
+    made: Moving | None = _in_room(ROOMS[str(result.spec.fidelity)], "figures:moving")(result)
     return made
 
 
