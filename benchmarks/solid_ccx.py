@@ -54,7 +54,7 @@ def by_cfmkit(spec: cfmkit.Spec) -> list[float]:
         found.append(float(np.hypot(*supports.reactions(pose.unknowns, pose.travel, forces)[:, :2].T).max()))
         return b""
 
-    import cfmkit.solid.deck as decks
+    import cfmkit.solid.input_deck as decks
 
     own, decks.deck = decks.deck, noted
     try:

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
     from cfmkit.studies.batch_entries import Entry
-    from cfmkit.studies.changes import Change
+    from cfmkit.studies.metric_changes import Change
 
 PLACED = re.compile(r"(?P<file>.*?):(?P<line>\d+):(?P<col>\d+): (?P<told>.*)", re.DOTALL)
 """How the fault of a file begins."""

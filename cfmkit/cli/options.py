@@ -16,7 +16,7 @@ from cfmkit.cli import completion
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from cfmkit.plots.form import FigureForm
+    from cfmkit.plots.figure_options import FigureForm
 
 MOST = 2**63 - 1
 """The largest integer of an option: what a signed integer of 64 bits in files and generators holds."""
@@ -158,7 +158,7 @@ class Drawing(Common):
             If an option is malformed, or figures are both described and refused.
         """
         from cfmkit.errors import UsageError
-        from cfmkit.plots.form import form_of
+        from cfmkit.plots.figure_options import form_of
 
         said = {"--figures": self.figures, "--figure-width": self.figure_width, "--figure-style": self.figure_style}
         given = [name for name, value in said.items() if value is not None] + ["--no-titles"] * self.no_titles

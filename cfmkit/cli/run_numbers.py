@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from cfmkit import api
 from cfmkit.families import family
 from cfmkit.metrics import Window, known_metrics, left_of, split_name, window_of
-from cfmkit.specs.many_parts import OF_MANY_PARTS
+from cfmkit.specs.many_parts_metrics import OF_MANY_PARTS
 from cfmkit.specs.units import border_unit, format_short, to_border
 
 if TYPE_CHECKING:

@@ -127,7 +127,7 @@ def units_page() -> Answer:
 def metrics_page() -> Answer:
     """Return the metrics that every family has."""
     from cfmkit.metrics import definitions
-    from cfmkit.specs.many_parts import OF_MANY_PARTS
+    from cfmkit.specs.many_parts_metrics import OF_MANY_PARTS
     from cfmkit.specs.units import border_unit
 
     records = [
@@ -263,7 +263,7 @@ def found(name: str) -> Answer | None:
 
 def _symbols(name: str) -> list[Record]:
     """Return what a symbol such as ``theta2`` is in the drawings of the families; they are imported for it."""
-    from cfmkit.runs.scheme import scheme
+    from cfmkit.runs.dimension_drawing import scheme
 
     return [
         {"name": one.symbol, "family": record.name, "key": one.key, "meaning": one.meaning}
@@ -328,7 +328,7 @@ def _materials() -> Records:
 
 def _metrics() -> Records:
     from cfmkit.metrics import definitions
-    from cfmkit.specs.many_parts import OF_MANY_PARTS
+    from cfmkit.specs.many_parts_metrics import OF_MANY_PARTS
     from cfmkit.specs.units import border_unit
 
     known = [(one.name, border_unit(one.dimension), one.definition) for one in definitions(None)]

@@ -28,7 +28,7 @@ from cfmkit.experiment.low_pass import DEFAULT_ORDER, LowPass, low_passed
 from cfmkit.experiment.reading import read_recording
 from cfmkit.metrics import Frame, Window, measure
 from cfmkit.metrics.branch_views import span_text
-from cfmkit.numerics.robust import spikes
+from cfmkit.numerics.robust_statistics import spikes
 from cfmkit.results import Finding, Quantity
 from cfmkit.specs.units import format_short
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from cfmkit.experiment.comparison import model_at
 from cfmkit.plots.curves import CurveLook, plot_curve
-from cfmkit.plots.place import Label, place_labels
+from cfmkit.plots.label_placement import Label, place_labels
 from cfmkit.plots.style import GREY, LINES, axes_mm, new_figure, styled
 from cfmkit.plots.text import Heading, axis_label, write_heading
 from cfmkit.specs.units import to_border

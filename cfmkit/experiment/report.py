@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from cfmkit.curves import Curve
     from cfmkit.metrics import Frame, Window
-    from cfmkit.plots.form import FigureForm
+    from cfmkit.plots.figure_options import FigureForm
     from cfmkit.results import Finding
 
 
@@ -131,6 +131,6 @@ def files(report: MeasureReport, plots: bool = True, form: FigureForm | None = N
     yield "metrics.json", json_bytes(report.data)
     if plots:
         from cfmkit.experiment.figures import figures
-        from cfmkit.plots.form import PLAIN
+        from cfmkit.plots.figure_options import PLAIN
 
         yield from (form or PLAIN).files(figures(report.source, report.numbers))

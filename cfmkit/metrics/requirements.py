@@ -13,7 +13,7 @@ from cfmkit.metrics.branch_views import span_text
 from cfmkit.metrics.evaluation import Survey, Surveys, Value, kind_of, survey_of, window_of
 from cfmkit.metrics.metrics_json import finite_border
 from cfmkit.metrics.table import Definition, branch_fault, known_metrics, split_name, unknown_metric
-from cfmkit.specs.many_parts import OF_MANY_PARTS
+from cfmkit.specs.many_parts_metrics import OF_MANY_PARTS
 from cfmkit.specs.units import DIMENSIONS, SHARE, border_unit, format_short, read_one_of, to_border
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from cfmkit.numerics.robust import robust_scale
+from cfmkit.numerics.robust_statistics import robust_scale
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from cfmkit.numerics.least_squares import correlation_time
-from cfmkit.numerics.robust import robust_scale, tukey
+from cfmkit.numerics.robust_statistics import robust_scale, tukey
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -1,10 +1,10 @@
 """Pictures: data in, artists on an Axes out; one look for all families.
 
-`style` is the look, `place` writes names where nothing else is, `curves` and `loop`
-draw force over displacement, `bands` the requirements on it, `diagram` everything
+`style` is the look, `label_placement` finds room for names, `curves` and `loop_figure`
+draw force over displacement, `bands` the requirements on it, `line_diagram` everything
 else over a common axis, `parts` mechanical parts to scale, `figures` all that there is of a result.
 """
 
-from cfmkit.plots.home import find_room
+from cfmkit.plots.font_cache import find_room
 
 find_room()  # before any file of this package imports matplotlib, which reads where it may write

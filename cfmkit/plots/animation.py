@@ -1,6 +1,6 @@
 """The mechanism in motion beside its curve, as a GIF or a film for slides.
 
-The poses are those of the page (`cfmkit.plots.moving`), there and back. GIF needs nothing more; a film needs the
+The poses are those of the page (`cfmkit.plots.moving_svg`), there and back. GIF needs nothing more; a film needs the
 program ``ffmpeg``.
 """
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from cfmkit.plots.moving import Moving
+    from cfmkit.plots.moving_svg import Moving
     from cfmkit.results import Result
 
 KINDS = ("gif", "mp4")

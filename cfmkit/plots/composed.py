@@ -9,13 +9,13 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from cfmkit.errors import UsageError
-from cfmkit.plots.box_stretching import laid_out, noted
+from cfmkit.plots.figure_resizing import laid_out, noted
 from cfmkit.plots.style import MM, NORMAL, is_to_scale, size_mm, styled, with_settings
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from cfmkit.plots.form import FigureForm
+    from cfmkit.plots.figure_options import FigureForm
 
 GAP = 4.0
 """Between panels that stand beside each other [mm], about two letters."""

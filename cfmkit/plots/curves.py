@@ -15,8 +15,8 @@ import numpy as np
 
 from cfmkit.curves import Curve
 from cfmkit.plots.bands import Band, bands_of
-from cfmkit.plots.diagram import Limit, Region, level, padded, shade
-from cfmkit.plots.place import Label, place_labels
+from cfmkit.plots.label_placement import Label, place_labels
+from cfmkit.plots.line_diagram import Limit, Region, level, padded, shade
 from cfmkit.plots.style import BAND, LINES, TROUBLE, styled
 from cfmkit.plots.text import axis_label, finite_range, shown_range, value_text
 from cfmkit.results import Result

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.plots.curves import CurveLook, plot_curve
-from cfmkit.plots.diagram import padded
-from cfmkit.plots.place import Label, place_labels
+from cfmkit.plots.label_placement import Label, place_labels
+from cfmkit.plots.line_diagram import padded
 from cfmkit.plots.style import GREY, LINES, axes_mm, new_figure, styled
 from cfmkit.plots.text import axis_label, remark, shown_range, write_heading
 from cfmkit.specs.units import to_border

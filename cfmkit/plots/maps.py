@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from cfmkit.plots.marks import COLOURS, EMPTY, HATCH, HEAD, edges, head, key_of, star, ticks
 from cfmkit.plots.rounding import is_level, levelled
+from cfmkit.plots.study_marks import COLOURS, EMPTY, HATCH, HEAD, edges, head, key_of, star, ticks
 from cfmkit.plots.style import SMALL, axes_mm, new_figure, styled
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.plots.findings import DrawnScale, StudyMarks
+    from cfmkit.plots.study_data import DrawnScale, StudyMarks
 
 MOST_TICKS = 8
 """Values of a parameter that have a tick each: with more their numbers come close to each other (by eye)."""

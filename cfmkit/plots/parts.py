@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.plots.place import Label
+from cfmkit.plots.label_placement import Label
 from cfmkit.plots.style import GREY, INK, OCHRE, SMALL, VERMILLION, axes_mm, styled
 from cfmkit.specs.units import to_border
 

@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.colors import to_hex
 
-from cfmkit.plots.diagram import padded
+from cfmkit.plots.label_placement import Label, place_labels
+from cfmkit.plots.line_diagram import padded
 from cfmkit.plots.maps import draw_map
-from cfmkit.plots.marks import COLOURS, EMPTY, HATCH, HEAD, edges, head, key_of, star, ticks
-from cfmkit.plots.place import Label, place_labels
 from cfmkit.plots.rounding import is_level, levelled
+from cfmkit.plots.study_marks import COLOURS, EMPTY, HATCH, HEAD, edges, head, key_of, star, ticks
 from cfmkit.plots.style import BLUE, GREY, INK, LINES, SMALL, VERMILLION, axes_mm, new_figure, styled
 from cfmkit.plots.text import finite_range
 
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.plots.findings import DrawnScale, StudyCurve, StudyMarks
+    from cfmkit.plots.study_data import DrawnScale, StudyCurve, StudyMarks
 
 
 MOST_PANELS = 8

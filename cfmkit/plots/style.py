@@ -29,7 +29,7 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from cfmkit.plots.box_stretching import current
+from cfmkit.plots.figure_resizing import current
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

@@ -11,24 +11,24 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 from cfmkit.errors import CfmError, ExitCode, SpecError, UsageError, code_of, lines_of, visible
-from cfmkit.plots.form import PLAIN, FigureForm
+from cfmkit.plots.figure_options import PLAIN, FigureForm
 from cfmkit.results import Status
 from cfmkit.runs import batch_files
 from cfmkit.runs.run import Outcome, Request, Verb, analysed, designed, journal_of, long_run, spec_of
 from cfmkit.runs.run import carry_out as carried_out
 from cfmkit.runs.run_findings import worst
 from cfmkit.studies.batch_entries import LEFT, Entry
-from cfmkit.studies.changes import TOLERANCE, Comparison, earlier, gone
-from cfmkit.studies.changes import changes as changes_of
+from cfmkit.studies.metric_changes import TOLERANCE, Comparison, earlier, gone
+from cfmkit.studies.metric_changes import changes as changes_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
     from cfmkit.runs.run import Noting
     from cfmkit.specs.spec import Spec
-    from cfmkit.studies.changes import Known
     from cfmkit.studies.executors import Executor, Lost
     from cfmkit.studies.finished_runs import KeptRuns
+    from cfmkit.studies.metric_changes import Known
     from cfmkit.tables import Table
 
 
@@ -114,7 +114,7 @@ def _natural(spec: Spec) -> str:
 def _data_of(spec: Spec) -> tuple[tuple[str, str | None], ...]:
     """Return the data files that a specification names, and the hashes of their content."""
     from cfmkit.store import file_hash
-    from cfmkit.tables.source import named_in
+    from cfmkit.tables.data_files import named_in
 
     return tuple((str(source), file_hash(source.path.resolve())) for source in named_in(spec.model_dump()))
 

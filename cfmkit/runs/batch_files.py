@@ -6,14 +6,14 @@ import shlex
 from typing import TYPE_CHECKING, Any
 
 from cfmkit.errors import ExitCode
-from cfmkit.studies.changes import changes_table
+from cfmkit.studies.metric_changes import changes_table
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from cfmkit.store import RunFolder
     from cfmkit.studies.batch_entries import Entry
-    from cfmkit.studies.changes import Comparison
+    from cfmkit.studies.metric_changes import Comparison
 
 
 def about(arguments: Sequence[str], seed: int, named: Sequence[str], code: ExitCode) -> dict[str, Any]:

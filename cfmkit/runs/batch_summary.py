@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from cfmkit.studies.batch_entries import Entry
-    from cfmkit.studies.changes import Comparison
+    from cfmkit.studies.metric_changes import Comparison
 
 MOST_CHANGES = 50
 """Changed values that are listed; all stand in changes.csv."""

@@ -125,7 +125,7 @@ def copy(name: str, out: str | os.PathLike[str] = ".", schema: bool = False) -> 
     from cfmkit import api
     from cfmkit.store.disk import discard, make_folders, reporting, write_new
     from cfmkit.studies.batch_entries import is_figure
-    from cfmkit.tables.source import named_in
+    from cfmkit.tables.data_files import named_in
 
     chosen = example(name)
     target = Path(out) / chosen.path.name

@@ -138,7 +138,7 @@ class Explorer:
         """Return the mechanism in the middle of its travel as SVG; empty where its family draws none."""
         from cfmkit.families import family
         from cfmkit.plots.figures import moving_of
-        from cfmkit.plots.moving import still
+        from cfmkit.plots.moving_svg import still
 
         try:
             result = api.analyze(self.spec(changes))

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 from cfmkit import api
 from cfmkit.errors import SolutionError
 from cfmkit.families import family
+from cfmkit.plots.figure_options import PLAIN, FigureForm
 from cfmkit.plots.figures import moving_of
-from cfmkit.plots.form import PLAIN, FigureForm
 from cfmkit.tables.jsontext import json_bytes
 
 if TYPE_CHECKING:
@@ -86,7 +86,7 @@ def files(
 
 def sources(spec: Spec) -> Iterator[tuple[str, bytes]]:
     """Yield the data files that a specification names, under the same names: resolved.yaml names them, too."""
-    from cfmkit.tables.source import named_in
+    from cfmkit.tables.data_files import named_in
 
     for source in named_in(spec.model_dump()):
         yield str(source), source.path.read_bytes()
@@ -113,7 +113,7 @@ def geometry(drawing: Drawing) -> Iterator[tuple[str, bytes]]:
 
 
 def _drawn(drawing: Drawing, spec: Spec) -> Figure:
-    from cfmkit.plots.drawing import drawing_figure
+    from cfmkit.plots.workshop_drawing import drawing_figure
 
     return drawing_figure(drawing, spec.name or f"a {spec.family} mechanism", stated_tolerances(spec))
 

@@ -62,7 +62,7 @@ class Analysis(Result):
     def _picture(self) -> str:
         """Return the first figure as SVG; nothing where there is none."""
         from cfmkit.plots.figures import figures
-        from cfmkit.plots.formats import inline, svg
+        from cfmkit.plots.vector_formats import inline, svg
 
         name, draw = next(iter(figures(family(self.spec.family), self).items()), ("", None))
         return "" if draw is None else inline(svg(draw()), name)

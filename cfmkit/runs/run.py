@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 from cfmkit import api
 from cfmkit.errors import SpecError, UsageError
 from cfmkit.families.base import Run
-from cfmkit.plots.form import PLAIN, FigureForm
+from cfmkit.plots.figure_options import PLAIN, FigureForm
 from cfmkit.results import Status
 from cfmkit.runs import run_findings
 from cfmkit.runs.files import files
@@ -240,7 +240,7 @@ def _of_many_parts(found: Report, given: Spec, run: Run) -> Report:
     """Return a report with what is known of many parts of its design, and what to do at the bench with one."""
     if found.result.status is not Status.COMPLETE:
         return found
-    from cfmkit.studies.bench import bench
+    from cfmkit.studies.bench_note import bench
 
     found = _with_yield(found, given, run)
     told = bench(found.result, run)

@@ -60,7 +60,7 @@ def page(report: Report, drawn: Mapping[str, Figure], command: str = "") -> byte
     command : str
         How the run was started, for whoever wants to repeat it.
     """
-    from cfmkit.plots.formats import inline, svg
+    from cfmkit.plots.vector_formats import inline, svg
 
     result = report.result
     record = family(result.spec.family)
@@ -163,7 +163,7 @@ def _film(result: Result, drawn: Mapping[str, Figure], figures: dict[str, str]) 
     moving = moving_of(family(result.spec.family), result)
     if moving is None or not drawn:
         return None
-    from cfmkit.plots.moving import film
+    from cfmkit.plots.moving_svg import film
 
     name = next(iter(drawn))
     spots = list(_cursors(drawn[name], to_border(moving.motion, result.curve.motion_dimension)))

@@ -109,7 +109,7 @@ def standard_input() -> bytes:
     cfmkit.errors.UsageError
         If nothing can come in.
     """
-    from cfmkit.specs.yamlio.source import LARGEST
+    from cfmkit.specs.yamlio.source_text import LARGEST
 
     if sys.stdin is None:
         raise UsageError("standard input is closed; name a file")
@@ -124,7 +124,7 @@ def content(name: str) -> bytes:
     cfmkit.errors.UsageError
         In one sentence, if it is not there, a folder or not readable.
     """
-    from cfmkit.specs.yamlio.source import LARGEST
+    from cfmkit.specs.yamlio.source_text import LARGEST
 
     if not name or "\0" in name:
         raise UsageError(f"{name!r} is not the name of a file")
@@ -217,7 +217,7 @@ def _sensitivity_faults(document: Document, spec: Spec) -> Iterator[Problem]:
 
 def _design_faults(document: Document, spec: Spec) -> Iterator[Problem]:
     """Yield what is wrong with the tolerances of the block `design`, each with its place in the file."""
-    from cfmkit.specs.many_parts import OF_MANY_PARTS
+    from cfmkit.specs.many_parts_metrics import OF_MANY_PARTS
     from cfmkit.specs.spec import DesignKeys
 
     design = getattr(spec, "design", None)  # a family need not have this block, nor another package's these keys

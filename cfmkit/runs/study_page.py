@@ -65,7 +65,7 @@ def page(
     drawn : mapping of str to Figure
         The pictures of the study, by their names.
     """
-    from cfmkit.plots.formats import inline, svg
+    from cfmkit.plots.vector_formats import inline, svg
 
     summary = json.loads(files["metrics.json"])
     head, *points = csv.reader(io.StringIO(files["results.csv"].decode()))

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.solid.law import Law
     from cfmkit.solid.mesh import Mesh
+    from cfmkit.solid.plane_stress_law import Law
 
 # Three points inside [Strang, Fix, 1973]: exact to degree two, which is that of the strain energy of a straight-sided
 # element where strains are small.

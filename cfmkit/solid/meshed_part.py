@@ -11,10 +11,10 @@ import numpy as np
 from cfmkit.arrays import FloatArray, read_only
 from cfmkit.errors import GeometryError
 from cfmkit.solid.boundary import Ring
-from cfmkit.solid.course import follow
 from cfmkit.solid.elements import Elements
 from cfmkit.solid.equilibrium import Problem
 from cfmkit.solid.mesh import mesh
+from cfmkit.solid.path_following import follow
 from cfmkit.solid.rigid_groups import Group, Supports, within
 
 if TYPE_CHECKING:
@@ -23,9 +23,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cfmkit.export.contours import Contour
-    from cfmkit.solid.course import Course
-    from cfmkit.solid.law import Law
     from cfmkit.solid.mesh import Mesh
+    from cfmkit.solid.path_following import Course
+    from cfmkit.solid.plane_stress_law import Law
 
 ACROSS, SHARE = 2.5, 0.2
 """Elements across the thinnest place, and side of an element on a fillet in radii, of the finer mesh: the force of

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model, field_validator, model_validator
 
-from cfmkit.specs.many_parts import OF_MANY_PARTS
+from cfmkit.specs.many_parts_metrics import OF_MANY_PARTS
 from cfmkit.specs.units import (
     DIMENSIONS,
     SHARE,

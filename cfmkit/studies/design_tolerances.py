@@ -12,8 +12,8 @@ import numpy as np
 
 from cfmkit.errors import SpecError
 from cfmkit.specs.spec import Sensitivity
+from cfmkit.studies.sensitivity.distributions import draw, values_at
 from cfmkit.studies.sensitivity.parameters import correlations, groups, parameters_of
-from cfmkit.studies.sensitivity.spreads import draw, values_at
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

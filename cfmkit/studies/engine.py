@@ -13,11 +13,11 @@ import numpy as np
 
 from cfmkit.errors import OutputError, UsageError
 from cfmkit.families import family
-from cfmkit.studies.blocks import BLOCK, evaluate_block, vectorised
 from cfmkit.studies.executors import Lost, serial
 from cfmkit.studies.journal import INSIDE, MOST_TOGETHER, Memory, line_of
 from cfmkit.studies.rows import ResultRows, cut, gathered, joined, recalled, recalled_row, record
 from cfmkit.studies.study import Row
+from cfmkit.studies.vectorised_blocks import BLOCK, evaluate_block, vectorised
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.errors import UsageError, visible
-from cfmkit.plots.findings import DrawnScale, StudyMarks
 from cfmkit.plots.study import figures
+from cfmkit.plots.study_data import DrawnScale, StudyMarks
 from cfmkit.results import Status
 from cfmkit.studies.pictures import best_words, measured_scale, scales, study_curve
 from cfmkit.tables import Table, TableColumn, read_csv
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.plots.findings import StudyCurve
+    from cfmkit.plots.study_data import StudyCurve
     from cfmkit.specs.spec import Spec
     from cfmkit.tables import Cell
 

@@ -21,7 +21,7 @@ from cfmkit.families import family
 from cfmkit.metrics import split_name
 from cfmkit.metrics.requirements import Bounds
 from cfmkit.results import Quantity, Result
-from cfmkit.specs.many_parts import OF_MANY_PARTS
+from cfmkit.specs.many_parts_metrics import OF_MANY_PARTS
 from cfmkit.specs.spec import DesignKeys
 from cfmkit.studies.design_tolerances import Tolerances, tolerances_of
 from cfmkit.studies.engine import Silent, Work

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.plots.findings import PERCENT, DrawnScale, StudyCurve, StudyMarks, short_names
 from cfmkit.plots.study import figures
+from cfmkit.plots.study_data import PERCENT, DrawnScale, StudyCurve, StudyMarks, short_names
 from cfmkit.specs.keys import keys
 from cfmkit.tables import Table, TableColumn, border_values, read_csv
 

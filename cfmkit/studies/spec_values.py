@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, Literal
 from cfmkit.errors import QuantityError
 from cfmkit.specs.units import BareFloat, Quantity, place_of
 from cfmkit.specs.units.fields import described
-from cfmkit.specs.yamlio.explain import not_among
-from cfmkit.specs.yamlio.shape import Slot, expected, required
+from cfmkit.specs.yamlio.allowed_keys import Slot, expected, required
+from cfmkit.specs.yamlio.explain_errors import not_among
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -24,7 +24,7 @@ from cfmkit.metrics import check, evaluate, gaps, values_of_family, window_of, w
 from cfmkit.results import Result, Status
 from cfmkit.specs.units import to_border
 from cfmkit.store import file_hash, origin, stable_hash
-from cfmkit.tables.source import named_in
+from cfmkit.tables.data_files import named_in
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

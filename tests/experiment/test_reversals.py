@@ -12,7 +12,7 @@ import cfmkit
 from cfmkit.experiment.evaluation import LEFT_OUT, measured, numbers_of
 from cfmkit.experiment.reading import Recording
 from cfmkit.metrics import Window
-from cfmkit.numerics.robust import spikes
+from cfmkit.numerics.robust_statistics import spikes
 
 
 def ripples(numbers, gap=1.0):

@@ -17,7 +17,7 @@ from cfmkit.cli.main import main
 from cfmkit.errors import ExitCode, UsageError
 from cfmkit.runs.batch_summary import summary
 from cfmkit.studies.batch_entries import Entry
-from cfmkit.studies.changes import Earlier, changes
+from cfmkit.studies.metric_changes import Earlier, changes
 
 ROOT = Path(__file__).parents[2]
 SPEC = (ROOT / "configs" / "vcfm_ding2022.yaml").read_text()

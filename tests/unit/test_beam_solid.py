@@ -124,7 +124,8 @@ def test_a_part_is_pulled_as_well_as_pressed(tmp_path):
 def test_a_drive_that_nothing_follows_has_no_curve_and_names_the_keys(monkeypatch, tmp_path):
     path = tmp_path / "vee.yaml"
     path.write_text(VEE, encoding="utf-8")
-    monkeypatch.setattr("cfmkit.solid.course.advanced", lambda *_: None)  # no pose beside the first is ever found
+    # no pose beside the first is ever found
+    monkeypatch.setattr("cfmkit.solid.path_following.advanced", lambda *_: None)
     result = cfmkit.analyze(cfmkit.load(path))
     assert result.status is Status.NO_EQUILIBRIUM
     assert "mechanism.nodes.shuttle.support" in result.message

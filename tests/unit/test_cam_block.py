@@ -8,8 +8,7 @@ from cfmkit.families.base import Block, Measure
 from cfmkit.families.cam.many_designs.measures import CYCLES, KNOWN, WINDOWED
 from cfmkit.families.cam.many_designs.model import VARIED, analyze_block
 from cfmkit.results import Status
-from cfmkit.studies import blocks
-from cfmkit.studies.blocks import evaluate_block, vectorised
+from cfmkit.studies import vectorised_blocks
 from cfmkit.studies.engine import Work, run
 from cfmkit.studies.executors import Lost
 from cfmkit.studies.journal import Journal
@@ -18,6 +17,7 @@ from cfmkit.studies.plan import Draw, sampled
 from cfmkit.studies.rows import joined
 from cfmkit.studies.study import Study
 from cfmkit.studies.variation import axes, wishes
+from cfmkit.studies.vectorised_blocks import evaluate_block, vectorised
 
 SPEC = cfmkit.load("configs/cam.yaml").replace({"analysis.points": 61})
 BRANCHED = sorted(WINDOWED - set(CYCLES))
@@ -299,7 +299,7 @@ def test_every_metric_of_one_cut_cam_with_other_parts_is_that_of_each(changes, r
     metrics = metrics_of(spec, (), cfmkit.analyze(spec).curve)
     many = Work(Study(spec, plan.paths, metrics), plan)
     assert many.vectorised
-    answer = blocks._answer(many.study, plan, 0, 16)
+    answer = vectorised_blocks._answer(many.study, plan, 0, 16)
     assert answer.done.mean() > 0.8
     together = run(many)
     for k in np.flatnonzero(answer.done).tolist():

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from cfmkit.errors import FolderInUse
-from cfmkit.runs.remains import remains_below, remains_in, remove
+from cfmkit.runs.cleaning import remains_below, remains_in, remove
 from cfmkit.store import RunFolder
 from cfmkit.store.names import JOURNAL
 from cfmkit.studies.journal import Journal

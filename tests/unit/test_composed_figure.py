@@ -10,9 +10,9 @@ import cfmkit
 from cfmkit.cli.main import main
 from cfmkit.errors import SpecError, UsageError
 from cfmkit.plots.composed import composed
-from cfmkit.plots.form import FigureForm
-from cfmkit.plots.formats import svg
+from cfmkit.plots.figure_options import FigureForm
 from cfmkit.plots.style import MM, size_mm
+from cfmkit.plots.vector_formats import svg
 from cfmkit.runs.composed_figure import panels, read
 from cfmkit.studies.batch_entries import files_below
 from cfmkit.studies.executors import serial

@@ -9,7 +9,7 @@ import cfmkit
 from cfmkit import api
 from cfmkit.errors import UsageError
 from cfmkit.plots import style
-from cfmkit.plots.form import PLAIN, FigureForm, form_of
+from cfmkit.plots.figure_options import PLAIN, FigureForm, form_of
 from cfmkit.plots.parts import to_scale
 from cfmkit.plots.text import Heading, write_heading
 
@@ -60,7 +60,7 @@ def test_without_titles_the_heading_and_its_room_are_gone():
 
 
 def style_heading():
-    from cfmkit.plots.box_stretching import HEADING
+    from cfmkit.plots.figure_resizing import HEADING
 
     return HEADING
 

@@ -8,7 +8,7 @@ from plot_support import axes, data_lines, loop_curve
 
 from cfmkit.curves import Curve
 from cfmkit.plots.curves import CurveLook, plot_curve
-from cfmkit.plots.diagram import Limit, Region
+from cfmkit.plots.line_diagram import Limit, Region
 from cfmkit.plots.style import png
 
 

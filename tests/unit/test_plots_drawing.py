@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import cfmkit
-from cfmkit.plots.drawing import SCALES, drawing_figure, holes
+from cfmkit.plots.workshop_drawing import SCALES, drawing_figure, holes
 from cfmkit.runs.files import files, part_of
 from cfmkit.runs.run_findings import report_on
 from cfmkit.specs.units import format_short

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import cfmkit
-from cfmkit.plots.findings import DrawnScale, StudyCurve, StudyMarks
 from cfmkit.plots.study import figures
+from cfmkit.plots.study_data import DrawnScale, StudyCurve, StudyMarks
 from cfmkit.plots.style import png
 from cfmkit.studies.engine import run
 from cfmkit.studies.pictures import _nominal, findings

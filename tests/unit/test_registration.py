@@ -7,7 +7,7 @@ import pytest
 from flanks import Errors, flanks, measured, parameters, profile
 
 from cfmkit.numerics.registration import feet, gaps_across, register, registered_where_it_is, turned
-from cfmkit.numerics.robust import neighbour_noise
+from cfmkit.numerics.robust_statistics import neighbour_noise
 from cfmkit.numerics.smoothing import smoothed
 
 ANGLE, SHIFT = -0.3, (-1.49579067, 0.80784298)

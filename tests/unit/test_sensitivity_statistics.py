@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from cfmkit.studies.sensitivity import intervals, local, morris, oat, sobol, spreads, tolerance
-from cfmkit.studies.sensitivity.spreads import ParameterSpread
+from cfmkit.studies.sensitivity import distributions, intervals, local, morris, oat, sobol, tolerance
+from cfmkit.studies.sensitivity.distributions import ParameterSpread
 
 RANGE = {"kind": "uniform", "nominal": 0.0}
 
@@ -162,7 +162,7 @@ def normal(deviation, nominal=0.0, low=-np.inf, high=np.inf):
 
 
 def made(tolerances, matrix, count=40_000, seed=0, groups=()):
-    unit = spreads.draw(matrix, count, np.random.default_rng(seed))
+    unit = distributions.draw(matrix, count, np.random.default_rng(seed))
     return tolerance.sample(unit, tolerances, groups)
 
 
@@ -178,22 +178,22 @@ def test_the_yield_of_a_normal_tolerance_is_that_of_the_normal_distribution():
 
 @pytest.mark.parametrize("correlation", [-0.6, 0.0, 0.5, 1.0])
 def test_the_sum_of_correlated_springs_scatters_as_theory_says(correlation):
-    matrix = spreads.correlation_matrix(2, [((0, 1), correlation)])
+    matrix = distributions.correlation_matrix(2, [((0, 1), correlation)])
     total = made([normal(1.0), normal(1.0)], matrix)[:, 0].sum(axis=1)
     assert total.std() == pytest.approx(sqrt(2 + 2 * correlation), rel=0.02)
 
 
 def test_correlation_leaves_each_distribution_as_it_is():
     spread = ParameterSpread("uniform", 0.0, -1.0, 1.0)
-    points = made([spread, spread], spreads.correlation_matrix(2, [((0, 1), 0.9)]))[:, 0]
+    points = made([spread, spread], distributions.correlation_matrix(2, [((0, 1), 0.9)]))[:, 0]
     # The rank correlation of a Gaussian copula is 6/pi asin(r/2); for uniform parameters it is their own.
     assert np.corrcoef(points.T)[0, 1] == pytest.approx(6 / pi * np.arcsin(0.45), abs=0.01)
     assert points.std(axis=0) == pytest.approx([1 / sqrt(3)] * 2, rel=0.02)
 
 
 def test_correlations_that_cannot_be_are_refused():
-    with pytest.raises(spreads.Incompatible, match="oppose"):
-        spreads.correlation_matrix(3, [((0, 1, 2), -0.9)])
+    with pytest.raises(distributions.Incompatible, match="oppose"):
+        distributions.correlation_matrix(3, [((0, 1, 2), -0.9)])
 
 
 def test_a_truncated_normal_distribution_keeps_its_ends_and_its_shape():

@@ -10,14 +10,14 @@ import cfmkit
 from cfmkit import api
 from cfmkit.families.base import Block, Measure
 from cfmkit.families.slider_crank.springs.many_designs.model import analyze_block
-from cfmkit.plots.findings import DrawnScale, StudyMarks
 from cfmkit.plots.study import draw_map, draw_metric
+from cfmkit.plots.study_data import DrawnScale, StudyMarks
 from cfmkit.plots.style import png
-from cfmkit.studies.blocks import evaluate_block, measures
 from cfmkit.studies.noted_metrics import metrics_of
 from cfmkit.studies.plan import grid, zipped
 from cfmkit.studies.study import Study
 from cfmkit.studies.variation import axes, wishes
+from cfmkit.studies.vectorised_blocks import evaluate_block, measures
 
 NAMES = {
     "li2019": (

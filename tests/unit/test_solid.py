@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 
 from cfmkit.errors import GeometryError
 from cfmkit.solid.boundary import Ring
-from cfmkit.solid.course import Course, Ending, follow
 from cfmkit.solid.elements import Elements, equivalent
 from cfmkit.solid.equilibrium import Problem
-from cfmkit.solid.law import NeoHookean, SaintVenantKirchhoff
 from cfmkit.solid.mesh import Mesh, mesh
+from cfmkit.solid.path_following import Course, Ending, follow
+from cfmkit.solid.plane_stress_law import NeoHookean, SaintVenantKirchhoff
 from cfmkit.solid.rigid_groups import Group, Supports
 
 E, NU = 2e9, 0.35

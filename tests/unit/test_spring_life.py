@@ -10,8 +10,8 @@ from pydantic import ValidationError
 
 import cfmkit
 from cfmkit.errors import SpecError
+from cfmkit.stock.springs.helical import Wound
 from cfmkit.stock.springs.spec import CatalogueSpring
-from cfmkit.stock.springs.wound import Wound
 
 WIRE = {"wire": "1.25 mm", "coil": "12.5 mm", "turns": 40}
 RATE = Wound("extension", 1.25e-3, 12.5e-3, 40.0).rate

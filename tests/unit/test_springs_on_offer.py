@@ -17,9 +17,9 @@ from cfmkit.families import family
 from cfmkit.families.base import Run
 from cfmkit.families.slider_crank.springs.assembly import assemble
 from cfmkit.stock.springs.catalogue import Miss, generic, nearest
+from cfmkit.stock.springs.helical import Wound
 from cfmkit.stock.springs.spec import CatalogueSpring, offers
-from cfmkit.stock.springs.wound import Wound
-from cfmkit.tables.source import DataSource
+from cfmkit.tables.data_files import DataSource
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 WANTED = {"force": "50 N", "stroke": "200 mm", "choose": "catalogue"}

@@ -195,7 +195,7 @@ def test_the_warnings_of_a_block_are_those_of_its_model_and_of_single_analyses(m
         return dataclasses.replace(found, warnings=(Finding("odd", "no matter"), Finding("odd", "again")))
 
     fake = dataclasses.replace(record, models={"quasi-static": single}, analyze_block=block)
-    monkeypatch.setattr("cfmkit.studies.blocks.family", lambda _name: fake)
+    monkeypatch.setattr("cfmkit.studies.vectorised_blocks.family", lambda _name: fake)
     monkeypatch.setattr("cfmkit.studies.study.family", lambda _name: fake)
     some = work("mechanism.profile.friction=[0, 0.001, 0.002, 0.003]", names=("theoretical_force",))
     expected = [None, "undercut", "high_pressure_angle; undercut", "odd"]
@@ -262,7 +262,7 @@ def test_warnings_that_a_block_model_does_not_know_are_not_told_as_none(monkeypa
         return dataclasses.replace(family("cam").analyze(spec, run), warnings=())
 
     fake = dataclasses.replace(family("cam"), models={"quasi-static": single}, analyze_block=block)
-    monkeypatch.setattr("cfmkit.studies.blocks.family", lambda _name: fake)
+    monkeypatch.setattr("cfmkit.studies.vectorised_blocks.family", lambda _name: fake)
     monkeypatch.setattr("cfmkit.studies.study.family", lambda _name: fake)
     assert warnings(run(work(FRICTION, names=("theoretical_force",)))) == ["not_judged", None]
 

@@ -16,8 +16,8 @@ from cfmkit.families.beam.propose import kept_shapes
 from cfmkit.runs.suggestions import exit_code
 from cfmkit.runs.wish_file import wish_of
 from cfmkit.stock.springs.catalogue import SHEAR_SHARE
-from cfmkit.stock.springs.to_measure import extension_spring, loaded_length
-from cfmkit.stock.springs.wound import tensile_strength
+from cfmkit.stock.springs.helical import tensile_strength
+from cfmkit.stock.springs.made_to_measure import extension_spring, loaded_length
 from cfmkit.studies.suggest.proposal import Job, made
 from cfmkit.studies.suggest.search import ordered, suggest
 

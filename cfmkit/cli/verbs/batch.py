@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from cfmkit.cli.terminal import Terminal
     from cfmkit.runs.batch import BatchResult
     from cfmkit.studies.batch_entries import Entry
-    from cfmkit.studies.changes import Comparison
+    from cfmkit.studies.metric_changes import Comparison
 
 PLACE = 26
 EXAMPLE = "cfmkit batch 'specs/*.yaml' --junit results.xml"

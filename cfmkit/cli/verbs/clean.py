@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from cfmkit.cli.page_blocks import TextLine
     from cfmkit.cli.terminal import Terminal
-    from cfmkit.runs.remains import Remains
+    from cfmkit.runs.cleaning import Remains
 
 PLACE = 80
 EXAMPLE = "cfmkit clean cfm-out"
@@ -36,7 +36,7 @@ def run(options: CleanOptions, terminal: Terminal) -> Answer:
 
     Only what a manifest or a journal proves to be theirs goes: files that were edited, and all others, stay.
     """
-    from cfmkit.runs.remains import remains_below
+    from cfmkit.runs.cleaning import remains_below
 
     _refuse_what_is_no_folder(options.folder)
     found = list(remains_below(options.folder))
@@ -84,7 +84,7 @@ def _agreed(found: Sequence[Remains], terminal: Terminal) -> bool:
 
 def _removed(found: Sequence[Remains], top: str) -> tuple[list[Remains], list[FolderInUse]]:
     """Remove what was found, innermost folders first; return what has gone, and where live runs are at work."""
-    from cfmkit.runs.remains import remove
+    from cfmkit.runs.cleaning import remove
 
     gone, busy = [], []
     for one in sorted(found, key=lambda one: len(one.folder.parts), reverse=True):
@@ -108,7 +108,7 @@ def _message(found: Sequence[Remains], removed: Sequence[Remains]) -> str:
 
 
 def _lines(found: Sequence[Remains], everything: bool) -> Iterator[TextLine]:
-    from cfmkit.runs.remains import EDITED
+    from cfmkit.runs.cleaning import EDITED
     from cfmkit.store.disk import shown
 
     for one in found:

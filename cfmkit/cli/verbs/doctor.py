@@ -106,7 +106,7 @@ def _solver() -> Record:
 
 def _fonts() -> Record:
     """Return the font of all figures and where it is: it comes with matplotlib, and another one changes their bytes."""
-    from cfmkit.plots.home import font_of_figures
+    from cfmkit.plots.font_cache import font_of_figures
 
     name, path = font_of_figures()
     return {"name": name, "path": path}
@@ -115,7 +115,7 @@ def _fonts() -> Record:
 def _caches() -> Iterator[Record]:
     """Yield what cfmkit and its libraries keep between runs: everything there can be deleted and is made again."""
     from cfmkit.elastica.kernels.kept import folders
-    from cfmkit.plots.home import kept_lists
+    from cfmkit.plots.font_cache import kept_lists
 
     for what, path in {"compiled solver": next(iter(folders())), "list of fonts": kept_lists()}.items():
         files = [one for one in Path(path).glob("*") if one.is_file()] if Path(path).is_dir() else []

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 from cfmkit.elastica.kernels.machine import Code, linked, processor
 from cfmkit.store.identity import installed
-from cfmkit.store.private import place, private_folder, trusted
+from cfmkit.store.private_folder import place, private_folder, trusted
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -17,10 +17,10 @@ from cfmkit.families.beam.surface_following import ride
 from cfmkit.plots import parts
 from cfmkit.plots.bands import limits_on
 from cfmkit.plots.curves import CurveLook
-from cfmkit.plots.diagram import Diagram, Limit, Region, Scale, Series, diagram_figure
-from cfmkit.plots.loop import loop_figure
-from cfmkit.plots.moving import Moving, chosen
-from cfmkit.plots.place import place_labels
+from cfmkit.plots.label_placement import place_labels
+from cfmkit.plots.line_diagram import Diagram, Limit, Region, Scale, Series, diagram_figure
+from cfmkit.plots.loop_figure import loop_figure
+from cfmkit.plots.moving_svg import Moving, chosen
 from cfmkit.plots.rounding import vanishing
 from cfmkit.plots.stress_map import StressView, stress_map_figure
 from cfmkit.plots.style import BLUE, GREY, INK, LINES, TROUBLE, VERMILLION, axes_mm, new_figure, styled
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from cfmkit.elastica import Path
     from cfmkit.families.beam.solid import SolidSolution
     from cfmkit.families.beam.solution import Solution
-    from cfmkit.plots.place import Label
+    from cfmkit.plots.label_placement import Label
     from cfmkit.results import Result
 
 

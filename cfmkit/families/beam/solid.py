@@ -132,8 +132,8 @@ def analyze(spec: BeamSpec, run: Run) -> Result:
     Result
         PARTIAL if the path ends before the travel, NO_EQUILIBRIUM if there is no first pose.
     """
-    from cfmkit.solid.course import Ending
     from cfmkit.solid.meshed_part import ACROSS, COARSER
+    from cfmkit.solid.path_following import Ending
 
     assembly = assemble(spec)
     size = spec.analysis.solid.mesh or _thinnest(assembly) / ACROSS
@@ -174,8 +174,8 @@ def analyze(spec: BeamSpec, run: Run) -> Result:
 
 def part_of(spec: BeamSpec, assembly: Assembly) -> Part:
     """Return the part as it is solved: its outline, with what is held and driven."""
-    from cfmkit.solid.law import LAWS
     from cfmkit.solid.meshed_part import Part, Place, rings_of
+    from cfmkit.solid.plane_stress_law import LAWS
 
     cut = [contour for contour in drawing(spec).contours if contour.layer == "cut"]
     beam = next(iter(spec.mechanism.beams.values()))
@@ -187,7 +187,7 @@ def part_of(spec: BeamSpec, assembly: Assembly) -> Part:
 
 def decks(spec: BeamSpec) -> dict[str, bytes]:
     """Return the part as an input deck of a finite-element solver, by file name."""
-    from cfmkit.solid.deck import deck
+    from cfmkit.solid.input_deck import deck
     from cfmkit.solid.meshed_part import ACROSS
 
     spec = spec.replace({"analysis.fidelity": "solid"})

@@ -20,7 +20,7 @@ from cfmkit.specs.spec import Analysis, DesignBlock, Displacement, Model, SolidA
 from cfmkit.specs.units import DIMENSIONS, Factor, Force, Length, Ratio, Torque
 from cfmkit.specs.units.fields import LARGEST
 from cfmkit.stock.spec import sheet_faults
-from cfmkit.tables.source import DataSource
+from cfmkit.tables.data_files import DataSource
 
 Fidelity = Literal["inextensible", "extensible", "reissner", "solid"]
 _EXTENT = {"displacement": "travel", "rotation": "travel", "force": "force", "moment": "moment", "loads": "factor"}

@@ -37,8 +37,8 @@ from cfmkit.families.findings import mm
 from cfmkit.families.no_mechanism import CannotBuild, no_result
 from cfmkit.numerics.registration import Registration, gaps_across, register, registered_where_it_is
 from cfmkit.results import Quantity, Result, Status
+from cfmkit.tables.data_files import DataSource
 from cfmkit.tables.labpoints import read_sides
-from cfmkit.tables.source import DataSource
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

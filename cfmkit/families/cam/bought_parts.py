@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from cfmkit.families.findings import mm, newton, rate
-from cfmkit.stock.parts import Part
+from cfmkit.stock.parts_list import Part
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -9,7 +9,7 @@ import numpy as np
 from cfmkit.families.base import Room
 from cfmkit.families.cam.outline import plate_contours
 from cfmkit.families.cam.picture_parts import pose, roller_path
-from cfmkit.stock.springs.to_measure import extension_spring
+from cfmkit.stock.springs.made_to_measure import extension_spring
 
 if TYPE_CHECKING:
     from cfmkit.families.cam.spec import Springs

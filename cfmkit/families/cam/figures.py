@@ -13,10 +13,10 @@ from cfmkit.families.cam.scalar_results import theoretical_force
 from cfmkit.plots import parts
 from cfmkit.plots.bands import limits_on
 from cfmkit.plots.curves import CurveLook, plot_curve
-from cfmkit.plots.diagram import Diagram, Limit, Region, Scale, Series, diagram_figure
-from cfmkit.plots.loop import loop_figure
-from cfmkit.plots.moving import Moving, chosen
-from cfmkit.plots.place import place_labels
+from cfmkit.plots.label_placement import place_labels
+from cfmkit.plots.line_diagram import Diagram, Limit, Region, Scale, Series, diagram_figure
+from cfmkit.plots.loop_figure import loop_figure
+from cfmkit.plots.moving_svg import Moving, chosen
 from cfmkit.plots.style import BLUE, GREY, OCHRE, PURPLE, TROUBLE, VERMILLION, new_figure, styled
 from cfmkit.plots.text import Heading, finite_range, right_axis, top_axis, value_text, write_heading
 from cfmkit.specs.units import to_border
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.families.cam.picture_parts import Scene
     from cfmkit.families.cam.solution import Built, Solution
-    from cfmkit.plots.place import Label
+    from cfmkit.plots.label_placement import Label
     from cfmkit.results import Result
 
 

@@ -22,7 +22,7 @@ from cfmkit.families.cam.scalar_results import (
 )
 from cfmkit.families.cam.statics import spring_force
 from cfmkit.families.findings import finder, mm, mpa, newton
-from cfmkit.numerics.robust import neighbour_noise
+from cfmkit.numerics.robust_statistics import neighbour_noise
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

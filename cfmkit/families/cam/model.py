@@ -31,7 +31,7 @@ from cfmkit.families.cam.statics import Forces, forces
 from cfmkit.families.findings import mm
 from cfmkit.families.no_mechanism import CannotBuild, no_result
 from cfmkit.results import Result, Status
-from cfmkit.stock.parts import listed
+from cfmkit.stock.parts_list import listed
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray

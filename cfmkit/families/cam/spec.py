@@ -11,7 +11,7 @@ from cfmkit.specs.spec import Analysis, DesignBlock, Model, OldWords, Spec, refu
 from cfmkit.specs.units import Angle, Force, Inertia, Length, Mass, Ratio, Stiffness, Time, format_short
 from cfmkit.stock.spec import Friction, Guide, MaterialField, MaterialSpec, Pins, SafetyFactor
 from cfmkit.stock.springs.spec import Catalogue, Life, SpringWire
-from cfmkit.tables.source import DataSource
+from cfmkit.tables.data_files import DataSource
 
 Positive = Field(gt=0)
 PositiveLength = Annotated[Length, Field(gt=0)]

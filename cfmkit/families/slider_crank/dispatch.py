@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from cfmkit.export.contours import Contour, Drawing, Edge
     from cfmkit.families.base import Run
     from cfmkit.families.slider_crank.spec import SliderCrankSpec
-    from cfmkit.plots.moving import Moving
+    from cfmkit.plots.moving_svg import Moving
     from cfmkit.results import Design, Result
 
 ROOMS = {"prb": "springs", "lumped": "printed", "beam": "printed", "solid": "printed"}

@@ -149,8 +149,8 @@ class SolidSampler(ExactSampler):
 
 def part_of(spec: VcfmSpec, piece: SolvedPiece) -> Part:
     """Return a piece of the drawing as it is solved."""
-    from cfmkit.solid.law import LAWS
     from cfmkit.solid.meshed_part import Part, Place, rings_of
+    from cfmkit.solid.plane_stress_law import LAWS
 
     mechanism = spec.mechanism
     about = mechanism.bistable if piece.of_leaf else mechanism.positive
@@ -170,7 +170,7 @@ def part_of(spec: VcfmSpec, piece: SolvedPiece) -> Part:
 
 def decks(spec: VcfmSpec) -> dict[str, bytes]:
     """Return leaf and spring as input decks of a finite-element solver, by file name."""
-    from cfmkit.solid.deck import deck
+    from cfmkit.solid.input_deck import deck
     from cfmkit.solid.meshed_part import ACROSS
 
     spec = spec.replace({"analysis.fidelity": "solid"})

@@ -10,10 +10,10 @@ from pydantic import BaseModel, ValidationError
 
 from cfmkit.errors import Problem, SpecError
 from cfmkit.specs.units.fields import BareFloat, BareInt
-from cfmkit.specs.yamlio.explain import explain, not_among
-from cfmkit.specs.yamlio.options import NoSuchPlace, Option, parse_option, with_value
+from cfmkit.specs.yamlio.explain_errors import explain, not_among
 from cfmkit.specs.yamlio.paths import Path, dotted, typed
-from cfmkit.specs.yamlio.source import Fault
+from cfmkit.specs.yamlio.set_option import NoSuchPlace, Option, parse_option, with_value
+from cfmkit.specs.yamlio.source_text import Fault
 from cfmkit.specs.yamlio.tree_builder import Reading, read
 
 if TYPE_CHECKING:

@@ -12,8 +12,8 @@ from pydantic import BaseModel
 from cfmkit.errors import QuantityError
 from cfmkit.specs.units.numbers import odd_character
 from cfmkit.specs.units.quantities import decimal_text
+from cfmkit.specs.yamlio.allowed_keys import Slot
 from cfmkit.specs.yamlio.scalars import read_plain
-from cfmkit.specs.yamlio.shape import Slot
 
 WIDTH = 100
 _PLAIN = re.compile(r"[\w.+(/][^:#\[\]{},\"'&*!|>%@`\\=?-]*(?:[-%=?'*](?! )[^:#\[\]{},\"&!|>@`\\]*)*")

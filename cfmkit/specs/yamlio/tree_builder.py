@@ -26,8 +26,8 @@ from yaml.events import (
 from cfmkit.errors import QuantityError
 from cfmkit.specs.units.numbers import shown
 from cfmkit.specs.yamlio.scalars import check_text, read_plain
-from cfmkit.specs.yamlio.source import Fault, Unreadable, decode, without_odd_characters
-from cfmkit.specs.yamlio.syntax import fault_of
+from cfmkit.specs.yamlio.source_text import Fault, Unreadable, decode, without_odd_characters
+from cfmkit.specs.yamlio.syntax_errors import fault_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from cfmkit.metrics.fatigue_and_relaxation import FatigueLaw
     from cfmkit.stock.springs.catalogue import Offer
-    from cfmkit.stock.springs.wound import Wound
+    from cfmkit.stock.springs.helical import Wound
 
 WIRE_DEFINITIONS = {
     "wire_stress_max": (

@@ -13,13 +13,13 @@ from cfmkit.specs.spec import Model
 from cfmkit.specs.units import Angle, Force, Length, Ratio, RotationalStiffness, Stiffness, Stress, Torque
 from cfmkit.stock.spec import Fatigue
 from cfmkit.stock.springs.catalogue import GENERIC, Offer, generic
-from cfmkit.stock.springs.wound import SHEAR_MODULUS, YOUNGS_MODULUS, Wound
-from cfmkit.tables.source import DataSource
+from cfmkit.stock.springs.helical import SHEAR_MODULUS, YOUNGS_MODULUS, Wound
+from cfmkit.tables.data_files import DataSource
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from cfmkit.stock.springs.wound import Kind
+    from cfmkit.stock.springs.helical import Kind
 
 Positive = Field(gt=0)
 AGREE = 0.1

@@ -2,8 +2,8 @@
 
 Sampling and analysing are apart: a method draws points, somebody evaluates them, the
 method reads the outcome. The statistics work on plain arrays and know no mechanism:
-`oat`, `local`, `morris`, `sobol` and `tolerance`, with `spreads` (how parameters are
-distributed), `intervals` (confidence) and `failures` (what a sample without a value
+`oat`, `local`, `morris`, `sobol` and `tolerance`, with `distributions` (of the
+parameters), `intervals` (confidence) and `failures` (what a sample without a value
 means for an index: never "no influence").
 
 `parameters` reads the block `sensitivity:` against a specification, `study` joins

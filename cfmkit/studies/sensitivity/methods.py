@@ -10,11 +10,11 @@ import numpy as np
 from cfmkit.families import family
 from cfmkit.specs.units import border_unit, to_border
 from cfmkit.studies.sensitivity import inverse, local, morris, oat, sobol, tolerance
+from cfmkit.studies.sensitivity.distributions import draw, values_across, values_at
 from cfmkit.studies.sensitivity.evaluation import Evaluator, Interrupted
 from cfmkit.studies.sensitivity.failures import evaluated, nothing, stated
 from cfmkit.studies.sensitivity.findings import Findings, IndexLine, lines_of
 from cfmkit.studies.sensitivity.findings import stated as told
-from cfmkit.studies.sensitivity.spreads import draw, values_across, values_at
 from cfmkit.studies.study import Metric
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from cfmkit.errors import Problem, QuantityError, SpecError
 from cfmkit.specs.spec import Tolerance
 from cfmkit.specs.units import read_number, read_quantity
-from cfmkit.studies.sensitivity.spreads import Incompatible, ParameterSpread, correlation_matrix
+from cfmkit.studies.sensitivity.distributions import Incompatible, ParameterSpread, correlation_matrix
 from cfmkit.studies.spec_values import CannotVary, Leaf, leaf
 
 if TYPE_CHECKING:

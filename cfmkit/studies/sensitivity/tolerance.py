@@ -24,9 +24,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
+    from cfmkit.studies.sensitivity.distributions import ParameterSpread
     from cfmkit.studies.sensitivity.failures import Policy
     from cfmkit.studies.sensitivity.intervals import Interval
-    from cfmkit.studies.sensitivity.spreads import ParameterSpread
 
 YIELD_GAIN, VARIANCE_DROP = "yield_gain_when_halved", "variance_drop_when_halved"
 TIGHTER = 0.5

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 from cfmkit.plots import parts
 from cfmkit.plots.curves import CurveLook
-from cfmkit.plots.diagram import Limit
-from cfmkit.plots.loop import loop_figure
+from cfmkit.plots.line_diagram import Limit
+from cfmkit.plots.loop_figure import loop_figure
 from cfmkit.plots.style import new_figure, styled
 from cfmkit.plots.text import Heading, value_text, write_heading
 

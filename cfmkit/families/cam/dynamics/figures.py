@@ -10,9 +10,9 @@ import numpy as np
 from cfmkit.families.cam.scalar_results import constant_force
 from cfmkit.plots.bands import limits_on
 from cfmkit.plots.curves import CurveLook
-from cfmkit.plots.diagram import Diagram, Limit, Region, Scale, Series, diagram_figure
-from cfmkit.plots.loop import loop_figure
-from cfmkit.plots.place import Label, place_labels
+from cfmkit.plots.label_placement import Label, place_labels
+from cfmkit.plots.line_diagram import Diagram, Limit, Region, Scale, Series, diagram_figure
+from cfmkit.plots.loop_figure import loop_figure
 from cfmkit.plots.style import BLUE, GREY, PURPLE, VERMILLION, styled
 from cfmkit.plots.text import Heading, value_text
 from cfmkit.specs.units import to_border

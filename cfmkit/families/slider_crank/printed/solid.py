@@ -109,8 +109,8 @@ def analyze(spec: SliderCrankSpec, run: Run) -> Result:
 
     PARTIAL if the path ends before the travel; NO_EQUILIBRIUM if it cannot be meshed or has no second pose.
     """
-    from cfmkit.solid.course import Ending
     from cfmkit.solid.meshed_part import ACROSS, COARSER
+    from cfmkit.solid.path_following import Ending
 
     try:
         spec = resolve(spec)
@@ -156,8 +156,8 @@ def analyze(spec: SliderCrankSpec, run: Run) -> Result:
 
 def part_of(spec: SliderCrankSpec) -> Part:
     """Return one leg as it is solved: its outline as printed, with its widths and both pads."""
-    from cfmkit.solid.law import LAWS
     from cfmkit.solid.meshed_part import Part, Place, rings_of
+    from cfmkit.solid.plane_stress_law import LAWS
 
     piece = solved_piece(spec)
     made_of = elasticity(spec.mechanism)
@@ -175,7 +175,7 @@ def part_of(spec: SliderCrankSpec) -> Part:
 
 def decks(spec: SliderCrankSpec) -> dict[str, bytes]:
     """Return one leg as an input deck of a finite-element solver, by file name."""
-    from cfmkit.solid.deck import deck
+    from cfmkit.solid.input_deck import deck
     from cfmkit.solid.meshed_part import ACROSS
 
     spec = resolve(spec.replace({"analysis.fidelity": "solid"}))
@@ -230,7 +230,7 @@ def _values(solution: SolidSolution) -> Mapping[str, Quantity]:
 
 
 def _findings(solution: SolidSolution) -> Iterator[Finding]:
-    from cfmkit.solid.course import Ending
+    from cfmkit.solid.path_following import Ending
 
     names = {Ending.LIMIT_POINT: "limit_point", Ending.UNSTABLE: "unstable"}
     course, (force, stress) = solution.fine.course, solution.differences

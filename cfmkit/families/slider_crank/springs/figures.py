@@ -14,10 +14,10 @@ from cfmkit.families.slider_crank.unit_springs import JOINTS
 from cfmkit.plots import parts
 from cfmkit.plots.bands import limits_on
 from cfmkit.plots.curves import CurveLook, plot_curve
-from cfmkit.plots.diagram import Diagram, Limit, Scale, Series, diagram_figure
-from cfmkit.plots.loop import loop_figure
-from cfmkit.plots.moving import Moving, chosen
-from cfmkit.plots.place import Label, place_labels
+from cfmkit.plots.label_placement import Label, place_labels
+from cfmkit.plots.line_diagram import Diagram, Limit, Scale, Series, diagram_figure
+from cfmkit.plots.loop_figure import loop_figure
+from cfmkit.plots.moving_svg import Moving, chosen
 from cfmkit.plots.style import BLUE, BROWN, GREY, INK, OCHRE, PURPLE, VERMILLION, axes_mm, new_figure, styled
 from cfmkit.plots.text import Heading, value_text, write_heading
 from cfmkit.specs.units import format_short, to_border

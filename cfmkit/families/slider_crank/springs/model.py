@@ -30,7 +30,7 @@ from cfmkit.families.slider_crank.springs.solution import Character, ClosedForm,
 from cfmkit.families.slider_crank.unit_springs import JOINTS
 from cfmkit.results import Result, Status
 from cfmkit.specs.units import between, format_short
-from cfmkit.stock.parts import Part, listed
+from cfmkit.stock.parts_list import Part, listed
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

@@ -11,7 +11,7 @@ from cfmkit.specs.units import Angle, Force, Length, Ratio, RotationalStiffness,
 from cfmkit.stock.springs.spec import AGREE, Catalogue, Life, SpringWire
 
 if TYPE_CHECKING:
-    from cfmkit.stock.springs.wound import Kind
+    from cfmkit.stock.springs.helical import Kind
 
 PositiveLength = Annotated[Length, Field(gt=0)]
 PositiveAngle = Annotated[Angle, Field(gt=0)]

@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Any
 from cfmkit.errors import Problem, QuantityError, SpecError
 from cfmkit.specs.units.fields import described
 from cfmkit.specs.units.numbers import shown
+from cfmkit.specs.yamlio.allowed_keys import Slot, Trace, expected, trace
 from cfmkit.specs.yamlio.paths import Path, dotted
-from cfmkit.specs.yamlio.shape import Slot, Trace, expected, trace
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

@@ -56,7 +56,7 @@ class FigureForm:
 
     def draw(self, make: Callable[[], Figure]) -> Figure:
         """Return a figure in this form."""
-        from cfmkit.plots.box_stretching import laid_out, noted
+        from cfmkit.plots.figure_resizing import laid_out, noted
         from cfmkit.plots.style import is_to_scale, with_settings
 
         with with_settings(self.settings, self.titles):
@@ -70,8 +70,8 @@ class FigureForm:
 
     def write(self, figure: Figure, stem: str) -> Iterator[tuple[str, bytes]]:
         """Yield a figure's files as (name, content), below ``figures/``."""
-        from cfmkit.plots.formats import written
         from cfmkit.plots.style import with_settings
+        from cfmkit.plots.vector_formats import written
 
         for kind in self.formats:
             with with_settings(self.settings, self.titles):

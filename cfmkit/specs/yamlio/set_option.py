@@ -13,7 +13,7 @@ from typing import Any
 from cfmkit.errors import UsageError
 from cfmkit.specs.units.numbers import shown
 from cfmkit.specs.yamlio.paths import dotted
-from cfmkit.specs.yamlio.source import Fault
+from cfmkit.specs.yamlio.source_text import Fault
 from cfmkit.specs.yamlio.tree_builder import DEEPEST, read
 
 

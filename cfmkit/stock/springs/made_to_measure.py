@@ -1,6 +1,6 @@
 """Extension springs wound to measure: the slimmest one of a rate that can be stretched so far, where no list has it.
 
-The formulas and the wire are those of `cfmkit.stock.springs.wound`, the share of the strength is that of the generic
+The formulas and the wire are those of `cfmkit.stock.springs.helical`, the share of the strength is that of the generic
 series. Wires above some 6 mm are not drawn as music wire: their strength is extrapolated. Bodies are close-wound, loops
 are as high as the inside of the coil.
 """
@@ -10,7 +10,7 @@ from __future__ import annotations
 from math import log2
 
 from cfmkit.stock.springs.catalogue import SHEAR_SHARE
-from cfmkit.stock.springs.wound import Wound, tensile_strength
+from cfmkit.stock.springs.helical import Wound, tensile_strength
 
 INDICES = (5.0, 6.0, 8.0, 10.0, 12.0, 16.0)
 """Mean diameter of the coil over that of the wire: what is wound easily."""

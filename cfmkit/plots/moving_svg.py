@@ -14,8 +14,8 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from cfmkit.plots.formats import inline, svg
 from cfmkit.plots.style import axes_mm, new_figure, styled
+from cfmkit.plots.vector_formats import inline, svg
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

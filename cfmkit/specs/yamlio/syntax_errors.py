@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING
 
-from cfmkit.specs.yamlio.source import Fault
+from cfmkit.specs.yamlio.source_text import Fault
 
 if TYPE_CHECKING:
     from yaml.error import Mark, YAMLError

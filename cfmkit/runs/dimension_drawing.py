@@ -72,8 +72,8 @@ def drawn(found: Scheme, kind: str) -> bytes:
     cfmkit.errors.UsageError
         If it is none of them.
     """
-    from cfmkit.plots.formats import pdf, svg
     from cfmkit.plots.style import png
+    from cfmkit.plots.vector_formats import pdf, svg
 
     writers: dict[str, Callable[[Figure], bytes]] = {".png": png, ".svg": svg, ".pdf": pdf}
     if kind.lower() not in writers:
