@@ -37,12 +37,25 @@ def test_what_only_the_search_knows_is_a_block_of_its_own_with_model_and_window(
     told = json.loads((cli.folder / "out/metrics.json").read_text())
     assert json.loads(done.out)["search"] == told["search"]
     assert not any(name.startswith(("audit", "tolerance", "starts")) for name in told["metrics"])
-    starts, reissner = told["search"]["starts"], told["search"]["audit_half_band_reissner"]
-    assert (starts["value"], starts["unit"], starts["model"]) == (2.0, "1", "inextensible")
-    assert (reissner["model"], reissner["window"], reissner["window_unit"]) == ("reissner", [6.0, 12.0], "mm")
-    page = " ".join(cli("design", arch, "-o", "out", "--no-plots").out.split())
+    starts = told["search"]["starts"]
+    assert (starts["value"], starts["unit"], starts["model"]) == (2.0, "1", "reissner")
+    assert (starts["window"], starts["window_unit"]) == ([6.0, 12.0], "mm")
+    page = " ".join(cli("design", arch, "-o", "bends", "--no-plots", "--fidelity", "inextensible").out.split())
     assert "search inextensible, 6 ... 12 mm: starts 2, " in page
     assert "search reissner, 6 ... 12 mm: audit half band reissner " in page
+
+
+def test_shapes_are_searched_with_stretch_and_shear_and_every_start_is_audited(cli, arch):
+    done = cli("design", arch, "-o", "out", "--no-plots")
+    assert done.code == 0
+    assert "fidelity: reissner" in (cli.folder / "out/design.yaml").read_text()
+    header, *rows = (cli.folder / "out/starts.csv").read_text().splitlines()
+    assert "sound,crossings,gap [mm]" in header
+    assert len(rows) == 2
+    assert all(",true,0," in row for row in rows)
+    report = json.loads((cli.folder / "out/metrics.json").read_text())
+    assert report["search"]["starts_sound"]["value"] == 2
+    assert "audit_half_band_reissner" not in report["search"]  # that is what the metrics are of
 
 
 def test_without_a_shape_the_blocking_limit_and_the_nearest_value_are_named(cli, arch):

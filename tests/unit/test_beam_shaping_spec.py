@@ -8,7 +8,7 @@ from beam_support import CONFIGS
 import cfmkit
 from cfmkit.designing.starts import Clock
 from cfmkit.errors import SpecError
-from cfmkit.families.beam.shaping.design import _nothing
+from cfmkit.families.beam.shaping.design import _nothing, task_of, with_stretch_and_shear
 from cfmkit.families.beam.shaping.multistart import Explored
 from cfmkit.families.beam.shaping.search import Plan
 
@@ -46,3 +46,21 @@ def test_a_start_that_the_time_ended_is_no_reason_to_widen_the_envelope():
     nothing = Explored({0: None}, reused=0, missing=0)
     assert "the time budget ended" in _nothing(nothing, Plan(clock=Clock(0.0))).message
     assert "widen the envelope" in _nothing(nothing, Plan()).message
+
+
+@pytest.mark.parametrize(
+    ("said", "model"),
+    [
+        ([], "reissner"),
+        (["analysis.fidelity=inextensible"], "inextensible"),
+        (["mechanism.axial=true"], "extensible"),
+        (["mechanism.axial=false"], "inextensible"),
+    ],
+)
+def test_shapes_are_searched_with_stretch_and_shear_unless_the_specification_says_otherwise(said, model):
+    spec = with_stretch_and_shear(cfmkit.load("configs/beam_design_arch.yaml", said))
+    assert spec.fidelity == model
+    task = task_of(spec, spec.design.optimise)
+    assert task.fidelity == model
+    assert task.first.fidelity == "inextensible"
+    assert (task.first is task) == (model == "inextensible")

@@ -135,7 +135,7 @@ class BeamAnalysis(Analysis):
     fidelity: Fidelity | None = Field(
         None,
         description="model: bending only, with stretching, with shear, too, or the part as a planar solid; default: as "
-        "in the mechanism",
+        "in the mechanism, and 'reissner' for a search of shapes where that says nothing",
     )
     solid: SolidAnalysis = Field(SolidAnalysis(), description="of fidelity 'solid'")
     stress: Literal["bending", "total"] | None = Field(

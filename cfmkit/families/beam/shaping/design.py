@@ -11,9 +11,9 @@ from cfmkit.families.beam.findings import finding, percent
 from cfmkit.families.beam.shaping.audit import NetworkScatter, tolerated
 from cfmkit.families.beam.shaping.blocking_limits import blocked, held_by
 from cfmkit.families.beam.shaping.multistart import Explored, explored, ranked
-from cfmkit.families.beam.shaping.report import Judged, judged, notes_of, search_of, starts_table
+from cfmkit.families.beam.shaping.report import REISSNER, Judged, judged, notes_of, search_of, starts_table
 from cfmkit.families.beam.shaping.search import Plan, finished, widened
-from cfmkit.families.beam.shaping.task import MARGIN, Coordinate, Limits, Task
+from cfmkit.families.beam.shaping.task import BENDING_ONLY, MARGIN, Coordinate, Limits, Task
 from cfmkit.families.beam.shaping.variables import Variables
 from cfmkit.results import Design, Finding, Status
 
@@ -38,6 +38,7 @@ def shaped(spec: BeamSpec, wanted: Optimise, run: Run) -> Design:
     if spec.extent < wanted.window[1] * (1 - 1e-12):
         problem = "analysis.travel ends before design.optimise.window: let it reach the end of the window"
         return Design(None, Status.INVALID, problem)
+    spec = with_stretch_and_shear(spec)
     task = task_of(spec, wanted)
     plan = Plan(drawn=wanted.drawn, clock=Clock.of(wanted.time_budget, run.time_budget))
     result = explored(task, plan, (wanted.starts, wanted.widened), identity_of(spec, run.seed), run)
@@ -62,6 +63,14 @@ def shaped(spec: BeamSpec, wanted: Optimise, run: Run) -> Design:
     )
 
 
+def with_stretch_and_shear(spec: BeamSpec) -> BeamSpec:
+    """Return a specification whose beams stretch and shear, unless it says what its beams do."""
+    said = {"axial", "shear"} & spec.mechanism.model_fields_set
+    if spec.analysis.fidelity is not None or said:
+        return spec
+    return spec.replace({"analysis.fidelity": REISSNER})
+
+
 def task_of(spec: BeamSpec, wanted: Optimise) -> Task:
     """Return what is to be shaped; of layers in series one, which moves its share."""
     mechanism = spec.mechanism
@@ -70,6 +79,7 @@ def task_of(spec: BeamSpec, wanted: Optimise) -> Task:
         one = mechanism.copies.model_copy(update={"layers": 1})
         spec = spec.model_copy(update={"mechanism": mechanism.model_copy(update={"copies": one})})
     assembly = assemble(spec)
+    bends = assemble(spec.replace({"analysis.fidelity": BENDING_ONLY})).network
     return Task(
         network=assembly.network,
         driven=assembly.driven,
@@ -88,6 +98,7 @@ def task_of(spec: BeamSpec, wanted: Optimise) -> Task:
         total_stress=spec.stress == "total",
         safety_factor=mechanism.safety_factor,
         layers=layers,
+        bending_only=None if spec.fidelity == BENDING_ONLY else bends,
     )
 
 
@@ -123,7 +134,7 @@ def _limits(wanted: Optimise, allowable_stress: float | None) -> Limits:
 
 def _best(spec: BeamSpec, task: Task, result: Explored, plan: Plan) -> Judged | Design:
     """Return the best design that analysis and audit confirm, or why there is none."""
-    candidates = [one for _, one in ranked(task, result.found)]
+    candidates = [(one, result.audits.get(index)) for index, one in ranked(task, result.found)]
     if not candidates:
         some = [one for one in result.found.values() if one is not None]
         if not some:
@@ -141,9 +152,9 @@ def _best(spec: BeamSpec, task: Task, result: Explored, plan: Plan) -> Judged | 
             missed = "; ".join(f"{name} ({about})" for name, about in why.missed.items())
             said = f"no shape of {len(some)} starts meets all limits; the best misses {missed}"
             return Design(None, Status.INFEASIBLE, said, nearest_feasible=why.nearest)
-        candidates = [met]
-    if task.objective == "range" and candidates[0].objective > task.half_band:
-        flattest = min(candidates, key=lambda one: one.objective)
+        candidates = [(met, None)]
+    if task.objective == "range" and candidates[0][0].objective > task.half_band:
+        flattest = min((one for one, _ in candidates), key=lambda one: one.objective)
         said = (
             f"no shape of {len(result.found)} starts keeps the force within ± {percent(task.half_band)} over the "
             f"requested window (design.optimise.window); the flattest keeps it within ± {percent(flattest.objective)}"
@@ -151,8 +162,8 @@ def _best(spec: BeamSpec, task: Task, result: Explored, plan: Plan) -> Judged | 
         nearest = {"design.optimise.half_band": f"at least {percent(1.02 * flattest.objective)}"}
         return Design(None, Status.INFEASIBLE, said, nearest_feasible=nearest)
     fallback = None
-    for one in candidates:
-        design = judged(spec, task, one)
+    for one, audit in candidates:
+        design = judged(spec, task, one, audit)
         if not design.faults:
             return design
         fallback = fallback or design
@@ -182,6 +193,8 @@ def _told(task: Task, design: Judged, result: Explored) -> str:
     found, window = design.found, design.window
     some = [one for one in result.found.values() if one is not None]
     feasible = [one for one in some if one.feasible]
+    unsound = len(feasible) - sum(one.sound for one in result.audits.values())
+    refuted = f", the audit refutes {unsound} of them" if unsound else ""
     total = sum(one.evaluations for one in some)
     reused = f", {result.reused} from the journal" if result.reused else ""
     left = f", {result.missing} not done in the time" if result.missing else ""
@@ -192,7 +205,8 @@ def _told(task: Task, design: Judged, result: Explored) -> str:
     if task.objective == "paper":
         reached = f"F(a)/F(b) - 1 = {found.objective:.3f}"
     return (
-        f"{reached}; {len(feasible)} of {len(result.found)} starts meet all limits ({total} traces{reused}{left}); "
+        f"{reached}; {len(feasible)} of {len(result.found)} starts meet all limits{refuted} "
+        f"({total} traces{reused}{left}); "
         f"the last minimisation {found.ending}"
     )
 

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cfmkit.designing.starts import Stage, done
+from cfmkit.families.beam.shaping.audit import Audit, audited
 from cfmkit.families.beam.shaping.search import VIOLATION, Found, Plan, searched, widened
+from cfmkit.families.beam.shaping.variables import Variables
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -58,12 +60,15 @@ class Explored:
         Starts that led to nothing: the time did not suffice, or a process died.
     lost : tuple of str
         Why processes died.
+    audits : mapping
+        Number of the start -> the audit of its design, of those that meet all limits.
     """
 
     found: dict[int, Found | None]
     reused: int
     missing: int
     lost: tuple[str, ...] = ()
+    audits: Mapping[int, Audit] = field(default_factory=dict)
 
 
 def explored(task: Task, plan: Plan, counts: tuple[int, int], identity: str, run: Run) -> Explored:
@@ -92,7 +97,8 @@ def explored(task: Task, plan: Plan, counts: tuple[int, int], identity: str, run
         more = done(second, run, plan.clock, partial(_tell, run, "widenings", len(best), (share, 1.0)))
         lost += more.lost
         found |= {index: _found(record["found"]) for index, record in more.records.items()}
-    return Explored(found, begun.reused, starts - len(found), lost)
+    audits = {index: audited(Variables(task, one.order), one) for index, one in ranked(task, found)}
+    return Explored(found, begun.reused, starts - len(found), lost, audits)
 
 
 def _tell(run: Run, what: str, count: int, share: tuple[float, float], records: Mapping[int, dict[str, Any]]) -> None:

@@ -65,14 +65,22 @@ class Judged:
         return float(window[0]), float(window[1])
 
 
-def judged(spec: BeamSpec, task: Task, found: Found) -> Judged:
-    """Return a design as its own analysis finds it: the same curve, stress and metrics as of `cfmkit analyze`."""
+def judged(spec: BeamSpec, task: Task, found: Found, audit: Audit | None = None) -> Judged:
+    """Return a design as its own analysis finds it: the same curve, stress and metrics as of `cfmkit analyze`.
+
+    Parameters
+    ----------
+    spec, task, found : BeamSpec, Task, Found
+        What was given, what was searched for, and what came out.
+    audit : Audit, optional
+        Of the design, where it is known already.
+    """
     new = written(spec, task, found)
     result = analyze(new, Run())
     window = _confirmed_window(task, result, _window(spec, task, found), _asked(spec)[0])
     new = new.replace({"analysis.window": window})
     (band,) = measured(result, window, "half_band")
-    audit = audited(Variables(task, found.order), found)
+    audit = audit or audited(Variables(task, found.order), found)
     return Judged(new, found, audit, band, tuple(_faults(task, audit, result, window)))
 
 
@@ -162,6 +170,10 @@ REISSNER = "reissner"
 DEFINITIONS = {
     "starts": ("count", "random starts that led to a shape"),
     "starts_within_limits": ("count", "starts whose shape meets all limits, as the audit at more poses found"),
+    "starts_sound": (
+        "count",
+        "such starts whose shape reaches the end of the window, is stable all the way and does not cross itself",
+    ),
     "traces": ("count", "networks that were followed over the window"),
     "audit_gap": ("length", "least gap between surfaces of different beams at 61 poses from rest on, away from joints"),
     "audit_crossings": ("count", "poses, of 61 from rest on, at which beams cross"),
@@ -201,7 +213,7 @@ def search_of(task: Task, design: Judged, drawn: Drawn, result: Explored) -> Map
     own = design.window
     asked, whole = (task.layers * task.window[0], own[1]), (0.0, own[1])
     told = dict.fromkeys(DEFINITIONS, (task.fidelity, whole))
-    told |= dict.fromkeys(("starts", "starts_within_limits", "traces"), (task.fidelity, asked))
+    told |= dict.fromkeys(("starts", "starts_within_limits", "starts_sound", "traces"), (task.fidelity, asked))
     told |= dict.fromkeys(("tolerance_half_band_median", "tolerance_half_band_p90"), (task.fidelity, own))
     told |= {"audit_half_band_reissner": (REISSNER, own), "audit_strict_range_reissner": (REISSNER, whole)}
     numbers = _counts(result) | _audited(design.audit) | _drawn(drawn)
@@ -221,7 +233,9 @@ def _counts(result: Explored) -> dict[str, float | None]:
     some = [one for one in result.found.values() if one is not None]
     feasible = sum(one.feasible for one in some)
     traces = sum(one.evaluations for one in some)
-    return {"starts": float(len(some)), "starts_within_limits": float(feasible), "traces": float(traces)}
+    sound = sum(one.sound for one in result.audits.values())
+    counts = {"starts": len(some), "starts_within_limits": feasible, "starts_sound": sound, "traces": traces}
+    return {name: float(count) for name, count in counts.items()}
 
 
 def _audited(audit: Audit) -> dict[str, float | None]:
@@ -260,9 +274,11 @@ def _held(held: tuple[str, ...]) -> tuple[str, str]:
 
 
 def starts_table(task: Task, result: Explored) -> Table:
-    """Return one row per start, in order."""
+    """Return one row per start, in order, each with the audit of its design where that meets all limits."""
     from cfmkit.tables import Table, TableColumn
 
+    audits = [result.audits.get(index) for index, one in result.found.items() if one is not None]
+    gaps = [np.nan if one is None or one.gap is None else 1e3 * one.gap for one in audits]
     rows = [(index, one) for index, one in result.found.items() if one is not None]
     columns = {
         "window_share": [1 - one.start / task.window[1] for _, one in rows],
@@ -273,6 +289,9 @@ def starts_table(task: Task, result: Explored) -> Table:
         (
             TableColumn("start", tuple(index for index, _ in rows)),
             *(TableColumn(name, np.array(values, dtype=float), "1") for name, values in columns.items()),
+            TableColumn("sound", tuple(None if one is None else one.sound for one in audits)),
+            TableColumn("crossings", tuple(None if one is None else one.crossings for one in audits)),
+            TableColumn("gap", np.array(gaps, dtype=float), "mm"),
             TableColumn("evaluations", tuple(one.evaluations for _, one in rows)),
             TableColumn("ending", tuple(one.ending for _, one in rows)),
         )

@@ -1,5 +1,8 @@
 """One start of the search: a random network, made to meet the limits, then flattened order by order, then widened.
 
+A start begins with beams that bend only, whatever the model of the task: what is flat and within the limits there is
+nearly so where beams stretch and shear, too, and is taken on from there in the model of the task.
+
 A flat force and low stress seldom come together in a random network. One that is flat is easy to draw, and the stress
 can be brought down while it stays flat: so the limits are met first, with the half band capped, by letting all of them
 give way by one amount that is minimised. The other way round ends in stiff springs that meet every limit.
@@ -44,6 +47,7 @@ _BACK = 0.1  # of the gain is given up where it cannot be
 _TOLERANCE = 1e-5  # of the objective
 _FLAT = 0.05  # a random network with this half band is flat enough to begin with
 _ROUNDS = 6  # towards the limits
+_HOPELESS = 0.1  # of a limit: what bends only and misses one by so much is not taken on where beams stretch and shear
 _STIFF = 0.2  # one with this is a spring, and not looked at further
 _FINER = (33, 65)  # poses in the window where the first 17 do not show what the force does
 _SAME = 1.01  # a half band at many poses that is within this and the next of that at few
@@ -130,9 +134,25 @@ def searched(task: Task, seed: int, index: int, plan: Plan) -> Found | None:
     plan : Plan
         How much is tried.
     """
+    first, rng = task.first, np.random.default_rng([seed, index])
+    begun = _begun(first, rng, plan)
+    if begun is None and first is not task:  # straight beams that cannot stretch may not be able to move at all
+        first, begun = task, _begun(task, rng, plan)
+    if begun is None:
+        return None
+    if first is task:
+        return finished(task, begun, plan)
+    found = modelled(task, improved(first, begun, plan))
+    if found.violation > _HOPELESS:
+        return found
+    return finished(task, found if found.feasible else met(task, found, found.order, plan), plan)
+
+
+def _begun(task: Task, rng: np.random.Generator, plan: Plan) -> Found | None:
+    """Return a random network that was made to meet the limits, or that misses them least; None without any."""
     best: Found | None = None
     evaluations = plan.drawn
-    for first in drawn(task, np.random.default_rng([seed, index]), plan)[: plan.tries]:
+    for first in drawn(task, rng, plan)[: plan.tries]:
         found = met(task, replace(first, evaluations=evaluations), _coarse(task), plan)
         evaluations = found.evaluations
         if best is None or found.violation < best.violation:
@@ -142,7 +162,18 @@ def searched(task: Task, seed: int, index: int, plan: Plan) -> Found | None:
     if best is None:
         return None
     best = replace(best, evaluations=evaluations)
-    return finished(task, best if best.feasible else met(task, best, task.orders[-1], plan), plan)
+    return best if best.feasible else met(task, best, task.orders[-1], plan)
+
+
+def modelled(task: Task, found: Found) -> Found:
+    """Return a design that was found in another model with objective and limits as they are in that of the task."""
+    program = Shaping(Variables(task, found.order), found.start, Flattest())
+    view = program.view(found.x)
+    if view is None:
+        return replace(found, objective=np.inf, violation=np.inf)
+    objective = found.objective if task.objective == "paper" else _half_band(window_force(view))
+    violation = worst_of(program, found.x)
+    return replace(found, objective=objective, violation=violation, evaluations=found.evaluations + 1)
 
 
 def finished(task: Task, found: Found, plan: Plan) -> Found:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Literal
 
@@ -12,6 +12,9 @@ if TYPE_CHECKING:
     from cfmkit.elastica import Network
 
 Objective = Literal["ripple", "range", "paper"]
+
+BENDING_ONLY = "inextensible"
+"""The model of beams that bend only, as ``analysis.fidelity`` names it."""
 
 MARGIN = 2e-3
 """The search asks for so much less stress and slimmer beams: the stress peaks between its poses and places, too."""
@@ -111,6 +114,8 @@ class Task:
         Yield strength over allowable stress [1].
     layers : int
         How many of the network stand in series in the mechanism: its displacements are so many times as large.
+    bending_only : Network or None
+        The network with beams that bend only, which a start begins with; None where those of the network do no more.
     """
 
     network: Network
@@ -127,10 +132,18 @@ class Task:
     half_band: float = 0.025
     compared: tuple[float, float] | None = None
     points: int = 17
-    fidelity: str = "inextensible"
+    fidelity: str = BENDING_ONLY
     total_stress: bool = False
     safety_factor: float = 1.0
     layers: int = 1
+    bending_only: Network | None = None
+
+    @property
+    def first(self) -> Task:
+        """The same with beams that bend only: the model in which a start begins."""
+        if self.bending_only is None:
+            return self
+        return replace(self, network=self.bending_only, fidelity=BENDING_ONLY, total_stress=False, bending_only=None)
 
     @property
     def allowable_stress(self) -> float | None:
