@@ -92,13 +92,13 @@ class Assembly:
         close = 1e-6 * abs(extent) / len(even)  # an end that all but meets a point needs none of its own
         apart = np.abs(ends[:, None] - even).min(axis=1, initial=np.inf) > close
         inside = apart & (ends * np.sign(extent) > 0) & (np.abs(ends) < abs(extent))
-        sense = float(np.sign(extent))
-        return np.asarray(sense * np.unique(sense * np.concatenate([even, ends[inside]])))
+        return np.array(sorted({*even.tolist(), *ends[inside].tolist()}, key=abs))
 
     @property
     def on_curve(self) -> NDArray[np.bool_]:
         """Which of `places` are points of the curve."""
-        return np.isin(self.places, self._even)
+        even = set(self._even.tolist())
+        return np.array([place in even for place in self.places.tolist()])
 
     def drive(self) -> engine.Displacement | engine.Rotation | engine.Loading:
         """Return what is done to the network, from rest to the end: at even steps, and where windows end between."""
