@@ -27,5 +27,6 @@ def room(result: Result) -> Room | None:
     boxes = np.array([scene(solution, float(d), float(p)).box for d in travels for p in sorted(set(preloads))])
     (left, bottom), (right, top) = boxes[:, :2].min(axis=0), boxes[:, 2:].max(axis=0)
     mechanism = result.spec.at("mechanism")
-    depth = max(mechanism.positive.width, mechanism.bistable.width)
+    coil = mechanism.springs.outer_diameter or 0.0 if mechanism.springs else mechanism.flexures.width
+    depth = max(coil, mechanism.bistable.width)
     return Room(float(right - left), float(top - bottom), depth, 2, corner=(float(left), float(bottom)))

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from cfmkit.families.vcfm.leaves.cosine import CosineLeaf
 from cfmkit.families.vcfm.leaves.hybrid import HybridLeaf
-from cfmkit.families.vcfm.leaves.springs import Diamond, StraightSpring, UShape, folded
+from cfmkit.families.vcfm.leaves.springs import Coils, Diamond, StraightSpring, UShape, folded
 from cfmkit.families.vcfm.leaves.strip import Strip
 from cfmkit.families.vcfm.leaves.truss import TrussDiamond, TrussLeaf
 from cfmkit.families.vcfm.leaves.v_beam import VBeam
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from cfmkit.families.vcfm.leaves.springs import Spring
-    from cfmkit.families.vcfm.spec import Bistable, LeafMaterial, Positive, VcfmSpec
+    from cfmkit.families.vcfm.spec import Bistable, BoughtSprings, LeafMaterial, Positive, VcfmSpec
 
 
 RIM = 0.75
@@ -91,6 +91,8 @@ def share_of(positive: Positive) -> float:
 def spring_room(spec: VcfmSpec) -> float:
     """Return how far the spring can be compressed until its rigid blocks meet [m]; infinite where none do."""
     about = spec.mechanism.positive
+    if about is None:
+        return inf
     rims = 2.0 * RIM * about.thickness
     if about.structure == "diamond":
         return 2.0 * about.length * sin(about.angle) + spec.mechanism.frame.corner - rims
@@ -100,12 +102,19 @@ def spring_room(spec: VcfmSpec) -> float:
 def parts(spec: VcfmSpec) -> Parts:
     """Return the leaves of a specification with the laws that its fidelity asks for; those of `exact` are analytic."""
     mechanism = spec.mechanism
-    positive, bistable = mechanism.positive, mechanism.bistable
-    one, other = strip_of(positive, mechanism.material), strip_of(bistable, mechanism.material)
-    share = share_of(positive)
+    bistable, other = mechanism.bistable, strip_of(mechanism.bistable, mechanism.material)
+    if mechanism.springs is not None:
+        return Parts(_LEAVES[bistable.structure](other, bistable), coils(mechanism.springs), bistable.half_beams)
+    positive = mechanism.flexures
+    one, share = strip_of(positive, mechanism.material), share_of(positive)
     if spec.analysis.fidelity == "truss":
         return Parts(TrussLeaf(other), TrussDiamond(one, share), bistable.half_beams)
     return Parts(_LEAVES[bistable.structure](other, bistable), _springs(one, positive, share), bistable.half_beams)
+
+
+def coils(springs: BoughtSprings) -> Coils:
+    """Return the law of bought springs, all of them together."""
+    return Coils(springs.count * springs.rate, springs.count * springs.initial_tension)
 
 
 def _springs(strip: Strip, positive: Positive, share: float) -> Spring:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.families.findings import mm
-from cfmkit.families.vcfm.build import parts, share_of, strip_of
+from cfmkit.families.vcfm.build import coils, parts, share_of, strip_of
 from cfmkit.families.vcfm.model import LawSampler, rest_of, result_of, solve, travel_grid
 from cfmkit.families.vcfm.solution import Characteristics, LeafSamples
 from cfmkit.families.vcfm.traced_network import traced
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica import Network
     from cfmkit.families.base import Run
+    from cfmkit.families.vcfm.leaves.springs import Coils
     from cfmkit.families.vcfm.leaves.strip import Strip
     from cfmkit.families.vcfm.spec import VcfmSpec
     from cfmkit.results import Result
@@ -81,7 +82,7 @@ def spring_chain(spec: VcfmSpec) -> SpringChain:
     """Return what is traced of the spring."""
     from cfmkit.elastica import CLAMPED, Beam, Network, Node, Support, arc, guided
 
-    about = spec.mechanism.positive
+    about = spec.mechanism.flexures
     strip, share = strip_of(about, spec.mechanism.material), share_of(about)
     made, wall = section(strip), Node(0, 0, CLAMPED)
     if about.structure == "u-shape":
@@ -124,6 +125,8 @@ class ExactSampler:
     pushed: Any
     pulled: Any
     sides: list[Any]
+    coils: Coils | None
+    """The law of bought springs, which have no path; None where the spring is a structure of leaves."""
 
     def __init__(self, spec: VcfmSpec, end: float, back: float) -> None:
         """Trace leaf and spring."""
@@ -132,12 +135,14 @@ class ExactSampler:
         self.each = about.half_beams * (1.0 if about.guided else 0.5)
         self.pushed = traced(network, "shuttle", end, branch=spec.analysis.branch, imperfection=about.waviness)
         self.pulled = traced(network, "shuttle", -back)
+        self.coils = None if spec.mechanism.springs is None else coils(spec.mechanism.springs)
+        self.problem = problem_of("leaves were", (self.pushed, self.pulled), 1.0)
+        if self.coils is not None:
+            return
         self.chain = spring_chain(spec)
         ends = (max(preloads) + end, min(min(preloads) - back, -0.02 * end))
         self.sides = [traced(self.chain.network, self.chain.node, self.chain.travel * side) for side in ends]
-        self.problem = problem_of("leaves were", (self.pushed, self.pulled), 1.0) or problem_of(
-            "spring was", self.sides, self.chain.travel
-        )
+        self.problem = self.problem or problem_of("spring was", self.sides, self.chain.travel)
 
     def leaves(self, travel: FloatArray) -> LeafSamples:
         """Return what all leaves do at some travels [m]; NaN beyond what was reached."""
@@ -152,6 +157,8 @@ class ExactSampler:
 
     def spring(self, compression: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return force [N] and largest stress [Pa] of the spring at some compressions [m]."""
+        if self.coils is not None:
+            return self.coils.force(compression), self.coils.stress(compression)
         place = self.chain.travel * np.asarray(compression, dtype=float)
         pressed, stretched = self.sides[0].at(np.maximum(place, 0.0)), self.sides[1].at(np.minimum(place, 0.0))
         force, stress = (np.where(place < 0, stretched[k], pressed[k]) for k in (0, 1))
@@ -172,10 +179,13 @@ class ExactSampler:
             steepest = max(0.0, -float(np.gradient(push.at(places)[0], places).min()))
         tiny = 1e-4 * push.edges[-1]
         first_stiffness = float((push.at(np.array([tiny]))[0] - self.pulled.at(np.array([-tiny]))[0])[0] / (2.0 * tiny))
-        ends = np.array([-tiny, tiny])
-        forces = self.spring(ends)[0]
+        if self.coils is None:
+            forces = self.spring(np.array([-tiny, tiny]))[0]
+            stiffness = float((forces[1] - forces[0]) / (2.0 * tiny))
+        else:
+            stiffness = self.coils.stiffness
         return Characteristics(
-            float((forces[1] - forces[0]) / (2.0 * tiny)),
+            stiffness,
             self.each * steepest,
             self.each * first_stiffness,
             (first, last),

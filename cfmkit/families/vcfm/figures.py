@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -111,9 +111,12 @@ def stress(result: Result) -> Figure:
     over = most.travel
     series = [
         Series(np.interp(over, nominal.travel, nominal.leaves.stress, left=np.nan), "leaves", BLUE, prefer=0.5),
-        Series(np.interp(over, nominal.travel, nominal.spring_stress, left=np.nan), "spring", OCHRE, prefer=0.6),
     ]
-    if most is not nominal:
+    bought = solution.spec.mechanism.springs is not None  # whose wire is of another material, with another limit
+    if not bought:
+        pressed = np.interp(over, nominal.travel, nominal.spring_stress, left=np.nan)
+        series.append(Series(pressed, "spring", OCHRE, prefer=0.6))
+    if most is not nominal and not bought:
         text = f"spring, preload {value_text(most.preload, 'length')}"
         series.append(Series(most.spring_stress, text, VERMILLION, prefer=0.5))
     allowed = solution.spec.mechanism.allowable_stress
@@ -215,9 +218,12 @@ def _shift(solution: Solution, preload: float, grid: FloatArray) -> float:
 def stress_map(result: Result) -> Figure:
     """Return the stress of a leaf and of a chain of the spring as drawn, where each has its largest one."""
     solution: Solution = result.state
-    leaf, spring = solution.sampler.pushed.solved, solution.sampler.sides[0].solved  # type: ignore[attr-defined]
+    sampler: Any = solution.sampler
+    solids = [("leaf", sampler.pushed.solved, 1.0)]
+    if sampler.sides:
+        solids.append(("spring", sampler.sides[0].solved, sampler.chain.travel))
     views = []
-    for name, solved, share in (("leaf", leaf, 1.0), ("spring", spring, solution.sampler.chain.travel)):  # type: ignore[attr-defined]
+    for name, solved, share in solids:
         pose = int(solved.peaks[0].argmax())
         views.append(StressView(solved, pose, f"{name} at {value_text(solved.course.travel[pose] / share, 'length')}"))
     return stress_map_figure(result, views, "stress of leaf and spring as drawn")

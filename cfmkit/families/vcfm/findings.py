@@ -57,6 +57,9 @@ FINDINGS = {
     "envelope": "the design does not fit into the given space",
     "mesh_coarse": "results on two meshes of leaf or spring differ by more than the limit",
     "sharp_corners": "without fillets the stress in inside corners has no value",
+    "spring_overstretched": "bought springs are deflected beyond their limit",
+    "spring_slack": "bought springs carry nothing over a part of the travel",
+    "no_spring_fits": "no spring of the catalogue fits",
     "stress_unreachable": "no leaf length brings the exact stress below the one allowed",
 }
 
@@ -98,6 +101,7 @@ def findings_of(solution: Solution) -> tuple[Finding, ...]:
         _flatness,
         _returns,
         _preloads,
+        _bought_springs,
         _strength,
         _buckling,
         _imperfect,
@@ -161,7 +165,8 @@ def _flattening(solution: Solution, ripple: float) -> tuple[str, tuple[str, ...]
     factor, left = _better_width(solution)
     allowed = solution.spec.analysis.flatness
     if left <= allowed and left < ripple:
-        text = f"; leaves {factor:.3g} times as wide, or a spring {1.0 / factor:.3g} times as wide, make them equal"
+        other = "as wide" if solution.spec.mechanism.springs is None else "as stiff"
+        text = f"; leaves {factor:.3g} times as wide, or a spring {1.0 / factor:.3g} times {other}, make them equal"
         return text, ()
     (first, last), (low, high) = solution.character.linear, solution.window
     why = ""
@@ -288,6 +293,27 @@ def _preloads(solution: Solution) -> Iterator[Finding]:
                 f"where the leaves are flat it is K_p (h + dr), which vanishes at {mm(-solution.parts.balance)}",
             )
             return
+
+
+def _bought_springs(solution: Solution) -> Iterator[Finding]:
+    springs = solution.spec.mechanism.springs
+    if springs is None:
+        return
+    worst = max(solution.pushes, key=lambda push: push.preload)
+    most, limit = float(worst.travel[-1]) + worst.preload, springs.max_elongation
+    if limit and most > limit * (1 + ROUNDING):
+        yield finding(
+            "spring_overstretched",
+            f"with a preload of {mm(worst.preload)} the springs are deflected by {mm(most)}, their limit is "
+            f"{mm(limit)}, reached at {mm(limit - worst.preload)} of travel ('mechanism.springs.max_elongation')",
+        )
+    least = min(push.preload for push in solution.pushes)
+    if least < 0:
+        yield finding(
+            "spring_slack",
+            f"with a preload of {mm(least)} the springs carry nothing up to {mm(-least)} of travel: bought springs do "
+            "not pull back",
+        )
 
 
 def _strength(solution: Solution) -> Iterator[Finding]:
@@ -429,7 +455,7 @@ def spring_closed(solution: Solution) -> Iterator[Finding]:
     most = max(spec.analysis.preloads)
     if most + spec.travel <= room * (1 + ROUNDING):
         return
-    positive, needed = spec.mechanism.positive, most + spec.travel - room
+    positive, needed = spec.mechanism.flexures, most + spec.travel - room
     place = f"at {mm(room - most)} of the travel" if room > most else "before the shuttle moves"
     if positive.structure == "diamond":
         key, size = "mechanism.frame.corner", at_least(spec.mechanism.frame.corner + needed)

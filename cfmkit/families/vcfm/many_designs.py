@@ -87,7 +87,7 @@ def _applies(spec: VcfmSpec, block: Block) -> bool:
     mechanism, analysis = spec.mechanism, spec.analysis
     plain = (
         analysis.fidelity in ("truss", "analytic")
-        and (mechanism.positive.structure, mechanism.bistable.structure) == ("diamond", "v-beam")
+        and mechanism.kinds == ("diamond", "v-beam")
         and mechanism.bistable.flexure_length is None  # which bounds the length
         and analysis.preloads[0] == 0
         and analysis.travel is not None
@@ -148,8 +148,8 @@ class Slab:
             sizes = {name: column(f"{kind}.{name}", getattr(part, name)) for name in _SIZES}
             return Strip(**sizes, youngs_modulus=modulus, poisson_ratio=mechanism.material.poisson)
 
-        side, leaf_strip = strip("spring", mechanism.positive), strip("leaf", mechanism.bistable)
-        share, points = share_of(mechanism.positive), spec.analysis.points
+        side, leaf_strip = strip("spring", mechanism.flexures), strip("leaf", mechanism.bistable)
+        share, points = share_of(mechanism.flexures), spec.analysis.points
         grid = spec.travel * (np.arange(points) / (points - 1.0))
         paper = spec.analysis.fidelity == "truss"
         leaf: Any = TrussLeaf(leaf_strip) if paper else VBeam(leaf_strip)

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.curves import Column, Curve
+from cfmkit.families.vcfm.bought_parts import parts_of
 from cfmkit.families.vcfm.build import parts, spring_room
 from cfmkit.families.vcfm.findings import findings_of, spring_closed
 from cfmkit.families.vcfm.leaves.v_beam import VBeam
@@ -22,6 +23,7 @@ from cfmkit.families.vcfm.solution import Characteristics, LeafSamples, Push, So
 from cfmkit.numerics.bracketing import last_places
 from cfmkit.numerics.roots import bracketed_root
 from cfmkit.results import Result, Status
+from cfmkit.stock.parts import listed
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -83,7 +85,8 @@ def result_of(solution: Solution) -> Result:
         allowable_stress=spec.mechanism.allowable_stress,
         load_cases=curves[1:],
         closed=DenseCurve(solution),
-        tables={"adjustability": partial(adjustability, solution), "readings": partial(readings, solution)},
+        tables={"adjustability": partial(adjustability, solution), "readings": partial(readings, solution)}
+        | listed(parts_of(spec)),
         state=solution,
     )
 
@@ -120,7 +123,9 @@ def rests_of(sampler: PartSampler, preloads: Sequence[float], grid: FloatArray) 
     for preload in (one for one in preloads if one < 0):
         force = sampler.leaf_force(grid) + sampler.spring(grid + preload)[0]
         beyond = np.flatnonzero(force >= 0)
-        if len(beyond) and beyond[0]:
+        if len(beyond) and beyond[0] == 0 and force[0] == 0:
+            found[preload] = 0.0  # springs that are bought hang slack: they do not pull
+        elif len(beyond) and beyond[0]:
             found[preload] = _balanced(sampler, preload, grid[beyond[0] - 1], grid[beyond[0]])
     pressed = np.array([one for one in preloads if one > 0])
     if len(pressed):

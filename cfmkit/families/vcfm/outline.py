@@ -29,6 +29,7 @@ from cfmkit.export.contours import (
 )
 from cfmkit.export.fillets import filleted, sharp_notes
 from cfmkit.families.findings import mm
+from cfmkit.families.vcfm.bought_parts import parts_of
 from cfmkit.families.vcfm.build import RIM, strip_of
 from cfmkit.specs.units import format_short
 from cfmkit.stock.spec import CutPart
@@ -56,9 +57,10 @@ Item = Point | Arc | Smooth
 def drawing(spec: VcfmSpec, tolerance: float = TOLERANCE) -> Drawing:
     """Return the leaves with shuttle and walls and the spring, and a table of the leaves' centre line."""
     leaves, low = leaves_contours(spec)
+    bought = spec.mechanism.springs is not None
     places, heights, _ = _centre_line(spec)
     table = Curve2D("leaf", {"x": (places, "length"), "y": (heights, "length")})
-    spring = spring_contours(spec, low - GAP)
+    spring = [] if bought else spring_contours(spec, low - GAP)
     dimensions, facts = tuple(_dimensions(spec)), tuple(_facts(spec))
     part = spec.mechanism.part or CutPart()
     rounded = [filleted(contour, part.fillet) for contour in (*leaves, *spring)]
@@ -82,28 +84,37 @@ def _facts(spec: VcfmSpec) -> Iterator[tuple[str, str]]:
     """Yield what both parts are made of, and their leaves."""
     leaves, spring = spec.mechanism.bistable, spec.mechanism.positive
     yield "material", spec.mechanism.material.words
+    for part in parts_of(spec):
+        yield "springs", f"{part.count} x {f'{part.name}, ' if part.name else ''}{part.data}"
     for word, one, count in (("leaves", leaves, leaves.half_beams), ("spring", spring, None)):
+        if one is None:
+            continue
         size = f"{mm(one.length)} long, {mm(one.thickness)} thick, {mm(one.width)} wide"
         angle = f", at {format_short(one.angle, 'angle')}" if one.angle else ""
         yield word, f"{f'{count} {one.structure}' if count else one.structure}: {size}{angle}"
 
 
 def _sheet(spec: VcfmSpec, spring: Sequence[Contour]) -> Sheet:
-    """Return the widths of both parts: that of the leaves, and that of the spring around its outline."""
+    """Return the widths of both parts: that of the leaves, and that of the spring around its outline, if it is cut."""
+    if not spring:
+        return Sheet(spec.mechanism.bistable.width)
     x0, y0, x1, y1 = spring[0].extents
     around = np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]]) + GAP / 4 * np.array(
         [[-1, -1], [1, -1], [1, 1], [-1, 1]]
     )
-    return Sheet(spec.mechanism.bistable.width, (Region(around, spec.mechanism.positive.width),))
+    return Sheet(spec.mechanism.bistable.width, (Region(around, spec.mechanism.flexures.width),))
 
 
 def _notes(spec: VcfmSpec) -> Iterator[str]:
     """Yield what the contours do not show."""
     about, count = spec.mechanism.positive, spec.mechanism.bistable.half_beams
-    if about.structure == "folded" and about.loaded == "whole":
+    if about is not None and about.structure == "folded" and about.loaded == "whole":
         yield "one half of the eight folded beams is drawn: make it twice"
     if count % 2:
         yield f"leaves are drawn as whole Vs: {count + 1} instead of {count}; leave one off"
+    if about is None:
+        yield "the springs are bought and not drawn: parts.csv lists them"
+        return
     leaves, spring = spec.mechanism.bistable.width, about.width
     if leaves != spring:
         yield f"two sheets: leaves with shuttle and walls are {mm(leaves)} thick, the spring {mm(spring)}"
@@ -199,7 +210,7 @@ def solved_leaf(spec: VcfmSpec) -> SolvedPiece:
 
 def solved_spring(spec: VcfmSpec) -> SolvedPiece:
     """Return one chain of the spring, of a diamond or folded beams the upper half of it."""
-    about, frame, part = spec.mechanism.positive, spec.mechanism.frame, spec.mechanism.part or CutPart()
+    about, frame, part = spec.mechanism.flexures, spec.mechanism.frame, spec.mechanism.part or CutPart()
     half = 0.5 * frame.block
     if about.structure == "straight":
         right, bottom = _straight(spec, 0.0)
@@ -227,7 +238,7 @@ def solved_spring(spec: VcfmSpec) -> SolvedPiece:
 
 def spring_contours(spec: VcfmSpec, top: float) -> list[Contour]:
     """Return the spring with its rigid blocks, its upper end at `top` [m]."""
-    about, frame = spec.mechanism.positive, spec.mechanism.frame
+    about, frame = spec.mechanism.flexures, spec.mechanism.frame
     half = 0.5 * frame.block
     if about.structure == "straight":
         right, bottom = _straight(spec, top)
@@ -244,7 +255,7 @@ def spring_contours(spec: VcfmSpec, top: float) -> list[Contour]:
 
 def _diamond(spec: VcfmSpec, top: float) -> tuple[list[Item], list[Item], float]:
     """Return outer and inner edge of the right chain from its top down, and the height of its lower end [m]."""
-    about, frame = spec.mechanism.positive, spec.mechanism.frame
+    about, frame = spec.mechanism.flexures, spec.mechanism.frame
     strip = strip_of(about, spec.mechanism.material)
     half, x = 0.5 * frame.block, 0.5 * frame.block + float(strip.reach)
     rise, v = float(strip.rise), 0.5 * about.thickness / float(np.cos(strip.angle))
@@ -261,7 +272,7 @@ def _diamond(spec: VcfmSpec, top: float) -> tuple[list[Item], list[Item], float]
 
 def _bend(spec: VcfmSpec, top: float) -> tuple[list[Item], list[Item], float]:
     """Return the same of a U-shaped chain."""
-    about, frame = spec.mechanism.positive, spec.mechanism.frame
+    about, frame = spec.mechanism.flexures, spec.mechanism.frame
     half, v, radius = 0.5 * frame.block, 0.5 * about.thickness, float(about.radius or 0.0)
     if radius <= v:
         raise GeometryError(
@@ -279,7 +290,7 @@ def _bend(spec: VcfmSpec, top: float) -> tuple[list[Item], list[Item], float]:
 
 def _straight(spec: VcfmSpec, top: float) -> tuple[list[Item], float]:
     """Return the right half of a straight beam with its blocks, and its lowest point [m]."""
-    about, frame = spec.mechanism.positive, spec.mechanism.frame
+    about, frame = spec.mechanism.flexures, spec.mechanism.frame
     half, v = 0.5 * frame.block, 0.5 * about.thickness
     x, middle = half + about.length, top - frame.block
     out, bottom = x + frame.block, top - frame.block - half

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.families.vcfm.build import RIM
+from cfmkit.families.vcfm.build import RIM, strip_of
 from cfmkit.families.vcfm.leaves.cosine import CosineLeaf
 from cfmkit.families.vcfm.leaves.hybrid import HybridLeaf
 from cfmkit.families.vcfm.leaves.s_form import BUCKLED, POLE, axial_root, pose
@@ -104,16 +104,19 @@ def scene(solution: Solution, travel: float, preload: float) -> Scene:
 
 def _add_spring(found: Scene, solution: Solution, top: float, compression: float) -> None:
     """Add the spring below the shuttle's lower end."""
-    about, frame = solution.spec.mechanism.positive, solution.spec.mechanism.frame
+    if solution.spec.mechanism.springs is not None:
+        _add_coils(found, solution, top, compression)
+        return
+    about, frame = solution.spec.mechanism.flexures, solution.spec.mechanism.frame
     half, rim = 0.5 * frame.block, RIM * about.thickness
     if about.structure == "straight":
         _add_straight(found, solution, top, compression)
         return
     if about.structure == "u-shape":
-        chain = u_chain(solution.parts.spring.strip, float(about.radius or 0.0), compression)
+        chain = u_chain(strip_of(about, solution.spec.mechanism.material), float(about.radius or 0.0), compression)
         lines, corners, height = [chain], [], float(chain[-1, 1])
     else:
-        lower = bent_leaf(solution.parts.spring.strip, 0.5 * compression, free=True)
+        lower = bent_leaf(strip_of(about, solution.spec.mechanism.material), 0.5 * compression, free=True)
         height = 2.0 * float(lower[-1, 1]) + frame.corner
         lines = [lower, lower * np.array([1.0, -1.0]) + np.array([0.0, height])]
         x, y = lower[-1]
@@ -130,11 +133,46 @@ def _add_spring(found: Scene, solution: Solution, top: float, compression: float
     found.base = (0.0, base - frame.block)
 
 
+WINDINGS = 8
+"""Turns of a bought spring as they are drawn."""
+
+
+def _add_coils(found: Scene, solution: Solution, bottom: float, deflection: float) -> None:
+    """Add bought springs side by side: below the shuttle, or above it where they are pulled.
+
+    Sizes that are not stated are such as fit the frame: only the deflection is to scale then.
+    """
+    springs, frame = solution.spec.mechanism.springs, solution.spec.mechanism.frame
+    assert springs is not None
+    hangs = springs.kind == "extension"
+    across = springs.outer_diameter or 1.5 * frame.block
+    farthest = max(push.preload for push in solution.pushes) + float(solution.nominal.travel[-1])
+    length = (springs.free_length or max(2.0 * frame.corner, 1.5 * farthest)) + (deflection if hangs else -deflection)
+    start = found.top[1] if hangs else bottom
+    end = start + length if hangs else start - length
+    wire = springs.wound.wire if springs.wound else 0.06 * across
+    shown = min(springs.count, 4)
+    pitch = 1.2 * across
+    # an even number leaves the middle to the force
+    middles = pitch * (np.arange(shown) - 0.5 * (shown - 1)) + (pitch if hangs and shown % 2 else 0.0)
+    phase = np.linspace(0.0, 2.0 * np.pi * WINDINGS, 40 * WINDINGS + 1)
+    heights = start + (end - start) * phase / phase[-1]
+    for middle in middles:
+        line = np.column_stack([middle + 0.5 * (across - wire) * np.sin(phase), heights])
+        found.spring.append(band(line, wire))
+    left, right = float(middles.min()) - 0.6 * across, float(middles.max()) + 0.6 * across
+    away = frame.block if hangs else -frame.block
+    found.rigid.append(rectangle(left, min(end, end + away), right, max(end, end + away)))
+    if hangs:  # a beam on the shuttle that they pull on
+        found.rigid.append(rectangle(min(left, 0.0), start - 0.5 * frame.block, right, start))
+    found.base = (0.5 * (left + right), end + away)
+
+
 def _add_straight(found: Scene, solution: Solution, top: float, compression: float) -> None:
     """Add a straight beam clamped at both ends, with the shuttle on its middle."""
-    about, frame = solution.spec.mechanism.positive, solution.spec.mechanism.frame
+    about, frame = solution.spec.mechanism.flexures, solution.spec.mechanism.frame
     half, length = 0.5 * frame.block, about.length
-    line = bent_leaf(solution.parts.spring.strip, -compression)
+    line = bent_leaf(strip_of(about, solution.spec.mechanism.material), -compression)
     middle = top - half
     for side in (1.0, -1.0):
         mirror = np.array([side, 1.0])

@@ -11,6 +11,7 @@ from cfmkit.families.vcfm.build import share_of, strip_of
 from cfmkit.families.vcfm.leaves.springs import measured_stiffness_for
 from cfmkit.families.vcfm.leaves.truss import TrussDiamond, TrussLeaf
 from cfmkit.results import Quantity
+from cfmkit.stock.springs.in_use import WIRE_DEFINITIONS, SpringInUse, wire_quantities
 from cfmkit.tables import Table, TableColumn, border_column
 
 if TYPE_CHECKING:
@@ -57,6 +58,8 @@ DEFINITIONS = {
         "with the window, this one counts",
     ),
     "travel_safety_factor": ("factor", "allowable stress over that"),
+    "spring_deflection_max": ("length", "largest deflection of bought springs over the travel and all preloads"),
+    **WIRE_DEFINITIONS,
 }
 
 
@@ -90,7 +93,7 @@ def values_of(solution: Solution) -> Mapping[str, Quantity]:
         "least_force": solution.least[1] if solution.least else None,
         "stiffness_mismatch": abs(one.positive_stiffness - one.negative_stiffness) * span / force if force else None,
         "allowable_stress": allowed,
-        "spring_stress_max": spring,
+        "spring_stress_max": spring if solution.spec.mechanism.springs is None else None,
         "bistable_stress_max": leaves,
         "travel_stress_max": over_travel,
         "travel_safety_factor": allowed / over_travel if allowed and over_travel else None,
@@ -98,7 +101,23 @@ def values_of(solution: Solution) -> Mapping[str, Quantity]:
     numbers |= getattr(
         solution.sampler, "mesh_differences", {"mesh_force_difference": None, "mesh_stress_difference": None}
     )
-    return {name: _quantity(name, value) for name, value in numbers.items()}
+    return {name: _quantity(name, value) for name, value in numbers.items()} | _bought(solution)
+
+
+def _bought(solution: Solution) -> dict[str, Quantity]:
+    """Return what bought springs are put through between rest and the end of the travel, at the worst preload."""
+    springs = solution.spec.mechanism.springs
+    if springs is None:
+        return {}
+    wound = None if springs.wound is None else springs.wound.wound(springs.kind)
+    fatigue = None if springs.wound is None or springs.wound.fatigue is None else springs.wound.fatigue.law
+    used = []
+    for push in solution.pushes:
+        ends = (max(float(place) + push.preload, 0.0) for place in (push.travel[0], push.travel[-1]))
+        least, most = (springs.initial_tension * (end > 0) + springs.rate * end for end in ends)
+        used.append(SpringInUse(wound, least, most, fatigue, springs.life))
+    farthest = max(float(push.travel[-1]) + push.preload for push in solution.pushes)
+    return {"spring_deflection_max": _quantity("spring_deflection_max", max(farthest, 0.0))} | wire_quantities(used)
 
 
 def _quantity(name: str, value: float | None) -> Quantity:
@@ -214,14 +233,19 @@ _READING_COLUMNS = {
 
 def _readings(solution: Solution) -> Iterator[TableReading]:
     mechanism, told = solution.spec.mechanism, solution.spec.analysis.measured
-    whole = solution.character.positive_stiffness / share_of(mechanism.positive)
+    if mechanism.positive is None:
+        for leaves in sorted({2, 4, mechanism.bistable.half_beams}):
+            mark = ", as specified" if leaves == mechanism.bistable.half_beams else ""
+            yield TableReading(f"{leaves} half-beams{mark}", leaves, solution.character.positive_stiffness)
+        return
+    whole = solution.character.positive_stiffness / share_of(mechanism.flexures)
     for leaves in sorted({2, 4, mechanism.bistable.half_beams}):
         for name, share in (("half", 0.5), ("whole", 1.0)):
-            same = leaves == mechanism.bistable.half_beams and name == mechanism.positive.loaded
+            same = leaves == mechanism.bistable.half_beams and name == mechanism.flexures.loaded
             mark = ", as specified" if same else ""
             yield TableReading(f"{leaves} half-beams, {name} spring{mark}", leaves, share * whole)
-    if mechanism.positive.structure == "diamond" and mechanism.bistable.structure == "v-beam":
-        one_chain = TrussDiamond(strip_of(mechanism.positive, mechanism.material), 0.5).stiffness
+    if mechanism.kinds == ("diamond", "v-beam"):
+        one_chain = TrussDiamond(strip_of(mechanism.flexures, mechanism.material), 0.5).stiffness
         yield TableReading("the paper's eq. 19 as printed: truss law", 2, float(one_chain), truss=True)
     if told is not None:
         yield TableReading("measured stiffness, 2 half-beams", 2, told.positive_stiffness)

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.errors import GeometryError
-from cfmkit.families.vcfm.build import parts
+from cfmkit.families.vcfm.build import coils, parts
 from cfmkit.families.vcfm.exact_model import ExactSampler, problem_of, spring_chain
 from cfmkit.families.vcfm.findings import finding
 from cfmkit.families.vcfm.model import LawSampler, rest_of, result_of, solve, travel_grid
@@ -124,23 +124,26 @@ class SolidSampler(ExactSampler):
         """Mesh and follow leaf and spring."""
         about, preloads, back = spec.mechanism.bistable, spec.analysis.preloads, max(back, 0.02 * end)
         self.each = about.half_beams * (1.0 if about.guided else 0.5)
-        self.chain = spring_chain(spec)
-        leaf, spring = (part_of(spec, one) for one in (solved_leaf(spec), solved_spring(spec)))
-        share = self.chain.travel
-        forth, back_again = share * (max(preloads) + end), share * min(min(preloads) - back, -0.02 * end)
+        leaf = part_of(spec, solved_leaf(spec))
+        self.coils = None if spec.mechanism.springs is None else coils(spec.mechanism.springs)
         self.pushed = followed(spec, leaf, end, True, lambda part: run.progress(0.6 * part, "leaf"))
         self.pulled = followed(spec, leaf, -back, False, lambda part: run.progress(0.6 + 0.1 * part, "leaf, back"))
+        self.sides, self.problem = [], problem_of("leaves were", (self.pushed, self.pulled), 1.0)
+        if self.coils is not None:
+            return
+        self.chain = spring_chain(spec)
+        spring, share = part_of(spec, solved_spring(spec)), self.chain.travel
+        forth, back_again = share * (max(preloads) + end), share * min(min(preloads) - back, -0.02 * end)
         press = followed(spec, spring, forth, True, lambda part: run.progress(0.7 + 0.2 * part, "spring"))
         pull = followed(spec, spring, back_again, False, lambda part: run.progress(0.9 + 0.1 * part, "spring, back"))
         self.sides = [press, pull]
-        self.problem = problem_of("leaves were", (self.pushed, self.pulled), 1.0) or problem_of(
-            "spring was", self.sides, self.chain.travel
-        )
+        self.problem = self.problem or problem_of("spring was", self.sides, self.chain.travel)
 
     @property
     def mesh_differences(self) -> dict[str, float | None]:
         """Values of what two meshes differ by, the larger of leaf and spring."""
-        leaf, spring = self.pushed.differences, self.sides[0].differences
+        leaf = self.pushed.differences
+        spring = self.sides[0].differences if self.sides else (0.0, 0.0)
         return {
             "mesh_force_difference": max(leaf[0], spring[0]),
             "mesh_stress_difference": max(leaf[1], spring[1]),
@@ -153,7 +156,7 @@ def part_of(spec: VcfmSpec, piece: SolvedPiece) -> Part:
     from cfmkit.solid.plane_stress_law import LAWS
 
     mechanism = spec.mechanism
-    about = mechanism.bistable if piece.of_leaf else mechanism.positive
+    about = mechanism.bistable if piece.of_leaf else mechanism.flexures
     turns = piece.of_leaf and not mechanism.bistable.guided
     law = LAWS[spec.analysis.solid.law](mechanism.material.modulus, mechanism.material.poisson)
     across = np.array([[1.0], [0.0], [0.0]]) if piece.glides else np.zeros((3, 0))
@@ -174,10 +177,12 @@ def decks(spec: VcfmSpec) -> dict[str, bytes]:
     from cfmkit.solid.meshed_part import ACROSS
 
     spec = spec.replace({"analysis.fidelity": "solid"})
-    share = spring_chain(spec).travel
-    ends = {"leaf": spec.travel, "spring": share * (max(*spec.analysis.preloads, 0.0) + spec.travel)}
+    pieces, ends = {"leaf": solved_leaf(spec)}, {"leaf": spec.travel}
+    if spec.mechanism.springs is None:
+        pieces["spring"] = solved_spring(spec)
+        ends["spring"] = spring_chain(spec).travel * (max(*spec.analysis.preloads, 0.0) + spec.travel)
     found = {}
-    for name, piece in (("leaf", solved_leaf(spec)), ("spring", solved_spring(spec))):
+    for name, piece in pieces.items():
         part = part_of(spec, piece)
         meshed = part.meshed(spec.analysis.solid.mesh or part.thinnest / ACROSS)
         found[f"vcfm-{name}.inp"] = deck(f"{spec.name} {name}", part, meshed, ends[name], spec.analysis.solid.poses)

@@ -118,7 +118,7 @@ class Solution:
         Leaves that do not buckle push where they are flat, and so do hybrid ones; a straight beam as the spring has no
         constant stiffness. Then no single number stands for the curve.
         """
-        kinds = self.spec.mechanism.positive.structure, self.spec.mechanism.bistable.structure
+        kinds = self.spec.mechanism.kinds
         place = np.array([self.parts.balance])
         force = float(self.sampler.spring(place + self.nominal.preload)[0][0])
         # leaves with a stated waviness carry a little there, which no flatness tells

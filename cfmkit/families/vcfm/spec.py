@@ -12,6 +12,7 @@ from cfmkit.metrics.fatigue_and_relaxation import Durability
 from cfmkit.specs.spec import Analysis, DesignBlock, Model, SolidAnalysis, Spec, refuse
 from cfmkit.specs.units import Angle, Force, Length, Ratio, Stiffness
 from cfmkit.stock.spec import CutPart, MaterialSpec, PositiveStress, SafetyFactor, material_input, sheet_faults
+from cfmkit.stock.springs.spec import Catalogue, Life, SpringWire
 
 PositiveLength = Annotated[Length, Field(gt=0)]
 NonNegativeLength = Annotated[Length, Field(ge=0)]
@@ -63,6 +64,50 @@ class Positive(Model):
         if self.structure == "u-shape" and self.radius is None:
             raise ValueError("'structure: u-shape' needs 'radius', of its flexible semicircle")
         return self
+
+
+class BoughtSprings(Model):
+    """Equal helical springs side by side, in place of leaves: the preload moves their far ends.
+
+    Compression springs stand below the shuttle, extension springs hang above it; neither carries anything where it is
+    shorter (longer) than relaxed, and all are relaxed as made.
+    """
+
+    kind: Literal["compression", "extension"] = Field("compression", description="what they are loaded by")
+    stiffness: Annotated[Stiffness, Field(gt=0)] | None = Field(None, description="of one; default: from 'wound'")
+    count: int = Field(1, ge=1, le=1000, description="how many in parallel")
+    initial_tension: Annotated[Force, Field(ge=0)] = Field(
+        0.0, description="force at which an extension spring begins to open"
+    )
+    max_elongation: PositiveLength | None = Field(
+        None, description="largest elongation (compression) that a spring may see"
+    )
+    free_length: PositiveLength | None = Field(None, description="relaxed length, for drawings and the room it takes")
+    outer_diameter: PositiveLength | None = Field(None, description="of the coil, for the same")
+    name: str | None = Field(None, min_length=1, description="by which it is bought, for the list of parts")
+    wound: SpringWire | None = Field(
+        None, description="its wire, coil and turns: gives the stress in the wire, and the rate where none is stated"
+    )
+    life: Life | None = None
+
+    @model_validator(mode="after")
+    def _rate_is_known(self) -> Self:
+        if self.stiffness is None:
+            if self.wound is None:
+                refuse("BoughtSprings", {("stiffness",): "missing: give it, or 'wound' from which it follows"})
+            else:
+                # past the frozen model, and not counted as set: another wire then has another rate
+                object.__setattr__(self, "stiffness", self.wound.wound(self.kind).rate)
+        elif self.wound is not None:
+            self.wound.check_rate(self.kind, self.stiffness)
+        if self.initial_tension and self.kind == "compression":
+            raise ValueError("'initial_tension' is of extension springs: compression springs have none")
+        return self
+
+    @property
+    def rate(self) -> float:
+        """Stiffness of one [N/m]."""
+        return self.stiffness or 0.0
 
 
 class Bistable(Model):
@@ -130,7 +175,8 @@ class Mechanism(Model):
         description="of leaves and spring: a name from `show materials`, or {youngs_modulus, ...}"
     )
     safety_factor: SafetyFactor = 1.0
-    positive: Positive
+    positive: Positive | None = Field(None, description="the spring as a structure of leaves; or 'springs'")
+    springs: BoughtSprings | None = Field(None, description="bought springs instead of 'positive'")
     bistable: Bistable
     frame: Frame = Field(default_factory=lambda: Frame(), description="rigid parts, for drawings")
     part: CutPart | None = Field(None, description="how both parts are cut: inside corners, sheet, holes")
@@ -144,6 +190,32 @@ class Mechanism(Model):
             told = "is an old word, and means nothing beside 'safety_factor': give 'yield_strength' instead"
             refuse("Mechanism", {("material", "allowable_stress"): told})
         return data
+
+    @model_validator(mode="after")
+    def _one_kind_of_spring(self) -> Self:
+        if self.positive is None and self.springs is None:
+            raise ValueError("needs 'positive', a spring of leaves, or 'springs' that are bought")
+        if self.positive is not None and self.springs is not None:
+            raise ValueError("give either 'positive', a spring of leaves, or 'springs' that are bought")
+        return self
+
+    @property
+    def flexures(self) -> Positive:
+        """The structure of leaves.
+
+        Raises
+        ------
+        TypeError
+            If the spring is bought: ask `springs` first.
+        """
+        if self.positive is None:
+            raise TypeError("the springs of this mechanism are bought")
+        return self.positive
+
+    @property
+    def kinds(self) -> tuple[str, str]:
+        """Structure of the spring, "springs" where it is bought, and of the leaves."""
+        return "springs" if self.positive is None else self.positive.structure, self.bistable.structure
 
     @property
     def allowable_stress(self) -> float | None:
@@ -160,7 +232,20 @@ class VcfmDesign(DesignBlock):
     )
     stroke: PositiveLength = Field(description="travel over which it is constant")
     preload: PositiveLength | None = Field(None, description="preload that raises it by that much")
-    rise: PositiveLength | None = Field(None, description="of the leaves, h; instead of 'preload'")
+    rise: PositiveLength | None = Field(
+        None,
+        description="of the leaves, h; instead of 'preload'. Of bought springs, whose rate decides it: the largest",
+    )
+    catalogue: Catalogue = Field(
+        (),
+        description="springs to pick instead of a diamond: a list, a CSV file beside the specification, or `generic`",
+    )
+    spring_room: PositiveLength | None = Field(
+        None, description="place for a spring of the catalogue: a longer one, relaxed, is not taken"
+    )
+    spring_life: Life | None = Field(
+        None, description="cycles that a spring of the catalogue must last; one whose life is not known is not taken"
+    )
     leaf_length: PositiveLength | None = Field(None, description="L2 to take; default: the shortest within the stress")
     min_thickness: PositiveLength | None = Field(None, description="thinnest leaf that can be made")
     max_span: PositiveLength | None = Field(
@@ -171,7 +256,7 @@ class VcfmDesign(DesignBlock):
 
     @model_validator(mode="after")
     def _one_length(self) -> Self:
-        if (self.preload is None) == (self.rise is None):
+        if self.preload is not None and self.rise is not None:
             raise ValueError(
                 "give either 'preload' or 'rise': one follows from the other, rise = force/adjustment preload"
             )
@@ -254,7 +339,9 @@ class VcfmSpec(Spec):
     @model_validator(mode="after")
     def _is_cut_from_one_sheet(self) -> Self:
         part = self.mechanism
-        widths = {"bistable.width": part.bistable.width, "positive.width": part.positive.width}
+        widths = {"bistable.width": part.bistable.width}
+        if part.positive is not None:
+            widths["positive.width"] = part.positive.width
         if self.design is not None and part.part is not None and part.part.sheet is not None:
             refuse("Spec", {("mechanism", "part", "sheet"): "a design finds both widths: drop the sheet, or 'design'"})
         refuse("Spec", sheet_faults(part.part, widths))
@@ -262,7 +349,7 @@ class VcfmSpec(Spec):
 
     @model_validator(mode="after")
     def _truss_has_two_laws(self) -> Self:
-        kinds = self.mechanism.positive.structure, self.mechanism.bistable.structure
+        kinds = self.mechanism.kinds
         if self.analysis.fidelity == "truss" and kinds != ("diamond", "v-beam"):
             raise ValueError("the truss laws are for 'diamond' and 'v-beam'; choose another 'analysis.fidelity'")
         return self
@@ -282,9 +369,18 @@ class VcfmSpec(Spec):
 
     @model_validator(mode="after")
     def _design_has_laws(self) -> Self:
-        kinds = self.mechanism.positive.structure, self.mechanism.bistable.structure
-        if self.design is not None and kinds != ("diamond", "v-beam"):
-            raise ValueError("only 'diamond' and 'v-beam' can be designed; remove 'design'")
+        if self.design is None:
+            return self
+        spring, leaves = self.mechanism.kinds
+        if leaves != "v-beam" or (spring not in ("diamond", "springs") and not self.design.catalogue):
+            raise ValueError("only 'v-beam' with a 'diamond' or with 'springs' can be designed; remove 'design'")
+        free = spring == "springs" or bool(self.design.catalogue)
+        if not free and self.design.preload is None and self.design.rise is None:
+            raise ValueError(
+                "'design' needs either 'preload' or 'rise': one follows from the other, rise = force/adjustment preload"
+            )
+        if free and not self.design.catalogue and (self.design.spring_life or self.design.spring_room):
+            raise ValueError("'spring_life' and 'spring_room' are of springs that are picked: they need a 'catalogue'")
         return self
 
     @property

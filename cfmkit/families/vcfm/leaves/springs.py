@@ -1,4 +1,4 @@
-"""Positive-stiffness structures as closed forms: diamond, folded, U-shaped and straight beams; rules for the preload.
+"""Positive-stiffness structures as closed forms: diamond, folded, U-shaped and straight beams, bought springs; preload.
 
 All are given for the whole structure: two chains of the diamond or of U-shaped beams, four of folded beams, one
 straight beam with a leaf to either side. A chain is two leaves in series, each taking half of the compression.
@@ -148,7 +148,32 @@ class StraightSpring:
         return strip.bending / strip.length**2, s_force(0.0, strip.thickness / strip.length, travel)
 
 
-Spring = Diamond | UShape | StraightSpring
+@dataclass(frozen=True)
+class Coils:
+    """Bought helical springs, all of them together: straight in their deflection, and slack without any.
+
+    Attributes
+    ----------
+    stiffness : float
+        Of all [N/m].
+    tension : float
+        Force at which they begin to open [N].
+    """
+
+    stiffness: float
+    tension: float = 0.0
+
+    def force(self, compression: Any) -> FloatArray:
+        """Return the force [N] at a deflection [m]; none where it is not positive."""
+        deflection = np.asarray(compression, dtype=float)
+        return np.where(deflection > 0, self.tension + self.stiffness * deflection, 0.0 * deflection)
+
+    def stress(self, compression: Any) -> FloatArray:
+        """Return zero: the wire is not of the mechanism's material (`wire_stress_max` is its stress)."""
+        return 0.0 * np.asarray(compression, dtype=float)
+
+
+Spring = Diamond | UShape | StraightSpring | Coils
 
 
 def folded(strip: Strip, share: Any = 1.0) -> Diamond:
