@@ -72,8 +72,21 @@ class Around:
         return f"{self.springs.count} x {self.springs.name or 'the spring'}"
 
 
+    def rank(self, wanted: VcfmDesign) -> tuple[float, float, int]:
+        """Return what springs that fit are sorted by: how far below the limit, length of leaves [m], number."""
+        below = 0.0
+        if wanted.rise is not None:
+            below = 1.0 - self.target.height / wanted.rise
+        elif wanted.preload is not None:
+            below = 1.0 - self.target.preload_stroke / wanted.preload
+        return round(below, 6), float(self.leaf.length), self.springs.count
+
+
 def with_bought_springs(spec: VcfmSpec, target: VcfmDesign) -> Design:
-    """Return the design with the shortest leaves around springs of the catalogue, or around those of the mechanism.
+    """Return the design with leaves around springs of the catalogue, or around those of the mechanism.
+
+    Of springs that fit the one is taken whose rise, or preload, comes nearest to the largest that is allowed; where
+    neither is limited, the one with the shortest leaves.
 
     Parameters
     ----------
@@ -89,8 +102,10 @@ def with_bought_springs(spec: VcfmSpec, target: VcfmDesign) -> Design:
     """
     try:
         check_guide(spec)
+        if target.rise is not None:
+            thickness_for(target)  # what the largest rise does not allow no spring does
         tried = [_around(spec, target, springs, offer) for springs, offer in _choices(spec, target)]
-        fitting = sorted((one for one in tried if isinstance(one, Around)), key=lambda one: float(one.leaf.length))
+        fitting = sorted((one for one in tried if isinstance(one, Around)), key=lambda one: one.rank(target))
         missed = [one for one in tried if isinstance(one, Miss)]
         if not target.refine and fitting:
             return _made(spec, target, fitting[0])

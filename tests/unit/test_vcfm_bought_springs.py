@@ -1,0 +1,146 @@
+"""Bought springs beside snap-through leaves: their law in every model, their choice, and what is said of them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import cfmkit
+from cfmkit.errors import SpecError
+from cfmkit.families import family
+from cfmkit.families.base import Run
+from cfmkit.families.vcfm.leaves.springs import Coils
+from cfmkit.stock.springs.catalogue import generic
+
+CONFIG = Path(__file__).parents[2] / "configs" / "vcfm_bought_springs.yaml"
+
+
+@pytest.fixture(scope="module")
+def spec():
+    return cfmkit.load(CONFIG)
+
+
+def designed(spec, **changes):
+    changes = {f"design.{key}": value for key, value in changes.items()}
+    return family("vcfm").design(spec.replace({"design.refine": False} | changes), Run())
+
+
+def test_springs_add_their_rate_and_nothing_below_their_free_length():
+    law = Coils(1000.0, 2.0)
+    assert law.force(np.array([-1e-3, 0.0, 1e-3])) == pytest.approx([0.0, 0.0, 3.0])
+    assert not law.stress(np.array([1e-3])).any()
+
+
+def test_a_diamond_of_the_same_rate_gives_the_same_curve(spec):
+    """The leaves do not know what pushes back."""
+    found = cfmkit.analyze(spec)
+    rate = found.values["positive_stiffness"].value
+    leaf = {"length": "30 mm", "angle": "7 deg", "thickness": "1.5 mm", "width": 0.01, "structure": "diamond"}
+    plain = spec.replace({"mechanism.springs": None, "mechanism.positive": leaf, "design": None})
+    width = 0.01 * rate / cfmkit.analyze(plain).values["positive_stiffness"].value
+    same = cfmkit.analyze(plain.replace({"mechanism.positive.width": width}))
+    assert same.curve.effort == pytest.approx(found.curve.effort, rel=1e-9, abs=1e-9)
+    assert same.values["constant_force"].value == pytest.approx(found.values["constant_force"].value, rel=1e-9)
+
+
+def test_the_exact_model_takes_the_springs_as_they_are(spec):
+    exact = cfmkit.analyze(spec.replace({"analysis.fidelity": "exact"}))
+    springs = spec.mechanism.springs
+    assert exact.values["positive_stiffness"].value == pytest.approx(2 * springs.rate, rel=1e-12)
+    assert exact.values["spring_stress_max"].value is None
+    place = exact.curve.motion - 0.002
+    middle = int(np.argmin(np.abs(place)))
+    pressed = exact.curve.extra["spring_force"].values[middle]
+    assert pressed == pytest.approx(2 * springs.rate * exact.curve.motion[middle], rel=1e-12)
+
+
+def test_the_wire_bears_travel_and_preload_together(spec):
+    found, springs = cfmkit.analyze(spec), spec.mechanism.springs
+    most = 4.754e-3 + 1.92e-3
+    assert found.values["spring_deflection_max"].value == pytest.approx(most, rel=1e-12)
+    wound = springs.wound.wound("compression")
+    assert found.values["wire_stress_max"].value == pytest.approx(wound.stress(springs.rate * most), rel=1e-12)
+    (count,) = [column.values for column in found.tables["parts"]().columns if column.name == "count"]
+    assert list(count) == [2]
+
+
+def test_slack_and_overstretched_springs_are_told(spec):
+    pulled = cfmkit.analyze(spec.replace({"analysis.preloads": (0.0, -1e-3)}))
+    assert "spring_slack" in {item.name for item in pulled.warnings}
+    assert pulled.load_cases[0].motion[0] == 0.0  # the shuttle rests where it was made: slack springs do not pull
+    over = cfmkit.analyze(spec.replace({"mechanism.springs.max_elongation": "6 mm"}))
+    (told,) = [item.message for item in over.warnings if item.name == "spring_overstretched"]
+    assert "deflected by 6.674 mm, their limit is 6 mm, reached at 4.08 mm of travel" in told
+
+
+def test_the_initial_tension_of_extension_springs_carries_a_part_of_the_force(spec):
+    rate = generic("compression")[0].rate
+    offer = {"name": "pull", "kind": "extension", "stiffness": f"{rate / 1000} N/mm", "initial_tension": "1 N"}
+    hung = spec.replace({"mechanism.springs": {"kind": "extension", "stiffness": "1 N/mm"}})
+    found = designed(hung, catalogue=(offer | {"counts": (1, 2)},), rise=None, preload=None, spring_room=None)
+    made = found.spec.mechanism
+    total = made.springs.count * made.springs.rate
+    h = made.bistable.length * np.sin(made.bistable.angle)
+    assert total * h + made.springs.count == pytest.approx(11.15, rel=1e-9)
+    assert cfmkit.analyze(found.spec).values["constant_force"].value == pytest.approx(11.15, rel=1e-9)
+
+
+@pytest.mark.parametrize("rise", [4.5e-3, 6e-3])
+def test_of_generic_springs_the_one_nearest_to_the_largest_rise_is_taken(spec, rise):
+    found = designed(spec, rise=rise)
+    made = found.spec.mechanism
+    h = made.bistable.length * np.sin(made.bistable.angle)
+    most = cfmkit.analyze(found.spec).values["spring_deflection_max"].value
+    # springs with a rise between this one and the limit are too long, or are deflected too far
+    nearer = [
+        one
+        for one in generic("compression")
+        for count in one.counts
+        if h * (1 + 1e-6) < 11.15 / (one.rate * count) <= rise
+    ]
+    assert h <= rise
+    assert all(one.free_length > 30e-3 or one.largest < most for one in nearer)
+    assert made.springs.free_length <= 30e-3
+    assert made.springs.max_elongation >= most
+    assert "the rise of the leaves follows from their rate" in found.message
+
+
+def test_where_none_fits_the_nearest_three_are_told(spec):
+    soft = [
+        {"name": f"s{k}", "kind": "compression", "stiffness": f"{k} N/mm", "counts": (1,)} for k in (1, 2, 30, 40, 50)
+    ]
+    found = designed(spec, catalogue=tuple(soft))
+    assert found.status.exit_code == 4
+    assert "1 x s2: too soft, they need a rise of 5.575 mm ('design.rise' 4.5 mm)" in found.message
+    assert "2 others miss more" in found.message
+    torsion = ({"name": "t", "kind": "torsion", "rate": "1 N*mm/rad"},)
+    assert "it lists no spring of the kind that is wanted" in designed(spec, catalogue=torsion).message
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ({"mechanism.springs": None}, "needs 'positive', a spring of leaves, or 'springs' that are bought"),
+        ({"mechanism.springs.initial_tension": "1 N"}, "compression springs have none"),
+        ({"analysis.fidelity": "truss"}, "truss laws are for 'diamond'"),
+        ({"design.catalogue": (), "design.spring_life": 1e5}, "they need a 'catalogue'"),
+        ({"design.preload": "2 mm"}, "give either 'preload' or 'rise'"),
+        (
+            {"mechanism.positive": {"length": "30 mm", "thickness": "1 mm", "width": "1 mm"}},
+            "give either 'positive', a spring of leaves, or 'springs' that are bought",
+        ),
+    ],
+)
+def test_what_contradicts_itself_is_refused(spec, changes, told):
+    with pytest.raises(SpecError, match=told):
+        spec.replace(changes)
+
+
+@pytest.mark.slow
+def test_the_refined_design_keeps_force_and_stress_by_the_exact_model(spec):
+    found = family("vcfm").design(spec, Run())
+    exact = cfmkit.analyze(found.spec.replace({"analysis.fidelity": "exact"}))
+    assert exact.values["window_force"].value == pytest.approx(11.15, rel=2e-3)
+    assert exact.values["travel_stress_max"].value <= 30e6 * 1.0002
