@@ -71,7 +71,6 @@ class Around:
         """Number and name."""
         return f"{self.springs.count} x {self.springs.name or 'the spring'}"
 
-
     def rank(self, wanted: VcfmDesign) -> tuple[float, float, int]:
         """Return what springs that fit are sorted by: how far below the limit, length of leaves [m], number."""
         below = 0.0
@@ -158,18 +157,24 @@ def _around(spec: VcfmSpec, target: VcfmDesign, springs: BoughtSprings, offer: O
     if left <= 0:
         return Miss(label, law.tension / target.force, "their initial tension alone is more than the force")
     rise, preload = left / law.stiffness, (target.adjustment or 0.0) / law.stiffness
-    for name, value, limit in (("rise", rise, target.rise), ("preload", preload, target.preload)):
-        if limit is not None and value > limit * (1 + 1e-9):
-            return Miss(
-                label, value / limit - 1.0, f"too soft, they need a {name} of {mm(value)} ('design.{name}' {mm(limit)})"
-            )
     reachable = 4.0 * rise / 3.0
-    if target.stroke >= reachable:
-        return Miss(
-            label,
-            target.stroke / reachable - 1.0,
+    ratios = [
+        (
+            target.stroke / reachable * (1 + 2e-9),
             f"too stiff, a rise of {mm(rise)} gives less than {mm(reachable)} of stroke",
-        )
+        ),
+        *(
+            (value / limit, f"too soft, they need a {name} of {mm(value)} ('design.{name}' {mm(limit)})")
+            for name, value, limit in (("rise", rise, target.rise), ("preload", preload, target.preload))
+            if limit is not None
+        ),
+    ]
+    if springs.free_length is not None and target.spring_room is not None:
+        told = f"too long, {mm(springs.free_length)} relaxed ('design.spring_room' {mm(target.spring_room)})"
+        ratios.append((springs.free_length / target.spring_room, told))
+    worst, told = max(ratios)
+    if worst > 1 + 1e-9:
+        return Miss(label, worst - 1.0, told)
     own = target.model_copy(update={"force": left, "rise": rise, "preload": preload or None})
     try:
         thickness = thickness_for(own)
@@ -195,7 +200,6 @@ def _missed(spec: VcfmSpec, target: VcfmDesign, found: Around, offer: Offer | No
     most = float(found.linear[1]) + own.preload_stroke
     limits = (
         ("deflected by", most, springs.max_elongation, "they allow"),
-        ("long", springs.free_length, target.spring_room, "'design.spring_room' is"),
         ("between the walls", 2.0 * float(leaf.reach), target.max_span, "'design.max_span' is"),
         ("wide leaves", float(leaf.width), target.max_width, "'design.max_width' is"),
         ("thick leaves, buckling out of the plane", SQUAT * leaf.thickness, float(leaf.width), "their width is"),
