@@ -5,9 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from cfmkit.families.findings import mm, newton, rate
-from cfmkit.stock.parts import Part
+from cfmkit.stock.parts_list import Part
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from cfmkit.families.vcfm.solution import Solution
     from cfmkit.families.vcfm.spec import VcfmSpec
 
 
@@ -27,3 +30,26 @@ def parts_of(spec: VcfmSpec) -> tuple[Part, ...]:
         data.append(f"wire {mm(wire.wire)}, mean coil {mm(wire.coil)}, {wire.turns:g} turns")
     place = "below the shuttle" if springs.kind == "compression" else "above the shuttle"
     return (Part(place, springs.name or "", springs.count, ", ".join(data)),)
+
+
+def spring_faults(solution: Solution) -> Iterator[tuple[str, str]]:
+    """Yield (name, what is wrong) of bought springs over the travel and all preloads."""
+    springs = solution.spec.mechanism.springs
+    if springs is None:
+        return
+    worst = max(solution.pushes, key=lambda push: push.preload)
+    most, limit = float(worst.travel[-1]) + worst.preload, springs.max_elongation
+    if limit and most > limit * (1 + 1e-9):
+        place = f"at {mm(limit - worst.preload)} of travel" if limit > worst.preload else "by the preload alone"
+        yield (
+            "spring_overstretched",
+            f"with a preload of {mm(worst.preload)} the springs are deflected by {mm(most)}, their limit is "
+            f"{mm(limit)}, reached {place} ('mechanism.springs.max_elongation')",
+        )
+    least = min(push.preload for push in solution.pushes)
+    if least < 0:
+        yield (
+            "spring_slack",
+            f"with a preload of {mm(least)} the springs carry nothing up to {mm(-least)} of travel: bought springs do "
+            "not pull back",
+        )

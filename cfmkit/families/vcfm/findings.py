@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.families.findings import at_least, at_most, finder, mm, mpa, newton, percent, rate
+from cfmkit.families.vcfm.bought_parts import spring_faults
 from cfmkit.families.vcfm.build import spring_room
 from cfmkit.families.vcfm.leaves.hybrid import HybridLeaf
 from cfmkit.families.vcfm.leaves.s_form import POLE
@@ -296,24 +297,8 @@ def _preloads(solution: Solution) -> Iterator[Finding]:
 
 
 def _bought_springs(solution: Solution) -> Iterator[Finding]:
-    springs = solution.spec.mechanism.springs
-    if springs is None:
-        return
-    worst = max(solution.pushes, key=lambda push: push.preload)
-    most, limit = float(worst.travel[-1]) + worst.preload, springs.max_elongation
-    if limit and most > limit * (1 + ROUNDING):
-        yield finding(
-            "spring_overstretched",
-            f"with a preload of {mm(worst.preload)} the springs are deflected by {mm(most)}, their limit is "
-            f"{mm(limit)}, reached at {mm(limit - worst.preload)} of travel ('mechanism.springs.max_elongation')",
-        )
-    least = min(push.preload for push in solution.pushes)
-    if least < 0:
-        yield finding(
-            "spring_slack",
-            f"with a preload of {mm(least)} the springs carry nothing up to {mm(-least)} of travel: bought springs do "
-            "not pull back",
-        )
+    for name, told in spring_faults(solution):
+        yield finding(name, told)
 
 
 def _strength(solution: Solution) -> Iterator[Finding]:

@@ -23,7 +23,7 @@ from cfmkit.families.vcfm.solution import Characteristics, LeafSamples, Push, So
 from cfmkit.numerics.bracketing import last_places
 from cfmkit.numerics.roots import bracketed_root
 from cfmkit.results import Result, Status
-from cfmkit.stock.parts import listed
+from cfmkit.stock.parts_list import listed
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
