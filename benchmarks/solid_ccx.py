@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 import cfmkit
-from cfmkit.families.base import function_named
+from cfmkit import api
 
 SPECS = {
     "configs/vcfm_u_shape.yaml": ["analysis.travel=0.8 mm"],
@@ -45,22 +45,11 @@ def by_ccx(data: bytes) -> tuple[float, float]:
 def by_cfmkit(spec: cfmkit.Spec) -> list[float]:
     """Return the same of every part of a specification, in the order of its decks."""
     found = []
-
-    def noted(name: str, part: object, meshed: object, travel: float, poses: int) -> bytes:
-        course = meshed.followed((travel * np.linspace(0, 1, poses)).tolist()).course  # type: ignore[attr-defined]
-        supports = meshed.problem.supports  # type: ignore[attr-defined]
-        pose = course.poses[-1]
-        forces = meshed.problem.elements.forces(supports.displaced(pose.unknowns, pose.travel))  # type: ignore[attr-defined]
+    for one in api.elastic_parts(spec):
+        solved = one.part.meshed(one.size).followed(np.linspace(0.0, one.stops[-1], len(one.stops)).tolist())
+        supports, pose = solved.problem.supports, solved.course.poses[-1]
+        forces = solved.problem.elements.forces(solved.moved(pose))
         found.append(float(np.hypot(*supports.reactions(pose.unknowns, pose.travel, forces)[:, :2].T).max()))
-        return b""
-
-    import cfmkit.solid.input_deck as decks
-
-    own, decks.deck = decks.deck, noted
-    try:
-        function_named(cfmkit.families.family(spec.family).decks)(spec)
-    finally:
-        decks.deck = own
     return found
 
 

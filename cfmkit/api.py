@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from cfmkit.metrics import Outcome, Window
     from cfmkit.results import Design, Quantity, Result
     from cfmkit.runs.notebook import Analysis
+    from cfmkit.solid.two_meshes import DrivenPart
     from cfmkit.specs.spec import Spec
     from cfmkit.studies.outcome import StudyResult
     from cfmkit.studies.suggest.search import Suggestions
@@ -421,10 +422,19 @@ def drawn_files(
 def _decks(spec: Spec) -> dict[str, bytes]:
     """Return the elastic parts as decks of a finite-element solver."""
     record = family(spec.family)
-    if record.decks is None:
+    if record.elastic_parts is None:
         raise UsageError(f"--format inp: {record.phrase} has no elastic part to be solved")
-    made: dict[str, bytes] = function_named(record.decks)(spec)
-    return made
+    from cfmkit.solid.input_deck import deck
+
+    return {f"{one.name}.inp": deck(f"{spec.name}, {one.name}", one) for one in elastic_parts(spec)}
+
+
+def elastic_parts(spec: AnySpec) -> tuple[DrivenPart, ...]:
+    """Return the parts of a mechanism that are solved as planar solids; none where its family has none."""
+    spec = spec_of(spec)
+    record = family(spec.family)
+    found: tuple[DrivenPart, ...] = function_named(record.elastic_parts)(spec) if record.elastic_parts else ()
+    return found
 
 
 def _formats(given: str | Sequence[str] | None, usual: Sequence[str]) -> tuple[str, ...]:

@@ -334,9 +334,9 @@ class Family:
         ``"module:function"``, ``propose(wish, run) -> Offer``: what the family could do with a wish, by scaling laws.
     room : str, optional
         ``"module:function"``, ``room(result) -> Room``: the box that a solved mechanism stays in.
-    decks : str, optional
-        ``"module:function"`` with ``function(spec) -> {name: bytes}``: decks of a finite-element solver of the elastic
-        parts, imported when exporting.
+    elastic_parts : str, optional
+        ``"module:function"`` with ``function(spec) -> (DrivenPart, ...)``: what is solved as planar solids, for decks
+        of finite-element solvers; imported when exporting.
     headline : tuple of str
         Values and metrics that are shown first after a run, in this order.
     branches : tuple of str
@@ -371,7 +371,7 @@ class Family:
     draw: str | None = None
     scheme: str | None = None
     outline: str | None = None
-    decks: str | None = None
+    elastic_parts: str | None = None
     propose: str | None = None
     room: str | None = None
     headline: tuple[str, ...] = ()

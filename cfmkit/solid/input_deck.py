@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.solid.meshed_part import Meshed, Part
     from cfmkit.solid.rigid_groups import Group
+    from cfmkit.solid.two_meshes import DrivenPart
 
 THIN = 0.1
 """Width of the deck's elements, in the thinnest place of the part at most: within 6e-4 of plane stress then."""
@@ -26,22 +27,19 @@ ROW = 12
 """Numbers on a line of a set."""
 
 
-def deck(name: str, part: Part, meshed: Meshed, travel: float, poses: int) -> bytes:
-    """Return a deck that runs as it is.
+def deck(name: str, driven: DrivenPart) -> bytes:
+    """Return a deck of the finer mesh that runs as it is.
 
     Parameters
     ----------
     name : str
         For its heading.
-    part : Part
-    meshed : Meshed
-        Of it.
-    travel : float
-        To which the drive goes [m or rad].
-    poses : int
-        Increments of the step, evenly.
+    driven : DrivenPart
+        Its travel is taken in as many even increments as it has stops.
     """
-    return ("\n".join(_lines(name, part, meshed, travel, poses)) + "\n").encode("ascii", "replace")
+    part, stops = driven.part, driven.stops
+    lines = _lines(name, part, part.meshed(driven.size), stops[-1], len(stops))
+    return ("\n".join(lines) + "\n").encode("ascii", "replace")
 
 
 def _lines(name: str, part: Part, meshed: Meshed, travel: float, poses: int) -> Iterator[str]:

@@ -178,20 +178,24 @@ class MeshSolution:
         return read_only(stresses), read_only(places)
 
     def differences(self, coarse: MeshSolution) -> tuple[float, float]:
-        """Return by how much a coarser mesh differs at the poses of both: in force and in largest stress.
+        """Return by how much a coarser mesh differs at the poses of both: in force and in their largest stresses.
 
-        Both in parts of this one's largest.
+        Both in parts of this one's largest. All poses count: at a single one two meshes may agree by chance.
         """
         _, own, other = np.intersect1d(self.course.travel, coarse.course.travel, return_indices=True)
         force = np.array([self.course.poses[k].effort for k in own])
-        apart = float(np.abs(force - [coarse.course.poses[k].effort for k in other]).max(initial=0.0))
-        largest, peak = float(np.abs(force).max(initial=0.0)), float(self.peaks[0][own].max(initial=0.0))
-        stress = abs(float(coarse.peaks[0][other].max(initial=0.0)) / peak - 1.0) if peak else 0.0
-        return apart / largest if largest else 0.0, stress
+        there = np.array([coarse.course.poses[k].effort for k in other])
+        return _apart(force, there), _apart(self.peaks[0][own], coarse.peaks[0][other])
 
     def moved(self, pose: Any) -> FloatArray:
         """Return the displacements of all nodes at a pose (n, 2) [m]."""
         return self.problem.supports.displaced(pose.unknowns, pose.travel)
+
+
+def _apart(values: FloatArray, others: FloatArray) -> float:
+    """Return the largest difference of values, in parts of the largest of the first; 0 where that is 0."""
+    largest = float(np.abs(values).max(initial=0.0))
+    return float(np.abs(values - others).max()) / largest if largest else 0.0
 
 
 def rings_of(contours: Sequence[Contour], sagitta: float = 1e-6) -> tuple[Ring, ...]:

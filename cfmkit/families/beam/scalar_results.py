@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.families.beam.build import thickest_of
+from cfmkit.families.mesh_values import DEFINITIONS as OF_MESHES
 from cfmkit.numerics.cubic import bisect, crossing, first_extreme, value_at
 from cfmkit.results import Quantity
 from cfmkit.specs.units import between
@@ -60,8 +61,7 @@ DEFINITIONS = {
     "frequency_free_min": ("frequency", "lowest natural frequency in the window while the drive is free to move"),
     "peak_stress_x": ("length", "x of the place of the largest stress in the window, on the part before any load"),
     "peak_stress_y": ("length", "y of that place"),
-    "mesh_force_difference": ("ratio", "largest difference of the force on two meshes over the largest force"),
-    "mesh_stress_difference": ("ratio", "difference of the largest stress on two meshes over that on the finer one"),
+    **OF_MESHES,
     "strain_energy_max": ("energy", "largest strain energy on the path, of all copies"),
 }
 

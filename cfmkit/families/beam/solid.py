@@ -36,9 +36,7 @@ if TYPE_CHECKING:
     from cfmkit.families.beam.spec import BeamSpec
     from cfmkit.results import Finding
     from cfmkit.solid.meshed_part import MeshSolution, Part
-
-FORCE_APART, STRESS_APART = 2e-3, 0.05
-"""Differences of two meshes from which on they are called coarse: a tenth of what parts differ from beams by."""
+    from cfmkit.solid.two_meshes import DrivenPart, MeshError, TwoMeshes
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,21 +47,24 @@ class SolidSolution:
     ----------
     assembly : Assembly
         The network that the part is drawn from.
-    fine, coarse : MeshSolution
-        The finer mesh, whose values are reported, and the one that it is compared with.
+    meshes : TwoMeshes
     motion : (n,) array
         Travel of the points of the curve [m or rad].
     """
 
     assembly: Assembly
-    fine: MeshSolution
-    coarse: MeshSolution
+    meshes: TwoMeshes
     motion: FloatArray = field(default_factory=lambda: np.zeros(0))
 
     @property
     def spec(self) -> BeamSpec:
         """The specification."""
         return self.assembly.spec
+
+    @property
+    def fine(self) -> MeshSolution:
+        """The finer mesh, whose values are reported."""
+        return self.meshes.fine
 
     @property
     def copies(self) -> int:
@@ -112,9 +113,9 @@ class SolidSolution:
         return float(stresses[pose]), places[pose]
 
     @cached_property
-    def differences(self) -> tuple[float, float]:
-        """Of force and of largest stress, between the meshes, in parts of the finer one's largest."""
-        return self.fine.differences(self.coarse)
+    def error(self) -> MeshError:
+        """What the two meshes differ by."""
+        return self.meshes.error
 
 
 def analyze(spec: BeamSpec, run: Run) -> Result:
@@ -132,32 +133,24 @@ def analyze(spec: BeamSpec, run: Run) -> Result:
     Result
         PARTIAL if the path ends before the travel, NO_EQUILIBRIUM if there is no first pose.
     """
-    from cfmkit.solid.meshed_part import ACROSS, COARSER
     from cfmkit.solid.path_following import Ending
 
     assembly = assemble(spec)
-    size = spec.analysis.solid.mesh or _thinnest(assembly) / ACROSS
-    stops = _stops(spec)
     try:
-        part = part_of(spec, assembly)
-        every_second = [*stops[:-1:2], stops[-1]]
-        coarse = part.meshed(COARSER * size).followed(
-            every_second, lambda share: run.progress(0.35 * share, "coarser mesh")
-        )
-        fine = part.meshed(size).followed(stops, lambda share: run.progress(0.35 + 0.65 * share, "finer mesh"))
+        meshes = driven_part(spec, assembly).solved(run.progress)
     except GeometryError as error:
         message = f"the part cannot be meshed: {error}; look at analysis.solid.mesh and mechanism.part"
         return Result(resolve(spec), Status.NO_EQUILIBRIUM, message)
-    if min(len(one.course.poses) for one in (fine, coarse)) < 2:
-        why = next(one.course.ending.value for one in (coarse, fine) if len(one.course.poses) < 2)
+    if why := meshes.no_curve(2):
         keys = ", ".join(f"mechanism.nodes.{name}.support" for name in spec.mechanism.nodes)
         message = f"no curve: {why}; look at mechanism.drive, {keys}, analysis.solid.mesh"
         return Result(resolve(spec), Status.NO_EQUILIBRIUM, message)
     asked = np.linspace(0.0, spec.extent, spec.analysis.points)
     forwards = np.sign(spec.extent)
-    reached = forwards * asked <= forwards * fine.course.travel[-1] * (1 + 1e-12)
-    solution = SolidSolution(assembly, fine, coarse, read_only(asked[reached]))
-    complete = fine.course.ending is Ending.COMPLETE
+    course = meshes.fine.course
+    reached = forwards * asked <= forwards * course.travel[-1] * (1 + 1e-12)
+    solution = SolidSolution(assembly, meshes, read_only(asked[reached]))
+    complete = course.ending is Ending.COMPLETE
     return Result(
         spec=resolve(spec),
         status=Status.COMPLETE if complete else Status.PARTIAL,
@@ -185,16 +178,19 @@ def part_of(spec: BeamSpec, assembly: Assembly) -> Part:
     return Part(rings_of(cut), _thinnest(assembly), width, law, tuple(places))
 
 
-def decks(spec: BeamSpec) -> dict[str, bytes]:
-    """Return the part as an input deck of a finite-element solver, by file name."""
-    from cfmkit.solid.input_deck import deck
+def driven_part(spec: BeamSpec, assembly: Assembly) -> DrivenPart:
+    """Return the part with the travels that it is solved for."""
     from cfmkit.solid.meshed_part import ACROSS
+    from cfmkit.solid.two_meshes import DrivenPart
 
+    part = part_of(spec, assembly)
+    return DrivenPart("beams", part, spec.analysis.solid.mesh or part.thinnest / ACROSS, tuple(_stops(spec)))
+
+
+def elastic_parts(spec: BeamSpec) -> tuple[DrivenPart, ...]:
+    """Return what is solved of a mechanism, for decks of other solvers and for studies of meshes."""
     spec = spec.replace({"analysis.fidelity": "solid"})
-    part = part_of(spec, assemble(spec))
-    about = spec.analysis.solid
-    meshed = part.meshed(about.mesh or part.thinnest / ACROSS)
-    return {"beams.inp": deck(spec.name, part, meshed, spec.extent, about.poses)}
+    return (driven_part(spec, assemble(spec)),)
 
 
 def _thinnest(assembly: Assembly) -> float:
@@ -261,8 +257,7 @@ def _values(solution: SolidSolution) -> Mapping[str, Quantity]:
     """Return the scalar results by name; None where the model does not know a value."""
     numbers: dict[str, float | None] = dict.fromkeys(DEFINITIONS) | {
         "allowable_stress": solution.assembly.allowable_stress,
-        "mesh_force_difference": solution.differences[0],
-        "mesh_stress_difference": solution.differences[1],
+        **solution.error.values(),
     }
     if solution.worst is not None:
         numbers["peak_stress_x"], numbers["peak_stress_y"] = solution.worst[1].tolist()
@@ -282,13 +277,8 @@ def _findings(solution: SolidSolution) -> Iterator[Finding]:
         yield finding(
             "sharp_corners", "without fillets the stress in inside corners has no value", "mechanism.part.fillet=0.5 mm"
         )
-    force, stress = solution.differences
-    if force > FORCE_APART or stress > STRESS_APART:
-        yield finding(
-            "mesh_coarse",
-            f"two meshes of the part differ by {100 * force:.2g} % in force and {100 * stress:.2g} % in stress: give a "
-            "smaller analysis.solid.mesh",
-        )
+    for name, told in solution.error.too_large():
+        yield finding(name, told)
     allowable = solution.assembly.allowable_stress
     if allowable is not None and solution.worst is not None and solution.worst[0] > allowable:
         largest, spot = solution.worst

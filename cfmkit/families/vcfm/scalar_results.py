@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cfmkit.families.mesh_values import DEFINITIONS as OF_MESHES
 from cfmkit.families.vcfm.build import share_of, strip_of
 from cfmkit.families.vcfm.leaves.springs import measured_stiffness_for
 from cfmkit.families.vcfm.leaves.truss import TrussDiamond, TrussLeaf
@@ -21,12 +22,8 @@ if TYPE_CHECKING:
     from cfmkit.families.vcfm.solution import Push, Solution
 
 
-OF_MESHES = ("mesh_force_difference", "mesh_stress_difference")
-"""Known of solids only."""
-
 DEFINITIONS = {
-    "mesh_force_difference": ("ratio", "largest difference of the force on a coarser mesh, in parts of the largest"),
-    "mesh_stress_difference": ("ratio", "difference of the largest stress on a coarser mesh"),
+    **OF_MESHES,
     "positive_stiffness": ("stiffness", "K_p of the spring as made"),
     "negative_stiffness": ("stiffness", "size of the leaves' negative stiffness: constant where they are buckled"),
     "first_stiffness": ("stiffness", "K_b1 of the leaves as made"),
@@ -98,9 +95,8 @@ def values_of(solution: Solution) -> Mapping[str, Quantity]:
         "travel_stress_max": over_travel,
         "travel_safety_factor": allowed / over_travel if allowed and over_travel else None,
     } | _adjustment(solution)
-    numbers |= getattr(
-        solution.sampler, "mesh_differences", {"mesh_force_difference": None, "mesh_stress_difference": None}
-    )
+    error = getattr(solution.sampler, "mesh_error", None)  # known of solids only
+    numbers |= dict.fromkeys(OF_MESHES) if error is None else error.values()
     return {name: _quantity(name, value) for name, value in numbers.items()} | _bought(solution)
 
 

@@ -25,7 +25,7 @@ from cfmkit.results import Result, Status
 from cfmkit.stock.spec import CutPart
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
     from cfmkit.arrays import FloatArray
     from cfmkit.families.base import Run
@@ -33,11 +33,10 @@ if TYPE_CHECKING:
     from cfmkit.families.vcfm.spec import VcfmSpec
     from cfmkit.results import Finding
     from cfmkit.solid.meshed_part import MeshSolution, Part
+    from cfmkit.solid.two_meshes import DrivenPart
 
 GATHERED = 1.5
 """Poses stand at (k/n) to this power of the travel: the peak of thin leaves is within its first twentieth."""
-FORCE_APART, STRESS_APART = 2e-3, 0.05
-"""Differences of two meshes from which on they are called coarse."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,16 +46,10 @@ class SolidPath:
     Attributes
     ----------
     solved : MeshSolution
-        The finer mesh.
-    coarse : MeshSolution or None
-        The coarser one, where there is one.
-    end : float
-        How far it was to go [m], of either sign.
+        The finer mesh, where there are two.
     """
 
     solved: MeshSolution
-    coarse: MeshSolution | None
-    end: float
 
     @property
     def edges(self) -> tuple[float, ...]:
@@ -99,11 +92,6 @@ class SolidPath:
         stress = np.where(beyond, np.nan, np.maximum(self._stress(np.abs(inside)), 0.0))
         return force, stress, stable, (np.abs(x) >= abs(first)) & (np.abs(x) <= abs(last))
 
-    @property
-    def differences(self) -> tuple[float, float]:
-        """Of force and of largest stress between the meshes, in parts of the finer one's largest; 0 without two."""
-        return (0.0, 0.0) if self.coarse is None else self.solved.differences(self.coarse)
-
 
 class SolidSampler(ExactSampler):
     """Samples of leaves and spring as solids, over what an analysis needs.
@@ -124,30 +112,19 @@ class SolidSampler(ExactSampler):
         """Mesh and follow leaf and spring."""
         about, preloads, back = spec.mechanism.bistable, spec.analysis.preloads, max(back, 0.02 * end)
         self.each = about.half_beams * (1.0 if about.guided else 0.5)
-        leaf = part_of(spec, solved_leaf(spec))
         self.coils = None if spec.mechanism.springs is None else coils(spec.mechanism.springs)
-        self.pushed = followed(spec, leaf, end, True, lambda part: run.progress(0.6 * part, "leaf"))
-        self.pulled = followed(spec, leaf, -back, False, lambda part: run.progress(0.6 + 0.1 * part, "leaf, back"))
+        leaf, *spring = elastic_parts(spec)
+        leaves = leaf.solved(lambda part, _: run.progress(0.6 * part, "leaf"))
+        self.pushed, self.mesh_error = SolidPath(leaves.fine), leaves.error
+        self.pulled = _pulled(spec, leaf, -back, lambda part: run.progress(0.6 + 0.1 * part, "leaf, back"))
         self.sides, self.problem = [], problem_of("leaves were", (self.pushed, self.pulled), 1.0)
-        if self.coils is not None:
-            return
-        self.chain = spring_chain(spec)
-        spring, share = part_of(spec, solved_spring(spec)), self.chain.travel
-        forth, back_again = share * (max(preloads) + end), share * min(min(preloads) - back, -0.02 * end)
-        press = followed(spec, spring, forth, True, lambda part: run.progress(0.7 + 0.2 * part, "spring"))
-        pull = followed(spec, spring, back_again, False, lambda part: run.progress(0.9 + 0.1 * part, "spring, back"))
-        self.sides = [press, pull]
-        self.problem = self.problem or problem_of("spring was", self.sides, self.chain.travel)
-
-    @property
-    def mesh_differences(self) -> dict[str, float | None]:
-        """Values of what two meshes differ by, the larger of leaf and spring."""
-        leaf = self.pushed.differences
-        spring = self.sides[0].differences if self.sides else (0.0, 0.0)
-        return {
-            "mesh_force_difference": max(leaf[0], spring[0]),
-            "mesh_stress_difference": max(leaf[1], spring[1]),
-        }
+        for one in spring:
+            self.chain = spring_chain(spec)
+            back_again = self.chain.travel * min(min(preloads) - back, -0.02 * end)
+            springs = one.solved(lambda part, _: run.progress(0.7 + 0.2 * part, "spring"))
+            pull = _pulled(spec, one, back_again, lambda part: run.progress(0.9 + 0.1 * part, "spring, back"))
+            self.sides, self.mesh_error = [SolidPath(springs.fine), pull], self.mesh_error.worse(springs.error)
+            self.problem = self.problem or problem_of("spring was", self.sides, self.chain.travel)
 
 
 def part_of(spec: VcfmSpec, piece: SolvedPiece) -> Part:
@@ -171,22 +148,22 @@ def part_of(spec: VcfmSpec, piece: SolvedPiece) -> Part:
     return Part(rings_of((piece.contour,)), about.thickness, about.width, law, (shuttle, *walls))
 
 
-def decks(spec: VcfmSpec) -> dict[str, bytes]:
-    """Return leaf and spring as input decks of a finite-element solver, by file name."""
-    from cfmkit.solid.input_deck import deck
+def elastic_parts(spec: VcfmSpec) -> tuple[DrivenPart, ...]:
+    """Return leaf and, unless it is bought, spring as they are solved, pushed; for decks of other solvers and for studies of meshes, too."""
     from cfmkit.solid.meshed_part import ACROSS
+    from cfmkit.solid.two_meshes import DrivenPart
 
     spec = spec.replace({"analysis.fidelity": "solid"})
     pieces, ends = {"leaf": solved_leaf(spec)}, {"leaf": spec.travel}
     if spec.mechanism.springs is None:
         pieces["spring"] = solved_spring(spec)
         ends["spring"] = spring_chain(spec).travel * (max(*spec.analysis.preloads, 0.0) + spec.travel)
-    found = {}
+    found = []
     for name, piece in pieces.items():
         part = part_of(spec, piece)
-        meshed = part.meshed(spec.analysis.solid.mesh or part.thinnest / ACROSS)
-        found[f"vcfm-{name}.inp"] = deck(f"{spec.name} {name}", part, meshed, ends[name], spec.analysis.solid.poses)
-    return found
+        size = spec.analysis.solid.mesh or part.thinnest / ACROSS
+        found.append(DrivenPart(f"vcfm-{name}", part, size, _stops(spec, ends[name], 1)))
+    return tuple(found)
 
 
 def _seams(polygon: FloatArray) -> tuple[FloatArray, ...]:
@@ -194,17 +171,15 @@ def _seams(polygon: FloatArray) -> tuple[FloatArray, ...]:
     return tuple(np.array([a, b]) for a, b in zip(polygon, np.roll(polygon, -1, axis=0), strict=True))
 
 
-def followed(spec: VcfmSpec, part: Part, end: float, twice: bool, report: Any) -> SolidPath:
-    """Return a part that is followed to a travel [m]: on two meshes, or on one and with a quarter of the poses."""
-    from cfmkit.solid.meshed_part import ACROSS, COARSER
+def _stops(spec: VcfmSpec, end: float, fewer: int) -> tuple[float, ...]:
+    """Return the travels to solve for, up to an end [m]; of the poses wanted one in `fewer`."""
+    count = max(5, spec.analysis.solid.poses // fewer)
+    return tuple((end * np.linspace(0.0, 1.0, count) ** GATHERED).tolist())
 
-    about = spec.analysis.solid
-    size = about.mesh or part.thinnest / ACROSS
-    count = about.poses if twice else max(5, about.poses // 4)
-    stops = (end * np.linspace(0.0, 1.0, count) ** GATHERED).tolist()
-    second = [*stops[:-1:2], stops[-1]]
-    coarse = part.meshed(COARSER * size).followed(second, lambda done: report(0.3 * done)) if twice else None
-    return SolidPath(part.meshed(size).followed(stops, lambda done: report(0.3 + 0.7 * done)), coarse, end)
+
+def _pulled(spec: VcfmSpec, driven: DrivenPart, end: float, report: Callable[[float], None]) -> SolidPath:
+    """Return a part that is pulled back to a travel [m], on one mesh and with a quarter of the poses."""
+    return SolidPath(driven.part.meshed(driven.size).followed(_stops(spec, end, 4), report))
 
 
 def analyze(spec: VcfmSpec, run: Run) -> Result:
@@ -228,10 +203,5 @@ def _findings(spec: VcfmSpec, sampler: SolidSampler) -> Iterator[Finding]:
     if (spec.mechanism.part or CutPart()).fillet == 0:
         told = "without fillets the stress in inside corners has no value"
         yield finding("sharp_corners", told, "mechanism.part.fillet=0.5 mm")
-    force, stress = sampler.mesh_differences.values()
-    if (force or 0.0) > FORCE_APART or (stress or 0.0) > STRESS_APART:
-        yield finding(
-            "mesh_coarse",
-            f"two meshes differ by {100 * (force or 0.0):.2g} % in force and {100 * (stress or 0.0):.2g} % in stress: "
-            "give a smaller analysis.solid.mesh",
-        )
+    for name, told in sampler.mesh_error.too_large():
+        yield finding(name, told)

@@ -40,13 +40,12 @@ if TYPE_CHECKING:
     from cfmkit.families.slider_crank.spec import SliderCrankSpec
     from cfmkit.results import Finding
     from cfmkit.solid.meshed_part import MeshSolution, Part
+    from cfmkit.solid.two_meshes import DrivenPart, MeshError, TwoMeshes
 
 GATHERED = 3.0
 """Poses stand at (k/n) to this power of the travel, and where the stiffness leaps."""
 LARGEST = 4.0
 """Sides of elements in links, in those of flexures: links are stiff, and hardly bend."""
-FORCE_APART, STRESS_APART = 2e-3, 0.05
-"""Differences of two meshes from which on they are called coarse."""
 ELSEWHERE = "the model of the part as a solid does not compute it"
 
 
@@ -58,8 +57,7 @@ class SolidSolution:
     ----------
     spec : SliderCrankSpec
         With every default written out.
-    fine, coarse : MeshSolution
-        The finer mesh, whose values are reported, and the one that it is compared with.
+    meshes : TwoMeshes
     travel : (n,) array
         Of the slider, at the points of the curve [m].
     pins : (3, 2) array
@@ -67,8 +65,7 @@ class SolidSolution:
     """
 
     spec: SliderCrankSpec
-    fine: MeshSolution
-    coarse: MeshSolution
+    meshes: TwoMeshes
     travel: FloatArray
     pins: FloatArray = field(default_factory=lambda: np.zeros((3, 2)))
 
@@ -85,10 +82,15 @@ class SolidSolution:
         found = PchipInterpolator(self.fine.course.travel, self.fine.peaks[0])(self.travel)
         return read_only(np.maximum(found, 0.0))
 
+    @property
+    def fine(self) -> MeshSolution:
+        """The finer mesh, whose values are reported."""
+        return self.meshes.fine
+
     @cached_property
-    def differences(self) -> tuple[float, float]:
-        """Of force and of largest stress, between the meshes, in parts of the finer one's largest."""
-        return self.fine.differences(self.coarse)
+    def error(self) -> MeshError:
+        """What the two meshes differ by."""
+        return self.meshes.error
 
     @property
     def window(self) -> tuple[float, float]:
@@ -109,7 +111,6 @@ def analyze(spec: SliderCrankSpec, run: Run) -> Result:
 
     PARTIAL if the path ends before the travel; NO_EQUILIBRIUM if it cannot be meshed or has no second pose.
     """
-    from cfmkit.solid.meshed_part import ACROSS, COARSER
     from cfmkit.solid.path_following import Ending
 
     try:
@@ -117,12 +118,7 @@ def analyze(spec: SliderCrankSpec, run: Run) -> Result:
         linkage = linkage_of(spec.mechanism)
         unloaded = unloaded_angle(spec.mechanism, linkage)
         spec = as_run(spec, linkage, unloaded)
-        part = part_of(spec)
-        size = spec.analysis.solid.mesh or part.thinnest / ACROSS
-        stops, own = _stops(spec), run.progress
-        second = [*stops[:-1:2], stops[-1]]
-        coarse = part.meshed(COARSER * size).followed(second, lambda share: own(0.3 * share, "coarser mesh"))
-        fine = part.meshed(size).followed(stops, lambda share: own(0.3 + 0.7 * share, "finer mesh"))
+        meshes = driven_part(spec).solved(run.progress)
     except CannotBuild as problem:
         return no_result(spec, problem.finding)
     except GeometryError as error:
@@ -131,13 +127,13 @@ def analyze(spec: SliderCrankSpec, run: Run) -> Result:
     except InputError as problem:
         return Result(spec, Status.INVALID, str(problem))
     low, high = spec.analysis.travel or (0.0, 0.0)
-    if min(len(one.course.poses) for one in (fine, coarse)) < 3:
-        why = next(one.course.ending.value for one in (coarse, fine) if len(one.course.poses) < 3)
+    if why := meshes.no_curve(3):
         return Result(spec, Status.NO_EQUILIBRIUM, f"no curve: {why}; look at analysis.solid.mesh")
     asked = np.linspace(low, high, spec.analysis.points)
-    reached = read_only(asked[asked <= fine.course.travel[-1] * (1 + 1e-12)])
-    solution = SolidSolution(spec, fine, coarse, reached, pins_of(spec.mechanism, linkage, unloaded))
-    complete = fine.course.ending is Ending.COMPLETE
+    course = meshes.fine.course
+    reached = read_only(asked[asked <= course.travel[-1] * (1 + 1e-12)])
+    solution = SolidSolution(spec, meshes, reached, pins_of(spec.mechanism, linkage, unloaded))
+    complete = course.ending is Ending.COMPLETE
     found = (*_findings(solution), *friction_left_out(spec))
     return Result(
         spec=spec,
@@ -173,18 +169,20 @@ def part_of(spec: SliderCrankSpec) -> Part:
     return Part(rings, piece.thinnest, float(piece.sheet.thickness or 0.0), law, places, regions, LARGEST)
 
 
-def decks(spec: SliderCrankSpec) -> dict[str, bytes]:
-    """Return one leg as an input deck of a finite-element solver, by file name."""
-    from cfmkit.solid.input_deck import deck
+def driven_part(spec: SliderCrankSpec) -> DrivenPart:
+    """Return one leg with the travels that it is solved for."""
     from cfmkit.solid.meshed_part import ACROSS
+    from cfmkit.solid.two_meshes import DrivenPart
 
+    part = part_of(spec)
+    return DrivenPart("slider-crank", part, spec.analysis.solid.mesh or part.thinnest / ACROSS, tuple(_stops(spec)))
+
+
+def elastic_parts(spec: SliderCrankSpec) -> tuple[DrivenPart, ...]:
+    """Return what is solved of a mechanism, for decks of other solvers and for studies of meshes."""
     spec = resolve(spec.replace({"analysis.fidelity": "solid"}))
     linkage = linkage_of(spec.mechanism)
-    spec = as_run(spec, linkage, unloaded_angle(spec.mechanism, linkage))
-    part, about = part_of(spec), spec.analysis.solid
-    meshed = part.meshed(about.mesh or part.thinnest / ACROSS)
-    travel = spec.analysis.travel or (0.0, 0.0)
-    return {"slider-crank.inp": deck(spec.name, part, meshed, travel[1], about.poses)}
+    return (driven_part(as_run(spec, linkage, unloaded_angle(spec.mechanism, linkage))),)
 
 
 def _stops(spec: SliderCrankSpec) -> list[float]:
@@ -212,15 +210,13 @@ def _curve(solution: SolidSolution) -> Curve:
 def _values(solution: SolidSolution) -> Mapping[str, Quantity]:
     """Return the scalar results by name; those that a solid does not know have no value."""
     limit = elasticity(solution.spec.mechanism).allowable_stress
-    force, stress = solution.differences
     known: dict[str, float | None] = {
         "kink": kink(solution.pins),
         "run_in_95": first_at(solution.travel, solution.force, 0.95 * solution.level),
         "run_in_98": first_at(solution.travel, solution.force, 0.98 * solution.level),
         "allowable_stress": limit,
         "stress_stroke": None if limit is None else first_at(solution.travel, solution.stress, limit),
-        "mesh_force_difference": force,
-        "mesh_stress_difference": stress,
+        **solution.error.values(),
     }
     names = [*DEFINITIONS, "energy_max", "stiffness_class", "crank_pin_rotation_max"]
     about = OF_SPRINGS | DEFINITIONS
@@ -233,19 +229,15 @@ def _findings(solution: SolidSolution) -> Iterator[Finding]:
     from cfmkit.solid.path_following import Ending
 
     names = {Ending.LIMIT_POINT: "limit_point", Ending.UNSTABLE: "unstable"}
-    course, (force, stress) = solution.fine.course, solution.differences
+    course = solution.fine.course
     if course.ending is not Ending.COMPLETE:
         where = format_short(float(course.travel[-1]), "length")
         yield finding(names.get(course.ending, "not_converged"), f"{course.ending.value}, at {where}")
     if (solution.spec.mechanism.part or PaddedPart()).fillet == 0:
         told = "without fillets the stress in inside corners has no value"
         yield finding("sharp_corners", told, "mechanism.part.fillet=0.5 mm")
-    if force > FORCE_APART or stress > STRESS_APART:
-        yield finding(
-            "mesh_coarse",
-            f"two meshes of the part differ by {100 * force:.2g} % in force and {100 * stress:.2g} % in stress: give a "
-            "smaller analysis.solid.mesh",
-        )
+    for name, told in solution.error.too_large():
+        yield finding(name, told)
     limit = elasticity(solution.spec.mechanism).allowable_stress
     peaks, places = solution.fine.peaks
     if limit is not None and peaks.max() > limit:

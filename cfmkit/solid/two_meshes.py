@@ -1,0 +1,139 @@
+"""A part on two meshes: the finer one's values, and how far they may be from those of an endlessly fine one.
+
+Two meshes of a free mesher are not nested: their differences show no order, so nothing is extrapolated from them. What
+they differ by, times a factor, is given as the error. The factors are read off parts that were solved a third time, on
+much finer meshes (`benchmarks/solid_mesh_error.py`, table in docs/solid.md).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from cfmkit.solid.meshed_part import MeshSolution, Part
+
+FORCE_FACTOR, STRESS_FACTOR = 1.0, 1.0
+"""Error in differences of the two meshes."""
+FORCE_ALLOWED, STRESS_ALLOWED = 2e-3, 0.05
+"""Errors from which on a mesh is called coarse: a tenth of what parts differ from beams by."""
+
+
+@dataclass(frozen=True)
+class DrivenPart:
+    """A part with what is needed to follow it.
+
+    Attributes
+    ----------
+    name : str
+        For files.
+    part : Part
+    size : float
+        Side of an element of the finer mesh [m].
+    stops : tuple of float
+        Travels to solve for, from rest on in one direction [m or rad].
+    """
+
+    name: str
+    part: Part
+    size: float
+    stops: tuple[float, ...]
+
+    def solved(self, report: Callable[[float, str], None] = lambda _share, _text: None) -> TwoMeshes:
+        """Return the part on both meshes, on the coarser one at every second stop.
+
+        Raises
+        ------
+        cfmkit.errors.GeometryError
+            If the outline cannot be meshed so, or no node is where the part is held.
+        """
+        from cfmkit.solid.meshed_part import COARSER
+
+        second = (*self.stops[:-1:2], self.stops[-1])
+        coarse = self.part.meshed(COARSER * self.size).followed(
+            second, lambda share: report(FIRST * share, "coarser mesh")
+        )
+        fine = self.part.meshed(self.size).followed(
+            self.stops, lambda share: report(FIRST + (1 - FIRST) * share, "finer mesh")
+        )
+        return TwoMeshes(fine, coarse)
+
+
+FIRST = 0.3
+"""Share of the time that the coarser mesh takes."""
+
+
+@dataclass(frozen=True, eq=False)
+class TwoMeshes:
+    """What was found on both.
+
+    Attributes
+    ----------
+    fine : MeshSolution
+        The one whose values are reported.
+    coarse : MeshSolution
+        With elements `COARSER` times as large.
+    """
+
+    fine: MeshSolution
+    coarse: MeshSolution
+
+    def no_curve(self, poses: int) -> str:
+        """Return why one of the meshes has fewer poses than a curve needs; empty if none has."""
+        short = (one.course.ending.value for one in (self.coarse, self.fine) if len(one.course.poses) < poses)
+        return next(short, "")
+
+    @property
+    def error(self) -> MeshError:
+        """What they differ by, and what it says."""
+        return MeshError(*self.fine.differences(self.coarse))
+
+
+@dataclass(frozen=True)
+class MeshError:
+    """What two meshes of a part differ by.
+
+    Attributes
+    ----------
+    force_difference, stress_difference : float
+        In parts of the largest force and of the largest stress.
+    """
+
+    force_difference: float
+    stress_difference: float
+
+    @property
+    def force(self) -> float:
+        """Error of the force, in parts of the largest."""
+        return FORCE_FACTOR * self.force_difference
+
+    @property
+    def stress(self) -> float:
+        """Error of the largest stress, in parts of it."""
+        return STRESS_FACTOR * self.stress_difference
+
+    def values(self) -> dict[str, float]:
+        """Return them by the names that every family gives them (`families.mesh_values`)."""
+        return {
+            "mesh_force_difference": self.force_difference,
+            "mesh_stress_difference": self.stress_difference,
+            "mesh_force_error": self.force,
+            "mesh_stress_error": self.stress,
+        }
+
+    def worse(self, other: MeshError) -> MeshError:
+        """Return the larger difference of both, each."""
+        return MeshError(
+            max(self.force_difference, other.force_difference), max(self.stress_difference, other.stress_difference)
+        )
+
+    def too_large(self) -> Iterator[tuple[str, str]]:
+        """Yield the name of a finding and what it says, where the mesh is too coarse."""
+        if self.force > FORCE_ALLOWED or self.stress > STRESS_ALLOWED:
+            yield (
+                "mesh_coarse",
+                f"by the difference of two meshes the force is known to {100 * self.force:.2g} % and the largest "
+                f"stress to {100 * self.stress:.2g} %: give a smaller analysis.solid.mesh",
+            )
