@@ -149,7 +149,7 @@ def part_of(spec: VcfmSpec, piece: SolvedPiece) -> Part:
 
 
 def elastic_parts(spec: VcfmSpec) -> tuple[DrivenPart, ...]:
-    """Return leaf and, unless it is bought, spring as they are solved, pushed; decks and mesh studies ask for them, too."""
+    """Return leaf and, unless it is bought, spring as solved: pushed. Decks and studies of meshes ask for them, too."""
     from cfmkit.solid.meshed_part import ACROSS
     from cfmkit.solid.two_meshes import DrivenPart
 
