@@ -8,8 +8,11 @@ import numpy as np
 import pytest
 
 import cfmkit
+from cfmkit.errors import SpecError
 from cfmkit.families import family
 from cfmkit.families.base import Run
+from cfmkit.families.slider_crank.springs.assembly import assemble
+from cfmkit.families.slider_crank.springs.turned_rest import turned
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 PINS = {"diameter": "3 mm", "friction": 0.1}
@@ -117,3 +120,48 @@ def test_the_spring_of_an_adjustment_is_stiff_enough_for_its_screw():
     springs = made.spec.mechanism.springs
     assert 2 * springs.slider * 0.010 >= 0.9 * (1 - 1e-12)
     assert springs.anchor == 0.0
+
+
+def test_the_unloaded_angle_trims_the_mean_force_by_what_is_stated():
+    given = spec("bilancia2019").replace({"analysis.window": ["3 mm", "30 mm"]})
+    assembly = assemble(given)
+    places = np.linspace(0.003, 0.030, 2001)
+    means = []
+    for turn in (0.002, -0.002):
+        other, less = turned(assembly, turn)
+        # the same place of the slider is as far from the other position at rest
+        at_rest = [one.linkage.slider_position(np.asarray(one.unloaded)) for one in (assembly, other)]
+        assert less == pytest.approx(float(at_rest[0] - at_rest[1]) * assembly.linkage.branch, abs=1e-15)
+        means.append((other.rates @ other.forces(places - less)).mean())
+    slope = (means[0] - means[1]) / 0.004
+    found = analyze(given).values["force_per_degree"].value
+    assert found == pytest.approx(slope * np.radians(1.0), rel=2e-3)
+
+
+def test_springs_are_chosen_that_the_unloaded_angle_can_trim_by_what_is_wanted():
+    given = cfmkit.load(CONFIGS / "slider_crank_bought.yaml")
+    given = given.replace({"design.catalogue": None, "design.tolerance": None, "mechanism.springs": {}})
+    plain = family("slider-crank").design(given, Run())
+    reached = abs(analyze(plain.spec).values["force_per_degree"].value)
+    wanted = {"design.adjustment": 1.2 * reached, "design.angle_travel": "1 deg"}
+    trimmed = family("slider-crank").design(given.replace(wanted), Run())
+    assert abs(analyze(trimmed.spec).values["force_per_degree"].value) >= 1.2 * reached * (1 - 1e-6)
+    capped = wanted | {"design.max_rates": {name: "10 N*mm/rad" for name in ("pivot", "crank_pin", "slider_pin")}}
+    refused = family("slider-crank").design(given.replace(capped), Run())
+    assert refused.status.exit_code == 4
+    assert "when the unloaded angle is turned by 1 deg" in refused.message
+
+
+@pytest.mark.parametrize(
+    ("block", "told"),
+    [
+        ({"angle_travel": "1 deg"}, "are of an 'adjustment'"),
+        ({"adjustment": "1 N"}, "needs either 'anchor_travel' or 'angle_travel'"),
+        ({"adjustment": "1 N", "angle_travel": "1 deg", "anchor_travel": "1 mm"}, "needs either"),
+        ({"adjustment": "1 N", "anchor_travel": "1 mm"}, "add 'slider' to 'springs'"),
+    ],
+)
+def test_a_trim_that_contradicts_itself_is_refused(block, told):
+    given = cfmkit.load(CONFIGS / "slider_crank_bought.yaml")
+    with pytest.raises(SpecError, match=told):
+        given.replace({f"design.{key}": value for key, value in block.items()})

@@ -172,6 +172,9 @@ def _best(few: RateGoal, goal: RateGoal, options: list[Option], cuts: tuple[tupl
         LinearConstraint(np.hstack([-columns, -one]), -np.inf, -few.wanted),
         LinearConstraint(np.array(list(_rows(options))), 0.0, 1.0),
     ]
+    if goal.least is not None:
+        row = np.array([goal.least[0][one.joint] * one.rate for one in options])
+        rules.append(LinearConstraint(np.append(row, 0.0)[None], goal.least[1], np.inf))
     for cut in cuts:
         inside = np.array([1.0 if option in cut else -1.0 for option in options])
         rules.append(LinearConstraint(np.append(inside, 0.0)[None], -np.inf, len(cut) - 1.0))

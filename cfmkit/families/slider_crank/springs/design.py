@@ -242,7 +242,7 @@ def _written(solved: Solved) -> SliderCrankSpec:
     """Return the spec with springs and lengths written in, and an analysis that looks where the design did."""
     spec, wanted = resolve(solved.task.spec), solved.task.wanted
     rates = dict(zip(JOINTS, solved.rates.tolist(), strict=True))
-    anchor = {"anchor": spec.mechanism.springs.anchor or 0.0} if wanted.adjustment is not None else {}
+    anchor = {"anchor": spec.mechanism.springs.anchor or 0.0} if wanted.anchor_travel is not None else {}
     bought = {"bought": tuple(option.written for option in solved.bought)}
     springs = spec.mechanism.springs.model_copy(update=rates | anchor | bought)
     mechanism = spec.mechanism.model_copy(update={"springs": springs})

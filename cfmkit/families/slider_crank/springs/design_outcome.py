@@ -105,7 +105,15 @@ def check_reach(task: Task, window: tuple[float, float]) -> None:
 
 
 def cannot_hold(task: Task) -> Finding:
-    """Return why a slope in the stretched position cannot be had."""
+    """Return why a slope in the stretched position, or a trim, cannot be had."""
+    wanted = task.wanted
+    if wanted.angle_travel is not None and not wanted.hold_stiffness:
+        text = (
+            f"no springs give an adjustment of {format_short(wanted.adjustment or 0.0, 'force')} when the unloaded "
+            f"angle is turned by {format_short(wanted.angle_travel, 'angle')}, within 'design.max_rates'; ask for less "
+            "'design.adjustment', or more 'design.angle_travel'"
+        )
+        return finding("infeasible_targets", text)
     text = (
         "no springs, none of them negative, have 'design.stiffness' in the stretched position within 'design.max_rates'"
     )

@@ -34,6 +34,8 @@ class RateGoal:
         A row and what it must give exactly.
     lower : (m,) array or None
         Smallest rates; None: zero.
+    least : tuple of (m,) array and float, or None
+        A row and what it must give at least.
     """
 
     matrix: FloatArray
@@ -41,6 +43,7 @@ class RateGoal:
     upper: FloatArray
     held: tuple[FloatArray, float] | None = None
     lower: FloatArray | None = None
+    least: tuple[FloatArray, float] | None = None
 
     @property
     def bounds(self) -> list[tuple[float, float | None]]:
@@ -78,7 +81,7 @@ ALL, FEW = 128, 25
 
 
 def minimax(goal: RateGoal) -> FloatArray | None:
-    """Return the rates with the smallest largest deviation; None if `held` cannot be met.
+    """Return the rates with the smallest largest deviation; None if `held` or `least` cannot be met.
 
     Solved on a few places, to which the worst of the others are added until none is worse.
     """
@@ -138,10 +141,15 @@ def _solved(goal: RateGoal, cost: FloatArray, worst: float | None) -> FloatArray
     if goal.held is not None:
         size = float(np.abs(goal.held[0] / scales).max()) or 1.0
         equal = {"A_eq": np.append(goal.held[0] / scales, 0.0)[None] / size, "b_eq": [goal.held[1] / size]}
+    limits = np.concatenate([goal.wanted, -goal.wanted])
+    if goal.least is not None:
+        size = float(np.abs(goal.least[0] / scales).max()) or 1.0
+        rows = np.vstack([rows, np.append(-goal.least[0] / scales, 0.0)[None] / size])
+        limits = np.append(limits, -goal.least[1] / size)
     found = linprog(
         cost,
         A_ub=rows,
-        b_ub=np.concatenate([goal.wanted, -goal.wanted]),
+        b_ub=limits,
         bounds=[*bounds, (0.0, worst)],
         method="highs",
         **equal,
@@ -254,6 +262,9 @@ def _most_even(goal: RateGoal, worst: float) -> FloatArray | None:
         above[[k, count]], below[[k, count + 1]] = (1.0, -1.0), (-1.0, 1.0)
         rows += [above, below]
         right += [0.0, 0.0]
+    if goal.least is not None:
+        rows.append(np.concatenate([-goal.least[0] * unit, [0.0, 0.0]]))
+        right.append(-goal.least[1])
     cost = np.concatenate([np.zeros(count), [1.0, -1.0]])
     own = ((low / unit, None if top is None else top / unit) for low, top in goal.bounds)
     bounds = [*own, (0.0, None), (0.0, None)]

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.families.slider_crank.springs.stiffness_classes import CLASSES, scale_factors, small_angle_number
+from cfmkit.families.slider_crank.springs.turned_rest import mean_effort_per_angle
 from cfmkit.families.slider_crank.unit_springs import JOINTS
 from cfmkit.results import Quantity
 from cfmkit.stock.springs.in_use import WIRE_DEFINITIONS, SpringInUse, wire_quantities
@@ -69,6 +70,11 @@ DEFINITIONS = {
         "by how much the force rises per travel of the anchor of the slider's spring: alike over the whole motion, so "
         "that a trim leaves the shape of the curve as it is",
     ),
+    "force_per_degree": (
+        "force",
+        "by how much the mean force in the window rises when the unloaded angle is turned by one degree, at the same "
+        "places of the slider",
+    ),
     "stretched_angle": ("angle", "crank angle with crank and coupler in one line, theta_A2 [LH, eq. 13b]"),
     "folded_angle": ("angle", "crank angle with the coupler folded over the crank [LH, eq. 13a, other branch]"),
     "unloaded_angle": ("angle", "crank angle with all springs relaxed, theta_A0"),
@@ -100,7 +106,7 @@ def _in_use(springs: Springs, solution: Solution) -> Iterator[SpringInUse]:
     """Yield the springs that are bought between their smallest and their largest load over the motion."""
     for one in springs.bought:
         joint = JOINTS.index(one.at)
-        turn = solution.units.turn[joint] + ((springs.anchor or 0.0) if one.at == "slider" else 0.0)
+        turn = solution.units.turn[joint]
         sizes = np.abs(turn)
         least = 0.0 if turn.min() < 0 < turn.max() else float(sizes.min())
         # springs of a joint turn alike: each bears its rate's share
@@ -131,6 +137,11 @@ def _trim(solution: Solution) -> Iterator[tuple[str, float | None]]:
     """Yield what the anchor of the slider's spring does, where there is one to be screwed."""
     if solution.anchored and solution.assembly.drive == "force":
         yield "force_per_anchor", float(solution.assembly.rates[3])
+    if solution.assembly.drive == "force":
+        motion = solution.motion
+        window = solution.character.window or (float(motion[0]), float(motion[-1]))
+        change = solution.assembly.rates @ mean_effort_per_angle(solution.assembly, window)
+        yield "force_per_degree", float(change) * float(np.radians(1.0)) if np.isfinite(change) else None
 
 
 def _numbers(solution: Solution) -> Iterator[tuple[str, tuple[float | None, str]]]:

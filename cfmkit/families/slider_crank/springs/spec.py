@@ -172,16 +172,28 @@ class SpringDesign(DesignBlock):
         "both ways",
     )
     adjustment: PositiveForce | None = Field(
-        None, description="how much more force the anchor of the slider's spring is to give when it is screwed back"
+        None,
+        description="how much more force a trim is to give: the anchor of the slider's spring when it is screwed, or "
+        "the unloaded angle when it is turned",
     )
     anchor_travel: PositiveLength | None = Field(None, description="how far that anchor can be screwed")
+    angle_travel: PositiveAngle | None = Field(
+        None, description="how far the unloaded angle can be turned, either way: the anchors of the torsion springs"
+    )
 
     @model_validator(mode="after")
     def _adjustment_has_its_travel(self) -> Self:
-        if (self.adjustment is None) != (self.anchor_travel is None):
-            raise ValueError("'adjustment' and 'anchor_travel' belong together: give both or neither")
-        if self.adjustment is not None and (self.torque is not None or "slider" not in self.springs):
-            raise ValueError("'adjustment' is that of the force by the slider's spring: it needs 'force' and 'slider'")
+        ways = [self.anchor_travel, self.angle_travel]
+        if self.adjustment is None and ways != [None, None]:
+            raise ValueError("'anchor_travel' and 'angle_travel' are of an 'adjustment': give it, too")
+        if self.adjustment is not None and ways.count(None) != 1:
+            raise ValueError("'adjustment' needs either 'anchor_travel' or 'angle_travel', by which it is made")
+        if self.adjustment is not None and self.torque is not None:
+            raise ValueError("'adjustment' is that of a force: it needs 'force' instead of 'torque'")
+        if self.anchor_travel is not None and "slider" not in self.springs:
+            raise ValueError("'anchor_travel' is that of the slider's spring: add 'slider' to 'springs'")
+        if self.angle_travel is not None and self.objective == "least-squares":
+            raise ValueError("'angle_travel' needs 'objective: minimax': least squares know no such limit")
         return self
 
     @model_validator(mode="after")

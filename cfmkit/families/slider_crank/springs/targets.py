@@ -14,6 +14,7 @@ from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.springs.assembly import assemble
 from cfmkit.families.slider_crank.springs.fit_rates import RateGoal
 from cfmkit.families.slider_crank.springs.friction import branch
+from cfmkit.families.slider_crank.springs.turned_rest import mean_effort_per_angle
 from cfmkit.families.slider_crank.unit_springs import JOINTS
 
 if TYPE_CHECKING:
@@ -132,7 +133,11 @@ class Task:
             return None
         legs, target = self.spec.mechanism.sets, self.wanted.target
         goal = RateGoal(
-            effort.T * (legs / target), np.ones(len(places)) - self._lost(places), self._upper(), lower=self._lower()
+            effort.T * (legs / target),
+            np.ones(len(places)) - self._lost(places),
+            self._upper(),
+            lower=self._lower(),
+            least=self._least(window),
         )
         return goal if self.wanted.stiffness is None else self._sloping(goal, places)
 
@@ -157,6 +162,19 @@ class Task:
             return None
         least = wanted.adjustment / wanted.anchor_travel / self.spec.mechanism.sets
         return np.array([0.0, 0.0, 0.0, least])
+
+    def _least(self, window: tuple[float, float]) -> tuple[FloatArray, float] | None:
+        """Return what each rate adds to the mean force as the unloaded angle is turned all the way, and the least sum.
+
+        It is turned in the sense in which springs at all joints raise the force.
+        """
+        wanted = self.wanted
+        if wanted.adjustment is None or wanted.angle_travel is None:
+            return None
+        row = mean_effort_per_angle(self.assembly, window) * (wanted.angle_travel * self.spec.mechanism.sets)
+        used = np.array([name in wanted.springs for name in JOINTS])
+        share = row / np.maximum(np.abs(self.assembly.forces(np.array(window))).max(axis=1), 1e-300)
+        return row * (1.0 if share[used].sum() >= 0 else -1.0), wanted.adjustment
 
     def _sloping(self, goal: RateGoal, places: FloatArray) -> RateGoal:
         """Return a goal that is a line through the stretched position."""

@@ -30,6 +30,7 @@ from cfmkit.families.slider_crank.springs.stiffness_classes import (
     scale_factors,
     small_angle_number,
 )
+from cfmkit.families.slider_crank.springs.turned_rest import mean_effort_per_angle
 from cfmkit.metrics.branch_views import Frame
 from cfmkit.metrics.continuous_curves import extremes, mean
 from cfmkit.metrics.ranges_many import (
@@ -117,6 +118,12 @@ class Base:
     def bounded(self) -> bool:
         """Whether every spring has an effort all over the grid: a mechanism alone leaves out where it has none."""
         return bool(np.isfinite(self.grid[1].effort).all())
+
+    @cached_property
+    def per_degree(self) -> FloatArray:
+        """By how much unit springs raise the mean force in the window per degree of the unloaded angle, (4,)."""
+        window = window_of(self.spec, self.assembly) or (self.low, self.high)
+        return np.asarray(mean_effort_per_angle(self.assembly, window) * np.radians(1.0))
 
     @cached_property
     def reference(self) -> float:
@@ -430,7 +437,8 @@ NO_LOOP = frozenset(
 """Metrics of two branches: these curves have one."""
 
 OTHER_DRIVE: dict[str, tuple[str, ...]] = {
-    "torque": ("constant_travel", "reference_force", "snap_through_travel", "second_stable_travel", "start_force"),
+    "torque": ("constant_travel", "reference_force", "snap_through_travel", "second_stable_travel", "start_force",
+               "force_per_degree"),
     "force": ("constant_angle", "reference_torque", "snap_through_angle", "second_stable_angle", "stretched_torque",
               "stretched_stiffness"),
 }  # fmt: skip
@@ -453,6 +461,7 @@ VALUES: dict[str, Callable[[Slab], Any]] = {
     "stretched_stiffness": lambda slab: slab.at(slab.base.assembly.stretched, "stiffness"),
     "energy_max": lambda slab: (slab.rates @ (0.5 * slab.base.units.turn**2)).max(axis=1),
     "start_force": lambda slab: slab.start_effort,
+    "force_per_degree": lambda slab: slab.rates @ slab.base.per_degree,
     "bistable_factor": lambda slab: slab.factors[:, 0],
     "positive_factor": lambda slab: slab.factors[:, 1],
     "small_angle_number": lambda slab: np.array([small_angle_number(one) for one in slab.assemblies], dtype=float),
