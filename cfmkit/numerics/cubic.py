@@ -40,18 +40,54 @@ def value_at(x: FloatArray, y: FloatArray, place: float) -> float:
 
 
 def values_at(x: FloatArray, y: FloatArray, places: FloatArray) -> FloatArray:
-    """Return the cubic's values at many places, (n,); of few, `value_at` is quicker."""
+    """Return the cubic's values at many places, (n,) or of samples (m, k) all columns, (n, k); see `value_at`."""
     count = min(4, len(x))
     first = np.clip(np.searchsorted(x, places) - 2, 0, len(x) - count)
     near = x[first[:, None] + np.arange(count)]
-    total = np.zeros(len(places))
+    total = np.zeros((len(places), *y.shape[1:]))
     for i in range(count):
         weight = np.ones(len(places))
         for j in range(count):
             if j != i:
                 weight *= (places - near[:, j]) / (near[:, i] - near[:, j])
-        total += weight * y[first + i]
+        total += weight.reshape(-1, *[1] * (y.ndim - 1)) * y[first + i]
     return total
+
+
+BESIDE = 1e-10
+"""Height of an extreme over the samples around it, in parts of the largest, below which it is rounding."""
+
+
+def inner_extremes(x: FloatArray, y: FloatArray) -> FloatArray:
+    """Return where the cubics between samples rise above or fall below both samples around them, increasing.
+
+    Examples
+    --------
+    >>> x = np.array([-1.5, -0.6, 0.5, 1.0, 2.0])
+    >>> inner_extremes(x, x**2).round(12).tolist()
+    [0.0]
+    """
+    if len(x) < 4:
+        return np.zeros(0)
+    left = np.arange(len(x) - 1)
+    first = np.clip(left - 1, 0, len(x) - 4)
+    t = x[first[:, None] + np.arange(4)] - x[left][:, None]
+    one = np.diff(y[first[:, None] + np.arange(4)], axis=1) / np.diff(t, axis=1)
+    two = np.diff(one, axis=1) / (t[:, 2:] - t[:, :-2])
+    three = (two[:, 1] - two[:, 0]) / (t[:, 3] - t[:, 0])
+    # Newton's form as powers of t: the slope is c + 2 b t + 3 a t^2
+    a, b = three, two[:, 0] - three * t[:, :3].sum(axis=1)
+    c = one[:, 0] - two[:, 0] * (t[:, 0] + t[:, 1])
+    c += three * (t[:, 0] * t[:, 1] + t[:, 0] * t[:, 2] + t[:, 1] * t[:, 2])
+    width, least = np.diff(x), BESIDE * float(np.abs(y).max())
+    with np.errstate(invalid="ignore", divide="ignore"):
+        root = -(b + np.copysign(np.sqrt(b * b - 3.0 * a * c), b))
+        places = np.stack([root / (3.0 * a), c / root], axis=1)
+        inside = (places > 0.0) & (places < width[:, None])
+    found = x[left][:, None] + np.where(inside, places, 0.0)
+    heights = values_at(x, y, found.ravel()).reshape(found.shape)
+    high, low = np.maximum(y[:-1], y[1:])[:, None], np.minimum(y[:-1], y[1:])[:, None]
+    return np.unique(found[inside & ((heights > high + least) | (heights < low - least))])
 
 
 def crossing(x: FloatArray, y: FloatArray, level: float) -> float | None:

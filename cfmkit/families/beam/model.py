@@ -76,6 +76,7 @@ def analyze(spec: BeamSpec, run: Run) -> Result:
         target=_target(spec),
         reference=None if spec.analysis.reference is None else float(spec.analysis.reference),
         allowable_stress=solution.assembly.allowable_stress,
+        closed=solution.everywhere,
         ends=_ends(solution),
         state=solution,
     )

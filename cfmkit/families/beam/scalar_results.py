@@ -13,9 +13,10 @@ from cfmkit.results import Quantity
 from cfmkit.specs.units import between
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
 
     from cfmkit.arrays import FloatArray
+    from cfmkit.elastica.outcome.between_points import BetweenPoints
     from cfmkit.families.beam.solution import OnCurve, Solution
 
 
@@ -110,7 +111,7 @@ def within(solution: OnCurve, low: float, high: float) -> Any:
 
 def ranges(solution: OnCurve) -> dict[str, float | None]:
     """Return what Lan says about the range that ends at d; nothing on a curve that turns back."""
-    x, force, stress = solution.motion, solution.effort, solution.stress
+    x, force = solution.motion, solution.effort
     end = window_of(solution)[1]
     numbers: dict[str, float | None] = dict.fromkeys(
         ("nominal_force", "range_start", "range_fraction", "strict_range_start", "strict_range_fraction"),
@@ -118,20 +119,46 @@ def ranges(solution: OnCurve) -> dict[str, float | None]:
     numbers |= dict.fromkeys(("stress_at_end", "stress_limit_displacement"))
     if not (np.diff(x) > 0).all() or not x[0] <= end <= x[-1] * (1 + 1e-12) or not np.isfinite(force).all():
         return numbers
+    law = solution.everywhere
+    if law is not None:
+        x, force = law.knots
     nominal = value_at(x, force, end)
-    numbers |= {"nominal_force": nominal, "stress_at_end": value_at(x, stress, end)}
+    numbers |= {"nominal_force": nominal, "stress_at_end": _stress_at(solution, end)}
     if solution.assembly.allowable_stress is not None:
         allowable = solution.assembly.allowable_stress
         # beam by beam: the largest of all has a kink where it passes from one beam to another
-        found = [crossing(x, value, allowable) for value, _ in solution.stresses.values()]
+        found = [crossing(solution.motion, value, allowable) for value, _ in solution.stresses.values()]
         numbers["stress_limit_displacement"] = min((place for place in found if place is not None), default=None)
-    start = crossing(x, force / nominal, 1 - BAND) if nominal else None
+    start = _settled(lambda x, force: crossing(x, force / nominal, 1 - BAND), x, force, law) if nominal else None
     if start is not None and start <= end and end > 0:
         numbers |= {"range_start": start, "range_fraction": (end - start) / end}
-        if value_at(x, force, end) > 0:  # else no band lies around the force there
-            strict = strict_start(x, force, end)
+        if nominal > 0:  # else no band lies around the force there
+            strict = _settled(lambda x, force: strict_start(x, force, end), x, force, law) or 0.0
             numbers |= {"strict_range_start": strict, "strict_range_fraction": (end - strict) / end}
     return numbers
+
+
+def _stress_at(solution: OnCurve, place: float) -> float:
+    """Return the largest stress at a place [Pa], beam by beam: the largest of all has kinks."""
+    return max(value_at(solution.motion, value, place) for value, _ in solution.stresses.values())
+
+
+_ROUNDS = 4
+_SETTLED = 1e-11  # of the travel: a place that moves by less is known
+
+
+def _settled(
+    find: Callable[[FloatArray, FloatArray], float | None], x: FloatArray, force: FloatArray, law: BetweenPoints | None
+) -> float | None:
+    """Return a place that cubics tell, put right by the equilibrium that is solved there, if the model can do so."""
+    place = find(x, force)
+    for _ in range(_ROUNDS):
+        if law is None or place is None or np.abs(x - place).min() <= _SETTLED * (x[-1] - x[0]):
+            break
+        at = int(np.searchsorted(x, place))
+        x, force = np.insert(x, at, place), np.insert(force, at, law.effort("", np.array([place])))
+        place = find(x, force)
+    return place
 
 
 def strict_start(x: FloatArray, force: FloatArray, end: float, band: float = BAND) -> float:
@@ -170,9 +197,9 @@ def _closure(solution: Solution) -> dict[str, float | None]:
 
 def _rest(solution: Solution) -> dict[str, float | None]:
     """Return what happens at rest, and the stress with all its parts."""
-    path, keep = solution.path, solution.keep
-    total = np.max([path.sections(name).stress()[keep].max(axis=1) for name in path.layout.network.beams], axis=0)
-    inside = within(solution, *window_of(solution))
+    path, every = solution.path, solution.with_ends
+    stresses = [path.sections(name).stress()[every.keep].max(axis=1) for name in path.layout.network.beams]
+    total, inside = np.max(stresses, axis=0), within(every, *window_of(solution))
     return {
         "prestress_force": _significant(solution.effort, solution.path.error),
         "prestress_stress": _significant(solution.stress, solution.path.error),
@@ -182,8 +209,9 @@ def _rest(solution: Solution) -> dict[str, float | None]:
 
 def _parasitic(solution: Solution) -> dict[str, float | None]:
     """Return how far the driven node goes where it is not to; of drives that turn it, nothing."""
-    drive = solution.spec.mechanism.drive
-    inside = within(solution, *window_of(solution))
+    drive, low, high = solution.spec.mechanism.drive, *window_of(solution)
+    solution = solution.with_ends
+    inside = within(solution, low, high)
     if drive.kind not in ("displacement", "force", "loads") or not inside.any():
         return {}
     x, y, turn = solution.path.motion(drive.node)[solution.keep][inside].T
@@ -231,6 +259,8 @@ def extremes(solution: OnCurve) -> dict[str, float | None]:
     numbers: dict[str, float | None] = dict.fromkeys(names)
     if not (np.diff(x) > 0).all() or not np.isfinite(force).all():
         return numbers
+    if solution.everywhere is not None:
+        x, force = solution.everywhere.knots
     peak = first_extreme(x, force)
     if peak is None:
         return numbers

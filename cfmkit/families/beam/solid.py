@@ -92,6 +92,10 @@ class SolidSolution:
         return read_only(np.maximum(cubics(self.motion), 0.0))  # at rest rounding may be below
 
     @property
+    def everywhere(self) -> None:
+        """Nothing: a pose between two of these takes seconds."""
+
+    @property
     def stresses(self) -> Mapping[str, tuple[FloatArray, FloatArray]]:
         """The same, by part."""
         return {"part": (self.stress, np.zeros_like(self.stress))}

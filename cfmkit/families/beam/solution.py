@@ -5,13 +5,14 @@ Every other file of this family may import these types.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
 from cfmkit.arrays import read_only
+from cfmkit.elastica.outcome.between_points import between_points
 from cfmkit.elastica.outcome.path import most_stressed
 from cfmkit.families.beam.build import Assembly, mirror_axis, thickest_of
 from cfmkit.families.beam.strips import BeamGap, mirrored, smallest_gap
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica import Path
+    from cfmkit.elastica.outcome.between_points import BetweenPoints
     from cfmkit.elastica.vibration import Frequencies
     from cfmkit.families.beam.spec import BeamSpec
 
@@ -73,6 +75,17 @@ class Solution:
     def motion_dimension(self) -> str:
         """The dimension of the motion: "length" or "angle"."""
         return "angle" if self.spec.mechanism.drive.kind in ("rotation", "moment") else "length"
+
+    @cached_property
+    def everywhere(self) -> BetweenPoints | None:
+        """The equilibria between the points of the path; None of drives by loads, and of paths that turn back."""
+        return between_points(self.path, self.assembly.effort_unit, self.spec.stress == "total")
+
+    @cached_property
+    def with_ends(self) -> Solution:
+        """The same with the ends of windows among the points of the curve."""
+        keep = np.union1d(self.keep, self.ends).astype(np.int64)
+        return self if len(keep) == len(self.keep) else replace(self, keep=read_only(keep, np.int64), ends=())
 
     @cached_property
     def effort(self) -> FloatArray:
@@ -198,3 +211,7 @@ class OnCurve(Protocol):
     @property
     def accurate(self) -> Any:
         """Whether each point reaches the tolerance, (n,)."""
+
+    @property
+    def everywhere(self) -> BetweenPoints | None:
+        """The model between the points of the curve, where it is so cheap."""

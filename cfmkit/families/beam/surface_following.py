@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
 
     from cfmkit.arrays import FloatArray
+    from cfmkit.elastica.outcome.between_points import BetweenPoints
     from cfmkit.families.beam.solution import Solution
     from cfmkit.families.beam.spec import FileProfile, FormulaProfile, Surface
     from cfmkit.results import Finding
@@ -204,6 +205,8 @@ class Tip:
         Its height and slope.
     x, effort, stress, stable : (n,) arrays
         Displacements [m], forces [N], largest stresses [Pa], and 1 where stable.
+    between : BetweenPoints or None
+        The model between these displacements.
     """
 
     surface: Surface
@@ -212,6 +215,13 @@ class Tip:
     effort: FloatArray
     stress: FloatArray
     stable: FloatArray
+    between: BetweenPoints | None = None
+
+    def stress_at(self, displacement: FloatArray) -> FloatArray:
+        """Return the largest stress in the mechanism at displacements [Pa]."""
+        if self.between is None:
+            return np.interp(displacement, self.x, self.stress)
+        return self.between.stress("", np.clip(displacement, self.x[0], self.x[-1]))
 
     def displacement(self, place: FloatArray) -> FloatArray:
         """Return the displacement of the mechanism at places along the surface [m]."""
@@ -288,7 +298,7 @@ def ride(solution: Solution) -> Ride | None:
     u = tip.displacement(rows)
     ways = (1, -1)
     contact, lateral = (np.array([of(rows, way) for way in ways]) for of in (tip.contact, tip.lateral))
-    stress, stable = np.interp(u, tip.x, tip.stress), np.interp(u, tip.x, tip.stable) == 1
+    stress, stable = tip.stress_at(u), np.interp(u, tip.x, tip.stable) == 1
     values = _values(tip, rows, solution.assembly.allowable_stress)
     shown = Ride(rows, u - surface.preload, u, tip.force(rows), contact, lateral, stress, stable, values, ending)
     return replace(shown, findings=tuple(_findings(tip, shown, solution.assembly.allowable_stress)))
@@ -301,9 +311,14 @@ def _tip(solution: Solution, surface: Surface) -> Tip:
     turns = np.flatnonzero(steps != steps[0])
     count = int(turns[0]) + 1 if len(turns) else len(x)
     sense = slice(None) if steps[0] > 0 else slice(None, None, -1)
+    x, effort, stress, stable = (
+        part[:count][sense] for part in (x, effort, stress, np.asarray(solution.stable, float))
+    )
+    if (law := solution.everywhere) is not None:  # with the extremes between the points
+        places, effort = law.knots
+        x, stress, stable = places, law.stress("", places), np.interp(places, x, stable)
     effort = np.where(np.abs(effort) > _NO_FORCE * np.nanmax(np.abs(effort)), effort, 0.0 * effort)  # at rest: rounding
-    parts = (part[:count][sense] for part in (x, effort, stress, np.asarray(solution.stable, dtype=float)))
-    return Tip(surface, course_of(surface), *parts)
+    return Tip(surface, course_of(surface), x, effort, stress, stable, law)
 
 
 def _values(tip: Tip, rows: FloatArray, allowable: float | None) -> dict[str, float | None]:
@@ -315,7 +330,7 @@ def _values(tip: Tip, rows: FloatArray, allowable: float | None) -> dict[str, fl
     top, bottom = largest(tip.displacement, places), -largest(lambda at: -tip.displacement(at), places)
     between = np.unique(np.concatenate([np.linspace(bottom, top, LOOKED_AT), np.clip(tip.x, bottom, top)]))
     high, low = largest(tip.force_at, between), -largest(lambda at: -tip.force_at(at), between)
-    stress = float(np.interp(between, tip.x, tip.stress).max())
+    stress = float(tip.stress_at(between).max())
     contact, lateral = (
         max(largest(lambda at, of=of, way=way: of(at, way), places) for way in (1, -1))  # type: ignore[misc]
         for of in (tip.contact, tip.lateral)

@@ -1,0 +1,228 @@
+"""A traced path at every place of its drive: equilibria between its points, and the extremes that lie there.
+
+What is stated of a curve must not depend on how many points it has. An equilibrium between two points of the path is
+solved from the polynomial through the nearest four, on the branch that these are on: a hundredth of a millisecond. A
+stress takes ten times as long, and is solved at its extremes only; elsewhere the polynomial is taken, for each beam by
+itself, since the largest of all has a kink where it passes from one beam to another.
+
+Assumes: a path under a displacement or a rotation that does not turn back.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfmkit.arrays import read_only
+from cfmkit.elastica.equilibrium.meshed_network import Points
+from cfmkit.elastica.kernels.codes import REQUESTED
+from cfmkit.elastica.model.drive import Loading
+from cfmkit.numerics.cubic import inner_extremes, values_at
+
+if TYPE_CHECKING:
+    from cfmkit.arrays import FloatArray
+    from cfmkit.elastica.outcome.path import Path
+
+FEWEST = 4
+"""Points of a path below which nothing is said of what lies between them: a cubic needs four."""
+
+ROUNDS = 3
+"""Extremes are solved for, and looked for again with what was found: the third moves them by less than rounding."""
+
+NEARLY = 0.9
+"""Share of the largest stress of all beams from which on an extreme of one beam may be the largest."""
+
+STRAY, LEAST = 0.5, 1e-3
+"""How far a pose may be from its first guess, as a share of the change between the two points around it, and at least
+[rad or mean beam lengths]: beyond that another branch was found."""
+
+KNOWN = 1e-12
+"""Share of the drive's range within which a place is that of a point."""
+
+
+def between_points(path: Path, unit: float = 1.0, axial: bool = True) -> BetweenPoints | None:
+    """Return a path at every place of its drive; None of one that turns back, is too short, or misses its tolerance.
+
+    Parameters
+    ----------
+    path : Path
+        Under a displacement or a rotation.
+    unit : float
+        What the effort is multiplied by: parts side by side.
+    axial : bool
+        Whether the stress has its axial part.
+    """
+    if isinstance(path.layout.drive, Loading) or len(path) < FEWEST or not np.all(path.accurate):
+        return None
+    steps = np.diff(path.points.drive)
+    if not ((steps > 0).all() or (steps < 0).all()):
+        return None
+    return BetweenPoints(path, unit, axial)
+
+
+@dataclass(frozen=True, eq=False)
+class BetweenPoints:
+    """The effort and the stress of a path at every place (a `cfmkit.results.ClosedForm`).
+
+    Attributes
+    ----------
+    path : Path
+        Whose drive never turns back.
+    unit : float
+        What its effort is multiplied by.
+    axial : bool
+        Whether the stress has its axial part.
+    """
+
+    path: Path
+    unit: float
+    axial: bool
+
+    @cached_property
+    def _order(self) -> Any:
+        """The points of the path in the order of an increasing drive."""
+        return slice(None) if self.path.drive[-1] > self.path.drive[0] else slice(None, None, -1)
+
+    @property
+    def places(self) -> FloatArray:
+        """The points of the path, and extremes between them, increasing [m or rad]."""
+        return self.knots[0]
+
+    @cached_property
+    def _points(self) -> FloatArray:
+        """Where the path has points, increasing [m or rad]."""
+        return read_only(self.path.drive[self._order])
+
+    @cached_property
+    def _efforts(self) -> FloatArray:
+        return read_only(self.unit * self.path.effort[self._order])
+
+    @cached_property
+    def peaks(self) -> FloatArray:
+        """Where the effort has an extreme between two points, (m,) [m or rad]."""
+        return read_only(np.setdiff1d(self.knots[0], self._points))
+
+    @cached_property
+    def knots(self) -> tuple[FloatArray, FloatArray]:
+        """The points of the path and the extremes between them: places, increasing, and efforts, (n,) each."""
+        x, effort = self._points, self._efforts
+        for _ in range(ROUNDS):
+            more = inner_extremes(x, effort)
+            if not len(more):
+                break
+            x, effort = _inserted(x, effort, more, self.effort("", more))
+        return read_only(x), read_only(effort)
+
+    @cached_property
+    def _stresses(self) -> tuple[tuple[FloatArray, FloatArray], ...]:
+        """Of each beam, places and stresses: those of the path, and extremes between them that may be the largest."""
+        x, names = self._points, list(self.path.layout.network.beams)
+        rows = [self.path.beam_stress(name, self.axial)[0][self._order] for name in names]
+        tops = [inner_extremes(x, row) for row in rows]
+        largest = np.max(rows, axis=0)
+        found = []
+        for name, row, top in zip(names, rows, tops, strict=True):
+            beside = np.searchsorted(x, top)
+            more = top[np.maximum(row[beside - 1], row[beside]) >= NEARLY * largest[beside]]
+            if len(more):
+                there = self.at(more)
+                solved = np.where(there.accurate, there.beam_stress(name, self.axial)[0], values_at(x, row, more))
+                found.append(_inserted(x, row, more, solved))
+            else:
+                found.append((x, row))
+        return tuple(found)
+
+    def effort(self, _branch: str, places: FloatArray, /) -> FloatArray:
+        """Return the effort at places of any shape [N or N m]; next to a bifurcation between the points beside it."""
+        flat = np.ravel(places)
+        there = self.at(flat)
+        solved = np.where(there.accurate, self.unit * there.effort, np.interp(flat, self._points, self._efforts))
+        return np.asarray(solved.reshape(np.shape(places)))
+
+    def stress(self, _branch: str, places: FloatArray, /) -> FloatArray:
+        """Return the largest stress of all beams at places of any shape [Pa]."""
+        flat = np.ravel(places)
+        largest = np.max([values_at(x, stress, flat) for x, stress in self._stresses], axis=0)
+        return np.asarray(largest.reshape(np.shape(places)))
+
+    def at(self, places: FloatArray) -> Path:
+        """Return the equilibria at places (n,) in the range of the path; `accurate` is False where none was found."""
+        solver, drive = self.path.solver, self._drive
+        wanted = np.clip(places / self.path.layout.scales.drive, drive[0], drive[-1])
+        left = np.clip(np.searchsorted(drive, wanted, side="right") - 1, 0, len(drive) - 2)
+        near = self._nearest(wanted, left)
+        y = self._guesses(wanted, near)
+        known = np.abs(wanted - drive[near]) <= KNOWN * (drive[-1] - drive[0])
+        y[known] = self._y[near[known]]
+        found, changes = known.copy(), self._poses(self._y[left + 1] - self._y[left])
+        for number in np.flatnonzero(~known).tolist():
+            spot = solver.solve(y[number], float(wanted[number]))
+            if spot is None or spot.unstable != self._unstable[near[number]]:
+                continue
+            moved = float(self._poses((spot.y - y[number])[None])[0])
+            if moved <= max(LEAST, STRAY * float(changes[number])):
+                y[number], found[number] = spot.y, True
+        info = self.path.points.info[self._order][near]
+        info[:, REQUESTED] = -1
+        branch = self.path.branch[self._order][near]
+        return replace(self.path, points=Points(y, wanted, info), branch=branch, accurate=read_only(found, np.bool_))
+
+    def _poses(self, changes: FloatArray) -> FloatArray:
+        """Return the largest change of positions and rotations in each of some changes of the unknowns, (n,)."""
+        solver = self.path.solver
+        inner = np.abs(changes[:, solver.n :].reshape(len(changes), -1, 6)[:, :, :3])
+        free = np.abs(changes[:, : solver.n_free])
+        return np.asarray(np.maximum(inner.max(axis=(1, 2), initial=0.0), free.max(axis=1, initial=0.0)))
+
+    @cached_property
+    def _drive(self) -> FloatArray:
+        return np.asarray(self.path.points.drive[self._order])
+
+    @cached_property
+    def _y(self) -> FloatArray:
+        return np.asarray(self.path.points.y[self._order])
+
+    @cached_property
+    def _unstable(self) -> FloatArray:
+        return np.asarray(self.path.points.unstable[self._order])
+
+    @cached_property
+    def _stretch(self) -> Any:
+        """The number of the smooth stretch that each point is on: they are parted by bifurcations, (n,)."""
+        parted = np.zeros(len(self._drive), dtype=bool)
+        branch = self.path.branch[self._order]
+        parted[1:] = (branch[1:] != branch[:-1]) | (self._unstable[1:] != self._unstable[:-1])
+        return np.cumsum(parted)
+
+    @cached_property
+    def _events(self) -> FloatArray:
+        """Where the path bifurcates, dimensionless, increasing."""
+        scale = self.path.layout.scales.drive
+        return np.sort([one.drive / scale for one in self.path.events if one.kind == "bifurcation"])
+
+    def _nearest(self, wanted: FloatArray, left: Any) -> Any:
+        """Return the nearest point of the stretch that each value of the drive is on; `left`: the points before."""
+        drive, events = self._drive, self._events
+        near = left + (wanted - drive[left] > drive[left + 1] - wanted)
+        for number in np.flatnonzero(self._stretch[left] != self._stretch[left + 1]).tolist():
+            here = events[(events >= drive[left[number]]) & (events <= drive[left[number] + 1])]
+            if len(here):
+                near[number] = left[number] + bool(wanted[number] > here[0])
+        return near
+
+    def _guesses(self, wanted: FloatArray, near: Any) -> FloatArray:
+        """Return the polynomials through up to four points of a stretch at values of the drive on it, (n, unknowns)."""
+        found = np.empty((len(wanted), self._y.shape[1]))
+        for stretch in np.unique(self._stretch[near]).tolist():
+            own, here = np.flatnonzero(self._stretch == stretch), self._stretch[near] == stretch
+            found[here] = values_at(self._drive[own], self._y[own], wanted[here])
+        return found
+
+
+def _inserted(x: FloatArray, y: FloatArray, places: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return increasing places with some more among them, and their values."""
+    at = np.searchsorted(x, places)
+    return np.insert(x, at, places), np.insert(y, at, values)
