@@ -18,7 +18,7 @@ from cfmkit.plots.style import axes_mm, new_figure, styled
 from cfmkit.plots.vector_formats import inline, svg
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Iterable, Sequence
 
     from matplotlib.axes import Axes
 
@@ -70,24 +70,31 @@ def film(moving: Moving, title: str) -> str:
     title : str
         What a screen reader says about it.
     """
-    drawn = [_pose(moving, number) for number in range(len(moving.motion))]
-    return _merged(drawn, title)
+    return _merged(poses(moving, range(len(moving.motion))), title)
 
 
 @styled
 def still(moving: Moving, number: int, title: str) -> str:
     """Return one pose as SVG for a page."""
-    return _merged([_pose(moving, number)], title)
+    return _merged(poses(moving, (number,)), title)
 
 
-def _pose(moving: Moving, number: int) -> ElementTree.Element:
+@styled
+def poses(moving: Moving, numbers: Iterable[int]) -> list[ElementTree.Element]:
+    """Return poses as SVG, all drawn on the same axes: to make axes takes as long as to draw on them."""
     left, bottom, right, top = moving.box
     scale = min(WIDTH / (right - left), HIGHEST / (top - bottom))
     figure = new_figure((right - left) * scale, (top - bottom) * scale)
     ax = axes_mm(figure, (0.0, 0.0, (right - left) * scale, (top - bottom) * scale))
-    moving.draw(ax, number)
     ax.set_axis_off()
-    return ElementTree.fromstring(inline(svg(figure), "film"))
+    own = set(ax.get_children())
+    drawn = []
+    for number in numbers:
+        moving.draw(ax, number)
+        drawn.append(ElementTree.fromstring(inline(svg(figure), "film")))
+        for artist in set(ax.get_children()) - own:
+            artist.remove()
+    return drawn
 
 
 def _merged(poses: Sequence[ElementTree.Element], title: str) -> str:

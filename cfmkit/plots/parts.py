@@ -119,6 +119,18 @@ def force_arrow(ax: Axes, tail: Point, tip: Point, gid: str = "force") -> None:
 
 
 @styled
+def area(ax: Axes, outline: Any, color: str, gid: str) -> None:
+    """Fill an outline (n, 2) [m]; the limits of the axes do not follow it.
+
+    They are those of `to_scale`: to find what a shape of a hundred points spans takes matplotlib five times as long as to
+    draw it.
+    """
+    from matplotlib.patches import Polygon
+
+    ax.add_artist(Polygon(mm(outline), closed=True, color=color, linewidth=0.4, zorder=2.0, gid=gid))
+
+
+@styled
 def contact(ax: Axes, point: Point, gid: str = "contact") -> None:
     """Mark a point of contact."""
     x, y = mm(point)

@@ -7,6 +7,7 @@ import re
 from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -14,7 +15,10 @@ import pytest
 import cfmkit
 from cfmkit import api
 from cfmkit.errors import ExitCode
+from cfmkit.families import family
 from cfmkit.families.slider_crank.dispatch import moving
+from cfmkit.plots.figures import moving_of
+from cfmkit.plots.moving import poses
 from cfmkit.results import Finding, Result, Status
 from cfmkit.runs import batch_page, run_findings, run_page, study_page
 from cfmkit.studies.batch_entries import Entry
@@ -96,6 +100,15 @@ def test_a_page_holds_verdict_requirements_metrics_figures_and_film_and_asks_for
     assert outside == []
     assert "@import" not in text
     assert not re.search(r"url\((?!#)", text)
+
+
+@pytest.mark.parametrize("name", ["cam", "vcfm", "strip"])
+def test_a_pose_of_a_film_is_drawn_as_if_it_stood_alone(reports, name):
+    result = reports[name].result
+    shown = moving_of(family(result.spec.family), result)
+    together = [ElementTree.tostring(pose) for pose in poses(shown, (0, 7, 16))]
+    assert together == [ElementTree.tostring(pose) for number in (0, 7, 16) for pose in poses(shown, (number,))]
+    assert len(set(together)) == 3
 
 
 def test_the_same_report_gives_the_same_bytes(reports):

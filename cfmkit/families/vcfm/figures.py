@@ -288,7 +288,7 @@ def _draw(ax: Axes, one: Scene) -> None:
     parts.plate(ax, one.rigid, "rigid")
     for name, outlines, color in (("leaf", one.leaves, BLUE), ("spring", one.spring, OCHRE)):
         for outline in outlines:
-            ax.fill(*parts.mm(outline).T, color=color, linewidth=0.4, zorder=2.0, gid=name)
+            parts.area(ax, outline, color, name)
 
 
 def moving(result: Result) -> Moving:

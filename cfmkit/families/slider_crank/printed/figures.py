@@ -148,7 +148,7 @@ def _body(ax: Axes, points: FloatArray, half: FloatArray, solid: bool) -> None:
     normal = np.column_stack([-way[:, 1], way[:, 0]])
     around = parts.mm(np.concatenate([points + half[:, None] * normal, (points - half[:, None] * normal)[::-1]]))
     look = {"facecolor": BLUE, "edgecolor": INK} if solid else {"facecolor": "#d9dde2", "edgecolor": GREY}
-    ax.add_patch(Polygon(around, closed=True, linewidth=0.5, zorder=3 if solid else 2, **look))
+    ax.add_artist(Polygon(around, closed=True, linewidth=0.5, zorder=3 if solid else 2, **look))
 
 
 def _place(solution: Solution, shape: list[tuple[FloatArray, FloatArray]], along: float) -> FloatArray:
