@@ -122,8 +122,8 @@ def force_arrow(ax: Axes, tail: Point, tip: Point, gid: str = "force") -> None:
 def area(ax: Axes, outline: Any, color: str, gid: str) -> None:
     """Fill an outline (n, 2) [m]; the limits of the axes do not follow it.
 
-    They are those of `to_scale`: to find what a shape of a hundred points spans takes matplotlib five times as long as to
-    draw it.
+    They are those of `to_scale`: to find what a shape of a hundred points spans takes matplotlib five times as long as
+    to draw it.
     """
     from matplotlib.patches import Polygon
 
