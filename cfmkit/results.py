@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.curves import Curve
     from cfmkit.specs.spec import Spec
+    from cfmkit.specs.target_curve import TargetCurve
     from cfmkit.tables import Table
 
 
@@ -168,6 +169,8 @@ class Result:
         (for a cam: the roller runs on the flank). ``usable_stroke`` looks there only.
     target : float, optional
         Force or torque that the curve should have [N or N m].
+    target_curve : TargetCurve, optional
+        What the curve should follow where it is not to be constant; default: the specification's own.
     reference : float, optional
         Motion of the pose that the band ranges are measured around [m or rad].
     allowable_stress : float, optional
@@ -194,6 +197,7 @@ class Result:
     travel: tuple[float, float] | None = None
     valid: tuple[tuple[float, float], ...] | None = None
     target: float | None = None
+    target_curve: TargetCurve | None = None
     reference: float | None = None
     allowable_stress: float | None = None
     load_cases: tuple[Curve, ...] = ()

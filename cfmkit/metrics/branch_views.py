@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from cfmkit.curves import Curve, Kind
     from cfmkit.metrics.fatigue_and_relaxation import Durability
     from cfmkit.results import ClosedForm
+    from cfmkit.specs.target_curve import TargetCurve
 
 
 ZERO = 1e-9
@@ -52,6 +53,8 @@ class Frame:
         The model at every place, for metrics that are places.
     durability : Durability or None
         Fatigue and relaxation of the material.
+    curve : TargetCurve or None
+        What it should follow where it is not to be constant.
     """
 
     target: float | None = None
@@ -63,6 +66,7 @@ class Frame:
     closed: ClosedForm | None = field(default=None, compare=False)
     ends: Curve | None = field(default=None, compare=False)
     durability: Durability | None = None
+    curve: TargetCurve | None = None
 
     def needed_target(self) -> float:
         """Return the target, which may not be zero.
@@ -73,8 +77,23 @@ class Frame:
             If there is none.
         """
         if not self.target:
-            raise Undefined("there is no target to compare with" if self.target is None else "the target is zero")
+            told = "the target is zero" if self.target is not None else "there is no target to compare with"
+            raise Undefined(f"{told}; 'deviation_from_curve' compares with a curve" if self.curve else told)
         return self.target
+
+    def needed_curve(self, low: float, high: float, kind: Kind) -> TargetCurve:
+        """Return the target curve, which must be known between two places [m or rad].
+
+        Raises
+        ------
+        Undefined
+            If there is none, or it does not cover them.
+        """
+        if self.curve is None:
+            raise Undefined("there is no target curve to compare with: give 'design.target' or 'analysis.target'")
+        if not self.curve.covers(low, high):
+            raise Undefined(f"the target curve covers {span_text(*self.curve.extent, kind)} only")
+        return self.curve
 
 
 class Function(NamedTuple):
@@ -356,6 +375,7 @@ def usable_interval(cycle: Cycle) -> Interval | None:
     A place counts only if every state of the path at that place keeps them, so
     that a branch that folds back needs no sorting.
     """
+    cycle = _levelled(cycle)
     reference = cycle.frame.target or _mean(cycle)
     travel = (max(b.extent[0] for b in cycle.branches), min(b.extent[1] for b in cycle.branches))
     if cycle.closed and len(cycle.frame.valid or (travel,)) == 1:
@@ -366,6 +386,54 @@ def usable_interval(cycle: Cycle) -> Interval | None:
     longest = max((high - low for low, high in gaps), default=0.0)
     # the first of those that are equally long but for rounding
     return next((gap for gap in gaps if gap[1] - gap[0] >= longest * (1 - 1e-9)), None)
+
+
+def _levelled(cycle: Cycle) -> Cycle:
+    """Return a cycle that follows a curve as one that is to be level: its offsets from it, on its largest effort."""
+    curve = cycle.frame.curve
+    if curve is None:
+        return cycle
+    low, high = max(b.extent[0] for b in cycle.branches), min(b.extent[1] for b in cycle.branches)
+    low, high = max(low, curve.extent[0]), min(high, curve.extent[1])
+    if not (low < high and (size := curve.largest(low, high))):
+        raise Undefined("the target curve says nothing of this travel")
+    valid = [(max(a, low), min(b, high)) for a, b in cycle.frame.valid or ((low, high),)]
+    model = None if cycle.frame.closed is None else LevelledModel(cycle.frame.closed, curve, size)
+    frame = replace(
+        cycle.frame, target=size, curve=None, closed=model, valid=tuple((a, b) for a, b in valid if a < b) or None
+    )
+    branches = (
+        replace(b, frame=frame, trace=replace(b.trace, effort=b.trace.effort - curve.at(b.trace.motion) + size))
+        for b in cycle.branches
+    )
+    return Cycle(tuple(branches), frame)
+
+
+@dataclass(frozen=True, eq=False)
+class LevelledModel:
+    """A model less a curve, on a constant effort (a `cfmkit.results.ClosedForm`)."""
+
+    model: ClosedForm
+    curve: TargetCurve
+    size: float
+
+    @property
+    def places(self) -> FloatArray:
+        """Those of the model [m or rad]."""
+        return self.model.places
+
+    @property
+    def peaks(self) -> FloatArray:
+        """Those of the model [m or rad]."""
+        return self.model.peaks
+
+    def effort(self, branch: str, places: FloatArray) -> FloatArray:
+        """Return the effort less the curve, plus the constant [N or N m]."""
+        return np.asarray(self.model.effort(branch, places) - self.curve.at(places) + self.size)
+
+    def stress(self, branch: str, places: FloatArray) -> FloatArray:
+        """Return that of the model [Pa]."""
+        return self.model.stress(branch, places)
 
 
 def _solved_interval(cycle: Cycle, reference: float, valid: float) -> Interval | None:

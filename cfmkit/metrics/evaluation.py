@@ -137,6 +137,8 @@ def _entries(view: Survey, definition: Definition) -> Iterator[tuple[str, Quanti
     known = view.subject.frame.durability
     if definition.function is None or (definition.of_material and known is None):
         return
+    if definition.of_curve and view.subject.frame.curve is None:
+        return
     if definition.argument:
         for text in map(hold_text, known.holds if known else ()):
             found = view.worst(definition, view.each(definition, text))
@@ -166,6 +168,7 @@ def frame_of(result: Result) -> Frame:
         result.closed,
         durability=getattr(result.spec, "durability", None),
         ends=result.ends,
+        curve=result.target_curve or getattr(result.spec, "target_curve", None),
     )
 
 

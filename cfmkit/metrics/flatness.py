@@ -75,13 +75,42 @@ def deviation_from_target(branch: Branch) -> float:
 def rms_to_target(branch: Branch) -> float:
     """Return the root mean square of F - target at places uniform in the motion, the window's start excluded."""
     target = branch.frame.needed_target()
+    offset = _uniform(branch)[1] - target
+    return sqrt(float(offset @ offset) / UNIFORM_POINTS)
+
+
+def _uniform(branch: Branch) -> tuple[FloatArray, FloatArray]:
+    """Return places uniform in the motion, the start of the window left out, and the efforts there."""
     branch.inside  # noqa: B018  (raises where the window is not covered)
     lo, hi = branch.ends
     places = lo + (hi - lo) * np.arange(1, UNIFORM_POINTS + 1) / UNIFORM_POINTS
     function, model = branch.function, branch.frame.closed
     sampled = np.interp(places, function.motion, function.effort)
-    effort = sampled if model is None else model.effort(branch.name, places)
-    offset = effort - target
+    return places, sampled if model is None else model.effort(branch.name, places)
+
+
+def deviation_from_curve(branch: Branch) -> float:
+    """Return the largest ``|F - F*|`` over the largest ``|F*|`` in the window; of a model, next to the points, too."""
+    (low, high), part, model = branch.ends, branch.inside, branch.frame.closed
+    curve = branch.frame.needed_curve(low, high, branch.kind)
+    size = curve.largest(low, high)
+    if not size:
+        raise Undefined("the target curve is zero in the window")
+    offset = part.effort - curve.at(part.motion)
+    top, bottom = offset.max(), offset.min()
+    if model is not None:
+
+        def beside(places: FloatArray) -> FloatArray:
+            return np.asarray(model.effort(branch.name, places) - curve.at(places))
+
+        top, bottom = (float(one[0]) for one in extremes(beside, part.motion[None, :], offset[None, :]))
+    return float(max(top, -bottom)) / size
+
+
+def rms_to_curve(branch: Branch) -> float:
+    """Return the root mean square of F - F* at places uniform in the motion, the window's start excluded."""
+    places, effort = _uniform(branch)
+    offset = effort - branch.frame.needed_curve(*branch.ends, branch.kind).at(places)
     return sqrt(float(offset @ offset) / UNIFORM_POINTS)
 
 

@@ -67,6 +67,8 @@ class Definition:
         What stands in its brackets in place of a branch: a dimension, or nothing.
     of_material : bool
         Whether it is there only where the material says something about use.
+    of_curve : bool
+        Whether it is there only where a target curve is.
     """
 
     name: str
@@ -78,6 +80,7 @@ class Definition:
     windowed: bool = True
     argument: str = ""
     of_material: bool = False
+    of_curve: bool = False
 
     @property
     def per_branch(self) -> bool:
@@ -140,6 +143,22 @@ _FLATNESS = (
         "sqrt(mean((F - target)^2)) of the {effort} at 100 places uniform in the {motion}, "
         "the start of the window excluded [Bilancia 2019, eq. 8]",
         flatness.rms_to_target,
+    ),
+    Definition(
+        "deviation_from_curve",
+        "ratio",
+        "largest |F - F*| of the {effort} over the largest |F*| in the window, F* the curve of `design.target` or "
+        "`analysis.target`",
+        flatness.deviation_from_curve,
+        of_curve=True,
+    ),
+    Definition(
+        "rms_to_curve",
+        "effort",
+        "sqrt(mean((F - F*)^2)) of the {effort} at 100 places uniform in the {motion}, the start of the window "
+        "excluded, F* the curve of `design.target` or `analysis.target`",
+        flatness.rms_to_curve,
+        of_curve=True,
     ),
 )
 

@@ -14,10 +14,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.curves import Curve
+from cfmkit.metrics import frame_of, window_of
 from cfmkit.plots.bands import Band, bands_of
 from cfmkit.plots.label_placement import Label, place_labels
 from cfmkit.plots.line_diagram import Limit, Region, level, padded, shade
-from cfmkit.plots.style import BAND, LINES, TROUBLE, styled
+from cfmkit.plots.style import BAND, GREY, LINES, TROUBLE, styled
 from cfmkit.plots.text import axis_label, finite_range, shown_range, value_text
 from cfmkit.results import Result
 from cfmkit.specs.units import to_border
@@ -97,7 +98,8 @@ def plot_curve(source: Result | Curve | Sequence[Curve], ax: Axes, look: CurveLo
         return ax
     kind = curves[0].kind
     bands = bands_of(source) if look.bands and isinstance(source, Result) else ()
-    _limit(ax, (lines, bands), look, kind)
+    wanted = _target_line(source) if isinstance(source, Result) else None
+    _limit(ax, (lines if wanted is None else [*lines, wanted], bands), look, kind)
     if len(curves) > 1 and look.names and look.window is None:
         ax.set_xlim(right=ax.get_xlim()[1] + NAME_ROOM * float(np.ptp(ax.get_xlim())))
     region_names = [shade(ax, region, _motion(kind)) for region in look.regions]
@@ -108,8 +110,12 @@ def plot_curve(source: Result | Curve | Sequence[Curve], ax: Axes, look: CurveLo
     if look.arrows and not _all_coincide(ax, lines):
         for line in lines:
             _draw_arrow(ax, line)
+    target_names = [] if wanted is None else [_draw_target(ax, wanted)]
     if look.names:
-        place_labels(ax, [*_name_lines(ax, lines), *_unstable_name(lines), *level_names, *band_names, *region_names])
+        place_labels(
+            ax,
+            [*_name_lines(ax, lines), *target_names, *_unstable_name(lines), *level_names, *band_names, *region_names],
+        )
     return ax
 
 
@@ -231,6 +237,28 @@ def _draw_band(ax: Axes, band: Band, curve: Curve) -> Label:
     inside = np.linspace(max(left, ax.get_xlim()[0]), min(right, ax.get_xlim()[1]), 40)
     points = np.column_stack([np.repeat(inside, len(edges)), np.tile(edges, len(inside))])
     return Label(band.text, color, points, prefer=0.3)
+
+
+def _target_line(result: Result) -> _Line | None:
+    """Return the curve that a result is compared with, where it has one, over its window or its whole motion."""
+    target = frame_of(result).curve
+    if target is None or not len(result.curve):
+        return None
+    curve, (first, last), window = result.curve, target.extent, window_of(result)
+    low, high = (float(curve.motion.min()), float(curve.motion.max())) if window is None else (window.lo, window.hi)
+    low, high = max(low, first), min(high, last)
+    if not low < high:
+        return None
+    places = np.linspace(low, high, 201)
+    effort = to_border(target.at(places), curve.kind)
+    points = np.column_stack([to_border(places, curve.motion_dimension), effort])
+    return _Line(points, np.ones(len(places), dtype=np.bool_), GREY, "target")
+
+
+def _draw_target(ax: Axes, line: _Line) -> Label:
+    """Draw the target curve dashed, and return its name."""
+    ax.plot(*line.points.T, color=line.color, linewidth=1.0, dashes=(6, 3), zorder=3.5)
+    return Label(line.name, line.color, line.points, prefer=0.85)
 
 
 def _name_lines(ax: Axes, lines: list[_Line]) -> list[Label]:

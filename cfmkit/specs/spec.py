@@ -11,9 +11,11 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model, field_validator, model_validator
+from pydantic import BaseModel, Field, ValidationError, create_model, field_validator, model_validator
 
+from cfmkit.specs.block import Model
 from cfmkit.specs.many_parts_metrics import OF_MANY_PARTS
+from cfmkit.specs.target_curve import Target, TargetCurve
 from cfmkit.specs.units import (
     DIMENSIONS,
     SHARE,
@@ -25,15 +27,6 @@ from cfmkit.specs.units import (
     dimension_of_end,
     ends_increase,
 )
-
-
-class Model(BaseModel):
-    """Base of every block: frozen, no unknown keys, no silent type changes."""
-
-    # Blocks stand in others, and only the whole is validated: built with it, each is built once, and quicker to import.
-    model_config = ConfigDict(
-        frozen=True, extra="forbid", strict=True, allow_inf_nan=False, validate_default=True, defer_build=True
-    )
 
 
 class OldWords:
@@ -85,6 +78,10 @@ class Analysis(Model):
     )
     band: Annotated[Ratio, Field(gt=0, lt=1)] = Field(
         0.05, description="half width of the force band of `usable_stroke`"
+    )
+    target: Target | None = Field(
+        None,
+        description="curve that metrics compare with (`deviation_from_curve`, ...); default: `design.target`",
     )
 
     @model_validator(mode="after")
@@ -297,6 +294,34 @@ class Spec(Model):
             "[1 %, 100 %]"
             for path, ends in self.windows()
             if {dimension_of_end(end) for end in ends} - {self.motion, SHARE}
+        }
+        refuse("Spec", faults)
+        return self
+
+    def _targets(self) -> Iterator[tuple[tuple[str, ...], Target]]:
+        """Yield (path, target curve) of the analysis, then of the design."""
+        # a family need not have these blocks, and no family is named here
+        for block in ("analysis", "design"):
+            target = getattr(getattr(self, block, None), "target", None)
+            if isinstance(target, Target):
+                yield (block, "target"), target
+
+    @property
+    def target_curve(self) -> TargetCurve | None:
+        """The curve that the analysis or else the design names; None where the force is to be constant."""
+        design = getattr(self, "design", None)
+        level = getattr(design, "force", None) or getattr(design, "torque", None)
+        return next((target.curve(level) for _, target in self._targets()), None)
+
+    @model_validator(mode="after")
+    def _target_is_of_the_motion(self) -> Self:
+        if self.motion is None:
+            return self
+        right = "torque" if self.motion == "angle" else "force"
+        faults: dict[tuple[str | int, ...], str] = {
+            path: f"is a curve of {target.kind}, and this mechanism is driven by {right}"
+            for path, target in self._targets()
+            if target.kind not in (None, right)
         }
         refuse("Spec", faults)
         return self

@@ -22,6 +22,9 @@ NEED_STRESS = ("stress_max", "safety_factor")
 NEED_FATIGUE = ("fatigue_life",)
 """Metrics that need fatigue data of the material."""
 
+NEED_CURVE = ("deviation_from_curve", "rms_to_curve")
+"""Metrics that compare with a target curve."""
+
 NEED_TIME = ("force_after", "torque_after")
 """Metrics of a time, which their name says: without one there is nothing to note."""
 
@@ -63,7 +66,8 @@ def _left_out(spec: Spec, sample: Curve | None) -> frozenset[str]:
     stressed = sample is None or "max_stress" in sample.extra
     lasting = getattr(spec, "durability", None)
     lives = () if lasting is not None and lasting.fatigue is not None else NEED_FATIGUE
-    return frozenset((*(() if stressed else NEED_STRESS), *lives, *NEED_TIME))
+    followed = () if getattr(spec, "target_curve", None) is not None else NEED_CURVE
+    return frozenset((*followed, *(() if stressed else NEED_STRESS), *lives, *NEED_TIME))
 
 
 def sample_curve(spec: Spec, plan: Plan, design: bool) -> Curve | None:

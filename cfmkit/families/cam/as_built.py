@@ -26,10 +26,12 @@ from cfmkit.families.cam.geometry.built_track import BuiltTrack, built_flank, bu
 from cfmkit.families.cam.geometry.flank import DesignFlank
 from cfmkit.families.cam.scalar_results import (
     DEFINITIONS,
+    curve_cut_for,
     design_values,
     largest,
     pressure_of,
     requested_travel,
+    target_force,
     values_of_built,
 )
 from cfmkit.families.cam.solution import Assembly, Built, Sides
@@ -94,7 +96,12 @@ def analyze_built(spec: CamSpec) -> Result:
         ),
         travel=requested_travel(built),
         valid=((float(travel[0]) + built.origin, float(travel[-1]) + built.origin),),
-        target=spec.design.force if spec.design else float(built.shares["design"][-1]),
+        target=(
+            target_force(spec, assembly)
+            if spec.design or assembly.spec.mechanism.profile.curve
+            else float(built.shares["design"][-1])
+        ),
+        target_curve=None if spec.target_curve else curve_cut_for(assembly),
         allowable_stress=allowable_stress(spec.mechanism),
         state=built,
     )

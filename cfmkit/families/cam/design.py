@@ -13,14 +13,23 @@ Reference
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isclose
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.families.cam.build import CLOSE, assemble_sides, check_start, rollers_overlap, weights_of
+from cfmkit.families.cam.build import (
+    CLOSE,
+    assemble_sides,
+    check_start,
+    cut_profile,
+    rollers_overlap,
+    weights_of,
+    with_curve,
+)
 from cfmkit.families.cam.findings import finding
+from cfmkit.families.cam.geometry.curve_profile import CurveSlopeLaw
 from cfmkit.families.cam.geometry.path import reach
 from cfmkit.families.cam.geometry.profile import SlopeLaw, brace_tangent
 from cfmkit.families.cam.outline import plate_notes
@@ -36,7 +45,9 @@ if TYPE_CHECKING:
 
     from cfmkit.families.base import Run
     from cfmkit.families.cam.spec import CamDesign, CamSpec, Mechanism, Springs
+    from cfmkit.numerics.through_points import ThroughPoints
     from cfmkit.results import Finding
+    from cfmkit.specs.target_curve import TargetCurve
     from cfmkit.stock.springs.catalogue import Offer
 
 
@@ -77,6 +88,8 @@ def design(spec: CamSpec, run: Run) -> Design:
 
 
 def _design(spec: CamSpec, target: CamDesign) -> Design:
+    if target.target is not None:
+        _check_curve(target)
     pull, factor = shaping(spec, target)
     _check_beginning(spec, target, factor)
     smallest = None if target.choose == "preload" else _smallest_constant(spec, target, factor)
@@ -90,6 +103,7 @@ def _design(spec: CamSpec, target: CamDesign) -> Design:
     choice = ways[target.choose](spec, target, pull, factor, smallest)
     law = _law(spec, target, choice.force_constant, factor, choice.preload)
     _check_stroke(law, target, choice.springs)
+    _check_bend(spec, law, target)
     written = _written(spec, target, choice, factor)
     told = (*_overwritten(spec, written), *_plate_lacks(written))
     return Design(written, Status.COMPLETE, choice.note, active_bounds=choice.active, warnings=told)
@@ -97,22 +111,83 @@ def _design(spec: CamSpec, target: CamDesign) -> Design:
 
 def shaping(spec: CamSpec, target: CamDesign) -> tuple[float, float]:
     """Return the force F' that the springs provide [N] and the slope factor c of the profile."""
+    force = _largest_force(target)
     if not target.gravity:
-        return target.force, 1.0
+        return force, 1.0
     roller, slider = weights_of(spec.mechanism).along
     least = slider + 2.0 * roller
-    if target.force <= least:
+    if force <= least:
         raise Infeasible(
             finding(
                 "weight_too_large",
                 f"the moving parts weigh {newton(least)}: a force of "
-                f"{newton(target.force)} does not even carry them; request more ('design.force'), or lighten "
+                f"{newton(force)} does not even carry them; request more ('design.force'), or lighten "
                 "the parts ('mechanism.masses')",
             ),
             {"design.force": f"more than {newton(least)}"},
         )
-    pull = target.force - slider
+    pull = force - slider
     return pull, pull / (pull - 2.0 * roller)
+
+
+def _curve(target: CamDesign) -> TargetCurve | None:
+    """Return the curve of forces that is wanted; None of a constant force."""
+    return None if target.target is None else target.target.curve(target.force)
+
+
+def _largest_force(target: CamDesign) -> float:
+    """Return the force that is wanted, or the largest of a curve [N]."""
+    curve = _curve(target)
+    return target.force or 0.0 if curve is None else curve.extremes(0.0, target.stroke)[1]
+
+
+def _check_curve(target: CamDesign) -> None:
+    """Raise if no springs that pull the rollers in give the curve of forces."""
+    curve = _curve(target)
+    assert curve is not None
+    first, last = curve.extent
+    if not curve.covers(0.0, target.stroke) or 0.0 > first > -float("inf"):
+        known = f"{mm(first)} to {mm(last)}"
+        raise Infeasible(
+            finding(
+                "target_curve",
+                f"the target curve goes from {known}, and the slider from 0 mm to {mm(target.stroke)}; let its points "
+                "begin at 0 mm and reach the stroke ('design.target', 'design.stroke')",
+            ),
+            {"design.stroke": at_most(last)} if last > 0 >= first else None,
+        )
+    shape = curve.between(0.0, target.stroke)
+    places = np.linspace(0.0, max(target.stroke, shape.places[-1]), 2001)
+    force = np.asarray(curve.at(places))
+    lowest = int(np.argmin(force[1:])) + 1
+    if force[lowest] <= 0 or force[0] < 0:
+        at = places[0 if force[0] < min(force[lowest], 0.0) else lowest]
+        raise Infeasible(
+            finding(
+                "target_curve",
+                f"the target curve is {newton(float(curve.at(at)))} at {mm(float(at))}: a cam holds up a force, which "
+                "must stay above 0 beyond the start, or the rollers would have to give back energy that the springs "
+                "do not have ('design.target')",
+            )
+        )
+    if force[0] == 0.0 and not shape.slope(0.0) > 0:
+        raise Infeasible(
+            finding(
+                "target_curve",
+                "the target curve begins at zero force and does not grow from there: the path would begin vertical; "
+                "begin with some force, or with a slope ('design.target')",
+            )
+        )
+
+
+def _shape(spec: CamSpec, target: CamDesign) -> ThroughPoints | None:
+    """Return the force that springs and carried weights give, as shares of the largest; None of a constant force."""
+    curve = _curve(target)
+    if curve is None:
+        return None
+    slider = weights_of(spec.mechanism).along[1] if target.gravity else 0.0
+    wanted, most = curve.between(0.0, target.stroke), _largest_force(target) - slider
+    return replace(wanted, values=tuple((value - slider) / most for value in wanted.values))
 
 
 def _law(
@@ -121,14 +196,21 @@ def _law(
     """Return the slope law of a designed profile; the elongation `preload` [m] is the mechanism's unless given."""
     mechanism = spec.mechanism
     half = 0.5 * (mechanism.preload if preload is None else preload)
-    return SlopeLaw(force_constant, mechanism.rest_half_width, mechanism.brace_length, target.friction, factor, half)
+    law = SlopeLaw(force_constant, mechanism.rest_half_width, mechanism.brace_length, target.friction, factor, half)
+    shape = _shape(spec, target)
+    if shape is None:
+        return law
+    try:
+        return with_curve(law, shape)
+    except CannotBuild as problem:
+        raise Infeasible(problem.finding) from None
 
 
 def _undercuts(spec: CamSpec, law: SlopeLaw, smallest: float | None) -> bool:
     """Return whether a force constant below `smallest` [m] undercuts: with a preload some small ones do not."""
     if smallest is None or law.force_constant >= smallest:
         return False
-    return not law.preload or float(law.curvature_radius(law.rest_half_width)) < spec.mechanism.roller_radius
+    return not law.constant or not law.preload or law.undercuts(spec.mechanism.roller_radius)
 
 
 def _check_beginning(spec: CamSpec, target: CamDesign, factor: float) -> None:
@@ -292,6 +374,19 @@ def _with_spring(
     return gap, Choice(constant, springs, note=note, preload=preload)
 
 
+def _check_bend(spec: CamSpec, law: SlopeLaw, target: CamDesign) -> None:
+    """Raise where a roller cannot follow the path of a curve: a corner in it, or nothing left of the flank."""
+    if not isinstance(law, CurveSlopeLaw):
+        return
+    path, end = reach(law, target.stroke)
+    try:
+        cut_profile(path, spec.mechanism.roller_radius, end)
+    except CannotBuild as problem:
+        raise Infeasible(
+            problem.finding, {"mechanism.roller_radius": at_most(law.tightest(end)[1] * (1 - 1e-6))}
+        ) from None
+
+
 def _stroke_of(law: SlopeLaw, target: CamDesign, springs: Springs) -> float:
     """Return the travel up to which geometry and springs hold out [m]."""
     path, end = reach(law, target.stroke)
@@ -333,7 +428,8 @@ def two_way_gap(law: SlopeLaw, target: CamDesign, friction: float) -> float:
     if (lever[0] <= 0).any():
         return float("inf")
     force = (stretch + carried) / lever
-    return float(np.abs(force - 1.0).max())
+    wanted = law.shape.at(path.travel(x)) if isinstance(law, CurveSlopeLaw) else 1.0
+    return float(np.abs(force - wanted).max())
 
 
 def _check_stroke(law: SlopeLaw, target: CamDesign, springs: Springs) -> None:
@@ -369,6 +465,7 @@ _SOURCES = {
     "friction": "design.friction",
     "preload": "mechanism.springs.preload",
     "slope_factor": "design.gravity",
+    "curve": "design.target",
     "offset": "",
     "file": "",
     "noise": "",
@@ -409,7 +506,7 @@ def _plate_lacks(spec: CamSpec) -> Iterator[Finding]:
 def _written(spec: CamSpec, target: CamDesign, choice: Choice, factor: float) -> CamSpec:
     """Return the spec with the designed profile written out, so that it is a fixed part from now on."""
     mechanism = spec.mechanism
-    profile = {
+    profile: dict[str, Any] = {
         "force_constant": choice.force_constant,
         "friction": target.friction,
         "slope_factor": factor,
@@ -423,4 +520,10 @@ def _written(spec: CamSpec, target: CamDesign, choice: Choice, factor: float) ->
         springs.pop(stated, None)
     if choice.preload:
         profile["preload"] = springs["preload"] = choice.preload
-    return spec.replace({"mechanism.profile": profile, "mechanism.springs": springs})
+    changes: dict[str, Any] = {"mechanism.profile": profile, "mechanism.springs": springs}
+    if (shape := _shape(spec, target)) is not None and target.target is not None:
+        points = tuple(zip(shape.places, shape.values, strict=True))
+        profile["curve"] = {"points": points, "interpolation": "smooth" if shape.smooth else "linear"}
+        changes["design.target"] = target.target.written_out(target.force)
+        changes["design.force"] = None
+    return spec.replace(changes)

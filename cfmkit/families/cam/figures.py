@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.families.cam.picture_parts import moment, pivoting, pose, scene, spring_count, start_curve, swallowtail
-from cfmkit.families.cam.scalar_results import theoretical_force
+from cfmkit.families.cam.scalar_results import constant_force
 from cfmkit.plots import parts
 from cfmkit.plots.bands import limits_on
 from cfmkit.plots.curves import CurveLook, plot_curve
@@ -35,6 +35,9 @@ if TYPE_CHECKING:
 
 
 TRAVEL = Scale("displacement", "length")
+
+MOST_RADIUS = 100.0
+"""Times the brace's length: a path with a larger radius of curvature is straight, and is left out of its picture."""
 
 STACK_BELOW = 0.5
 """Flat mechanisms, less high than this fraction of their width, are drawn below each other, not side by side."""
@@ -94,9 +97,11 @@ def draw_mechanism(solution: Solution, index: int, ax: Axes, view: Scene | None 
 def loop(result: Result) -> Figure:
     """Return the force-displacement loop with the theoretical force and the requirement bands."""
     solution: Solution = result.state
-    force = theoretical_force(solution)
+    force = constant_force(solution.assembly)
     name = "4KA + slider's weight" if solution.assembly.loads.slider_weight else "4KA"
-    look = CurveLook(levels=(Limit(force, f"{name} = {value_text(force, 'force')}"),), regions=tuple(regions(solution)))
+    level = Limit(force, f"{name} = {value_text(force, 'force')}")
+    constant = solution.assembly.profile.path.law.constant
+    look = CurveLook(levels=(level,) if constant else (), regions=tuple(regions(solution)))
     return loop_figure(result, look, "force over travel of the slider")
 
 
@@ -172,8 +177,12 @@ def curvature(result: Result) -> Figure:
     solution: Solution = result.state
     profile = solution.assembly.profile
     x = np.linspace(profile.path.law.rest_half_width, profile.end, 400)
-    radius = profile.path.law.curvature_radius(x)
-    flank = np.where(radius - profile.roller_radius > 0.5 * radius[0], radius - profile.roller_radius, np.nan)
+    radius = np.asarray(profile.path.law.curvature_radius(x))
+    if not profile.path.law.constant:  # where the path is hollow or straight no roller is too large
+        radius = np.where((radius > 0) & (radius < MOST_RADIUS * profile.path.law.brace_length), radius, np.nan)
+    flank = np.where(
+        radius - profile.roller_radius > 0.5 * np.nan_to_num(radius[0]), radius - profile.roller_radius, np.nan
+    )
     cut_for, built = profile.roller_radius, solution.assembly.spec.mechanism.roller_radius
     limits = [Limit(cut_for, f"roller {value_text(cut_for, 'length')}", trouble=profile.corner is not None)]
     if built != cut_for:
@@ -237,7 +246,7 @@ def springs(result: Result) -> Figure:
 def undercut(result: Result) -> Figure:
     """Return what undercut does: the roller on the corner, what is cut away, and the force there."""
     solution: Solution = result.state
-    heading, force = Heading.of(result, "undercut at the start"), theoretical_force(solution)
+    heading, force = Heading.of(result, "undercut at the start"), constant_force(solution.assembly)
     figure = new_figure(160.0, 12.0 + 50.0 + 6.0 + heading.height_mm)
     write_heading(figure, heading)
     titles = "the roller pivots on the corner", "the corner, enlarged", "force on the slider [N]"

@@ -62,6 +62,7 @@ FINDINGS = {
     "overwritten": "a value of the profile that the design replaces by its own",
     "plate_incomplete": "there is no room for the tab of the plate, or for its fixing holes",
     "old_word": "a word of the specification that the next version will not accept",
+    "target_curve": "no cam gives the target curve: it ends too early, is not above zero, or asks for a vertical path",
     "weight_too_large": "the target force does not even carry the weight of the moving parts",
     "force_constant_too_small": "the force constant needed is below the one that avoids undercut",
     "registration_weak": "the measured points determine the position of the cam poorly",
@@ -154,7 +155,8 @@ def _undercut(solution: Solution) -> Iterator[Finding]:
     yield finding(
         "undercut",
         f"{roller} is larger than the path's smallest radius of curvature "
-        f"({mm(radius)}, at the start); the first {mm(corner)} run on a corner, without the constant force. "
+        f"({mm(radius)}, at the start); the first {mm(corner)} run on a corner, "
+        f"without the {'constant force' if law.constant else 'force it is cut for'}. "
         f"Use {tighter}{fits}{larger}",
         *cures,
     )

@@ -25,7 +25,7 @@ from cfmkit.families.cam.build import CLOSE, assemble, check_first_pose, check_s
 from cfmkit.families.cam.clearance import smallest, touching
 from cfmkit.families.cam.contact_pressure import allowable_stress, flank_pressure, stress
 from cfmkit.families.cam.findings import finding, findings_of, left_out
-from cfmkit.families.cam.scalar_results import contact_pressure, theoretical_force, values_of
+from cfmkit.families.cam.scalar_results import contact_pressure, curve_cut_for, target_force, values_of
 from cfmkit.families.cam.solution import ON_CORNER, Assembly, Solution
 from cfmkit.families.cam.statics import Forces, forces
 from cfmkit.families.findings import mm
@@ -91,7 +91,8 @@ def analyze(spec: CamSpec, run: Run) -> Result:
                 float(solution.travel[-1]) + solution.origin,
             ),
         ),
-        target=spec.design.force if spec.design else theoretical_force(solution),
+        target=target_force(spec, assembly),
+        target_curve=None if spec.target_curve else curve_cut_for(assembly),
         allowable_stress=allowable_stress(spec.mechanism),
         closed=DenseLoop(solution),
         tables=listed(parts_of(spec)),

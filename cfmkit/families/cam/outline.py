@@ -107,7 +107,7 @@ def _coordinates(profile: CamProfile, start: float) -> FloatArray:
     slope = profile.path.law.slope(fine)
     steps = np.hypot(np.diff(fine), np.diff(profile.path.height(fine)))
     measure = np.zeros_like(fine)
-    for grown in (steps, np.diff(np.arctan(slope)), np.diff(fine)):
+    for grown in (steps, np.abs(np.diff(np.arctan(slope))), np.diff(fine)):
         measure[1:] += np.cumsum(grown) / max(float(np.sum(grown)), 1e-300)
     spread: FloatArray = np.interp(np.linspace(0.0, measure[-1], POINTS), measure, fine)
     return spread

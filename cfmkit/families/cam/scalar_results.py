@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from math import isfinite
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cfmkit.families.cam.contact_pressure import flank_pressure
+from cfmkit.families.cam.geometry.curve_profile import CurveSlopeLaw
 from cfmkit.families.cam.geometry.track_records import TrackStates
 from cfmkit.families.cam.solution import ON_CORNER, pressure_angle
 from cfmkit.families.cam.statics import Forces, Losses, forces, normal_turn
 from cfmkit.metrics.continuous_curves import extremes
 from cfmkit.results import Quantity
+from cfmkit.specs.target_curve import TargetCurve
 from cfmkit.specs.units import between
 from cfmkit.stock.springs.in_use import WIRE_DEFINITIONS, SpringInUse, wire_quantities
 
@@ -23,6 +26,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.families.cam.solution import Assembly, Built, Solution
+    from cfmkit.families.cam.spec import CamSpec
 
 
 BUILT_DEFINITIONS = {
@@ -64,7 +68,8 @@ DEFINITIONS = {
     "spring_stiffness": ("stiffness", "K, the sum of all parallel springs"),
     "theoretical_force": (
         "force",
-        "4 K A, plus the weights that the profile is shaped to carry: without friction, with the parts it is cut for",
+        "4 K A, plus the weights that the profile is shaped to carry: without friction, with the parts it is cut for; "
+        "of a curve the largest",
     ),
     "undercut_travel": ("length", "travel at the start that runs on a corner of the cam; 0 if the roller fits"),
     "roller_radius_max": ("length", "smallest radius of curvature of the roller path: the largest roller that fits"),
@@ -141,8 +146,8 @@ def values_of(solution: Solution) -> Mapping[str, Quantity]:
     numbers: dict[str, float | None] = {
         **design_values(assembly),
         "undercut_travel": solution.corner_travel,
-        "roller_radius_max": float(law.curvature_radius(law.rest_half_width)),
-        "force_constant_min": law.smallest_force_constant(assembly.profile.roller_radius),
+        "roller_radius_max": _largest_roller(assembly),
+        "force_constant_min": law.smallest_force_constant(assembly.profile.roller_radius) if law.constant else None,
         "corner_force_max": _corner_peak(solution),
         "jam_travel": next((high for low, high in solution.jams if low == 0), 0.0),
         "spring_elongation_max": float(solution.elongation.max()),
@@ -179,6 +184,15 @@ def _wire(solution: Solution) -> dict[str, Quantity]:
     return wire_quantities([SpringInUse(wound, least, most, fatigue, springs.life)])
 
 
+def _largest_roller(assembly: Assembly) -> float | None:
+    """Return the smallest radius of curvature of the roller path [m]; None where no roller is too large for it."""
+    law = assembly.profile.path.law
+    if isinstance(law, CurveSlopeLaw):
+        radius = law.tightest(assembly.profile.end)[1]
+        return radius if isfinite(radius) else None
+    return float(law.curvature_radius(law.rest_half_width))
+
+
 def design_values(assembly: Assembly) -> dict[str, float]:
     """Return what the profile and the springs say by themselves, by name."""
     return {
@@ -188,15 +202,27 @@ def design_values(assembly: Assembly) -> dict[str, float]:
     }
 
 
-def theoretical_force(solution: Solution) -> float:
-    """Return 4 K A and the weights that a weight-carrying profile adds [N]."""
-    return constant_force(solution.assembly)
-
-
 def constant_force(assembly: Assembly) -> float:
     """Return the force that the profile is cut for, with the springs and weights built in [N]."""
     law, loads = assembly.profile.path.law, assembly.loads
     return 4.0 * loads.stiffness * law.force_constant + loads.slider_weight
+
+
+def target_force(spec: CamSpec, assembly: Assembly) -> float | None:
+    """Return the constant force that is wanted or that the profile is cut for [N]; None where it follows a curve."""
+    if spec.target_curve is not None or assembly.spec.mechanism.profile.curve is not None:
+        return None
+    return spec.design.force if spec.design else constant_force(assembly)
+
+
+def curve_cut_for(assembly: Assembly) -> TargetCurve | None:
+    """Return the curve of forces that the profile is cut for, with the springs built in; None of a constant force."""
+    law, loads = assembly.profile.path.law, assembly.loads
+    if not isinstance(law, CurveSlopeLaw):
+        return None
+    full = 4.0 * loads.stiffness * law.force_constant
+    shape = replace(law.shape, values=tuple(full * share + loads.slider_weight for share in law.shape.values))
+    return TargetCurve(shape, "force")
 
 
 def contact_pressure(solution: Solution, forces: Forces | None = None) -> FloatArray:

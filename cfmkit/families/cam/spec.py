@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import itertools
+from functools import cached_property
 from math import pi, radians
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
 
+from cfmkit.numerics.through_points import ThroughPoints
 from cfmkit.specs.spec import Analysis, DesignBlock, Model, OldWords, Spec, refuse
+from cfmkit.specs.target_curve import MOST_POINTS, Interpolation, Target
 from cfmkit.specs.units import Angle, Force, Inertia, Length, Mass, Ratio, Stiffness, Time, format_short
 from cfmkit.stock.spec import Friction, Guide, MaterialField, MaterialSpec, Pins, SafetyFactor
 from cfmkit.stock.springs.spec import Catalogue, Life, SpringWire
@@ -116,6 +120,34 @@ class LeftMasses(Model):
     roller_inertia: NonNegativeInertia | None = Field(None, description="of the left roller")
 
 
+class ProfileCurve(Model):
+    """Force over travel that a profile is cut for, as shares of 4 K A."""
+
+    points: tuple[tuple[NonNegativeLength, Annotated[Ratio, Field(ge=0)]], ...] = Field(
+        min_length=2, max_length=MOST_POINTS, description="[[0 mm, 0.5], [20 mm, 1], ...]: travel, share of 4 K A"
+    )
+    interpolation: Interpolation = Field(
+        "smooth", description="between points: monotone cubics (smooth), or straight lines (linear)"
+    )
+
+    @model_validator(mode="after")
+    def _can_be_cut(self) -> Self:
+        places = [place for place, _ in self.points]
+        if places[0] != 0 or any(after <= before for before, after in itertools.pairwise(places)):
+            raise ValueError("points must begin at a travel of 0 and increase")
+        if min(share for _, share in self.points[1:]) <= 0:
+            raise ValueError("shares must be above 0 beyond the start: springs that pull the rollers in cannot push")
+        if self.points[0][1] == 0 and not self.shape.slope(0.0) > 0:
+            raise ValueError("a force that begins at zero must grow from there: the path would begin vertical")
+        return self
+
+    @cached_property
+    def shape(self) -> ThroughPoints:
+        """The curve as a function of travel [m]."""
+        places, shares = zip(*self.points, strict=True)
+        return ThroughPoints(places, shares, self.interpolation == "smooth")
+
+
 class Profile(Model):
     """The cam as it is cut. What is left out follows the mechanism's own values."""
 
@@ -126,6 +158,9 @@ class Profile(Model):
     slope_factor: Annotated[Ratio, Field(gt=0)] = Field(
         1.0,
         description="1, or more where the profile carries the weight of the moving parts; less where they hang down",
+    )
+    curve: ProfileCurve | None = Field(
+        None, description="force over travel, as shares of 4 K A, that it is cut for; default: constant"
     )
     stroke: PositiveLength | None = Field(None, description="slider travel that the flank is cut for")
     brace_length: PositiveLength | None = Field(None, description="brace it is cut for")
@@ -358,7 +393,12 @@ class Mechanism(Model):
 class CamDesign(DesignBlock):
     """What `cfmkit design` is to reach, and what it may choose."""
 
-    force: Annotated[Force, Field(gt=0)] = Field(description="target force, weight included if gravity is on")
+    force: Annotated[Force, Field(gt=0)] | None = Field(
+        None, description="target force, weight included if gravity is on"
+    )
+    target: Target | None = Field(
+        None, description="instead of a constant force a curve of forces over travel, from 0 to the stroke"
+    )
     stroke: PositiveLength = Field(description="target travel of the slider")
     choose: Literal["force-constant", "stiffness", "catalogue", "preload"] = Field(
         "force-constant",
@@ -379,6 +419,19 @@ class CamDesign(DesignBlock):
     )
     avoid_undercut: bool = Field(False, description="take the smallest A whose path the roller can follow")
     gravity: bool = Field(False, description="shape the profile so that the weight of the moving parts is carried too")
+
+    @model_validator(mode="after")
+    def _one_target(self) -> Self:
+        both = self.force is not None and self.target is not None
+        if (self.force is None and self.target is None) or (
+            both and self.target and (self.target.stiffness is None or self.target.start is not None)
+        ):
+            raise ValueError(
+                "give either 'force' or 'target'; with 'target: {stiffness}' the force is that at the start"
+            )
+        if self.target is not None and self.choose == "preload":
+            raise ValueError("'choose: preload' is for a constant force: give a preload in 'mechanism.springs'")
+        return self
 
     @model_validator(mode="after")
     def _catalogue_where_needed(self) -> Self:
@@ -478,8 +531,17 @@ class CamSpec(Spec):
             raise ValueError("the dynamic model needs a motion: add 'analysis.dynamics'")
         if self.fidelity == "dynamic" and self.mechanism.profile.file is not None:
             raise ValueError("the dynamic model runs on the design: remove 'profile.file', or choose 'quasi-static'")
+        left = self.mechanism.left and self.mechanism.left.profile
+        if self.fidelity == "dynamic" and (self.mechanism.profile.curve or (left and left.curve)):
+            raise ValueError("the dynamic model is for constant forces: remove 'profile.curve', or say 'quasi-static'")
         if self.fidelity == "dynamic" and self.mechanism.masses is None:
             raise ValueError("the dynamic model needs the masses of the moving parts: add 'mechanism.masses'")
+        return self
+
+    @model_validator(mode="after")
+    def _target_counts_from_the_path(self) -> Self:
+        if self.target_curve is not None and self.analysis.origin != "path-start":
+            raise ValueError("a target curve counts from the start of the path: remove 'analysis.origin'")
         return self
 
     @property

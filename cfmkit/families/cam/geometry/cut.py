@@ -99,9 +99,12 @@ def cut(path: RollerPath, roller_radius: float, end: float) -> CamProfile:
     """
     profile = CamProfile(path, roller_radius, end)
     law, x0 = path.law, path.law.rest_half_width
-    if law.curvature_radius(x0) >= roller_radius:
+    if not law.undercuts(roller_radius):
         return profile
-    cusp = _crossing(lambda x: law.curvature_radius(x) - roller_radius, x0, end)
+    if law.constant:
+        cusp = _crossing(lambda x: law.curvature_radius(x) - roller_radius, x0, end)
+    else:  # a path that may become hollow has a curvature through zero
+        cusp = _crossing(lambda x: 1.0 / roller_radius - 1.0 / law.curvature_radius(x), x0, end)
 
     def clear_of_start(x: float) -> float:
         cx, cy = profile.flank(x)

@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from cfmkit.families.cam.geometry.curve_profile import CurveSlopeLaw
 from cfmkit.families.cam.geometry.profile import Real, brace_tangent, drop
 from cfmkit.numerics.quadrature import RunningIntegral
 from cfmkit.numerics.roots import bracketed_root
@@ -48,9 +49,11 @@ class RollerPath:
     def __init__(self, law: SlopeLaw, end: float, method: Method = "quadrature") -> None:
         """Integrate the slope once."""
         self.law, self.end, self.method = law, end, method
-        self._height: _ClosedHeight | _QuadratureHeight | _OdeHeight
+        self._height: _ClosedHeight | _QuadratureHeight | _OdeHeight | _CurveHeight
         if method == "ode":
             self._height = _OdeHeight(law, end)
+        elif isinstance(law, CurveSlopeLaw):
+            self._height = _CurveHeight(law)
         elif law.friction:
             self._height = _QuadratureHeight(law, end)
         else:
@@ -77,6 +80,18 @@ class _ClosedHeight:
         out = x - law.rest_half_width
         stretch = out * (out + 2.0 * law.preload) / (2.0 * law.force_constant)
         return law.slope_factor * (stretch - drop(x, law.rest_half_width, law.brace_length))
+
+
+class _CurveHeight:
+    """Height of a path whose force follows a curve: the travel less what the braces lower the slider by."""
+
+    def __init__(self, law: CurveSlopeLaw) -> None:
+        self.law = law
+
+    def __call__(self, x: Real) -> Real:
+        law = self.law
+        height: Any = law.travel(x) - drop(x, law.rest_half_width, law.brace_length)
+        return height
 
 
 class _QuadratureHeight:
@@ -141,9 +156,8 @@ class _OdeHeight:
 
 
 def ideal_position(law: SlopeLaw, travel: Real) -> Real:
-    """Return x after a slider travel [m]: exact without friction and weight, s = (D^2 - d0^2)/2A, else near it."""
-    stretched = (law.preload**2 + 2.0 * law.force_constant * travel / law.slope_factor) ** 0.5
-    return law.rest_half_width + (stretched - law.preload)
+    """Return x after a slider travel [m]: exact without friction and weight, else near it."""
+    return law.position(travel)
 
 
 def reach(law: SlopeLaw, travel: float, method: Method = "quadrature") -> tuple[RollerPath, float]:

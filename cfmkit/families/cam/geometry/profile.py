@@ -75,6 +75,20 @@ class SlopeLaw:
     slope_factor: float = 1.0
     preload: float = 0.0
 
+    @property
+    def constant(self) -> bool:
+        """Whether it is for a constant force."""
+        return True
+
+    def position(self, travel: Real) -> Real:
+        """Return x after a slider travel [m]: exact without friction and weight, s = (D^2 - d0^2)/2A, else near it."""
+        stretched = (self.preload**2 + 2.0 * self.force_constant * travel / self.slope_factor) ** 0.5
+        return self.rest_half_width + (stretched - self.preload)
+
+    def undercuts(self, roller_radius: float) -> bool:
+        """Return whether the path is curved more tightly at its start than a roller [m]."""
+        return not self.curvature_radius(self.rest_half_width) >= roller_radius
+
     def frictionless(self, x: Real) -> Real:
         """Return p(x), the slope before the contact normal is turned by friction [SS, eq. 3]."""
         stretch = (x - self.rest_half_width + self.preload) / self.force_constant

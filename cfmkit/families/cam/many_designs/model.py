@@ -72,6 +72,8 @@ def analyze_block(spec: CamSpec, block: Block) -> BlockAnswer | None:
     block : Block
         The variants and the measures.
     """
+    if spec.mechanism.profile.curve is not None or spec.target_curve is not None:
+        return None
     names = {measure.name for measure in block.measures}
     settings = spec.analysis.points, "contact_force_max" in names, spec.analysis.band
     if _one_cam(spec, block) and names <= (KNOWN_OF_BUILT if spec.mechanism.contact else KNOWN):

@@ -1,0 +1,268 @@
+"""A curve that the force or torque is to follow where it is not to be constant: as a file says it, and as a function.
+
+``design.target`` and ``analysis.target`` take points, a CSV file or a stiffness. What drives the mechanism decides
+whether these are forces over displacements or torques over angles; the units say which.
+"""
+
+from __future__ import annotations
+
+import csv
+import itertools
+import re
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
+
+from pydantic import Field, ValidationInfo, field_validator, model_validator
+
+from cfmkit.errors import QuantityError
+from cfmkit.numerics.through_points import ThroughPoints
+from cfmkit.specs.block import Model
+from cfmkit.specs.units import Displacement, Place, Quantity, format_quantity, format_short, read_quantity
+from cfmkit.specs.units.fields import plain_schema
+from cfmkit.tables.source import DataSource
+
+if TYPE_CHECKING:
+    from pydantic_core import CoreSchema
+
+
+EFFORTS, SLOPES = ("force", "torque"), ("stiffness", "rotational_stiffness")
+MOTION_OF = {"force": "length", "torque": "angle"}
+MOST_POINTS = 10_000
+
+
+class Measured(float):
+    """An SI float that knows its dimension."""
+
+    __slots__ = ("dimension",)
+    dimension: str
+
+    def __new__(cls, value: float, dimension: str) -> Measured:
+        """Return `value` as a number of that dimension."""
+        number = super().__new__(cls, value)
+        number.dimension = dimension
+        return number
+
+    def __reduce__(self) -> tuple[type[Measured], tuple[float, str]]:
+        """Return what copying and pickling need."""
+        return type(self), (float(self), self.dimension)
+
+
+@dataclass(frozen=True)
+class _OneOf(Quantity):
+    """Text of one of several dimensions, which the number then knows; a plain number is of the first."""
+
+    def __get_pydantic_core_schema__(self, _source: Any, _handler: Any) -> CoreSchema:
+        """Build the validator and the serialiser."""
+
+        def read(value: Any) -> Measured:
+            return value if isinstance(value, Measured) else Measured(*self.read(value))
+
+        def write(value: Measured) -> str:
+            return format_quantity(value, getattr(value, "dimension", self.dimensions[0]))
+
+        return plain_schema(read, write)
+
+    def __get_pydantic_json_schema__(self, _core: Any, _handler: Any) -> dict[str, Any]:
+        """Describe the text that is expected."""
+        return self.json_schema({})
+
+
+Effort = Annotated[float, _OneOf(EFFORTS)]
+AnyStiffness = Annotated[float, _OneOf(SLOPES)]
+Interpolation = Literal["smooth", "linear"]
+
+
+@dataclass(frozen=True)
+class TargetCurve:
+    """A force over displacements, or a torque over angles, that a mechanism is to have.
+
+    Attributes
+    ----------
+    function : ThroughPoints or (float, float)
+        Through points [m or rad, N or N m]; or a line, its value at zero and its slope.
+    kind : {"force", "torque"} or None
+        What it is; None where nothing but zeros says so.
+
+    Examples
+    --------
+    >>> TargetCurve((10.0, -500.0)).at(0.01)
+    5.0
+    """
+
+    function: ThroughPoints | tuple[float, float]
+    kind: str | None = None
+
+    def at(self, places: Any) -> Any:
+        """Return the effort that is wanted at places [N or N m]."""
+        if isinstance(self.function, ThroughPoints):
+            return self.function.at(places)
+        level, slope = self.function
+        return level + slope * places
+
+    @property
+    def extent(self) -> tuple[float, float]:
+        """Between which ends of the motion it is known [m or rad]."""
+        if isinstance(self.function, ThroughPoints):
+            return self.function.places[0], self.function.places[-1]
+        return -float("inf"), float("inf")
+
+    def covers(self, low: float, high: float) -> bool:
+        """Return whether it is known between two places [m or rad], but for rounding."""
+        first, last = self.extent
+        slack = 1e-9 * (high - low)
+        return first <= low + slack and high - slack <= last
+
+    def between(self, low: float, high: float) -> ThroughPoints:
+        """Return it as a function through points, of which a line has two [m or rad]."""
+        if isinstance(self.function, ThroughPoints):
+            return self.function
+        return ThroughPoints((low, high), (float(self.at(low)), float(self.at(high))))
+
+    def extremes(self, low: float, high: float) -> tuple[float, float]:
+        """Return the smallest and the largest effort between two places [N or N m]."""
+        return self.between(low, high).extremes(low, high)
+
+    def largest(self, low: float, high: float) -> float:
+        """Return the largest magnitude between two places [N or N m]."""
+        return max(map(abs, self.extremes(low, high)))
+
+
+class Target(Model):
+    """A curve instead of one force: points, a file of points, or a straight line."""
+
+    points: tuple[tuple[Displacement, Effort], ...] | None = Field(
+        None,
+        min_length=2,
+        max_length=MOST_POINTS,
+        description="[[0 mm, 0 N], [5 mm, 10 N], ...], increasing in the displacement or angle",
+    )
+    file: str | None = Field(
+        None,
+        description="the same as a CSV beside the specification: displacement [mm], force [N], or angle [deg], "
+        "torque [N*mm]",
+    )
+    stiffness: AnyStiffness | None = Field(None, description="or a straight line: its slope, negative if it falls")
+    start: Effort | None = Field(
+        None, description="of a line: force or torque at zero; default: that of the design, else 0"
+    )
+    interpolation: Interpolation = Field(
+        "smooth",
+        description="between points: monotone cubics, which round steps without overshoot (smooth), or straight lines",
+    )
+
+    @field_validator("file", mode="wrap")
+    @classmethod
+    def _beside_the_spec(cls, value: Any, handler: Any, info: ValidationInfo) -> Any:
+        folder = getattr(value, "folder", None) or (info.context or {}).get("folder") or "."
+        if value is None:
+            return None
+        source = DataSource(handler(value), folder)
+        _from_file(source)
+        return source
+
+    @model_validator(mode="after")
+    def _said_once(self) -> Self:
+        if sum(one is not None for one in (self.points, self.file, self.stiffness)) != 1:
+            raise ValueError("give one of 'points', 'file' and 'stiffness'")
+        if self.start is not None and self.stiffness is None:
+            raise ValueError("'start' belongs to 'stiffness': points say where they start")
+        if self.points is not None:
+            _check(self.points)
+        if self.start and self.stiffness and EFFORTS.index(_dim(self.start)) != SLOPES.index(_dim(self.stiffness)):
+            raise ValueError("'stiffness' and 'start' must both be of a force, or both of a torque")
+        return self
+
+    @property
+    def all_points(self) -> tuple[tuple[float, float], ...] | None:
+        """The points, those of the file included [m or rad, N or N m]; None of a straight line."""
+        return _from_file(self.file) if isinstance(self.file, DataSource) else self.points
+
+    @property
+    def kind(self) -> str | None:
+        """Force or torque; None where all numbers are zero."""
+        if (points := self.all_points) is not None:
+            said = {_dim(effort) for _, effort in points if effort}
+            said |= {"torque" for place, _ in points if place and _dim(place) == "angle"}
+            return said.pop() if said else None
+        if self.stiffness:
+            return EFFORTS[SLOPES.index(_dim(self.stiffness))]
+        return _dim(self.start) if self.start else None
+
+    def curve(self, level: float | None = None) -> TargetCurve:
+        """Return it as a function; a line without `start` has a level at zero [N or N m]."""
+        points = self.all_points
+        if points is None:
+            start = self.start if self.start is not None else level or 0.0
+            return TargetCurve((float(start), float(self.stiffness or 0.0)), self.kind)
+        places, efforts = zip(*((float(place), float(effort)) for place, effort in points), strict=True)
+        return TargetCurve(ThroughPoints(places, efforts, self.interpolation == "smooth"), self.kind)
+
+    def written_out(self, level: float | None = None) -> Target:
+        """Return it without a file, which other folders do not have, and a line with its level [N or N m]."""
+        if isinstance(self.file, DataSource):
+            return Target(points=_from_file(self.file), interpolation=self.interpolation)
+        if self.stiffness is not None and self.start is None and level:
+            return self.model_copy(update={"start": Measured(level, EFFORTS[SLOPES.index(_dim(self.stiffness))])})
+        return self
+
+
+def _dim(number: float) -> str:
+    return str(getattr(number, "dimension", ""))
+
+
+def _check(points: tuple[tuple[float, float], ...]) -> None:
+    """Raise if points do not increase, or mix forces and torques."""
+    for (before, _), (after, _) in itertools.pairwise(points):
+        if not after > before:
+            pair = [format_short(float(place), _dim(place) or "length") for place in (before, after)]
+            raise ValueError(
+                f"points must increase: {pair[1]} comes after {pair[0]}; a step needs a little travel between its ends"
+            )
+    efforts = {_dim(effort) for _, effort in points if effort} or {_dim(effort) for _, effort in points}
+    motions = {_dim(place) for place, _ in points if place}
+    if len(efforts) > 1 or len(motions) > 1 or (efforts and motions - {MOTION_OF[one] for one in efforts}):
+        raise ValueError("points are forces over displacements, or torques over angles; these are mixed")
+
+
+_HEADER = re.compile(r"\s*(?P<name>[a-z_]+)\s*\[(?P<unit>[^\[\]]+)\]\s*")
+_COLUMNS = {"displacement": "length", "force": "force", "angle": "angle", "torque": "torque"}
+
+
+def _from_file(source: DataSource) -> tuple[tuple[Place, Measured], ...]:
+    """Return the points of a CSV.
+
+    Raises
+    ------
+    ValueError
+        If its columns or numbers are not those of a curve; the message names the line.
+    """
+    try:
+        text = source.path.read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError):
+        raise ValueError(f"{source} cannot be read as text") from None
+    rows = list(csv.reader(text.splitlines()))
+    heads = [_HEADER.fullmatch(cell) for cell in (rows[0] if rows else [])]
+    units = {head["name"]: (column, head["unit"]) for column, head in enumerate(heads) if head}
+    pair = next((two for two in (("displacement", "force"), ("angle", "torque")) if set(two) <= set(units)), None)
+    if pair is None:
+        raise ValueError(f"{source}:1: needs columns displacement [mm] and force [N], or angle [deg] and torque [N*mm]")
+    points = []
+    for line, cells in enumerate(rows[1:], 2):
+        if not any(cell.strip() for cell in cells):
+            continue
+        numbers = []
+        for name in pair:
+            column, unit = units[name]
+            try:
+                numbers.append(read_quantity(f"{cells[column].strip()} {unit}", _COLUMNS[name]))
+            except (QuantityError, IndexError) as problem:
+                told = str(problem) if isinstance(problem, QuantityError) else f"no {name}"
+                raise ValueError(f"{source}:{line}: {told}") from None
+        points.append((Place(numbers[0], _COLUMNS[pair[0]]), Measured(numbers[1], _COLUMNS[pair[1]])))
+    if not 2 <= len(points) <= MOST_POINTS:
+        raise ValueError(f"{source}: a curve has 2 to {MOST_POINTS} points, not {len(points)}")
+    try:
+        _check(tuple(points))
+    except ValueError as problem:
+        raise ValueError(f"{source}: {problem}") from None
+    return tuple(points)

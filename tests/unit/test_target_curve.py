@@ -1,0 +1,248 @@
+"""A curve instead of a constant force: what a file may say, what metrics make of it, and cams that follow it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import cfmkit
+from cfmkit.errors import SpecError
+from cfmkit.families.cam.build import assemble
+from cfmkit.metrics import check, evaluate
+from cfmkit.numerics.through_points import ThroughPoints
+from cfmkit.specs.target_curve import Target
+
+CAM = """
+cfmkit: 1
+family: cam
+mechanism:
+  brace_length: 200 mm
+  rest_half_width: 68 mm
+  roller_radius: {roller}
+  springs: {{stiffness: 0.69 N/mm, count: 2}}
+  rolling_friction: {friction}
+  profile: {{force_constant: 9 mm}}
+  {mechanism}
+design:
+  target: {target}
+  stroke: 120 mm
+  {design}
+{more}
+"""
+
+RISING = "{points: [[0 mm, 10 N], [120 mm, 40 N]]}"
+FROM_ZERO = "{points: [[0 mm, 0 N], [40 mm, 10 N], [120 mm, 40 N]]}"
+STEP_DOWN = "{points: [[0 mm, 40 N], [40 mm, 40 N], [60 mm, 20 N], [120 mm, 20 N]]}"
+STEP_UP = "{points: [[0 mm, 20 N], [50 mm, 20 N], [60 mm, 40 N], [120 mm, 40 N]]}"
+FALLING = "{stiffness: -0.2 N/mm, start: 50 N}"
+MASSES = "masses: {slider: 0.3 kg, brace: 0.2 kg, roller: 0.1 kg}"
+
+
+def cam(target, roller="2 mm", friction=0, mechanism="", design="", more=""):
+    """Return a cam that is to follow a curve."""
+    return cfmkit.loads(
+        CAM.format(target=target, roller=roller, friction=friction, mechanism=mechanism, design=design, more=more)
+    )
+
+
+def designed(*args, **kwargs):
+    """Return the designed cam's specification."""
+    found = cfmkit.design(cam(*args, **kwargs))
+    assert found.spec is not None, found.message
+    return found.spec
+
+
+@pytest.mark.parametrize("smooth", [True, False])
+def test_integral_and_slope_are_those_of_the_function(smooth):
+    curve = ThroughPoints((0.0, 1.0, 2.5, 3.0, 4.0), (1.0, 1.0, 2.0, 0.5, 0.7), smooth)
+    x = np.linspace(-0.5, 4.5, 301)
+    x = x[np.abs(x[:, None] - np.array(curve.places)).min(axis=1) > 2e-5]
+    h = 1e-5
+    assert np.allclose((curve.integral(x + h) - curve.integral(x - h)) / (2 * h), curve.at(x), atol=1e-9)
+    inside = x[(x > 0) & (x < 4)]
+    assert np.allclose((curve.at(inside + h) - curve.at(inside - h)) / (2 * h), curve.slope(inside), atol=1e-6)
+    assert curve.at(np.array(curve.places)) == pytest.approx(curve.values)
+
+
+def test_a_smooth_curve_rounds_steps_and_does_not_overshoot():
+    curve = ThroughPoints((0.0, 1.0, 1.2, 3.0), (1.0, 1.0, 2.0, 2.0))
+    values = curve.at(np.linspace(0.0, 3.0, 1001))
+    assert values.min() == 1.0
+    assert values.max() == 2.0
+    assert (np.diff(values) >= 0).all()
+    assert curve.slope(1.0) == 0.0
+    assert curve.extremes(0.0, 3.0) == (1.0, 2.0)
+
+
+@pytest.mark.parametrize(
+    ("said", "told"),
+    [
+        ("{}", "give one of 'points', 'file' and 'stiffness'"),
+        ("{points: [[0 mm, 1 N], [0 mm, 2 N]]}", "points must increase"),
+        ("{points: [[5 mm, 1 N], [2 mm, 2 N]]}", "2 mm comes after 5 mm"),
+        ("{points: [[0 deg, 1 N], [5 deg, 2 N]]}", "these are mixed"),
+        ("{points: [[0 mm, 1 N], [5 mm, 2 N*mm]]}", "these are mixed"),
+        ("{points: [[0 mm, 1 N]]}", "at least 2"),
+        ("{points: [[0 mm, 1 kg], [1 mm, 2 N]]}", "is a mass"),
+        ("{points: [[0 mm, 1], [1 mm, 2 N]]}", "has no unit"),
+        ("{points: [[0 mm, 1 N], [1 mm, 2 N]], start: 1 N}", "'start' belongs to 'stiffness'"),
+        ("{stiffness: 1 N/mm, start: 1 N*mm}", "must both be"),
+        ("{points: [[0 deg, 1 N*mm], [9 deg, 2 N*mm]]}", "curve of torque"),
+        ("{points: [[0 mm, 1 N], [1 mm, 2 N]], interpolation: cubic}", "is not one of smooth, linear"),
+        ("{file: there-is-none.csv}", "there is no file"),
+    ],
+)
+def test_what_is_no_curve_is_refused_in_a_line(said, told):
+    with pytest.raises(SpecError) as caught:
+        cam(said)
+    assert told in str(caught.value)
+    assert "target" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("displacement [mm],force [N]\n0,1\n5,x\n", "curve.txt:3: "),
+        ("displacement [mm],force [N]\n0,1\n5\n", "no force"),
+        ("displacement,force\n0,1\n", "needs columns"),
+        ("displacement [mm],force [N]\n0,1\n", "2 to 10000 points"),
+        ("displacement [mm],force [N]\n3,1\n0,2\n", "0 mm comes after 3 mm"),
+        ("", "needs columns"),
+    ],
+)
+def test_a_file_that_is_no_curve_is_refused_with_its_line(tmp_path, text, told):
+    (tmp_path / "curve.txt").write_text(text)
+    spec = tmp_path / "cam.yaml"
+    spec.write_text(CAM.format(target="{file: curve.txt}", roller="2 mm", friction=0, mechanism="", design="", more=""))
+    with pytest.raises(SpecError) as caught:
+        cfmkit.load(spec)
+    assert told in str(caught.value)
+
+
+def test_a_file_says_the_same_as_its_points_and_the_design_no_longer_needs_it(tmp_path):
+    (tmp_path / "curve.csv.txt").write_text("\ufeffangle [deg],force [N],displacement [mm]\n7,10,0\n\n9,40,120\n")
+    spec = tmp_path / "cam.yaml"
+    spec.write_text(
+        CAM.format(target="{file: curve.csv.txt}", roller="2 mm", friction=0, mechanism="", design="", more="")
+    )
+    written = cfmkit.design(cfmkit.load(spec)).spec
+    assert written.design.target.file is None
+    assert written == cfmkit.loads(cfmkit.dumps(written))
+    assert cfmkit.analyze(written).curve.effort == pytest.approx(cfmkit.analyze(designed(RISING)).curve.effort)
+
+
+@pytest.mark.parametrize("target", [RISING, FROM_ZERO, STEP_DOWN, STEP_UP, FALLING])
+def test_a_cam_follows_its_curve_to_1e_9(target):
+    spec = designed(target)
+    result = cfmkit.analyze(spec)
+    wanted = spec.target_curve.at(result.curve.motion)
+    assert np.abs(result.curve.effort - wanted).max() < 1e-9 * wanted.max()
+    found = evaluate(result)
+    assert found["deviation_from_curve"].value < 1e-9
+    assert found["rms_to_curve"].value < 1e-9 * wanted.max()
+    assert found["usable_stroke"].value == pytest.approx(0.120)
+    assert found["deviation_from_target"].value is None
+
+
+def test_work_on_the_slider_is_the_energy_of_the_springs():
+    assembly = assemble(designed(STEP_UP))
+    law, stiffness = assembly.profile.path.law, assembly.loads.stiffness
+    x = np.linspace(law.rest_half_width, assembly.profile.end, 7)
+    stored = 0.5 * stiffness * (2.0 * (x - law.rest_half_width)) ** 2
+    wanted = Target(points=(("0 mm", "20 N"), ("50 mm", "20 N"), ("60 mm", "40 N"), ("120 mm", "40 N"))).curve()
+    assert wanted.function.integral(assembly.profile.path.travel(x)) == pytest.approx(stored, rel=1e-10, abs=1e-15)
+
+
+def test_a_level_curve_is_the_cam_of_a_constant_force():
+    level = cfmkit.analyze(designed("{points: [[0 mm, 50 N], [120 mm, 50 N]]}", design="friction: 0.002"))
+    text = CAM.replace("target: {target}", "force: 50 N").format(
+        roller="2 mm", friction=0, mechanism="", design="friction: 0.002", more=""
+    )
+    constant = cfmkit.analyze(cfmkit.design(cfmkit.loads(text)).spec)
+    for column in ("roller_x", "roller_y"):
+        assert level.curve.extra[column].values == pytest.approx(constant.curve.extra[column].values, rel=1e-9)
+
+
+@pytest.mark.parametrize("target", [RISING, STEP_DOWN])
+def test_a_profile_cut_for_friction_is_exact_on_the_way_up(target):
+    result = cfmkit.analyze(designed(target, friction=0.002, design="friction: 0.002"))
+    up = result.curve.on("load")
+    wanted = result.spec.target_curve.at(up.motion)
+    assert np.abs(up.effort / wanted - 1.0)[2:].max() < 1e-9
+
+
+@pytest.mark.parametrize("target", ["{points: [[0 mm, 60 N], [120 mm, 20 N]]}", "{stiffness: 0.2 N/mm, start: 30 N}"])
+def test_a_profile_carries_weights_beside_its_curve(target):
+    result = cfmkit.analyze(designed(target, mechanism=MASSES, design="gravity: true"))
+    wanted = result.spec.target_curve.at(result.curve.motion)
+    assert np.abs(result.curve.effort - wanted)[2:-2].max() < 1e-9 * wanted.max()
+
+
+@pytest.mark.parametrize(
+    ("target", "more", "told"),
+    [
+        ("{points: [[0 mm, 20 N], [120 mm, -5 N]]}", {}, "-5 N at 120 mm"),
+        ("{points: [[0 mm, -1 N], [120 mm, 5 N]]}", {}, "-1 N at 0 mm"),
+        ("{stiffness: -0.2 N/mm}", {}, "-24 N at 120 mm"),
+        ("{points: [[0 mm, 0 N], [60 mm, 0 N], [120 mm, 5 N]]}", {}, "above 0"),
+        ("{points: [[0 mm, 20 N], [80 mm, 20 N]]}", {}, "goes from 0 mm to 80 mm"),
+        ("{points: [[10 mm, 20 N], [120 mm, 20 N]]}", {}, "begin at 0 mm"),
+        (
+            "{points: [[0 mm, 40 N], [40 mm, 40 N], [41 mm, 5 N], [120 mm, 5 N]]}",
+            {"roller": "6 mm"},
+            "a smaller roller",
+        ),
+        ("{points: [[0 mm, 100 N], [120 mm, 900 N]]}", {}, "the stroke ends at"),
+        (FROM_ZERO, {"mechanism": "", "design": "friction: 0.002"}, "friction"),
+        ("{points: [[0 mm, 60 N], [120 mm, 1 N]]}", {"mechanism": MASSES, "design": "gravity: true"}, "weight"),
+    ],
+)
+def test_what_no_cam_gives_has_a_reason_and_no_design(target, more, told):
+    found = cfmkit.design(cam(target, **more))
+    assert found.spec is None
+    assert found.status.key == "infeasible"
+    assert told in found.message
+
+
+def test_springs_that_are_tight_at_a_start_without_force_have_no_path():
+    text = CAM.replace("count: 2", "count: 2, preload: 5 mm")
+    spec = cfmkit.loads(text.format(target=FROM_ZERO, roller="2 mm", friction=0, mechanism="", design="", more=""))
+    assert "would begin vertical" in cfmkit.design(spec).message
+
+
+def test_undercut_of_a_curve_has_the_same_cure_as_that_of_a_constant_force():
+    assert "undercut" in {one.name for one in cfmkit.analyze(designed(RISING, roller="10 mm")).warnings}
+    cured = cfmkit.analyze(designed(RISING, roller="10 mm", design="avoid_undercut: true"))
+    assert cured.warnings == ()
+    assert evaluate(cured)["deviation_from_curve"].value < 1e-9
+
+
+def test_metrics_of_an_analysis_compare_with_its_own_curve_and_requirements_count():
+    more = "analysis: {target: {stiffness: 0.25 N/mm, start: 10.4 N}}\n" + (
+        "requirements: [{metric: deviation_from_curve, max: 0.9 %}, {metric: rms_to_curve, max: 0.5 N}]"
+    )
+    result = cfmkit.analyze(designed(RISING, more=more))
+    assert evaluate(result)["deviation_from_curve"].value == pytest.approx(0.4 / 40.4, rel=1e-9)
+    assert evaluate(result)["rms_to_curve"].value == pytest.approx(0.4, rel=1e-9)
+    assert [one.ok for one in check(result.spec.requirements, result)] == [False, True]
+
+
+def test_a_window_that_the_curve_does_not_cover_has_no_deviation():
+    result = cfmkit.analyze(cam(RISING).replace({"analysis.target": {"points": ((0.0, 1.0), (0.01, 2.0))}}))
+    found = evaluate(result)["deviation_from_curve"]
+    assert found.value is None
+    assert "covers 0 ... 10 mm only" in found.reason
+
+
+def test_without_a_curve_there_are_no_metrics_of_one_and_a_requirement_says_why():
+    spec = cfmkit.load("configs/cam.yaml")
+    result = cfmkit.analyze(spec)
+    assert "deviation_from_curve" not in evaluate(result)
+    assert "no target curve" in evaluate(result, ["deviation_from_curve"])["deviation_from_curve"].reason
+
+
+def test_a_cut_curve_is_its_own_target_where_no_other_is_named():
+    spec = designed(RISING).replace({"design": None})
+    result = cfmkit.analyze(spec.replace({"mechanism.springs.stiffness": 2 * spec.mechanism.springs.stiffness}))
+    assert evaluate(result)["deviation_from_curve"].value < 1e-9
+    assert result.curve.effort[240] == pytest.approx(50.0)
