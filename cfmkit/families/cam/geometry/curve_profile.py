@@ -219,7 +219,8 @@ class CurveSlopeLaw(SlopeLaw):
         turn = (1.0 - self.friction * p) / (1.0 + self.friction**2) ** 0.5
         bend = np.asarray(turn * self._rise(x))
         radius: Any = np.asarray(1.0 + p * p) ** 1.5 / np.where(bend == 0.0, 1e-300, bend)
-        return radius if np.ndim(x) else float(radius)
+        own: Any = radius if np.ndim(x) else float(radius)
+        return own
 
     def tightest(self, end: float, start: float = 0.0) -> tuple[float, float]:
         """Return where the path is bent most of all convex places from `start` to `end` [m], and the radius there.
