@@ -19,7 +19,7 @@ from cfmkit.numerics.through_points import ThroughPoints
 from cfmkit.specs.block import Model
 from cfmkit.specs.units import Displacement, Place, Quantity, format_quantity, format_short, read_quantity
 from cfmkit.specs.units.fields import plain_schema
-from cfmkit.tables.source import DataSource
+from cfmkit.tables.data_files import DataSource
 
 if TYPE_CHECKING:
     from pydantic_core import CoreSchema
