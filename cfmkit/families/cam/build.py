@@ -8,12 +8,12 @@ slack at the start and tighten later can be built: the force is zero until they 
 
 from __future__ import annotations
 
-from dataclasses import fields
 from math import cos, sin
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from cfmkit.families.cam.curves_followed import check_bends, with_curve
 from cfmkit.families.cam.findings import finding
 from cfmkit.families.cam.geometry.curve_profile import CurveSlopeLaw
 from cfmkit.families.cam.geometry.cut import CamProfile, WholeCamUndercut, cut
@@ -30,7 +30,6 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.families.cam.geometry.profile import Real
     from cfmkit.families.cam.spec import CamSpec, Left, Masses, Mechanism, Mounting
-    from cfmkit.numerics.through_points import ThroughPoints
     from cfmkit.results import Finding
 
 
@@ -99,50 +98,7 @@ def slope_law(spec: CamSpec) -> SlopeLaw:
     )
     if profile.curve is None:
         return plain
-    shape, stroke = profile.curve.shape, float(profile.stroke or 0.0)
-    if stroke > shape.places[-1] * (1 + CLOSE):
-        raise CannotBuild(
-            finding(
-                "target_curve",
-                f"the curve of forces ends at {mm(shape.places[-1])}, before the stroke of {mm(stroke)}; give it more "
-                "points, or a shorter stroke ('curve' and 'stroke' of 'mechanism.profile')",
-            )
-        )
-    return with_curve(plain, shape)
-
-
-def with_curve(law: SlopeLaw, shape: ThroughPoints) -> CurveSlopeLaw:
-    """Return the law for a force that follows a curve of shares over travel [m].
-
-    Raises
-    ------
-    CannotBuild
-        If there is no such path: the finding says why.
-    """
-    curved = CurveSlopeLaw(**vars_of(law), shape=shape)
-    least = min(shape.values) - curved.carried
-    if shape.values[0] == 0.0 and law.preload:
-        raise CannotBuild(
-            finding(
-                "target_curve",
-                "the force begins at zero, and the springs are stretched there: the path would begin vertical; leave "
-                "out the preload ('mechanism.springs.preload'), or begin with some force",
-            )
-        )
-    if (shape.values[0] == 0.0 and (law.friction or law.slope_factor != 1.0)) or (curved.carried and least <= 0):
-        raise CannotBuild(
-            finding(
-                "target_curve",
-                "the smallest force of the curve does not carry the weight and friction that the profile is cut for; "
-                "use a curve with more force, or cut for none ('friction' and 'gravity' of 'design')",
-            )
-        )
-    return curved
-
-
-def vars_of(law: SlopeLaw) -> dict[str, float]:
-    """Return the numbers of a slope law by name."""
-    return {item.name: getattr(law, item.name) for item in fields(SlopeLaw)}
+    return with_curve(plain, profile.curve.shape, float(profile.stroke or 0.0))
 
 
 def hanging_weights(masses: Masses | None) -> tuple[float, float]:
@@ -362,7 +318,7 @@ def _check_bend(profile: CamProfile) -> None:
     """Raise where a path for hanging weights, which may be bent most behind its start, is bent too tightly there."""
     law = profile.path.law
     if isinstance(law, CurveSlopeLaw):
-        _check_curve(law, profile)
+        check_bends(law, profile)
         return
     if law.slope_factor >= 1.0:
         return
@@ -376,21 +332,6 @@ def _check_bend(profile: CamProfile) -> None:
                 f"the path that lets the weights help is bent to a radius of {mm(float(radius[tightest]))} at "
                 f"x = {mm(float(x[tightest]))}, inside a roller of {mm(profile.roller_radius)}; use a smaller roller "
                 "('mechanism.roller_radius') or leave the weight uncompensated ('design.gravity: false')",
-            )
-        )
-
-
-def _check_curve(law: CurveSlopeLaw, profile: CamProfile) -> None:
-    """Raise where a force that falls quickly bends the path more tightly than the roller, beyond the start."""
-    place, radius = law.tightest(profile.end, profile.start)
-    if radius < profile.roller_radius * (1 - 1e-9) and place > profile.start:
-        at = float(law.travel(place))
-        raise CannotBuild(
-            finding(
-                "undercut_total",
-                f"at {mm(at)} of travel the force falls so quickly that the path is bent to a radius of {mm(radius)}, "
-                f"inside a roller of {mm(profile.roller_radius)}; use a smaller roller ('mechanism.roller_radius'), "
-                "softer springs, or let the force fall over more travel ('design.target')",
             )
         )
 

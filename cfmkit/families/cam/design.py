@@ -13,7 +13,7 @@ Reference
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import isclose
 from typing import TYPE_CHECKING, Any
 
@@ -26,8 +26,8 @@ from cfmkit.families.cam.build import (
     cut_profile,
     rollers_overlap,
     weights_of,
-    with_curve,
 )
+from cfmkit.families.cam.curves_followed import check_target, largest_force, target_shape, with_curve
 from cfmkit.families.cam.findings import finding
 from cfmkit.families.cam.geometry.curve_profile import CurveSlopeLaw
 from cfmkit.families.cam.geometry.path import reach
@@ -45,9 +45,7 @@ if TYPE_CHECKING:
 
     from cfmkit.families.base import Run
     from cfmkit.families.cam.spec import CamDesign, CamSpec, Mechanism, Springs
-    from cfmkit.numerics.through_points import ThroughPoints
     from cfmkit.results import Finding
-    from cfmkit.specs.target_curve import TargetCurve
     from cfmkit.stock.springs.catalogue import Offer
 
 
@@ -89,7 +87,7 @@ def design(spec: CamSpec, run: Run) -> Design:
 
 def _design(spec: CamSpec, target: CamDesign) -> Design:
     if target.target is not None:
-        _check_curve(target)
+        check_target(target)
     pull, factor = shaping(spec, target)
     _check_beginning(spec, target, factor)
     smallest = None if target.choose == "preload" else _smallest_constant(spec, target, factor)
@@ -111,7 +109,7 @@ def _design(spec: CamSpec, target: CamDesign) -> Design:
 
 def shaping(spec: CamSpec, target: CamDesign) -> tuple[float, float]:
     """Return the force F' that the springs provide [N] and the slope factor c of the profile."""
-    force = _largest_force(target)
+    force = largest_force(target)
     if not target.gravity:
         return force, 1.0
     roller, slider = weights_of(spec.mechanism).along
@@ -130,64 +128,9 @@ def shaping(spec: CamSpec, target: CamDesign) -> tuple[float, float]:
     return pull, pull / (pull - 2.0 * roller)
 
 
-def _curve(target: CamDesign) -> TargetCurve | None:
-    """Return the curve of forces that is wanted; None of a constant force."""
-    return None if target.target is None else target.target.curve(target.force)
-
-
-def _largest_force(target: CamDesign) -> float:
-    """Return the force that is wanted, or the largest of a curve [N]."""
-    curve = _curve(target)
-    return target.force or 0.0 if curve is None else curve.extremes(0.0, target.stroke)[1]
-
-
-def _check_curve(target: CamDesign) -> None:
-    """Raise if no springs that pull the rollers in give the curve of forces."""
-    curve = _curve(target)
-    assert curve is not None
-    first, last = curve.extent
-    if not curve.covers(0.0, target.stroke) or 0.0 > first > -float("inf"):
-        known = f"{mm(first)} to {mm(last)}"
-        raise Infeasible(
-            finding(
-                "target_curve",
-                f"the target curve goes from {known}, and the slider from 0 mm to {mm(target.stroke)}; let its points "
-                "begin at 0 mm and reach the stroke ('design.target', 'design.stroke')",
-            ),
-            {"design.stroke": at_most(last)} if last > 0 >= first else None,
-        )
-    shape = curve.between(0.0, target.stroke)
-    places = np.linspace(0.0, max(target.stroke, shape.places[-1]), 2001)
-    force = np.asarray(curve.at(places))
-    lowest = int(np.argmin(force[1:])) + 1
-    if force[lowest] <= 0 or force[0] < 0:
-        at = places[0 if force[0] < min(force[lowest], 0.0) else lowest]
-        raise Infeasible(
-            finding(
-                "target_curve",
-                f"the target curve is {newton(float(curve.at(at)))} at {mm(float(at))}: a cam holds up a force, which "
-                "must stay above 0 beyond the start, or the rollers would have to give back energy that the springs "
-                "do not have ('design.target')",
-            )
-        )
-    if force[0] == 0.0 and not shape.slope(0.0) > 0:
-        raise Infeasible(
-            finding(
-                "target_curve",
-                "the target curve begins at zero force and does not grow from there: the path would begin vertical; "
-                "begin with some force, or with a slope ('design.target')",
-            )
-        )
-
-
-def _shape(spec: CamSpec, target: CamDesign) -> ThroughPoints | None:
-    """Return the force that springs and carried weights give, as shares of the largest; None of a constant force."""
-    curve = _curve(target)
-    if curve is None:
-        return None
-    slider = weights_of(spec.mechanism).along[1] if target.gravity else 0.0
-    wanted, most = curve.between(0.0, target.stroke), _largest_force(target) - slider
-    return replace(wanted, values=tuple((value - slider) / most for value in wanted.values))
+def _slider_weight(spec: CamSpec, target: CamDesign) -> float:
+    """Return the weight that the springs need not carry, where the profile carries weights [N]."""
+    return float(weights_of(spec.mechanism).along[1]) if target.gravity else 0.0
 
 
 def _law(
@@ -197,11 +140,11 @@ def _law(
     mechanism = spec.mechanism
     half = 0.5 * (mechanism.preload if preload is None else preload)
     law = SlopeLaw(force_constant, mechanism.rest_half_width, mechanism.brace_length, target.friction, factor, half)
-    shape = _shape(spec, target)
+    shape = target_shape(target, _slider_weight(spec, target))
     if shape is None:
         return law
     try:
-        return with_curve(law, shape)
+        return with_curve(law, shape, target.stroke)
     except CannotBuild as problem:
         raise Infeasible(problem.finding) from None
 
@@ -521,7 +464,7 @@ def _written(spec: CamSpec, target: CamDesign, choice: Choice, factor: float) ->
     if choice.preload:
         profile["preload"] = springs["preload"] = choice.preload
     changes: dict[str, Any] = {"mechanism.profile": profile, "mechanism.springs": springs}
-    if (shape := _shape(spec, target)) is not None and target.target is not None:
+    if (shape := target_shape(target, _slider_weight(spec, target))) is not None and target.target is not None:
         points = tuple(zip(shape.places, shape.values, strict=True))
         profile["curve"] = {"points": points, "interpolation": "smooth" if shape.smooth else "linear"}
         changes["design.target"] = target.target.written_out(target.force)

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import itertools
-from functools import cached_property
 from math import pi, radians
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
+from pydantic import BeforeValidator, Field, field_validator, model_validator
 
-from cfmkit.numerics.through_points import ThroughPoints
+from cfmkit.families.cam.geometry.spec import DesignFriction, Profile
 from cfmkit.specs.spec import Analysis, DesignBlock, Model, OldWords, Spec, refuse
-from cfmkit.specs.target_curve import MOST_POINTS, Interpolation, Target
-from cfmkit.specs.units import Angle, Force, Inertia, Length, Mass, Ratio, Stiffness, Time, format_short
+from cfmkit.specs.target_curve import Target
+from cfmkit.specs.units import Angle, Force, Inertia, Length, Mass, Stiffness, Time, format_short
 from cfmkit.stock.spec import Friction, Guide, MaterialField, MaterialSpec, Pins, SafetyFactor
 from cfmkit.stock.springs.spec import Catalogue, Life, SpringWire
-from cfmkit.tables.data_files import DataSource
 
 Positive = Field(gt=0)
 PositiveLength = Annotated[Length, Field(gt=0)]
@@ -23,7 +20,6 @@ PositiveStiffness = Annotated[Stiffness, Field(gt=0)]
 NonNegativeLength = Annotated[Length, Field(ge=0)]
 NonNegativeInertia = Annotated[Inertia, Field(ge=0)]
 SmallAngle = Annotated[Angle, Field(ge=-radians(45), le=radians(45))]
-DesignFriction = Annotated[Ratio, Field(gt=-1, lt=1)]
 
 
 class Springs(Model):
@@ -118,77 +114,6 @@ class LeftMasses(Model):
     roller: Annotated[Mass, Field(ge=0)] | None = Field(None, description="left roller with its share")
     brace_inertia: NonNegativeInertia | None = Field(None, description="of the left brace")
     roller_inertia: NonNegativeInertia | None = Field(None, description="of the left roller")
-
-
-class ProfileCurve(Model):
-    """Force over travel that a profile is cut for, as shares of 4 K A."""
-
-    points: tuple[tuple[NonNegativeLength, Annotated[Ratio, Field(ge=0)]], ...] = Field(
-        min_length=2, max_length=MOST_POINTS, description="[[0 mm, 0.5], [20 mm, 1], ...]: travel, share of 4 K A"
-    )
-    interpolation: Interpolation = Field(
-        "smooth", description="between points: monotone cubics (smooth), or straight lines (linear)"
-    )
-
-    @model_validator(mode="after")
-    def _can_be_cut(self) -> Self:
-        places = [place for place, _ in self.points]
-        if places[0] != 0 or any(after <= before for before, after in itertools.pairwise(places)):
-            raise ValueError("points must begin at a travel of 0 and increase")
-        if min(share for _, share in self.points[1:]) <= 0:
-            raise ValueError("shares must be above 0 beyond the start: springs that pull the rollers in cannot push")
-        if self.points[0][1] == 0 and not self.shape.slope(0.0) > 0:
-            raise ValueError("a force that begins at zero must grow from there: the path would begin vertical")
-        return self
-
-    @cached_property
-    def shape(self) -> ThroughPoints:
-        """The curve as a function of travel [m]."""
-        places, shares = zip(*self.points, strict=True)
-        return ThroughPoints(places, shares, self.interpolation == "smooth")
-
-
-class Profile(Model):
-    """The cam as it is cut. What is left out follows the mechanism's own values."""
-
-    force_constant: PositiveLength = Field(description="A; the force is 4 K A, K the sum of all springs")
-    friction: DesignFriction = Field(
-        0.0, description="rolling friction it is cut for; positive: exact on the way up, negative: on the way down"
-    )
-    slope_factor: Annotated[Ratio, Field(gt=0)] = Field(
-        1.0,
-        description="1, or more where the profile carries the weight of the moving parts; less where they hang down",
-    )
-    curve: ProfileCurve | None = Field(
-        None, description="force over travel, as shares of 4 K A, that it is cut for; default: constant"
-    )
-    stroke: PositiveLength | None = Field(None, description="slider travel that the flank is cut for")
-    brace_length: PositiveLength | None = Field(None, description="brace it is cut for")
-    rest_half_width: PositiveLength | None = Field(None, description="half width at which the path starts, x0")
-    roller_radius: PositiveLength | None = Field(None, description="roller it is cut for")
-    preload: NonNegativeLength | None = Field(None, description="elongation of the springs at the start, cut for")
-    offset: Length = Field(0.0, description="material left on the flank beyond the profile, outward (a cutting error)")
-    file: str | None = Field(None, description="measured points of both flanks, a CSV beside the spec: x [mm], y [mm]")
-    noise: PositiveLength | None = Field(None, description="standard deviation of the points in `file`")
-    registration: Literal["auto", "motion", "width", "datum"] | None = Field(
-        None,
-        description="how the points in `file` are laid on the design: by a motion, by a motion and one error of width, "
-        "not at all because they are in the part's datum; auto, the default: with the width where the points tell it",
-    )
-
-    @field_validator("file", mode="wrap")
-    @classmethod
-    def _beside_the_spec(cls, value: Any, handler: Any, info: ValidationInfo) -> Any:
-        folder = getattr(value, "folder", None) or (info.context or {}).get("folder") or "."
-        return None if value is None else DataSource(handler(value), folder)
-
-    @model_validator(mode="after")
-    def _noise_is_stated(self) -> Self:
-        if (self.file is None) != (self.noise is None):
-            raise ValueError("'file' and 'noise' belong together: how exact are the measured points?")
-        if self.registration is not None and self.file is None:
-            raise ValueError("'registration' says how measured points are laid on the design: it needs a 'file'")
-        return self
 
 
 class Plate(Model):

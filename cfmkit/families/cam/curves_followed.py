@@ -1,0 +1,136 @@
+"""Cams whose force follows a curve: which curves they can follow, and why not."""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cfmkit.families.cam.findings import finding
+from cfmkit.families.cam.geometry.curve_profile import CurveSlopeLaw
+from cfmkit.families.cam.geometry.profile import SlopeLaw
+from cfmkit.families.findings import at_most, mm, newton
+from cfmkit.families.no_mechanism import CannotBuild, Infeasible
+
+if TYPE_CHECKING:
+    from cfmkit.families.cam.geometry.cut import CamProfile
+    from cfmkit.families.cam.spec import CamDesign
+    from cfmkit.numerics.through_points import ThroughPoints
+    from cfmkit.specs.target_curve import TargetCurve
+
+
+def wanted_curve(target: CamDesign) -> TargetCurve | None:
+    """Return the curve of forces that is wanted; None of a constant force."""
+    return None if target.target is None else target.target.curve(target.force)
+
+
+def largest_force(target: CamDesign) -> float:
+    """Return the force that is wanted, or the largest of a curve [N]."""
+    curve = wanted_curve(target)
+    return target.force or 0.0 if curve is None else curve.extremes(0.0, target.stroke)[1]
+
+
+def check_target(target: CamDesign) -> None:
+    """Raise if no springs that pull the rollers in give the curve of forces."""
+    curve = wanted_curve(target)
+    assert curve is not None
+    first, last = curve.extent
+    if not curve.covers(0.0, target.stroke) or 0.0 > first > -float("inf"):
+        known = f"{mm(first)} to {mm(last)}"
+        raise Infeasible(
+            finding(
+                "target_curve",
+                f"the target curve goes from {known}, and the slider from 0 mm to {mm(target.stroke)}; let its points "
+                "begin at 0 mm and reach the stroke ('design.target', 'design.stroke')",
+            ),
+            {"design.stroke": at_most(last)} if last > 0 >= first else None,
+        )
+    shape = curve.between(0.0, target.stroke)
+    places = np.linspace(0.0, max(target.stroke, shape.places[-1]), 2001)
+    force = np.asarray(curve.at(places))
+    lowest = int(np.argmin(force[1:])) + 1
+    if force[lowest] <= 0 or force[0] < 0:
+        at = places[0 if force[0] < min(force[lowest], 0.0) else lowest]
+        raise Infeasible(
+            finding(
+                "target_curve",
+                f"the target curve is {newton(float(curve.at(at)))} at {mm(float(at))}: a cam holds up a force, which "
+                "must stay above 0 beyond the start, or the rollers would have to give back energy that the springs "
+                "do not have ('design.target')",
+            )
+        )
+    if force[0] == 0.0 and not shape.slope(0.0) > 0:
+        raise Infeasible(
+            finding(
+                "target_curve",
+                "the target curve begins at zero force and does not grow from there: the path would begin vertical; "
+                "begin with some force, or with a slope ('design.target')",
+            )
+        )
+
+
+def target_shape(target: CamDesign, slider: float) -> ThroughPoints | None:
+    """Return the force less the weight of the slider [N], as shares of the largest; None of a constant force."""
+    curve = wanted_curve(target)
+    if curve is None:
+        return None
+    wanted, most = curve.between(0.0, target.stroke), largest_force(target) - slider
+    return replace(wanted, values=tuple((value - slider) / most for value in wanted.values))
+
+
+def with_curve(law: SlopeLaw, shape: ThroughPoints, stroke: float) -> CurveSlopeLaw:
+    """Return the law for a force that follows a curve of shares over travel [m], up to a stroke [m].
+
+    Raises
+    ------
+    CannotBuild
+        If there is no such path: the finding says why.
+    """
+    if stroke > shape.places[-1] * (1 + 1e-6):
+        raise CannotBuild(
+            finding(
+                "target_curve",
+                f"the curve of forces ends at {mm(shape.places[-1])}, before the stroke of {mm(stroke)}; give it more "
+                "points, or a shorter stroke ('curve' and 'stroke' of 'mechanism.profile')",
+            )
+        )
+    curved = CurveSlopeLaw(**vars_of(law), shape=shape)
+    least = min(shape.values) - curved.carried
+    if shape.values[0] == 0.0 and law.preload:
+        raise CannotBuild(
+            finding(
+                "target_curve",
+                "the force begins at zero, and the springs are stretched there: the path would begin vertical; leave "
+                "out the preload ('mechanism.springs.preload'), or begin with some force",
+            )
+        )
+    if (shape.values[0] == 0.0 and (law.friction or law.slope_factor != 1.0)) or (curved.carried and least <= 0):
+        raise CannotBuild(
+            finding(
+                "target_curve",
+                "the smallest force of the curve does not carry the weight and friction that the profile is cut for; "
+                "use a curve with more force, or cut for none ('friction' and 'gravity' of 'design')",
+            )
+        )
+    return curved
+
+
+def vars_of(law: SlopeLaw) -> dict[str, float]:
+    """Return the numbers of a slope law by name."""
+    return {item.name: getattr(law, item.name) for item in fields(SlopeLaw)}
+
+
+def check_bends(law: CurveSlopeLaw, profile: CamProfile) -> None:
+    """Raise where a force that falls quickly bends the path more tightly than the roller, beyond the start."""
+    place, radius = law.tightest(profile.end, profile.start)
+    if radius < profile.roller_radius * (1 - 1e-9) and place > profile.start:
+        at = float(law.travel(place))
+        raise CannotBuild(
+            finding(
+                "undercut_total",
+                f"at {mm(at)} of travel the force falls so quickly that the path is bent to a radius of {mm(radius)}, "
+                f"inside a roller of {mm(profile.roller_radius)}; use a smaller roller ('mechanism.roller_radius'), "
+                "softer springs, or let the force fall over more travel ('design.target')",
+            )
+        )
