@@ -19,6 +19,16 @@
     return made;
   };
 
+  // as a button: Enter and the space bar do what a click does
+  const act = (made, does) => {
+    made.tabIndex = 0;
+    made.addEventListener("click", does);
+    made.addEventListener("keydown", (event) => {
+      if (event.key !== "Enter" && event.key !== " ") return;
+      event.preventDefault();
+      does();
+    });
+  };
   const matches = (row) => {
     for (const [column, value] of chosen) if (columns[column][row] !== value) return false;
     const wanted = filter.value.trim().toLowerCase();
@@ -41,9 +51,8 @@
   };
   const draw = () => {
     body.replaceChildren(...found.slice(first, first + PAGE).map((row) => {
-      const line = create("tr", { tabIndex: 0, className: "pick" }, ...columns.map((column) => create("td", { textContent: text(column[row]) })));
-      line.addEventListener("click", () => open(row));
-      line.addEventListener("keydown", (event) => { if (event.key === "Enter") open(row); });
+      const line = create("tr", { className: "pick" }, ...columns.map((column) => create("td", { textContent: text(column[row]) })));
+      act(line, () => open(row));
       return line;
     }));
     const last = Math.min(first + PAGE, found.length);
@@ -110,9 +119,7 @@
       heads.forEach((one, at) => one.setAttribute("aria-sort", at === column ? (order.up ? "ascending" : "descending") : "none"));
       update();
     };
-    cell.tabIndex = 0;
-    cell.addEventListener("click", sort);
-    cell.addEventListener("keydown", (event) => { if (event.key === "Enter") sort(); });
+    act(cell, sort);
   });
   const sliders = document.getElementById("sliders");
   for (const column of varied) {

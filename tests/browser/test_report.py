@@ -97,3 +97,88 @@ def test_points_of_a_sweep_sort_filter_and_open(opened, tmp_path):
     page.keyboard.press("ArrowRight")
     assert rows.count() == 1
     assert page.locator("#point svg polyline").count() == 2
+
+
+UNNAMED = """() => [
+  ...[...document.querySelectorAll("input, button, select")].filter((one) => {
+    const label = one.labels && one.labels.length ? one.labels[0].textContent.trim() : "";
+    const shown = getComputedStyle(one).display !== "none";
+    return shown && !one.getAttribute("aria-label") && !label && !one.textContent.trim();
+  }),
+  ...[...document.querySelectorAll("svg")].filter((one) => {
+    return one.getAttribute("role") !== "img" || !one.getAttribute("aria-label");
+  }),
+].map((one) => one.outerHTML.slice(0, 80))"""
+"""What a screen reader has no name for."""
+
+CONTRAST = """() => {
+  const light = (colour) => {
+    const linear = (one) => one <= 0.03928 ? one / 12.92 : ((one + 0.055) / 1.055) ** 2.4;
+    const [r, g, b] = colour.match(/[0-9.]+/g).map((one) => linear(one / 255));
+    return 0.2126 * r + 0.7152 * g + 0.0722 * b;
+  };
+  const paper = light(getComputedStyle(document.body).backgroundColor);
+  return Math.min(...[...document.querySelectorAll("p, td, th, dt, dd, li, h1, h2, summary, figcaption, code")]
+    .filter((one) => one.offsetParent && !one.closest("svg"))
+    .map((one) => light(getComputedStyle(one).color))
+    .map((ink) => (Math.max(ink, paper) + 0.05) / (Math.min(ink, paper) + 0.05)));
+}"""
+"""The smallest contrast of a text with the page [WCAG 2, sec. 1.4.3: 4.5 or more]."""
+
+
+@pytest.fixture(scope="module")
+def pages(tmp_path_factory):
+    """Return the pages of a run, of a sweep with curves and of a batch, by what they are."""
+    root = tmp_path_factory.mktemp("pages")
+    vary = (
+        "--vary",
+        "mechanism.roller_radius=8 mm:12 mm:3",
+        "--vary",
+        "mechanism.springs.stiffness=[0.6 N/mm, 0.69 N/mm]",
+    )
+    run("analyze", CONFIGS / "cam.yaml", "-o", root / "run", "--report", "--no-plots")
+    run(
+        "sweep",
+        CONFIGS / "cam.yaml",
+        *vary,
+        "--metrics",
+        "force_mean,force_ripple",
+        "--report",
+        "-j",
+        "1",
+        "-o",
+        root / "sweep",
+    )
+    run("batch", CONFIGS / "cam.yaml", "-o", root / "batch", "--report", "--no-plots", "-j", "1")
+    return {name: root / name / "report.html" for name in ("run", "sweep", "batch")}
+
+
+@pytest.mark.parametrize("name", ["run", "sweep", "batch"])
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_a_page_can_be_read_by_everybody_on_a_desk_a_telephone_and_paper(browser, pages, name, scheme):
+    context = browser.new_context(color_scheme=scheme, viewport={"width": 380, "height": 800})
+    page = context.new_page()
+    page.goto(pages[name].as_uri())
+    assert page.evaluate(UNNAMED) == []
+    assert page.evaluate(CONTRAST) >= 4.5
+    assert page.evaluate("document.documentElement.scrollWidth") <= 380
+    page.emulate_media(media="print")
+    assert page.evaluate("getComputedStyle(document.body).backgroundColor") == "rgb(255, 255, 255)"
+    assert page.locator("button:visible, input:visible").count() == 0
+    context.close()
+
+
+def test_tables_sort_and_points_open_from_the_keyboard(opened, pages):
+    page = opened(pages["sweep"])
+    head, rows = page.locator("#table th").first, page.locator("#table tbody tr")
+    head.focus()
+    for key, order, first in (("Enter", "ascending", "8"), ("Space", "descending", "12")):
+        page.keyboard.press(key)
+        assert head.get_attribute("aria-sort") == order
+        assert rows.first.locator("td").first.inner_text() == first
+    rows.first.focus()
+    page.keyboard.press("Space")
+    assert "cfmkit analyze SPEC --set 'mechanism.roller_radius=12 mm'" in page.locator("#point").inner_text()
+    page.locator("#filter").fill("(.*[")
+    assert rows.count() == 0
+    assert page.locator("#count").inner_text().startswith("0 to 0 of 0")
