@@ -42,6 +42,7 @@ from cfmkit.metrics.ranges_many import (
 )
 from cfmkit.metrics.spread import ManyWindows, metric_of, metrics_of
 from cfmkit.numerics.turning_points import Monotone, monotone, sharpened
+from cfmkit.stock.springs.in_use import WIRE_DEFINITIONS
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -152,6 +153,8 @@ class Base:
     def lacks(self, name: str) -> bool:
         """Return whether a mechanism with this drive has no such value: its cells are empty."""
         others = OTHER_DRIVE[self.assembly.drive]
+        if name in WIRE_DEFINITIONS and not self.spec.mechanism.springs.bought:
+            return True
         return name in NO_LOOP or (name in OF_PARTS and name not in DEFINITIONS) or name.startswith(others)
 
     def inside(self, window: tuple[float, float] | None) -> FloatArray:
