@@ -165,3 +165,20 @@ def test_a_trim_that_contradicts_itself_is_refused(block, told):
     given = cfmkit.load(CONFIGS / "slider_crank_bought.yaml")
     with pytest.raises(SpecError, match=told):
         given.replace({f"design.{key}": value for key, value in block.items()})
+
+
+def test_where_the_guide_holds_the_slider_no_torque_moves_it_and_energy_is_kept_elsewhere():
+    """The coupler stands so steeply across the way that the guide's friction outgrows what pushes the slider along."""
+    springs = {"pivot": 0.05, "slider_pin": 0.15, "slider": 30.0}
+    given = spec("friction").replace({
+        "mechanism.copies": "single", "mechanism.springs": springs, "mechanism.offset": 0.004, "design": None,
+        "mechanism.pins": {"diameter": "2.5 mm", "friction": 0.18}, "mechanism.guide": {"friction": 0.2},
+        "requirements": (), "analysis": {"drive": "torque", "points": 201, "angle": ["0.85 rad", "1.3 rad"]},
+    })  # fmt: skip
+    state = analyze(given).state
+    free = state.assembly.rates @ state.units.effort
+    for sign, one in zip((1.0, -1.0), state.ways, strict=True):
+        moves = np.isfinite(one.effort)
+        lost = sum(one.lost.values())[moves]
+        np.testing.assert_allclose(sign * (one.effort - free)[moves], lost, atol=1e-9 * np.abs(one.effort[moves]).max())
+    assert not np.isfinite(state.ways[0].effort).all()

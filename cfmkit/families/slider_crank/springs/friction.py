@@ -141,7 +141,10 @@ def _pressed(
     signs: list[FloatArray],
     assembly: Assembly,
 ) -> tuple[FloatArray, FloatArray]:
-    """Return pull and couple where a torque drives: the guide's friction depends on which way the slider is pressed."""
+    """Return pull and couple where a torque drives: the guide's friction depends on which way the slider is pressed.
+
+    NaN where it is pressed neither way: the mechanism holds itself.
+    """
     sine, cosine = direction
     length = assembly.linkage.coupler
     found = None
@@ -156,6 +159,8 @@ def _pressed(
             found = pull, couple
         else:
             other = found[0][1] < 0.0
+            # pressed neither way: the guide's friction holds the slider, and no torque moves it
+            pull = np.where(other & (pull[1] > 0.0), np.nan, pull)
             found = np.where(other, pull, found[0]), np.where(other, couple, found[1])
     assert found is not None
     return found
