@@ -46,3 +46,20 @@ def at_bounds(values: FloatArray, bounds: FloatArray, close: float, share: float
     low, high = bounds.T
     lowest, highest = (abs(values - end) <= close + share * abs(end) for end in (low, high))
     return np.where(lowest, -1, np.where(highest, 1, 0))
+
+
+AROUND = 0.25
+"""How far a value may move from that of a design, as a share of it: twice as far one mechanism becomes another."""
+
+
+def around(value: float, low: float | None = None, high: float | None = None) -> tuple[float, float]:
+    """Return the range about the value of a design in which it may move, cut where limits are given.
+
+    Examples
+    --------
+    >>> around(4.0), around(4.0, low=3.5, high=4.0)
+    ((3.0, 5.0), (3.5, 4.0))
+    """
+    reach = AROUND * abs(value)
+    least, most = value - reach, value + reach
+    return (least if low is None else max(least, low)), (most if high is None else min(most, high))

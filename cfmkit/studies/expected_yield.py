@@ -12,6 +12,7 @@ import numpy as np
 from cfmkit.designing.robust_design import SIGMA_STEP
 from cfmkit.errors import CfmError
 from cfmkit.families import family
+from cfmkit.families.base import function_named
 from cfmkit.specs.units import format_short
 from cfmkit.studies.process_tolerances import MODULUS, assumed
 from cfmkit.studies.requirement_rows import numbers_of, places_of, rows_of, sampled_of
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
     from cfmkit.studies.process_tolerances import Assumed
     from cfmkit.studies.requirement_rows import Rows
 
-MOST_LOOKS, MOST_ANALYSES = 24, 8
+MOST_LOOKS, MOST_ANALYSES = 24, 12
 """Parts that are looked at the quick way, or analysed, for an estimate: some tenths of a second on any machine."""
 
 PARTS = 4000
@@ -50,9 +51,10 @@ def expected(result: Result, run: Run) -> str:
         shares = _shares(result, found, run)
     except _NotKnown as why:
         return f"no yield is estimated for the assumed tolerances of {name}: {why}; {again} draws parts"
-    free = "" if family(spec.family).free else " --set 'design.free={...}'"
-    cure = f"with margins: {again} --set 'design.yield=90 %'{free}"
-    return f"{_told(found, shares)}; {cure}"
+    chosen = family(spec.family).free
+    if chosen is None or not function_named(chosen)(spec, spec):
+        return f"{_told(found, shares)}; nothing of it may move for margins unless 'design.free' names it"
+    return f"{_told(found, shares)}; with margins: {again} --set 'design.yield=90 %'"
 
 
 class _NotKnown(Exception):
@@ -61,15 +63,22 @@ class _NotKnown(Exception):
 
 def _told(found: Assumed, shares: tuple[float, float]) -> str:
     process = found.process
-    kinds = {"thickness": process.thickness, "position": process.position}
-    used = {kind: sigma for kind, sigma in kinds.items() if sigma in found.deviations.values()}
+    used = {kind: getattr(process, kind) for kind in ("thickness", "position") if kind in found.kinds.values()}
     told = [f"{kind} +- {format_short(sigma, 'length')}" for kind, sigma in used.items()]
     if found.modulus is not None:
         low, high = (format_short(end, "stress") for end in found.modulus)
         told.append(f"modulus {low} to {high}")
-    text = f"about {100 * shares[0]:.2g} % of parts would meet the requirements if made by {process.name} "
-    text += f"({', '.join(told)}; assumed: {process.reason}; to first order)"
-    return text if found.modulus is None else f"{text}, {100 * shares[1]:.2g} % once the modulus is measured"
+    reason = f": {process.reason}" if "thickness" in used else "; springs as stated"
+    text = f"{_percent(shares[0])} of parts would meet the requirements if made by {process.name} "
+    text += f"({', '.join(told)}; assumed{reason}; to first order)"
+    return text if found.modulus is None else f"{text}, {_percent(shares[1])} once the modulus is measured"
+
+
+def _percent(share: float) -> str:
+    """Return a share of drawn parts as it is told: to two digits, and never as all of them or none."""
+    if 100.0 * share >= 99.5:
+        return "over 99 %"
+    return f"about {100.0 * share:.2g} %" if share * PARTS >= 1.0 else "hardly any"
 
 
 def _shares(result: Result, found: Assumed, run: Run) -> tuple[float, float]:
@@ -117,5 +126,5 @@ def _numbers(spec: Spec, rows: Rows, run: Run) -> FloatArray:
     except CfmError as error:
         raise _NotKnown(str(error)) from None
     if found is None or not np.isfinite(found).all():
-        raise _NotKnown("a part near the design has no curve, or a metric of it no value")
+        raise _NotKnown("a part near the design has no curve, or it ends within a window of the requirements")
     return found

@@ -20,6 +20,9 @@ if TYPE_CHECKING:
     from cfmkit.specs.spec import Spec
     from cfmkit.stock.processes import Process
 
+OF_PLATES = "laser"
+"""How links and cams are made that say nothing of a material: as the prototype of Sanchez-Salinas et al. (2022)."""
+
 MODULUS = "mechanism.material.youngs_modulus"
 
 
@@ -31,15 +34,20 @@ class Assumed:
     ----------
     process : Process
         How it is made.
-    deviations : mapping of str to float
-        Path -> standard deviation [SI].
+    kinds : mapping of str to str
+        Path -> in what it errs, "thickness" or "position".
     modulus : (float, float) or None
         From where to where the modulus is found [Pa]; None where no source says it.
     """
 
     process: Process
-    deviations: Mapping[str, float]
+    kinds: Mapping[str, str]
     modulus: tuple[float, float] | None
+
+    @property
+    def deviations(self) -> dict[str, float]:
+        """Path -> standard deviation [m]."""
+        return {path: getattr(self.process, kind) for path, kind in self.kinds.items()}
 
 
 def assumed(spec: Spec) -> Assumed | None:
@@ -48,15 +56,16 @@ def assumed(spec: Spec) -> Assumed | None:
     if errors is None:
         return None
     kinds: Mapping[str, str] = function_named(errors)(spec)
-    material = getattr(getattr(spec, "mechanism", None), "material", None)
-    if not kinds or material is None:
+    if not kinds:
         return None
+    material = getattr(getattr(spec, "mechanism", None), "material", None)
     named = getattr(getattr(spec, "design", None), "process", None)
-    process = PROCESSES[named] if named else usual(material.name, material.modulus)
-    band = None
-    if material.name in MATERIALS and material.modulus == MATERIALS[material.name].youngs_modulus:
-        band = MATERIALS[material.name].scatter.youngs_modulus
-    return Assumed(process, {path: getattr(process, kind) for path, kind in kinds.items()}, band)
+    process = PROCESSES[named or OF_PLATES]
+    if material is not None and not named:
+        process = usual(material.name, material.modulus)
+    known = None if material is None else MATERIALS.get(material.name)
+    band = known.scatter.youngs_modulus if known is not None and material.modulus == known.youngs_modulus else None
+    return Assumed(process, kinds, band)
 
 
 def tolerances(spec: Spec) -> dict[str, Any]:

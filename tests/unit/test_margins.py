@@ -83,11 +83,28 @@ def test_a_strip_is_moved_until_nine_of_ten_parts_are_good(few):
 
 
 def test_without_a_range_nothing_moves_and_that_is_said():
-    spec = cfmkit.load("configs/cam.yaml").replace(
-        {"design.yield": 0.9, "design.tolerances": {"mechanism.springs.stiffness": {"normal": "1 %"}}}
+    spec = cfmkit.load("configs/slider_crank_bought.yaml").replace(
+        {"design.yield": 0.9, "design.tolerances": {"mechanism.crank_length": {"normal": "0.05 mm"}}}
     )
-    design = cfmkit.design(spec)
+    design = with_design_margins(spec, cfmkit.results.Design(spec, cfmkit.results.Status.COMPLETE), Run())
     assert "design.free" in dict(design.notes)["margins"]
+
+
+@pytest.mark.parametrize(
+    ("config", "moving"),
+    [
+        ("cam", ["mechanism.profile.force_constant"]),
+        ("vcfm_pla", ["mechanism.bistable.thickness", "mechanism.bistable.length", "mechanism.positive.width"]),
+        ("beam_design_arch", ["mechanism.nodes.b.at.1", "mechanism.beams.s.shape.coefficients.2"]),
+        ("beam_rescaled", ["mechanism.width"]),
+        ("slider_crank_bilancia2019_optimum", ["mechanism.springs.pivot"]),
+    ],
+)
+def test_what_a_design_chooses_may_move_for_its_yield_too(config, moving):
+    spec = cfmkit.load(f"configs/{config}.yaml")
+    found = margins.free_of(spec, spec)
+    assert set(moving) <= set(found)
+    assert all(low <= spec.at(path) <= high and low < high for path, (low, high) in found.items())
 
 
 def test_a_closed_model_is_moved_as_well():

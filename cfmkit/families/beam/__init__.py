@@ -24,6 +24,7 @@ FAMILY = Family(
     values=DEFINITIONS | SURFACE,
     resolve=resolve,
     errors="cfmkit.families.beam.force_at_few_poses:errors",
+    free="cfmkit.families.beam.free_values:free",
     sampled="cfmkit.families.beam.force_at_few_poses:sampled",
     draw="cfmkit.families.beam.figures",
     scheme="cfmkit.families.beam.dimension_drawing",

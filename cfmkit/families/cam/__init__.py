@@ -27,6 +27,8 @@ FAMILY = Family(
     outline="cfmkit.families.cam.outline",
     propose="cfmkit.families.cam.propose:propose",
     room="cfmkit.families.cam.bounding_box:room",
+    free="cfmkit.families.cam.free_values:free",
+    errors="cfmkit.families.cam.process_errors:errors",
     headline=(
         "force_constant",
         "theoretical_force",

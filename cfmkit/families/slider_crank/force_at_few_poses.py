@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.designing.variables import around
 from cfmkit.families.base import Sampled
 from cfmkit.families.no_mechanism import CannotBuild
 from cfmkit.families.slider_crank.build import linkage_of, resolve, unloaded_angle
@@ -48,10 +49,18 @@ def sampled(spec: SliderCrankSpec, places: FloatArray) -> Sampled | None:
 
 
 def free(given: SliderCrankSpec, designed: SliderCrankSpec) -> dict[str, tuple[float, float]]:
-    """Return the thicknesses and the width of a designed strip with the ranges of `design.beam`; nothing of springs."""
+    """Return thicknesses and width of a designed strip with the ranges of `design.beam`; of springs, their rates.
+
+    Parameters
+    ----------
+    given : SliderCrankSpec
+        With the `design` block.
+    designed : SliderCrankSpec
+        What came out.
+    """
     wanted, beam = given.design.beam if given.design else None, designed.mechanism.beam
     if wanted is None or beam is None:
-        return {}
+        return _rates(given, designed)
     found: dict[str, tuple[float, float]] = {}
     if isinstance(beam.thickness, tuple):
         ranges = wanted.thicknesses or (wanted.thickness or DEFAULT_THICKNESS,) * len(beam.thickness)
@@ -64,6 +73,28 @@ def free(given: SliderCrankSpec, designed: SliderCrankSpec) -> dict[str, tuple[f
     return {path: (float(low), float(high)) for path, (low, high) in found.items() if low < high}
 
 
+def _rates(given: SliderCrankSpec, designed: SliderCrankSpec) -> dict[str, tuple[float, float]]:
+    """Return the rates that a design chose, up to their limits; those of bought springs stay."""
+    design, springs = given.design, designed.mechanism.springs
+    if design is None or springs is None or design.catalogue or springs.bought:
+        return {}
+    found = {}
+    for joint in design.springs:
+        rate, most = getattr(springs, joint), getattr(design.max_rates, joint, None)
+        if rate > 0:
+            found[f"mechanism.springs.{joint}"] = around(float(rate), high=most)
+    return {path: ends for path, ends in found.items() if ends[0] < ends[1]}
+
+
 def errors(spec: SliderCrankSpec) -> dict[str, str]:
-    """Return which values of a strip a process errs in: how thick it comes out everywhere; nothing of springs."""
-    return {} if spec.mechanism.beam is None or spec.fidelity != "beam" else {"mechanism.beam.offset": "thickness"}
+    """Return which values a process errs in: how thick a strip comes out everywhere; of links, where holes lie.
+
+    Springs are bought: their rates are no matter of the process.
+    """
+    mechanism = spec.mechanism
+    if mechanism.beam is not None:
+        return {"mechanism.beam.offset": "thickness"} if spec.fidelity == "beam" else {}
+    if mechanism.flexures is not None:
+        return {}
+    given = {name: getattr(mechanism, name) for name in ("crank_length", "stretched_position", "offset")}
+    return {f"mechanism.{name}": "position" for name, value in given.items() if isinstance(value, float)}

@@ -15,6 +15,7 @@ FAMILY = Family(
     summary="V-beams that snap through beside a diamond spring, adjustable by the spring's preload",
     spec_type=VcfmSpec,
     errors="cfmkit.families.vcfm.process_errors:errors",
+    free="cfmkit.families.vcfm.free_values:free",
     models={
         "truss": analyze,
         "analytic": analyze,

@@ -22,7 +22,7 @@ from cfmkit.designing.limits import worst
 from cfmkit.designing.starts import Clock
 from cfmkit.designing.variables import rounded as rounded_within
 from cfmkit.families.beam.shaping.check_between_poses import CloseView, looked_at
-from cfmkit.families.beam.shaping.goals import Compared, Flattest, Widest, window_force
+from cfmkit.families.beam.shaping.goals import WEIGHT, Compared, Flattest, Widest, window_force
 from cfmkit.families.beam.shaping.limits import LIMITS
 from cfmkit.families.beam.shaping.sqp_program import Shaping
 from cfmkit.families.beam.shaping.variables import Variables, candidates
@@ -46,6 +46,8 @@ _ALMOST = 2e-3  # a limit missed by less is repaired afterwards
 _BACK = 0.1  # of the gain is given up where it cannot be
 _TOLERANCE = 1e-5  # of the objective
 _FLAT = 0.05  # a random network with this half band is flat enough to begin with
+_ENOUGH = 0.5  # of the band of the widest window: flat enough to be taken on to the model of the task
+_FAR = 3.0  # times that band: so far from it, what bends only is not taken on
 _ROUNDS = 6  # towards the limits
 _HOPELESS = 0.1  # of a limit: what bends only and misses one by so much is not taken on where beams stretch and shear
 _STIFF = 0.2  # one with this is a spring, and not looked at further
@@ -142,8 +144,9 @@ def searched(task: Task, seed: int, index: int, plan: Plan) -> Found | None:
         return None
     if first is task:
         return finished(task, begun, plan)
-    found = modelled(task, improved(first, begun, plan))
-    if found.violation > _HOPELESS:
+    enough = _ENOUGH * task.half_band if task.objective == "range" else -np.inf
+    found = modelled(task, improved(first, begun, plan, enough))
+    if found.violation > _HOPELESS or (task.objective == "range" and found.objective > _FAR * task.half_band):
         return found
     return finished(task, found if found.feasible else met(task, found, found.order, plan), plan)
 
@@ -185,11 +188,11 @@ def finished(task: Task, found: Found, plan: Plan) -> Found:
     return confirmed(task, improved(task, found, plan), plan, again)
 
 
-def improved(task: Task, found: Found, plan: Plan) -> Found:
-    """Return a design flattened in every order from its own on."""
+def improved(task: Task, found: Found, plan: Plan, enough: float = -np.inf) -> Found:
+    """Return a design flattened in every order from its own on, in each until the half band is small enough."""
     for order in task.orders:
         if order >= found.order and not plan.late():
-            found = _flattened(task, found, order, plan, plan.flattening)
+            found = _flattened(task, found, order, plan, plan.flattening, enough)
     return found
 
 
@@ -312,14 +315,14 @@ def met(
     return found
 
 
-def _flattened(task: Task, found: Found, order: int, plan: Plan, steps: int) -> Found:
-    """Return a design with the objective minimised; the one before where that is better."""
+def _flattened(task: Task, found: Found, order: int, plan: Plan, steps: int, enough: float = -np.inf) -> Found:
+    """Return a design with the objective minimised, as far as is enough; the one before where that is better."""
     variables, x = Variables(task, found.order).raised(found.x, order)
     program = Shaping(variables, found.start, Compared() if task.objective == "paper" else Flattest())
     z = program.begin(x)
     if z is None:
         return found
-    optimum = minimize(program, z, program.bounds, plan.effort(steps))
+    optimum = minimize(program, z, program.bounds, plan.effort(steps, WEIGHT * enough))
     now = found_of(program, optimum, found.evaluations)
     worse = found.feasible and not now.feasible
     return replace(found, evaluations=now.evaluations) if worse else now

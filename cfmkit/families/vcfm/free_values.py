@@ -1,0 +1,38 @@
+"""Which values of a designed mechanism with an adjustable force may move for a yield: those that its design chooses."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from cfmkit.designing.variables import around
+
+if TYPE_CHECKING:
+    from cfmkit.families.vcfm.spec import VcfmSpec
+
+
+def free(given: VcfmSpec, designed: VcfmSpec) -> dict[str, tuple[float, float]]:
+    """Return both widths, and length, angle and thickness of the leaves, within the limits of the design.
+
+    Parameters
+    ----------
+    given : VcfmSpec
+        With the `design` block.
+    designed : VcfmSpec
+        What came out.
+    """
+    wanted = given.design
+    if wanted is None:
+        return {}
+    leaf, spring = designed.mechanism.bistable, designed.mechanism.positive
+    longest = None if wanted.max_span is None else wanted.max_span / (2.0 * math.cos(leaf.angle))
+    length = wanted.leaf_length if wanted.leaf_length is not None else None
+    found = {
+        "mechanism.positive.width": around(spring.width, high=wanted.max_width),
+        "mechanism.bistable.width": around(leaf.width, high=wanted.max_width),
+        "mechanism.bistable.thickness": around(leaf.thickness, low=wanted.min_thickness),
+        "mechanism.bistable.angle": around(leaf.angle),
+    }
+    if length is None:
+        found["mechanism.bistable.length"] = around(leaf.length, high=longest)
+    return {path: ends for path, ends in found.items() if ends[0] < ends[1]}
