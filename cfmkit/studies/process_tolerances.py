@@ -63,8 +63,9 @@ def assumed(spec: Spec) -> Assumed | None:
     process = PROCESSES[named or OF_PLATES]
     if material is not None and not named:
         process = usual(material.name, material.modulus)
-    known = None if material is None else MATERIALS.get(material.name)
-    band = known.scatter.youngs_modulus if known is not None and material.modulus == known.youngs_modulus else None
+    band = None
+    if material is not None and (known := MATERIALS.get(material.name)) and material.modulus == known.youngs_modulus:
+        band = known.scatter.youngs_modulus
     return Assumed(process, kinds, band)
 
 

@@ -24,9 +24,8 @@ def free(given: CamSpec, designed: CamSpec) -> dict[str, tuple[float, float]]:
     if wanted is None:
         return {}
     found = {}
-    profile, springs = mechanism.profile, mechanism.springs
-    if isinstance(getattr(profile, "force_constant", None), float):
-        found["mechanism.profile.force_constant"] = around(profile.force_constant)
-    if wanted.choose == "stiffness" and isinstance(getattr(springs, "stiffness", None), float):
-        found["mechanism.springs.stiffness"] = around(springs.stiffness)
+    found["mechanism.profile.force_constant"] = around(mechanism.profile.force_constant)
+    rate = mechanism.springs.stiffness
+    if wanted.choose == "stiffness" and isinstance(rate, float):
+        found["mechanism.springs.stiffness"] = around(rate)
     return found

@@ -76,7 +76,7 @@ def free(given: SliderCrankSpec, designed: SliderCrankSpec) -> dict[str, tuple[f
 def _rates(given: SliderCrankSpec, designed: SliderCrankSpec) -> dict[str, tuple[float, float]]:
     """Return the rates that a design chose, up to their limits; those of bought springs stay."""
     design, springs = given.design, designed.mechanism.springs
-    if design is None or springs is None or design.catalogue or springs.bought:
+    if design is None or design.catalogue or springs.bought:
         return {}
     found = {}
     for joint in design.springs:

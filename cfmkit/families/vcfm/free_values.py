@@ -26,13 +26,13 @@ def free(given: VcfmSpec, designed: VcfmSpec) -> dict[str, tuple[float, float]]:
         return {}
     leaf, spring = designed.mechanism.bistable, designed.mechanism.positive
     longest = None if wanted.max_span is None else wanted.max_span / (2.0 * math.cos(leaf.angle))
-    length = wanted.leaf_length if wanted.leaf_length is not None else None
     found = {
-        "mechanism.positive.width": around(spring.width, high=wanted.max_width),
         "mechanism.bistable.width": around(leaf.width, high=wanted.max_width),
         "mechanism.bistable.thickness": around(leaf.thickness, low=wanted.min_thickness),
         "mechanism.bistable.angle": around(leaf.angle),
     }
-    if length is None:
+    if spring is not None:
+        found["mechanism.positive.width"] = around(spring.width, high=wanted.max_width)
+    if wanted.leaf_length is None:
         found["mechanism.bistable.length"] = around(leaf.length, high=longest)
     return {path: ends for path, ends in found.items() if ends[0] < ends[1]}
