@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from cfmkit.export.contours import Drawing
     from cfmkit.metrics import Outcome, Window
     from cfmkit.results import Design, Quantity, Result
-    from cfmkit.runs.notebook import Analysis
+    from cfmkit.runs.notebook import AnalysisView
     from cfmkit.solid.two_meshes import DrivenPart
     from cfmkit.specs.spec import Spec
     from cfmkit.studies.outcome import StudyResult
@@ -122,7 +122,7 @@ def _result_of(result: Result | AnySpec) -> Result:
     return result if isinstance(result, Result) else analyze(result)
 
 
-def analyze(spec: AnySpec, run: Run | None = None) -> Analysis:
+def analyze(spec: AnySpec, run: Run | None = None) -> AnalysisView:
     """Return the curves of a mechanism, its scalar results and what is wrong with it.
 
     Parameters
@@ -142,10 +142,10 @@ def analyze(spec: AnySpec, run: Run | None = None) -> Analysis:
     50.0002
     """
     from cfmkit.metrics import windows_judged
-    from cfmkit.runs.notebook import Analysis
+    from cfmkit.runs.notebook import AnalysisView
 
     spec = spec_of(spec)
-    return Analysis.of(windows_judged(family(spec.family).analyze(spec, run or Run())))
+    return AnalysisView.of(windows_judged(family(spec.family).analyze(spec, run or Run())))
 
 
 def design(spec: AnySpec, run: Run | None = None) -> Design:

@@ -14,7 +14,7 @@ from cfmkit.runs.papers import VERDICTS, check, rows
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
-    from cfmkit.runs.papers import Checked
+    from cfmkit.runs.papers import ComputedRow
 
 PAGE = Path(__file__).with_name("papers.md")
 HEAD = """\
@@ -33,25 +33,25 @@ $ cfmkit papers cam -q
 """
 
 
-def page(done: Sequence[Checked]) -> str:
+def page(done: Sequence[ComputedRow]) -> str:
     """Return the page for rows that were computed."""
     return (
         "\n".join([HEAD, *_counts(done), *(line for paper in _papers(done) for line in _section(paper, done))]) + "\n"
     )
 
 
-def _papers(done: Iterable[Checked]) -> list[str]:
+def _papers(done: Iterable[ComputedRow]) -> list[str]:
     return list(dict.fromkeys(one.row.paper for one in done))
 
 
-def _counts(done: Sequence[Checked]) -> Iterator[str]:
+def _counts(done: Sequence[ComputedRow]) -> Iterator[str]:
     yield "| verdict | numbers | meaning |\n|---|---|---|"
     for verdict, meaning in VERDICTS.items():
         yield f"| {verdict} | {sum(len(one.row.printed) for one in done if one.row.verdict == verdict)} | {meaning} |"
     yield ""
 
 
-def _section(paper: str, done: Sequence[Checked]) -> Iterator[str]:
+def _section(paper: str, done: Sequence[ComputedRow]) -> Iterator[str]:
     mine = [one for one in done if one.row.paper == paper]
     (reference,) = [text for record in records() for text in record.references if _names(text, paper)][:1]
     yield f"## {paper}\n\n{reference}\n"
@@ -68,7 +68,7 @@ def _names(reference: str, paper: str) -> bool:
     return first == author and year in reference
 
 
-def _here(one: Checked) -> str:
+def _here(one: ComputedRow) -> str:
     if one.row.verdict == "given":
         return "the same"
     return ", ".join(one.row.here if one.skipped else one.computed)

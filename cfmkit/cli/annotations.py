@@ -11,20 +11,20 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
     from cfmkit.studies.batch_entries import Entry
-    from cfmkit.studies.metric_changes import Change
+    from cfmkit.studies.metric_changes import MetricChange
 
 PLACED = re.compile(r"(?P<file>.*?):(?P<line>\d+):(?P<col>\d+): (?P<told>.*)", re.DOTALL)
 """How the fault of a file begins."""
 
 
-def github(entries: Sequence[Entry], changes: Sequence[Change] = ()) -> Iterator[str]:
+def github(entries: Sequence[Entry], changes: Sequence[MetricChange] = ()) -> Iterator[str]:
     """Yield one workflow command per fault, missed requirement, warning and changed value, with its place.
 
     Parameters
     ----------
     entries : sequence of Entry
         Every specification of a batch.
-    changes : sequence of Change
+    changes : sequence of MetricChange
         Since an earlier batch; those beyond the tolerance are errors.
     """
     for one in entries:

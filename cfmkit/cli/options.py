@@ -127,7 +127,7 @@ class Changing(Common):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Drawing(Common):
+class FigureChoice(Common):
     """What a verb takes that draws."""
 
     no_plots: NoPlots = False
@@ -176,7 +176,7 @@ class OneSpec(Changing):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Computing(OneSpec, Drawing):
+class Computing(OneSpec, FigureChoice):
     """What a verb takes that computes."""
 
     fidelity: Fidelity = None

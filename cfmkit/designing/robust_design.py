@@ -47,7 +47,7 @@ FLOOR = 1e-2
 """Least standard deviation of a row, as a share of the largest of its limit: what no error moves is kept strictly."""
 
 
-class Seen(Protocol):
+class SeenPart(Protocol):
     """What a family sees of a part."""
 
     def __call__(self, x: FloatArray, errors: FloatArray, /) -> FloatArray | None:
@@ -64,7 +64,7 @@ def unheard(_share: float, _steps: int) -> None:
 
 
 @dataclass(frozen=True)
-class Problem:
+class RobustProblem:
     """What may vary, what errors there are, and what must hold.
 
     Attributes
@@ -89,7 +89,7 @@ class Problem:
         Takes the share estimated and the number of steps so far.
     """
 
-    seen: Seen
+    seen: SeenPart
     bounds: FloatArray
     errors: FloatArray
     deviations: FloatArray
@@ -147,7 +147,7 @@ class Linear:
 
 
 @dataclass(frozen=True)
-class Found:
+class RobustResult:
     """Where the steps ended.
 
     Attributes
@@ -183,7 +183,7 @@ class NoPart(Exception):
 class _Counted:
     """A problem whose parts are counted."""
 
-    problem: Problem
+    problem: RobustProblem
     count: int = 0
 
     def __call__(self, x: FloatArray, errors: FloatArray) -> FloatArray | None:
@@ -195,7 +195,7 @@ class _Counted:
         return np.asarray(self.problem.matrix @ numbers + self.problem.constant)
 
 
-def linear(problem: Problem, x: FloatArray, seen: Seen) -> Linear | None:
+def linear(problem: RobustProblem, x: FloatArray, seen: SeenPart) -> Linear | None:
     """Return a design to first order, by central differences; None where it or a neighbour has no numbers."""
     middle = seen(x, problem.none)
     if middle is None:
@@ -214,7 +214,7 @@ def linear(problem: Problem, x: FloatArray, seen: Seen) -> Linear | None:
     return Linear(x, matrix @ middle + problem.constant, matrix @ by_x, matrix @ by_error)
 
 
-def _by_values(problem: Problem, x: FloatArray, errors: FloatArray, seen: Seen) -> FloatArray | None:
+def _by_values(problem: RobustProblem, x: FloatArray, errors: FloatArray, seen: SeenPart) -> FloatArray | None:
     """Return the derivatives of the numbers of a part by the values of its design, (q, n)."""
     columns = []
     for k, width in enumerate(problem.reach.tolist()):
@@ -228,12 +228,12 @@ def _by_values(problem: Problem, x: FloatArray, errors: FloatArray, seen: Seen) 
     return np.array(columns).T
 
 
-def with_margins(problem: Problem, x: FloatArray, most: int = 40) -> Found:
+def with_margins(problem: RobustProblem, x: FloatArray, most: int = 40) -> RobustResult:
     """Return values for which the share of good parts, estimated to first order, is what was requested, or largest.
 
     Parameters
     ----------
-    problem : Problem
+    problem : RobustProblem
         What may vary and what must hold.
     x : (n,) array
         Where to begin.
@@ -278,11 +278,11 @@ def with_margins(problem: Problem, x: FloatArray, most: int = 40) -> Found:
         if share >= best_share:
             best, best_share = now, share
         problem.tell(share, steps)
-    return Found(best.x, best_share, began, steps, seen.count, best, best_share >= problem.share)
+    return RobustResult(best.x, best_share, began, steps, seen.count, best, best_share >= problem.share)
 
 
 def _moved_risk(
-    now: Linear, there: FloatArray, few: FloatArray, scale: FloatArray, problem: Problem, seen: _Counted
+    now: Linear, there: FloatArray, few: FloatArray, scale: FloatArray, problem: RobustProblem, seen: _Counted
 ) -> float:
     """Return the risk of other values, errors moving the rows as they do now."""
     numbers = seen(there, problem.none)
@@ -291,7 +291,7 @@ def _moved_risk(
     return _risk(replace(now, rows=seen.rows(numbers)).parts(few) / scale, problem.share)
 
 
-def _scale(now: Linear, problem: Problem) -> FloatArray:
+def _scale(now: Linear, problem: RobustProblem) -> FloatArray:
     """Return by what each row is divided: its standard deviation over the drawn parts."""
     moved = (problem.errors @ now.by_error.T).std(axis=0)
     out: FloatArray = np.empty(len(moved))
@@ -314,7 +314,7 @@ def _risk(parts: FloatArray, share: float) -> float:
 
 
 def _step(
-    parts: FloatArray, slopes: NDArray[np.float64], problem: Problem, x: FloatArray, trust: float
+    parts: FloatArray, slopes: NDArray[np.float64], problem: RobustProblem, x: FloatArray, trust: float
 ) -> FloatArray | None:
     """Return the move of the values (n,) that lowers the risk most within the trust; None where there is none.
 
@@ -324,7 +324,7 @@ def _step(
         Rows of each part.
     slopes : (k, m, n) array
         Their derivatives by the values.
-    problem, x : Problem and (n,) array
+    problem, x : RobustProblem and (n,) array
         Bounds, and where the values are.
     trust : float
         Largest move, as a share of the ranges.
@@ -360,7 +360,7 @@ def _step(
 class _Parts:
     """Drawn parts that are solved themselves."""
 
-    problem: Problem
+    problem: RobustProblem
     errors: FloatArray
     seen: _Counted
     slopes: FloatArray | None = field(default=None)
@@ -384,14 +384,14 @@ class _Parts:
         return out
 
 
-def drawn(problem: Problem, found: Found, count: int, worst: bool = False, most: int = 25) -> Found:
+def drawn(problem: RobustProblem, found: RobustResult, count: int, worst: bool = False, most: int = 25) -> RobustResult:
     """Return values for which drawn parts, each solved itself, are good: from a design that first order led to.
 
     Parameters
     ----------
-    problem : Problem
+    problem : RobustProblem
         What may vary and what must hold.
-    found : Found
+    found : RobustResult
         Where to begin.
     count : int
         Parts that are drawn.
@@ -432,10 +432,12 @@ def drawn(problem: Problem, found: Found, count: int, worst: bool = False, most:
     if now is None:
         return found
     share = now.share(problem.errors)
-    return Found(x, share, found.began, found.steps + steps, found.seen + seen.count, now, share >= problem.share)
+    return RobustResult(
+        x, share, found.began, found.steps + steps, found.seen + seen.count, now, share >= problem.share
+    )
 
 
-def costliest(found: Found, problem: Problem, groups: list[tuple[int, ...]]) -> int:
+def costliest(found: RobustResult, problem: RobustProblem, groups: list[tuple[int, ...]]) -> int:
     """Return the number of the group of errors without which most more parts would be good, to first order."""
     shares = []
     for members in groups:

@@ -46,7 +46,7 @@ class Rows:
 
 
 @dataclass(frozen=True)
-class Seen:
+class SeenPoint:
     """What is known at a point: the objective with its derivatives (k,), if they were requested, and all rows."""
 
     objective: float
@@ -57,7 +57,7 @@ class Seen:
 class Source(Protocol):
     """What a family knows of its design at a point."""
 
-    def seen(self, z: FloatArray, sloped: bool) -> Seen | None:
+    def seen(self, z: FloatArray, sloped: bool) -> SeenPoint | None:
         """Return objective and rows at z, with derivatives or without; None where the model has no answer."""
 
 

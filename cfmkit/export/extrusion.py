@@ -57,13 +57,13 @@ class Body:
 
 
 @dataclass(frozen=True)
-class Plate:
+class LayeredPolygon:
     """One part seen from above: a polygon of shapely, cut into faces of one thickness each [m]."""
 
     faces: tuple[tuple[Any, float], ...]
 
 
-def plates(drawn: Sequence[Outline], sheet: Sheet, tolerance: float) -> tuple[Plate, ...]:
+def plates(drawn: Sequence[Outline], sheet: Sheet, tolerance: float) -> tuple[LayeredPolygon, ...]:
     """Return what a drawing cuts, with the thickness of every face.
 
     Parameters
@@ -98,7 +98,7 @@ def plates(drawn: Sequence[Outline], sheet: Sheet, tolerance: float) -> tuple[Pl
     return tuple(found)
 
 
-def _faces(part: Any, sheet: Sheet) -> Plate:
+def _faces(part: Any, sheet: Sheet) -> LayeredPolygon:
     """Return a part cut along the edges of the regions that lie in it."""
     from shapely import Polygon, prepare, set_precision, union_all
     from shapely.ops import polygonize
@@ -108,7 +108,7 @@ def _faces(part: Any, sheet: Sheet) -> Plate:
     areas = [(set_precision(Polygon(one.polygon), GRID), one.thickness) for one in other]
     areas = [(area, thickness) for area, thickness in areas if area.intersection(part).area > SPECK]
     if not areas:
-        return Plate(((part, usual),))
+        return LayeredPolygon(((part, usual),))
     lines = union_all([part.boundary, *(area.boundary.intersection(part) for area, _ in areas)], grid_size=GRID)
     prepare(part)
     faces = []
@@ -116,10 +116,10 @@ def _faces(part: Any, sheet: Sheet) -> Plate:
         inside = face.representative_point()
         if part.contains(inside):
             faces.append((face, max((t for area, t in areas if area.contains(inside)), default=usual)))
-    return Plate(tuple(faces))
+    return LayeredPolygon(tuple(faces))
 
 
-def bodies(found: Sequence[Plate]) -> tuple[Body, ...]:
+def bodies(found: Sequence[LayeredPolygon]) -> tuple[Body, ...]:
     """Return parts as closed surfaces.
 
     Raises
@@ -130,7 +130,7 @@ def bodies(found: Sequence[Plate]) -> tuple[Body, ...]:
     return tuple(_body(plate) for plate in found)
 
 
-def _body(plate: Plate) -> Body:
+def _body(plate: LayeredPolygon) -> Body:
     flat, corners, halves = _triangles(plate)
     levels = sorted({level for half in set(halves.tolist()) for level in (-half, half)})
     shell = _Shell(flat, np.array(levels))
@@ -141,7 +141,7 @@ def _body(plate: Plate) -> Body:
     return shell.closed()
 
 
-def _triangles(plate: Plate) -> tuple[FloatArray, NDArray[np.int64], FloatArray]:
+def _triangles(plate: LayeredPolygon) -> tuple[FloatArray, NDArray[np.int64], FloatArray]:
     """Return points (n, 2) [m], triangles (m, 3) counter-clockwise and half the thickness of each (m,) [m]."""
     from shapely import constrained_delaunay_triangles, get_coordinates
 

@@ -29,7 +29,7 @@ Box = tuple[float, float, float, float]
 
 
 @dataclass
-class Layout:
+class FigureLayout:
     """What a drawing asks for, and what it gets: while `boxes` is empty it is only listened to.
 
     Attributes
@@ -63,7 +63,7 @@ class Layout:
         self.asked.append(box)
         return self.boxes[len(self.asked) - 1] if self.boxes else box
 
-    def stretched(self, width: float, titles: bool, to_scale: bool) -> Layout:
+    def stretched(self, width: float, titles: bool, to_scale: bool) -> FigureLayout:
         """Return the layout for another width [mm]: boxes by one factor in both directions, margins as they are.
 
         Diagrams, which are not to scale, lose less height than width: their labels need it.
@@ -78,7 +78,7 @@ class Layout:
         for left, low, wide, high in self.asked:
             x, y = across.at(left, factor), up.at(low, taller)
             boxes.append((x, y, across.at(left + wide, factor) - x, up.at(low + high, taller) - y))
-        return Layout((width, up.at(self.size[1], taller) - cut), [], boxes)
+        return FigureLayout((width, up.at(self.size[1], taller) - cut), [], boxes)
 
 
 @dataclass(frozen=True)
@@ -111,17 +111,17 @@ class _Stretch:
         return place + (factor - 1.0) * self.covered(place)
 
 
-_LAYOUT: ContextVar[Layout | None] = ContextVar("layout", default=None)
+_LAYOUT: ContextVar[FigureLayout | None] = ContextVar("layout", default=None)
 
 
-def current() -> Layout | None:
+def current() -> FigureLayout | None:
     """Return the layout of the figure that is being drawn; None where it is drawn as it says."""
     return _LAYOUT.get()
 
 
-def noted(make: Callable[[], Figure]) -> tuple[Figure, Layout]:
+def noted(make: Callable[[], Figure]) -> tuple[Figure, FigureLayout]:
     """Return a figure as it is drawn, and the boxes that it asks for."""
-    layout = Layout()
+    layout = FigureLayout()
     mark = _LAYOUT.set(layout)
     try:
         return make(), layout
@@ -129,7 +129,7 @@ def noted(make: Callable[[], Figure]) -> tuple[Figure, Layout]:
         _LAYOUT.reset(mark)
 
 
-def laid_out(make: Callable[[], Figure], layout: Layout) -> Figure:
+def laid_out(make: Callable[[], Figure], layout: FigureLayout) -> Figure:
     """Return a figure in a layout."""
     mark = _LAYOUT.set(layout)
     try:

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Job:
+class BatchJob:
     """One specification of a batch and the folder it writes to, below the batch's own."""
 
     index: int
@@ -70,7 +70,7 @@ class BatchWork:
         form = [] if given.form.plain else [repr(given.form), repr(given.form.settings)]
         return [list(given.changes), given.fidelity, given.seed, not given.plots, self.verb, *page, *form]
 
-    def __call__(self, job: Job) -> Entry:
+    def __call__(self, job: BatchJob) -> Entry:
         """Return what becomes of one specification; nothing is raised but what ends the process."""
         start = time.perf_counter()
         entry = Entry(job.spec, job.folder)
@@ -82,7 +82,7 @@ class BatchWork:
             entry = replace(_failed(entry, error), bug="".join(traceback.format_exception(error)))
         return replace(entry, seconds=time.perf_counter() - start)
 
-    def refusal(self, job: Job) -> Entry | None:
+    def refusal(self, job: BatchJob) -> Entry | None:
         """Return what is wrong with a specification; None if it is valid."""
         try:
             spec_of(replace(self.common, spec=job.spec))
@@ -159,14 +159,14 @@ def _of_one(entry: Entry, error: Exception) -> Iterator[str]:
         yield str(problem) if not problem.source.startswith("--") else f"{visible(entry.spec)}: {problem}"
 
 
-def lost(job: Job, outcome: Lost) -> Entry:
+def lost(job: BatchJob, outcome: Lost) -> Entry:
     """Return what became of a specification whose process did not answer."""
     bug = outcome.status is Status.CRASHED
     code = ExitCode.BUG if bug else outcome.status.exit_code
     return Entry(job.spec, job.folder, "", "", "", outcome.status.key, code, outcome.message, bug=outcome.bug)
 
 
-class Monitor(Protocol):
+class BatchMonitor(Protocol):
     """Who is told how far a batch is, and may end it."""
 
     @property
@@ -206,11 +206,11 @@ class Crew:
 
     executor: Executor
     fail_fast: bool
-    progress: Monitor
+    progress: BatchMonitor
     kept: KeptRuns
 
 
-def carry_out(work: BatchWork, jobs: Sequence[Job], crew: Crew) -> tuple[Entry, ...]:
+def carry_out(work: BatchWork, jobs: Sequence[BatchJob], crew: Crew) -> tuple[Entry, ...]:
     """Return what became of every specification, in their order; those that were not run are skipped.
 
     What an earlier batch has finished and nobody has changed since is not computed again.
@@ -221,11 +221,11 @@ def carry_out(work: BatchWork, jobs: Sequence[Job], crew: Crew) -> tuple[Entry, 
         failed = crew.fail_fast and any(one.code is not ExitCode.OK for one in found.values())
         return failed or crew.progress.stopping()
 
-    def note(job: Job, entry: Entry) -> None:
+    def note(job: BatchJob, entry: Entry) -> None:
         found[job.index] = entry
         crew.progress.done(1, int(entry.code is not ExitCode.OK), entry.reused)
 
-    def new() -> Iterator[Job]:
+    def new() -> Iterator[BatchJob]:
         for job in jobs:
             if stopping():
                 return
@@ -342,7 +342,7 @@ def batch(
     page: bool = False,
     form: FigureForm | None = None,
     arguments: Sequence[str] = (),
-    monitor: Monitor | None = None,
+    monitor: BatchMonitor | None = None,
     noting: Noting = journal_of,
 ) -> BatchResult:
     """Design or analyse many specifications, check their requirements, and write a folder for each and for all.
@@ -387,7 +387,7 @@ def batch(
         How figures are written.
     arguments : sequence of str
         What manifests say of the command line.
-    monitor : Monitor, optional
+    monitor : BatchMonitor, optional
         Who is told how far it is, and may end it.
     noting : callable
         What opens the journal of the folder.
@@ -425,7 +425,7 @@ def batch(
     files = sources(named, place)
     common = Request("", place, given, fidelity, seed, plots, of_many=True, page=page, form=form or PLAIN)
     work = BatchWork(common, verb, tuple(arguments), fresh)
-    todo = [Job(k, *pair) for k, pair in enumerate(zip(files, folders(files), strict=True))]
+    todo = [BatchJob(k, *pair) for k, pair in enumerate(zip(files, folders(files), strict=True))]
     executor = executor_for(jobs, len(todo), timeout_per_point)
     report = None if junit is None else prepared(junit)
     told = None if summary is None else prepared(summary, "--summary")

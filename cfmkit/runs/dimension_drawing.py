@@ -19,7 +19,7 @@ FORMATS = (".png", ".svg", ".pdf")
 
 
 @dataclass(frozen=True)
-class Scheme:
+class FamilyDrawing:
     """What a family shows of itself.
 
     Attributes
@@ -37,7 +37,7 @@ class Scheme:
     figure: Callable[[], Figure]
 
 
-def scheme(name: str | None) -> Scheme:
+def scheme(name: str | None) -> FamilyDrawing:
     """Return the drawing of a family.
 
     Raises
@@ -54,15 +54,15 @@ def scheme(name: str | None) -> Scheme:
     if record.scheme is None:
         raise UsageError(f"the family {visible(name)!r} has no drawing; there are {', '.join(drawn)}")
     module = import_module(record.scheme)
-    return Scheme(record.name, module.DIMENSIONS, module.figure)
+    return FamilyDrawing(record.name, module.DIMENSIONS, module.figure)
 
 
-def drawn(found: Scheme, kind: str) -> bytes:
+def drawn(found: FamilyDrawing, kind: str) -> bytes:
     """Return a drawing as the content of a file.
 
     Parameters
     ----------
-    found : Scheme
+    found : FamilyDrawing
         What to draw.
     kind : str
         The ending of the file: one of `FORMATS`.

@@ -1,6 +1,6 @@
 """Results as a notebook shows them: metrics, requirements and one figure, in a few kilobytes.
 
-What `cfmkit.analyze` gives back is an `Analysis`: a `Result` that also measures itself when it is asked to.
+What `cfmkit.analyze` gives back is an `AnalysisView`: a `Result` that also measures itself when it is asked to.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, repr=False)
-class Analysis(Result):
+class AnalysisView(Result):
     """A result with its metrics and requirements, computed when they are first needed."""
 
     @classmethod
-    def of(cls, result: Result) -> Analysis:
+    def of(cls, result: Result) -> AnalysisView:
         """Return a result as an analysis."""
         return cls(**{item.name: getattr(result, item.name) for item in fields(result)})
 

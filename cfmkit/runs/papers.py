@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from cfmkit.curves import Curve
-    from cfmkit.runs.notebook import Analysis
+    from cfmkit.runs.notebook import AnalysisView
     from cfmkit.specs.spec import Spec
 
 VERDICTS: Mapping[str, str] = {
@@ -101,7 +101,7 @@ class PrintedRow:
 
 
 @dataclass(frozen=True)
-class Checked:
+class ComputedRow:
     """A row with what was computed.
 
     Attributes
@@ -163,7 +163,7 @@ def chosen(name: str | None) -> tuple[PrintedRow, ...]:
     raise UsageError(f"there is no paper {visible(name)!r}; {hint}")
 
 
-def check(some: Sequence[PrintedRow], everything: bool = False) -> Iterator[Checked]:
+def check(some: Sequence[PrintedRow], everything: bool = False) -> Iterator[ComputedRow]:
     """Compute rows again, one after the other.
 
     Parameters
@@ -175,20 +175,20 @@ def check(some: Sequence[PrintedRow], everything: bool = False) -> Iterator[Chec
     """
     for row in some:
         if not row.ask:
-            yield Checked(row)
+            yield ComputedRow(row)
         elif row.heavy and not everything:
-            yield Checked(row, skipped=True)
+            yield ComputedRow(row, skipped=True)
         else:
             yield _checked(row)
 
 
-def _checked(row: PrintedRow) -> Checked:
+def _checked(row: PrintedRow) -> ComputedRow:
     try:
         values = _values(row)
     except (CfmError, ValueError, KeyError) as error:
-        return Checked(row, trouble=f"cannot be computed: {error.args[0] if error.args else error}")
+        return ComputedRow(row, trouble=f"cannot be computed: {error.args[0] if error.args else error}")
     shown = tuple(_told(value, text) for value, text in zip(values, row.here or row.printed, strict=True))
-    return Checked(row, shown, "; ".join(_faults(row, values)))
+    return ComputedRow(row, shown, "; ".join(_faults(row, values)))
 
 
 def _values(row: PrintedRow) -> tuple[float, ...]:
@@ -304,7 +304,7 @@ class _Scope:
     def specification(self) -> Spec:
         return _specification(self.spec, self.changes, self.verb)
 
-    def result(self) -> Analysis:
+    def result(self) -> AnalysisView:
         return _result(self.spec, self.changes, self.verb)
 
 
@@ -325,7 +325,7 @@ def _specification(name: str, changes: tuple[str, ...], verb: str) -> Spec:
 
 
 @cache
-def _result(name: str, changes: tuple[str, ...], verb: str) -> Analysis:
+def _result(name: str, changes: tuple[str, ...], verb: str) -> AnalysisView:
     from cfmkit import api
 
     return api.analyze(_specification(name, changes, verb))

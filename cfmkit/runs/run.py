@@ -83,7 +83,7 @@ class Outcome:
         return tuple(self.manifest.files)
 
 
-class Wish(Protocol):
+class RunRequest(Protocol):
     """What says which specification is meant: its file, what replaces its values, and a fidelity."""
 
     @property
@@ -172,12 +172,12 @@ def carry_out(
     return Outcome(verb, found, wanted.spec, wanted.changes, wanted.out, manifest, kept, seconds)
 
 
-def spec_of(wanted: Wish) -> Spec:
+def spec_of(wanted: RunRequest) -> Spec:
     """Return the checked specification that is meant, with what is changed in it."""
     return _bound(_document(wanted), wanted)
 
 
-def _document(wanted: Wish) -> Document:
+def _document(wanted: RunRequest) -> Document:
     of_many = getattr(wanted, "of_many", False)
     if wanted.fidelity is None:
         return read_spec(wanted.spec, wanted.changes, of_many)
@@ -186,7 +186,7 @@ def _document(wanted: Wish) -> Document:
     return read_spec(wanted.spec, (*wanted.changes, f"analysis.fidelity={wanted.fidelity}"), of_many)
 
 
-def _bound(document: Document, wanted: Wish) -> Spec:
+def _bound(document: Document, wanted: RunRequest) -> Spec:
     try:
         return bind(document)
     except SpecError as error:

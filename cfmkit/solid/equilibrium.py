@@ -92,7 +92,7 @@ class Factors:
 
 
 @dataclass(frozen=True)
-class Linear:
+class LinearisedPart:
     """A linearised problem.
 
     Attributes
@@ -165,7 +165,7 @@ class Selection:
 
 
 @dataclass(frozen=True)
-class Problem:
+class SolidProblem:
     """A part, its supports, and how to solve for it.
 
     Attributes
@@ -181,7 +181,7 @@ class Problem:
     def _scale(self) -> float:
         return float(np.ptp(self.elements.mesh.nodes, axis=0).max())
 
-    def linearised(self, unknowns: FloatArray, travel: float) -> Linear:
+    def linearised(self, unknowns: FloatArray, travel: float) -> LinearisedPart:
         """Return the problem's linearisation at some displacements; RuntimeError where it is singular at first."""
         moved = self.supports.displaced(unknowns, travel)
         forces, stiffness = self.elements.tangent(moved)
@@ -192,7 +192,7 @@ class Problem:
         if len(corner):  # free motions are last: their full rows fill nothing in
             side = csc_array(beside[selection.order])
             matrix = csc_array(block_array([[matrix, side], [side.T, csc_array(corner)]], format="csc"))
-        return Linear(matrix, order, slope, pinned, self.supports.residual(unknowns, travel, forces), forces)
+        return LinearisedPart(matrix, order, slope, pinned, self.supports.residual(unknowns, travel, forces), forces)
 
     def _selection(self, stiffness: csc_array) -> Selection:
         """Return the selection of the loose displacements, found once."""
@@ -240,7 +240,7 @@ class Problem:
         finite = np.isfinite(np.abs(forces).max())
         return bool(finite and np.abs(step[: len(self.supports.loose)]).max(initial=0.0) < FAR * self._scale)
 
-    def _balance(self, unknowns: FloatArray, travel: float, here: Linear, factors: Factors) -> Balance | None:
+    def _balance(self, unknowns: FloatArray, travel: float, here: LinearisedPart, factors: Factors) -> Balance | None:
         """Return the equilibrium, with factors of a tangent close to its own; None where they are not close enough."""
         slope = -factors.solve(here.slope)
         for _ in range(REFINEMENTS):

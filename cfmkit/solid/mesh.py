@@ -116,7 +116,7 @@ def mesh(
     laid = [_laid(ring, field) for ring in rings]
     fixed = np.concatenate([ring.at(arc) for ring, arc in zip(rings, laid, strict=True)])
     sewn = np.concatenate([np.zeros((0, 2)), *(_sewn(region, field, seam) for seam in seams)])
-    kept_from = Room(field, sewn)
+    kept_from = Spacing(field, sewn)
     inside = kept_from(_thrown(region, field, np.random.default_rng(seed)))
     if 4 * (len(inside) + len(fixed)) > MOST_NODES:  # a node in the middle of each side: three to a corner
         raise _too_many(4 * (len(inside) + len(fixed)))
@@ -232,7 +232,7 @@ def _sewn(region: Any, field: Sizes, seam: FloatArray) -> FloatArray:
 
 
 @dataclass(frozen=True)
-class Room:
+class Spacing:
     """Keeps points away from the boundary and from seams.
 
     Attributes
@@ -255,7 +255,7 @@ class Room:
         return points[far]
 
 
-def _relaxed(region: Any, room: Room, fixed: FloatArray, inside: FloatArray) -> FloatArray:
+def _relaxed(region: Any, room: Spacing, fixed: FloatArray, inside: FloatArray) -> FloatArray:
     """Return the points inside (k, 2) [m] where bars that push each other apart let them rest."""
     from shapely import contains_xy
 

@@ -12,7 +12,7 @@ from cfmkit.arrays import FloatArray, read_only
 from cfmkit.errors import GeometryError
 from cfmkit.solid.boundary import Ring
 from cfmkit.solid.elements import Elements
-from cfmkit.solid.equilibrium import Problem
+from cfmkit.solid.equilibrium import SolidProblem
 from cfmkit.solid.mesh import mesh
 from cfmkit.solid.path_following import follow
 from cfmkit.solid.rigid_groups import Group, Supports, within
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from cfmkit.export.contours import Contour
     from cfmkit.solid.mesh import Mesh
-    from cfmkit.solid.path_following import Course
+    from cfmkit.solid.path_following import PosePath
     from cfmkit.solid.plane_stress_law import Law
 
 ACROSS, SHARE = 2.5, 0.2
@@ -37,7 +37,7 @@ ON = 5e-6
 
 
 @dataclass(frozen=True)
-class Place:
+class HeldOrDriven:
     """Where a part is held or driven, and moves as one rigid piece.
 
     Attributes
@@ -75,7 +75,7 @@ class Part:
     width : float
         Out of the plane, where no region says otherwise [m].
     law : Law
-    places : tuple of Place
+    places : tuple of HeldOrDriven
     regions : tuple of ((n, 2) array, float)
         Polygons of another width [m].
     largest : float
@@ -86,7 +86,7 @@ class Part:
     thinnest: float
     width: float
     law: Law
-    places: tuple[Place, ...]
+    places: tuple[HeldOrDriven, ...]
     regions: tuple[tuple[FloatArray, float], ...] = ()
     largest: float = 1.0
 
@@ -104,7 +104,7 @@ class Part:
         grid = mesh(self.rings, self.largest * size, share, across, seams)
         groups, held = self._groups(grid.nodes)
         elements = Elements(grid, self.law, self._widths(grid)).without(held)
-        return Meshed(Problem(elements, Supports(grid.nodes, groups)), held)
+        return Meshed(SolidProblem(elements, Supports(grid.nodes, groups)), held)
 
     def _widths(self, grid: Mesh) -> FloatArray:
         """Return the width of every element [m], by where its middle is."""
@@ -137,12 +137,12 @@ class Meshed:
 
     Attributes
     ----------
-    problem : Problem
+    problem : SolidProblem
     held : (n,) array of bool
         Nodes that are held or driven.
     """
 
-    problem: Problem
+    problem: SolidProblem
     held: NDArray[np.bool_]
 
     def followed(self, stops: Sequence[float], report: Callable[[float], None] = lambda _share: None) -> MeshSolution:
@@ -156,14 +156,14 @@ class MeshSolution:
 
     Attributes
     ----------
-    problem : Problem
-    course : Course
+    problem : SolidProblem
+    course : PosePath
     held : (n,) array of bool
         Nodes of pads and holes.
     """
 
-    problem: Problem
-    course: Course
+    problem: SolidProblem
+    course: PosePath
     held: NDArray[np.bool_]
 
     @cached_property

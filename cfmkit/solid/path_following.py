@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.solid.equilibrium import Balance, Problem
+    from cfmkit.solid.equilibrium import Balance, SolidProblem
 
 SMALLEST = 2.0**-12
 """Smallest step, in parts of the whole travel: a bifurcation's place is then known to 2.5e-4 of the travel."""
@@ -45,7 +45,7 @@ SOFT = 30.0
 """The path has a limit point where it ends while its tangent has grown by so much against the travel's first pose."""
 
 
-class Ending(enum.Enum):
+class PathEnd(enum.Enum):
     """Why a path ended."""
 
     COMPLETE = ""
@@ -56,20 +56,20 @@ class Ending(enum.Enum):
 
 
 @dataclass(frozen=True)
-class Course:
+class PosePath:
     """Poses of a part in order of travel.
 
     Attributes
     ----------
     poses : tuple of Balance
         The requested ones as far as they were reached, and those on the way where steps were cut; without factors.
-    ending : Ending
+    ending : PathEnd
     bifurcations : tuple of float
         Travels at which another branch was taken [m or rad].
     """
 
     poses: tuple[Balance, ...]
-    ending: Ending
+    ending: PathEnd
     bifurcations: tuple[float, ...] = ()
 
     @property
@@ -86,12 +86,14 @@ class Course:
         return np.asarray(CubicHermiteSpline(places, efforts, slopes)(travel))
 
 
-def follow(problem: Problem, stops: Sequence[float], report: Callable[[float], None] = lambda _share: None) -> Course:
+def follow(
+    problem: SolidProblem, stops: Sequence[float], report: Callable[[float], None] = lambda _share: None
+) -> PosePath:
     """Return the poses of a part at some travels, on its stable branch.
 
     Parameters
     ----------
-    problem : Problem
+    problem : SolidProblem
         The part and its supports.
     stops : sequence of float
         Travels, from rest on in one direction [m or rad].
@@ -100,9 +102,9 @@ def follow(problem: Problem, stops: Sequence[float], report: Callable[[float], N
     """
     start = problem.solve(np.zeros(problem.supports.size), stops[0])
     if start is None:
-        return Course((), Ending.NO_START)
+        return PosePath((), PathEnd.NO_START)
     span = stops[-1] - stops[0]
-    course, state, step = Course((start.kept(),), Ending.COMPLETE), start, stops[1] - stops[0]
+    course, state, step = PosePath((start.kept(),), PathEnd.COMPLETE), start, stops[1] - stops[0]
     before: Balance | None = None
     for stop in stops[1:]:
         while state.travel != stop:
@@ -140,7 +142,7 @@ def bends(state: Balance, found: Balance, steepest: float) -> bool:
     return change > CORNER * max(abs(state.stiffness), abs(found.stiffness)) and change > SEEN * steepest
 
 
-def advanced(problem: Problem, state: Balance, travel: float, before: Balance | None = None) -> Balance | None:
+def advanced(problem: SolidProblem, state: Balance, travel: float, before: Balance | None = None) -> Balance | None:
     """Return the pose at a travel that continues the path from a pose; None where there is none in reach.
 
     With a pose before it, on the same branch, the prediction is the cubic through both with their slopes.
@@ -165,7 +167,7 @@ def _bending(before: Balance, state: Balance, travel: float) -> FloatArray:
     return np.asarray(ahead**2 * (3 * gap + drop) + ahead**3 * (2 * gap + drop))
 
 
-def softest(problem: Problem, state: Balance) -> FloatArray:
+def softest(problem: SolidProblem, state: Balance) -> FloatArray:
     """Return the softest mode (q,), by inverse iteration; its largest displacement is 1 m."""
     assert state.factors is not None  # poses on the way have theirs
     mode = np.random.default_rng(0).standard_normal(problem.supports.size)
@@ -175,12 +177,12 @@ def softest(problem: Problem, state: Balance) -> FloatArray:
     return np.asarray(mode / loose)
 
 
-def switched(problem: Problem, state: Balance, least: float, stop: float) -> Balance | None:
+def switched(problem: SolidProblem, state: Balance, least: float, stop: float) -> Balance | None:
     """Return the nearest stable pose beyond a bifurcation; None where pushing along the softest mode finds none.
 
     Parameters
     ----------
-    problem : Problem
+    problem : SolidProblem
     state : Balance
         The last stable pose before it.
     least : float
@@ -202,9 +204,9 @@ def switched(problem: Problem, state: Balance, least: float, stop: float) -> Bal
     return None
 
 
-def _ending(start: Balance, state: Balance, beyond: Balance | None) -> Ending:
+def _ending(start: Balance, state: Balance, beyond: Balance | None) -> PathEnd:
     """Return why a path cannot go on from a pose."""
     if beyond is not None:
-        return Ending.UNSTABLE
+        return PathEnd.UNSTABLE
     grown = float(np.linalg.norm(state.slope) / np.linalg.norm(start.slope))
-    return Ending.LIMIT_POINT if grown > SOFT else Ending.LOST
+    return PathEnd.LIMIT_POINT if grown > SOFT else PathEnd.LOST

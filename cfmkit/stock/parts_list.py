@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Part:
+class BoughtPart:
     """A part that is bought.
 
     Attributes
@@ -33,12 +33,12 @@ class Part:
     data: str = ""
 
 
-def parts_table(parts: Sequence[Part]) -> Table:
+def parts_table(parts: Sequence[BoughtPart]) -> Table:
     """Return the list as a table: place, name, count, data."""
     columns = ("place", "name", "count", "data")
     return Table(tuple(TableColumn(name, tuple(getattr(part, name) for part in parts)) for name in columns))
 
 
-def listed(parts: Sequence[Part]) -> dict[str, Callable[[], Table]]:
+def listed(parts: Sequence[BoughtPart]) -> dict[str, Callable[[], Table]]:
     """Return the list as a result carries it; empty where nothing is bought by name."""
     return {"parts": lambda: parts_table(parts)} if parts else {}

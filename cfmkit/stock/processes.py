@@ -17,7 +17,7 @@ ProcessName = Literal["laser", "wire-edm", "fdm", "sls", "mill"]
 
 
 @dataclass(frozen=True)
-class Process:
+class ProcessAccuracy:
     """What a process is assumed to hold.
 
     Attributes
@@ -46,19 +46,19 @@ class Process:
 
 
 _ALL = (
-    Process("laser", 0.2e-3, 0.03e-3, 0.05e-3, 0.5e-3, 0.1e-3,
+    ProcessAccuracy("laser", 0.2e-3, 0.03e-3, 0.05e-3, 0.5e-3, 0.1e-3,
             "a leaf has two cut sides, and the kerf changes with focus, power and sheet"),
-    Process("wire-edm", 0.3e-3, 0.005e-3, 0.005e-3, 0.2e-3, 0.15e-3,
+    ProcessAccuracy("wire-edm", 0.3e-3, 0.005e-3, 0.005e-3, 0.2e-3, 0.15e-3,
             "the gap follows the generator; inside corners have the radius of a 0.25 mm wire and its gap"),
-    Process("fdm", 0.0, 0.05e-3, 0.1e-3, 0.4e-3, 0.2e-3,
+    ProcessAccuracy("fdm", 0.0, 0.05e-3, 0.1e-3, 0.4e-3, 0.2e-3,
             "walls are whole strands of a 0.4 mm nozzle, whose width changes with flow and cooling"),
-    Process("sls", 0.0, 0.05e-3, 0.1e-3, 0.7e-3, 0.3e-3,
+    ProcessAccuracy("sls", 0.0, 0.05e-3, 0.1e-3, 0.7e-3, 0.3e-3,
             "powder sinters on to each side, and parts shrink with their place in the chamber"),
-    Process("mill", 2.0e-3, 0.02e-3, 0.02e-3, 0.5e-3, 1.0e-3,
+    ProcessAccuracy("mill", 2.0e-3, 0.02e-3, 0.02e-3, 0.5e-3, 1.0e-3,
             "a thin leaf yields to the cutter; inside corners have the radius of a 2 mm one"),
 )  # fmt: skip
 
-PROCESSES: Mapping[str, Process] = MappingProxyType({one.name: one for one in _ALL})
+PROCESSES: Mapping[str, ProcessAccuracy] = MappingProxyType({one.name: one for one in _ALL})
 """All by name."""
 
 PRINTED = {"pla": "fdm", "abs": "fdm", "petg": "fdm", "pa12-sls": "sls", "pa12-mjf": "sls"}
@@ -66,7 +66,7 @@ METAL = 20e9
 """Young's modulus above which a material is taken for a metal [Pa]: no plastic reaches it, no metal is as soft."""
 
 
-def usual(material: str | None, youngs_modulus: float) -> Process:
+def usual(material: str | None, youngs_modulus: float) -> ProcessAccuracy:
     """Return the process that a material is usually made by: what it was named for, else wire for metals, else laser.
 
     Examples

@@ -46,23 +46,23 @@ class Change:
 
 
 @dataclass(frozen=True)
-class Plan:
+class CommitPlan:
     """All changes of a commit in the order of execution, and the folders that it will create."""
 
     changes: tuple[Change, ...]
     folders: tuple[str, ...]
 
 
-def plan_for(root: Path, new: dict[str, str], removed: Iterable[str]) -> Plan:
+def plan_for(root: Path, new: dict[str, str], removed: Iterable[str]) -> CommitPlan:
     """Return the plan that installs the staged files `new` (name -> hash) and removes others."""
     changes = [Change(name, new[name], hash_in(root, name)) for name in sorted(new) if name != MANIFEST]
     changes += [Change(name, None, hash_in(root, name)) for name in sorted(removed)]
     changes += [Change(MANIFEST, new[MANIFEST], hash_in(root, MANIFEST))]
     above = {parent for name in new for parent in _parents(name)}
-    return Plan(tuple(changes), tuple(sorted(name for name in above if mode_of(root / name) is None)))
+    return CommitPlan(tuple(changes), tuple(sorted(name for name in above if mode_of(root / name) is None)))
 
 
-def execute(root: Path, plan: Plan) -> None:
+def execute(root: Path, plan: CommitPlan) -> None:
     """Carry out a plan whose new files are staged.
 
     Raises
@@ -115,7 +115,7 @@ def _pending(root: Path) -> bool:
     return any(mode_of(root / RUN / name) is not None for name in (PLAN, UNDO))
 
 
-def _keep_old(root: Path, plan: Plan) -> None:
+def _keep_old(root: Path, plan: CommitPlan) -> None:
     """Give every file that will go a second name, and bring all names down to the disk."""
     for change in plan.changes:
         if change.old is not None:
@@ -129,7 +129,7 @@ def _keep_old(root: Path, plan: Plan) -> None:
     sync_folder(root)
 
 
-def _roll_forward(root: Path, plan: Plan) -> None:
+def _roll_forward(root: Path, plan: CommitPlan) -> None:
     touched = {root}
     for change in plan.changes:
         if change.name == MANIFEST:
@@ -162,7 +162,7 @@ def _refuse_changed(root: Path, change: Change) -> None:
         raise OutputError(f"{shown(place)} was changed while a run was replacing it; {CURE}")
 
 
-def _resume(root: Path, plan: Plan) -> None:
+def _resume(root: Path, plan: CommitPlan) -> None:
     """Roll forward if every new file is there, as it is after any kill; else roll back."""
     found = (hash_in(root / RUN / NEW, change.name) or hash_in(root, change.name) for change in plan.changes)
     if all(change.new in (None, there) for change, there in zip(plan.changes, found, strict=True)):
@@ -171,7 +171,7 @@ def _resume(root: Path, plan: Plan) -> None:
     _turn_back(root, plan)
 
 
-def _turn_back(root: Path, plan: Plan) -> None:
+def _turn_back(root: Path, plan: CommitPlan) -> None:
     """Undo a plan, if it was ever begun."""
     run = root / RUN
     if mode_of(run / PLAN) is not None:
@@ -179,7 +179,7 @@ def _turn_back(root: Path, plan: Plan) -> None:
         _roll_back(root, plan)
 
 
-def _roll_back(root: Path, plan: Plan) -> None:
+def _roll_back(root: Path, plan: CommitPlan) -> None:
     for change in reversed(plan.changes):
         _restore(root, change)
     remove_empty(root / name for name in plan.folders)
@@ -211,16 +211,16 @@ def _parents(name: str) -> list[str]:
     return ["/".join(parts[:count]) for count in range(1, len(parts))]
 
 
-def _to_json(plan: Plan) -> bytes:
+def _to_json(plan: CommitPlan) -> bytes:
     return json.dumps(asdict(plan), indent=1).encode()
 
 
-def _read_plan(root: Path, name: str) -> Plan:
+def _read_plan(root: Path, name: str) -> CommitPlan:
     """Return a plan, checked: it decides what is replaced and removed."""
     path = root / RUN / name
     try:
         data = json.loads(path.read_bytes())
-        plan = Plan(tuple(Change(**change) for change in data["changes"]), tuple(data["folders"]))
+        plan = CommitPlan(tuple(Change(**change) for change in data["changes"]), tuple(data["folders"]))
         names = [change.name for change in plan.changes if change.name != MANIFEST]
         for item in (*names, *plan.folders):
             checked_name(item)

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.families.base import Run
     from cfmkit.results import Result
-    from cfmkit.studies.design_tolerances import Tolerances
+    from cfmkit.studies.design_tolerances import DesignTolerances
 
 PARTS, SHARE = 4000, 0.95
 """Parts that are drawn, and the share of them whose forces are named."""
@@ -75,7 +75,7 @@ def bench(result: Result, run: Run) -> str:
     )
 
 
-def _dimension(made: Tolerances, k: int) -> str:
+def _dimension(made: DesignTolerances, k: int) -> str:
     """Return a dimension with its drawn value, as ``bistable.thickness (1.01 mm)``."""
     value = format_short(float(made.nominal[k]), made.parameters[k].dimension)
     return f"{made.paths[k].removeprefix('mechanism.')} ({value} as drawn)"
@@ -85,7 +85,7 @@ def _listed(items: list[str]) -> str:
     return ", ".join(items[:-1]) + (" and " if len(items) > 1 else "") + items[-1]
 
 
-def _made(result: Result, run: Run) -> tuple[Tolerances | None, str]:
+def _made(result: Result, run: Run) -> tuple[DesignTolerances | None, str]:
     """Return the tolerances of a part, those that are given or those that are assumed, and whence they are."""
     block = getattr(result.spec, "design", None)
     if isinstance(block, DesignKeys) and block.tolerances:
@@ -105,7 +105,9 @@ def _places(result: Result) -> FloatArray:
     return np.array([low, high])
 
 
-def _moved(result: Result, made: Tolerances, places: FloatArray, run: Run) -> tuple[FloatArray, FloatArray] | None:
+def _moved(
+    result: Result, made: DesignTolerances, places: FloatArray, run: Run
+) -> tuple[FloatArray, FloatArray] | None:
     """Return the force of the design at places (p,), on its first branch, and its derivatives by the errors (p, d)."""
     spec = made.spec
     quick = family(spec.family).sampled is not None

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Tolerances:
+class DesignTolerances:
     """The tolerances of a `design` block on one specification.
 
     Attributes
@@ -68,7 +68,7 @@ class Tolerances:
         return [*many, *((k,) for k in range(len(self.parameters)) if k not in taken)]
 
 
-def tolerances_of(spec: Spec, design: DesignBlock, seed: int) -> Tolerances | None:
+def tolerances_of(spec: Spec, design: DesignBlock, seed: int) -> DesignTolerances | None:
     """Return the tolerances of a `design` block on a specification, or those of its process; None where it has none.
 
     Raises
@@ -85,7 +85,7 @@ def tolerances_of(spec: Spec, design: DesignBlock, seed: int) -> Tolerances | No
     except SpecError as error:
         raise SpecError([replace(one, path=_renamed(one.path)) for one in error.problems]) from None
     chosen = seed if design.seed is None else design.seed
-    return Tolerances(spec, block, parameters, design.samples, chosen)
+    return DesignTolerances(spec, block, parameters, design.samples, chosen)
 
 
 def stated_tolerances(spec: Spec, design: DesignBlock) -> dict[str, Any]:

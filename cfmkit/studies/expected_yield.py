@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from cfmkit.results import Result
     from cfmkit.specs.spec import Spec
     from cfmkit.studies.process_tolerances import Assumed
-    from cfmkit.studies.requirement_rows import Rows
+    from cfmkit.studies.requirement_rows import RequirementRows
 
 MOST_LOOKS, MOST_ANALYSES = 24, 12
 """Parts that are looked at the quick way, or analysed, for an estimate: some tenths of a second on any machine."""
@@ -119,7 +119,7 @@ def _shares(result: Result, found: Assumed, run: Run) -> tuple[float, float]:
     return share, measured
 
 
-def _numbers(spec: Spec, rows: Rows, run: Run) -> FloatArray:
+def _numbers(spec: Spec, rows: RequirementRows, run: Run) -> FloatArray:
     """Return what rows look at of a part; a part without it ends the estimate."""
     try:
         found = numbers_of(spec, rows, run)

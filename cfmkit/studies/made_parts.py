@@ -23,7 +23,7 @@ from cfmkit.metrics.requirements import Bounds
 from cfmkit.results import Quantity, Result
 from cfmkit.specs.many_parts_metrics import OF_MANY_PARTS
 from cfmkit.specs.spec import DesignKeys
-from cfmkit.studies.design_tolerances import Tolerances, tolerances_of
+from cfmkit.studies.design_tolerances import DesignTolerances, tolerances_of
 from cfmkit.studies.engine import Silent, Work
 from cfmkit.studies.engine import run as computed
 from cfmkit.studies.journal import Journal
@@ -55,7 +55,7 @@ SCALED = ("force", "torque", "energy")
 
 
 @dataclass(frozen=True)
-class Share:
+class YieldShare:
     """How many of some parts are good.
 
     Attributes
@@ -90,7 +90,7 @@ class Share:
 
 
 @dataclass(frozen=True)
-class Judged:
+class JudgedParts:
     """Parts with what their analyses say.
 
     Attributes
@@ -110,10 +110,10 @@ class Judged:
     failed: NDArray[np.bool_]
     why: str = ""
 
-    def share(self, met: NDArray[np.bool_] | None = None) -> Share:
+    def share(self, met: NDArray[np.bool_] | None = None) -> YieldShare:
         """Return the share of parts that meet every requirement."""
         good: NDArray[np.bool_] = np.asarray((self.met if met is None else met).all(axis=1))
-        return Share(int(good.sum()), int(self.failed.sum()), len(good), self.why)
+        return YieldShare(int(good.sum()), int(self.failed.sum()), len(good), self.why)
 
 
 class _Told(Silent):
@@ -128,12 +128,12 @@ class _Told(Silent):
         self._run.progress(self._done / self._count, f"{self._done} of {self._count} {self._what}")
 
 
-def judge(made: Tolerances, values: FloatArray, nominal: Result, run: Run, what: str = "parts") -> Judged:
+def judge(made: DesignTolerances, values: FloatArray, nominal: Result, run: Run, what: str = "parts") -> JudgedParts:
     """Return what becomes of parts.
 
     Parameters
     ----------
-    made : Tolerances
+    made : DesignTolerances
         Of the specification that is made.
     values : (n, d) array
         Of its parameters in each part [SI].
@@ -158,7 +158,7 @@ def judge(made: Tolerances, values: FloatArray, nominal: Result, run: Run, what:
         failed[indices] = ~complete
         met[indices] = rows.met & complete[:, None]
         found[indices] = rows.values
-    return Judged(met, _trimmed(spec, nominal, metrics, found, met), failed, why)
+    return JudgedParts(met, _trimmed(spec, nominal, metrics, found, met), failed, why)
 
 
 def _noted(spec: Spec, nominal: Result) -> tuple[Metric, ...]:
@@ -215,7 +215,7 @@ def _value(nominal: Result, metric: Metric) -> float | None:
     return study.quantities(nominal)[0].value
 
 
-def common(made: Tolerances, nominal: Result, run: Run) -> tuple[int, ...]:
+def common(made: DesignTolerances, nominal: Result, run: Run) -> tuple[int, ...]:
     """Return the parameters whose errors change the force by the same share everywhere in the window."""
     found: list[int] = []
     for members in made.joined():
@@ -225,7 +225,7 @@ def common(made: Tolerances, nominal: Result, run: Run) -> tuple[int, ...]:
     return tuple(sorted(found))
 
 
-def _force_share(made: Tolerances, members: tuple[int, ...], nominal: Result, run: Run) -> FloatArray | None:
+def _force_share(made: DesignTolerances, members: tuple[int, ...], nominal: Result, run: Run) -> FloatArray | None:
     """Return by which share a standard deviation of some parameters changes the force; None where it cannot be said."""
     changes = {made.paths[k]: _one_sigma(made.parameters[k]) for k in members}
     try:
@@ -264,29 +264,29 @@ class Yields:
 
     Attributes
     ----------
-    made : Tolerances
+    made : DesignTolerances
         On the design.
-    after, trimmed : Share
+    after, trimmed : YieldShare
         Of its parts, as they are and after the trim.
-    frozen : Share or None
+    frozen : YieldShare or None
         Without common errors; None where there are none.
     common : tuple of str
         The paths of those.
-    each : tuple of Share
+    each : tuple of YieldShare
         Of parts that meet one requirement.
-    before : Share or None
+    before : YieldShare or None
         Of the specification that the design began with.
     why : str
         Why there is no yield of that.
     """
 
-    made: Tolerances
-    after: Share
-    trimmed: Share
-    frozen: Share | None
+    made: DesignTolerances
+    after: YieldShare
+    trimmed: YieldShare
+    frozen: YieldShare | None
     common: tuple[str, ...]
-    each: tuple[Share, ...]
-    before: Share | None
+    each: tuple[YieldShare, ...]
+    before: YieldShare | None
     why: str = ""
 
     def quantities(self) -> dict[str, Quantity]:
@@ -379,7 +379,7 @@ def yields_of(design: Result, given: Spec | None, run: Run) -> Yields | None:
     return Yields(made, judged.share(), judged.share(judged.trimmed), frozen, paths, each, before, why)
 
 
-def _before(given: Spec | None, block: DesignBlock, run: Run) -> tuple[Share | None, str]:
+def _before(given: Spec | None, block: DesignBlock, run: Run) -> tuple[YieldShare | None, str]:
     """Return the yield of the specification as given, or why there is none."""
     if given is None:
         return None, "nothing was given to begin with"
@@ -399,4 +399,4 @@ def _told(problem: Problem) -> str:
     return f"{problem.path}: {problem.message}"
 
 
-__all__ = ["Tolerances", "Yields", "common", "judge", "tolerances_of", "yields_of"]
+__all__ = ["DesignTolerances", "Yields", "common", "judge", "tolerances_of", "yields_of"]

@@ -16,7 +16,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.designing.audit import searched
-from cfmkit.designing.robust_design import SIGMA_STEP, Found, NoPart, Problem, costliest, drawn, with_margins
+from cfmkit.designing.robust_design import (
+    SIGMA_STEP,
+    NoPart,
+    RobustProblem,
+    RobustResult,
+    costliest,
+    drawn,
+    with_margins,
+)
 from cfmkit.designing.starts import Clock
 from cfmkit.errors import CfmError, SolutionError, SpecError
 from cfmkit.errors import Problem as Fault
@@ -24,7 +32,7 @@ from cfmkit.families import family
 from cfmkit.families.base import Run, function_named
 from cfmkit.results import Design, Status
 from cfmkit.studies.design_tolerances import tolerances_of
-from cfmkit.studies.requirement_rows import Rows, numbers_of, places_of, rows_of, sampled_of
+from cfmkit.studies.requirement_rows import RequirementRows, numbers_of, places_of, rows_of, sampled_of
 from cfmkit.studies.sensitivity.intervals import clopper_pearson
 from cfmkit.studies.spec_values import CannotVary, leaf
 
@@ -34,7 +42,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.results import Result
     from cfmkit.specs.spec import Spec
-    from cfmkit.studies.design_tolerances import Tolerances
+    from cfmkit.studies.design_tolerances import DesignTolerances
     from cfmkit.studies.sensitivity.parameters import Parameter
 
 
@@ -64,9 +72,9 @@ class Sight:
         The design that the search began with.
     free : tuple of str
         Paths of the values that may move.
-    made : Tolerances
+    made : DesignTolerances
         What errors there are.
-    rows : Rows
+    rows : RequirementRows
         What is looked at.
     run : Run
         Seed.
@@ -74,8 +82,8 @@ class Sight:
 
     spec: Spec
     free: tuple[str, ...]
-    made: Tolerances
-    rows: Rows
+    made: DesignTolerances
+    rows: RequirementRows
     run: Run
     known: dict[bytes, Any] = field(default_factory=dict)
 
@@ -213,9 +221,9 @@ def with_design_margins(given: Spec, design: Design, run: Run) -> Design:
     return _designed(design, sight, found, good, problem)
 
 
-def _held(problem: Problem, sight: Sight, start: FloatArray) -> tuple[Found, int]:
+def _held(problem: RobustProblem, sight: Sight, start: FloatArray) -> tuple[RobustResult, int]:
     """Return the design with margins and how many of `CHECKED` parts are good; more is requested until enough are."""
-    best: tuple[Found, int] | None = None
+    best: tuple[RobustResult, int] | None = None
     asked, x, began = problem.share, start, None
     for _ in range(ROUNDS):
         found = with_margins(replace(problem, share=asked), x)
@@ -241,7 +249,7 @@ def checked(sight: Sight, x: FloatArray) -> int:
     return good
 
 
-def _problem(sight: Sight, free: Mapping[str, tuple[float, float]], wanted: float, run: Run) -> Problem:
+def _problem(sight: Sight, free: Mapping[str, tuple[float, float]], wanted: float, run: Run) -> RobustProblem:
     made, clock = sight.made, Clock.of(run.time_budget)
     values = made.drawn(ESTIMATED, made.seed + SEARCH_SEED)
     errors = values - made.nominal
@@ -251,7 +259,7 @@ def _problem(sight: Sight, free: Mapping[str, tuple[float, float]], wanted: floa
     def tell(share: float, steps: int) -> None:
         run.progress(min(0.99, steps / 20.0), f"step {steps}: about {100.0 * share:.3g} % of parts good")
 
-    return Problem(
+    return RobustProblem(
         sight,
         np.array(list(free.values())),
         errors,
@@ -265,7 +273,7 @@ def _problem(sight: Sight, free: Mapping[str, tuple[float, float]], wanted: floa
     )
 
 
-def _designed(design: Design, sight: Sight, found: Found, good: int, problem: Problem) -> Design:
+def _designed(design: Design, sight: Sight, found: RobustResult, good: int, problem: RobustProblem) -> Design:
     """Return the design with its values moved, or why there is none, and what the search says of it."""
     steps = 10.0**-DIGITS * problem.reach
     x = np.clip(np.round(found.x / steps) * steps, *problem.bounds.T)
@@ -290,7 +298,7 @@ def _designed(design: Design, sight: Sight, found: Found, good: int, problem: Pr
     return replace(design, spec=spec, search={**design.search, **about}, notes=(*design.notes, ("margins", told)))
 
 
-def _impossible(design: Design, sight: Sight, good: int, worst: str, problem: Problem) -> Design:
+def _impossible(design: Design, sight: Sight, good: int, worst: str, problem: RobustProblem) -> Design:
     """Return why no design was found: the largest yield, and what stands in its way."""
     value = 100.0 * good / CHECKED
     told = (

@@ -35,7 +35,7 @@ class Earlier:
 
 
 @dataclass(frozen=True)
-class Change:
+class MetricChange:
     """One value that is not what it was.
 
     Attributes
@@ -78,7 +78,7 @@ class Comparison:
         Of the earlier batch.
     tolerance : float
         Relative change up to which a metric counts as the same.
-    changes : tuple of Change
+    changes : tuple of MetricChange
         Everything that is not as it was.
     gone : tuple of str
         Folders of specifications that are not there any more.
@@ -86,11 +86,11 @@ class Comparison:
 
     folder: str
     tolerance: float
-    changes: tuple[Change, ...]
+    changes: tuple[MetricChange, ...]
     gone: tuple[str, ...]
 
     @property
-    def beyond(self) -> tuple[Change, ...]:
+    def beyond(self) -> tuple[MetricChange, ...]:
         """The changes that are larger than the tolerance."""
         return tuple(one for one in self.changes if one.beyond)
 
@@ -133,7 +133,9 @@ def _read(path: str) -> dict[str, Any] | None:
     return found if isinstance(found, dict) else None
 
 
-def changes(known: Known, entries: Sequence[Entry], folder: str, tolerance: float = TOLERANCE) -> tuple[Change, ...]:
+def changes(
+    known: Known, entries: Sequence[Entry], folder: str, tolerance: float = TOLERANCE
+) -> tuple[MetricChange, ...]:
     """Return what is not as it was, in the order of the specifications and their metrics.
 
     Parameters
@@ -147,20 +149,22 @@ def changes(known: Known, entries: Sequence[Entry], folder: str, tolerance: floa
     tolerance : float
         Relative change of a metric up to which it counts as the same.
     """
-    found: list[Change] = []
+    found: list[MetricChange] = []
     for entry in entries:
         before = known.get(entry.folder)
         if before is None or entry.skipped:
             continue
         if (before.status, before.exit_code) != (entry.status, int(entry.code)):
-            found.append(Change(entry.spec, "status", before.status, entry.status, "", None, True))
+            found.append(MetricChange(entry.spec, "status", before.status, entry.status, "", None, True))
         if entry.written:
             now = (_read(os.path.join(folder, entry.folder, "metrics.json")) or {}).get("metrics", {})
             found += _of_metrics(entry.spec, before.metrics, now, tolerance)
     return tuple(found)
 
 
-def _of_metrics(spec: str, before: Mapping[str, Any], after: Mapping[str, Any], tolerance: float) -> Iterator[Change]:
+def _of_metrics(
+    spec: str, before: Mapping[str, Any], after: Mapping[str, Any], tolerance: float
+) -> Iterator[MetricChange]:
     for name in dict.fromkeys((*before, *after)):
         old, new = (side.get(name, {}).get("value") for side in (before, after))
         unit = str((after.get(name) or before.get(name) or {}).get("unit", ""))
@@ -168,11 +172,11 @@ def _of_metrics(spec: str, before: Mapping[str, Any], after: Mapping[str, Any], 
             continue
         numbers = all(isinstance(value, int | float) and math.isfinite(value) for value in (old, new))
         if not numbers:
-            yield Change(spec, name, old, new, unit, None, True)
+            yield MetricChange(spec, name, old, new, unit, None, True)
             continue
         if abs(new - old) > NOTHING:
             relative = (new - old) / max(abs(old), abs(new))
-            yield Change(spec, name, old, new, unit, relative, abs(relative) > tolerance)
+            yield MetricChange(spec, name, old, new, unit, relative, abs(relative) > tolerance)
 
 
 def gone(known: Known, entries: Sequence[Entry]) -> tuple[str, ...]:
@@ -181,7 +185,7 @@ def gone(known: Known, entries: Sequence[Entry]) -> tuple[str, ...]:
     return tuple(name for name in known if name not in there)
 
 
-def changes_table(found: Sequence[Change]) -> Table:
+def changes_table(found: Sequence[MetricChange]) -> Table:
     """Return changes.csv: one row per value that is not as it was."""
     return Table(
         (

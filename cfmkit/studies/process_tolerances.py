@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from cfmkit.specs.spec import Spec
-    from cfmkit.stock.processes import Process
+    from cfmkit.stock.processes import ProcessAccuracy
 
 OF_PLATES = "laser"
 """How links and cams are made that say nothing of a material: as the prototype of Sanchez-Salinas et al. (2022)."""
@@ -32,7 +32,7 @@ class Assumed:
 
     Attributes
     ----------
-    process : Process
+    process : ProcessAccuracy
         How it is made.
     kinds : mapping of str to str
         Path -> in what it errs, "thickness" or "position".
@@ -40,7 +40,7 @@ class Assumed:
         From where to where the modulus is found [Pa]; None where no source says it.
     """
 
-    process: Process
+    process: ProcessAccuracy
     kinds: Mapping[str, str]
     modulus: tuple[float, float] | None
 

@@ -36,7 +36,7 @@ NARROW = 0.02
 
 
 @dataclass(frozen=True)
-class Rows:
+class RequirementRows:
     """Requirements as rows of what is seen of a part.
 
     Attributes
@@ -131,7 +131,7 @@ class _RowsOfMargins:
         columns, sign = (first + at).tolist(), float(np.sign(values.mean())) or 1.0
         return _OF_EFFORT[name](_View(columns, values, sign, self.places[at], self.nominal.target), limits)
 
-    def rows_of(self) -> Rows:
+    def rows_of(self) -> RequirementRows:
         """Return all rows."""
         size = self._numbers + len(self.metrics)
         matrix = np.zeros((len(self.rows), size))
@@ -140,7 +140,7 @@ class _RowsOfMargins:
                 matrix[r, column] += weight
         constant = np.array([constant for _, constant, _ in self.rows])
         about = tuple(number for _, _, number in self.rows)
-        return Rows(self.places, self.branches, self.stresses, matrix, constant, tuple(self.metrics), about)
+        return RequirementRows(self.places, self.branches, self.stresses, matrix, constant, tuple(self.metrics), about)
 
 
 @dataclass(frozen=True)
@@ -252,7 +252,7 @@ def places_of(nominal: Result) -> FloatArray:
     return np.asarray(places[near])
 
 
-def rows_of(nominal: Result, first: Sampled, places: FloatArray) -> Rows:
+def rows_of(nominal: Result, first: Sampled, places: FloatArray) -> RequirementRows:
     """Return the requirements on a result as rows of what is seen of its parts."""
     builder = _RowsOfMargins(nominal, places, first)
     for number, one in enumerate(nominal.spec.part_requirements):
@@ -283,7 +283,7 @@ def sampled_of(spec: Spec, places: FloatArray, run: Run) -> Sampled | None:
     return Sampled(effort, np.array(stress).reshape(-1, len(places)))
 
 
-def numbers_of(spec: Spec, rows: Rows, run: Run) -> FloatArray | None:
+def numbers_of(spec: Spec, rows: RequirementRows, run: Run) -> FloatArray | None:
     """Return what rows look at of a part, (q,); None where it has no such numbers."""
     found = sampled_of(spec, rows.places, run)
     if found is None or tuple(found.effort) != rows.branches or len(found.stress) != rows.stresses:

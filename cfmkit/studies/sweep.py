@@ -13,7 +13,7 @@ from cfmkit.studies.plan import MOST_POINTS, Draw, grid, sampled, zipped
 from cfmkit.studies.study import Study
 from cfmkit.studies.summary import Summary, main_columns
 from cfmkit.studies.tables import curves_csv, results_csv
-from cfmkit.studies.variation import Wish, axes, wishes
+from cfmkit.studies.variation import WantedVariation, axes, wishes
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -38,7 +38,7 @@ class SweepRequest:
 
     Attributes
     ----------
-    vary : tuple of Wish
+    vary : tuple of WantedVariation
         What varies; none: as in the specification. What is given replaces all of that.
     combine : {"grid", "zip", "lhs", "sobol"}, optional
         How values are combined.
@@ -56,7 +56,7 @@ class SweepRequest:
         Whether pictures will be drawn: those of one parameter show curves.
     """
 
-    vary: tuple[Wish, ...] = ()
+    vary: tuple[WantedVariation, ...] = ()
     combine: Combine | None = None
     samples: int | None = None
     design: bool | None = None
@@ -101,7 +101,7 @@ def _given(option: bool | None, otherwise: bool) -> bool:
     return otherwise if option is None else option
 
 
-def _plan(spec: Spec, request: SweepRequest, asked: tuple[Wish, ...]) -> Plan:
+def _plan(spec: Spec, request: SweepRequest, asked: tuple[WantedVariation, ...]) -> Plan:
     block = spec.sweep
     combine, samples = request.combine, request.samples
     if combine is None:

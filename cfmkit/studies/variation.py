@@ -25,7 +25,7 @@ LARGEST = 10**18
 
 
 @dataclass(frozen=True)
-class Wish:
+class WantedVariation:
     """What a user wants to vary, as it was written.
 
     Attributes
@@ -68,7 +68,7 @@ class Axis:
     count: int | None = None
 
 
-def wish(option: str) -> Wish:
+def wish(option: str) -> WantedVariation:
     """Return what ``--vary PATH=...`` asks for.
 
     Raises
@@ -88,30 +88,32 @@ def wish(option: str) -> Wish:
         raise UsageError(f"--vary {shown(option)}: {shown(path)} is not a dotted path; {EXAMPLE}")
     source = f"--vary {path}"
     if not content.startswith("["):
-        return Wish(path, content, source)
+        return WantedVariation(path, content, source)
     reading = read(content)
     if reading.faults or not isinstance(reading.tree, tuple):
         faults = [fault.message for fault in reading.faults] or [f"{shown(content)} is not a list"]
         raise SpecError([Problem(source, 0, 0, "", message) for message in faults])
-    return Wish(path, reading.tree, source)
+    return WantedVariation(path, reading.tree, source)
 
 
-def wishes(vary: Mapping[str, Any]) -> tuple[Wish, ...]:
+def wishes(vary: Mapping[str, Any]) -> tuple[WantedVariation, ...]:
     """Return what a mapping asks for: path -> ``"start:stop:n"`` or a sequence of values."""
     found = []
     for path, content in vary.items():
-        found.append(Wish(path, content if isinstance(content, str) else tuple(content), f"sweep.vary: {path}"))
+        found.append(
+            WantedVariation(path, content if isinstance(content, str) else tuple(content), f"sweep.vary: {path}")
+        )
     return tuple(found)
 
 
-def axes(spec: Spec, wanted: Iterable[Wish], drawn: bool = False, joint: bool = False) -> tuple[Axis, ...]:
+def axes(spec: Spec, wanted: Iterable[WantedVariation], drawn: bool = False, joint: bool = False) -> tuple[Axis, ...]:
     """Return what varies, checked against a specification.
 
     Parameters
     ----------
     spec : Spec
         What is varied.
-    wanted : iterable of Wish
+    wanted : iterable of WantedVariation
         In order; the first varies slowest.
     drawn : bool
         Whether values are drawn from ranges (``start:stop``) rather than stepped through.
@@ -130,7 +132,9 @@ def axes(spec: Spec, wanted: Iterable[Wish], drawn: bool = False, joint: bool = 
     return tuple(axis(spec, one, drawn) for one in asked)
 
 
-def faults(spec: Spec, asked: tuple[Wish, ...], drawn: bool, joint: bool = False) -> Iterator[tuple[Wish, str]]:
+def faults(
+    spec: Spec, asked: tuple[WantedVariation, ...], drawn: bool, joint: bool = False
+) -> Iterator[tuple[WantedVariation, str]]:
     """Yield (wish, what is wrong with it)."""
     for index, one in enumerate(asked):
         try:
@@ -147,7 +151,7 @@ def faults(spec: Spec, asked: tuple[Wish, ...], drawn: bool, joint: bool = False
                 yield one, f"{other.path!r}, which lies in it, is varied already; one of them is enough"
 
 
-def axis(spec: Spec, one: Wish, drawn: bool) -> Axis:
+def axis(spec: Spec, one: WantedVariation, drawn: bool) -> Axis:
     """Return one thing that varies.
 
     Raises

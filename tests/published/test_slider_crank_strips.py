@@ -19,7 +19,7 @@ from cfmkit.families.base import Run
 from cfmkit.families.slider_crank.printed.chain import Elasticity, joints
 from cfmkit.families.slider_crank.printed.chain import kink as offset
 from cfmkit.families.slider_crank.printed.search import (
-    Found,
+    FoundStrip,
     Ranges,
     descend,
     search,
@@ -48,12 +48,12 @@ def first_and_slow(rows: list[tuple[float, ...]]) -> list[Any]:
 
 
 @cache
-def found_for(width: float, ripple: float, nodes: int) -> Found:
+def found_for(width: float, ripple: float, nodes: int) -> FoundStrip:
     ranges = Ranges(np.tile([0.5, 2.0], (nodes, 1)), 60 * MM)
     return search(replace(TASK, ripple=ripple), Form(nodes, width=width * MM), ranges, 1, Run())
 
 
-def kept(found: Found) -> tuple[float, float]:
+def kept(found: FoundStrip) -> tuple[float, float]:
     """Return largest deviation and stress of a found strip over its stroke, looked at in 150 places."""
     form = found.form
     stroke = found.program.stroke(found.descent.z)

@@ -24,7 +24,7 @@ from cfmkit.families.beam.shaping.multistart import explored
 from cfmkit.families.beam.shaping.report import judged, written
 from cfmkit.families.beam.shaping.search import Found, Plan, confirmed, improved, searched
 from cfmkit.families.beam.shaping.sqp_program import Shaping
-from cfmkit.families.beam.shaping.task import MARGIN, Limits, Task
+from cfmkit.families.beam.shaping.task import MARGIN, Task, TaskLimits
 from cfmkit.families.beam.shaping.variables import Variables, candidates, lengths, sound
 from cfmkit.results import Status
 
@@ -50,7 +50,7 @@ def found_of(task: Task, x: np.ndarray, start: float = 6.8e-3) -> Found:
     return Found(x, 2, start, 0.03, 0.003, "", 0)
 
 
-ALL = Limits(
+ALL = TaskLimits(
     stress=48e6,
     envelope=(2.5e-3, 34.5e-3, 0.0, 40e-3),
     deformed_envelope=(0.0, 40e-3, -1e-3, 41e-3),
@@ -126,7 +126,7 @@ def seen_at(points: int) -> tuple[Task, Found]:
 
 def test_a_design_is_ranked_by_its_force_between_the_poses_too() -> None:
     task, found = seen_at(2)
-    kept = confirmed(replace(task, limits=Limits()), found, Plan(), lambda _, design: design)
+    kept = confirmed(replace(task, limits=TaskLimits()), found, Plan(), lambda _, design: design)
     view = looked_at(task, Variables(task, 2).build(kept.x))
     assert view is not None
     assert kept.objective == view.half_band(found.start)
@@ -141,14 +141,14 @@ def test_where_the_poses_do_not_show_the_force_the_search_goes_on_with_more_of_t
         tried.append(finer.points)
         return replace(design, objective=1.0 if finer.points > 33 else design.objective)
 
-    kept = confirmed(replace(task, limits=Limits()), found, Plan(), again)
+    kept = confirmed(replace(task, limits=TaskLimits()), found, Plan(), again)
     assert tried == [33, 65]
     assert kept.points == 65
 
 
 def test_a_window_that_is_not_kept_between_the_poses_is_cut_to_where_it_is() -> None:
     task, found = seen_at(17)
-    task = replace(task, limits=Limits(), objective="range", half_band=0.05)
+    task = replace(task, limits=TaskLimits(), objective="range", half_band=0.05)
     kept = confirmed(task, replace(found, start=3e-3, objective=0.05), Plan(), lambda _, design: design)
     assert 3e-3 < kept.start <= task.window[0]
     assert kept.objective <= 0.05
@@ -159,13 +159,13 @@ def test_a_window_that_is_not_kept_between_the_poses_is_cut_to_where_it_is() -> 
 
 def test_a_widened_window_goes_as_far_as_the_force_keeps_the_band() -> None:
     task, found = seen_at(17)
-    task = replace(task, limits=Limits(), objective="range", half_band=0.05)
+    task = replace(task, limits=TaskLimits(), objective="range", half_band=0.05)
     kept = confirmed(task, replace(found, start=6.7e-3, objective=0.04), Plan(), lambda _, design: design)
     assert kept.start < 6.7e-3
     assert 0.0495 < kept.objective <= 0.05
     mean = 9.6  # of the force from 6.7 mm on; it is less over a wider window
     kept = confirmed(
-        replace(task, limits=Limits(force_min=mean)),
+        replace(task, limits=TaskLimits(force_min=mean)),
         replace(found, start=6.7e-3, objective=0.04),
         Plan(),
         lambda _, design: design,
@@ -175,7 +175,7 @@ def test_a_widened_window_goes_as_far_as_the_force_keeps_the_band() -> None:
 
 def test_stress_that_is_missed_at_few_poses_is_a_limit_that_is_missed() -> None:
     task, found = seen_at(17)
-    task = replace(task, limits=Limits(stress=40e6))
+    task = replace(task, limits=TaskLimits(stress=40e6))
     kept = confirmed(task, found, Plan(), lambda _, design: design)
     assert kept.violation == pytest.approx(48.2187e6 / task.allowable_stress - 1, abs=1e-3)  # Table 3 at 13.6 mm
     assert not kept.feasible

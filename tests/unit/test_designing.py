@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from cfmkit.designing import limits, sqp_program
-from cfmkit.designing.sqp_program import Rows, Seen
+from cfmkit.designing.sqp_program import Rows, SeenPoint
 from cfmkit.designing.starts import NEVER, Clock, Stage, done
 from cfmkit.designing.variables import at_bounds, rounded
 from cfmkit.families.base import Run
@@ -25,12 +25,12 @@ class Disc:
     line: float = 10.0
     elastic: tuple[str, ...] = ()
 
-    def seen(self, z: np.ndarray, sloped: bool) -> Seen | None:
+    def seen(self, z: np.ndarray, sloped: bool) -> SeenPoint | None:
         x, y = z
         if x < -5.0:
             return None
         disc, line = np.array([1.0 - x * x - y * y]), np.array([self.line - x])
-        return Seen(
+        return SeenPoint(
             (x - 2.0) ** 2 + (y - 1.0) ** 2,
             np.array([2.0 * (x - 2.0), 2.0 * (y - 1.0)]) if sloped else None,
             [
@@ -60,9 +60,9 @@ def test_slopes_of_a_program_are_those_of_its_values(elastic: tuple[str, ...]) -
 
 def test_a_program_without_rows_and_one_without_an_answer() -> None:
     class Free(Disc):
-        def seen(self, z: np.ndarray, sloped: bool) -> Seen | None:
+        def seen(self, z: np.ndarray, sloped: bool) -> SeenPoint | None:
             seen = super().seen(z, sloped)
-            return None if seen is None else Seen(seen.objective, seen.slope, [])
+            return None if seen is None else SeenPoint(seen.objective, seen.slope, [])
 
     assert Free().slopes(np.zeros(2))[1].shape == (0, 2)
     assert Free().values(np.array([-6.0, 0.0])) is None

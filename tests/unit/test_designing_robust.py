@@ -8,7 +8,7 @@ from statistics import NormalDist
 import numpy as np
 import pytest
 
-from cfmkit.designing.robust_design import NoPart, Problem, costliest, drawn, linear, with_margins
+from cfmkit.designing.robust_design import NoPart, RobustProblem, costliest, drawn, linear, with_margins
 
 PHI = NormalDist().cdf
 
@@ -18,7 +18,7 @@ def problem(seen, errors, matrix, constant, bounds, share=0.9):
     matrix, constant = np.asarray(matrix, dtype=float), np.asarray(constant, dtype=float)
     deviations = np.ones(errors.shape[1])
     about = np.arange(len(constant))
-    return Problem(seen, np.array(bounds, dtype=float), errors, deviations, matrix, constant, about, share)
+    return RobustProblem(seen, np.array(bounds, dtype=float), errors, deviations, matrix, constant, about, share)
 
 
 def normal(count, size):

@@ -485,8 +485,8 @@ def test_finished_starts_are_noted_and_a_second_run_begins_none(monkeypatch: pyt
     assert len(notes) == 2
     monkeypatch.setattr(search, "_climb", None)
     again = search.search(*wanted)
-    assert isinstance(first, search.Found)
-    assert isinstance(again, search.Found)
+    assert isinstance(first, search.FoundStrip)
+    assert isinstance(again, search.FoundStrip)
     np.testing.assert_array_equal(again.descent.z, first.descent.z)
     assert again.descent.evaluations == first.descent.evaluations
 

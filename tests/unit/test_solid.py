@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from cfmkit.errors import GeometryError
 from cfmkit.solid.boundary import Ring
 from cfmkit.solid.elements import Elements, equivalent
-from cfmkit.solid.equilibrium import Problem
+from cfmkit.solid.equilibrium import SolidProblem
 from cfmkit.solid.mesh import Mesh, mesh
-from cfmkit.solid.path_following import Course, Ending, follow
+from cfmkit.solid.path_following import PathEnd, PosePath, follow
 from cfmkit.solid.plane_stress_law import NeoHookean, SaintVenantKirchhoff
 from cfmkit.solid.rigid_groups import Group, Supports
 
@@ -40,9 +40,9 @@ def at(grid: Mesh, axis: int, place: float) -> np.ndarray:
     return np.flatnonzero(np.abs(grid.nodes[:, axis] - place) < 1e-12)
 
 
-def problem(grid: Mesh, groups: list[Group], law=HOOKE, width: float = 1e-3) -> Problem:
+def problem(grid: Mesh, groups: list[Group], law=HOOKE, width: float = 1e-3) -> SolidProblem:
     elements = Elements(grid, law, np.full(len(grid.triangles), width))
-    return Problem(elements, Supports(grid.nodes, tuple(groups)))
+    return SolidProblem(elements, Supports(grid.nodes, tuple(groups)))
 
 
 # --- meshes --------------------------------------------------------------------------------------------------------
@@ -136,7 +136,7 @@ def test_tiny_travels_converge_as_large_ones_do(law):
     root = Group("root", at(grid, 0, 0.0), np.zeros(2))
     tip = Group("tip", at(grid, 0, length), np.array([length, height / 2]), np.array([0.0, -1.0, 0.0]))
     course = follow(problem(grid, [root, tip], law), [0.0, 1e-12, 1e-9])
-    assert course.ending is Ending.COMPLETE
+    assert course.ending is PathEnd.COMPLETE
     assert course.poses[1].effort / 1e-12 == pytest.approx(course.poses[0].stiffness, rel=1e-6)
 
 
@@ -171,7 +171,7 @@ def test_a_cantilever_bends_as_timoshenko_says():
     assert course.poses[-1].stiffness == pytest.approx(1 / compliance, rel=3e-4)
 
 
-def plate_with_hole(width: float) -> tuple[Problem, float]:
+def plate_with_hole(width: float) -> tuple[SolidProblem, float]:
     """Return a plate with a hole of radius 1 mm that is pulled, and its gross section [m2]."""
     tall = 2.5 * width
     rings = (Ring.of(box(-width / 2, -tall / 2, width / 2, tall / 2), False), Ring.of(circle(1e-3, 2000), True))
@@ -197,7 +197,7 @@ def test_stress_beside_a_hole_is_kirschs_in_a_wide_plate_and_howlands_in_a_narro
 # --- stability -----------------------------------------------------------------------------------------------------
 
 
-def strut(slenderness: float = 30.0) -> tuple[Problem, float, float]:
+def strut(slenderness: float = 30.0) -> tuple[SolidProblem, float, float]:
     """Return a strip between clamps that is pressed along, Euler's force [N] and its shortening there [m]."""
     height = 1e-3
     length = slenderness * height
@@ -211,7 +211,7 @@ def strut(slenderness: float = 30.0) -> tuple[Problem, float, float]:
 def test_a_pressed_strip_leaves_for_its_buckled_branch():
     held, euler, shortening = strut()
     course = follow(held, np.linspace(0, 3 * shortening, 7).tolist())
-    assert course.ending is Ending.COMPLETE
+    assert course.ending is PathEnd.COMPLETE
     assert all(pose.unstable == 0 for pose in course.poses)
     # Euler's load less what the shortening of the strip and its shear take
     assert max(pose.effort for pose in course.poses) == pytest.approx(euler, rel=0.02)
@@ -223,7 +223,7 @@ def test_a_pressed_strip_leaves_for_its_buckled_branch():
 def test_cubics_between_poses_have_their_stiffness():
     held, _, shortening = strut()
     course = follow(held, np.linspace(0, 0.5 * shortening, 3).tolist())
-    assert isinstance(course, Course)
+    assert isinstance(course, PosePath)
     fine = follow(held, [0.0, 0.125 * shortening])
     assert course.effort(np.array([0.125 * shortening])) == pytest.approx(fine.poses[-1].effort, rel=1e-4)
 
@@ -241,5 +241,5 @@ def test_an_end_that_is_free_to_turn_is_a_pin():
     load = 2.0457 * np.pi**2 * E * (1e-3 * height**3 / 12) / length**2
     shortening = load * length / (E * 1e-6)
     course = follow(problem(grid, groups), [0.0, 0.5 * shortening, 2 * shortening])
-    assert course.ending is Ending.COMPLETE
+    assert course.ending is PathEnd.COMPLETE
     assert max(pose.effort for pose in course.poses) == pytest.approx(load, rel=0.02)

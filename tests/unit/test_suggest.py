@@ -18,7 +18,7 @@ from cfmkit.runs.wish_file import wish_of
 from cfmkit.stock.springs.catalogue import SHEAR_SHARE
 from cfmkit.stock.springs.helical import tensile_strength
 from cfmkit.stock.springs.made_to_measure import extension_spring, loaded_length
-from cfmkit.studies.suggest.proposal import Job, made
+from cfmkit.studies.suggest.proposal import ProposalJob, made
 from cfmkit.studies.suggest.search import ordered, suggest
 
 WISHES = Path(__file__).parents[1] / "wishes"
@@ -75,7 +75,7 @@ def test_a_spring_of_wire_keeps_its_rate_and_its_stress():
 def test_a_proposal_keeps_the_wish_when_its_file_is_analysed():
     asked = wish()
     offer = function_named(family("cam").propose)(asked, Run())
-    found = [made(Job("cam", one, asked, 0, None)) for one in offer.candidates[:4]]
+    found = [made(ProposalJob("cam", one, asked, 0, None)) for one in offer.candidates[:4]]
     good = [one for one in found if one.good]
     assert good
     for one in good:
@@ -91,7 +91,7 @@ def test_what_misses_a_wish_says_which():
     asked = wish()
     offer = function_named(family("cam").propose)(asked, Run())
     narrow = replace(asked, room=(0.010, 0.060, 0.012))
-    one = made(Job("cam", offer.candidates[0], narrow, 0, None))
+    one = made(ProposalJob("cam", offer.candidates[0], narrow, 0, None))
     assert not one.good
     assert any("across the travel" in told for told in one.missed)
 
@@ -128,7 +128,9 @@ def test_a_wish_beyond_energy_gets_nothing_and_ends_with_4():
 def test_the_order_follows_what_is_preferred():
     asked = wish()
     offer = function_named(family("cam").propose)(asked, Run())
-    found = [one for one in (made(Job("cam", each, asked, 0, None)) for each in offer.candidates[:5]) if one.good]
+    found = [
+        one for one in (made(ProposalJob("cam", each, asked, 0, None)) for each in offer.candidates[:5]) if one.good
+    ]
     flat = ordered(found, asked, ("ripple",))
     assert [one.numbers["ripple"] for one in flat] == sorted(one.numbers["ripple"] for one in found)
 

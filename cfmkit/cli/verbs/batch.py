@@ -9,8 +9,8 @@ from cfmkit.cli import completion
 from cfmkit.cli.answer import Answer
 from cfmkit.cli.options import (
     Changing,
-    Drawing,
     Fidelity,
+    FigureChoice,
     Fresh,
     Jobs,
     Quiet,
@@ -38,7 +38,7 @@ EXAMPLE = "cfmkit batch 'specs/*.yaml' --junit results.xml"
 
 
 @dataclass(frozen=True, kw_only=True)
-class BatchOptions(Changing, Drawing):
+class BatchOptions(Changing, FigureChoice):
     """Arguments and options."""
 
     specs: Annotated[

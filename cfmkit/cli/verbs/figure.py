@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cfmkit.cli import completion
 from cfmkit.cli.answer import Answer
-from cfmkit.cli.options import Changing, Drawing, Jobs, Quiet, argument, option
+from cfmkit.cli.options import Changing, FigureChoice, Jobs, Quiet, argument, option
 from cfmkit.cli.page_blocks import Written
 
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ EXAMPLE = "cfmkit figure figure.yaml --figures pdf"
 
 
 @dataclass(frozen=True, kw_only=True)
-class FigureOptions(Changing, Drawing):
+class FigureOptions(Changing, FigureChoice):
     """Arguments and options."""
 
     file: Annotated[

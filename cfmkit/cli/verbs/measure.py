@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cfmkit.cli import completion
 from cfmkit.cli.answer import Answer
 from cfmkit.cli.measured_data_options import Measuring, data_record
-from cfmkit.cli.options import Drawing, Quiet, argument, flag, option
+from cfmkit.cli.options import FigureChoice, Quiet, argument, flag, option
 from cfmkit.cli.page_blocks import BAD, BLANK, LABEL, Grid, GridColumn, Paragraph, Span, TextLine, Written
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ EXAMPLE = "cfmkit measure loop.csv --window '40 mm:210 mm'"
 
 
 @dataclass(frozen=True, kw_only=True)
-class MeasureOptions(Measuring, Drawing):
+class MeasureOptions(Measuring, FigureChoice):
     """Arguments and options."""
 
     data: Annotated[str, argument("DATA.csv", "Columns with displacement and force, perhaps time.", completion.tables)]

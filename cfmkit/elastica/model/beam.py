@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from cfmkit.elastica.model.section import Taper
-from cfmkit.elastica.model.shapes import STRAIGHT, Course, Shape, direction
+from cfmkit.elastica.model.shapes import STRAIGHT, FittedShape, Shape, direction
 from cfmkit.errors import InputError
 
 if TYPE_CHECKING:
@@ -103,7 +103,7 @@ class Fit:
     scale: Any
     gap: float
     length: Any
-    course: Course
+    course: FittedShape
 
     def angle(self, t: Any, inside: float) -> Any:
         """Return the reference angle [rad] as used."""
@@ -246,7 +246,7 @@ def _in_place(fitted: Fit, beam: Beam, known: Fit | None) -> Fit:
     return replace(fitted, course=fitted.course.over(marks, marks + 1j * steps))
 
 
-def _has_corner(course: Course, t: float) -> bool:
+def _has_corner(course: FittedShape, t: float) -> bool:
     """Tell whether the angle jumps at the break at t; the ends count as corners."""
     k = int(np.abs(course.breaks - t).argmin())
     if k in (0, len(course.breaks) - 1):
@@ -273,14 +273,14 @@ def _station_step(beam: Beam, station: float) -> float:
     return float(steps[0])
 
 
-def _change(course: Course) -> float:
+def _change(course: FittedShape) -> float:
     """Return by how much complex steps change angle and, relatively, speed at the middles of a course's pieces."""
     middles = (0.5 * (course.breaks[1:] + course.breaks[:-1])).tolist()
     angles = [abs(np.imag(course.angle(t, t))) for t in middles]
     return float(max(*angles, *(abs(np.imag(course.speed(t, t)) / np.real(course.speed(t, t))) for t in middles)))
 
 
-def _turn_of(course: Course, left: Any, right: Any) -> float:
+def _turn_of(course: FittedShape, left: Any, right: Any) -> float:
     """Return by how much the angle turns between two neighbouring breaks, to and fro added up [rad].
 
     The angle itself, unlike its sine, shows at a few places how far it runs.
@@ -290,7 +290,7 @@ def _turn_of(course: Course, left: Any, right: Any) -> float:
     return float(np.abs(np.diff(angles)).sum())
 
 
-def _integral(course: Course) -> tuple[tuple[Any, Any], Any]:
+def _integral(course: FittedShape) -> tuple[tuple[Any, Any], Any]:
     """Return the integrals of (cos, sin) of the angle and of the speed over a whole course."""
     x: Any = 0.0
     y: Any = 0.0

@@ -27,7 +27,7 @@ GROUND, NOWHERE = -1, -1
 
 
 @dataclass(frozen=True)
-class Plan:
+class NumberingPlan:
     """Numbers of degrees of freedom and attachments.
 
     Attributes
@@ -136,7 +136,7 @@ class Builder:
             return self.pins[body]
         return self.first[self.network.master_of(node)] + 2
 
-    def plan(self) -> Plan:
+    def plan(self) -> NumberingPlan:
         """Collect the attachments."""
         names = list(self.network.beams)
         ends = [[self._beam_place(k, name, side) for side in (0, 1)] for k, name in enumerate(names)]
@@ -154,7 +154,7 @@ class Builder:
         free = self._free(np.array(ends), springs, loads)
         slot = np.full(self.count, -1, dtype=np.int64)
         slot[free] = np.arange(int(free.sum()))
-        return Plan(
+        return NumberingPlan(
             masters=self.masters,
             first=self.first,
             turn=self.turn,
@@ -242,7 +242,7 @@ def apart(network: Network, node: str) -> bool:
 
 
 _KEPT = 64  # plans: of all that a study varies at once
-_plans: OrderedDict[Any, Plan] = OrderedDict()
+_plans: OrderedDict[Any, NumberingPlan] = OrderedDict()
 
 
 def driven(network: Network, drive: Drive) -> tuple[str, int, float] | None:
@@ -278,7 +278,7 @@ def driven(network: Network, drive: Drive) -> tuple[str, int, float] | None:
     raise InputError(f"node {drive.node!r} cannot be moved along {direction:.6g} deg: it is held")
 
 
-def plan_of(network: Network, drive: Drive, moved: tuple[str, int, float] | None) -> Plan:
+def plan_of(network: Network, drive: Drive, moved: tuple[str, int, float] | None) -> NumberingPlan:
     """Return the plan of a network under a drive that moves what `driven` says; kept for the next of its kind."""
     key = _key(network, drive, moved)
     plan = _plans.get(key)

@@ -25,7 +25,7 @@ AngleLaw = Callable[[Any, float], Any]  # (t, a place inside the piece) -> angle
 
 
 @dataclass(frozen=True)
-class Course:
+class FittedShape:
     """A shape made for a chord: angle [rad] and speed ds/dt [m] over t, smooth between `breaks`.
 
     Complex steps of a shape may move its breaks, which are then complex (see `Course.over`).
@@ -36,7 +36,7 @@ class Course:
     breaks: Any
     uniform: bool  # whether t is the fraction of the arc length
 
-    def over(self, marks: FloatArray, moved: Any) -> Course:
+    def over(self, marks: FloatArray, moved: Any) -> FittedShape:
         """Return the course over another parameter, of which this one is a piecewise-linear function.
 
         Parameters
@@ -56,7 +56,7 @@ class Course:
             piece = np.searchsorted(marks, inside, side="right") - 1
             return self.speed(own(t), inside) * rates[min(int(piece), len(rates) - 1)]
 
-        return Course(lambda t, inside: self.angle(own(t), inside), speed, read_only(marks), False)
+        return FittedShape(lambda t, inside: self.angle(own(t), inside), speed, read_only(marks), False)
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ class Polynomial:
     coefficients: tuple[float, ...] = ()
     length: float | None = None
 
-    def course(self, chord: Any) -> Course:
+    def course(self, chord: Any) -> FittedShape:
         """Return the course; its length is the nominal one, or the chord where there is none."""
         c = tuple(self.coefficients) or (0.0,)
 
@@ -81,7 +81,7 @@ class Polynomial:
             return value
 
         length = chord if self.length is None else self.length
-        return Course(angle, lambda u, inside: length + 0.0 * u, read_only([0.0, 1.0]), True)
+        return FittedShape(angle, lambda u, inside: length + 0.0 * u, read_only([0.0, 1.0]), True)
 
 
 STRAIGHT = Polynomial()
@@ -109,7 +109,7 @@ class CosineArch:
         if self.waves not in (0.5, 1.0):
             raise InputError(f"a cosine arch has 0.5 or 1 waves, got {self.waves}")
 
-    def course(self, chord: Any) -> Course:
+    def course(self, chord: Any) -> FittedShape:
         """Return the course for a chord [m]."""
         span = chord if self.waves == 1.0 else (chord**2 - self.rise**2) ** 0.5
         k = 2 * np.pi * self.waves
@@ -121,7 +121,7 @@ class CosineArch:
         def speed(t: Any, inside: float) -> Any:
             return span * np.sqrt(1 + (slope * np.sin(k * t)) ** 2)
 
-        return Course(angle, speed, read_only([0.0, 1.0]), False)
+        return FittedShape(angle, speed, read_only([0.0, 1.0]), False)
 
 
 @dataclass(frozen=True)
@@ -134,7 +134,7 @@ class Polyline:
         """Freeze and check the points."""
         object.__setattr__(self, "points", _points(self.points))
 
-    def course(self, chord: Any) -> Course:
+    def course(self, chord: Any) -> FittedShape:
         """Return the course; t is the fraction of the arc length."""
         steps = np.diff(self.points, axis=0)
         lengths = (steps[:, 0] ** 2 + steps[:, 1] ** 2) ** 0.5
@@ -147,7 +147,7 @@ class Polyline:
         def angle(t: Any, inside: float) -> Any:
             return angles[min(int(np.searchsorted(breaks.real, inside, side="right")) - 1, len(angles) - 1)] + 0.0 * t
 
-        return Course(angle, lambda t, inside: length + 0.0 * t, read_only(breaks, breaks.dtype), True)
+        return FittedShape(angle, lambda t, inside: length + 0.0 * t, read_only(breaks, breaks.dtype), True)
 
 
 @dataclass(frozen=True)
@@ -160,7 +160,7 @@ class Spline:
         """Freeze and check the points."""
         object.__setattr__(self, "points", _points(self.points))
 
-    def course(self, chord: Any) -> Course:
+    def course(self, chord: Any) -> FittedShape:
         """Return the course; t is the fraction of the chord polygon's length."""
         steps = np.diff(self.points, axis=0)
         knots = np.concatenate([[0.0], np.cumsum((steps[:, 0] ** 2 + steps[:, 1] ** 2) ** 0.5)])
@@ -180,7 +180,7 @@ class Spline:
             v = velocity(t, inside)
             return (v[..., 0] ** 2 + v[..., 1] ** 2) ** 0.5
 
-        return Course(angle, speed, read_only(knots, knots.dtype), False)
+        return FittedShape(angle, speed, read_only(knots, knots.dtype), False)
 
 
 def _spline_velocity(knots: Any, points: Any) -> AngleLaw:
@@ -236,11 +236,11 @@ class Bent:
     shape: Polynomial | CosineArch | Polyline | Spline | Bent
     coefficients: tuple[float, ...]
 
-    def course(self, chord: Any) -> Course:
+    def course(self, chord: Any) -> FittedShape:
         """Return the course of the shape, bent."""
         base = self.shape.course(chord)
         added = np.polynomial.Chebyshev(self.coefficients, domain=[0.0, 1.0])
-        return Course(lambda t, inside: base.angle(t, inside) + added(t), base.speed, base.breaks, base.uniform)
+        return FittedShape(lambda t, inside: base.angle(t, inside) + added(t), base.speed, base.breaks, base.uniform)
 
 
 Shape = Polynomial | CosineArch | Polyline | Spline | Bent

@@ -137,7 +137,7 @@ def analyze(spec: BeamSpec, run: Run) -> Result:
     Result
         PARTIAL if the path ends before the travel, NO_EQUILIBRIUM if there is no first pose.
     """
-    from cfmkit.solid.path_following import Ending
+    from cfmkit.solid.path_following import PathEnd
 
     assembly = assemble(spec)
     try:
@@ -154,7 +154,7 @@ def analyze(spec: BeamSpec, run: Run) -> Result:
     course = meshes.fine.course
     reached = forwards * asked <= forwards * course.travel[-1] * (1 + 1e-12)
     solution = SolidSolution(assembly, meshes, read_only(asked[reached]))
-    complete = course.ending is Ending.COMPLETE
+    complete = course.ending is PathEnd.COMPLETE
     return Result(
         spec=resolve(spec),
         status=Status.COMPLETE if complete else Status.PARTIAL,
@@ -171,14 +171,14 @@ def analyze(spec: BeamSpec, run: Run) -> Result:
 
 def part_of(spec: BeamSpec, assembly: Assembly) -> Part:
     """Return the part as it is solved: its outline, with what is held and driven."""
-    from cfmkit.solid.meshed_part import Part, Place, rings_of
+    from cfmkit.solid.meshed_part import HeldOrDriven, Part, rings_of
     from cfmkit.solid.plane_stress_law import LAWS
 
     cut = [contour for contour in drawing(spec).contours if contour.layer == "cut"]
     beam = next(iter(spec.mechanism.beams.values()))
     material, width = beam.material or spec.mechanism.material, beam.width or spec.mechanism.width
     law = LAWS[spec.analysis.solid.law](material.modulus, material.poisson)
-    places = [Place(one.name, one.shapes, one.at, *_motions(assembly, one), one.seams) for one in regions(spec)]
+    places = [HeldOrDriven(one.name, one.shapes, one.at, *_motions(assembly, one), one.seams) for one in regions(spec)]
     return Part(rings_of(cut), _thinnest(assembly), width, law, tuple(places))
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from cfmkit.families.findings import mm, newton, rate
-from cfmkit.stock.parts_list import Part
+from cfmkit.stock.parts_list import BoughtPart
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -13,12 +13,12 @@ if TYPE_CHECKING:
     from cfmkit.families.cam.spec import CamSpec
 
 
-def parts_of(spec: CamSpec) -> tuple[Part, ...]:
+def parts_of(spec: CamSpec) -> tuple[BoughtPart, ...]:
     """Return the bought parts; none where the specification names no spring, bearing or pin."""
     return tuple(_parts(spec))
 
 
-def _parts(spec: CamSpec) -> Iterator[Part]:
+def _parts(spec: CamSpec) -> Iterator[BoughtPart]:
     mechanism, springs = spec.mechanism, spec.mechanism.springs
     if not (springs.name or mechanism.bearings or mechanism.pins):
         return
@@ -27,11 +27,11 @@ def _parts(spec: CamSpec) -> Iterator[Part]:
     limit = f", up to {mm(springs.max_elongation)}" if springs.max_elongation else ""
     tight = f", stretched by {mm(mechanism.preload)} at the start" if mechanism.preload else ""
     told = " to ".join(dict.fromkeys((rate(min(rates)), rate(max(rates)))))
-    yield Part("between the rollers", springs.name or "", count, f"extension spring, {told}{limit}{tight}")
+    yield BoughtPart("between the rollers", springs.name or "", count, f"extension spring, {told}{limit}{tight}")
     if bearings := mechanism.bearings:
         rated = f", C {newton(bearings.dynamic_rating)}" if bearings.dynamic_rating else ""
         rated += f", C0 {newton(bearings.static_rating)}" if bearings.static_rating else ""
         data = f"{bearings.kind} bearing, bore {mm(bearings.bore)}{rated}"
-        yield Part("in the rollers", bearings.name or "", 2 * bearings.per_roller, data)
+        yield BoughtPart("in the rollers", bearings.name or "", 2 * bearings.per_roller, data)
     if pins := mechanism.pins:
-        yield Part("slider pin and spring hooks", "", 3, f"pin, diameter {mm(pins.diameter)}")
+        yield BoughtPart("slider pin and spring hooks", "", 3, f"pin, diameter {mm(pins.diameter)}")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from cfmkit.families.findings import mm, newton, rate
-from cfmkit.stock.parts_list import Part
+from cfmkit.stock.parts_list import BoughtPart
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from cfmkit.families.vcfm.spec import VcfmSpec
 
 
-def parts_of(spec: VcfmSpec) -> tuple[Part, ...]:
+def parts_of(spec: VcfmSpec) -> tuple[BoughtPart, ...]:
     """Return the bought parts; none where the spring is a structure of leaves."""
     springs = spec.mechanism.springs
     if springs is None:
@@ -29,7 +29,7 @@ def parts_of(spec: VcfmSpec) -> tuple[Part, ...]:
     if wire := springs.wound:
         data.append(f"wire {mm(wire.wire)}, mean coil {mm(wire.coil)}, {wire.turns:g} turns")
     place = "below the shuttle" if springs.kind == "compression" else "above the shuttle"
-    return (Part(place, springs.name or "", springs.count, ", ".join(data)),)
+    return (BoughtPart(place, springs.name or "", springs.count, ", ".join(data)),)
 
 
 def spring_faults(solution: Solution) -> Iterator[tuple[str, str]]:

@@ -129,7 +129,7 @@ class SolidSampler(ExactSampler):
 
 def part_of(spec: VcfmSpec, piece: SolvedPiece) -> Part:
     """Return a piece of the drawing as it is solved."""
-    from cfmkit.solid.meshed_part import Part, Place, rings_of
+    from cfmkit.solid.meshed_part import HeldOrDriven, Part, rings_of
     from cfmkit.solid.plane_stress_law import LAWS
 
     mechanism = spec.mechanism
@@ -138,11 +138,13 @@ def part_of(spec: VcfmSpec, piece: SolvedPiece) -> Part:
     law = LAWS[spec.analysis.solid.law](mechanism.material.modulus, mechanism.material.poisson)
     across = np.array([[1.0], [0.0], [0.0]]) if piece.glides else np.zeros((3, 0))
     turning = np.array([[0.0], [0.0], [1.0]]) if turns else np.zeros((3, 0))
-    shuttle = Place(
+    shuttle = HeldOrDriven(
         "shuttle", (piece.moved,), piece.moved.mean(axis=0), np.array([0.0, -1.0, 0.0]), turning, _seams(piece.moved)
     )
     walls = [
-        Place(f"wall-{number}", (one,), one.mean(axis=0), np.zeros(3), across, _seams(one) if len(one) > 2 else ())
+        HeldOrDriven(
+            f"wall-{number}", (one,), one.mean(axis=0), np.zeros(3), across, _seams(one) if len(one) > 2 else ()
+        )
         for number, one in enumerate(piece.held, start=1)
     ]
     return Part(rings_of((piece.contour,)), about.thickness, about.width, law, (shuttle, *walls))

@@ -33,7 +33,7 @@ ROUNDS = 40
 
 
 @dataclass(frozen=True)
-class Answer:
+class ToleranceFactors:
     """Factors on the stated tolerances; NaN where even none of that error leaves the yield too low.
 
     Attributes
@@ -53,7 +53,9 @@ class Answer:
     perfect: float
 
 
-def answered(rows: FloatArray, by_error: FloatArray, errors: FloatArray, costs: FloatArray, wanted: float) -> Answer:
+def answered(
+    rows: FloatArray, by_error: FloatArray, errors: FloatArray, costs: FloatArray, wanted: float
+) -> ToleranceFactors:
     """Return the factors on tolerances that keep a yield.
 
     Parameters
@@ -82,7 +84,9 @@ def answered(rows: FloatArray, by_error: FloatArray, errors: FloatArray, costs: 
     shape = _shape(rows, by_error, errors, costs)
     together = _largest(lambda f: share(f * ones), wanted)
     allocated = _largest(lambda f: share(np.minimum(f * shape, WIDEST)), wanted)
-    return Answer(alone, together * ones, np.minimum(allocated * shape, WIDEST), share(ones), share(0.0 * ones))
+    return ToleranceFactors(
+        alone, together * ones, np.minimum(allocated * shape, WIDEST), share(ones), share(0.0 * ones)
+    )
 
 
 def _largest(share: Callable[[float], float], wanted: float) -> float:

@@ -233,7 +233,7 @@ def _inverse(setup: Setup, evaluator: Evaluator) -> Findings:
     return replace(plain, all_met=tolerance.yield_of(whole, failed, setup.policy), each_met=tuple(each))
 
 
-def _tolerance_lines(setup: Setup, answer: inverse.Answer) -> Iterator[IndexLine]:
+def _tolerance_lines(setup: Setup, answer: inverse.ToleranceFactors) -> Iterator[IndexLine]:
     """Yield what each tolerance may be, in its own unit: a standard deviation, or the half width of a range."""
     for k, one in enumerate(setup.parameters):
         spread = one.spread

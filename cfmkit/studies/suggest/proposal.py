@@ -28,7 +28,7 @@ SLACK = 1e-9
 
 
 @dataclass(frozen=True)
-class Job:
+class ProposalJob:
     """A candidate of a family that is to be made and judged against a wish, in some seconds."""
 
     family: str
@@ -102,7 +102,7 @@ def spec_of(name: str, text: str) -> Spec:
     return read_document(text, "design.yaml").bind(family(name).spec_type)
 
 
-def made(job: Job) -> Proposal:
+def made(job: ProposalJob) -> Proposal:
     """Return what becomes of a candidate; whatever its design or model refuses is its message."""
     candidate = job.candidate
     try:
@@ -119,7 +119,7 @@ def made(job: Job) -> Proposal:
         return Proposal(job.family, candidate.variant, message=" ".join(str(problem).split())[:300])
 
 
-def _designed(job: Job) -> tuple[Spec | None, str]:
+def _designed(job: ProposalJob) -> tuple[Spec | None, str]:
     """Return the candidate's specification, designed and finished; else None with the reason."""
     record, spec = family(job.family), job.candidate.spec
     if job.candidate.design and record.design is not None:

@@ -15,7 +15,7 @@ from cfmkit.families import family, names
 from cfmkit.families.base import Run, function_named
 from cfmkit.families.wishes import Offer
 from cfmkit.store.identity import code_stamp, stable_hash
-from cfmkit.studies.suggest.proposal import Job, Proposal, made
+from cfmkit.studies.suggest.proposal import Proposal, ProposalJob, made
 from cfmkit.studies.suggest.verification import unverified, verified
 
 if TYPE_CHECKING:
@@ -106,7 +106,7 @@ def suggest(
     while not late() and (batch := list(_next(queues, done, ROUNDS[min(turn, len(ROUNDS) - 1)]))):
         turn += 1
         left = LONGEST if deadline is None else min(LONGEST, max(deadline - time.monotonic(), 0.1))
-        jobs = [Job(name, candidate, wish, run.seed, left) for name, candidate in batch]
+        jobs = [ProposalJob(name, candidate, wish, run.seed, left) for name, candidate in batch]
         keys = [_key(job) for job in jobs]
         places = [run.notes.find(key) for key in keys]
         known = {
@@ -161,7 +161,7 @@ def _verified(item: tuple[int, Proposal]) -> Proposal:
     return verified(item[1])
 
 
-def _indexed(item: tuple[int, Job]) -> Proposal:
+def _indexed(item: tuple[int, ProposalJob]) -> Proposal:
     return made(item[1])
 
 
@@ -181,7 +181,7 @@ def _next(queues: dict[str, list[Candidate]], done: Sequence[Proposal], most: in
                 yield name, queue.pop(0)
 
 
-def _key(job: Job) -> str:
+def _key(job: ProposalJob) -> str:
     """Return by what a proposal is found again: all that decides it, the code included, but not the time left."""
     candidate = job.candidate
     content = {

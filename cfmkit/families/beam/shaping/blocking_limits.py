@@ -18,7 +18,7 @@ from cfmkit.specs.units import format_short
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
 
-    from cfmkit.families.beam.shaping.task import Limits, Task
+    from cfmkit.families.beam.shaping.task import Task, TaskLimits
 
 MOST = 3
 """Designs that are looked at, the ones that miss the limits least."""
@@ -122,7 +122,7 @@ def _box(key: str) -> Callable[[Task, float], dict[str, str]]:
 
 
 def _scaled(
-    key: str, value: Callable[[Limits, float], float], sense: str, dimension: str
+    key: str, value: Callable[[TaskLimits, float], float], sense: str, dimension: str
 ) -> Callable[..., dict[str, str]]:
     def nearest(task: Task, slack: float) -> dict[str, str]:
         return {f"design.optimise.limits.{key}": f"{sense} {format_short(value(task.limits, slack), dimension)}"}

@@ -13,7 +13,7 @@ from cfmkit.families.beam.shaping.blocking_limits import blocked, held_by
 from cfmkit.families.beam.shaping.multistart import Explored, explored, ranked
 from cfmkit.families.beam.shaping.report import REISSNER, Judged, judged, notes_of, search_of, starts_table
 from cfmkit.families.beam.shaping.search import Plan, finished, widened
-from cfmkit.families.beam.shaping.task import BENDING_ONLY, MARGIN, Coordinate, Limits, Task
+from cfmkit.families.beam.shaping.task import BENDING_ONLY, MARGIN, Coordinate, Task, TaskLimits
 from cfmkit.families.beam.shaping.variables import Variables
 from cfmkit.results import Design, Finding, Status
 
@@ -114,10 +114,10 @@ def _coordinates(wanted: Optimise) -> list[Coordinate]:
     return found
 
 
-def _limits(wanted: Optimise, allowable_stress: float | None) -> Limits:
+def _limits(wanted: Optimise, allowable_stress: float | None) -> TaskLimits:
     limits, force = wanted.limits, wanted.force
     box, deformed = limits.envelope, limits.deformed_envelope
-    return Limits(
+    return TaskLimits(
         stress=allowable_stress * (1 - MARGIN) if limits.stress and allowable_stress else None,
         envelope=None if box is None else (*box.x, *box.y),
         deformed_envelope=None if deformed is None else (*deformed.x, *deformed.y),

@@ -9,7 +9,7 @@ import numpy as np
 
 from cfmkit.designing import sqp_program
 from cfmkit.designing.limits import worst
-from cfmkit.designing.sqp_program import Rows, Seen
+from cfmkit.designing.sqp_program import Rows, SeenPoint
 from cfmkit.families.beam.shaping.limits import LIMITS
 from cfmkit.families.beam.shaping.response import NoAnswer, PosePlan, View, poses_of, respond
 
@@ -83,7 +83,7 @@ class Shaping:
         """Return their derivatives."""
         return sqp_program.slopes(self, z, self.elastic)
 
-    def seen(self, z: FloatArray, sloped: bool) -> Seen | None:
+    def seen(self, z: FloatArray, sloped: bool) -> SeenPoint | None:
         """Return the goal, its rows and those of all limits at the design and the goal's own variables."""
         own = z[self.variables.count :]
         view = self.view(z[: self.variables.count], self.goal.window_start(own, self.start), sloped)
@@ -94,9 +94,9 @@ class Shaping:
         except NoAnswer:
             return None
         if aim.by_x is None or aim.rows_by_x is None:
-            return Seen(aim.value, None, [Rows("goal", aim.rows), *limits])
+            return SeenPoint(aim.value, None, [Rows("goal", aim.rows), *limits])
         slopes = np.concatenate([aim.rows_by_x, aim.rows_by_own], axis=1)
-        return Seen(aim.value, np.concatenate([aim.by_x, aim.by_own]), [Rows("goal", aim.rows, slopes), *limits])
+        return SeenPoint(aim.value, np.concatenate([aim.by_x, aim.by_own]), [Rows("goal", aim.rows, slopes), *limits])
 
     def limits(self, view: View) -> list[Rows]:
         """Return the rows of all limits."""

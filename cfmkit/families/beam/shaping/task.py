@@ -36,7 +36,7 @@ class Coordinate:
 
 
 @dataclass(frozen=True)
-class Limits:
+class TaskLimits:
     """What must hold; None: not asked.
 
     Attributes
@@ -96,7 +96,7 @@ class Task:
         Orders of the shape polynomials, from coarse to fine.
     coefficient_limit : float
         Largest coefficient [rad].
-    limits : Limits
+    limits : TaskLimits
         What must hold.
     objective : str
         "ripple": flattest over the window; "range": the widest window with `half_band`; "paper": F(a)/F(b) - 1.
@@ -127,7 +127,7 @@ class Task:
     shaped: tuple[str, ...]
     orders: tuple[int, ...] = (0, 1, 2)
     coefficient_limit: float = 0.5 * np.pi
-    limits: Limits = field(default_factory=Limits)
+    limits: TaskLimits = field(default_factory=TaskLimits)
     objective: Objective = "range"
     half_band: float = 0.025
     compared: tuple[float, float] | None = None

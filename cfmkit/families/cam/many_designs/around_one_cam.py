@@ -16,7 +16,7 @@ import numpy as np
 from cfmkit.families.cam.contact_pressure import YIELD_PRESSURE, allowable_stress, pressure_between
 from cfmkit.families.cam.geometry.many_tracks import sign_changes, tangents
 from cfmkit.families.cam.many_designs.forces import Forces, Pose, Slab
-from cfmkit.families.cam.many_designs.windows import CutWindows, Sampled
+from cfmkit.families.cam.many_designs.windows import CutWindows, SampledBranch
 from cfmkit.families.cam.model import nodes
 from cfmkit.families.cam.statics import JAM_SHARES, at_dead_point
 from cfmkit.metrics.continuous_curves import extremes
@@ -382,7 +382,7 @@ class BuiltSlab(Slab):
         values = self._pressure(self._poses, self._every, forces.contact) / YIELD_PRESSURE
         exact = self._exact_stress(way)
         known = np.isfinite(self.inside(branch, window).mean)
-        return np.where(known, CutWindows(Sampled(self.travel, values, exact), window).extremes[0], np.nan)
+        return np.where(known, CutWindows(SampledBranch(self.travel, values, exact), window).extremes[0], np.nan)
 
     def _exact_stress(self, way: float) -> Callable[[FloatArray, Rows], FloatArray]:
         return lambda travel, rows: self.stress_at(way, travel, rows)

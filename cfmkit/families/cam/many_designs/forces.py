@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 import numpy as np
 
 from cfmkit.families.cam.geometry.many_tracks import tangents
-from cfmkit.families.cam.many_designs.windows import CutWindows, Sampled
+from cfmkit.families.cam.many_designs.windows import CutWindows, SampledBranch
 from cfmkit.families.cam.model import nodes
 from cfmkit.families.cam.solution import ON_CORNER
 from cfmkit.metrics.continuous_curves import extremes
@@ -350,12 +350,12 @@ class Slab:
         return self.cut_windows[branch, window]
 
     @cached_property
-    def _loading(self) -> Sampled:
-        return Sampled(self.travel, self.up.slider, partial(self.somewhere, 1.0), self.peaks)
+    def _loading(self) -> SampledBranch:
+        return SampledBranch(self.travel, self.up.slider, partial(self.somewhere, 1.0), self.peaks)
 
     @cached_property
-    def _unloading(self) -> Sampled:
-        return Sampled(self.travel, self.down.slider, partial(self.somewhere, -1.0), self.peaks)
+    def _unloading(self) -> SampledBranch:
+        return SampledBranch(self.travel, self.down.slider, partial(self.somewhere, -1.0), self.peaks)
 
 
 def force_at(cams: Designs, pose: Pose, way: float | FloatArray) -> FloatArray:

@@ -24,7 +24,7 @@ _SLACK = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class Sampled:
+class SampledBranch:
     """One branch of many cams, force or stress.
 
     Attributes
@@ -51,9 +51,9 @@ class Sampled:
     def _every(self) -> NDArray[np.intp]:
         return np.arange(len(self.values))
 
-    def take(self, rows: NDArray[np.intp]) -> Sampled:
+    def take(self, rows: NDArray[np.intp]) -> SampledBranch:
         """Return some of the cams."""
-        taken = Sampled(
+        taken = SampledBranch(
             self.travel[rows],
             self.values[rows],
             lambda travel, some: self.exact(travel, rows[some]),
@@ -67,7 +67,7 @@ class Sampled:
 class CutWindows(ManyWindows):
     """What one branch of many cams has inside a window: each cam its own samples, those alike worked on together."""
 
-    def __init__(self, sampled: Sampled, window: tuple[float, float] | None) -> None:
+    def __init__(self, sampled: SampledBranch, window: tuple[float, float] | None) -> None:
         """Cut the window out."""
         self.count = len(sampled.values)
         ways = _ways(sampled, window)
@@ -105,7 +105,7 @@ class CutWindows(ManyWindows):
         return self._each(lambda part: part.work)
 
 
-def _ways(sampled: Sampled, window: tuple[float, float] | None) -> NDArray[np.intp]:
+def _ways(sampled: SampledBranch, window: tuple[float, float] | None) -> NDArray[np.intp]:
     """Return how the window cuts each cam's samples: first and past the last inside, ends added, peaks inside.
 
     Nothing is inside a window that is not covered.
@@ -136,7 +136,7 @@ def _ways(sampled: Sampled, window: tuple[float, float] | None) -> NDArray[np.in
     return np.column_stack([ways, between.astype(np.intp)])
 
 
-def _part(sampled: Sampled, window: tuple[float, float] | None, way: NDArray[np.intp]) -> ManyWindows:
+def _part(sampled: SampledBranch, window: tuple[float, float] | None, way: NDArray[np.intp]) -> ManyWindows:
     """Return what lies in a window that cuts the samples of all these cams alike."""
     rows, (start, stop, before, after) = np.arange(len(sampled.values)), way[:4].tolist()
 
@@ -154,7 +154,7 @@ def _part(sampled: Sampled, window: tuple[float, float] | None, way: NDArray[np.
 
 
 def _extremes(
-    sampled: Sampled, inside: NDArray[np.bool_], motion: FloatArray, force: FloatArray
+    sampled: SampledBranch, inside: NDArray[np.bool_], motion: FloatArray, force: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return largest and smallest force, NaN where one of the samples has none; `inside` says which peaks are."""
     rows, more = np.arange(len(force)), sampled.peaks

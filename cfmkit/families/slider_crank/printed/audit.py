@@ -17,7 +17,7 @@ from cfmkit.families.slider_crank.printed.solution import SecondOpinion, Solutio
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.families.slider_crank.printed.chain import Strip
-    from cfmkit.families.slider_crank.printed.search import Found
+    from cfmkit.families.slider_crank.printed.search import FoundStrip
     from cfmkit.families.slider_crank.printed.sqp_program import Form
 
 
@@ -31,7 +31,7 @@ HELD = 0.02  # a limit that is so near, as a share of itself, holds the design
 
 
 @dataclass(frozen=True)
-class Judged:
+class FinishedStrip:
     """A finished strip.
 
     Attributes
@@ -64,17 +64,17 @@ class Judged:
 
 def judge(
     values: FloatArray,
-    found: Found,
+    found: FoundStrip,
     limits: tuple[float | None, float | None],
     pins: FloatArray,
-) -> Judged | None:
+) -> FinishedStrip | None:
     """Return what became of a strip; None if it has no equilibrium over its travel.
 
     Parameters
     ----------
     values : (n,) array
         Numbers of the form.
-    found : Found
+    found : FoundStrip
         The search that they come from.
     limits : (float or None, float or None)
         Ripple as a share and stress [Pa] that end the stroke, where it is what is sought.
@@ -99,7 +99,7 @@ def judge(
     opinion = solution.recheck
     if not inside.any() or opinion is None:
         return None
-    return Judged(
+    return FinishedStrip(
         strip,
         _shares(form, values),
         (task.start, stroke),
@@ -141,7 +141,7 @@ def _shares(form: Form, values: FloatArray) -> tuple[tuple[float, ...], ...] | N
     return tuple(tuple(float(v) for v in own[a:b]) for a, b in itertools.pairwise(ends))
 
 
-def _at_bounds(found: Found, values: FloatArray) -> list[str]:
+def _at_bounds(found: FoundStrip, values: FloatArray) -> list[str]:
     """Return which numbers are at an end of their range."""
     form, told = found.form, []
     ends = at_bounds(values, found.ranges.form, *AT_END)

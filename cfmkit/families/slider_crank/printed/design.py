@@ -24,12 +24,12 @@ from cfmkit.families.no_mechanism import CannotBuild, no_design
 from cfmkit.families.slider_crank.build import linkage_of, resolve, unloaded_angle
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.printed.assembly import corners, elasticity, pins_of, travel_direction
-from cfmkit.families.slider_crank.printed.audit import Judged, judge
+from cfmkit.families.slider_crank.printed.audit import FinishedStrip, judge
 from cfmkit.families.slider_crank.printed.model import analyze, slider_reach
 from cfmkit.families.slider_crank.printed.search import (
     LOOSE,
     SHORTEST,
-    Found,
+    FoundStrip,
     Ranges,
     infeasible,
     search,
@@ -169,7 +169,7 @@ class Reported:
         return all(limit is None or (value is not None and value <= limit) for value, limit in pairs)
 
 
-def _reported(spec: SliderCrankSpec, judged: Judged, run: Run) -> Reported:
+def _reported(spec: SliderCrankSpec, judged: FinishedStrip, run: Run) -> Reported:
     result = analyze(spec, run)
     names = ("deviation_from_target", "rms_to_target", "stress_max", "recheck_force", "recheck_stress")
     deviation, rms, stress, *opinion = measured(result, judged.window, *names)
@@ -177,7 +177,7 @@ def _reported(spec: SliderCrankSpec, judged: Judged, run: Run) -> Reported:
     return Reported(spec, deviation, rms, stress, said)
 
 
-def _search_of(found: Found, judged: Judged) -> dict[str, Searched]:
+def _search_of(found: FoundStrip, judged: FinishedStrip) -> dict[str, Searched]:
     """Return what only the search knows."""
     numbers: dict[str, tuple[float | None, str, str]] = {
         "strips_tried": (float(found.descent.evaluations), "count", "strips that the last descent pressed"),
@@ -194,12 +194,12 @@ def _search_of(found: Found, judged: Judged) -> dict[str, Searched]:
     return searched(numbers, "beam", judged.window)
 
 
-def _compared(found: Found) -> bool:
+def _compared(found: FoundStrip) -> bool:
     """Return whether a strip of one thickness is known to compare with."""
     return found.uniform is not None and found.uniform.feasible and found.form.count > 1 and found.task.goal == "stroke"
 
 
-def _one_thickness(found: Found) -> float:
+def _one_thickness(found: FoundStrip) -> float:
     """Return the stroke of a strip of one thickness [m]."""
     return 0.0 if found.uniform is None else 0.01 * float(found.uniform.z[-1])
 
@@ -330,7 +330,7 @@ def _with_part(spec: SliderCrankSpec, part: StripSpec, window: tuple[float, floa
     return spec.model_copy(update={"mechanism": mechanism, "analysis": analysis})
 
 
-def _written(spec: SliderCrankSpec, judged: Judged, wanted: StripDesign) -> SliderCrankSpec:
+def _written(spec: SliderCrankSpec, judged: FinishedStrip, wanted: StripDesign) -> SliderCrankSpec:
     strip = judged.strip
     values: FloatArray = np.asarray(strip.thickness)
     listed = tuple(round(float(value), DECIMALS) for value in values)
@@ -340,7 +340,7 @@ def _written(spec: SliderCrankSpec, judged: Judged, wanted: StripDesign) -> Slid
     return _with_part(spec, part, judged.window)
 
 
-def _message(found: Found, judged: Judged, reported: Reported) -> str:
+def _message(found: FoundStrip, judged: FinishedStrip, reported: Reported) -> str:
     descent, count = found.descent, found.form.count
     what = "one thickness" if count == 1 else f"{count} thicknesses"
     if found.task.goal == "rms":
@@ -361,7 +361,7 @@ def _message(found: Found, judged: Judged, reported: Reported) -> str:
     )
 
 
-def _warnings(found: Found, judged: Judged) -> tuple[Finding, ...]:
+def _warnings(found: FoundStrip, judged: FinishedStrip) -> tuple[Finding, ...]:
     told = []
     if found.descent.ending is not SearchEnding.OPTIMUM:
         text = f"the search was {found.descent.ending.value}: a better strip may exist; try 'design.beam.seeds'"

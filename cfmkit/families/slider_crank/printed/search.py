@@ -88,7 +88,7 @@ class Ranges:
 
 
 @dataclass(frozen=True)
-class Found:
+class FoundStrip:
     """A strip that was found.
 
     Attributes
@@ -190,17 +190,17 @@ class OneStart:
         kept |= {"ending": found.ending.name, "evaluations": found.evaluations, "allowed": found.allowed}
         return {"found": kept, "late": self.clock.late()}
 
-    def read(self, record: dict[str, Any]) -> Found:
+    def read(self, record: dict[str, Any]) -> FoundStrip:
         """Return the strip of a record."""
         kept = record["found"]
         arrays = {name: np.array(kept[name]) for name in ("z", "constraints")}
         descent = Optimum(**{**kept, **arrays, "ending": SearchEnding[kept["ending"]]})
-        return Found(self.task, self.form, self.ranges, StripProgram(self.task, self.form), descent, self.uniform)
+        return FoundStrip(self.task, self.form, self.ranges, StripProgram(self.task, self.form), descent, self.uniform)
 
 
 def search(
     task: Task, form: Form, ranges: Ranges, starts: int, run: Run, identity: str = "", clock: Clock = NEVER
-) -> Found | Design:
+) -> FoundStrip | Design:
     """Return the best strip found, from the uniform one coarse to fine, and from random ones where asked.
 
     Parameters
@@ -222,7 +222,7 @@ def search(
 
     Returns
     -------
-    Found or Design
+    FoundStrip or Design
         Why there is none, where no start came to an end.
     """
 
@@ -266,7 +266,7 @@ def _ladder(form: Form) -> tuple[int, ...]:
     return (*steps, form.count)
 
 
-def _climb(start: OneStart, steps: tuple[int, ...], factors: FloatArray | None) -> Found:
+def _climb(start: OneStart, steps: tuple[int, ...], factors: FloatArray | None) -> FoundStrip:
     """Return the outcome of one start: every search begins where the one with fewer thicknesses ended."""
     task, form, ranges = start.task, start.form, start.ranges
     x, last = _begin(task, form, ranges, start.uniform, steps[0])
@@ -285,10 +285,10 @@ def _climb(start: OneStart, steps: tuple[int, ...], factors: FloatArray | None) 
         descent = descend(program, begin, bounds, *effort, start.clock)
         x = descent.z[: now.size]
         last = descent.z[-1]
-    return Found(task, form, ranges, program, descent, start.uniform)
+    return FoundStrip(task, form, ranges, program, descent, start.uniform)
 
 
-def _tightened(start: OneStart) -> Found | None:
+def _tightened(start: OneStart) -> FoundStrip | None:
     """Return the outcome of a band that begins as wide as the uniform strip needs it, and is made narrower in steps.
 
     Where a band is out of reach of the first strip, the steps towards it get stuck; those within bands do not. None
@@ -305,7 +305,7 @@ def _tightened(start: OneStart) -> Found | None:
         if ripple > task.ripple and 0.01 * descent.violation > ripple:
             return None
         x, last = descent.z[: form.size], descent.z[-1]
-    return Found(task, form, ranges, program, descent, uniform)
+    return FoundStrip(task, form, ranges, program, descent, uniform)
 
 
 def _precise(task: Task) -> float:
@@ -360,7 +360,7 @@ def _uniform(task: Task, form: Form, ranges: Ranges, clock: Clock) -> Optimum | 
     return None if found.ending is SearchEnding.NO_ANSWER else found
 
 
-def infeasible(found: Found) -> Design:
+def infeasible(found: FoundStrip) -> Design:
     """Return what the nearest strip misses, and the target that it would meet."""
     descent, program, task = found.descent, found.program, found.task
     if descent.ending is SearchEnding.NO_ANSWER:

@@ -111,7 +111,7 @@ def analyze(spec: SliderCrankSpec, run: Run) -> Result:
 
     PARTIAL if the path ends before the travel; NO_EQUILIBRIUM if it cannot be meshed or has no second pose.
     """
-    from cfmkit.solid.path_following import Ending
+    from cfmkit.solid.path_following import PathEnd
 
     try:
         spec = resolve(spec)
@@ -133,7 +133,7 @@ def analyze(spec: SliderCrankSpec, run: Run) -> Result:
     course = meshes.fine.course
     reached = read_only(asked[asked <= course.travel[-1] * (1 + 1e-12)])
     solution = SolidSolution(spec, meshes, reached, pins_of(spec.mechanism, linkage, unloaded))
-    complete = course.ending is Ending.COMPLETE
+    complete = course.ending is PathEnd.COMPLETE
     found = (*_findings(solution), *friction_left_out(spec))
     return Result(
         spec=spec,
@@ -152,7 +152,7 @@ def analyze(spec: SliderCrankSpec, run: Run) -> Result:
 
 def part_of(spec: SliderCrankSpec) -> Part:
     """Return one leg as it is solved: its outline as printed, with its widths and both pads."""
-    from cfmkit.solid.meshed_part import Part, Place, rings_of
+    from cfmkit.solid.meshed_part import HeldOrDriven, Part, rings_of
     from cfmkit.solid.plane_stress_law import LAWS
 
     piece = solved_piece(spec)
@@ -160,7 +160,7 @@ def part_of(spec: SliderCrankSpec) -> Part:
     way = travel_direction(linkage_of(spec.mechanism))
     driven = np.array([np.cos(way), np.sin(way), 0.0])
     places = tuple(
-        Place(name, (pad,), pad.mean(axis=0), motion, seams=(pad[:2],))
+        HeldOrDriven(name, (pad,), pad.mean(axis=0), motion, seams=(pad[:2],))
         for name, pad, motion in (("ground", piece.pads[0], np.zeros(3)), ("slider", piece.pads[1], driven))
     )
     law = LAWS[spec.analysis.solid.law](made_of.youngs_modulus, made_of.poisson_ratio)
@@ -226,11 +226,11 @@ def _values(solution: SolidSolution) -> Mapping[str, Quantity]:
 
 
 def _findings(solution: SolidSolution) -> Iterator[Finding]:
-    from cfmkit.solid.path_following import Ending
+    from cfmkit.solid.path_following import PathEnd
 
-    names = {Ending.LIMIT_POINT: "limit_point", Ending.UNSTABLE: "unstable"}
+    names = {PathEnd.LIMIT_POINT: "limit_point", PathEnd.UNSTABLE: "unstable"}
     course = solution.fine.course
-    if course.ending is not Ending.COMPLETE:
+    if course.ending is not PathEnd.COMPLETE:
         where = format_short(float(course.travel[-1]), "length")
         yield finding(names.get(course.ending, "not_converged"), f"{course.ending.value}, at {where}")
     if (solution.spec.mechanism.part or PaddedPart()).fillet == 0:

@@ -45,7 +45,7 @@ HALVINGS = 12
 
 
 @dataclass(frozen=True, eq=False)
-class Course:
+class ChainCurve:
     """Force and stress of a chain at every travel (a `cfmkit.results.ClosedForm`).
 
     Attributes
@@ -117,7 +117,7 @@ def course(
     pressed: Callable[[FloatArray], tuple[FloatArray, FloatArray] | None],
     ends: tuple[float, float],
     first: tuple[float, float],
-) -> Course | None:
+) -> ChainCurve | None:
     """Return the course between two travels; None where the chain cannot be pressed to every node.
 
     Parameters
@@ -138,7 +138,7 @@ def course(
     borders = np.linspace(low, high, int(np.ceil((high - low) / WIDE)) + 1)
     force, stress = resolved(values, borders, CLOSE, HALVINGS)
     whole = np.isfinite(force.coefficients).all() and np.isfinite(stress.coefficients).all()
-    return Course(ends, first, (force, stress)) if whole else None
+    return ChainCurve(ends, first, (force, stress)) if whole else None
 
 
 Model = Literal["lumped", "beam"]
@@ -268,7 +268,7 @@ class Solution:
         return energy
 
     @cached_property
-    def course(self) -> Course | None:
+    def course(self) -> ChainCurve | None:
         """Force and stress at every travel; None where the chain cannot be followed to places between its points."""
         low, high = float(self.travel[0]), float(self.travel[-1])
         return course(self._at_travels, (low, high), (float(self.force[0]), float(self.stress[0])))

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from cfmkit.designing import sqp_program
-from cfmkit.designing.sqp_program import Rows, Seen
+from cfmkit.designing.sqp_program import Rows, SeenPoint
 from cfmkit.elastica import Control, Displacement, PathStatus, gradient, trace
 from cfmkit.elastica.sensitivity.neighbour import drive_slope, neighbouring
 from cfmkit.errors import InputError
@@ -241,7 +241,7 @@ class StripProgram:
         """Return the derivatives of objective and constraints."""
         return sqp_program.slopes(self, z)
 
-    def seen(self, z: FloatArray, sloped: bool) -> Seen | None:
+    def seen(self, z: FloatArray, sloped: bool) -> SeenPoint | None:
         """Return the objective, the rows of the band, and those of the stress."""
         state = self.state(z)
         if state is None:
@@ -250,7 +250,7 @@ class StripProgram:
         ratio = state.force / self.task.force - 1.0
         by = None if force is None else force / self.task.force
         objective, slope = self._objective(z, ratio, by)
-        return Seen(objective, slope, [*self._band(z, ratio, by), *self._strength(state, stress)])
+        return SeenPoint(objective, slope, [*self._band(z, ratio, by), *self._strength(state, stress)])
 
     def _objective(self, z: FloatArray, ratio: FloatArray, by: FloatArray | None) -> tuple[float, FloatArray | None]:
         """Return the stroke with a minus [cm], the ripple [%], or the mean square; and its derivatives."""

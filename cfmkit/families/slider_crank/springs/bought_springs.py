@@ -39,7 +39,7 @@ SECONDS = 20.0
 
 
 @dataclass(frozen=True)
-class Option:
+class SpringOption:
     """A spring for a joint, in a number.
 
     Attributes
@@ -80,7 +80,7 @@ class Option:
 class Chosen:
     """Springs for all joints: the options taken, the rates that they add up to, and the largest deviation."""
 
-    options: tuple[Option, ...]
+    options: tuple[SpringOption, ...]
     rates: FloatArray
     deviation: float
 
@@ -103,7 +103,7 @@ def choose(task: Task, goal: RateGoal, window: tuple[float, float]) -> Chosen:
     if best is not None and (tolerance is None or best.deviation <= tolerance * (1 + 1e-9)):
         return best
     misses: list[Miss] = []
-    cuts: list[tuple[Option, ...]] = []
+    cuts: list[tuple[SpringOption, ...]] = []
     while best is not None and len(misses) < 3:
         label = " + ".join(one.label for one in best.options) or "no spring"
         misses.append(Miss(label, best.deviation, f"off by {percent(best.deviation)}"))
@@ -114,12 +114,12 @@ def choose(task: Task, goal: RateGoal, window: tuple[float, float]) -> Chosen:
     raise Infeasible(finding("no_spring_fits", f"no springs of the catalogue hold the target: {told}{allowed}"))
 
 
-def _options(task: Task, window: tuple[float, float]) -> tuple[list[Option], list[Miss]]:
+def _options(task: Task, window: tuple[float, float]) -> tuple[list[SpringOption], list[Miss]]:
     """Return what can be used at each joint, and what is refused because the window moves it too far."""
     assembly, wanted = task.assembly, task.wanted
     ends = min(assembly.start, window[0]), max(assembly.start, window[1])
     moved = np.abs(assembly.units(np.linspace(*ends, 401)).turn).max(axis=1)
-    usable: list[Option] = []
+    usable: list[SpringOption] = []
     refused: list[Miss] = []
     for joint, name in enumerate(JOINTS):
         if name not in wanted.springs:
@@ -133,7 +133,7 @@ def _options(task: Task, window: tuple[float, float]) -> tuple[list[Option], lis
             if reason is not None:
                 refused.append(Miss(f"{offer.name} at the {name.replace('_', ' ')}", *reason))
                 continue
-            own += [Option(joint, offer, count) for count in offer.counts]
+            own += [SpringOption(joint, offer, count) for count in offer.counts]
         cap = getattr(wanted.max_rates, name, None) if wanted.max_rates else None
         usable += _thinned([one for one in own if cap is None or one.rate <= cap])
     return usable, refused
@@ -150,9 +150,9 @@ def _why_not(offer: Offer, moved: float, joint: int) -> tuple[float, str] | None
     return None
 
 
-def _thinned(options: list[Option]) -> list[Option]:
+def _thinned(options: list[SpringOption]) -> list[SpringOption]:
     """Return options of different rates, few and single springs first; of too many those evenly spread."""
-    kept: dict[float, Option] = {}
+    kept: dict[float, SpringOption] = {}
     for one in sorted(options, key=lambda one: (one.rate, one.count)):
         kept.setdefault(float(f"{one.rate:.3g}"), one)
     found = list(kept.values())
@@ -161,7 +161,9 @@ def _thinned(options: list[Option]) -> list[Option]:
     return [found[k] for k in np.unique(np.linspace(0, len(found) - 1, MOST).round().astype(int))]
 
 
-def _best(few: RateGoal, goal: RateGoal, options: list[Option], cuts: tuple[tuple[Option, ...], ...]) -> Chosen | None:
+def _best(
+    few: RateGoal, goal: RateGoal, options: list[SpringOption], cuts: tuple[tuple[SpringOption, ...], ...]
+) -> Chosen | None:
     """Return the set with the smallest largest deviation that is none of those cut off."""
     from scipy.optimize import Bounds, LinearConstraint, milp
 
@@ -195,7 +197,7 @@ def _best(few: RateGoal, goal: RateGoal, options: list[Option], cuts: tuple[tupl
     return Chosen(taken, rates, goal.deviation(rates))
 
 
-def _rows(options: list[Option]) -> Iterator[list[float]]:
+def _rows(options: list[SpringOption]) -> Iterator[list[float]]:
     """Yield for each joint which options are its own: it takes one of them at most."""
     for joint in range(len(JOINTS)):
         yield [*(float(option.joint == joint) for option in options), 0.0]

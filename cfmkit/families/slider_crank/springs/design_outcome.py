@@ -19,7 +19,7 @@ from cfmkit.specs.units import format_short
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.families.slider_crank.spec import CrankDesign, SliderCrankSpec
-    from cfmkit.families.slider_crank.springs.bought_springs import Option
+    from cfmkit.families.slider_crank.springs.bought_springs import SpringOption
     from cfmkit.families.slider_crank.springs.targets import Task
     from cfmkit.results import Finding, Searched
 
@@ -44,7 +44,7 @@ class Solved:
         At so many of the window the deviations were looked at.
     exact : bool
         Whether deviation and rms are those that the analysis of the design measures.
-    bought : tuple of Option
+    bought : tuple of SpringOption
         Springs of a catalogue; none where any rate may be had.
     """
 
@@ -56,7 +56,7 @@ class Solved:
     proven: bool = True
     places: int = 0
     exact: bool = False
-    bought: tuple[Option, ...] = ()
+    bought: tuple[SpringOption, ...] = ()
 
     @property
     def judged(self) -> tuple[float, float]:

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Branch:
+class FrictionBranch:
     """One way through the motion, n places.
 
     Attributes
@@ -50,7 +50,7 @@ class Branch:
     lost: dict[str, FloatArray]
 
 
-def branch(assembly: Assembly, motion: FloatArray, way: float) -> Branch:
+def branch(assembly: Assembly, motion: FloatArray, way: float) -> FrictionBranch:
     """Return the efforts with friction.
 
     Parameters
@@ -64,7 +64,7 @@ def branch(assembly: Assembly, motion: FloatArray, way: float) -> Branch:
 
     Returns
     -------
-    Branch
+    FrictionBranch
         Efforts, forces inside, and what friction takes.
     """
     units, link, rates = assembly.units(motion), assembly.linkage, assembly.rates
@@ -99,7 +99,7 @@ def branch(assembly: Assembly, motion: FloatArray, way: float) -> Branch:
             dragged = np.abs(effort - free)
         swept = sum(np.abs(rate) for rate in (crank_rate, coupler_rate - crank_rate, coupler_rate))
         lost = {"pins": couple * swept, "guide": dragged}
-    return Branch(effort, np.hypot(pull[0], pull[1]), across, lost)
+    return FrictionBranch(effort, np.hypot(pull[0], pull[1]), across, lost)
 
 
 def _rates(assembly: Assembly, angle: FloatArray, beta: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -30,7 +30,7 @@ from cfmkit.families.slider_crank.springs.solution import Character, ClosedForm,
 from cfmkit.families.slider_crank.unit_springs import JOINTS
 from cfmkit.results import Result, Status
 from cfmkit.specs.units import between, format_short
-from cfmkit.stock.parts_list import Part, listed
+from cfmkit.stock.parts_list import BoughtPart, listed
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -89,7 +89,7 @@ def analyze(spec: SliderCrankSpec, run: Run) -> Result:
     )
 
 
-def parts_of(spec: SliderCrankSpec) -> tuple[Part, ...]:
+def parts_of(spec: SliderCrankSpec) -> tuple[BoughtPart, ...]:
     """Return the bought parts: springs that the specification names, and pins; of all legs together."""
     mechanism, found = spec.mechanism, []
     for one in mechanism.springs.bought:
@@ -97,9 +97,9 @@ def parts_of(spec: SliderCrankSpec) -> tuple[Part, ...]:
         rate = format_short(value, "stiffness" if one.at == "slider" else "rotational_stiffness")
         kind = "spring" if one.at == "slider" else "torsion spring"
         place = one.at.replace("_", " ")
-        found.append(Part(place, one.name, one.count * mechanism.sets, f"{kind}, {rate} of all in one leg"))
+        found.append(BoughtPart(place, one.name, one.count * mechanism.sets, f"{kind}, {rate} of all in one leg"))
     if mechanism.pins:
-        found.append(Part("joints", "", 3 * mechanism.sets, f"pin, diameter {mm(mechanism.pins.diameter)}"))
+        found.append(BoughtPart("joints", "", 3 * mechanism.sets, f"pin, diameter {mm(mechanism.pins.diameter)}"))
     return tuple(found)
 
 

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.families.slider_crank.springs.assembly import reactions
-from cfmkit.families.slider_crank.springs.friction import Branch, branch
+from cfmkit.families.slider_crank.springs.friction import FrictionBranch, branch
 from cfmkit.families.slider_crank.springs.stiffness_classes import CLASSES, Classified, classify, signs
 from cfmkit.numerics.roots import bracketed_root
 from cfmkit.numerics.turning_points import Monotone, monotone
@@ -260,7 +260,7 @@ class Solution:
         return _weighed(self.assembly.rates, self.units.effort)
 
     @cached_property
-    def ways(self) -> tuple[Branch, Branch] | None:
+    def ways(self) -> tuple[FrictionBranch, FrictionBranch] | None:
         """The motion with friction, forth and back; None where nothing rubs."""
         if not self.assembly.rubbing.there:
             return None
