@@ -11,7 +11,6 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from cfmkit.plots.moving import poses
 
 import cfmkit
 from cfmkit import api
@@ -19,6 +18,7 @@ from cfmkit.errors import ExitCode
 from cfmkit.families import family
 from cfmkit.families.slider_crank.dispatch import moving
 from cfmkit.plots.figures import moving_of
+from cfmkit.plots.moving_svg import poses
 from cfmkit.results import Finding, Result, Status
 from cfmkit.runs import batch_page, run_findings, run_page, study_page
 from cfmkit.studies.batch_entries import Entry
