@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     )
     from cfmkit.elastica.model.section import Section, Taper
     from cfmkit.elastica.model.shapes import STRAIGHT, CosineArch, Polyline, Polynomial, Spline, arc
+    from cfmkit.elastica.outcome.curling import HinderedCurling, hindered_curling
     from cfmkit.elastica.outcome.path import Event, Path, PathStatus
     from cfmkit.elastica.sensitivity.gradient import Gradient, gradient
 
@@ -62,6 +63,7 @@ _HOMES = {
     ),
     "model.section": ("Section", "Taper"),
     "model.shapes": ("STRAIGHT", "CosineArch", "Polyline", "Polynomial", "Spline", "arc"),
+    "outcome.curling": ("HinderedCurling", "hindered_curling"),
     "outcome.path": ("Event", "Path", "PathStatus"),
     "sensitivity.gradient": ("Gradient", "gradient"),
 }
@@ -78,6 +80,7 @@ __all__ = [
     "Displacement",
     "Event",
     "Gradient",
+    "HinderedCurling",
     "LineLoad",
     "LineSpring",
     "Link",
@@ -100,6 +103,7 @@ __all__ = [
     "arc",
     "gradient",
     "guided",
+    "hindered_curling",
     "trace",
     "trace_many",
 ]

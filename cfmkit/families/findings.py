@@ -12,6 +12,10 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
 
+TOO_SOFT = 0.01
+"""Share of the energy of bending from which on wide beams that are solved as narrow ones are told of."""
+
+
 class Finder(Protocol):
     """Makes the findings of one family."""
 
@@ -65,6 +69,14 @@ def rate(value: float) -> str:
 def percent(value: float) -> str:
     """Return a ratio with three significant digits, in percent."""
     return format_short(value, "ratio", 3)
+
+
+def too_soft(share: float, where: str) -> str:
+    """Return the sentence of the finding `wide_beam`: by what share of the energy of bending, and where that is."""
+    return (
+        f"beams that are wide for their thickness cannot curl across their width: the force is about {percent(share)} "
+        f"larger {where}; where their ends are clamped it is more"
+    )
 
 
 def at_most(length: float) -> str:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.elastica.kernels.model import TABLE_COLUMNS, Model
+from cfmkit.elastica.kernels.model import HALVES, TABLE_COLUMNS, Model
 from cfmkit.elastica.kernels.splitting import DRIFTS, KICKS, NODES, ROWS
 from cfmkit.elastica.model.beam import SAME
 from cfmkit.elastica.model.numbering import LINE, SLIDE, TURN
@@ -17,7 +17,9 @@ from cfmkit.elastica.model.section import Taper
 
 if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
+    from cfmkit.elastica.model.beam import Fit
     from cfmkit.elastica.model.layout import Layout
+    from cfmkit.elastica.model.section import Section
 
 _GAUSS = np.polynomial.legendre.leggauss(5)
 PRESTRESS, LOADS = "prestress", "constant loads"  # what may be applied before the drive begins
@@ -151,8 +153,11 @@ def table(layout: Layout, cut: Grid, known: Any = None) -> Any:
     bundle, units = layout.bundle, layout.units
     plain: Any = None
     if bundle.plain:
-        plain = bundle.table(*cut.rows(bundle.coefficients.shape[1], bundle.plain[0]), units[1:])
+        plain = bundle.table(*cut.rows(bundle.coefficients.shape[1], bundle.plain[0]), units[1:TABLE_COLUMNS])
         plain = plain.reshape(len(bundle.plain), -1, ROWS, TABLE_COLUMNS)
+        if bundle.wide:
+            plain = np.pad(plain, [(0, 0)] * 3 + [(0, len(units) - TABLE_COLUMNS)])
+            plain[..., HALVES[0]] = plain[..., HALVES[1]] = 0.5 * plain[..., 2]
     if not bundle.others:
         return plain.reshape(-1, ROWS, TABLE_COLUMNS)
     blocks: list[Any] = [None] * len(bundle.beams)
@@ -183,7 +188,7 @@ def _si_table(layout: Layout, name: str, cut: Grid, steps: Any) -> Any:
 
 
 def si_rows(layout: Layout, name: str, left: FloatArray, right: FloatArray, where: tuple[float, float]) -> Any:
-    """Return the rows of steps on one smooth piece of a beam in SI, (n, rows, 6): see `Model.table`.
+    """Return the rows of steps on one smooth piece of a beam in SI, (n, rows, columns): see `Model.table`.
 
     left, right: parameters (n, 1) at the ends of the steps; where: a parameter on the piece and the fraction of the
     arc length there.
@@ -208,8 +213,39 @@ def si_rows(layout: Layout, name: str, left: FloatArray, right: FloatArray, wher
         drift = speeds.sum(axis=-1)
         bending = section.rigidities(fitted.arc(inner) if tapers else inner, inside)[0]
         turn = (speeds / bending).sum(axis=-1)
-    columns = fitted.angle(t, middle), length, turn, length * axial, length * shear, np.cumsum(drift, axis=1)
+    columns = [fitted.angle(t, middle), length, turn, length * axial, length * shear, np.cumsum(drift, axis=1)]
+    if layout.bundle.wide:
+        columns += _strip_columns(fitted, section, (before, t), where, (drift, turn))
     return np.stack(np.broadcast_arrays(*columns), axis=-1)
+
+
+_PAIR = 0.5 + 0.5 * np.array([-1.0, 1.0]) / np.sqrt(3.0)
+_THIRDS = np.linspace(0.0, 1.0, 4)
+_RISE = np.array([[0.0, 1.0, 2 * x, 3 * x * x] for x in _PAIR]) @ np.linalg.inv(np.vander(_THIRDS, increasing=True))
+"""Slopes at the two nodes of Gauss' rule of the cubic through values at the thirds of a stretch."""
+
+
+def _strip_columns(
+    fitted: Fit, section: Section, ends: tuple[Any, Any], where: tuple[float, float], whole: tuple[Any, Any]
+) -> list[Any]:
+    """Return the columns that wide strips have beside others, in SI: see `cfmkit.elastica.kernels.model.HALVES`.
+
+    ends: parameters at both ends of the drifts; whole: their lengths, and integrals of ds/EI.
+    """
+    (before, after), (middle, inside), (drift, turn) = ends, where, whole
+    angles = np.stack(np.broadcast_arrays(*(fitted.angle(before + x * (after - before), middle) for x in _THIRDS)))
+    places = [before + x * (after - before) for x in _PAIR]
+    arcs = [fitted.arc(place) if isinstance(section.thickness, Taper) else place for place in places]
+    speeds = [fitted.speed(place, middle) for place in places]
+    softs = [speed / section.rigidities(arc, inside)[0] for speed, arc in zip(speeds, arcs, strict=True)]
+    still = drift == 0  # of no length: nothing turns in it
+    columns = [section.curling(section.thickness_at(arcs[0], inside))[1]]
+    for speed, soft, arc, rise in zip(speeds, softs, arcs, _RISE, strict=True):
+        length = np.where(still, 1.0, drift) * speed / sum(speeds)
+        curl = section.curling(section.thickness_at(arc, inside))[0] / length**2
+        rest = 0.5 * np.tensordot(rise, angles, 1)
+        columns += [turn * soft / sum(softs), rest, np.where(still, 0.0, curl)]
+    return columns
 
 
 def model(layout: Layout, mesh: Mesh, ramp: str = "") -> Model:

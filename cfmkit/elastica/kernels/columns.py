@@ -20,7 +20,6 @@ from cfmkit.elastica.kernels.force_slopes import (
     value_changes,
     value_slopes,
 )
-from cfmkit.elastica.kernels.model import TABLE_COLUMNS
 from cfmkit.elastica.kernels.newton import assemble
 from cfmkit.elastica.kernels.splitting import ROWS
 
@@ -41,7 +40,7 @@ def _segment_slopes(m, design, e, y, n, drive, ends, none):
                 state[(7 + r) * count + q] = design.line[k, e, 0, r] + drive * design.line[k, e, 1, r]
         o = n + 6 * j
         start = (y[o + 2], y[o + 3], y[o + 4], y[o + 5])
-        at = design.begin[e] + (first - m.segment_step[begin]) * ROWS * TABLE_COLUMNS * count
+        at = design.begin[e] + (first - m.segment_step[begin]) * ROWS * m.table.shape[2] * count
         flow_slopes(m.table, (first, m.segment_step[j + 1]), start, load, design.table, at, state, none)
 
 

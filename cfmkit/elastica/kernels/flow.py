@@ -20,7 +20,9 @@ from __future__ import annotations
 import numpy as np
 
 from cfmkit.elastica.kernels.compiler import inlined, kernel
+from cfmkit.elastica.kernels.model import TABLE_COLUMNS
 from cfmkit.elastica.kernels.splitting import ROWS
+from cfmkit.elastica.kernels.wide_strip import strip_drift
 
 COLUMNS = 5  # the state itself, then its derivatives by the start's rotation, h, v and M
 FORCE = 20  # of a segment's outcome: h and v at its end; before them what `flow` says
@@ -114,7 +116,7 @@ def flow(table, steps, starts, loads, outs):
     then derivatives by rotation, h, v, M; then the force h, v at the end. X and Y count from the start.
     """
     (one, other), (p, q) = starts, loads
-    if p[0] != 0.0 or p[1] != 0.0 or q[0] != 0.0 or q[1] != 0.0:
+    if table.shape[2] > TABLE_COLUMNS or p[0] != 0.0 or p[1] != 0.0 or q[0] != 0.0 or q[1] != 0.0:
         _loaded(table, steps[0], steps[2], one, p, outs[0])
         _loaded(table, steps[1], steps[2], other, q, outs[1])
         return
@@ -131,18 +133,34 @@ def flow(table, steps, starts, loads, outs):
     _end(other[1], other[2], b, outs[1])
 
 
+@inlined
+def _wide_drift(table, step, i, a):
+    """Return a segment's state and its derivatives after the drift of a row, and the slope of its turn by the moment.
+
+    Where no beam is a wide strip the turn is the moment times that slope.
+    """
+    if table.shape[2] == TABLE_COLUMNS:
+        w = table[step, i, 2]
+        return _drift_all(w, a), w
+    phi, moment, x, y = a[0]
+    turn, slope, _ = strip_drift(table, step, i, moment)
+    return ((phi + turn, moment, x, y), _drift(slope, a[1]), _drift(slope, a[2]), _drift(slope, a[3])), slope
+
+
 @kernel
 def _loaded(table, first, count, start, load, out):
-    """Integrate over one segment under a line load, with derivatives; the load does not turn with the segment."""
+    """Integrate over one segment, a wide strip or one under a line load, with derivatives; loads keep direction."""
     a, turned = _begin(start), (1.0, 0.0, 0.0, 0.0)  # the latter is the derivative by the rotation at the start
     h, v = start[1], start[2]
     for step in range(first, first + count):
         for i in range(_CLOSING):
-            w, run = table[step, i, 2], table[step, i, 5]
-            a, by = _kick(table, step, i, h - load[0] * run, v - load[1] * run, _drift_all(w, a))
+            run = table[step, i, 5]
+            a, w = _wide_drift(table, step, i, a)
+            a, by = _kick(table, step, i, h - load[0] * run, v - load[1] * run, a)
             turned = _carry(_drift(w, turned), by, 0.0, 0.0, 0.0)
-        w, run = table[step, _CLOSING, 2], table[step, _CLOSING, 5]
-        a, turned = _drift_all(w, a), _drift(w, turned)
+        run = table[step, _CLOSING, 5]
+        a, w = _wide_drift(table, step, _CLOSING, a)
+        turned = _drift(w, turned)
         h, v = h - load[0] * run, v - load[1] * run
     _end(h, v, a, out)
     for k in range(4):
@@ -157,7 +175,7 @@ def plain_flow(table, steps, start, load, states):
     those at the end alone.
     """
     first, last = steps
-    every = 1 if states.shape[0] > 1 else 0
+    every, wide = (1 if states.shape[0] > 1 else 0), table.shape[2] > TABLE_COLUMNS
     zero = start[0] * 0.0
     phi, moment, x, y, energy = start[0] + zero, start[3] + zero, zero, zero, zero
     begin_h, begin_v = start[1] + zero, start[2] + zero
@@ -166,8 +184,13 @@ def plain_flow(table, steps, start, load, states):
         for i in range(ROWS):
             w, run = table[step, i, 2], table[step, i, 5]
             h, v = begin_h - load[0] * run, begin_v - load[1] * run
-            phi += w * moment
-            energy += 0.5 * w * moment * moment
+            if wide:
+                turn, _, stored = strip_drift(table, step, i, moment)
+                phi += turn
+                energy += stored
+            else:
+                phi += w * moment
+                energy += 0.5 * w * moment * moment
             if i < _CLOSING:
                 length, pull, slide = table[step, i, 1], table[step, i, 3], table[step, i, 4]
                 c, s = np.cos(table[step, i, 0] + phi), np.sin(table[step, i, 0] + phi)

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 from cfmkit.elastica.kernels.compiler import inlined, kernel
 from cfmkit.elastica.kernels.flow import sincos
-from cfmkit.elastica.kernels.model import TABLE_COLUMNS
+from cfmkit.elastica.kernels.model import HALVES, SHARE, TABLE_COLUMNS
 from cfmkit.elastica.kernels.splitting import ROWS as STEP_ROWS
+from cfmkit.elastica.kernels.wide_strip import bent, by_section, strain_energy
 
 ROWS = 7  # phi, M, X, Y, strain energy, h, v
 _CLOSING = STEP_ROWS - 1
@@ -25,20 +26,21 @@ def flow_slopes(table, steps, start, load, changes, at, state, rows):
     if there is room.
     """
     count = state.shape[0] // 9
+    columns = table.shape[2]
     keep = rows.shape[0] > 1
     phi, h, v, moment = start[0], start[1], start[2], start[3]
     for step in range(steps[0], steps[1]):
         if keep:
             for q in range(ROWS * count):
                 rows[step - steps[0], q] = state[q]
-        o = at + (step - steps[0]) * STEP_ROWS * TABLE_COLUMNS * count
+        o = at + (step - steps[0]) * STEP_ROWS * columns * count
         for i in range(_CLOSING):
-            phi += _drifted(table[step, i, 2], moment, (changes, o), state, count)
+            phi += _drifted(table, step, i, moment, (changes, o), state, count)
             run = table[step, i, 5]
             place = phi, h - load[0] * run, v - load[1] * run
             moment += _kicked(table, step, i, place, load, (changes, o), state)
-            o += TABLE_COLUMNS * count
-        phi += _drifted(table[step, _CLOSING, 2], moment, (changes, o), state, count)
+            o += columns * count
+        phi += _drifted(table, step, _CLOSING, moment, (changes, o), state, count)
         run = table[step, _CLOSING, 5]
         for q in range(count):
             longer = changes[o + 5 * count + q]
@@ -51,14 +53,39 @@ def flow_slopes(table, steps, start, load, changes, at, state, rows):
 
 
 @inlined
-def _drifted(turn, moment, changed, state, n):
+def _drifted(table, step, i, moment, changed, state, n):
     """Carry the derivatives over a drift; return by how much the rotation grows in it."""
     changes, o = changed
+    if table.shape[2] > TABLE_COLUMNS:
+        return _wide_drifted(table, step, i, moment, changed, state, n)
+    turn = table[step, i, 2]
     for q in range(n):
         by, dm = changes[o + 2 * n + q], state[n + q]
         state[q] += by * moment + turn * dm
         state[4 * n + q] += (0.5 * by * moment + turn * dm) * moment
     return turn * moment
+
+
+@kernel
+def _wide_drifted(table, step, i, moment, changed, state, n):
+    """Carry the derivatives over a drift of a wide strip; return by how much the rotation grows in it."""
+    (changes, o), share, total = changed, table[step, i, SHARE], 0.0
+    for half in HALVES:
+        w, rest, curl = table[step, i, half], table[step, i, half + 1], table[step, i, half + 2]
+        if w == 0.0:
+            continue
+        turn, slope = bent(w * moment, rest, curl, share)
+        moments, energies = by_section(turn, rest, curl, share)
+        energy, first = strain_energy(turn, rest, curl, share, w), o + half * n
+        total += turn
+        for q in range(n):
+            by, dr, dc = changes[first + q], changes[first + n + q], changes[first + 2 * n + q]
+            ds, dm = changes[o + SHARE * n + q], state[n + q]
+            more = slope * (by * moment + w * dm - moments[0] * dr - moments[1] * dc - moments[2] * ds)
+            state[q] += more
+            state[4 * n + q] += moment * more - energy * by / w
+            state[4 * n + q] += (energies[0] * dr + energies[1] * dc + energies[2] * ds) / w
+    return total
 
 
 @kernel

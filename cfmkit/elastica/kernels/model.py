@@ -25,6 +25,14 @@ IntArray = NDArray[Any]
 
 TABLE_COLUMNS = 6  # see `Model`
 
+SHARE, HALVES = 6, (7, 10)
+"""Columns that a table with wide strips has beside those: nu^2/(1 - nu^2), and where the halves of a drift begin.
+
+A half has its integral of ds/EI, its turn at rest, and its th^4/(turn + rest)^2 of
+`cfmkit.elastica.kernels.wide_strip`, each at a node of Gauss' rule with two of them: beams whose curvature or thickness
+varies are then integrated to the fourth order, as the splitting is where the energy is no square of the moment.
+"""
+
 
 class _ModelArrays(NamedTuple):
     table: Any
@@ -53,10 +61,11 @@ class Model(Packed, _ModelArrays):
 
     Attributes
     ----------
-    table : (steps, rows, 6) array
+    table : (steps, rows, 6 or 13) array
         What the drifts and kicks of every step take, see `cfmkit.elastica.kernels.splitting`: the reference angle at
         the kick; the arc length L of the kick; the integral of ds/EI over the drift before it; L/EA and L/GA of the
-        kick; the arc length from the step's start to the kick. The last row is the closing drift, without a kick.
+        kick; the arc length from the step's start to the kick. The last row is the closing drift, without a kick. Seven
+        columns more where a beam is a wide strip: see `HALVES`.
     segment_step : (segments + 1,) int array
         First step of each segment.
     segment_turn : (segments,) array
@@ -131,7 +140,7 @@ class DesignSlopes(Packed, _DesignSlopesArrays):
     first : (beams + 1,) int array
         Where each beam begins in `variable`.
     table : (n,) array
-        Per beam its steps x rows x 6 table columns x its variables, flattened.
+        Per beam its steps x rows x table columns x its variables, flattened.
     begin : (beams,) int array
         Where each beam begins in `table`.
     moves : (k,) bool array

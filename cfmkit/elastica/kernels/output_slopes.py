@@ -5,7 +5,6 @@ from __future__ import annotations
 from cfmkit.elastica.kernels.compiler import kernel
 from cfmkit.elastica.kernels.flow_slopes import flow_slopes
 from cfmkit.elastica.kernels.force_slopes import beam_slopes, load_slopes, spring_slopes, value_slopes
-from cfmkit.elastica.kernels.model import TABLE_COLUMNS
 from cfmkit.elastica.kernels.newton import all_values
 from cfmkit.elastica.kernels.splitting import ROWS
 
@@ -60,7 +59,7 @@ def row_slopes(m, design, n_free, y, drive, dy, out, state):
                 for r in range(2):
                     state[(7 + r) * count + k] = design.line[k, e, 0, r] + drive * design.line[k, e, 1, r]
             start = (y[o + 2], y[o + 3], y[o + 4], y[o + 5])
-            at = design.begin[e] + (first - begin) * ROWS * TABLE_COLUMNS * count
+            at = design.begin[e] + (first - begin) * ROWS * m.table.shape[2] * count
             rows = out[row : row + last - first + 1]
             flow_slopes(m.table, (first, last), start, load, design.table, at, state, rows)
             row += last - first + 1

@@ -87,6 +87,11 @@ class Bundle:
         self._set_rigidities()
 
     @property
+    def wide(self) -> bool:
+        """Whether any beam is a wide strip: all tables then have the columns that those need."""
+        return any(self.beams[k].section.wide for k in self.others)
+
+    @property
     def curved(self) -> bool:
         """Whether any beam is known not to be straight before it is loaded, or may not be."""
         return bool(self.others) or self.coefficients.shape[1] > 1
@@ -162,8 +167,10 @@ class Bundle:
 
 
 def is_plain(beam: Beam) -> bool:
-    """Tell whether a beam has a polynomial angle, no coil of many turns, and one thickness."""
-    return isinstance(beam.shape, Polynomial) and not isinstance(beam.section.thickness, Taper) and not coils(beam)
+    """Tell whether a beam has a polynomial angle, no coil of many turns, one thickness, and is no wide strip."""
+    if beam.section.wide or isinstance(beam.section.thickness, Taper):
+        return False
+    return isinstance(beam.shape, Polynomial) and not coils(beam)
 
 
 def coils(beam: Beam) -> bool:

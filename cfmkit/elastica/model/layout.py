@@ -156,9 +156,13 @@ class Layout:
 
     @cached_property
     def units(self) -> Any:
-        """Factors that make the columns of a table dimensionless, (6,): see `cfmkit.elastica.kernels.model.Model`."""
-        length, force = self.scales.length, self.scales.force
-        return np.array([1.0, 1 / length, self.scales.rigidity / length, force / length, force / length, 1 / length])
+        """Factors that make the columns of a table dimensionless, (6,): see `cfmkit.elastica.kernels.model.Model`.
+
+        Thirteen where a beam is a wide strip: see `cfmkit.elastica.kernels.model.HALVES`.
+        """
+        length, force, turn = self.scales.length, self.scales.force, self.scales.rigidity / self.scales.length
+        own = [1.0, 1 / length, turn, force / length, force / length, 1 / length]
+        return np.array([*own, 1.0, turn, 1.0, 1.0, turn, 1.0, 1.0] if self.bundle.wide else own)
 
     def _scales(self) -> Scales:
         lengths, middles = self.bundle.sizes(self.fits if self.bundle.others else None)

@@ -19,6 +19,9 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
 
 
+_SINES = 64  # places of half a sine: the mean over it is smooth, and periodic
+
+
 @dataclass(frozen=True)
 class Taper:
     """A thickness that is linear between stations along the beam.
@@ -73,6 +76,8 @@ class Section:
         For the shear modulus [1].
     shear_factor : float
         Share of the area that carries shear [1]; 5/6 for a rectangle.
+    wide : bool
+        Whether it stiffens as its curling across the width is hindered: see `cfmkit.elastica.kernels.wide_strip`.
     """
 
     youngs_modulus: float
@@ -82,6 +87,7 @@ class Section:
     shear: bool = False
     poisson_ratio: float = 0.3
     shear_factor: float = 5.0 / 6.0
+    wide: bool = False
 
     def __post_init__(self) -> None:
         """Check the values."""
@@ -123,6 +129,10 @@ class Section:
         shear = (1.0 if self.shear else 0.0) / (modulus * area)
         return bending, axial, shear
 
+    def curling(self, thickness: Any) -> tuple[Any, Any]:
+        """Return what says how far curling is hindered: th^4/K^2 [m2] and nu^2/(1 - nu^2), none unless it is wide."""
+        return curling(self.width, thickness, self.poisson_ratio) if self.wide else (0.0 * thickness, 0.0)
+
     def mean_compliance(self, start: Any, end: Any, inside: float) -> Any:
         """Return the mean of 1/EI [1/(N m2)] over the arc between places on the piece that holds `inside`.
 
@@ -130,6 +140,55 @@ class Section:
         """
         a, b = self.thickness_at(start, inside), self.thickness_at(end, inside)
         return 6 * (a + b) / (self.youngs_modulus * self.width * (a * b) ** 2)
+
+
+def curling(width: Any, thickness: Any, poisson_ratio: Any) -> tuple[Any, Any]:
+    """Return th^4/K^2 [m2] and nu^2/(1 - nu^2) of a wide strip: see `cfmkit.elastica.kernels.wide_strip`."""
+    plane = 1 - poisson_ratio**2
+    return 3 * plane * (width**2 / thickness) ** 2, poisson_ratio**2 / plane
+
+
+def hindered_share(width: Any, thickness: Any, poisson_ratio: float, curvature: Any) -> Any:
+    """Return by what share hindered curling raises the energy of a strip that is bent to half a sine, or more.
+
+    Parameters
+    ----------
+    width, thickness : float or array
+        [m].
+    poisson_ratio : float
+        [1].
+    curvature : float or array
+        The largest, of a strip that was straight [1/m].
+
+    Returns
+    -------
+    float or array
+        Of the shape that the values broadcast to [1].
+
+    Examples
+    --------
+    >>> round(float(hindered_share(10e-3, 1e-3, 0.35, 60.0)), 4)
+    0.0342
+    """
+    bent = np.sin(np.pi * (np.arange(_SINES) + 0.5) / _SINES) ** 2
+    curl, plate = curling(width, thickness, poisson_ratio)
+    return plate * (curl_hindered(np.multiply.outer(curl * curvature**2, bent)) @ bent) / bent.sum()
+
+
+def curl_hindered(z: Any) -> Any:
+    """Return the share 1 - g of its curling that a wide strip cannot do, 0 to 1, at z = th^4 (an array).
+
+    The function g and its argument: `cfmkit.elastica.kernels.wide_strip`, which has the law for the compiled code.
+
+    Examples
+    --------
+    >>> curl_hindered(np.array([0.0, 180.0, 1e8])).round(3).tolist()
+    [0.0, 0.492, 0.98]
+    """
+    th = np.sqrt(np.sqrt(np.maximum(z, 1e-4)))  # below: th^4/180, less than rounding of the closed form is worth
+    e = np.exp(-th)
+    g = 2 / th * (1 - 2 * e * np.cos(th) + e * e) / (1 + 2 * e * np.sin(th) - e * e)
+    return np.where(z < 1e-4, z / 180, 1 - g)
 
 
 def _positive(name: str, value: Any) -> None:

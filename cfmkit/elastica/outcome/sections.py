@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.elastica.equilibrium.mesh import Mesh, assemble_model, grid, si_rows, table
-from cfmkit.elastica.kernels.model import TABLE_COLUMNS
 from cfmkit.elastica.kernels.splitting import ROWS
 
 if TYPE_CHECKING:
@@ -137,7 +136,7 @@ class Sampler:
     def step_table(self, beam: int, step: Any, left: FloatArray, right: FloatArray) -> Any:
         """Return the table of `elastica.kernels.model.Model` from one parameter (k,) to another, on steps (k,)."""
         cut, name = self.cut, list(self.layout.network.beams)[beam]
-        out, pieces = np.empty((len(step), ROWS, TABLE_COLUMNS)), cut.piece[step]
+        out, pieces = np.empty((len(step), ROWS, len(self.layout.units))), cut.piece[step]
         for piece in sorted(set(pieces.tolist())):
             own = pieces == piece
             first = int(step[own][0])
@@ -229,7 +228,7 @@ def stress_slopes(
     along, across = g * (1 + found.normal * axial), g * found.shear * shear
     load = sampler.load(beam, points) * scales.force / scales.length
     moment = across * found.normal - along * found.shear
-    turn = angle.imag / _STEP + g * found.moment / bending
+    turn = angle.imag / _STEP + g * found.moment / bending  # a wide strip turns less; N/A hardly varies with it
     normal = found.shear * turn - g * (load[:, 0] * c + load[:, 1] * s)
     t0, grow = thick.real, thick.imag / _STEP / thick.real
     area = section.width * t0

@@ -235,6 +235,7 @@ def _beam(spec: BeamSpec, beam: MemberSpec) -> engine.Beam:
         axial=spec.fidelity != "inextensible",
         shear=spec.fidelity in ("reissner", "solid"),
         poisson_ratio=of.poisson,
+        wide=mechanism.wide_beams,
     )
     return engine.Beam(
         beam.start,

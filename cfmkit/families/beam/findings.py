@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.elastica import PathStatus
+from cfmkit.elastica import PathStatus, hindered_curling
 from cfmkit.families.beam.build import thickest_of, thinnest_of
 from cfmkit.families.beam.scalar_results import window_of, within
-from cfmkit.families.findings import finder
+from cfmkit.families.findings import TOO_SOFT, finder, too_soft
 from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
@@ -49,6 +49,7 @@ FINDINGS = {
     "surface_stress_exceeded": "the stress along the surface exceeds the allowable one",
     "tip_jams": "somewhere the surface is too steep for the friction at the tip",
     "thick_beam": "a beam is short for its thickness: beam theory is inaccurate",
+    "wide_beam": "a beam is so wide that it cannot curl across its width: it is stiffer than beam theory says",
     "beams_touch": "two beams touch, or cross: contact is not modelled",
     "gap_small": "two beams are closer than can be cut",
     "sharp_corners": "without fillets the stress in inside corners has no value: it grows as the mesh gets finer",
@@ -160,7 +161,7 @@ def findings_of(solution: Solution) -> tuple[Finding, ...]:
     return tuple(
         one
         for source in (
-            _ending, _closure, _events, _stability, _accuracy, _imperfection, _stress, _slenderness, _gaps,
+            _ending, _closure, _events, _stability, _accuracy, _imperfection, _stress, _slenderness, _width, _gaps,
         )
         for one in source(solution)
     )  # fmt: skip
@@ -324,6 +325,19 @@ def _slenderness(solution: Solution) -> Iterator[Finding]:
                 f"beam {name} is {format_short(length, 'length')} long and {format_short(thickest, 'length')} thick: "
                 f"below {THICK:g} times the thickness beam theory is rough",
             )
+
+
+def _width(solution: Solution) -> Iterator[Finding]:
+    """Say by how much beams are too soft that are solved as narrow ones."""
+    if len(solution.keep) < 2 or solution.spec.mechanism.wide_beams:
+        return
+    found = hindered_curling(solution.path)
+    share, beam = found.share[solution.keep], found.beam[solution.keep]
+    worst = int(share.argmax())
+    if share[worst] > TOO_SOFT:
+        place = format_short(float(solution.motion[worst]), solution.motion_dimension)
+        where = f"at {place}, most of it in beam {beam[worst]}"
+        yield finding("wide_beam", too_soft(float(share[worst]), where), "mechanism.wide_beams=true")
 
 
 def _gaps(solution: Solution) -> Iterator[Finding]:

@@ -324,9 +324,11 @@ def _solid_faults(spec: BeamSpec) -> Iterator[str]:
 
 
 def _no_density(spec: BeamSpec) -> str:
-    """Return which density is missing for natural frequencies; nothing if none is."""
+    """Return what is missing for natural frequencies; nothing if nothing is."""
     if not spec.analysis.modes:
         return ""
+    if spec.mechanism.wide_beams:
+        return "natural frequencies are known of narrow beams only: drop mechanism.wide_beams"
     mechanism = spec.mechanism
     keys = [
         "mechanism.material.density" if beam.material is None else f"mechanism.beams.{name}.material.density"

@@ -48,6 +48,7 @@ FINDINGS = {
     "branch_begins_late": "the branch to which the kink does not lead exists only beyond some travel",
     "force_negative": "the chain pulls instead of pushing back",
     "overstressed": "the stress exceeds the allowable one within the travel",
+    "wide_beam": "strip or flexures are so wide that they cannot curl across: they are stiffer than beam theory says",
     "sharp_corners": "without fillets the stress in inside corners has no value",
     "mesh_coarse": "results on two meshes of the part differ by more than the limit",
     "too_thin": "a thickness is below the thinnest wall of the process",

@@ -32,8 +32,8 @@ if TYPE_CHECKING:
 DOWN = -0.5 * np.pi
 
 
-def section(strip: Strip, thickness: Any = None) -> Any:
-    """Return the engine's section of a leaf."""
+def section(strip: Strip, thickness: Any = None, wide: bool = False) -> Any:
+    """Return the engine's section of a leaf; `wide`: its curling across the width is hindered."""
     from cfmkit.elastica import Section
 
     return Section(
@@ -42,6 +42,7 @@ def section(strip: Strip, thickness: Any = None) -> Any:
         strip.thickness if thickness is None else thickness,
         shear=True,
         poisson_ratio=strip.poisson_ratio,
+        wide=wide,
     )
 
 
@@ -58,10 +59,11 @@ def leaf_network(spec: VcfmSpec) -> Network:
         shape, mirrored = CosineArch(h, 0.5), CosineArch(-h, 0.5)  # type: ignore[assignment]
     if about.structure == "hybrid":
         thickness = Taper(*(np.array(item) for item in about.profile))
-    beams = {"leaf": Beam("wall", "shuttle", section(strip, thickness), shape)}
+    made = section(strip, thickness, spec.mechanism.wide_beams)
+    beams = {"leaf": Beam("wall", "shuttle", made, shape)}
     if not about.guided:
         nodes["far wall"] = Node(2.0 * x, 0, CLAMPED)
-        beams["mirrored leaf"] = Beam("far wall", "shuttle", section(strip, thickness), mirrored)
+        beams["mirrored leaf"] = Beam("far wall", "shuttle", made, mirrored)
     return Network(nodes, beams)
 
 
@@ -84,7 +86,7 @@ def spring_chain(spec: VcfmSpec) -> SpringChain:
 
     about = spec.mechanism.flexures
     strip, share = strip_of(about, spec.mechanism.material), share_of(about)
-    made, wall = section(strip), Node(0, 0, CLAMPED)
+    made, wall = section(strip, wide=spec.mechanism.wide_beams), Node(0, 0, CLAMPED)
     if about.structure == "u-shape":
         radius = float(about.radius or 0.0)
         nodes = {

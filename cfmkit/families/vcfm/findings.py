@@ -7,7 +7,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.families.findings import at_least, at_most, finder, mm, mpa, newton, percent, rate
+from cfmkit.elastica.model.section import hindered_share
+from cfmkit.families.findings import (
+    TOO_SOFT,
+    at_least,
+    at_most,
+    finder,
+    mm,
+    mpa,
+    newton,
+    percent,
+    rate,
+    too_soft,
+)
 from cfmkit.families.vcfm.bought_parts import spring_faults
 from cfmkit.families.vcfm.build import spring_room
 from cfmkit.families.vcfm.leaves.hybrid import HybridLeaf
@@ -56,6 +68,7 @@ FINDINGS = {
     "measured_contradiction": "the reported force and stiffness cannot both hold for these leaves",
     "too_thin": "the design needs a leaf thinner than can be made",
     "envelope": "the design does not fit into the given space",
+    "wide_beam": "leaves are so wide that they cannot curl across their width: they are stiffer than beam theory says",
     "mesh_coarse": "results on two meshes of leaf or spring differ by more than the limit",
     "sharp_corners": "without fillets the stress in inside corners has no value",
     "spring_overstretched": "bought springs are deflected beyond their limit",
@@ -105,6 +118,7 @@ def findings_of(solution: Solution) -> tuple[Finding, ...]:
         _bought_springs,
         _strength,
         _buckling,
+        _width,
         _imperfect,
         _range,
     )
@@ -340,6 +354,28 @@ def _buckling(solution: Solution) -> Iterator[Finding]:
             f"the leaves are {mm(about.width)} wide and {mm(about.thickness)} thick: below twice the thickness they "
             "buckle out of the plane; use wider (and longer) leaves",
         )
+
+
+def _width(solution: Solution) -> Iterator[Finding]:
+    """Say by how much leaves and spring are too soft: their curvature is taken from the stress, as half a sine."""
+    spec = solution.spec
+    if spec.mechanism.wide_beams or spec.analysis.fidelity == "truss":
+        return
+    of, push = spec.mechanism.material, solution.nominal
+    for name, about, stress in (
+        ("leaves", spec.mechanism.bistable, push.leaves.stress),
+        ("spring", spec.mechanism.positive, push.spring_stress),
+    ):
+        if about is None:  # a bought spring
+            continue
+        worst = int(np.nanargmax(stress))
+        curvature = 2.0 * float(stress[worst]) / (of.modulus * about.thickness)
+        share = float(hindered_share(about.width, about.thickness, of.poisson, curvature))
+        if share > TOO_SOFT:
+            cures = ("mechanism.wide_beams=true",) if spec.analysis.fidelity in TRACED else ()
+            hint = "" if cures else ". The model 'exact' can count it ('mechanism.wide_beams')"
+            where = f"in the {name} at {mm(float(push.travel[worst]))}"
+            yield finding("wide_beam", too_soft(share, where) + hint, *cures)
 
 
 def _imperfect(solution: Solution) -> Iterator[Finding]:

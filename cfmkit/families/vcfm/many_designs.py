@@ -12,7 +12,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cfmkit.elastica.model.section import hindered_share
 from cfmkit.families.base import BlockAnswer
+from cfmkit.families.findings import TOO_SOFT
 from cfmkit.families.vcfm.build import RIM, share_of
 from cfmkit.families.vcfm.findings import PRESSED, ROUNDING, returns
 from cfmkit.families.vcfm.leaves.springs import Diamond, measured_stiffness_for
@@ -280,6 +282,7 @@ def warned(spec: VcfmSpec, slab: Slab) -> dict[str, NDArray[np.bool_]]:
             | (travel / (2.0 * spring.length) > PRESSED)
         )
         & (not paper),
+        "wide_beam": _too_wide(slab) & (not paper),
         "overstressed": _overstressed(spec, slab),
         "measured_contradiction": np.array(False),
     }
@@ -307,6 +310,16 @@ def _stays(slab: Slab) -> NDArray[np.bool_]:
     least = -pulled(place[:, None])
     back = returns(least, np.abs(slab.force).max(axis=1, keepdims=True))
     return np.asarray(falls.any(axis=1, keepdims=True) & ~back)
+
+
+def _too_wide(slab: Slab) -> NDArray[np.bool_]:
+    """Return of which designs leaves or spring are too wide for beams, (k, 1): as the finding `wide_beam` has it."""
+    found = np.zeros((len(slab.force), 1), dtype=bool)
+    for part in (slab.leaf, slab.spring):
+        strip, stress = part.strip, np.asarray(part.stress(slab.grid[None, :])).max(axis=1, keepdims=True)
+        curvature = 2.0 * stress / (strip.youngs_modulus * strip.thickness)
+        found = found | (hindered_share(strip.width, strip.thickness, strip.poisson_ratio, curvature) > TOO_SOFT)
+    return found
 
 
 def _overstressed(spec: VcfmSpec, slab: Slab) -> NDArray[np.bool_]:

@@ -178,6 +178,11 @@ class Mechanism(Model):
     positive: Positive | None = Field(None, description="the spring as a structure of leaves; or 'springs'")
     springs: BoughtSprings | None = Field(None, description="bought springs instead of 'positive'")
     bistable: Bistable
+    wide_beams: bool = Field(
+        False,
+        description="whether wide leaves stiffen as their curling across the width is hindered; exact model only, "
+        "clamped ends left out",
+    )
     frame: Frame = Field(default_factory=lambda: Frame(), description="rigid parts, for drawings")
     part: CutPart | None = Field(None, description="how both parts are cut: inside corners, sheet, holes")
 
@@ -345,6 +350,13 @@ class VcfmSpec(Spec):
         if self.design is not None and part.part is not None and part.part.sheet is not None:
             refuse("Spec", {("mechanism", "part", "sheet"): "a design finds both widths: drop the sheet, or 'design'"})
         refuse("Spec", sheet_faults(part.part, widths))
+        return self
+
+    @model_validator(mode="after")
+    def _wide_leaves_are_traced(self) -> Self:
+        if self.mechanism.wide_beams and self.analysis.fidelity in ("truss", "analytic"):
+            told = "no closed form knows it: add 'analysis.fidelity: exact'"
+            refuse("Spec", {("mechanism", "wide_beams"): told})
         return self
 
     @model_validator(mode="after")

@@ -221,6 +221,11 @@ class Mechanism(Model):
     width: PositiveLength = Field(description="out of the plane (t of Lan)")
     axial: bool = Field(False, description="whether beams stretch; `analysis.fidelity` takes precedence")
     shear: bool = Field(False, description="whether beams shear, too")
+    wide_beams: bool = Field(
+        False,
+        description="whether wide beams stiffen as their curling across the width is hindered; clamped ends, which "
+        "stiffen them further, are left out",
+    )
     closure: Literal["rotscale", "chain", "raw"] = Field(
         "rotscale",
         description=(

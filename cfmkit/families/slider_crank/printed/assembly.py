@@ -44,7 +44,7 @@ def elasticity(printed: Printed) -> Elasticity:
     given = printed.material
     if given is None:
         raise InputError("a part of flexures or a strip needs 'mechanism.material'")
-    return Elasticity(given.modulus, given.poisson, given.allowable(printed.safety_factor))
+    return Elasticity(given.modulus, given.poisson, given.allowable(printed.safety_factor), printed.wide_beams)
 
 
 def flexures_of(printed: Printed) -> tuple[Flexure, ...]:

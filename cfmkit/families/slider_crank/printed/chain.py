@@ -70,15 +70,21 @@ STRIP = "strip"
 
 @dataclass(frozen=True)
 class Elasticity:
-    """What the part is made of: modulus [Pa], Poisson ratio, largest stress allowed [Pa] (None: no limit)."""
+    """What the part is made of: modulus [Pa], Poisson ratio, largest stress allowed [Pa] (None: no limit).
+
+    `wide`: whether wide sections stiffen as their curling across the width is hindered.
+    """
 
     youngs_modulus: float
     poisson_ratio: float = 0.35
     allowable_stress: float | None = None
+    wide: bool = False
 
     def section(self, width: Any, thickness: Any) -> Section:
         """Return a rectangle that bends, stretches and shears."""
-        return Section(self.youngs_modulus, width, thickness, shear=True, poisson_ratio=self.poisson_ratio)
+        return Section(
+            self.youngs_modulus, width, thickness, shear=True, poisson_ratio=self.poisson_ratio, wide=self.wide
+        )
 
 
 @dataclass(frozen=True)

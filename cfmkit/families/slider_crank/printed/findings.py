@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.findings import mm, mpa, newton
+from cfmkit.elastica import hindered_curling
+from cfmkit.families.findings import TOO_SOFT, mm, mpa, newton, too_soft
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.printed.chain import kink
 from cfmkit.families.slider_crank.printed.scalar_results import stress_stroke
@@ -40,6 +41,7 @@ def findings_of(spec: SliderCrankSpec, solution: Solution) -> tuple[Finding, ...
             *_signs(solution),
             *_kink(spec, solution),
             *_making(spec, solution),
+            *_width(spec, solution),
             *_guide(solution),
             *friction_left_out(spec),
             *_opinion(solution),
@@ -119,6 +121,17 @@ def _making(spec: SliderCrankSpec, solution: Solution) -> Iterator[Finding]:
             f"the width is {solution.width_ratio:.3g} times the largest thickness: out of its plane the part bends "
             "nearly as easily as in it; guide it between plates, or make it wider",
         )
+
+
+def _width(spec: SliderCrankSpec, solution: Solution) -> Iterator[Finding]:
+    """Say by how much strip or flexures are too soft that are solved as narrow ones."""
+    if spec.mechanism.wide_beams:
+        return
+    share = hindered_curling(solution.pressed.path).share[solution.pressed.path.at_requested]
+    worst = int(share.argmax())
+    if share[worst] > TOO_SOFT:
+        where = f"at {mm(float(solution.travel[worst]))}"
+        yield finding("wide_beam", too_soft(float(share[worst]), where), "mechanism.wide_beams=true")
 
 
 def _guide(solution: Solution) -> Iterator[Finding]:

@@ -113,6 +113,11 @@ class Printed(Model):
     safety_factor: SafetyFactor = 1.0
     flexures: Flexures | None = Field(None, description="small flexures at the joints, rigid links between: 'lumped'")
     beam: StripSpec | None = Field(None, description="one strip of varying thickness: fidelity 'beam'")
+    wide_beams: bool = Field(
+        False,
+        description="whether a wide strip or flexure stiffens as its curling across the width is hindered; clamped "
+        "ends left out",
+    )
     process: Process | None = Field(None, description="how it is made, for warnings")
     part: PaddedPart | None = Field(None, description="how it is cut: inside corners, sheet, pads, holes")
 

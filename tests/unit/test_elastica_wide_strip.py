@@ -1,0 +1,179 @@
+"""The bending law of wide strips [Ashwell 1950]: its limits, energy, derivatives, and what it is in the engine."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cfmkit.elastica import (
+    CLAMPED,
+    Beam,
+    Control,
+    Displacement,
+    LineLoad,
+    Loading,
+    Network,
+    Node,
+    PathStatus,
+    PointLoad,
+    Section,
+    Taper,
+    arc,
+    gradient,
+    trace,
+)
+from cfmkit.elastica.model.section import curl_hindered
+
+E, B, T, NU, LENGTH = 2e9, 10e-3, 1e-3, 0.35, 50e-3
+PLATE = NU**2 / (1 - NU**2)
+TAPER = Taper(np.array([0, 0.5, 1]), np.array([T, 0.7 * T, T]))
+FINE = Control(tolerance=1e-9)
+
+
+def cantilever(section: Section, turn: float = 0.0) -> Network:
+    nodes = {"a": Node(0, 0, CLAMPED), "b": Node(LENGTH, 0)}
+    return Network(nodes, {"x": Beam("a", "b", section, arc(turn))})
+
+
+def strip(wide: bool = True, width: float = B, nu: float = NU) -> Section:
+    return Section(E, width, T, axial=False, poisson_ratio=nu, wide=wide)
+
+
+def twisted(network: Network, moment: float) -> Any:
+    return trace(network, Loading((PointLoad("b", 0, 0, 1.0),), np.array([moment])), FINE)
+
+
+def energy(bend: float, rest: float, width: float = B) -> float:
+    """Strain energy per length [J/m] of a strip of curvature `rest` that is bent by `bend` [1/m]."""
+    z = 3 * (1 - NU**2) * (width**2 / T) ** 2 * (bend + rest) ** 2
+    return float(E * width * T**3 / 24 * bend**2 * (1 + PLATE * curl_hindered(np.array(z))))
+
+
+def moment(bend: float, rest: float) -> float:
+    h = 1e-3 * abs(bend)
+    near = [energy(bend + k * h, rest) for k in (-2, -1, 1, 2)]
+    return (near[0] - 8 * near[1] + 8 * near[2] - near[3]) / (12 * h)
+
+
+def test_the_energy_is_the_least_that_any_curling_of_the_section_takes():
+    bend = 60.0
+    plate = E * T**3 / (12 * (1 - NU**2))
+    z, w = np.polynomial.legendre.leggauss(40)
+    z, w = 0.5 * B * z, 0.5 * B * w
+    even = [np.polynomial.Legendre.basis(2 * k, domain=[-B / 2, B / 2]) for k in range(8)]
+    lift, curl = np.array([p(z) for p in even]), np.array([p.deriv(2)(z) for p in even])
+    stiff = plate * (curl * w) @ curl.T + E * T * bend**2 * (lift * w) @ lift.T
+    push = plate * NU * bend * (curl * w).sum(axis=1)
+    least = 0.5 * plate * bend**2 * B - 0.5 * push @ np.linalg.solve(stiff, push)
+    assert energy(bend, 0.0) == pytest.approx(least, rel=1e-9)
+
+
+def test_a_narrow_strip_curls_freely_and_a_very_wide_one_not_at_all():
+    assert curl_hindered(np.array([0.0, 1e-12, 1e16])) == pytest.approx([0.0, 0.0, 1.0], abs=1e-3)
+
+
+def test_the_series_and_the_closed_form_of_the_law_meet():
+    from cfmkit.elastica.kernels.wide_strip import curling
+
+    below, above = (np.array(curling.py_func(z)) for z in (1.0 - 1e-12, 1.0))
+    assert below == pytest.approx(above, rel=2e-11)
+    for z in (0.3, 4.0, 900.0):
+        g, first, second = (curling.py_func(z + 1e-30j)[k] for k in range(3))
+        assert 1 - g.real == pytest.approx(curl_hindered(np.array(z)), rel=1e-11)
+        assert g.imag / 1e-30 == pytest.approx(first.real, rel=1e-11)
+        assert first.imag / 1e-30 == pytest.approx(second.real, rel=1e-9)
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.8, -0.8])
+def test_a_strip_under_an_end_moment_has_the_curvature_that_its_energy_says(turn):
+    found = twisted(cantilever(strip(), turn), 0.1)
+    length = float(np.real(found.fits["x"].length))
+    bend = float(found.motion("b")[-1, 2]) / length
+    assert moment(bend, turn / length) == pytest.approx(0.1, rel=1e-9)
+    assert found.energy[-1] == pytest.approx(energy(bend, turn / length) * length, rel=1e-9)
+
+
+def test_a_strip_without_poissons_ratio_and_a_narrow_one_are_beams():
+    for section, near in ((strip(nu=0.0), 1e-12), (strip(width=0.2e-3), 1e-7)):
+        usual = Section(E, section.width, T, axial=False, poisson_ratio=section.poisson_ratio)
+        wide, beam = (twisted(cantilever(one), 5.0 * section.width).motion("b")[-1] for one in (section, usual))
+        assert wide == pytest.approx(beam, rel=near)
+
+
+def test_a_strip_in_a_network_with_narrow_beams_does_the_work_that_it_stores():
+    narrow, wide = Section(E, 2e-3, T), Section(E, B, T, poisson_ratio=NU, shear=True, wide=True)
+    tapered = Section(E, B, TAPER, poisson_ratio=NU, wide=True)
+    nodes = {"a": Node(0, 0, CLAMPED), "b": Node(0.05, 0.03), "c": Node(0.1, 0, CLAMPED), "d": Node(0.05, 0, CLAMPED)}
+    beams = {"x": Beam("a", "b", wide, arc(0.9)), "y": Beam("b", "c", tapered), "z": Beam("b", "d", narrow)}
+    drive = Displacement("b", 0.3, np.array([0.002, 0.004]))
+    found = trace(Network(nodes, beams), drive, Control())
+    assert found.status is PathStatus.COMPLETE
+    x, w = np.polynomial.legendre.leggauss(16)
+    places = trace(Network(nodes, beams), Displacement("b", 0.3, 0.003 + 0.001 * x), Control())
+    work = 0.001 * w @ places.effort[places.at_requested]
+    before, after = found.energy[found.at_requested]
+    assert after - before == pytest.approx(work, rel=1e-6)
+
+
+def test_the_splitting_converges_fast_with_the_law():
+    """Its order falls from six to four where the energy is no square of the moment, but the departure is slight."""
+    from cfmkit.elastica.equilibrium.mesh import Mesh
+    from cfmkit.elastica.equilibrium.meshed_network import Solver
+    from cfmkit.elastica.model.layout import Layout
+
+    section = Section(E, B, TAPER, axial=False, poisson_ratio=NU, wide=True)
+    layout = Layout(cantilever(section, 1.0), Loading((PointLoad("b", 0, 1.0, 0),), np.array([1.5])))
+    found = []
+    for steps in (2, 4, 8, 64):
+        solver = Solver(layout, Mesh(2, steps))
+        drive = 1.5 / layout.scales.drive
+        spot = solver.solve(solver.unstressed(), 0.0)
+        for share in np.linspace(0.1, 1.0, 10):
+            spot = solver.solve(spot.y, share * drive)
+        found.append(spot.y[: solver.n_free].copy())
+    errors = [float(np.abs(one - found[-1]).max()) for one in found[:-1]]
+    assert errors[0] < 2e-7
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(4.0, abs=0.3)
+    assert np.log2(errors[1] / errors[2]) == pytest.approx(4.0, abs=0.3)
+
+
+def test_derivatives_are_those_of_differences():
+    def build(x: Any) -> Network:
+        section = Section(x[0] * 1e9, x[1] * 1e-3, x[2] * 1e-3, poisson_ratio=x[3], wide=True)
+        nodes = {"a": Node(0, 0, CLAMPED), "b": Node(x[4] * 1e-2, 0.02), "c": Node(0.1, 0, CLAMPED)}
+        beams = {
+            "ab": Beam("a", "b", section, arc(x[5])),
+            "bc": Beam("b", "c", Section(2e9, 4e-3, x[2] * 1e-3)),
+        }
+        return Network(nodes, beams, loads=(LineLoad("ab", 0.0, -20.0),))
+
+    x0 = np.array([2.0, 10.0, 1.0, 0.35, 5.0, 0.7])
+    drive = Displacement("b", -np.pi / 2, np.array([2e-3, 6e-3]))
+    control = Control(tolerance=1e-11)
+
+    def outputs(x: Any) -> Any:
+        path = trace(build(x), drive, control)
+        keep = path.at_requested
+        bending = path.sections("ab").bending_stress[keep][:, ::4]
+        return np.concatenate([path.effort[keep], 1e3 * path.energy[keep], 1e-6 * bending.ravel()])
+
+    path = trace(build(x0), drive, control)
+    found = gradient(path, build, x0)
+    stress = found.sections("ab").bending_stress[:, ::4]
+    own = np.concatenate([found.effort, 1e3 * found.energy, 1e-6 * stress.reshape(-1, len(x0))])
+    for k in range(len(x0)):
+        h = 2e-4 * x0[k]
+        near = [outputs(x0 + j * h * np.eye(len(x0))[k]) for j in (-2, -1, 1, 2)]
+        differences = (near[0] - 8 * near[1] + 8 * near[2] - near[3]) / (12 * h)
+        assert own[:, k] == pytest.approx(differences, rel=2e-6, abs=2e-6 * np.abs(differences).max())
+
+
+def test_a_tape_that_is_bent_back_ends_where_it_would_snap():
+    thin = Section(2e11, 25e-3, 0.1e-3, axial=False, poisson_ratio=0.3, wide=True)
+    nodes = {"a": Node(0, 0, CLAMPED), "b": Node(0.02, 0)}
+    network = Network(nodes, {"x": Beam("a", "b", thin, arc(-5.0))})
+    found = trace(network, Loading((PointLoad("b", 0, 0, 1.0),), np.array([0.2])), Control())
+    assert found.status is not PathStatus.COMPLETE
+    assert np.isfinite(found.motion("b")).all()
