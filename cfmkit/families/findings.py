@@ -72,7 +72,9 @@ def percent(value: float) -> str:
 
 
 def too_soft(share: float, where: str) -> str:
-    """Return the sentence of the finding `wide_beam`: by what share of the energy of bending, and where that is."""
+    """Return what the finding `wide_beam` says: by what share of the force, and where; nothing of a small one."""
+    if not share > TOO_SOFT:
+        return ""
     return (
         f"beams that are wide for their thickness cannot curl across their width: the force is about {percent(share)} "
         f"larger {where}; where their ends are clamped it is more"

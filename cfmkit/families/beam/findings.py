@@ -15,7 +15,7 @@ import numpy as np
 from cfmkit.elastica import PathStatus, hindered_curling
 from cfmkit.families.beam.build import thickest_of, thinnest_of
 from cfmkit.families.beam.scalar_results import window_of, within
-from cfmkit.families.findings import TOO_SOFT, finder, too_soft
+from cfmkit.families.findings import finder, too_soft
 from cfmkit.specs.units import format_short
 
 if TYPE_CHECKING:
@@ -334,10 +334,9 @@ def _width(solution: Solution) -> Iterator[Finding]:
     found = hindered_curling(solution.path)
     share, beam = found.share[solution.keep], found.beam[solution.keep]
     worst = int(share.argmax())
-    if share[worst] > TOO_SOFT:
-        place = format_short(float(solution.motion[worst]), solution.motion_dimension)
-        where = f"at {place}, most of it in beam {beam[worst]}"
-        yield finding("wide_beam", too_soft(float(share[worst]), where), "mechanism.wide_beams=true")
+    place = format_short(float(solution.motion[worst]), solution.motion_dimension)
+    if told := too_soft(float(share[worst]), f"at {place}, most of it in beam {beam[worst]}"):
+        yield finding("wide_beam", told, "mechanism.wide_beams=true")
 
 
 def _gaps(solution: Solution) -> Iterator[Finding]:

@@ -7,19 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.elastica.model.section import hindered_share
-from cfmkit.families.findings import (
-    TOO_SOFT,
-    at_least,
-    at_most,
-    finder,
-    mm,
-    mpa,
-    newton,
-    percent,
-    rate,
-    too_soft,
-)
+from cfmkit.families.findings import at_least, at_most, finder, mm, mpa, newton, percent, rate, too_soft
 from cfmkit.families.vcfm.bought_parts import spring_faults
 from cfmkit.families.vcfm.build import spring_room
 from cfmkit.families.vcfm.leaves.hybrid import HybridLeaf
@@ -357,25 +345,11 @@ def _buckling(solution: Solution) -> Iterator[Finding]:
 
 
 def _width(solution: Solution) -> Iterator[Finding]:
-    """Say by how much leaves and spring are too soft: their curvature is taken from the stress, as half a sine."""
-    spec = solution.spec
-    if spec.mechanism.wide_beams or spec.analysis.fidelity == "truss":
-        return
-    of, push = spec.mechanism.material, solution.nominal
-    for name, about, stress in (
-        ("leaves", spec.mechanism.bistable, push.leaves.stress),
-        ("spring", spec.mechanism.positive, push.spring_stress),
-    ):
-        if about is None:  # a bought spring
-            continue
-        worst = int(np.nanargmax(stress))
-        curvature = 2.0 * float(stress[worst]) / (of.modulus * about.thickness)
-        share = float(hindered_share(about.width, about.thickness, of.poisson, curvature))
-        if share > TOO_SOFT:
-            cures = ("mechanism.wide_beams=true",) if spec.analysis.fidelity in TRACED else ()
-            hint = "" if cures else ". The model 'exact' can count it ('mechanism.wide_beams')"
-            where = f"in the {name} at {mm(float(push.travel[worst]))}"
-            yield finding("wide_beam", too_soft(share, where) + hint, *cures)
+    exact = solution.spec.analysis.fidelity in TRACED
+    cures, hint = (("mechanism.wide_beams=true",), "") if exact else ((), "; only 'analysis.fidelity: exact' counts it")
+    for name, share, place in solution.hindered_curling:
+        if told := too_soft(share, f"in the {name} at {mm(place)}"):
+            yield finding("wide_beam", told + hint, *cures)
 
 
 def _imperfect(solution: Solution) -> Iterator[Finding]:

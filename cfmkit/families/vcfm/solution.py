@@ -15,6 +15,8 @@ from cfmkit.families.vcfm.longest_window import extreme, flat_window
 from cfmkit.specs.units import between
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from cfmkit.arrays import FloatArray
     from cfmkit.families.vcfm.build import Parts
     from cfmkit.families.vcfm.spec import VcfmSpec
@@ -126,6 +128,23 @@ class Solution:
             np.isfinite(self.character.linear[0]) and kinds[1] != "hybrid"
         )
         return None if bears or kinds[0] == "straight" else force
+
+    @property
+    def hindered_curling(self) -> Iterator[tuple[str, float, float]]:
+        """By what share leaves and spring are too soft at most, as wide strips, and at which travel [m].
+
+        Their curvature is taken from the stress, as if they were bent to half a sine.
+        """
+        about, push = self.spec.mechanism, self.nominal
+        if about.wide_beams or self.spec.analysis.fidelity == "truss":
+            return
+        own, nu = about.material.modulus, about.material.poisson
+        parts = (("leaves", about.bistable, push.leaves.stress), ("spring", about.positive, push.spring_stress))
+        for name, leaf, stress in parts:
+            if leaf is not None:  # a bought spring is none
+                worst = int(np.nanargmax(stress))
+                curvature = 2.0 * float(stress[worst]) / (own * leaf.thickness)
+                yield name, float(hindered_share(leaf.width, leaf.thickness, nu, curvature)), float(push.travel[worst])
 
     @cached_property
     def windows(self) -> tuple[tuple[float, float] | None, ...]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.elastica import hindered_curling
-from cfmkit.families.findings import TOO_SOFT, mm, mpa, newton, too_soft
+from cfmkit.families.findings import mm, mpa, newton, too_soft
 from cfmkit.families.slider_crank.findings import finding
 from cfmkit.families.slider_crank.printed.chain import kink
 from cfmkit.families.slider_crank.printed.scalar_results import stress_stroke
@@ -129,9 +129,8 @@ def _width(spec: SliderCrankSpec, solution: Solution) -> Iterator[Finding]:
         return
     share = hindered_curling(solution.pressed.path).share[solution.pressed.path.at_requested]
     worst = int(share.argmax())
-    if share[worst] > TOO_SOFT:
-        where = f"at {mm(float(solution.travel[worst]))}"
-        yield finding("wide_beam", too_soft(float(share[worst]), where), "mechanism.wide_beams=true")
+    if told := too_soft(float(share[worst]), f"at {mm(float(solution.travel[worst]))}"):
+        yield finding("wide_beam", told, "mechanism.wide_beams=true")
 
 
 def _guide(solution: Solution) -> Iterator[Finding]:
