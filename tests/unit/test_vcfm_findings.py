@@ -404,8 +404,9 @@ def test_every_finding_is_explained_and_no_other_can_be_made():
     tested = {*CASES, "preload_out_of_range", "force_reversal", "unstable_branch", "stroke_unreachable"}
     designs = {"too_thin", "envelope", "stress_unreachable"}  # the first two: test_vcfm_design.py
     solids = {"sharp_corners", "mesh_coarse"}  # test_vcfm_solid.py
+    wide = {"wide_beam"}  # test_wide_beams.py
     bought = {"spring_overstretched", "spring_slack", "no_spring_fits"}  # test_vcfm_bought_springs.py
-    assert tested | designs | solids | bought == set(FINDINGS)
+    assert tested | designs | solids | wide | bought == set(FINDINGS)
     with pytest.raises(KeyError):
         finding("bad_luck", "")
 

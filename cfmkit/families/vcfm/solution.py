@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
+from cfmkit.elastica.model.section import hindered_share
 from cfmkit.families.vcfm.longest_window import extreme, flat_window
 from cfmkit.specs.units import between
 

@@ -1,0 +1,65 @@
+"""What families say and do of beams that are too wide to curl: the finding `wide_beam`, the key `wide_beams`."""
+
+from __future__ import annotations
+
+import pytest
+from beam_support import CONFIGS
+
+import cfmkit
+from cfmkit.errors import SpecError
+
+LAN, DING = CONFIGS / "beam_lan2010.yaml", CONFIGS / "vcfm_ding2022.yaml"
+STRIP = CONFIGS / "slider_crank_strip.yaml"
+
+
+def changed(path, *changes):
+    return cfmkit.load(path, changes)
+
+
+def told(path, *changes):
+    found = cfmkit.analyze(changed(path, *changes))
+    return [one for one in found.warnings if one.name == "wide_beam"]
+
+
+def test_lans_part_is_too_soft_by_what_its_energy_says_and_the_cure_counts_it():
+    """To first order in the energy of the curve: 3.6 % at 2 mm, 5.1 at 10, 5.7 at 13.5; the force grows by more."""
+    short = ("analysis.travel=13.5 mm", "analysis.points=28")
+    (one,) = told(LAN, *short)
+    assert "about 5.67 % larger at 13.5 mm" in one.message
+    assert one.cures == ("mechanism.wide_beams=true",)
+    assert told(LAN, *short, "mechanism.wide_beams=true") == []
+    narrow, wide = (cfmkit.analyze(changed(LAN, *short, *more)).curve for more in ((), ("mechanism.wide_beams=true",)))
+    assert wide.force[4] / narrow.force[4] - 1 == pytest.approx(0.0372, abs=2e-4)
+    assert wide.force[20] / narrow.force[20] - 1 == pytest.approx(0.0602, abs=2e-4)
+
+
+def test_narrow_beams_are_not_told_of():
+    assert told(LAN, "mechanism.width=1 mm", "analysis.points=11") == []
+    assert told(DING) == []
+
+
+def test_wide_leaves_are_told_of_and_only_the_exact_model_counts_them():
+    wide = "mechanism.bistable.width=20 mm"
+    (one,) = told(DING, wide)
+    assert "4.74 % larger in the leaves at 4.263 mm" in one.message
+    assert "only 'analysis.fidelity: exact' counts it" in one.message
+    with pytest.raises(SpecError, match=r"mechanism\.wide_beams: no closed form knows it"):
+        changed(DING, wide, "mechanism.wide_beams=true")
+
+
+def test_a_wide_strip_is_told_of():
+    (one,) = told(STRIP, "mechanism.beam.width=30 mm", "analysis.points=15", "design=null")
+    assert "larger at" in one.message
+
+
+@pytest.mark.parametrize("value", ["3", "wide", "[true]", "null"])
+@pytest.mark.parametrize("path", [LAN, DING, STRIP])
+def test_anything_but_a_truth_value_is_refused(path, value):
+    with pytest.raises(SpecError) as error:
+        changed(path, f"mechanism.wide_beams={value}")
+    assert [problem.path for problem in error.value.problems] == ["mechanism.wide_beams"]
+
+
+def test_natural_frequencies_do_not_know_wide_beams():
+    with pytest.raises(SpecError, match="known of narrow beams only"):
+        changed(LAN, "mechanism.wide_beams=true", "analysis.modes=2", "mechanism.material.density=1410 kg/m^3")
