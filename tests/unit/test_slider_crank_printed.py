@@ -147,6 +147,26 @@ def test_a_chain_that_begins_late_on_its_other_side_says_from_where() -> None:
     assert found.travel[0] > 0
 
 
+@pytest.mark.parametrize(
+    ("name", "unloaded", "begins"),
+    [("strip", "0.542 rad", 0.03745), ("strip", "0.6 rad", 0.30468), ("tapered", "0.55 rad", 0.05605)],
+)
+def test_a_branch_that_begins_late_begins_at_its_limit_point_whatever_the_points(
+    name: str, unloaded: str, begins: float
+) -> None:
+    """The strip was said to begin at 0.85 mm with 41 points, at 0.07 mm with 481."""
+    found = []
+    for points in (41, 301):
+        changes = ("analysis.side=before", f"mechanism.unloaded_angle={unloaded}", f"analysis.points={points}")
+        one = api.analyze(spec(name, *changes, "analysis.recheck=false"))
+        travel = one.curve.motion
+        assert travel[0] == pytest.approx(begins * MM, rel=1e-4)
+        assert np.diff(travel)[1:] == pytest.approx(travel[-1] / (points - 1))  # none behind the limit point is missing
+        metrics = api.evaluate(one, ("usable_stroke", "force_max", "force_min", "stress_max"))
+        found.append([metric.value for metric in metrics.values()])
+    assert found[0] == pytest.approx(found[1], rel=1e-6)
+
+
 LONG_WAYS = {
     "right": ("56.9 mm", "-30.2 mm", "110.5 mm", "5.48 deg", "131.6 mm"),
     "left": ("69.4 mm", "-41.1 mm", "110.4 mm", "-0.87 deg", "115.5 mm"),
@@ -604,6 +624,7 @@ PLACES += ("band_range_5pct", "run_in_95", "run_in_98")
         ("tapered", ()),
         ("tapered", ("analysis.fidelity=lumped",)),
         ("strip", ("mechanism.unloaded_angle=0.5404195002705842 rad",)),  # a corner, where the straight strip buckles
+        ("strip", ("analysis.side=before",)),  # this branch begins with a limit point
         ("strip", ("analysis.side=beyond", "mechanism.material.yield_strength=30 MPa")),
         ("strip", ("analysis.travel=[5 mm, 30 mm]", "analysis.window=[6 mm, 29 mm]")),
     ],

@@ -173,7 +173,7 @@ class BetweenPoints:
     def _poses(self, changes: FloatArray) -> FloatArray:
         """Return the largest change of positions and rotations in each of some changes of the unknowns, (n,)."""
         solver = self.path.solver
-        inner = np.abs(changes[:, solver.n :].reshape(len(changes), -1, 6)[:, :, :3])
+        inner = np.abs(changes[:, solver.n :].reshape(len(changes), solver.n_segments, 6)[:, :, :3])
         free = np.abs(changes[:, : solver.n_free])
         return np.asarray(np.maximum(inner.max(axis=(1, 2), initial=0.0), free.max(axis=1, initial=0.0)))
 

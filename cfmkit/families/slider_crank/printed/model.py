@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.curves import Column, Curve
+from cfmkit.elastica.outcome.between_points import between_points
 from cfmkit.errors import InputError
 from cfmkit.families.no_mechanism import CannotBuild, no_result
 from cfmkit.families.slider_crank.build import linkage_of, resolve, side_of, unloaded_angle
@@ -118,7 +119,7 @@ def analyze(spec: SliderCrankSpec, run: Run) -> Result:
         target=spec.design.force if spec.design else None,
         reference=spec.analysis.reference_travel,
         allowable_stress=solution.material.allowable_stress,
-        closed=solution.course,
+        closed=solution.course or between_points(pressed.path, float(solution.legs)),
         state=solution,
     )
 

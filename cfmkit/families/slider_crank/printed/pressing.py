@@ -18,7 +18,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.arrays import read_only
 from cfmkit.elastica import Control, Displacement, Path, PathStatus, trace
+from cfmkit.elastica.equilibrium.meshed_network import Points
+from cfmkit.elastica.kernels.codes import REQUESTED
+from cfmkit.elastica.outcome.between_points import between_points
 from cfmkit.elastica.sensitivity.neighbour import neighbouring
 from cfmkit.families.slider_crank.printed.chain import SLIDER, kink, mirrored
 
@@ -29,6 +33,7 @@ if TYPE_CHECKING:
 
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica import Network
+    from cfmkit.elastica.equilibrium.meshed_network import Spot
 
 
 FIRST_STEP = 1e-5
@@ -42,6 +47,16 @@ BOW = 2e-3
 
 FEWEST = 2
 """A curve has at least so many points."""
+
+NEAR_LIMIT = 1e-12
+"""Last step back towards the limit point of a branch, as a share of the travel at which the branch is known: the force
+there goes with the root of the distance, and is right to 1e-6."""
+
+BESIDE = 1e-4
+"""Where the slope of the branch is taken, as a share of the travel at its first known point."""
+
+ASTRAY = 0.3
+"""How far unknowns may be from their prediction in such a step, as a share of their change; else another branch."""
 
 BENT = 0.1
 """Offset beyond which it is a frame rather than a chain, and goes where its shape sends it."""
@@ -188,7 +203,7 @@ class Chain:
         path = neighbouring(known, self.build(self.points), drive)
         first = _beginning(path, drive) if other else 0
         if other and 0 < first < len(drive.points):
-            path = _since(path, first)
+            path = _from_its_limit(_since(path, first), drive.points[:first])
             text = f"with its kink the other way the chain has an equilibrium from {path.drive[0] * 1e3:.4g} mm on only"
             return Pressed(path, Ending.STARTS_LATE, text, wanted)
         return self._judged(path, wanted)
@@ -257,6 +272,65 @@ def _beginning(path: Path, drive: Displacement) -> int:
 def _since(path: Path, first: int) -> Path:
     """Return a path from the point with a number on."""
     return part_of(path, path.requested >= first)
+
+
+def _from_its_limit(path: Path, missing: FloatArray) -> Path:
+    """Return a path that is followed back to the limit point that it begins with, which becomes its first point.
+
+    Parameters
+    ----------
+    path : Path
+        Without the first of the points that were requested.
+    missing : (m,) array
+        The travels that were requested before it begins [m]; those behind the limit point are found on the way.
+    """
+    found = _followed_back(path)
+    if not found:
+        return path
+    back = Points.none(path.solver.size).joined(*(Points.of(spot, -1) for spot in reversed(found)))
+    longer = _with_points_before(path, back)
+    between, places = between_points(longer), missing[missing > longer.drive[0]]
+    if between is None:
+        return path
+    more = between.at(places)
+    number = len(missing) - len(places)
+    info = np.concatenate([back.info, more.points.info])
+    info[0, REQUESTED], info[len(back) :, REQUESTED] = number - 1, np.arange(number, len(missing))
+    drives, y = np.concatenate([back.drive, more.points.drive]), np.concatenate([back.y, more.points.y])
+    kept = np.concatenate([np.ones(len(back), dtype=bool), more.accurate])
+    order = [k for k in np.argsort(drives, kind="stable").tolist() if kept[k]]
+    return _with_points_before(path, Points(y[order], drives[order], info[order]))
+
+
+def _followed_back(path: Path) -> list[Spot]:
+    """Return equilibria from the first point of a path back to a limit point of its travel, in this order."""
+    solver, y, drive = path.solver, path.points.y[0], float(path.points.drive[0])
+    beside = solver.solve(y, drive * (1.0 + BESIDE))  # tells the slope
+    if beside is None:
+        return []
+    before, last, step = beside.y, beside.drive, BESIDE * drive
+    unstable, found = int(path.points.unstable[0]), []
+    while step > NEAR_LIMIT * path.points.drive[0]:
+        guess = y + (y - before) * (step / (last - drive))
+        spot = solver.solve(guess, drive - step)
+        off = np.inf if spot is None else np.abs(spot.y - guess).max()
+        if spot is None or spot.unstable > unstable or off > ASTRAY * np.abs(guess - y).max():
+            step *= 0.5
+            continue
+        y, before, drive, last = spot.y, y, spot.drive, drive
+        found.append(spot)
+        step = min(2.0 * step, 0.5 * drive)
+    return found
+
+
+def _with_points_before(path: Path, points: Points) -> Path:
+    """Return a path with more points before its first."""
+    return replace(
+        path,
+        points=points.joined(path.points),
+        branch=np.concatenate([np.repeat(path.branch[:1], len(points)), path.branch]),
+        accurate=read_only(np.concatenate([np.ones(len(points), dtype=bool), path.accurate]), np.bool_),
+    )
 
 
 def part_of(path: Path, keep: NDArray[np.bool_]) -> Path:
