@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 import cfmkit
-from cfmkit import api
+from cfmkit.families import family
 
 SPECS = {
     "configs/vcfm_u_shape.yaml": ["analysis.travel=0.8 mm"],
@@ -45,7 +45,7 @@ def by_ccx(data: bytes) -> tuple[float, float]:
 def by_cfmkit(spec: cfmkit.Spec) -> list[float]:
     """Return the same of every part of a specification, in the order of its decks."""
     found = []
-    for one in api.elastic_parts(spec):
+    for one in family(spec.family).driven_parts(spec):
         solved = one.part.meshed(one.size).followed(np.linspace(0.0, one.stops[-1], len(one.stops)).tolist())
         supports, pose = solved.problem.supports, solved.course.poses[-1]
         forces = solved.problem.elements.forces(solved.moved(pose))

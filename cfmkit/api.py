@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from cfmkit.errors import UsageError
 from cfmkit.families import family, origin
-from cfmkit.families.base import Run, function_named
+from cfmkit.families.base import Run
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from cfmkit.metrics import Outcome, Window
     from cfmkit.results import Design, Quantity, Result
     from cfmkit.runs.notebook import AnalysisView
-    from cfmkit.solid.two_meshes import DrivenPart
     from cfmkit.specs.spec import Spec
     from cfmkit.studies.outcome import StudyResult
     from cfmkit.studies.suggest.search import Suggestions
@@ -162,11 +161,16 @@ def design(spec: AnySpec, run: Run | None = None) -> Design:
         raise UsageError(f"{record.phrase} cannot be designed, only analysed")
     run = run or Run()
     found = record.design(spec, run)
-    if getattr(getattr(spec, "design", None), "yield", None) is None:
-        return found
-    from cfmkit.studies.margins import with_design_margins
+    asked = getattr(spec, "design", None)
+    if getattr(asked, "yield", None) is not None:
+        from cfmkit.studies.margins import with_design_margins
 
-    return with_design_margins(spec, found, run)
+        found = with_design_margins(spec, found, run)
+    if getattr(asked, "verify", None) is not None:
+        from cfmkit.studies.verified_design import verified
+
+        found = verified(spec, found, run)
+    return found
 
 
 def evaluate(
@@ -426,15 +430,7 @@ def _decks(spec: Spec) -> dict[str, bytes]:
         raise UsageError(f"--format inp: {record.phrase} has no elastic part to be solved")
     from cfmkit.solid.input_deck import deck
 
-    return {f"{one.name}.inp": deck(f"{spec.name}, {one.name}", one) for one in elastic_parts(spec)}
-
-
-def elastic_parts(spec: AnySpec) -> tuple[DrivenPart, ...]:
-    """Return the parts of a mechanism that are solved as planar solids; none where its family has none."""
-    spec = spec_of(spec)
-    record = family(spec.family)
-    found: tuple[DrivenPart, ...] = function_named(record.elastic_parts)(spec) if record.elastic_parts else ()
-    return found
+    return {f"{one.name}.inp": deck(f"{spec.name}, {one.name}", one) for one in record.driven_parts(spec)}
 
 
 def _formats(given: str | Sequence[str] | None, usual: Sequence[str]) -> tuple[str, ...]:

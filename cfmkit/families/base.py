@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.curves import Kind
     from cfmkit.results import Design, Result
+    from cfmkit.solid.two_meshes import DrivenPart
     from cfmkit.specs.spec import Spec
 
 
@@ -337,6 +338,8 @@ class Family:
     elastic_parts : str, optional
         ``"module:function"`` with ``function(spec) -> (DrivenPart, ...)``: what is solved as planar solids, for decks
         of finite-element solvers; imported when exporting.
+    levels : tuple of str
+        Dotted paths of the forces that its `design` block may ask for.
     headline : tuple of str
         Values and metrics that are shown first after a run, in this order.
     branches : tuple of str
@@ -374,6 +377,7 @@ class Family:
     elastic_parts: str | None = None
     propose: str | None = None
     room: str | None = None
+    levels: tuple[str, ...] = ()
     headline: tuple[str, ...] = ()
     branches: tuple[str, ...] = ()
     template: str = ""
@@ -402,6 +406,11 @@ class Family:
         model = self.models[spec.fidelity or only]
         function: Analyzer = function_named(model) if isinstance(model, str) else model
         return function(spec, run)
+
+    def driven_parts(self, spec: Spec) -> tuple[DrivenPart, ...]:
+        """Return the parts of a mechanism that are solved as planar solids; none where the family has none."""
+        found: tuple[DrivenPart, ...] = function_named(self.elastic_parts)(spec) if self.elastic_parts else ()
+        return found
 
 
 def packaged(name: str) -> str:

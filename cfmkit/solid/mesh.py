@@ -113,7 +113,7 @@ def mesh(
     if (around := sum(float(ring.places[-1]) for ring in rings)) > size * MOST_NODES:
         raise _too_many(int(around / size))
     field = sizes(rings, size, share, across)
-    laid = [_laid(ring, field) for ring in rings]
+    laid = [_laid(ring, field, _crossings(ring, seams, field)) for ring in rings]
     fixed = np.concatenate([ring.at(arc) for ring, arc in zip(rings, laid, strict=True)])
     sewn = np.concatenate([np.zeros((0, 2)), *(_sewn(region, field, seam) for seam in seams)])
     kept_from = Spacing(field, sewn)
@@ -156,9 +156,38 @@ def _region(rings: tuple[Ring, ...]) -> Any:
     return region
 
 
-def _laid(ring: Ring, field: Sizes) -> FloatArray:
-    """Return the arc lengths (k,) [m] of the nodes on a ring: corners, and between them places by size."""
-    stops = ring.places[ring.corners] if len(ring.corners) else np.zeros(1)
+STEEP = 0.5
+"""Sine of the angle at which a seam must cross an edge to begin at a node of it."""
+
+
+def _crossings(ring: Ring, seams: Sequence[FloatArray], field: Sizes) -> FloatArray:
+    """Return the arc lengths (k,) [m] at which seams cross a ring, but for those next to its corners."""
+    along = np.roll(ring.points, -1, axis=0) - ring.points
+    found = []
+    for start, end in seams:
+        seam, way = end - start, start - ring.points
+        det = along[:, 0] * seam[1] - along[:, 1] * seam[0]
+        steep = np.abs(det) > STEEP * ring.lengths * np.hypot(*seam)
+        det = np.where(steep, det, 1.0)
+        share = (way[:, 0] * seam[1] - way[:, 1] * seam[0]) / det
+        on_seam = (way[:, 0] * along[:, 1] - way[:, 1] * along[:, 0]) / det
+        slack = 1e-6  # ends of seams stand on edges, but for rounding
+        met = steep & (share >= 0) & (share < 1) & (on_seam >= -slack) & (on_seam <= 1 + slack)
+        found.append(ring.places[:-1][met] + share[met] * ring.lengths[met])
+    arcs = np.unique(np.concatenate([np.zeros(0), *found]))
+    if not len(arcs):
+        return arcs
+    corners = ring.at(ring.places[ring.corners]) if len(ring.corners) else np.full((1, 2), np.inf)
+    places = ring.at(arcs)
+    away = np.hypot(*(places[:, None] - corners).transpose(2, 0, 1)).min(axis=1)
+    apart = np.diff(arcs, prepend=-np.inf) > 0.2 * field(places)
+    return np.asarray(arcs[(away > 0.2 * field(places)) & apart])
+
+
+def _laid(ring: Ring, field: Sizes, crossings: FloatArray) -> FloatArray:
+    """Return the arc lengths (k,) [m] of the nodes on a ring: corners, crossings, and between them places by size."""
+    stops = np.unique(np.concatenate([ring.places[ring.corners], crossings]))
+    stops = stops if len(stops) else np.zeros(1)
     ends = np.append(stops[1:], stops[0] + ring.places[-1])
     found = []
     for low, high in zip(stops, ends, strict=True):

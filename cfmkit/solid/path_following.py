@@ -37,6 +37,8 @@ CORNER, SEEN, SHORT = 0.3, 0.1, 8.0
 many smallest ones: a smooth curve changes less and less, one that does not has a corner, as at a bifurcation."""
 PUSHES = np.geomspace(1e-4, 0.1, 13)
 """Amplitudes along the softest mode, in parts of the part's size: a branch leaves its bifurcation like a root."""
+NEAR = 1e-3
+"""How closely the travel is found at which a part touches itself, in parts of the whole travel."""
 BEYOND = (2.0, 8.0, 32.0)
 """How far beyond a bifurcation its branch is looked for, in smallest steps."""
 MODE_ROUNDS = 30
@@ -53,6 +55,7 @@ class PathEnd(enum.Enum):
     UNSTABLE = "the part loses its stability, and no stable branch was found"
     LOST = "no equilibrium was found within the smallest step"
     NO_START = "the part has no equilibrium at rest"
+    CONTACT = "the part touches itself"
 
 
 @dataclass(frozen=True)
@@ -66,11 +69,22 @@ class PosePath:
     ending : PathEnd
     bifurcations : tuple of float
         Travels at which another branch was taken [m or rad].
+    touching : (2,) array or None
+        Where the part touches itself just beyond the last pose, on the part as it is then [m].
     """
 
     poses: tuple[Balance, ...]
     ending: PathEnd
     bifurcations: tuple[float, ...] = ()
+    touching: FloatArray | None = None
+
+    @property
+    def ended(self) -> str:
+        """Why it ended early, with the place where it touches itself; empty if it did not."""
+        if self.touching is None:
+            return self.ending.value
+        x, y = (1e3 * self.touching).tolist()
+        return f"{self.ending.value} at ({x:.4g} mm, {y:.4g} mm)"
 
     @property
     def travel(self) -> FloatArray:
@@ -111,6 +125,12 @@ def follow(
             ahead = stop if abs(stop - state.travel) <= abs(step) * (1 + 1e-9) else state.travel + step
             found = advanced(problem, state, ahead, before)
             steepest = max(abs(pose.stiffness) for pose in course.poses)
+            spot = None if found is None else touching(problem, found)
+            if spot is not None:
+                if abs(ahead - state.travel) <= NEAR * abs(span):
+                    return replace(course, ending=PathEnd.CONTACT, touching=spot)
+                step = 0.5 * (ahead - state.travel)
+                continue
             if found is not None and found.unstable <= state.unstable:
                 if bends(state, found, steepest) and abs(ahead - state.travel) > SHORT * SMALLEST * abs(span):
                     step = 0.5 * (ahead - state.travel)  # between poses the curve is a cubic: none has a corner
@@ -134,6 +154,34 @@ def follow(
             course, state = replace(course, poses=(*course.poses, found.kept())), found
             report((state.travel - stops[0]) / span)
     return course
+
+
+def touching(problem: SolidProblem, pose: Balance) -> FloatArray | None:
+    """Return where the boundary crosses itself at a pose (2,) [m]; None where it does not.
+
+    What moves as one rigid piece cannot cross itself. Edges are lines between nodes: two that touch overlap by their
+    sagitta at most.
+    """
+    from shapely import STRtree, crosses, linestrings
+
+    elements, supports = problem.elements, problem.supports
+    edges = elements.mesh.edges
+    places = elements.mesh.nodes + supports.displaced(pose.unknowns, pose.travel)
+    pieces = np.concatenate([edges[:, [0, 2]], edges[:, [2, 1]]])
+    rigid = -np.ones(len(places), int)
+    for number, group in enumerate(supports.groups):
+        rigid[group.nodes] = number
+    of = np.where(rigid[pieces[:, 0]] == rigid[pieces[:, 1]], rigid[pieces[:, 0]], -1)
+    lines = linestrings(places[pieces])
+    own, others = STRtree(lines).query(lines)
+    apart = (own < others) & ((of[own] < 0) | (of[own] != of[others]))
+    own, others = own[apart], others[apart]
+    apart = (pieces[own][:, :, None] != pieces[others][:, None, :]).all(axis=(1, 2))  # neighbours share a node
+    own, others = own[apart], others[apart]
+    met = np.flatnonzero(crosses(lines[own], lines[others]))
+    if not len(met):
+        return None
+    return np.asarray(lines[own[met[0]]].intersection(lines[others[met[0]]]).coords[0])
 
 
 def bends(state: Balance, found: Balance, steepest: float) -> bool:

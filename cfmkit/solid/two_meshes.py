@@ -82,7 +82,7 @@ class TwoMeshes:
 
     def no_curve(self, poses: int) -> str:
         """Return why one of the meshes has fewer poses than a curve needs; empty if none has."""
-        short = (one.course.ending.value for one in (self.coarse, self.fine) if len(one.course.poses) < poses)
+        short = (one.course.ended for one in (self.coarse, self.fine) if len(one.course.poses) < poses)
         return next(short, "")
 
     @property

@@ -103,9 +103,6 @@ class SolidAnalysis(Model):
     mesh: Annotated[Length, Field(gt=0)] | None = Field(
         None, description="side of an element; default: 0.4 of the thickness of the thinnest beam, leaf or strip"
     )
-    law: Literal["st-venant-kirchhoff", "neo-hookean"] = Field(
-        "st-venant-kirchhoff", description="material law at large strain"
-    )
 
 
 class Sweep(Model):
@@ -212,6 +209,11 @@ class DesignKeys(Model):
         None,
         description="after margins to first order: 24 drawn parts are solved at each step, and the mean of the worst "
         "share of them counts (cvar), or the worst",
+    )
+    verify: Literal["solid"] | None = Field(
+        None,
+        description="solid: the design ends with the part as drawn, as a planar solid; its widths (from a sheet: the "
+        "force that is designed for) are corrected once, so that the solid's mean force is the wanted one",
     )
     samples: int = Field(
         400, ge=20, le=1_000_000, description="parts that are drawn from the tolerances to judge the design"
@@ -325,6 +327,11 @@ class Spec(Model):
         }
         refuse("Spec", faults)
         return self
+
+    @property
+    def widths(self) -> Mapping[str, float | None]:
+        """What is cut from a sheet: each width out of the plane [m], by its key below `mechanism`."""
+        return {}
 
     def windows(self) -> Iterator[tuple[tuple[str | int, ...], Ends]]:
         """Yield (path, window) of the analysis, then of each requirement that has its own."""

@@ -8,7 +8,7 @@ One rule: the allowable stress is the yield strength over `safety_factor`, which
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import TYPE_CHECKING, Annotated, Any, Self
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, Field, model_validator
 
@@ -120,6 +120,11 @@ class MaterialSpec(Model):
     yield_strength: PositiveStress | None = Field(
         None, description="for the allowable stress; default: the named material's, if known"
     )
+    law: Literal["st-venant-kirchhoff", "neo-hookean"] = Field(
+        "st-venant-kirchhoff",
+        description="at large strain, for fidelity 'solid': Hooke's law in Green's strain, or rubber-like; beams bend "
+        "with small strains, for which both are Hooke's",
+    )
     fatigue: Fatigue | None = Field(
         None, description="S-N points or Basquin's line, for `fatigue_life`; none unless given"
     )
@@ -142,6 +147,9 @@ class MaterialSpec(Model):
         for key, value in given.items():
             if getattr(self, key) is None:
                 object.__setattr__(self, key, value)  # past the frozen model, and not counted as set
+        if self.law == "neo-hookean" and self.poisson >= 0.5:
+            told = "'neo-hookean' needs a poisson_ratio below 0.5: at 0.5 it has no finite bulk modulus"
+            refuse("Material", {("law",): told})
         return self
 
     @property

@@ -19,7 +19,9 @@ LAN = CONFIGS / "beam_lan2010.yaml"
 @cache
 def lan(**changes: object) -> Result:
     """Return Lan's part as a solid: some five seconds, the least in which its numbers can be had."""
+    law = changes.pop("law", None)
     keys = {f"analysis.solid.{key}": value for key, value in changes.items()}
+    keys |= {} if law is None else {"mechanism.material.law": law}
     return cfmkit.analyze(cfmkit.load(LAN).replace({"analysis.fidelity": "solid", **keys}))
 
 
@@ -135,7 +137,42 @@ def test_an_incompressible_material_is_refused_where_the_law_has_no_value_for_it
     path = tmp_path / "vee.yaml"
     path.write_text(VEE.replace("0.35", "0.5"), encoding="utf-8")
     with pytest.raises(SpecError, match=r"poisson_ratio below 0\.5"):
-        cfmkit.load(path).replace({"analysis.solid.law": "neo-hookean"})
+        cfmkit.load(path).replace({"mechanism.material.law": "neo-hookean"})
+
+
+HAIRPIN = """
+cfmkit: 1
+family: beam
+name: hairpin
+mechanism:
+  material: {youngs_modulus: 2 GPa, poisson_ratio: 0.35}
+  thickness: 1 mm
+  width: 5 mm
+  nodes:
+    root: {at: [0 mm, 0 mm], support: clamped}
+    bend: {at: [40 mm, 0 mm]}
+    top: {at: [40 mm, 4 mm]}
+    tip: {at: [0 mm, 4 mm], support: guided, direction: 90 deg}
+  beams:
+    low: {start: root, end: bend}
+    side: {start: bend, end: top}
+    high: {start: top, end: tip}
+  drive: {kind: displacement, node: tip, direction: -90 deg}
+  part: {fillet: 0.5 mm, pad: [3 mm, 2 mm]}
+analysis: {travel: 6 mm, points: 31, fidelity: solid, solid: {poses: 5, mesh: 1 mm}}
+"""
+
+
+def test_a_part_that_touches_itself_is_a_partial_curve_with_the_place(tmp_path):
+    """Two beams 3 mm apart, one of them driven towards the other: pads of 2 mm meet before they do."""
+    path = tmp_path / "hairpin.yaml"
+    path.write_text(HAIRPIN, encoding="utf-8")
+    result = cfmkit.analyze(cfmkit.load(path))
+    assert result.status is Status.PARTIAL
+    (told,) = (found.message for found in result.warnings if found.name == "self_contact")
+    assert told == result.message
+    assert told.startswith("the part touches itself at (")
+    assert 1.7e-3 < float(result.curve.motion[-1]) <= 2.0e-3
 
 
 @pytest.mark.parametrize("size", ["0.001 mm", "1e-9 mm"])

@@ -30,6 +30,7 @@ FAMILY = Family(
     scheme="cfmkit.families.beam.dimension_drawing",
     outline="cfmkit.families.beam.outline",
     elastic_parts="cfmkit.families.beam.solid:elastic_parts",
+    levels=("design.rescale.force", "design.optimise.force.target"),
     propose="cfmkit.families.beam.propose:propose",
     room="cfmkit.families.beam.bounding_box:room",
     headline=(

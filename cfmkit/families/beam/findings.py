@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 FINDINGS = {
     "closure_adjusted": "beams were turned and scaled to fit between rounded nodes, or nodes moved to the beams' ends",
     "closure_prestress": "beams are forced into place between rounded nodes: the mechanism is prestressed at rest",
+    "self_contact": "the part as a solid touches itself: the curve ends there",
     "ends_early": "the path ends before the requested travel or load",
     "inaccurate": "at some points the tolerance is not reached: they have no force",
     "limit_point": "the load has an extremum on the path: under load control the mechanism snaps there",

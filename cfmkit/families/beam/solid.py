@@ -177,7 +177,7 @@ def part_of(spec: BeamSpec, assembly: Assembly) -> Part:
     cut = [contour for contour in drawing(spec).contours if contour.layer == "cut"]
     beam = next(iter(spec.mechanism.beams.values()))
     material, width = beam.material or spec.mechanism.material, beam.width or spec.mechanism.width
-    law = LAWS[spec.analysis.solid.law](material.modulus, material.poisson)
+    law = LAWS[material.law](material.modulus, material.poisson)
     places = [HeldOrDriven(one.name, one.shapes, one.at, *_motions(assembly, one), one.seams) for one in regions(spec)]
     return Part(rings_of(cut), _thinnest(assembly), width, law, tuple(places))
 
@@ -237,7 +237,7 @@ def _motions(assembly: Assembly, place: HeldPlace) -> tuple[FloatArray, FloatArr
 def _ended(solution: SolidSolution) -> str:
     course = solution.fine.course
     where = format_short(float(course.travel[-1]), "angle" if _turns(solution.spec) else "length")
-    return f"{course.ending.value}, at {where}"
+    return f"{course.ended}, at {where}"
 
 
 def _turns(spec: BeamSpec) -> bool:
@@ -272,8 +272,8 @@ def _values(solution: SolidSolution) -> Mapping[str, Quantity]:
 
 def _findings(solution: SolidSolution) -> Iterator[Finding]:
     spec, course = solution.spec, solution.fine.course
-    if course.ending.value:
-        yield finding("ends_early", _ended(solution))
+    if course.ended:
+        yield finding("ends_early" if course.touching is None else "self_contact", _ended(solution))
     for place in course.bifurcations:
         at = format_short(place, "angle" if _turns(spec) else "length")
         yield finding("bifurcation", f"the part leaves its path at {at} for a stable branch")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
@@ -183,12 +183,14 @@ class BeamSpec(Spec):
 
     @model_validator(mode="after")
     def _is_cut_from_one_sheet(self) -> Self:
-        mechanism = self.mechanism
-        widths = {"width": mechanism.width} | {
-            f"beams.{name}.width": one.width for name, one in mechanism.beams.items()
-        }
-        refuse("BeamSpec", sheet_faults(mechanism.part, widths))
+        refuse("BeamSpec", sheet_faults(self.mechanism.part, self.widths))
         return self
+
+    @property
+    def widths(self) -> Mapping[str, float | None]:
+        """Of all beams, and of those that have their own; None where one has none."""
+        own = {f"beams.{name}.width": one.width for name, one in self.mechanism.beams.items()}
+        return {"width": self.mechanism.width} | own
 
     @model_validator(mode="after")
     def _can_be_rescaled(self) -> Self:
@@ -217,8 +219,10 @@ class BeamSpec(Spec):
 
     @model_validator(mode="after")
     def _is_a_part_where_it_is_solid(self) -> Self:
-        found = list(_solid_faults(self)) if self.analysis.fidelity == "solid" else []
-        refuse("BeamSpec", {("analysis", "fidelity"): f"'solid' {'; '.join(found)}"} if found else {})
+        verified = self.design is not None and self.design.verify == "solid"
+        found = list(_solid_faults(self)) if self.analysis.fidelity == "solid" or verified else []
+        place = ("design", "verify") if verified else ("analysis", "fidelity")
+        refuse("BeamSpec", {place: f"'solid' {'; '.join(found)}"} if found else {})
         return self
 
     @property
@@ -312,9 +316,6 @@ def _solid_faults(spec: BeamSpec) -> Iterator[str]:
     unknown = [name for name, thing in things.items() if thing]
     if unknown:
         yield f"does not know {', '.join(unknown)}"
-    poisson = next((beam.material or mechanism.material).poisson for beam in mechanism.beams.values())
-    if analysis.solid.law == "neo-hookean" and poisson >= 0.5:
-        yield "needs a poisson_ratio below 0.5 with the law 'neo-hookean'"
     if mechanism.closure == "raw":
         yield "needs beams that end at their nodes: closure 'rotscale' or 'chain'"
     if len({beam.material or mechanism.material for beam in mechanism.beams.values()}) > 1:

@@ -38,6 +38,7 @@ FAMILY = Family(
     scheme="cfmkit.families.slider_crank.dimension_drawing",
     outline="cfmkit.families.slider_crank.dispatch",
     elastic_parts="cfmkit.families.slider_crank.printed.solid:elastic_parts",
+    levels=("design.force",),
     propose="cfmkit.families.slider_crank.propose:propose",
     room="cfmkit.families.slider_crank.bounding_box:room",
     headline=("stiffness_class", "band_range_05pct", "half_band", "energy_max", "crank_pin_rotation_max"),

@@ -44,6 +44,7 @@ FINDINGS = {
     "wrong_branch": "the chain bends to the side opposite to the requested one: the force differs",
     "unstable": "the equilibrium is unstable while the slider is held: the chain would jump",
     "limit_point": "the slider cannot be pressed further in equilibrium",
+    "self_contact": "the part as a solid touches itself: the curve ends there",
     "not_converged": "a solver did not converge: nothing of its iterates is reported",
     "branch_begins_late": "the branch to which the kink does not lead exists only beyond some travel",
     "force_negative": "the chain pulls instead of pushing back",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
@@ -132,12 +133,16 @@ class SliderCrankSpec(Spec):
 
     @model_validator(mode="after")
     def _is_cut_from_one_sheet(self) -> Self:
-        own = self.mechanism.flexures
+        refuse("Spec", sheet_faults(self.mechanism.part, self.widths))
+        return self
+
+    @property
+    def widths(self) -> Mapping[str, float | None]:
+        """Of flexures and strip, where there are any."""
+        own, strip = self.mechanism.flexures, self.mechanism.beam
         names = ("pivot", "crank_pin", "slider_pin")
         widths = {f"flexures.{name}.width": getattr(own, name).width for name in names} if own else {}
-        strip = self.mechanism.beam
-        refuse("Spec", sheet_faults(self.mechanism.part, widths | ({"beam.width": strip.width} if strip else {})))
-        return self
+        return widths | ({"beam.width": strip.width} if strip else {})
 
     @model_validator(mode="after")
     def _a_mirrored_pair_is_on_one_slider(self) -> Self:

@@ -28,6 +28,7 @@ FAMILY = Family(
     scheme="cfmkit.families.vcfm.dimension_drawing",
     outline="cfmkit.families.vcfm.outline",
     elastic_parts="cfmkit.families.vcfm.solid:elastic_parts",
+    levels=("design.force",),
     propose="cfmkit.families.vcfm.propose:propose",
     room="cfmkit.families.vcfm.bounding_box:room",
     analyze_block=analyze_block,

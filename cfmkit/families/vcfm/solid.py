@@ -60,7 +60,7 @@ class SolidPath:
     @property
     def problem(self) -> str:
         """Why the path ends early; empty if it does not."""
-        return self.solved.course.ending.value
+        return self.solved.course.ended
 
     @property
     def buckled_range(self) -> tuple[float, float]:
@@ -135,7 +135,7 @@ def part_of(spec: VcfmSpec, piece: SolvedPiece) -> Part:
     mechanism = spec.mechanism
     about = mechanism.bistable if piece.of_leaf else mechanism.flexures
     turns = piece.of_leaf and not mechanism.bistable.guided
-    law = LAWS[spec.analysis.solid.law](mechanism.material.modulus, mechanism.material.poisson)
+    law = LAWS[mechanism.material.law](mechanism.material.modulus, mechanism.material.poisson)
     across = np.array([[1.0], [0.0], [0.0]]) if piece.glides else np.zeros((3, 0))
     turning = np.array([[0.0], [0.0], [1.0]]) if turns else np.zeros((3, 0))
     shuttle = HeldOrDriven(

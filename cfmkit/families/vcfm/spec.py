@@ -344,13 +344,17 @@ class VcfmSpec(Spec):
     @model_validator(mode="after")
     def _is_cut_from_one_sheet(self) -> Self:
         part = self.mechanism
-        widths = {"bistable.width": part.bistable.width}
-        if part.positive is not None:
-            widths["positive.width"] = part.positive.width
         if self.design is not None and part.part is not None and part.part.sheet is not None:
             refuse("Spec", {("mechanism", "part", "sheet"): "a design finds both widths: drop the sheet, or 'design'"})
-        refuse("Spec", sheet_faults(part.part, widths))
+        refuse("Spec", sheet_faults(part.part, self.widths))
         return self
+
+    @property
+    def widths(self) -> Mapping[str, float | None]:
+        """Of leaves, and of a spring that is cut."""
+        spring = self.mechanism.positive
+        own = {} if spring is None else {"positive.width": spring.width}
+        return {"bistable.width": self.mechanism.bistable.width} | own
 
     @model_validator(mode="after")
     def _wide_leaves_are_traced(self) -> Self:
@@ -368,14 +372,12 @@ class VcfmSpec(Spec):
 
     @model_validator(mode="after")
     def _solid_is_of_what_is_made(self) -> Self:
-        if self.analysis.fidelity == "solid":
+        if self.analysis.fidelity == "solid" or (self.design is not None and self.design.verify == "solid"):
             found: dict[tuple[str | int, ...], str] = {}
             if self.mechanism.bistable.waviness:
                 found["mechanism", "bistable", "waviness"] = "the model 'solid' does not know it: leaves are as drawn"
             if self.analysis.branch == "primary":
                 found["analysis", "branch"] = "the model 'solid' follows the stable branch only"
-            if self.analysis.solid.law == "neo-hookean" and self.mechanism.material.poisson >= 0.5:
-                found["analysis", "solid", "law"] = "'neo-hookean' needs a poisson_ratio below 0.5"
             refuse("Spec", found)
         return self
 

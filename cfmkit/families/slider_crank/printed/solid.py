@@ -156,14 +156,15 @@ def part_of(spec: SliderCrankSpec) -> Part:
     from cfmkit.solid.plane_stress_law import LAWS
 
     piece = solved_piece(spec)
-    made_of = elasticity(spec.mechanism)
+    made_of, material = elasticity(spec.mechanism), spec.mechanism.material
     way = travel_direction(linkage_of(spec.mechanism))
     driven = np.array([np.cos(way), np.sin(way), 0.0])
     places = tuple(
         HeldOrDriven(name, (pad,), pad.mean(axis=0), motion, seams=(pad[:2],))
         for name, pad, motion in (("ground", piece.pads[0], np.zeros(3)), ("slider", piece.pads[1], driven))
     )
-    law = LAWS[spec.analysis.solid.law](made_of.youngs_modulus, made_of.poisson_ratio)
+    assert material is not None  # or `elasticity` had refused
+    law = LAWS[material.law](made_of.youngs_modulus, made_of.poisson_ratio)
     regions = tuple((one.polygon, one.thickness) for one in piece.sheet.regions)
     rings = rings_of((piece.contour, *piece.holes))
     return Part(rings, piece.thinnest, float(piece.sheet.thickness or 0.0), law, places, regions, LARGEST)
@@ -228,11 +229,11 @@ def _values(solution: SolidSolution) -> Mapping[str, Quantity]:
 def _findings(solution: SolidSolution) -> Iterator[Finding]:
     from cfmkit.solid.path_following import PathEnd
 
-    names = {PathEnd.LIMIT_POINT: "limit_point", PathEnd.UNSTABLE: "unstable"}
+    names = {PathEnd.LIMIT_POINT: "limit_point", PathEnd.UNSTABLE: "unstable", PathEnd.CONTACT: "self_contact"}
     course = solution.fine.course
     if course.ending is not PathEnd.COMPLETE:
         where = format_short(float(course.travel[-1]), "length")
-        yield finding(names.get(course.ending, "not_converged"), f"{course.ending.value}, at {where}")
+        yield finding(names.get(course.ending, "not_converged"), f"{course.ended}, at {where}")
     if (solution.spec.mechanism.part or PaddedPart()).fillet == 0:
         told = "without fillets the stress in inside corners has no value"
         yield finding("sharp_corners", told, "mechanism.part.fillet=0.5 mm")

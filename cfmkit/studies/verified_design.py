@@ -1,0 +1,163 @@
+"""Designs that end with the part as drawn: solved as a solid, and corrected once so that its force is the wanted one.
+
+A planar solid's force is proportional to its width. Where widths are free, all of them are multiplied by what the force
+misses; the stress stays as it is. Where a sheet fixes them, the force that is designed for is multiplied by it, and the
+design is repeated.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from cfmkit.designing.audit import searched
+from cfmkit.errors import SpecError
+from cfmkit.families import family
+from cfmkit.families.base import function_named
+from cfmkit.metrics import evaluate
+from cfmkit.results import Design, Status
+from cfmkit.specs.units import format_short
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from cfmkit.families.base import Run
+    from cfmkit.results import Result
+    from cfmkit.specs.spec import Spec
+
+FIDELITY = "analysis.fidelity"
+DIGITS = 7
+"""Significant ones of a corrected width: a tenth of a micrometre in a metre."""
+
+
+def verified(given: Spec, design: Design, run: Run) -> Design:
+    """Return a design that ends with its part as a solid, whose mean force is the wanted one.
+
+    Parameters
+    ----------
+    given : Spec
+        With `design.verify`.
+    design : Design
+        What the family made of it; returned as it is where there is none.
+    run : Run
+        Seed, progress, time budget.
+
+    Returns
+    -------
+    Design
+        Its specification has `analysis.fidelity: solid`. INVALID where the design cannot be a solid, INFEASIBLE where a
+        corrected width is not in its range, PARTIAL or NO_EQUILIBRIUM where the solid cannot be followed to the end.
+    """
+    if design.spec is None:
+        return design
+    record = family(given.family)
+    try:
+        as_solid = design.spec.replace({FIDELITY: "solid"})
+    except SpecError as error:
+        told = "; ".join(problem.message for problem in error.problems)
+        return Design(None, Status.INVALID, f"design.verify: this design cannot be a solid: {told}")
+    beams = record.analyze(design.spec, run)
+    solid = record.analyze(as_solid, run)
+    mean, own = _mean(solid), _mean(beams)
+    wanted = next((level for path in record.levels if (level := _level(given, path))), None) or own
+    if solid.status is not Status.COMPLETE or not wanted or not mean or not own or wanted / mean <= 0:
+        told = f"the part as a solid has no force to be corrected: {solid.message}"
+        return replace(design, spec=as_solid, notes=(*design.notes, ("verify", told)))
+    factor = wanted / mean
+    kind = solid.curve.kind
+    begun = (
+        f"{design.spec.fidelity} has a mean {kind} of {format_short(own, kind)}, the part as a solid of "
+        f"{format_short(mean, kind)} ({100 * (mean / own - 1):+.2g} %)"
+    )
+    if _sheet(as_solid):
+        return _relevelled(given, design, as_solid, factor, begun, run)
+    corrected = {path: float(f"{factor * width:.{DIGITS}g}") for path, width in _widths(as_solid).items()}
+    outside = _outside(given, design.spec, corrected)
+    if outside is not None:
+        return outside
+    told = "; ".join(
+        f"{path} {format_short(width, 'length')} -> {format_short(corrected[path], 'length', 6)}"
+        for path, width in _widths(as_solid).items()
+    )
+    made = as_solid.replace(corrected)
+    aim = format_short(wanted, kind)
+    note = f"{begun}; all widths are multiplied by {factor:.5g}, so that the solid has {aim}: {told}"
+    return _told(design, made, note, _numbers(wanted, own, mean, factor, kind), solid)
+
+
+def _relevelled(given: Spec, design: Design, as_solid: Spec, factor: float, begun: str, run: Run) -> Design:
+    """Return a design of another force, whose solid has the wanted one: the widths are those of the sheet."""
+    path = next((path for path in family(given.family).levels if _level(given, path)), None)
+    if path is None:
+        told = f"{begun}; the sheet fixes the widths and the design names no force: nothing is corrected"
+        return replace(design, spec=as_solid, notes=(*design.notes, ("verify", told)))
+    wanted = _level(given, path)
+    record = family(given.family)
+    assert record.design is not None
+    again = record.design(given.replace({path: factor * wanted}), run)
+    if again.spec is None:
+        return replace(again, message=f"design.verify: for a solid of {format_short(wanted, 'force')}, {again.message}")
+    # what is wanted stays what is wanted
+    made = again.spec.replace({path: wanted, FIDELITY: "solid"})
+    other, aim = format_short(factor * wanted, "force", 5), format_short(wanted, "force")
+    note = f"{begun}; the sheet fixes the widths, so it is designed for {other} instead of {aim}"
+    return replace(again, spec=made, notes=(*again.notes, ("verify", note)))
+
+
+def _mean(result: Result) -> float | None:
+    if not result.curves:
+        return None
+    name = f"{result.curve.kind}_mean"
+    return evaluate(result, [name])[name].value
+
+
+def _widths(spec: Spec) -> Mapping[str, float]:
+    return {f"mechanism.{key}": float(width) for key, width in spec.widths.items() if width is not None}
+
+
+def _sheet(spec: Spec) -> bool:
+    try:
+        return spec.at("mechanism.part.sheet") is not None
+    except KeyError:
+        return False
+
+
+def _level(spec: Spec, path: str) -> float:
+    try:
+        return float(spec.at(path) or 0.0)
+    except KeyError:
+        return 0.0
+
+
+def _outside(given: Spec, designed: Spec, corrected: Mapping[str, float]) -> Design | None:
+    """Return why there is no design, where a corrected width is not in the range that it is designed in."""
+    record = family(given.family)
+    ranges = function_named(record.free)(given, designed) if record.free is not None else {}
+    for path, (low, high) in ranges.items():
+        if path in corrected and not low * (1 - 1e-9) <= corrected[path] <= high * (1 + 1e-9):
+            told = (
+                f"design.verify: for the wanted force of the solid {path} would be "
+                f"{format_short(corrected[path], 'length')}, outside its range of {format_short(low, 'length')} to "
+                f"{format_short(high, 'length')}"
+            )
+            return Design(None, Status.INFEASIBLE, told)
+    return None
+
+
+def _numbers(
+    wanted: float, own: float, mean: float, factor: float, kind: str
+) -> dict[str, tuple[float | None, str, str]]:
+    return {
+        "verified_target": (wanted, kind, "mean force that the solid is to have"),
+        "verified_before": (own, kind, "mean force of the design by its own model"),
+        "verified_solid_before": (mean, kind, "mean force of the part as a solid, before its correction"),
+        "verified_width_factor": (factor, "ratio", "by which all widths were multiplied"),
+    }
+
+
+def _told(
+    design: Design, made: Spec, note: str, numbers: dict[str, tuple[float | None, str, str]], solid: Result
+) -> Design:
+    window = solid.travel or (0.0, 0.0)
+    about = searched(numbers, "solid", window, made.motion or "length")
+    return replace(design, spec=made, search={**design.search, **about}, notes=(*design.notes, ("verify", note)))
