@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cfmkit.errors import OutputError, UsageError, visible
+from cfmkit.runs.shipped import shipped_folder
 
 if TYPE_CHECKING:
     import os
@@ -47,11 +48,7 @@ def folder() -> Path:
     cfmkit.errors.UsageError
         If this installation has none.
     """
-    package = Path(__file__).parents[1]
-    for place in (package / "configs", package.parent / "configs"):
-        if (place / "cam.yaml").is_file():
-            return place
-    raise UsageError("this installation has no examples; install cfmkit from a wheel or from its source")
+    return shipped_folder("configs", "cam.yaml")
 
 
 def examples() -> tuple[Example, ...]:

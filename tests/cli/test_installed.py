@@ -31,6 +31,7 @@ COMMANDS = {
     "figure": ("figure", "one.yaml", "-o", "out"),
     "measure": ("measure", "synthetic/cam_loop.csv", "-o", "out", "--no-plots"),
     "new": ("new", "cam", "-o", "new.yaml"),
+    "docs": ("docs", "--json"),
     "papers": ("papers", "cam", "--json"),
     "schema": ("schema",),
     "sensitivity": ("sensitivity", "studies/cam_tolerance.yaml", *FEW, "-o", "out", "--no-plots"),

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import re
+import runpy
 import sys
 from pathlib import Path
 
 import pytest
 
 from cfmkit import families
+from cfmkit.errors import UsageError
+from cfmkit.runs import documentation
 from cfmkit.runs.examples import example
 from cfmkit.specs.keys import keys
 
@@ -73,3 +76,37 @@ def test_every_page_is_in_the_index_or_is_put_there(site):
     site.others(SimpleNamespace(env=SimpleNamespace(found_docs=pages)), "index", source)
     assert pages - {"index"} <= set(source[0].split())
     assert "OTHERS" not in source[0]
+
+
+LINKS = re.compile(r"\]\((?!https?:)([^)#\s]+)")
+
+
+def test_the_documentation_comes_with_the_package_and_its_links_lead_to_files():
+    found = documentation.pages()
+    assert [one.name for one in found][:4] == ["index", "tutorial", "howto", "reference"]
+    assert {one.name for one in found} == {path.stem for path in DOCS.glob("*.md")}
+    assert documentation.page("docs/cam.md#friction").path == DOCS / "cam.md"
+    with pytest.raises(UsageError, match="did you mean 'vcfm'"):
+        documentation.page("vcmf")
+    for one in found:
+        links = [link for link in LINKS.findall(one.text) if not link.startswith("made/")]
+        assert [link for link in links if not (DOCS / link).is_file()] == [], one.name
+
+
+@pytest.mark.parametrize(
+    ("url", "told"),
+    [
+        ("", "[no links](`cfmkit docs cam`)"),
+        ("https://example.org/us/cfmkit/", "[cam](https://example.org/us/cfmkit/blob/main/docs/cam.md)"),
+    ],
+)
+def test_the_description_of_a_wheel_has_no_link_that_leads_nowhere(monkeypatch, url, told):
+    setuptools = pytest.importorskip("setuptools")
+    given = {}
+    monkeypatch.setenv("CFMKIT_URL", url)
+    monkeypatch.setattr(setuptools, "setup", lambda **options: given.update(options))
+    runpy.run_path(str(DOCS.parent / "setup.py"))
+    assert LINKS.findall(given["long_description"]) == []
+    assert told.replace("[no links]", "cam ") in given["long_description"]
+    assert bool(given["project_urls"]) == bool(url)
+    assert all(one.startswith("https://example.org/us/cfmkit") for one in given["project_urls"].values())

@@ -12,6 +12,7 @@ import os
 import re
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -107,3 +108,17 @@ print(result.status.key, round(result.metrics["theoretical_force"].value, 3), le
 
 def test_a_notebook_user_sees_numbers_and_a_figure(run):
     assert run("-c", NOTEBOOK).stdout.split() == ["complete", "50.0", "2"]
+
+
+def test_everybody_has_the_documentation_without_a_network(cfmkit):
+    pages = {one["name"]: Path(one["path"]) for one in json.loads(cfmkit("docs", "--json").stdout)["pages"]}
+    assert {"tutorial", "howto", "reference", "cam", "ci"} <= set(pages)
+    for path in pages.values():
+        text = path.read_text(encoding="utf-8")
+        links = re.findall(r"\]\((?!https?:)([^)#\s]+)", text)
+        assert [one for one in links if not (path.parent / one).is_file()] == [], path.name
+    assert "ten minutes" in cfmkit("docs", "tutorial").stdout
+    (described,) = Path(INSTALLED).glob("cfmkit-*.dist-info/METADATA")
+    text = described.read_text(encoding="utf-8")
+    assert re.findall(r"\]\((?!https?:)", text) == []
+    assert "(`cfmkit docs cam`)" in text

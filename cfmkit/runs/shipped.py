@@ -1,0 +1,29 @@
+"""Folders that come with every installation: in the tree they stand beside the package, in a wheel inside of it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from cfmkit.errors import UsageError
+
+
+def shipped_folder(name: str, sample: str) -> Path:
+    """Return a folder that comes with the package.
+
+    Parameters
+    ----------
+    name : str
+        As it stands in the tree: ``configs``, ``docs``.
+    sample : str
+        A file that it must have: another package's folder of that name may stand beside this one.
+
+    Raises
+    ------
+    cfmkit.errors.UsageError
+        If this installation has none.
+    """
+    package = Path(__file__).parents[1]
+    for place in (package / name, package.parent / name):
+        if (place / sample).is_file():
+            return place
+    raise UsageError(f"this installation has no {name}; install cfmkit from a wheel or from its source")
