@@ -13,6 +13,8 @@ from cfmkit.tables.jsontext import json_bytes
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
+    from matplotlib.figure import Figure
+
     from cfmkit.families.base import Run
     from cfmkit.studies.suggest.proposal import Proposal
     from cfmkit.studies.suggest.search import Suggestions
@@ -129,7 +131,9 @@ def _record(found: Suggestions, one: Proposal, number: int | None = None) -> dic
     return about | place | {"misses": list(one.missed), "notes": list(one.notes)}
 
 
-def files(found: Suggestions, block: WishBlock, run: Run, plots: bool, deadline: float) -> Iterator[tuple[str, bytes]]:
+def files(
+    found: Suggestions, block: WishBlock, run: Run, plots: bool, deadline: float, command: str | None = None
+) -> Iterator[tuple[str, bytes]]:
     """Yield every file of the run as (name below the folder, content).
 
     Parameters
@@ -142,25 +146,46 @@ def files(found: Suggestions, block: WishBlock, run: Run, plots: bool, deadline:
         Whether to draw.
     deadline : float
         When the time is up [s since the epoch]: proposals whose turn comes later have their files, but no figures.
+    command : str, optional
+        How the search was started, for ``report.html``; None: no page is written, nor one of each proposal.
     """
     yield "metrics.json", json_bytes(as_json(found, block))
     yield "suggestions.csv", table(found)
-    if plots and found.proposals:
+    drawn = _pictures(found) if found.proposals and (plots or command is not None) else {}
+    if plots:
         from cfmkit.plots.style import png
-        from cfmkit.studies.suggest import figures
 
-        yield "figures/pareto.png", png(figures.pareto(found.proposals, found.wish))
-        yield "figures/proposals.png", png(figures.to_one_scale(found.proposals, found.wish))
+        for name, figure in drawn.items():
+            yield f"figures/{name}.png", png(figure)
+    if command is not None:
+        from cfmkit.runs import suggestions_page
+
+        texts = {folder_name(number, one): one.text for number, one in enumerate(found.proposals, 1)}
+        unit = "N" if found.wish.kind == "force" else "N*mm"
+        yield suggestions_page.NAME, suggestions_page.page(as_json(found, block), texts, drawn, unit, command)
     jobs = list(enumerate(found.proposals, 1))
     made = {
-        number: files for (number, _), files in run.executor(partial(_made, plots, deadline), iter(jobs), lambda: False)
+        number: files
+        for (number, _), files in run.executor(
+            partial(_made, (plots, command is not None), deadline), iter(jobs), lambda: False
+        )
     }
     for number, one in jobs:
         for name, data in made[number]:
             yield f"{folder_name(number, one)}/{name}", data
 
 
-def _made(plots: bool, deadline: float, job: tuple[int, Proposal]) -> list[tuple[str, bytes]]:
+def _pictures(found: Suggestions) -> dict[str, Figure]:
+    """Return the pictures of a search, by name."""
+    from cfmkit.studies.suggest import figures
+
+    return {
+        "pareto": figures.pareto(found.proposals, found.wish),
+        "proposals": figures.to_one_scale(found.proposals, found.wish),
+    }
+
+
+def _made(wanted: tuple[bool, bool], deadline: float, job: tuple[int, Proposal]) -> list[tuple[str, bytes]]:
     """Return the files of one proposal: its specification first, which `analyze` takes."""
     from cfmkit import api
     from cfmkit.results import Design, Status
@@ -171,7 +196,8 @@ def _made(plots: bool, deadline: float, job: tuple[int, Proposal]) -> list[tuple
     spec = proposal.spec
     # springs at pins have links that no drawing shows: nothing of them is cut
     design = None if "at pins" in proposal.variant else Design(spec, Status.COMPLETE)
-    found = dict(files(report_on(api.analyze(spec), design), plots and time() < deadline))
+    plots, page = wanted
+    found = dict(files(report_on(api.analyze(spec), design), plots and time() < deadline, page))
     return list(({"design.yaml": b""} | found | {"design.yaml": proposal.text.encode()}).items())
 
 

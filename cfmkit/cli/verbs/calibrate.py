@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cfmkit.cli import completion
 from cfmkit.cli.measured_data_options import Measuring, data_record, read_measured
-from cfmkit.cli.options import Computing, argument, option
+from cfmkit.cli.options import Computing, WithReport, argument, option
 
 if TYPE_CHECKING:
     from cfmkit.cli.answer import Answer
@@ -46,6 +46,7 @@ class CalibrateOptions(Computing, Measuring):
             "--loss", metavar="NAME", shown=True, text="Loss function of the residuals: linear, soft_l1, huber, cauchy."
         ),
     ] = "soft_l1"
+    report: WithReport = False
 
 
 def run(options: CalibrateOptions, terminal: Terminal) -> Answer:
@@ -59,7 +60,7 @@ def run(options: CalibrateOptions, terminal: Terminal) -> Answer:
         raise UsageError(f"--loss: there is no {options.loss!r}; there are {', '.join(LOSSES)}")
     source = read_measured(options.data, options)
     verb = Verb("calibrate", "calibrated", partial(compute, options, source), data_record(options.data))
-    return execute(verb, options, terminal)
+    return execute(verb, options, terminal, options.report)
 
 
 def compute(options: CalibrateOptions, source: MeasuredCurves, spec: Spec, run: Run) -> Report:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 import time
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
@@ -10,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cfmkit.cli import completion
 from cfmkit.cli.answer import Answer
-from cfmkit.cli.options import Common, Fresh, Jobs, NoPlots, Out, Quiet, Seed, argument, flag, option
+from cfmkit.cli.options import Common, Fresh, Jobs, NoPlots, Out, Quiet, Seed, WithReport, argument, flag, option
 from cfmkit.cli.page_blocks import BAD, BLANK, LABEL, Grid, GridColumn, Paragraph, Span, TextLine, Written, line
 from cfmkit.errors import ExitCode, UsageError
 
@@ -72,6 +73,7 @@ class SuggestOptions(Common):
     jobs: Jobs = None
     fresh: Fresh = False
     no_plots: NoPlots = False
+    report: WithReport = False
     quiet: Quiet = False
 
 
@@ -114,7 +116,8 @@ def run(options: SuggestOptions, terminal: Terminal) -> Answer:
             found = suggest(block.wish(), working, block.prefer, SPARE if options.no_plots else RESERVE)
             found = with_better_models(found, replace(working, time_budget=None), options.verify)
             drawing = replace(working, time_budget=None)
-            for name, content in suggestions.files(found, block, drawing, not options.no_plots, ends - SPARE):
+            command = shlex.join(["cfmkit", *terminal.arguments]) if options.report else None
+            for name, content in suggestions.files(found, block, drawing, not options.no_plots, ends - SPARE, command):
                 folder.write(name, content)
         code = suggestions.exit_code(found)
         manifest = folder.commit(
