@@ -81,7 +81,8 @@ def test_calibrate_writes_a_complete_spec_that_analyses_to_the_fitted_errors(cli
 
 
 def test_calibrate_draws_the_fit(cli, cam, rig):
-    cli("calibrate", cam, rig, *FIT, "-o", "fit", "-q")
+    cli("calibrate", cam, rig, *FIT, "-o", "fit", "-q", "--report")
+    assert "mechanism.rolling_friction" in (cli.folder / "fit" / "report.html").read_text(encoding="utf-8")
     assert (cli.folder / "fit/figures/data.png").read_bytes().startswith(b"\x89PNG")
 
 

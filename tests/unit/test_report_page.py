@@ -20,7 +20,7 @@ from cfmkit.families.slider_crank.dispatch import moving
 from cfmkit.plots.figures import moving_of
 from cfmkit.plots.moving_svg import poses
 from cfmkit.results import Finding, Result, Status
-from cfmkit.runs import batch_page, run_findings, run_page, study_page
+from cfmkit.runs import batch_page, run_findings, run_page, study_page, suggestions_page
 from cfmkit.studies.batch_entries import Entry
 
 CONFIGS = Path(__file__).parents[2] / "configs"
@@ -205,3 +205,24 @@ def test_a_batch_links_the_page_of_each_and_escapes_what_it_says():
     assert HOSTILE in outline.text
     assert "requirement missed" in outline.text
     assert "not all is well" in outline.text
+
+
+def test_a_wish_has_a_page_with_every_proposal_and_why_there_are_no_more():
+    one = {
+        "family": "cam", "variant": HOSTILE, "mean": 20.0, "ripple": 0.0123, "hysteresis": None, "safety_factor": 1.7,
+        "across": 80.0, "along": 90.5, "depth": None, "parts": 12, "life": None, "finer_deviation": None,
+        "folder": "1-cam-a b", "misses": [], "notes": [HOSTILE],
+    }  # fmt: skip
+    told = {
+        "status": "complete", "message": "1 mechanisms do all", "wish": {"force": "20 N", "room": ["1 mm", "2 mm"]},
+        "proposals": [one], "near_misses": [{"family": "beam", "variant": "b", "misses": ["ripple 9 % > 5 %"]}],
+        "families": [{"family": "vcfm", "proposals": 0, "reason": HOSTILE, "nearest": {"travel": "4 mm"}}],
+        "warnings": [{"name": "search_cut_short", "message": HOSTILE}],
+    }  # fmt: skip
+    text = suggestions_page.page(told, {"1-cam-a b": f"name: {HOSTILE}"}, {}, "N", HOSTILE).decode()
+    outline = Outline(text)
+    assert outline.unbalanced == []
+    assert {tag for tag, _ in outline.tags}.isdisjoint({"script", "img"})
+    assert [attributes["href"] for tag, attributes in outline.tags if tag == "a"] == ["1-cam-a%20b/report.html"]
+    for part in ("20 N, room 1 mm x 2 mm", "1.23 %", "90.5 mm", "ripple 9 % > 5 %", "travel 4 mm", HOSTILE):
+        assert part in outline.text, part
