@@ -1,7 +1,7 @@
 """Inside corners of exact contours, rounded by the cutter: tangent arcs in the place of corners.
 
 A corner is where the direction turns towards the waste: a cutter of that radius cannot reach into it. Where edges
-beside a corner are too short for the arc it stays sharp, and its place is told.
+beside a corner are too short for the arc it stays sharp, and its place is reported.
 """
 
 from __future__ import annotations

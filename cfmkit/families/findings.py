@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 TOO_SOFT = 0.01
-"""Share of the energy of bending from which on wide beams that are solved as narrow ones are told of."""
+"""Share of the energy of bending above which wide beams that are solved as narrow ones are reported."""
 
 
 class Finder(Protocol):

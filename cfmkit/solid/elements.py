@@ -88,16 +88,6 @@ class Elements:
         volume = weights[:, None] * det * self.width
         return np.ascontiguousarray(gradient.reshape(6, 2, -1)), volume.ravel()
 
-    @property
-    def smallest_jacobian(self) -> float:
-        """Smallest determinant of the map from the parent triangle at a node, in those of the straight element."""
-        x = self.mesh.nodes[self.mesh.triangles]
-        jacobian = np.einsum("qai,maj->qmij", slopes(CORNERS), x)
-        det = jacobian[..., 0, 0] * jacobian[..., 1, 1] - jacobian[..., 0, 1] * jacobian[..., 1, 0]
-        a, b, c = x[:, :3].swapaxes(0, 1)
-        straight = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
-        return float((det / straight).min())
-
     def _strained(self, gradient: FloatArray, moved: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the deformation gradient (2, 2, k) and Green's strain (3, k) at points with these slopes."""
         times = gradient.shape[-1] // len(self.mesh.triangles)

@@ -19,7 +19,7 @@ INSTEAD = {
     r"\bno\s+lever\b": "no leverage",
     r"\bwhatever\s+becomes\s+of\b": "whether it could be solved or not",
     r"\bfor\s+sure\b": "certain",
-    r"\b(bifurcations?|errors?|events?)\s+(is|are)\s+told\b": "reported",
+    r"\b(bifurcations?|errors?|events?|faults?|place|nearest three)\s+(is|are)\s+told\b": "reported",
     r"\b(takes|goes)\s+before\b|\b--seed` goes": "takes precedence",
     r"\bsorted\s+out\b": "rejected",
 }

@@ -275,7 +275,7 @@ def _shortfall(law: SlopeLaw, stroke: float, reached: float) -> Finding | None:
         raise CannotBuild(
             finding(
                 "design_singular",
-                f"a profile cut for a friction of {law.friction:g} self-locks: nowhere does the slider rise as the "
+                f"a profile cut for a friction of {law.friction:g} self-locks: the slider cannot rise anywhere as the "
                 "rollers move out; use less friction or a smaller force constant ('friction' and "
                 "'force_constant' of "
                 "'mechanism.profile')",
