@@ -7,6 +7,8 @@ import pytest
 from cam_support import analyze, cam, design
 from scipy.optimize import root
 
+from cfmkit.families.cam.figures import figures
+
 PINS = {"diameter": "6 mm", "friction": 0.15}
 BEARINGS = {"bore": "8 mm", "friction": 0.004}
 GUIDE = {"friction": 0.1, "drag": "0.3 N", "length": "40 mm", "offset": "5 mm"}
@@ -230,3 +232,10 @@ def test_inside_corners_have_the_radius_of_the_tool_where_there_is_room():
     assert area(rounded) - area(sharp) == pytest.approx(2 * (1 - np.pi / 4) * 0.003**2, rel=1e-3)
     told = " ".join(outline("300 mm").notes)
     assert "room for a tool radius" in told
+
+
+def test_a_roller_that_comes_to_the_end_of_its_flank_touches_nothing_else():
+    found = analyze(cam(roller_radius="10 mm", envelope={"gap": "1 mm"}))
+    assert "parts_touch" not in {one.name for one in found.warnings}
+    assert found.values["clearance_min"].value == pytest.approx(2 * (float(found.state.states.x.min()) - 0.010))
+    assert "clearance" in figures(found)

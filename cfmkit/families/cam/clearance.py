@@ -24,6 +24,9 @@ if TYPE_CHECKING:
     from cfmkit.families.cam.solution import Solution
     from cfmkit.results import Finding
 
+BESIDE, ROUNDING = "roller and plate beside the flanks", 1e-9
+"""A pair whose distance ends at zero where the roller comes to the flank's end, which is no fault: only overlap is."""
+
 Place = tuple[FloatArray | float, FloatArray | float]
 
 
@@ -42,7 +45,7 @@ def clearances(solution: Solution) -> Iterator[tuple[str, FloatArray]]:
     contours = plate_contours((profile, profile), mechanism.plate)
     yield "roller and roller", 2.0 * (x - radius)
     # The ends of the edges beside the flanks lie on the flanks, which the rollers touch: rounding is no overlap.
-    yield "roller and plate beside the flanks", _to_edges((x, y), contours[0].edges) - radius
+    yield BESIDE, _to_edges((x, y), contours[0].edges) - radius
     half = 0.5 * sizes.brace_width
     screws = [edge.center for contour in contours[1:] for edge in contour.edges if isinstance(edge, Arc)]
     for place in screws if sizes.screw_head else ():
@@ -60,9 +63,18 @@ def clearances(solution: Solution) -> Iterator[tuple[str, FloatArray]]:
             yield "slider and spring", pin - 0.5 * sizes.slider[1] - y - 0.5 * sizes.spring_diameter
 
 
+def nearest_pairs(solution: Solution) -> dict[str, FloatArray]:
+    """Return the gap of each pair of parts, of several alike the smallest, at every point of the solution, (n,) [m]."""
+    found: dict[str, FloatArray] = {}
+    for pair, gap in clearances(solution):
+        found[pair] = np.minimum(found[pair], gap) if pair in found else gap
+    return found
+
+
 def smallest(solution: Solution) -> dict[str, Quantity]:
     """Return the smallest distance by name; nothing where no sizes are given."""
-    found = [float(gap.min()) for _, gap in clearances(solution)]
+    least = {pair: float(gap.min()) for pair, gap in nearest_pairs(solution).items()}
+    found = [gap for pair, gap in least.items() if pair != BESIDE or gap < -ROUNDING]
     return {"clearance_min": Quantity(min(found), *DEFINITIONS["clearance_min"])} if found else {}
 
 
@@ -71,7 +83,7 @@ def touching(solution: Solution) -> Iterator[Finding]:
     envelope, told = solution.assembly.spec.mechanism.envelope, set()
     for pair, gap in sorted(clearances(solution), key=lambda item: float(item[1].min())):
         least = int(np.argmin(gap))
-        if envelope is None or pair in told or gap[least] >= envelope.gap - 1e-9:
+        if envelope is None or pair in told or gap[least] >= (0.0 if pair == BESIDE else envelope.gap) - ROUNDING:
             continue
         told.add(pair)
         by = f"overlap by {mm(-float(gap[least]))}" if gap[least] < 0 else f"come within {mm(float(gap[least]))}"

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cfmkit.families.cam.clearance import nearest_pairs
 from cfmkit.families.cam.picture_parts import moment, pivoting, pose, scene, spring_count, start_curve, swallowtail
 from cfmkit.families.cam.scalar_results import constant_force
 from cfmkit.plots import parts
@@ -17,7 +18,7 @@ from cfmkit.plots.label_placement import place_labels
 from cfmkit.plots.line_diagram import Diagram, Limit, Region, Scale, Series, diagram_figure
 from cfmkit.plots.loop_figure import loop_figure
 from cfmkit.plots.moving_svg import Moving, chosen
-from cfmkit.plots.style import BLUE, GREY, OCHRE, PURPLE, TROUBLE, VERMILLION, new_figure, styled
+from cfmkit.plots.style import BLACK, BLUE, BROWN, GREY, OCHRE, PURPLE, TROUBLE, VERMILLION, new_figure, styled
 from cfmkit.plots.text import Heading, finite_range, right_axis, top_axis, value_text, write_heading
 from cfmkit.specs.units import to_border
 
@@ -57,6 +58,8 @@ def figures(result: Result) -> dict[str, Callable[[], Figure]]:
     makers = [loop, mechanism, curvature, contact, springs]
     if solution.corner_travel > 0:
         makers.append(undercut)
+    if solution.assembly.spec.mechanism.envelope is not None:
+        makers.append(clearance)
     return {maker.__name__: partial(maker, result) for maker in makers} | band_figures(result)
 
 
@@ -240,6 +243,24 @@ def springs(result: Result) -> Figure:
     stiffness, count = float(to_border(solution.assembly.loads.stiffness, "stiffness")), spring_count(solution)
     right_axis(figure.axes[0], stiffness, f"force of {'the spring' if count == 1 else f'the {count} springs'} [N]")
     return figure
+
+
+def clearance(result: Result) -> Figure:
+    """Return how far the moving parts stay from plate, screws and each other over the travel, with the gap wanted."""
+    solution: Solution = result.state
+    envelope, found = solution.assembly.spec.mechanism.envelope, nearest_pairs(solution)
+    colors = (BLUE, VERMILLION, PURPLE, OCHRE, BLACK, BROWN, GREY)
+    order = sorted(found, key=lambda pair: float(found[pair].min()))
+    series = [
+        Series(found[pair], pair, color, prefer=0.15 + 0.12 * number)
+        for number, (pair, color) in enumerate(zip(order, colors, strict=False))
+    ]
+    wanted = envelope.gap if envelope is not None else 0.0
+    passed = any(float(gap.min()) < wanted - 1e-9 for gap in found.values())
+    text = f"wanted {value_text(wanted, 'length')}" if wanted else "touching"
+    limits = [*limits_on(result, "clearance_min"), Limit(wanted, text, trouble=passed)]
+    diagram = Diagram(solution.travel + solution.origin, TRAVEL, Scale("distance", "length"), series, limits)
+    return diagram_figure(Heading.of(result, "distances of the moving parts"), [diagram])
 
 
 @styled
