@@ -220,6 +220,8 @@ def _line(ax: Axes, start: tuple[float, float], end: tuple[float, float], text: 
         rotation=angle,
         rotation_mode="anchor",
         zorder=6,
+        # lines of other dimensions end beside a text that is longer than its own
+        bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.4},
     )
 
 

@@ -115,13 +115,32 @@ def geometry(drawing: Drawing) -> Iterator[tuple[str, bytes]]:
 def _drawn(drawing: Drawing, spec: Spec) -> Figure:
     from cfmkit.plots.workshop_drawing import drawing_figure
 
-    return drawing_figure(drawing, spec.name or f"a {spec.family} mechanism", stated_tolerances(spec))
+    told = stated_tolerances(spec) or assumed_tolerances(spec)
+    return drawing_figure(drawing, spec.name or f"a {spec.family} mechanism", told)
 
 
 def stated_tolerances(spec: Spec) -> tuple[str, ...]:
     """Return a line for each tolerance that the specification's design states."""
     made = getattr(getattr(spec, "design", None), "tolerances", None)
     return tuple(f"{path}: {_spread(stated)}" for path, stated in (made or {}).items())
+
+
+def assumed_tolerances(spec: Spec) -> tuple[str, ...]:
+    """Return the process by which a part is usually made and what it is assumed to hold, where nothing is stated."""
+    from cfmkit.studies.process_tolerances import assumed
+
+    found = assumed(spec)
+    if found is None:
+        return ()
+    process = found.process
+    kinds = [kind for kind in ("thickness", "position") if kind in found.kinds.values()]
+    held = [f"{kind} +- {1e3 * getattr(process, kind):g} mm (standard deviation)" for kind in kinds]
+    kerf = f"kerf {1e3 * process.kerf:g} mm, " if process.kerf else ""
+    return (
+        f"process: {process.name}, assumed",
+        *held,
+        f"{kerf}inside corners from {1e3 * process.least_radius:g} mm, walls from {1e3 * process.least_feature:g} mm",
+    )
 
 
 def _spread(stated: Any) -> str:

@@ -70,3 +70,11 @@ def test_a_design_writes_its_drawing_and_names_its_tolerances():
 
     (line,) = stated_tolerances(design.spec)
     assert line == "mechanism.brace_length: normal 0.1 mm"
+
+
+def test_a_drawing_without_stated_tolerances_names_the_process_that_is_assumed():
+    from cfmkit.runs.files import assumed_tolerances
+
+    lines = assumed_tolerances(cfmkit.load(CONFIGS / "make_finger.yaml"))
+    assert lines[:2] == ("process: fdm, assumed", "thickness +- 0.05 mm (standard deviation)")
+    assert lines[-1] == "inside corners from 0.2 mm, walls from 0.4 mm"
