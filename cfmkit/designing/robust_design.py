@@ -34,6 +34,9 @@ STEP = 2e-4
 SIGMA_STEP = 0.5
 """Step of a difference by an error, in standard deviations: so small that its own curvature does not count."""
 
+ASIDE = 0.25
+"""A mean error beyond so many standard deviations is one to one side, as of a waviness, which is never below zero."""
+
 LINEAR_PARTS, ROWS = 192, 24
 """Parts of a linear program, and how many of its rows each brings: those that are missed most, or nearly."""
 
@@ -104,6 +107,12 @@ class RobustProblem:
     def reach(self) -> FloatArray:
         """Widths of the ranges, (n,)."""
         return np.asarray(self.bounds[:, 1] - self.bounds[:, 0])
+
+    @property
+    def middle(self) -> FloatArray:
+        """Errors about which differences are taken, (d,): none, or of a range to one side of the design its middle."""
+        mean = self.errors.mean(axis=0)
+        return np.asarray(np.where(np.abs(mean) > ASIDE * self.deviations, mean, 0.0))
 
     @property
     def none(self) -> FloatArray:
@@ -204,7 +213,8 @@ def linear(problem: RobustProblem, x: FloatArray, seen: SeenPart) -> Linear | No
     by_error = np.empty((len(middle), len(problem.deviations)))
     for k, sigma in enumerate(problem.deviations.tolist()):
         step = SIGMA_STEP * sigma * np.eye(len(problem.deviations))[k]
-        ends = [seen(x, sign * step) for sign in (1.0, -1.0)]
+        about = problem.middle * (step > 0)
+        ends = [seen(x, about + sign * step) for sign in (1.0, -1.0)]
         if ends[0] is None or ends[1] is None:
             return None
         by_error[:, k] = (ends[0] - ends[1]) / (2.0 * SIGMA_STEP * sigma)

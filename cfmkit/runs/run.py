@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
     from contextlib import AbstractContextManager
 
+    from cfmkit.results import Result
     from cfmkit.runs.run_findings import Report
     from cfmkit.specs.spec import Spec
     from cfmkit.specs.yamlio import Document
@@ -233,29 +234,30 @@ def designed(spec: Spec, run: Run) -> Report:
     tables = {f"{stem}.csv": partial(_csv, table) for stem, table in design.tables.items()}
     found = run_findings.report_on(result, design)
     found = found.beside({}, run_findings.Supplement(files=tables, lines=design.notes))
-    return _of_many_parts(found, spec, run)
-
-
-def _of_many_parts(found: Report, given: Spec, run: Run) -> Report:
-    """Return a report with what is known of many parts of its design, and what to do at the bench with one."""
-    if found.result.status is not Status.COMPLETE:
+    if design.spec is None or result.status is not Status.COMPLETE:
         return found
+    # as it was written: what follows from other values follows from those of each part
+    return _of_many_parts(found, replace(result, spec=design.spec), spec, run)
+
+
+def _of_many_parts(found: Report, nominal: Result, given: Spec, run: Run) -> Report:
+    """Return a report with what is known of many parts of its design, and what to do at the bench with one."""
     from cfmkit.studies.bench_note import bench
 
-    found = _with_yield(found, given, run)
-    told = bench(found.result, run)
+    found = _with_yield(found, nominal, given, run)
+    told = bench(nominal, run)
     return found.beside({}, run_findings.Supplement(lines=(("bench", told),))) if told else found
 
 
-def _with_yield(found: Report, given: Spec, run: Run) -> Report:
+def _with_yield(found: Report, nominal: Result, given: Spec, run: Run) -> Report:
     """Return a report with what is known of many parts of its design, where their tolerances are given."""
     from cfmkit.studies.made_parts import yields_of
 
-    yields = yields_of(found.result, given, run)
+    yields = yields_of(nominal, given, run)
     if yields is None:
         from cfmkit.studies.expected_yield import expected
 
-        told = expected(found.result, run)
+        told = expected(nominal, run)
         return found.beside({}, run_findings.Supplement(lines=(("made", told),))) if told else found
     more = run_findings.Supplement(data={"yield": yields.as_json()}, lines=(("yield", yields.sentence()),))
     return found.beside(yields.quantities(), more).of_many_parts()

@@ -75,3 +75,26 @@ def test_the_tolerance_that_costs_most_is_the_one_with_the_largest_share_of_the_
 def test_a_design_without_numbers_is_refused():
     with pytest.raises(NoPart):
         with_margins(problem(lambda x, e: None, normal(10, 1), [[1.0]], [0.0], [[0, 1]]), np.array([0.5]))
+
+
+def test_an_error_to_one_side_is_never_looked_at_on_the_other():
+    """As a waviness, which is never negative: a part with a negative one has no numbers."""
+    rng = np.random.default_rng(3)
+
+    def seen(x, errors):
+        return None if errors[0] < 0 else np.array([x[0] - 2.0 * errors[0]])
+
+    problem = Problem(
+        seen,
+        np.array([[0.0, 5.0]]),
+        rng.uniform(0.0, 1.0, (400, 1)),
+        np.array([12.0**-0.5]),
+        np.ones((1, 1)),
+        np.zeros(1),
+        np.zeros(1, dtype=int),
+        0.9,
+    )
+    found = with_margins(problem, np.array([0.5]))
+    assert found.linear.by_error[0, 0] == pytest.approx(-2.0)
+    assert found.reached
+    assert found.x[0] >= 1.8
