@@ -84,7 +84,7 @@ def test_an_error_to_one_side_is_never_looked_at_on_the_other():
     def seen(x, errors):
         return None if errors[0] < 0 else np.array([x[0] - 2.0 * errors[0]])
 
-    problem = Problem(
+    problem = RobustProblem(
         seen,
         np.array([[0.0, 5.0]]),
         rng.uniform(0.0, 1.0, (400, 1)),
