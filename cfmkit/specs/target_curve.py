@@ -9,7 +9,7 @@ from __future__ import annotations
 import csv
 import itertools
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
@@ -105,6 +105,14 @@ class TargetCurve:
         if isinstance(self.function, ThroughPoints):
             return self.function.places[0], self.function.places[-1]
         return -float("inf"), float("inf")
+
+    def scaled(self, factor: float) -> TargetCurve:
+        """Return it with all efforts multiplied by a factor."""
+        if isinstance(self.function, ThroughPoints):
+            values = tuple(factor * value for value in self.function.values)
+            return replace(self, function=replace(self.function, values=values))
+        level, slope = self.function
+        return replace(self, function=(factor * level, factor * slope))
 
     def covers(self, low: float, high: float) -> bool:
         """Return whether it is known between two places [m or rad], but for rounding."""

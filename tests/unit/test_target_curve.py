@@ -246,3 +246,146 @@ def test_a_cut_curve_is_its_own_target_where_no_other_is_named():
     result = cfmkit.analyze(spec.replace({"mechanism.springs.stiffness": 2 * spec.mechanism.springs.stiffness}))
     assert evaluate(result)["deviation_from_curve"].value < 1e-9
     assert result.curve.effort[240] == pytest.approx(50.0)
+
+
+SPRINGS = """
+cfmkit: 1
+family: slider-crank
+mechanism:
+  crank_length: 54 mm
+  stretched_position: 100 mm
+  offset: 60 mm
+  unloaded_angle: 0.542 rad
+  springs: {{pivot: 35 N*mm/rad, crank_pin: 30 N*mm/rad, slider_pin: 49 N*mm/rad}}
+design: {{{design}}}
+analysis: {{drive: {drive}, travel: [0 mm, 32 mm]}}
+"""
+
+
+def test_springs_follow_a_rising_force_better_than_they_hold_a_constant_one():
+    design = "target: {points: [[0 mm, 0.9 N], [30 mm, 1.5 N]]}, travel: [5 mm, 30 mm]"
+    found = cfmkit.design(cfmkit.loads(SPRINGS.format(design=design, drive="force")))
+    result = cfmkit.analyze(found.spec)
+    said = evaluate(result)["deviation_from_curve"].value
+    inside = (result.curve.motion >= 0.005) & (result.curve.motion <= 0.030)
+    wanted = 0.9 + 20.0 * result.curve.motion[inside]
+    assert said == pytest.approx(np.abs(result.curve.effort[inside] - wanted).max() / 1.5, rel=0.02)
+    assert said < 1e-5
+    assert found.spec == cfmkit.loads(cfmkit.dumps(found.spec))
+
+
+def test_a_torque_follows_a_line_over_the_angle():
+    base = cfmkit.load("configs/slider_crank_li2019_widest.yaml")
+    target = {"points": (("-5 deg", "1.5 N*mm"), ("14 deg", "2.5 N*mm"))}
+    found = cfmkit.design(base.replace({"design": {"target": target, "angle": ("-4 deg", "10 deg")}}))
+    result = cfmkit.analyze(found.spec)
+    assert result.curve.kind == "torque"
+    inside = (result.curve.motion >= np.radians(-4)) & (result.curve.motion <= np.radians(10))
+    wanted = 1.5e-3 + 1e-3 / np.radians(19) * (result.curve.motion[inside] - np.radians(-5))
+    off = np.abs(result.curve.effort[inside] - wanted).max() / wanted.max()
+    assert off < 0.05
+    assert evaluate(result)["deviation_from_curve"].value == pytest.approx(off, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("design", "drive", "told"),
+    [
+        ("target: {points: [[0 mm, 1 N], [9 mm, 2 N]]}", "force", "needs its window: give 'travel'"),
+        ("target: {points: [[0 mm, 1 N], [9 mm, 2 N]]}, travel: [5 mm, 30 mm]", "force", "beyond the points"),
+        ("target: {points: [[0 mm, 1 N], [9 mm, 2 N]]}, travel: [5 mm, 8 mm], force: 1 N", "force", "give either"),
+        ("target: {points: [[0 mm, 0 N], [9 mm, 0 N]]}, travel: [5 mm, 8 mm]", "force", "zero all over"),
+        ("target: {points: [[0 mm, 1 N], [9 mm, 2 N]]}, travel: [5 mm, 8 mm]", "torque", "curve of force"),
+    ],
+)
+def test_springs_refuse_what_is_no_curve_of_theirs(design, drive, told):
+    with pytest.raises(SpecError) as caught:
+        cfmkit.loads(SPRINGS.format(design=design, drive=drive))
+    assert told in str(caught.value)
+
+
+def test_a_v_beam_falls_in_a_line():
+    found = cfmkit.design(cfmkit.load("configs/vcfm_falling.yaml"))
+    result = cfmkit.analyze(found.spec)
+    wanted = 13.4 - 800.0 * result.curve.motion
+    inside = (result.curve.motion >= 1.3e-3) & (result.curve.motion <= 4.3e-3)
+    assert np.abs(result.curve.effort - wanted)[inside].max() / 13.4 < 0.01
+    assert evaluate(result)["deviation_from_curve"].value < 0.01
+    assert "not_flat" not in {one.name for one in result.warnings}
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        ({"design.target": {"stiffness": "-5 N/mm", "start": "13.4 N"}}, "must be above 0"),
+        ({"design.target": {"points": (("0 mm", "13 N"), ("3 mm", "11 N"))}}, "give it points there"),
+    ],
+)
+def test_a_v_beam_that_cannot_follow_says_why(change, told):
+    found = cfmkit.design(cfmkit.load("configs/vcfm_falling.yaml").replace(change))
+    assert found.spec is None
+    assert told in found.message
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        ({"design.optimise.objective": "range"}, "objective: ripple"),
+        ({"design.target.points": (("0 mm", "1 N"), ("9 mm", "2 N"))}, "beyond the points"),
+        ({"design.target.points": (("0 mm", "1 N"), ("20 mm", "-2 N"))}, "must stay above 5%"),
+        ({"design.optimise.force.target": "3 N"}, "remove 'optimise.force'"),
+    ],
+)
+def test_a_network_refuses_a_curve_that_its_search_cannot_compare_with(change, told):
+    spec = cfmkit.load("configs/beam_design_lan.yaml")
+    with pytest.raises(SpecError) as caught:
+        spec.replace(
+            {
+                "design.target": {"points": (("6.8 mm", "1 N"), ("13.6 mm", "2 N"))},
+                "design.optimise.objective": "ripple",
+            }
+            | change
+        )
+    assert told in str(caught.value)
+
+
+STRIP = """
+cfmkit: 1
+family: slider-crank
+mechanism:
+  crank_length: 54 mm
+  stretched_position: 100 mm
+  offset: 60 mm
+  unloaded_angle: 0.542 rad
+  material: {youngs_modulus: 1800 MPa, poisson_ratio: 0.35, yield_strength: 42.5 MPa}
+  beam: {width: 5.138 mm, thickness: [1 mm, 1 mm, 1 mm, 1 mm, 1 mm, 1 mm, 1 mm]}
+design:
+  target: {points: [[0 mm, 1 N], [20 mm, 1.4 N]]}
+  travel: [3 mm, 20 mm]
+  beam: {goal: ripple, nodes: 7, thickness: [0.5 mm, 2 mm], width: 5.138 mm}
+analysis: {drive: force, travel: [0 mm, 20 mm]}
+"""
+
+
+@pytest.mark.slow
+def test_a_strip_comes_nearer_to_its_curve_than_one_of_one_thickness():
+    spec = cfmkit.loads(STRIP)
+    found = cfmkit.design(spec)
+    near, far = (cfmkit.analyze(one) for one in (found.spec, spec))
+    window = found.spec.analysis.window
+    said = evaluate(near)["deviation_from_curve"].value
+    assert said < 0.05
+    assert (
+        said < 0.5 * evaluate(cfmkit.analyze(spec.replace({"analysis.window": window})))["deviation_from_curve"].value
+    )
+    assert far.status.key == "complete"
+
+
+def test_a_strip_with_a_curve_has_no_longest_stroke():
+    found = cfmkit.design(
+        cfmkit.loads(
+            STRIP.replace("goal: ripple", "goal: stroke").replace(
+                "travel: [3 mm, 20 mm]\n  beam", "travel: [3 mm, 20 mm]\n  tolerance: 1 %\n  beam"
+            )
+        )
+    )
+    assert found.spec is None

@@ -17,6 +17,7 @@ from cfmkit.families.beam.shaping.spec import Optimise, optimise_faults
 from cfmkit.metrics.fatigue_and_relaxation import Durability
 from cfmkit.specs.formula import formula
 from cfmkit.specs.spec import Analysis, DesignBlock, Displacement, Model, SolidAnalysis, Spec, refuse
+from cfmkit.specs.target_curve import Target
 from cfmkit.specs.units import DIMENSIONS, Factor, Force, Length, Ratio, Torque
 from cfmkit.specs.units.fields import LARGEST
 from cfmkit.stock.spec import sheet_faults
@@ -100,11 +101,35 @@ class Rescale(Model):
         return self
 
 
+LEAST_SHARE = 0.05
+"""Of its largest force a target curve must have everywhere: the search compares by the force that is wanted."""
+
+
 class BeamDesign(DesignBlock):
     """What `cfmkit design` is to do."""
 
     rescale: Rescale | None = Field(None, description="another size, section or material for the same curve")
     optimise: Optimise | None = Field(None, description="node positions and beam shapes for a constant force")
+
+    target: Target | None = Field(
+        None, description="instead of a constant force a curve over the window of 'optimise', with 'objective: ripple'"
+    )
+
+    @model_validator(mode="after")
+    def _target_in_its_window(self) -> Self:
+        if self.target is None:
+            return self
+        if self.optimise is None or self.optimise.objective != "ripple":
+            raise ValueError("a 'target' needs 'optimise' with 'objective: ripple': it looks for the nearest force")
+        if self.optimise.force.target is not None or self.optimise.force.min is not None:
+            raise ValueError("'target' says the force: remove 'optimise.force'")
+        curve, window = self.target.curve(), self.optimise.window
+        if not curve.covers(*window):
+            raise ValueError("'optimise.window' is beyond the points of 'target'")
+        low, high = curve.extremes(*window)
+        if low < LEAST_SHARE * high or high <= 0:
+            raise ValueError(f"'target' must stay above {LEAST_SHARE:.0%} of its largest force in 'optimise.window'")
+        return self
 
     @model_validator(mode="after")
     def _one_way(self) -> Self:

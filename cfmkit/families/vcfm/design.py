@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.findings import at_least, mm, mpa
+from cfmkit.families.findings import at_least, mm, mpa, newton
 from cfmkit.families.no_mechanism import Infeasible, no_design
 from cfmkit.families.vcfm.build import parts, share_of
 from cfmkit.families.vcfm.findings import finding
@@ -38,9 +38,11 @@ from cfmkit.numerics.roots import bracketed_root
 from cfmkit.results import Design, Status
 
 if TYPE_CHECKING:
+    from cfmkit.arrays import FloatArray
     from cfmkit.families.base import Run
     from cfmkit.families.vcfm.exact_model import ExactSampler
     from cfmkit.families.vcfm.spec import VcfmDesign, VcfmSpec
+    from cfmkit.specs.target_curve import TargetCurve
 
 
 ROUNDS = 8
@@ -82,6 +84,9 @@ def _attempt(spec: VcfmSpec) -> Design:
     if allowable is None:
         message = "a design needs the stress that is allowed: add 'mechanism.material.yield_strength'"
         return Design(None, Status.INVALID, message)
+    if target.level <= 0:
+        told = f"the target curve is {newton(target.level)} in the middle of the leaves' linear region"
+        return no_design(finding("target_curve", f"{told}: it must be above 0 there ('design.target')"))
     try:
         sizes = closed_form(spec, target)
         active = ["mechanism.material.yield_strength"] if target.leaf_length is None else []
@@ -131,7 +136,7 @@ def spring_side(spec: VcfmSpec, target: VcfmDesign, leaf: Strip) -> Strip:
     e, t, tilt = made.modulus, positive.thickness, positive.angle
     length = sqrt(3.0 * e * t * deflection * cos(tilt) / (spec.mechanism.allowable_stress or 1.0))
     side = Strip(length, tilt, t, 1.0, e, made.poisson)
-    return replace(side, width=float(target.force / target.height / Diamond(side, share_of(positive)).stiffness))
+    return replace(side, width=float(target.level / target.height / Diamond(side, share_of(positive)).stiffness))
 
 
 def check_width(spec: VcfmSpec, target: VcfmDesign, leaf: Strip) -> None:
@@ -263,7 +268,7 @@ def fit_widths(spec: VcfmSpec, target: VcfmDesign, sizes: DesignSizes) -> tuple[
             followable_stroke(target.height, sizes.leaf),
         )
     leaves, spring = sampler.leaves(places).force, sampler.spring(places)[0]
-    wanted = np.full(len(places), target.force)
+    wanted = np.full(len(places), target.level) if target.curve is None else _followed(target.curve, places)
     (wide, stiff), *_ = np.linalg.lstsq(np.column_stack([leaves, spring]), wanted, rcond=None)
     leaf, side = sizes.leaf, sizes.side
     fitted = DesignSizes(
@@ -272,6 +277,35 @@ def fit_widths(spec: VcfmSpec, target: VcfmDesign, sizes: DesignSizes) -> tuple[
     end = np.concatenate([[_rest(sampler, full, (wide, stiff))], np.linspace(0.0, last, 201)])
     stresses = float(sampler.leaves(end).stress.max()), float(sampler.spring(np.array([last + full]))[1].max())
     return fitted, stresses
+
+
+def _followed(curve: TargetCurve, places: FloatArray) -> FloatArray:
+    """Return the forces of a curve at places in the linear region [N].
+
+    Raises
+    ------
+    Infeasible
+        If the curve does not cover them, or is not above zero there.
+    """
+    low, high = float(places[0]), float(places[-1])
+    if not curve.covers(low, high):
+        first, last = curve.extent
+        raise Infeasible(
+            finding(
+                "target_curve",
+                f"the linear region of the leaves is {mm(low)} to {mm(high)}, and the target curve goes from "
+                f"{mm(first)} to {mm(last)}; give it points there ('design.target')",
+            )
+        )
+    if curve.extremes(low, high)[0] <= 0:
+        raise Infeasible(
+            finding(
+                "target_curve",
+                f"the target curve is not above zero from {mm(low)} to {mm(high)}, the linear region of the leaves "
+                "('design.target')",
+            )
+        )
+    return np.asarray(curve.at(places))
 
 
 def _rest(sampler: ExactSampler, preload: float, factors: tuple[float, float]) -> float:

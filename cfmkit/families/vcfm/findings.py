@@ -54,6 +54,7 @@ FINDINGS = {
     "unstable_branch": "the reported force belongs to an unstable equilibrium, which a real leaf leaves",
     "truss_law": "the paper's law of a bar without bending: force and flatness are not those of the mechanism",
     "measured_contradiction": "the reported force and stiffness cannot both hold for these leaves",
+    "target_curve": "no leaves and spring give the target curve: it ends too early, or is not above zero",
     "too_thin": "the design needs a leaf thinner than can be made",
     "envelope": "the design does not fit into the given space",
     "wide_beam": "leaves are so wide that they cannot curl across their width: they are stiffer than beam theory says",
@@ -143,7 +144,7 @@ def _flatness(solution: Solution) -> Iterator[Finding]:
     if not len(force) or force.max() <= 0:
         return
     ripple, allowed = _ripple(force), solution.spec.analysis.flatness
-    if ripple <= allowed or solution.window_is_flat:
+    if ripple <= allowed or solution.window_is_flat or solution.spec.target_curve is not None:
         return
     one = solution.character
     alike = one.positive_stiffness > 0 and abs(one.negative_stiffness / one.positive_stiffness - 1.0) < ALIKE

@@ -52,7 +52,7 @@ def sized_leaf(spec: VcfmSpec, target: VcfmDesign, thickness: float, length: flo
     """Return a leaf as wide as the stiffness wants, F_c/h = n P_cr/X."""
     made, rise = spec.mechanism.material, target.height
     leaf = Strip(length, asin(rise / length), thickness, 1.0, made.modulus, made.poisson)
-    width = target.force / rise * leaf.reach / (spec.mechanism.bistable.half_beams * float(critical_force(leaf)))
+    width = target.level / rise * leaf.reach / (spec.mechanism.bistable.half_beams * float(critical_force(leaf)))
     return replace(leaf, width=float(width))
 
 
@@ -153,12 +153,14 @@ def completed(spec: VcfmSpec, target: VcfmDesign, linear: tuple[float, float], a
         if target.adjustment:
             most, least = (format_short(target.adjustment * (1.0 + share), "force", 6) for share in (flat, -flat))
             adjusted.append({"metric": "force_change_max", "min": least, "max": most})
+        flat_or_near = ("deviation_from_target", "force_ripple") if target.target is None else ("deviation_from_curve",)
         changes["requirements"] = (
-            {"metric": "deviation_from_target", "max": allowed},
-            {"metric": "force_ripple", "max": allowed},
+            *({"metric": name, "max": allowed} for name in flat_or_near),
             *adjusted,
             {"metric": "safety_factor", "min": f"{floor(1e3 * (1.0 - overrated(angle))) / 1e3:.3f}"},
         )
+    if target.target is not None:
+        changes |= {"design.target": target.target.written_out(target.force), "design.force": None}
     made = spec.replace(changes)
     closing = made.travel + max(target.preload_stroke, *made.analysis.preloads) - spring_room(made)
     if closing <= 0 or "corner" in spec.mechanism.frame.model_fields_set:

@@ -81,7 +81,7 @@ def analyze_block(spec: VcfmSpec, block: Block) -> BlockAnswer | None:
         for name, mask in warned(spec, slab).items():
             warnings.setdefault(name, np.zeros(block.size, dtype=bool))[chosen] = mask
     named = [{"load" if one.name in METRICS else "": found} for one, found in zip(block.measures, values, strict=True)]
-    target = None if spec.design is None else np.full(block.size, spec.design.force)
+    target = None if spec.design is None or spec.design.force is None else np.full(block.size, spec.design.force)
     return BlockAnswer(done, tuple(named), target, warnings=warnings)
 
 

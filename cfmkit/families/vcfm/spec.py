@@ -10,6 +10,7 @@ from pydantic import Field, field_validator, model_validator
 
 from cfmkit.metrics.fatigue_and_relaxation import Durability
 from cfmkit.specs.spec import Analysis, DesignBlock, Model, SolidAnalysis, Spec, refuse
+from cfmkit.specs.target_curve import Target, TargetCurve
 from cfmkit.specs.units import Angle, Force, Length, Ratio, Stiffness
 from cfmkit.stock.spec import CutPart, MaterialSpec, PositiveStress, SafetyFactor, material_input, sheet_faults
 from cfmkit.stock.springs.spec import Catalogue, Life, SpringWire
@@ -231,7 +232,10 @@ class Mechanism(Model):
 class VcfmDesign(DesignBlock):
     """What `cfmkit design` is to reach. Angle and thickness of the spring, and the number of leaves, stay."""
 
-    force: Annotated[Force, Field(gt=0)] = Field(description="constant force without preload")
+    force: Annotated[Force, Field(gt=0)] | None = Field(None, description="constant force without preload")
+    target: Target | None = Field(
+        None, description="instead of a constant force a curve over the displacement, best a line ('stiffness')"
+    )
     adjustment: Annotated[Force, Field(gt=0)] | None = Field(
         None, description="by how much the preload raises it; default: no preload, then give 'rise'"
     )
@@ -269,17 +273,43 @@ class VcfmDesign(DesignBlock):
             raise ValueError("'preload' needs the 'adjustment' that it gives; without one give the leaves' 'rise'")
         return self
 
+    @model_validator(mode="after")
+    def _one_target(self) -> Self:
+        if self.target is None:
+            if self.force is None:
+                raise ValueError("give either 'force' or 'target', a curve of forces")
+            return self
+        if self.force is not None and (self.target.stiffness is None or self.target.start is not None):
+            raise ValueError("give either 'force' or 'target'; with 'target: {stiffness}' the force is that at zero")
+        if self.rise is None or self.adjustment is not None or self.catalogue or not self.refine:
+            raise ValueError("a 'target' needs the leaves' 'rise' and the exact model: no adjustment, no catalogue")
+        return self
+
+    @property
+    def curve(self) -> TargetCurve | None:
+        """The curve that is wanted; None of a constant force."""
+        return None if self.target is None else self.target.curve(self.force)
+
+    @property
+    def level(self) -> float:
+        """The force, of a curve that in the middle of the leaves' linear region, two thirds of their rise [N]."""
+        if self.curve is not None:
+            return float(self.curve.at(2.0 / 3.0 * (self.rise or 0.0)))
+        return self.force or 0.0
+
     @property
     def height(self) -> float:
         """Rise of the leaves [m]."""
         if self.rise is not None or self.adjustment is None:
             return self.rise or 0.0
-        return (self.preload or 0.0) * self.force / self.adjustment
+        return (self.preload or 0.0) * self.level / self.adjustment
 
     @property
     def preload_stroke(self) -> float:
         """Preload for the whole adjustment [m]; 0 where none is wanted."""
-        return self.preload or (self.rise or 0.0) * (self.adjustment or 0.0) / self.force
+        if not self.adjustment:
+            return self.preload or 0.0
+        return self.preload or (self.rise or 0.0) * self.adjustment / self.level
 
 
 class Measured(Model):

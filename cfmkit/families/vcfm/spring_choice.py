@@ -153,9 +153,9 @@ def _choices(spec: VcfmSpec, target: VcfmDesign) -> Iterator[tuple[BoughtSprings
 def _around(spec: VcfmSpec, target: VcfmDesign, springs: BoughtSprings, offer: Offer | None) -> Around | Miss:
     """Return the leaves around some springs by closed forms, or what the springs miss."""
     label, law = f"{springs.count} x {springs.name or 'the spring'}", coils(springs)
-    left = target.force - law.tension
+    left = target.level - law.tension
     if left <= 0:
-        return Miss(label, law.tension / target.force, "their initial tension alone is more than the force")
+        return Miss(label, law.tension / target.level, "their initial tension alone is more than the force")
     rise, preload = left / law.stiffness, (target.adjustment or 0.0) / law.stiffness
     reachable = 4.0 * rise / 3.0
     ratios = [
@@ -247,7 +247,7 @@ def _fitted(spec: VcfmSpec, target: VcfmDesign, found: Around) -> Around | Miss:
         if sampler.problem:
             return Miss(found.label, 1.0, f"the exact model does not confirm the stroke: {sampler.problem}")
         leaves, spring = sampler.leaves(places).force, sampler.spring(places)[0]
-        wide = float(leaves @ (target.force - spring) / (leaves @ leaves))
+        wide = float(leaves @ (target.level - spring) / (leaves @ leaves))
         fitted = replace(found, leaf=replace(found.leaf, width=found.leaf.width * wide))
         ends = np.linspace(-_rest(sampler, wide, back), last, 201)
         worst = float(sampler.leaves(ends).stress.max()) / allowable

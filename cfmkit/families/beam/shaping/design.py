@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from cfmkit.designing.starts import Clock, identity_of
 from cfmkit.families.beam.build import assemble
 from cfmkit.families.beam.findings import finding, percent
@@ -21,6 +23,7 @@ if TYPE_CHECKING:
     from cfmkit.families.base import Run
     from cfmkit.families.beam.shaping.spec import Optimise
     from cfmkit.families.beam.spec import BeamSpec
+    from cfmkit.specs.target_curve import TargetCurve
 
 
 def shaped(spec: BeamSpec, wanted: Optimise, run: Run) -> Design:
@@ -80,6 +83,11 @@ def task_of(spec: BeamSpec, wanted: Optimise) -> Task:
         spec = spec.model_copy(update={"mechanism": mechanism.model_copy(update={"copies": one})})
     assembly = assemble(spec)
     bends = assemble(spec.replace({"analysis.fidelity": BENDING_ONLY})).network
+    curve = spec.design.target.curve() if spec.design is not None and spec.design.target is not None else None
+    mean = 0.0 if curve is None else mean_of(curve, wanted.window)
+    limits = _limits(wanted, assembly.allowable_stress)
+    if curve is not None:
+        limits = replace(limits, force_target=mean, force_tolerance=CLOSE_MEAN)
     return Task(
         network=assembly.network,
         driven=assembly.driven,
@@ -90,7 +98,7 @@ def task_of(spec: BeamSpec, wanted: Optimise) -> Task:
         shaped=wanted.beams if wanted.beams is not None else tuple(mechanism.beams),
         orders=wanted.orders,
         coefficient_limit=wanted.coefficient_limit,
-        limits=_limits(wanted, assembly.allowable_stress),
+        limits=limits,
         objective=wanted.objective,
         half_band=wanted.half_band,
         compared=None if wanted.compare is None else (wanted.compare[0] / layers, wanted.compare[1] / layers),
@@ -98,8 +106,19 @@ def task_of(spec: BeamSpec, wanted: Optimise) -> Task:
         total_stress=spec.stress == "total",
         safety_factor=mechanism.safety_factor,
         layers=layers,
+        shape=None if curve is None else curve.scaled(1.0 / mean),
         bending_only=None if spec.fidelity == BENDING_ONLY else bends,
     )
+
+
+CLOSE_MEAN = 1e-3
+"""Share within which the mean force is that of a curve: what is left of a limit that rounding cannot meet exactly."""
+
+
+def mean_of(curve: TargetCurve, window: tuple[float, float]) -> float:
+    """Return the mean of a curve over a window [N]."""
+    places = np.linspace(*window, 2001)
+    return float(np.trapezoid(curve.at(places), places) / (window[1] - window[0]))
 
 
 def _coordinates(wanted: Optimise) -> list[Coordinate]:
@@ -199,7 +218,9 @@ def _told(task: Task, design: Judged, result: Explored) -> str:
     reused = f", {result.reused} from the journal" if result.reused else ""
     left = f", {result.missing} not done in the time" if result.missing else ""
     reached = "the analysis has no force at the end of the window"
-    if design.half_band is not None:
+    if task.shape is not None:
+        reached = f"force within {percent(design.miss or 0.0)} of the largest of 'design.target' in the window"
+    elif design.half_band is not None:
         share = 1 - window[0] / window[1]
         reached = f"force within ± {percent(design.half_band)} over {percent(share)} of the travel"
     if task.objective == "paper":

@@ -57,8 +57,19 @@ class Goal(Protocol):
 
 
 def window_force(view: View) -> FloatArray:
-    """Return the force at many places of the window [N]: the polynomial through its poses."""
-    return np.asarray(_finer(len(view.poses.window)) @ view.response.state.force[view.poses.window])
+    """Return the force at many places of the window [N]: the polynomial through its poses.
+
+    Where the force is to follow a curve it is divided by that, so that what is flat follows it.
+    """
+    return np.asarray(
+        _finer(len(view.poses.window)) @ (view.response.state.force[view.poses.window] * _levelling(view))
+    )
+
+
+def _levelling(view: View) -> FloatArray | float:
+    """Return what makes a force level that follows the task's curve, at the poses of the window; 1 without one."""
+    task = view.response.variables.task
+    return 1.0 if task.shape is None else 1.0 / task.shape.at(view.poses.at[view.poses.window] * task.layers)
 
 
 @cache
@@ -104,7 +115,8 @@ class Flattest:
         by_own[:, 0] = np.concatenate([ratio, -ratio]) / level
         if not view.sloped:
             return Aim(WEIGHT * float(band), None, np.array([0.0, WEIGHT]), rows, None, by_own)
-        slope = _finer(len(view.poses.window)) @ view.response.slopes.force[view.poses.window] / unit
+        levelling = _levelling(view) if np.ndim(_levelling(view)) == 0 else np.asarray(_levelling(view))[:, None]
+        slope = _finer(len(view.poses.window)) @ (view.response.slopes.force[view.poses.window] * levelling) / unit
         by_x = np.concatenate([-slope, slope])
         return Aim(WEIGHT * float(band), np.zeros(by_x.shape[1]), np.array([0.0, WEIGHT]), rows, by_x, by_own)
 

@@ -49,6 +49,8 @@ class Judged:
         The metric of this name of the analysis, over the window.
     faults : tuple of str
         What analysis and audit hold against it.
+    miss : float or None
+        Largest distance from the target curve over its largest force, where there is one: a metric of the analysis.
     """
 
     spec: BeamSpec
@@ -56,6 +58,7 @@ class Judged:
     audit: Audit
     half_band: float | None
     faults: tuple[str, ...]
+    miss: float | None = None
 
     @property
     def window(self) -> tuple[float, float]:
@@ -81,7 +84,8 @@ def judged(spec: BeamSpec, task: Task, found: Found, audit: Audit | None = None)
     new = new.replace({"analysis.window": window})
     (band,) = measured(result, window, "half_band")
     audit = audit or audited(Variables(task, found.order), found)
-    return Judged(new, found, audit, band, tuple(_faults(task, audit, result, window)))
+    (miss,) = (None,) if task.shape is None else measured(result, window, "deviation_from_curve")
+    return Judged(new, found, audit, band, tuple(_faults(task, audit, result, window)), miss)
 
 
 def _confirmed_window(task: Task, result: Result, window: tuple[float, float], asked: float) -> tuple[float, float]:
@@ -143,6 +147,8 @@ def written(spec: BeamSpec, task: Task, found: Found) -> BeamSpec:
         }
         changes[f"mechanism.beams.{name}.shape"] = shape
     changes["analysis.window"] = _window(spec, task, found)
+    if spec.design is not None and spec.design.target is not None:
+        changes["design.target"] = spec.design.target.written_out()
     return spec.replace(changes)
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 if TYPE_CHECKING:
     from cfmkit.elastica import Network
+    from cfmkit.specs.target_curve import TargetCurve
 
 Objective = Literal["ripple", "range", "paper"]
 
@@ -114,6 +115,8 @@ class Task:
         Yield strength over allowable stress [1].
     layers : int
         How many of the network stand in series in the mechanism: its displacements are so many times as large.
+    shape : TargetCurve or None
+        Force over the mechanism's displacements that is wanted, as a share of its mean in the window; None: constant.
     bending_only : Network or None
         The network with beams that bend only, which a start begins with; None where those of the network do no more.
     """
@@ -136,6 +139,7 @@ class Task:
     total_stress: bool = False
     safety_factor: float = 1.0
     layers: int = 1
+    shape: TargetCurve | None = None
     bending_only: Network | None = None
 
     @property

@@ -91,7 +91,7 @@ def judge(
     if pressed.ending is not Ending.COMPLETE:
         return None
     solution = Solution("beam", chain, pressed, task.material, 1, (task.start, end), True)
-    ratio = solution.force / task.force - 1.0
+    ratio = solution.force / task.force - task.share(solution.travel)
     ripple, stress = limits
     stroke = min(end, _last(solution, ratio, ripple, stress))
     stroke = float(np.floor(stroke * 1e6) / 1e6) if task.goal == "stroke" else end
@@ -104,7 +104,7 @@ def judge(
         _shares(form, values),
         (task.start, stroke),
         float(np.abs(ratio[inside]).max()),
-        _rms(chain_force(solution, task.start, stroke), task.force),
+        _rms(chain_force(solution, task.start, stroke), task.force * task.share(_even(task.start, stroke))),
         (*_at_bounds(found, values), *_held(solution, ratio, inside, limits)),
         opinion,
         1.0 if stress is None or task.goal == "stroke" else float(solution.stress.max() / stress),
@@ -113,11 +113,14 @@ def judge(
 
 def chain_force(solution: Solution, start: float, stroke: float) -> FloatArray:
     """Return the force at ten even places of the travel, its start left out [N]."""
-    places = start + (stroke - start) * np.arange(1, 11) / 10
-    return np.asarray(solution.chain.press(places).force)
+    return np.asarray(solution.chain.press(_even(start, stroke)).force)
 
 
-def _rms(force: FloatArray, target: float) -> float:
+def _even(start: float, stroke: float) -> FloatArray:
+    return start + (stroke - start) * np.arange(1, 11) / 10
+
+
+def _rms(force: FloatArray, target: FloatArray | float) -> float:
     return float(np.sqrt(np.mean((force - target) ** 2)))
 
 

@@ -83,7 +83,7 @@ def design(spec: SliderCrankSpec, run: Run) -> Design:
         INFEASIBLE, with the reason and the nearest, where the targets contradict the ranges.
     """
     wanted = spec.design
-    if wanted is None or wanted.force is None:
+    if wanted is None or wanted.drive != "force" or (wanted.force is None and wanted.beam is None):
         return Design(None, Status.INVALID, "a part that is pressed needs 'design.force'")
     try:
         spec = resolve(spec)
@@ -171,7 +171,8 @@ class Reported:
 
 def _reported(spec: SliderCrankSpec, judged: FinishedStrip, run: Run) -> Reported:
     result = analyze(spec, run)
-    names = ("deviation_from_target", "rms_to_target", "stress_max", "recheck_force", "recheck_stress")
+    kind = "target" if spec.target_curve is None else "curve"
+    names = (f"deviation_from_{kind}", f"rms_to_{kind}", "stress_max", "recheck_force", "recheck_stress")
     deviation, rms, stress, *opinion = measured(result, judged.window, *names)
     said = None if None in opinion else (float(opinion[0] or 0.0), float(opinion[1] or 0.0))
     return Reported(spec, deviation, rms, stress, said)
@@ -215,10 +216,13 @@ def task_of(spec: SliderCrankSpec, linkage: Linkage, unloaded: float) -> Task:
     wanted = spec.design
     assert wanted is not None
     assert wanted.beam is not None
-    assert wanted.force is not None
     beam, ripple, travel = wanted.beam, wanted.tolerance, wanted.travel
     if beam.goal == "stroke" and (ripple is None or travel is not None):
         raise InputError("the longest stroke needs 'design.tolerance', and no 'design.travel'; else set 'goal: ripple'")
+    if wanted.curve is not None and (beam.goal == "stroke" or beam.shape == "uniform"):
+        raise InputError("a curve ('design.target') needs 'design.beam.goal: ripple' or 'rms', and a shape that varies")
+    if wanted.curve is not None and not wanted.curve.extremes(*(travel or (0.0, 1.0)))[0] >= 0:
+        raise InputError("'design.target' must not be negative over 'design.travel': a strip is pressed, not pulled")
     if beam.goal != "stroke" and travel is None:
         raise InputError(f"the goal {beam.goal!r} needs 'design.travel', over which the force is wanted")
     reach = slider_reach(linkage, unloaded)
@@ -237,12 +241,13 @@ def task_of(spec: SliderCrankSpec, linkage: Linkage, unloaded: float) -> Task:
         line,
         travel_direction(linkage),
         type(made_of)(made_of.youngs_modulus, made_of.poisson_ratio, limit),
-        wanted.force / spec.mechanism.sets,
+        wanted.size / spec.mechanism.sets,
         float(start),
         float(stroke),
         ripple or LOOSE,
         beam.goal,
         beam.longest or 0.5 * reach,
+        None if wanted.curve is None else wanted.curve.scaled(1.0 / wanted.size),
     )
 
 
@@ -327,6 +332,9 @@ def _with_part(spec: SliderCrankSpec, part: StripSpec, window: tuple[float, floa
         update={"travel": (0.0, window[1]), "window": window, "fidelity": None, "drive": "force"}
     )
     mechanism = spec.mechanism.model_copy(update={"beam": part})
+    if spec.design is not None and spec.design.target is not None:
+        told = spec.design.target.written_out(spec.design.force)
+        spec = spec.model_copy(update={"design": spec.design.model_copy(update={"target": told, "force": None})})
     return spec.model_copy(update={"mechanism": mechanism, "analysis": analysis})
 
 

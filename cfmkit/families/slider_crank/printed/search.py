@@ -131,7 +131,8 @@ def uniform_thickness(task: Task, width: float, guess: float = 1e-3) -> float:
         if state is None:
             return guess
         level = 0.5 * (state.force.max() + state.force.min())
-        factor = float((task.force / level) ** (1.0 / 3.0))
+        wanted = np.asarray(task.share(program.travel(np.array([thickness / SMALL, 1.0]))))
+        factor = float((0.5 * task.force * (wanted.max() + wanted.min()) / level) ** (1.0 / 3.0))
         thickness *= factor
         if abs(factor - 1.0) < 1e-10:
             break
@@ -377,10 +378,11 @@ def infeasible(found: FoundStrip) -> Design:
         )
     low, high = float(state.force.min()), float(state.force.max())
     level, missed, nearest = 0.5 * (low + high), [], {}
-    off, limit = max(high / task.force - 1.0, 1.0 - low / task.force), task.material.allowable_stress
+    ratio, limit = state.force / task.force - task.share(program.travel(descent.z)), task.material.allowable_stress
+    off = float(np.abs(ratio).max())
     if off > program.ripple(descent.z):
         missed.append(f"is up to {percent(off)} off the force")
-        flat = high - low <= 2.0 * level * program.ripple(descent.z)
+        flat = task.shape is None and high - low <= 2.0 * level * program.ripple(descent.z)
         name = "design.force" if flat else "design.tolerance"
         nearest[name] = newton(level) if flat else format_short(off, "ratio")
     worst = float(state.stress.max())

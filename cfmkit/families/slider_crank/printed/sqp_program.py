@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica import Network, Path
     from cfmkit.families.slider_crank.printed.chain import Elasticity
+    from cfmkit.specs.target_curve import TargetCurve
 
 
 SMALL = 1e-3
@@ -61,6 +62,8 @@ class Task:
         Longest stroke within the ripple; smallest ripple, or smallest root mean square, over the stroke.
     longest : float
         Stroke never exceeded [m].
+    shape : TargetCurve or None
+        Force over travel that is wanted, as a share of `force`; None: it is constant.
     """
 
     corners: FloatArray
@@ -72,6 +75,11 @@ class Task:
     ripple: float
     goal: Goal = "stroke"
     longest: float = 0.08
+    shape: TargetCurve | None = None
+
+    def share(self, travel: Any) -> Any:
+        """Return the force that is wanted at travels [m], as a share of `force`."""
+        return 1.0 if self.shape is None else self.shape.at(travel)
 
 
 @dataclass(frozen=True)
@@ -247,7 +255,7 @@ class StripProgram:
         if state is None:
             return None
         force, stress = self._derivatives(z, state) if sloped else (None, None)
-        ratio = state.force / self.task.force - 1.0
+        ratio = state.force / self.task.force - self.task.share(self.travel(z))
         by = None if force is None else force / self.task.force
         objective, slope = self._objective(z, ratio, by)
         return SeenPoint(objective, slope, [*self._band(z, ratio, by), *self._strength(state, stress)])

@@ -246,6 +246,11 @@ def _written(solved: Solved) -> SliderCrankSpec:
     bought = {"bought": tuple(option.written for option in solved.bought)}
     springs = spec.mechanism.springs.model_copy(update=rates | anchor | bought)
     mechanism = spec.mechanism.model_copy(update={"springs": springs})
+    if wanted.target is not None:
+        told = wanted.target.written_out(wanted.torque or wanted.force)
+        spec = spec.model_copy(
+            update={"design": wanted.model_copy(update={"target": told, "torque": None, "force": None})}
+        )
     if any(getattr(wanted, name) is not None for name in ("crank_length", "offset")):
         mechanism = solved.task.spec.mechanism.model_copy(update={"springs": springs})
     assembly = solved.task.assembly
@@ -280,7 +285,9 @@ def _reference(solved: Solved) -> float:
 
     low, high = solved.window
     places = np.linspace(low, high, DENSE)
-    legs, target = solved.task.spec.mechanism.sets, solved.task.wanted.target
+    if solved.task.wanted.curve is not None:
+        return 0.5 * (low + high)
+    legs, target = solved.task.spec.mechanism.sets, solved.task.wanted.size
     unit = solved.task.assembly
     offset = solved.rates @ unit.units(places).effort * legs - target
     change = np.flatnonzero(np.isfinite(offset[:-1]) & (offset[:-1] * offset[1:] <= 0.0))

@@ -72,9 +72,10 @@ def audited(solved: Solved, spec: SliderCrankSpec) -> Solved:
     """
     if solved.task.wanted.stiffness is not None:
         return solved
-    result, target = analyze(spec, Run()), abs(solved.task.wanted.target)
-    if not result.curves or not result.target:
+    result, target, followed = analyze(spec, Run()), abs(solved.task.wanted.size), solved.task.wanted.curve is not None
+    if not result.curves or not (result.target or followed):
         return solved
+    names = ("deviation_from_curve", "rms_to_curve") if followed else ("deviation_from_target", "rms_to_target")
     way = ""
     if solved.task.assembly.rubbing.there:
         way = solved.task.wanted.branch or "mean"
@@ -82,8 +83,8 @@ def audited(solved: Solved, spec: SliderCrankSpec) -> Solved:
             return solved
         way = f"[{way}]"
     (largest,), (rms,) = (
-        measured(result, solved.judged, f"deviation_from_target{way}"),
-        measured(result, solved.window, f"rms_to_target{way}"),
+        measured(result, solved.judged, f"{names[0]}{way}"),
+        measured(result, solved.window, f"{names[1]}{way}"),
     )
     if largest is None or rms is None:
         return solved
@@ -128,8 +129,11 @@ def nowhere(task: Task) -> Finding:
     """Return why no window keeps the tolerance, or why no springs are better than none in the window."""
     window = task.wanted.window
     goal = task.goal(window) if window is not None else None
+    if task.wanted.curve is not None:
+        text = "the best springs are none: no others come closer to 'design.target'"
+        return finding("infeasible_targets", f"{text}; change it, its window, or 'design.springs'")
     if goal is not None and task.assembly.drive == "torque" and (goal.matrix[:, :3] <= 0.0).all():
-        other = format_short(-task.wanted.target, "torque")
+        other = format_short(-task.wanted.size, "torque")
         text = f"in the window torsion springs turn the crank the other way; ask for 'design.torque: {other}'"
         return finding("infeasible_targets", text)
     if "slider" not in task.wanted.springs and task.assembly.drive == "torque":
@@ -147,7 +151,10 @@ def nowhere(task: Task) -> Finding:
 def hopeless(task: Task, deviation: float) -> Finding:
     """Return that even the best springs have nothing of a constant effort, and why."""
     text = f"even the best springs are off by {percent(deviation)}: that is no constant {task.assembly.drive}"
-    ahead = (task.assembly.stretched - task.assembly.start) * task.wanted.target
+    if task.wanted.curve is not None:
+        text = f"even the best springs are off by {percent(deviation)} of the largest of 'design.target'"
+        return finding("infeasible_targets", f"{text}; change it, its window, or the lengths in 'mechanism'")
+    ahead = (task.assembly.stretched - task.assembly.start) * task.wanted.size
     if task.assembly.drive == "torque" and ahead <= 0.0:
         text += "; the stretched position does not lie ahead of the unloaded one, and the torque only rises there; "
         text += "change 'mechanism.unloaded_angle' (or 'unloaded_offset'), or the sign of 'design.torque'"

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from cfmkit.specs.spec import DesignBlock, Model, refuse
+from cfmkit.specs.target_curve import Target, TargetCurve
 from cfmkit.specs.units import Angle, Force, Length, Ratio, RotationalStiffness, Stiffness, Torque
 from cfmkit.stock.springs.spec import AGREE, Catalogue, Life, SpringWire
 
@@ -114,6 +115,10 @@ class SpringDesign(DesignBlock):
         None, description="target at the crank, all legs together; negative: towards smaller angles"
     )
     force: PositiveForce | None = Field(None, description="target at the slider, all legs together")
+    target: Target | None = Field(
+        None,
+        description="instead of a constant torque or force a curve: torques over crank angles, or forces over travel",
+    )
     angle: tuple[Angle, Angle] | None = Field(None, description="crank angles over which the torque is to be held")
     travel: tuple[Length, Length] | None = Field(
         None, description="slider travel over which the force is to be held; without window: the widest at `tolerance`"
@@ -204,8 +209,11 @@ class SpringDesign(DesignBlock):
 
     @model_validator(mode="after")
     def _one_target(self) -> Self:
+        if self.target is not None:
+            self._check_curve(self.target)
+            return self
         if (self.torque is None) == (self.force is None):
-            raise ValueError("give either 'torque' or 'force': what is wanted constant")
+            raise ValueError("give either 'torque' or 'force': what is wanted constant; or 'target', a curve of one")
         if self.torque == 0.0:
             raise ValueError("'torque' must not be 0: springs that are absent do that")
         if self.torque is None and (self.angle or self.stiffness is not None or self.hold_stiffness):
@@ -236,17 +244,45 @@ class SpringDesign(DesignBlock):
             raise ValueError("'unloaded_offset' must have one sign: before or beyond the stretched position")
         return self
 
+    def _check_curve(self, target: Target) -> None:
+        """Refuse what has no meaning beside a curve, and a curve that does not cover its window."""
+        if target.stiffness is None and (self.torque, self.force) != (None, None):
+            raise ValueError("give either 'torque' or 'force', or 'target', a curve of one")
+        given = [name for name in ("stiffness", "adjustment") if getattr(self, name) is not None]
+        if given or self.hold_stiffness:
+            raise ValueError(f"{(given or ['hold_stiffness'])[0]!r} is for a constant effort, not for a 'target'")
+        name = "angle" if self.drive == "torque" else "travel"
+        if self.window is None or (self.travel if name == "angle" else self.angle) is not None:
+            raise ValueError(f"a 'target' of {self.drive} needs its window: give {name!r}")
+        if not (curve := target.curve(self.torque or self.force)).covers(*self.window):
+            raise ValueError(f"the window {name!r} is beyond the points of 'target'")
+        if not curve.largest(*self.window):
+            raise ValueError("'target' is zero all over its window: springs that are absent do that")
+
+    @property
+    def drive(self) -> Literal["torque", "force"]:
+        """What is wanted: a torque at the crank or a force at the slider."""
+        curved = self.target is not None and self.target.kind == "torque"
+        return "torque" if self.torque is not None or curved else "force"
+
     @property
     def window(self) -> tuple[float, float] | None:
         """Where the target is wanted [rad or m]; None: as wide as possible."""
-        return self.angle if self.torque is not None else self.travel
+        return self.angle if self.drive == "torque" else self.travel
 
     @property
     def within(self) -> tuple[float, float] | None:
         """Where the widest window is looked for [rad or m]; None: everywhere."""
-        return self.angle_within if self.torque is not None else self.travel_within
+        return self.angle_within if self.drive == "torque" else self.travel_within
 
     @property
-    def target(self) -> float:
-        """What is wanted [N m or N]."""
+    def curve(self) -> TargetCurve | None:
+        """The curve that is wanted; None of a constant torque or force."""
+        return None if self.target is None else self.target.curve(self.torque or self.force)
+
+    @property
+    def size(self) -> float:
+        """What is wanted, of a curve the largest magnitude in its window [N m or N]."""
+        if self.curve is not None and self.window is not None:
+            return self.curve.largest(*self.window)
         return self.torque or self.force or 0.0

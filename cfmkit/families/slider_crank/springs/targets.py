@@ -131,10 +131,12 @@ class Task:
         effort = self.assembly.units(places).effort
         if not np.isfinite(effort).all():
             return None
-        legs, target = self.spec.mechanism.sets, self.wanted.target
+        legs, target = self.spec.mechanism.sets, self.wanted.size
+        curve = self.wanted.curve
+        followed = np.ones(len(places)) if curve is None else np.asarray(curve.at(places)) / target
         goal = RateGoal(
             effort.T * (legs / target),
-            np.ones(len(places)) - self._lost(places),
+            followed - self._lost(places),
             self._upper(),
             lower=self._lower(),
             least=self._least(window),
@@ -153,7 +155,7 @@ class Task:
         if not np.isfinite(added).all():
             text = "friction holds the mechanism within the window: the line of force runs through its pins"
             raise Infeasible(finding("self_locks", f"{text}; use thinner pins ('mechanism.pins'), or another window"))
-        return np.asarray(added / self.wanted.target)
+        return np.asarray(added / self.wanted.size)
 
     def _lower(self) -> FloatArray | None:
         """Return the smallest rates: that of the slider's spring whose anchor is to adjust the force."""
@@ -179,11 +181,11 @@ class Task:
     def _sloping(self, goal: RateGoal, places: FloatArray) -> RateGoal:
         """Return a goal that is a line through the stretched position."""
         wanted, at = self.wanted, self.assembly.stretched
-        slope = (wanted.stiffness or 0.0) / wanted.target
+        slope = (wanted.stiffness or 0.0) / wanted.size
         line = goal.wanted + slope * (places - at)
         if not wanted.hold_stiffness:
             return replace(goal, wanted=line)
-        row = self.assembly.units(np.array([at])).stiffness[:, 0] * (self.spec.mechanism.sets / wanted.target)
+        row = self.assembly.units(np.array([at])).stiffness[:, 0] * (self.spec.mechanism.sets / wanted.size)
         return replace(goal, wanted=line, held=(row, slope))
 
     def _upper(self) -> FloatArray:
@@ -220,4 +222,4 @@ def task_of(spec: SliderCrankSpec) -> Task:
     """
     design = spec.design
     assert design is not None
-    return Task(spec, replace(assemble(spec), drive="torque" if design.torque is not None else "force"))
+    return Task(spec, replace(assemble(spec), drive=design.drive))
