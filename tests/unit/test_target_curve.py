@@ -276,15 +276,20 @@ def test_springs_follow_a_rising_force_better_than_they_hold_a_constant_one():
 
 def test_a_torque_follows_a_line_over_the_angle():
     base = cfmkit.load("configs/slider_crank_li2019_widest.yaml")
-    target = {"points": (("-5 deg", "1.5 N*mm"), ("14 deg", "2.5 N*mm"))}
-    found = cfmkit.design(base.replace({"design": {"target": target, "angle": ("-4 deg", "10 deg")}}))
+    target = {"points": (("-5 deg", "1.5 N*mm"), ("14 deg", "3 N*mm"))}
+    found = cfmkit.design(base.replace({"design": {"target": target, "angle": ("0 deg", "10 deg")}}))
     result = cfmkit.analyze(found.spec)
     assert result.curve.kind == "torque"
-    inside = (result.curve.motion >= np.radians(-4)) & (result.curve.motion <= np.radians(10))
-    wanted = 1.5e-3 + 1e-3 / np.radians(19) * (result.curve.motion[inside] - np.radians(-5))
+    inside = (result.curve.motion >= 0.0) & (result.curve.motion <= np.radians(10))
+    wanted = 1.5e-3 + 1.5e-3 / np.radians(19) * (result.curve.motion[inside] - np.radians(-5))
     off = np.abs(result.curve.effort[inside] - wanted).max() / wanted.max()
-    assert off < 0.05
-    assert evaluate(result)["deviation_from_curve"].value == pytest.approx(off, rel=0.02)
+    said = evaluate(result)["deviation_from_curve"].value
+    assert said == pytest.approx(off, rel=0.02)
+    for path in ("pivot", "crank_pin", "slider_pin", "slider"):  # no rate beside those of the design comes nearer
+        rate = found.spec.at(f"mechanism.springs.{path}")
+        for factor in (0.97, 1.03):
+            other = cfmkit.analyze(found.spec.replace({f"mechanism.springs.{path}": rate * factor + 1e-9}))
+            assert evaluate(other)["deviation_from_curve"].value > said * (1 - 1e-6)
 
 
 @pytest.mark.parametrize(

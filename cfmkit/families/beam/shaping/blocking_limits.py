@@ -104,8 +104,6 @@ def _stress(task: Task, slack: float) -> dict[str, str]:
 def _force(task: Task, slack: float) -> dict[str, str]:
     if task.limits.force_min is not None:
         return {"design.optimise.force.min": f"at most {format_short(task.limits.force_min * (1 - slack), 'force')}"}
-    if task.shape is not None:
-        return {"design.target": f"with a mean that is {percent(slack)} nearer to what such shapes give"}
     return {"design.optimise.force.tolerance": f"at least {task.limits.force_tolerance + slack:.3g}"}
 
 

@@ -87,7 +87,7 @@ def task_of(spec: BeamSpec, wanted: Optimise) -> Task:
     mean = 0.0 if curve is None else mean_of(curve, wanted.window)
     limits = _limits(wanted, assembly.allowable_stress)
     if curve is not None:
-        limits = replace(limits, force_target=mean, force_tolerance=CLOSE_MEAN)
+        limits = replace(limits, force_target=mean)
     return Task(
         network=assembly.network,
         driven=assembly.driven,
@@ -109,10 +109,6 @@ def task_of(spec: BeamSpec, wanted: Optimise) -> Task:
         shape=None if curve is None else curve.scaled(1.0 / mean),
         bending_only=None if spec.fidelity == BENDING_ONLY else bends,
     )
-
-
-CLOSE_MEAN = 1e-3
-"""Share within which the mean force is that of a curve: what is left of a limit that rounding cannot meet exactly."""
 
 
 def mean_of(curve: TargetCurve, window: tuple[float, float]) -> float:
