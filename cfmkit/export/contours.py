@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from cfmkit.arrays import FloatArray, read_only
+from cfmkit.export.layers import DRIVEN, HELD
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -154,6 +155,10 @@ def _along(edge: Edge, sagitta: float) -> FloatArray:
     return np.array(edge.center) + edge.radius * np.column_stack([np.cos(angle), np.sin(angle)])
 
 
+UNCUT = ("path", "reference", HELD, DRIVEN)
+"""Layers that nothing is cut along."""
+
+
 def circle(center: tuple[float, float], radius: float, layer: str, hole: bool = False) -> Contour:
     """Return a full circle [m] as a closed contour."""
     return Contour((Arc(center, radius, 0.0, 2 * math.pi),), layer, closed=True, hole=hole)
@@ -163,6 +168,12 @@ def polygon(corners: Sequence[tuple[float, float]], layer: str, hole: bool = Fal
     """Return a closed contour of straight edges through `corners` [m]."""
     ends = (*corners[1:], corners[0])
     return Contour(tuple(Line(a, b) for a, b in zip(corners, ends, strict=True)), layer, closed=True, hole=hole)
+
+
+def mark(shape: FloatArray, driven: bool) -> Contour:
+    """Return a polygon (n, 2) [m], or a line (2, 2), on the layer of what stands or of what is driven."""
+    layer, corners = DRIVEN if driven else HELD, [(float(x), float(y)) for x, y in shape]
+    return Contour((Line(*corners),), layer) if len(corners) == 2 else polygon(corners, layer)
 
 
 def reference_square(size: float = 0.05, corner: tuple[float, float] = (0.0, 0.0)) -> Contour:
@@ -244,9 +255,9 @@ class Dimension:
 class Drawing:
     """Everything about a part that can be cut: contours for DXF and SVG, tables for CSV, thickness for STL.
 
-    `name` is the file stem; `cut`, `path` and `reference` are the usual layers. `notes` say what the contours do not
-    show: how often a part is to be made. `dimensions` and `facts` are what a sheet of paper says beside the outline:
-    main lengths, and what it is made of in (word, text).
+    `name` is the file stem; `cut`, `path` and `reference` are the usual layers, `held` and `driven` mark what stands
+    and what is moved. `notes` say what the contours do not show: how often a part is to be made. `dimensions` and
+    `facts` are what a sheet of paper says beside the outline: main lengths, and what it is made of in (word, text).
     """
 
     name: str
@@ -260,7 +271,7 @@ class Drawing:
     @property
     def extents(self) -> tuple[float, float, float, float]:
         """Smallest x and y, largest x and y of what is cut [m]."""
-        boxes = np.array([one.extents for one in self.contours if one.layer not in ("path", "reference")])
+        boxes = np.array([one.extents for one in self.contours if one.layer not in UNCUT])
         return (*boxes[:, :2].min(axis=0).tolist(), *boxes[:, 2:].max(axis=0).tolist())
 
     def with_reference_square(self, size: float = 0.05) -> Drawing:

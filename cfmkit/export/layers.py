@@ -26,15 +26,21 @@ _LOOKS = {
     "path": LayerLook(150, "#007fff", (6.0, 1.5, 1.0, 1.5)),
     "reference": LayerLook(8, "#808080"),
 }
-_OTHERS = (LayerLook(6, "#ff00ff"), LayerLook(4, "#00a0a0"), LayerLook(30, "#ff8000"), LayerLook(3, "#008000"))
+HELD, DRIVEN = "held", "driven"
+"""Layers of what stands while the mechanism works, and of what is moved: closed contours that nothing is cut along."""
+
+_MARKS = {HELD: LayerLook(3, "#008000", (1.0, 1.0)), DRIVEN: LayerLook(30, "#ff8000", (1.0, 1.0))}
+_OTHERS = (LayerLook(6, "#ff00ff"), LayerLook(4, "#00a0a0"), LayerLook(34, "#995200"), LayerLook(92, "#408000"))
 
 
 def looks(used: Iterable[str]) -> dict[str, LayerLook]:
-    """Return the look of the three usual layers and of every other one in use, in that order."""
-    others = [name for name in dict.fromkeys(used) if name not in _LOOKS]
+    """Return the look of the three usual layers, of marks and of every other one in use, in that order."""
+    used = list(dict.fromkeys(used))
+    marks = {name: look for name, look in _MARKS.items() if name in used}
+    others = [name for name in used if name not in _LOOKS | marks]
     for name in others:
         check_name(name, "layer")
-    return _LOOKS | {name: _OTHERS[index % len(_OTHERS)] for index, name in enumerate(others)}
+    return _LOOKS | marks | {name: _OTHERS[index % len(_OTHERS)] for index, name in enumerate(others)}
 
 
 def check_name(name: str, what: str) -> str:

@@ -72,12 +72,12 @@ def percent(value: float) -> str:
 
 
 def too_soft(share: float, where: str) -> str:
-    """Return what the finding `wide_beam` says: by what share of the force, and where; nothing of a small one."""
+    """Return what the finding `wide_beam` says: by what share of the energy, and where; nothing of a small one."""
     if not share > TOO_SOFT:
         return ""
     return (
-        f"beams that are wide for their thickness cannot curl across their width: the force is about {percent(share)} "
-        f"larger {where}; where their ends are clamped it is more"
+        f"beams that are wide for their thickness cannot curl across their width: to bend them takes about "
+        f"{percent(share)} more energy {where}, and as much more force or a little more; clamped ends add to it"
     )
 
 

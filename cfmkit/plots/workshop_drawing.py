@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.export.contours import Arc, Dimension, Line, Smooth
+from cfmkit.export.contours import UNCUT, Arc, Dimension, Line, Smooth
+from cfmkit.export.layers import HELD
 from cfmkit.plots.parts import mm
 from cfmkit.plots.style import GREY, INK, NORMAL, SMALL, VERMILLION, axes_mm, new_figure, styled
 from cfmkit.specs.units import format_short
@@ -151,6 +152,9 @@ def _contour(ax: Axes, contour: Contour) -> None:
         chain = np.vstack([chain, chain[:1]])
     if contour.layer == "path":
         ax.plot(*chain.T, color=GREY, linewidth=0.6, dashes=(8, 2, 1, 2), zorder=2, gid="path")
+    elif contour.layer in UNCUT:
+        hatch = "////" if contour.layer == HELD else "...."
+        ax.fill(*chain.T, facecolor="none", edgecolor=GREY, linewidth=0.0, hatch=hatch, zorder=1, gid=contour.layer)
     else:
         ax.plot(*chain.T, color=INK, linewidth=0.9, zorder=3, solid_joinstyle="round", gid=contour.layer)
 

@@ -22,10 +22,10 @@ def told(path, *changes):
 
 
 def test_lans_part_is_too_soft_by_what_its_energy_says_and_the_cure_counts_it():
-    """To first order in the energy of the curve: 3.6 % at 2 mm, 5.1 at 10, 5.7 at 13.5; the force grows by more."""
+    """In the energy of the curve 3.6 % at 2 mm, 5.0 at 10, 5.4 at 13.5; its slope gives 3.8, 6.0, 6.7 of the force."""
     short = ("analysis.travel=13.5 mm", "analysis.points=28")
     (one,) = told(LAN, *short)
-    assert "about 5.67 % larger at 13.5 mm" in one.message
+    assert "about 5.43 % more energy at 13.5 mm" in one.message
     assert one.cures == ("mechanism.wide_beams=true",)
     assert told(LAN, *short, "mechanism.wide_beams=true") == []
     narrow, wide = (cfmkit.analyze(changed(LAN, *short, *more)).curve for more in ((), ("mechanism.wide_beams=true",)))
@@ -41,7 +41,7 @@ def test_narrow_beams_are_not_told_of():
 def test_wide_leaves_are_told_of_and_only_the_exact_model_counts_them():
     wide = "mechanism.bistable.width=20 mm"
     (one,) = told(DING, wide)
-    assert "4.74 % larger in the leaves at 4.263 mm" in one.message
+    assert "4.74 % more energy in the leaves at 4.263 mm" in one.message
     assert "only 'analysis.fidelity: exact' counts it" in one.message
     with pytest.raises(SpecError, match=r"mechanism\.wide_beams: no closed form knows it"):
         changed(DING, wide, "mechanism.wide_beams=true")
@@ -49,15 +49,14 @@ def test_wide_leaves_are_told_of_and_only_the_exact_model_counts_them():
 
 def test_a_wide_strip_is_told_of():
     (one,) = told(STRIP, "mechanism.beam.width=30 mm", "analysis.points=15", "design=null")
-    assert "larger at" in one.message
+    assert "more energy at" in one.message
 
 
 @pytest.mark.parametrize("value", ["3", "wide", "[true]", "null"])
 @pytest.mark.parametrize("path", [LAN, DING, STRIP])
 def test_anything_but_a_truth_value_is_refused(path, value):
-    with pytest.raises(SpecError) as error:
+    with pytest.raises(SpecError, match=r"mechanism\.wide_beams.* is not true or false"):
         changed(path, f"mechanism.wide_beams={value}")
-    assert [problem.path for problem in error.value.problems] == ["mechanism.wide_beams"]
 
 
 def test_natural_frequencies_do_not_know_wide_beams():

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.elastica.model.layout import Layout
-from cfmkit.export.contours import TOLERANCE, Contour, Curve2D, Dimension, Drawing, Region, Sheet, Smooth, circle
+from cfmkit.export.contours import TOLERANCE, Contour, Curve2D, Dimension, Drawing, Region, Sheet, Smooth, circle, mark
 from cfmkit.export.union import quarter_pieces
 from cfmkit.families.beam.build import assemble, mirror_axis, thickest
 from cfmkit.families.beam.parts.spec import PartSpec
@@ -84,10 +84,13 @@ def regions(spec: BeamSpec, tolerance: float = TOLERANCE) -> tuple[HeldPlace, ..
     network = assembly.network
     fits = Layout(network, assembly.drive()).fits
     beams = {name: strips(network, fits, name, SHARE * tolerance) for name in network.beams}
-    axis = mirror_axis(assembly)
+    return tuple(_held_places(assembly, beams, tolerance))
+
+
+def _held_places(assembly: Assembly, beams: dict[str, list[BeamStrip]], tolerance: float) -> Iterator[HeldPlace]:
+    spec, network, axis = assembly.spec, assembly.network, mirror_axis(assembly)
     moving = {assembly.driven, spec.mechanism.drive.node}
     bars = _bars(assembly, beams, *axis) if axis is not None else []
-    found = []
     for node, about in network.nodes.items():
         ends = _ends(assembly, beams, node)
         held = about.support.along or about.support.across or about.support.rotation
@@ -95,18 +98,15 @@ def regions(spec: BeamSpec, tolerance: float = TOLERANCE) -> tuple[HeldPlace, ..
             continue
         region = _region(assembly, node, ends, SHARE * tolerance)
         joined = tuple(bars) if node in moving else ()
-        found.append(replace(region, shapes=(*region.shapes, *joined)))
+        yield replace(region, shapes=(*region.shapes, *joined))
         if axis is not None and not _on_axis(assembly, node):
-            found.append(
-                HeldPlace(
-                    f"{node}'",
-                    node,
-                    mirrored(region.at[None], *axis)[0],
-                    tuple(mirrored(shape, *axis) for shape in region.shapes),
-                    tuple(mirrored(seam, *axis) for seam in region.seams),
-                )
+            yield HeldPlace(
+                f"{node}'",
+                node,
+                mirrored(region.at[None], *axis)[0],
+                tuple(mirrored(shape, *axis) for shape in region.shapes),
+                tuple(mirrored(seam, *axis) for seam in region.seams),
             )
-    return tuple(found)
 
 
 def _region(assembly: Assembly, node: str, ends: list[tuple[BeamStrip, bool]], bulge: float) -> HeldPlace:
@@ -151,13 +151,16 @@ def drawing(spec: BeamSpec, tolerance: float = TOLERANCE) -> Drawing:
     part = spec.mechanism.part or PartSpec()
     contours = merged(pieces, part.fillet, holes, rough=min(ROUGH, SHARE * tolerance))
     contours += tuple(circle(one.at, 0.5 * one.diameter, "cut", hole=True) for one in part.holes)
-    paths = tuple(Contour((line,), "path") for line in lines)
+    paths = [Contour((line,), "path") for line in lines]
+    moving = {assembly.driven, spec.mechanism.drive.node}
+    places = _held_places(assembly, beams, tolerance)
+    marks = [mark(shape, place.node in moving) for place in places for shape in place.shapes]
     tables = tuple(_table(f"beam-{name}", found) for name, found in beams.items())
     legs = spec.mechanism.copies.legs if spec.mechanism.copies else 1
     notes = (f"one of {legs} equal parts side by side is drawn: make it {legs} times",) if legs > 1 else ()
     dimensions, facts = tuple(_dimensions(assembly)), tuple(_facts(assembly, part.fillet))
     return Drawing(
-        "beams", (*contours, *paths), tables, notes, _sheet(assembly, beams), dimensions=dimensions, facts=facts
+        "beams", (*contours, *paths, *marks), tables, notes, _sheet(assembly, beams), dimensions=dimensions, facts=facts
     )
 
 

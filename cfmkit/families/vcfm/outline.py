@@ -26,6 +26,7 @@ from cfmkit.export.contours import (
     Sheet,
     Smooth,
     circle,
+    mark,
 )
 from cfmkit.export.fillets import filleted, sharp_notes
 from cfmkit.families.findings import mm
@@ -66,8 +67,39 @@ def drawing(spec: VcfmSpec, tolerance: float = TOLERANCE) -> Drawing:
     rounded = [filleted(contour, part.fillet) for contour in (*leaves, *spring)]
     notes = sharp_notes([place for _, sharp in rounded for place in sharp], part.fillet)
     holes = [circle(one.at, 0.5 * one.diameter, "cut", hole=True) for one in part.holes]
-    contours = (*(contour for contour, _ in rounded), *holes)
+    contours = (*(contour for contour, _ in rounded), *holes, *_marks(spec, spring))
     return Drawing("vcfm", contours, (table,), (*_notes(spec), *notes), _sheet(spec, spring), dimensions, facts)
+
+
+def _marks(spec: VcfmSpec, spring: Sequence[Contour]) -> Iterator[Contour]:
+    """Yield walls, shuttle and blocks of the spring on the layers of what stands and of what is driven.
+
+    The block of the spring that stands is the seat of the preload, which moves it before use.
+    """
+    frame, about = spec.mechanism.frame, spec.mechanism.bistable
+    half, levels = 0.5 * frame.shuttle_width, -(-about.half_beams // 2)
+    strip = strip_of(about, spec.mechanism.material)
+    wall, rise = half + float(strip.reach), float(strip.rise)
+    top, bottom = (levels - 1) * frame.spacing + frame.clearance, -frame.clearance
+    yield mark(_box(-half, bottom, half, top), driven=True)
+    for x in (wall, -wall - frame.block):
+        yield mark(
+            _box(x, -rise - frame.block, x + frame.block, (levels - 1) * frame.spacing - rise + frame.block), False
+        )
+    if not spring:
+        return
+    x0, y0, x1, y1 = spring[0].extents
+    half, kind = 0.5 * frame.block, spec.mechanism.flexures
+    yield mark(_box(-half, y0 if kind.structure == "straight" else y1 - frame.block, half, y1), driven=True)
+    if kind.structure != "straight":
+        yield mark(_box(-half, y0, half, y0 + frame.block), driven=False)
+        return
+    for x in (x1 - frame.block, *([x0] if kind.loaded == "whole" else [])):
+        yield mark(_box(x, y1 - 1.5 * frame.block, x + frame.block, y1 - 0.5 * frame.block), driven=False)
+
+
+def _box(x0: float, y0: float, x1: float, y1: float) -> FloatArray:
+    return np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])
 
 
 def _dimensions(spec: VcfmSpec) -> Iterator[Dimension]:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.export.contours import Contour, Curve2D, Dimension, Drawing, Line, Region, Sheet, circle, polygon
+from cfmkit.export.contours import Contour, Curve2D, Dimension, Drawing, Line, Region, Sheet, circle, mark, polygon
 from cfmkit.export.fillets import filleted, sharp_notes
 from cfmkit.families.slider_crank.build import linkage_of, unloaded_angle
 from cfmkit.families.slider_crank.printed.assembly import corners, flexures_of, strip_of
@@ -105,6 +105,13 @@ def solved_piece(spec: SliderCrankSpec) -> SolvedPiece:
         linkage = linkage_of(spec.mechanism)
         strip = strip_of(spec.mechanism, linkage, unloaded_angle(spec.mechanism, linkage))
         drawn = _cut(spec, replace(_strip(strip, 0.0, pad_of(spec)), sheet=Sheet(beam.width)))
+    outline, *others = (contour for contour in drawn.contours if contour.layer == "cut")
+    thinnest = float(drawn.tables[0].columns["thickness"][0].min())
+    return SolvedPiece(outline, tuple(others), _pads(spec, drawn), drawn.sheet, thinnest)
+
+
+def _pads(spec: SliderCrankSpec, drawn: Drawing) -> tuple[FloatArray, FloatArray]:
+    """Return the pads at the ground and at the slider, the face where the leg begins first, two (4, 2) arrays [m]."""
     table = drawn.tables[0].columns
     points = np.column_stack([table["x"][0], table["y"][0]])
     depth, breadth = pad_of(spec)
@@ -114,9 +121,7 @@ def solved_piece(spec: SliderCrankSpec) -> SolvedPiece:
         side = 0.5 * breadth * np.array([-way[1], way[0]])
         out = points[k] + depth * way
         ends.append(np.array([points[k] + side, points[k] - side, out - side, out + side]))
-    outline, *others = (contour for contour in drawn.contours if contour.layer == "cut")
-    thinnest = float(table["thickness"][0].min())
-    return SolvedPiece(outline, tuple(others), (ends[0], ends[1]), drawn.sheet, thinnest)
+    return ends[0], ends[1]
 
 
 def pad_of(spec: SliderCrankSpec) -> tuple[float, float]:
@@ -131,7 +136,8 @@ def _cut(spec: SliderCrankSpec, drawn: Drawing) -> Drawing:
     outline, *others = drawn.contours
     rounded, sharp = filleted(outline, part.fillet)
     holes = (circle(one.at, 0.5 * one.diameter, "cut", hole=True) for one in part.holes)
-    return replace(drawn, contours=(rounded, *holes, *others), notes=sharp_notes(sharp, part.fillet))
+    marks = (mark(pad, driven) for pad, driven in zip(_pads(spec, drawn), (False, True), strict=True))
+    return replace(drawn, contours=(rounded, *holes, *others, *marks), notes=sharp_notes(sharp, part.fillet))
 
 
 def _dimensions(points: FloatArray) -> Iterator[Dimension]:

@@ -1,0 +1,63 @@
+"""Layers of a drawing that say what stands and what is driven, in every family that is cut in one piece."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from beam_support import CONFIGS
+
+import cfmkit
+
+
+def drawn(name, *changes):
+    return cfmkit.drawing(cfmkit.load(CONFIGS / f"{name}.yaml", changes))
+
+
+def middles(drawing, layer):
+    """Return the middles of the extents of all contours of a layer, (n, 2) [mm], from left to right."""
+    boxes = np.array([one.extents for one in drawing.contours if one.layer == layer]).reshape(-1, 4)
+    return 1e3 * np.sort(0.5 * (boxes[:, :2] + boxes[:, 2:]), axis=0)
+
+
+@pytest.mark.parametrize(
+    ("name", "held", "driven"),
+    [("beam_lan2010", 4, 3), ("vcfm_ding2022", 3, 2), ("vcfm_straight", 4, 2), ("vcfm_u_shape", 3, 2),
+     ("slider_crank_strip", 1, 1), ("slider_crank_lumped", 1, 1)],
+)  # fmt: skip
+def test_what_stands_and_what_moves_is_on_layers_of_its_own(name, held, driven):
+    drawing = drawn(name)
+    assert (len(middles(drawing, "held")), len(middles(drawing, "driven"))) == (held, driven)
+
+
+def test_marks_lie_on_the_part_and_change_nothing_of_it():
+    from shapely import Polygon
+
+    drawing = drawn("vcfm_ding2022")
+    solid = Polygon()
+    for one in drawing.contours:
+        if one.layer == "cut":
+            own = Polygon(one.points(1e-6))
+            solid = solid.difference(own) if one.hole else solid.union(own)
+    for one in drawing.contours:
+        if one.layer in ("held", "driven"):
+            block = Polygon(one.points(1e-6))
+            assert block.difference(solid).area < 0.01 * block.area
+
+
+def test_marks_of_a_mirrored_part_are_mirrored():
+    held = middles(drawn("beam_lan2010"), "held")
+    assert held[:, 0] == pytest.approx(-held[::-1, 0], abs=1e-9)
+
+
+def test_files_have_the_layers_and_solids_do_not_see_them(tmp_path):
+    import ezdxf
+
+    drawing = drawn("slider_crank_strip")
+    path = tmp_path / "part.dxf"
+    from cfmkit.export.dxf import write_dxf
+    from cfmkit.export.svg import write_svg
+
+    path.write_bytes(write_dxf(drawing))
+    layers = {one.dxf.layer for one in ezdxf.readfile(path).modelspace()}
+    assert {"cut", "held", "driven"} <= layers
+    assert b'id="held"' in write_svg(drawing)
