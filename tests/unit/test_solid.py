@@ -17,6 +17,7 @@ from cfmkit.solid.mesh import Mesh, mesh
 from cfmkit.solid.path_following import PathEnd, PosePath, follow
 from cfmkit.solid.plane_stress_law import NeoHookean, SaintVenantKirchhoff
 from cfmkit.solid.rigid_groups import Group, Supports
+from cfmkit.solid.two_meshes import FORCE_FACTOR, FORCE_LEAST, STRESS_FACTOR, STRESS_LEAST, MeshError
 
 E, NU = 2e9, 0.35
 HOOKE = SaintVenantKirchhoff(E, NU)
@@ -243,3 +244,43 @@ def test_an_end_that_is_free_to_turn_is_a_pin():
     course = follow(problem(grid, groups), [0.0, 0.5 * shortening, 2 * shortening])
     assert course.ending is PathEnd.COMPLETE
     assert max(pose.effort for pose in course.poses) == pytest.approx(load, rel=0.02)
+
+
+# --- how far a mesh can be trusted ---------------------------------------------------------------------------------
+
+
+def test_the_error_is_the_difference_of_two_meshes_times_its_factor_and_chance_agreement_counts_little():
+    apart, alike = MeshError(1e-3, 0.03), MeshError(0.0, 0.0)
+    assert apart.values()["mesh_force_error"] == pytest.approx(FORCE_FACTOR * 1e-3)
+    assert apart.values()["mesh_stress_error"] == pytest.approx(STRESS_FACTOR * 0.03)
+    assert alike.force == pytest.approx(FORCE_FACTOR * FORCE_LEAST)
+    assert alike.stress == pytest.approx(STRESS_FACTOR * STRESS_LEAST)
+    assert not list(alike.too_large())
+    assert [name for name, _ in MeshError(0.01, 0.0).too_large()] == ["mesh_coarse"]
+
+
+def test_a_seam_across_an_edge_begins_at_a_node_of_it():
+    seam = np.array([[3.03e-3, -1e-3], [3.03e-3, 3e-3]])
+    grid = mesh((Ring.of(box(0, 0, 10e-3, 2e-3), False),), 0.5e-3, seams=[seam])
+    for height in (0.0, 2e-3):
+        assert np.hypot(*(grid.nodes - [3.03e-3, height]).T).min() < 1e-9
+
+
+def test_uniaxial_stretch_is_the_closed_form_of_either_law():
+    """Free across: St. Venant-Kirchhoff F S = lam E (lam^2 - 1)/2; neo-Hookean by its two free stretches."""
+    stretch = 1.1
+    green = 0.5 * (stretch**2 - 1)
+    stress, _, _ = HOOKE(np.array([green, -NU * green, 0.0]))
+    assert stretch * stress[0] == pytest.approx(stretch * E * green, rel=1e-12)
+    assert stress[1] == pytest.approx(0.0, abs=1e-6)
+    # both free stretches are equal, c: mu (c^2 - 1) + lambda ln(stretch c^2) = 0, P = (mu (s^2 - 1) + lambda ln J)/s
+    mu, lam = 0.5 * E / (1 + NU), E * NU / ((1 + NU) * (1 - 2 * NU))
+    low, high = 0.5, 1.0
+    for _ in range(80):
+        c = 0.5 * (low + high)
+        low, high = (low, c) if mu * (c**2 - 1) + lam * np.log(stretch * c**2) > 0 else (c, high)
+    nominal = (mu * (stretch**2 - 1) + lam * np.log(stretch * c**2)) / stretch
+    stress, _, across = NeoHookean(E, NU)(np.array([green, 0.5 * (c**2 - 1), 0.0]))
+    assert across == pytest.approx(c, rel=1e-9)
+    assert stretch * stress[0] == pytest.approx(nominal, rel=1e-9)
+    assert stress[1] == pytest.approx(0.0, abs=1e-6 * E)
