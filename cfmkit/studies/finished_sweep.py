@@ -44,19 +44,40 @@ def makers_of(folder: Path, spec: Spec) -> dict[str, Callable[[], Figure]]:
     """
     try:
         summary = json.loads((folder / "metrics.json").read_bytes())
-        drawn = summary["drawn"]
+        curves = folder / "curves.csv"
+        known = read_csv(curves) if curves.is_file() else None
         table = read_csv(folder / "results.csv")
-        found = _marks(spec, summary, drawn, table)
-        lines, labels = _curves(folder / "curves.csv", found)
+        found = _marks(spec, summary, table)
+        makers = makers_of_tables(spec, summary, table, known)
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
         raise UsageError(f"the sweep in {visible(str(folder))} cannot be drawn from its files: run it again") from None
     if len(table) < int(summary["points"]["total"]) or not np.isfinite([one.values for one in found.varied]).all():
         raise UsageError(f"the sweep in {visible(str(folder))} was not finished: run the same command again")
+    return makers
+
+
+def makers_of_tables(
+    spec: Spec, summary: Mapping[str, Any], table: Table, curves: Table | None
+) -> dict[str, Callable[[], Figure]]:
+    """Return what draws each picture of a sweep, by name.
+
+    Parameters
+    ----------
+    spec : Spec
+        What was swept.
+    summary : mapping
+        As metrics.json.
+    table, curves : Table
+        As results.csv and curves.csv, which not every sweep has.
+    """
+    found = _marks(spec, summary, table)
+    lines, labels = _curves(curves, found)
     return figures(found, lines, labels)
 
 
-def _marks(spec: Spec, summary: Mapping[str, Any], drawn: Mapping[str, Any], table: Table) -> StudyMarks:
+def _marks(spec: Spec, summary: Mapping[str, Any], table: Table) -> StudyMarks:
     """Return what the pictures show."""
+    drawn = summary["drawn"]
     columns = {column.name: column for column in table.columns}
     varied = [(one["path"], one["dimension"]) for one in drawn["varied"]]
     shown = [columns[path].cells() for path, _ in varied]
@@ -94,13 +115,12 @@ def _meets(columns: Mapping[str, TableColumn]) -> NDArray[np.bool_]:
     return np.array([good and one == "true" for good, one in zip(solved, met, strict=True)], dtype=bool)
 
 
-def _curves(path: Path, found: StudyMarks) -> tuple[list[StudyCurve], tuple[str, str]]:
-    """Return the curves in a file; none where there is none, or where more than two values vary."""
+def _curves(table: Table | None, found: StudyMarks) -> tuple[list[StudyCurve], tuple[str, str]]:
+    """Return the curves in a table; none where there is none, or where more than two values vary."""
     lines: list[StudyCurve] = []
     labels = ("", "")
-    if len(found.varied) > 2 or not path.is_file():
+    if len(found.varied) > 2 or table is None:
         return lines, labels
-    table = read_csv(path)
     own = [next(column for column in table.columns if column.name == one.name) for one in found.varied]
     points = {values: at for at, values in enumerate(zip(*map(_spoken, found.varied), strict=True))}
     rows: dict[int, list[int]] = {}

@@ -16,6 +16,10 @@ from cfmkit.studies.spec_values import CannotVary, leaf
 from cfmkit.tables import read_csv
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from matplotlib.figure import Figure
+
     from cfmkit.specs.spec import Spec
     from cfmkit.studies.engine import Records, Work
     from cfmkit.studies.executors import Executor
@@ -38,6 +42,8 @@ class StudyResult:
         As indices.csv and convergence.csv, of a sensitivity study.
     varied : tuple of str
         Headers of the columns that were varied.
+    spec : Spec, optional
+        What was varied.
     """
 
     table: Table
@@ -46,18 +52,45 @@ class StudyResult:
     indices: Table | None = None
     convergence: Table | None = None
     varied: tuple[str, ...] = ()
+    spec: Spec | None = None
 
     def __repr__(self) -> str:
         """Return the study in a line."""
         return f"<StudyResult: {self.summary.get('message', '')}; {self.table!r}>"
 
     def _repr_html_(self) -> str:
-        """Return what a notebook shows: how the study ended, and its first points."""
+        """Return what a notebook shows: how the study ended, its best point, requirements, a figure, first points."""
         from html import escape
 
-        from cfmkit.tables.html import first_rows
+        from cfmkit.tables.html import first_rows, html_table
 
-        return f"<div><p>{escape(str(self.summary.get('message', '')))}</p>{first_rows(self.table)}</div>"
+        parts = [f"<p>{escape(str(self.summary.get('message', '')))}</p>"]
+        if best := self.summary.get("best"):
+            told = ", ".join(f"{path} {value}" for path, value in best["values"].items())
+            parts.append(f"<p>{escape(told)}: {escape(best['sense'])} {escape(best['by'].replace('_', ' '))}</p>")
+            rows = [(name, _told(one), one["definition"]) for name, one in self.summary["metrics"].items()]
+            parts.append(html_table(("metric of the best point", "value", "what it is"), rows[:MOST_TOLD]))
+        required = [one for one in self.summary.get("requirements", ()) if "of" in one]
+        if required:
+            met = [(f"{one['metric']}{_bounds(one)}", f"{one['met']} of {one['of']}") for one in required]
+            parts.append(html_table(("requirement", "points that meet it"), met))
+        return f"<div>{''.join(parts)}{self._picture()}{first_rows(self.table)}</div>"
+
+    @property
+    def figures(self) -> Mapping[str, Callable[[], Figure]]:
+        """What draws each picture of a sweep, by its name: ``study.figures["force_mean"]()``."""
+        if self.spec is None or "drawn" not in self.summary:
+            return {}
+        from cfmkit.studies.finished_sweep import makers_of_tables
+
+        return makers_of_tables(self.spec, self.summary, self.table, self.curves)
+
+    def _picture(self) -> str:
+        """Return the first picture as SVG; nothing where there is none."""
+        from cfmkit.plots.vector_formats import inline, svg
+
+        name, draw = next(iter(self.figures.items()), ("", None))
+        return "" if draw is None else inline(svg(draw()), name)
 
     def to_pandas(self) -> Any:
         """Return the points as a `pandas.DataFrame`, columns headed ``force_mean [N]``."""
@@ -87,6 +120,24 @@ class StudyResult:
         return found
 
 
+MOST_TOLD = 8
+"""Metrics of the best point that a notebook shows: more are in `StudyResult.summary`."""
+
+
+def _told(metric: Mapping[str, Any]) -> str:
+    value, unit = metric["value"], metric["unit"]
+    if not isinstance(value, float | int):
+        return "" if value is None else str(value)
+    return f"{value:.5g}" + (f" {unit}" if unit not in (None, "", "1") else "")
+
+
+def _bounds(one: Mapping[str, Any]) -> str:
+    low, high = (
+        f" {sign} {one[end]}" if one.get(end) is not None else "" for sign, end in ((">=", "min"), ("<=", "max"))
+    )
+    return low + high
+
+
 def swept(spec: Spec, jobs: int, block: Mapping[str, Any]) -> StudyResult:
     """Return a sweep; see `cfmkit.sweep`."""
     from cfmkit.studies.engine import run
@@ -103,7 +154,7 @@ def swept(spec: Spec, jobs: int, block: Mapping[str, Any]) -> StudyResult:
     records = run(work, _executor(jobs))
     curves = spec.sweep is not None and spec.sweep.curves
     found = _read(outputs(records, summary_of(records), curves))
-    return replace(found, varied=tuple(found.table.headers[: len(work.plan.variables)]))
+    return replace(found, varied=tuple(found.table.headers[: len(work.plan.variables)]), spec=spec)
 
 
 def examined(spec: Spec, jobs: int, block: Mapping[str, Any]) -> StudyResult:

@@ -52,12 +52,17 @@ def test_a_result_without_a_curve_is_shown_with_its_reason():
     assert HOSTILE not in shown
 
 
-def test_a_study_is_shown_with_its_first_points():
+def test_a_study_is_shown_with_its_best_point_requirements_a_figure_and_its_first_points():
     vary = {"mechanism.roller_radius": np.linspace(0.008, 0.012, 12)}
     study = cfmkit.sweep(CONFIGS / "cam.yaml", vary=vary, metrics=["force_mean"])
     assert len(repr(study)) < 2000
     shown = study._repr_html_()
-    assert shown.count("<tr>") == 11
+    assert shown.count("<svg") == 1
+    assert "points that meet it" in shown
+    assert set(study.figures) <= set(study.table.headers) | {
+        header.partition(" [")[0] for header in study.table.headers
+    }
+    assert shown.rpartition("<table")[2].count("<tr>") == 11
     assert "2 more rows" in shown
 
 
