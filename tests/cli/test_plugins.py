@@ -166,14 +166,14 @@ def test_the_doctor_knows_versions_folders_and_the_solver(site, capsys):
 
 
 def test_the_doctor_sees_whether_the_solver_is_compiled(tmp_path, monkeypatch):
-    from cfmkit.elastica.kernels import kept, machine
+    from cfmkit.elastica.kernels import disk_cache, machine_code
 
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
-    assert kept.kept_in() is None
+    assert disk_cache.kept_in() is None
     (tmp_path / "solver-0123456789abcdef01234567.code").touch()
-    assert kept.kept_in() is None
-    kept.write("solver", machine.Code((), b"code"))
-    assert kept.kept_in() == tmp_path
+    assert disk_cache.kept_in() is None
+    disk_cache.write("solver", machine_code.Code((), b"code"))
+    assert disk_cache.kept_in() == tmp_path
 
 
 def test_the_doctor_finds_a_folder_that_cannot_be_written_to(site, monkeypatch, capsys):

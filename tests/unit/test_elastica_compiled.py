@@ -19,9 +19,9 @@ import numpy as np
 import pytest
 
 from cfmkit.elastica import CLAMPED, Beam, Control, Displacement, Network, Node, Section, trace
-from cfmkit.elastica.kernels import dense, entry, kept, machine, packing, predictor
+from cfmkit.elastica.kernels import compiled, dense, disk_cache, machine_code, packing, predictor
+from cfmkit.elastica.kernels.compiling_progress import reported
 from cfmkit.elastica.kernels.packing import HEAD, objects
-from cfmkit.elastica.kernels.progress import reported
 from cfmkit.elastica.kernels.signatures import DOORS
 from cfmkit.elastica.warming import warm
 from cfmkit.store.private_folder import trusted
@@ -83,47 +83,47 @@ def _pulled_beam() -> tuple[Network, Displacement]:
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Where alone code is kept in a test; what the test itself needs is loaded before."""
     trace(*_pulled_beam())
-    monkeypatch.setattr(kept, "_lasting", lambda: iter([tmp_path]))
+    monkeypatch.setattr(disk_cache, "_lasting", lambda: iter([tmp_path]))
     return tmp_path
 
 
-CODE = machine.Code(("cos",), b"machine\ncode")
+CODE = machine_code.Code(("cos",), b"machine\ncode")
 
 
 def test_code_is_kept_whole_and_for_this_user_alone(folder: Path) -> None:
-    assert kept.write("door", CODE) == folder
-    assert kept.read("door") == CODE
+    assert disk_cache.write("door", CODE) == folder
+    assert disk_cache.read("door") == CODE
     (file,) = folder.iterdir()
     assert file.stat().st_mode & 0o022 == 0
-    assert kept.stamp()[:24] in file.name
+    assert disk_cache.stamp()[:24] in file.name
 
 
 def test_a_changed_kernel_file_changes_the_digest(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    for path in Path(kept.__file__).parent.glob("*.py"):
+    for path in Path(disk_cache.__file__).parent.glob("*.py"):
         (tmp_path / path.name).write_bytes(path.read_bytes())
-    monkeypatch.setattr(kept, "__file__", str(tmp_path / "kept.py"))
-    before = kept.digest()
-    for name, same in (("entry.py", True), ("chain.py", False)):  # the code does not follow from who calls it
+    monkeypatch.setattr(disk_cache, "__file__", str(tmp_path / "disk_cache.py"))
+    before = disk_cache.digest()
+    for name, same in (("compiled.py", True), ("chain.py", False)):  # the code does not follow from who calls it
         with (tmp_path / name).open("a") as file:
             file.write("# changed\n")
-        assert (kept.digest() == before) is same
+        assert (disk_cache.digest() == before) is same
 
 
 @pytest.mark.parametrize("changed", ["sources", "python", "numba", "llvmlite", "numpy", "settings", "processor"])
 def test_code_of_another_origin_is_not_used(folder: Path, monkeypatch: pytest.MonkeyPatch, changed: str) -> None:
     """Neither under the name that it would have, nor if it were renamed."""
-    kept.write("door", CODE)
+    disk_cache.write("door", CODE)
     (file,) = folder.iterdir()
-    origin = kept.origin() | {changed: "another"}
-    kept.stamp.cache_clear()
-    monkeypatch.setattr(kept, "origin", lambda: origin)
+    origin = disk_cache.origin() | {changed: "another"}
+    disk_cache.stamp.cache_clear()
+    monkeypatch.setattr(disk_cache, "origin", lambda: origin)
     try:
-        assert kept.read("door") is None
-        file.rename(folder / f"door-{kept.stamp()[:24]}.code")
-        assert kept.read("door") is None
+        assert disk_cache.read("door") is None
+        file.rename(folder / f"door-{disk_cache.stamp()[:24]}.code")
+        assert disk_cache.read("door") is None
     finally:
         monkeypatch.undo()
-        kept.stamp.cache_clear()
+        disk_cache.stamp.cache_clear()
 
 
 @pytest.mark.parametrize(("name", "same"), [("NUMBA_NUM_THREADS", True), ("NUMBA_OPT", False)])
@@ -131,22 +131,22 @@ def test_settings_that_change_the_code_count_and_no_others(
     monkeypatch: pytest.MonkeyPatch, name: str, same: bool
 ) -> None:
     """Processes of one study may have different numbers of threads: they share their code."""
-    before = kept.origin()
+    before = disk_cache.origin()
     monkeypatch.setenv(name, "1")
-    kept.origin.cache_clear()
+    disk_cache.origin.cache_clear()
     try:
-        assert (kept.origin() == before) is same
+        assert (disk_cache.origin() == before) is same
     finally:
         monkeypatch.undo()
-        kept.origin.cache_clear()
+        disk_cache.origin.cache_clear()
 
 
 @pytest.mark.parametrize("damage", [lambda data: data[:-1], lambda data: data[:-1] + b"?", lambda _data: b""])
 def test_damaged_code_is_not_used(folder: Path, damage: Any) -> None:
-    kept.write("door", CODE)
+    disk_cache.write("door", CODE)
     (file,) = folder.iterdir()
     file.write_bytes(damage(file.read_bytes()))
-    assert kept.read("door") is None
+    assert disk_cache.read("door") is None
 
 
 @pytest.mark.parametrize("others", ["the folder", "the file", "a folder above"])
@@ -155,15 +155,15 @@ def test_code_is_never_used_where_others_could_have_put_it(
 ) -> None:
     place = tmp_path / "above" / "folder"
     place.mkdir(parents=True)
-    monkeypatch.setattr(kept, "_lasting", lambda: iter([place]))
-    monkeypatch.setattr(kept, "private_folder", lambda _name, make=True: None)
-    kept.write("door", CODE)
+    monkeypatch.setattr(disk_cache, "_lasting", lambda: iter([place]))
+    monkeypatch.setattr(disk_cache, "private_folder", lambda _name, make=True: None)
+    disk_cache.write("door", CODE)
     (file,) = place.iterdir()
-    assert kept.read("door") == CODE
+    assert disk_cache.read("door") == CODE
     {"the folder": place, "the file": file, "a folder above": place.parent}[others].chmod(0o777)
-    assert kept.read("door") is None
+    assert disk_cache.read("door") is None
     if others != "the file":
-        assert kept.write("door", CODE) is None
+        assert disk_cache.write("door", CODE) is None
 
 
 def test_a_file_of_another_user_is_not_trusted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -176,18 +176,18 @@ def test_a_file_of_another_user_is_not_trusted(tmp_path: Path, monkeypatch: pyte
 
 
 def test_what_the_linker_would_not_find_is_told_before_it_ends_the_process() -> None:
-    with pytest.raises(machine.Strange, match="no function no_such_function"):
-        machine.loaded(machine.Code(("no_such_function",), b""))
+    with pytest.raises(machine_code.Strange, match="no function no_such_function"):
+        machine_code.loaded(machine_code.Code(("no_such_function",), b""))
 
 
 def test_code_that_cannot_be_loaded_is_compiled_anew(
     folder: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     """Two seconds: the smallest door is compiled, once; its first compilation is announced."""
-    kept.write("states", machine.Code(("no_such_function",), b""))
+    disk_cache.write("states", machine_code.Code(("no_such_function",), b""))
     with caplog.at_level(logging.WARNING):
-        _states_with(entry._got("states"))
-        _states_with(entry._got("states"))
+        _states_with(compiled._got("states"))
+        _states_with(compiled._got("states"))
     said = [record.message for record in caplog.records]
     assert said == ["compiling the beam engine, once: states along beams, a moment"]
     assert len(list(folder.glob("*.code"))) == 1
@@ -199,7 +199,7 @@ def _states_with(call: Any) -> Any:
     path = trace(network, drive, Control(tolerance=1e-4))
     out = np.zeros((len(path), len(path.solver.cut.edges) + path.solver.n_segments, 7))
     given = objects((path.points.y, path.points.drive, out))
-    block = HEAD + entry._whole(path.solver.n_free) + path.solver.model.block + given
+    block = HEAD + compiled._whole(path.solver.n_free) + path.solver.model.block + given
     assert call(block, (ctypes.c_int64 * 2)()) == 0
     assert out.any()
     return out
@@ -210,18 +210,18 @@ def usual_door() -> Any:
     """The smallest door, compiled in numba's usual way: two seconds."""
     from cfmkit.elastica.kernels import build
 
-    return machine.callable_at(build.called("states"))
+    return machine_code.callable_at(build.called("states"))
 
 
 def test_kept_code_gives_to_the_last_bit_what_numba_gives(usual_door: Any) -> None:
     """One door; all of them: see the slow test below."""
     usual = _states_with(usual_door)
-    _states_with(entry._got("states"))
-    code, path = kept.read("states"), kept.library("states")
+    _states_with(compiled._got("states"))
+    code, path = disk_cache.read("states"), disk_cache.library("states")
     assert code is not None
-    assert _states_with(machine.loaded(code)).tobytes() == usual.tobytes()
+    assert _states_with(machine_code.loaded(code)).tobytes() == usual.tobytes()
     if path is not None:  # there is a C compiler
-        assert _states_with(machine.in_library(path)).tobytes() == usual.tobytes()
+        assert _states_with(machine_code.in_library(path)).tobytes() == usual.tobytes()
 
 
 _ONE_DOOR = """
@@ -274,8 +274,8 @@ def small(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     room = tmp_path_factory.mktemp("source")
     (room / "code.c").write_text(_WAY_IN)
     subprocess.run([linker, "-fPIC", "-c", "code.c"], cwd=room, check=True)
-    kept.write("door", machine.Code((), (room / "code.o").read_bytes()))
-    path = kept.library("door")
+    disk_cache.write("door", machine_code.Code((), (room / "code.o").read_bytes()))
+    path = disk_cache.library("door")
     assert path is not None
     return path
 
@@ -289,14 +289,14 @@ def _doubled(call: Any) -> int:
 def test_code_is_linked_where_there_is_a_compiler_and_runs_alike_where_there_is_none(
     small: Path, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    assert _doubled(machine.in_library(small)) == 42
-    code = kept.read("door")
+    assert _doubled(machine_code.in_library(small)) == 42
+    code = disk_cache.read("door")
     assert code is not None
-    assert _doubled(machine.loaded(code)) == 42
+    assert _doubled(machine_code.loaded(code)) == 42
     monkeypatch.setattr(shutil, "which", lambda _name: None)
-    kept.write("other", code)
-    assert kept.library("other") is None
-    assert kept.read("other") == code
+    disk_cache.write("other", code)
+    assert disk_cache.library("other") is None
+    assert disk_cache.read("other") == code
 
 
 @pytest.mark.parametrize("damage", ["half of it", "of another origin", "others can write to it"])
@@ -304,19 +304,19 @@ def test_a_damaged_or_strange_library_is_not_loaded(small: Path, damage: str, mo
     if damage == "half of it":
         small.write_bytes(small.read_bytes()[: small.stat().st_size // 2])
     elif damage == "of another origin":
-        kept.origin()
-        monkeypatch.setattr(kept, "stamp", lambda: "0" * 64)
+        disk_cache.origin()
+        monkeypatch.setattr(disk_cache, "stamp", lambda: "0" * 64)
         for file in (small, small.with_suffix(".sha256")):
             file.rename(small.with_name(f"door-{'0' * 24}{file.suffix}"))
     else:
         small.chmod(0o666)
-    assert kept.library("door") is None
+    assert disk_cache.library("door") is None
 
 
 def test_what_is_no_library_is_said_to_be_strange(tmp_path: Path) -> None:
     (tmp_path / "door.so").write_bytes(b"no library")
-    with pytest.raises(machine.Strange):
-        machine.in_library(tmp_path / "door.so")
+    with pytest.raises(machine_code.Strange):
+        machine_code.in_library(tmp_path / "door.so")
 
 
 def test_curves_and_gradients_are_the_same_to_the_last_bit_however_the_code_is_loaded(
@@ -325,10 +325,10 @@ def test_curves_and_gradients_are_the_same_to_the_last_bit_however_the_code_is_l
     """As it was compiled, by LLVM; and as it is kept, by the system where there is a C compiler."""
     list(warm())
     ours = [part.tobytes() for part in _curve_and_gradient()]
-    for name, door in entry._doors.items():
-        code = kept.read(name)
+    for name, door in compiled._doors.items():
+        code = disk_cache.read(name)
         if code is not None:
-            monkeypatch.setattr(door, "_call", machine.loaded(code))
+            monkeypatch.setattr(door, "_call", machine_code.loaded(code))
     assert [part.tobytes() for part in _curve_and_gradient()] == ours
 
 
@@ -338,10 +338,10 @@ def test_curves_and_gradients_are_those_of_numba_to_rounding(monkeypatch: pytest
     from cfmkit.elastica.kernels import build
 
     ours = _curve_and_gradient()
-    for name in entry._doors:
+    for name in compiled._doors:
         build.compiled(name)  # in the same process, whether or not it was kept before
-    for name, door in entry._doors.items():
-        monkeypatch.setattr(door, "_call", machine.callable_at(build.called(name)))
+    for name, door in compiled._doors.items():
+        monkeypatch.setattr(door, "_call", machine_code.callable_at(build.called(name)))
     for theirs, own in zip(_curve_and_gradient(), ours, strict=True):
         np.testing.assert_allclose(theirs, own, rtol=0.0, atol=1e-9 * np.abs(own).max())
 
@@ -378,9 +378,9 @@ def test_what_is_no_array_of_the_right_kind_is_refused(other: Any, number: int) 
     path = trace(*_pulled_beam())
     solver, y = path.solver, np.ascontiguousarray(path.points.y)
     out = np.zeros((len(path), len(solver.cut.edges) + solver.n_segments, 7))
-    door = entry._doors["states"]
+    door = compiled._doors["states"]
     with pytest.raises(TypeError, match=rf"array {number} of 'states': float64, 2 axes, in C order"):
-        door(entry._whole(solver.n_free), solver.model.block, objects((other(y), path.points.drive, out)))
+        door(compiled._whole(solver.n_free), solver.model.block, objects((other(y), path.points.drive, out)))
     assert not out.any()
 
 
@@ -451,12 +451,12 @@ def test_code_that_is_kept_runs_without_numba() -> None:
 _NOWHERE = """
 import logging, sys
 from pathlib import Path
-from cfmkit.elastica.kernels import kept, machine
+from cfmkit.elastica.kernels import disk_cache, machine_code
 logging.basicConfig(level=logging.INFO, format="%(message)s")
-kept._lasting = lambda: iter([Path("/proc/none")])  # neither package nor home is writable
-code = machine.Code((), b"code")
-before = kept.read("door") == code
-print(kept.write("door", code), before, kept.read("door") == code)
+disk_cache._lasting = lambda: iter([Path("/proc/none")])  # neither package nor home is writable
+code = machine_code.Code((), b"code")
+before = disk_cache.read("door") == code
+print(disk_cache.write("door", code), before, disk_cache.read("door") == code)
 """
 
 
@@ -498,13 +498,13 @@ def test_code_is_never_loaded_from_a_folder_that_others_could_have_prepared(tmp_
 
 
 def test_without_any_folder_code_is_compiled_and_not_kept(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(kept, "_lasting", lambda: iter(()))
-    monkeypatch.setattr(kept, "private_folder", lambda _name, make=True: None)
-    assert kept.write("door", CODE) is None
-    assert kept.read("door") is None
+    monkeypatch.setattr(disk_cache, "_lasting", lambda: iter(()))
+    monkeypatch.setattr(disk_cache, "private_folder", lambda _name, make=True: None)
+    assert disk_cache.write("door", CODE) is None
+    assert disk_cache.read("door") is None
 
 
 def test_warming_loads_every_part_of_the_compiled_code() -> None:
     parts = list(warm())
     assert len({part.name for part in parts}) == len(parts) == 5
-    assert all(entry._doors[name]._call is not None for name in DOORS if name != "complex_states")
+    assert all(compiled._doors[name]._call is not None for name in DOORS if name != "complex_states")

@@ -21,7 +21,7 @@ from cfmkit.elastica.continuation.decisions import decided
 from cfmkit.elastica.continuation.state import BranchEnd, Leg, Problem, Resume, Stop, Stretch, Trail
 from cfmkit.elastica.equilibrium.mesh import Mesh
 from cfmkit.elastica.equilibrium.meshed_network import Spot
-from cfmkit.elastica.kernels.codes import DONE, FULL, INERTIA, LONG, OUTSIDE, STALLED
+from cfmkit.elastica.kernels.status_codes import DONE, FULL, INERTIA, LONG, OUTSIDE, STALLED
 from cfmkit.elastica.model.layout import Layout
 
 ASKED = (1e-3, 2e-3, 3e-3)  # [m]; the mean beam length is 0.1 m

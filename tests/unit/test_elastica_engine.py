@@ -117,7 +117,7 @@ def test_the_tangent_by_the_drive_is_the_derivative_of_the_solution() -> None:
 
 def test_flow_derivatives_are_those_of_complex_steps() -> None:
     """The variational columns of a segment at random start values against complex steps of the plain integration."""
-    from cfmkit.elastica.kernels import entry
+    from cfmkit.elastica.kernels import compiled
 
     nodes = {"a": Node(0, 0, CLAMPED), "d": Node(0.08, 0.05)}
     section = Section(2e9, 8e-3, TAPER, shear=True)
@@ -138,7 +138,7 @@ def test_flow_derivatives_are_those_of_complex_steps() -> None:
             out = np.empty((1, rows, 7), dtype=complex)
             first = solver.model.segment_step[1]
             tilted = y + 1e-30j * step
-            entry.states(solver.model, solver.n_free, tilted[None], np.zeros(1, dtype=complex), out)
+            compiled.states(solver.model, solver.n_free, tilted[None], np.zeros(1, dtype=complex), out)
             ends.append(out[0, first].imag / 1e-30)
         ends = np.array(ends)  # rows: by rotation, h, v, m; columns: x, y, rotation, moment
         # after one segment: dq = A dq_a + B dp, dp_b = C dq_a + D dp with D the identity but for its last row
@@ -154,7 +154,7 @@ def test_flow_derivatives_are_those_of_complex_steps() -> None:
 
 def test_newton_s_method_converges_quadratically_from_random_states() -> None:
     """The error after each iteration is bounded by the square of the one before, down to rounding."""
-    from cfmkit.elastica.kernels import entry
+    from cfmkit.elastica.kernels import compiled
 
     solver = Solver(Layout(frame(), Displacement("d", -UP, TRAVEL)), Mesh(2, 3), 1e-13)
     rng = np.random.default_rng(1)
@@ -165,7 +165,7 @@ def test_newton_s_method_converges_quadratically_from_random_states() -> None:
         errors = []
         for _ in range(4):
             state, once = np.array([0.05, 0, 0, 0, 0]), np.array([0.0, 1.0])
-            entry.solve(
+            compiled.solve(
                 solver.model, solver.n_free, y, state, solver.unit, 0.05, once, solver.unit.copy(), solver.scratch
             )
             errors.append(float(np.abs(y - exact.y).max()))

@@ -24,7 +24,7 @@ from cfmkit.elastica import (
     guided,
     trace,
 )
-from cfmkit.elastica.kernels import entry
+from cfmkit.elastica.kernels import compiled
 from cfmkit.errors import InputError
 
 FINE = Control(tolerance=1e-11)
@@ -98,6 +98,6 @@ def test_a_singular_tangent_is_told_where_a_derivative_is_asked_for(
 ) -> None:
     path = trace(lan(LAN), Displacement("n5", -np.pi / 2, np.array([2e-3])), Control(tolerance=1e-5))
     found = gradient(path, lan, LAN)
-    monkeypatch.setattr(entry, "slopes", lambda *_: False)
+    monkeypatch.setattr(compiled, "slopes", lambda *_: False)
     with pytest.raises(InputError, match="singular"):
         getattr(found, output)

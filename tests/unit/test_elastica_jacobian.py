@@ -15,7 +15,7 @@ from beam_networks import drives, network
 
 from cfmkit.elastica.equilibrium.mesh import LOADS, PRESTRESS, Mesh
 from cfmkit.elastica.equilibrium.meshed_network import Solver
-from cfmkit.elastica.kernels import entry
+from cfmkit.elastica.kernels import compiled
 from cfmkit.elastica.model.layout import Layout
 
 WEIGHTS = np.array([1, -8, 8, -1]) / 12.0
@@ -43,7 +43,7 @@ def unfolded(solver: Solver, free: np.ndarray, first: np.ndarray, drive: float) 
     parts[m.beam_segment[:-1], :3], parts[m.beam_segment[:-1], 3:] = poses(solver, free, drive), first
     for _ in range(int(np.diff(m.beam_segment).max())):
         states = np.empty((1, len(solver.cut.edges) + solver.n_segments, 7))
-        entry.states(m, solver.n_free, y[None], np.array([drive]), states)
+        compiled.states(m, solver.n_free, y[None], np.array([drive]), states)
         ends = states[0, m.segment_step[1:] + np.arange(solver.n_segments)][:, [0, 1, 2, 4, 5, 3]]
         inner = np.setdiff1d(np.arange(solver.n_segments), m.beam_segment[:-1])
         parts[inner] = ends[inner - 1]
@@ -53,7 +53,7 @@ def unfolded(solver: Solver, free: np.ndarray, first: np.ndarray, drive: float) 
 
 def residuals(solver: Solver, y: np.ndarray, drive: float) -> tuple[np.ndarray, np.ndarray]:
     """Return the residuals in the order of the unknowns, and the Jacobian by the unknowns and the drive."""
-    entry.tangent(solver.model, solver.n_free, y.copy(), drive, solver.scratch)
+    compiled.tangent(solver.model, solver.n_free, y.copy(), drive, solver.scratch)
     found, slot = solver.scratch[3], solver.model.slot
     own = np.empty(solver.n)
     own[slot[slot >= 0]] = found[: len(slot)][slot >= 0]

@@ -36,7 +36,7 @@ from cfmkit.elastica import (
 from cfmkit.elastica.equilibrium.mesh import Mesh
 from cfmkit.elastica.equilibrium.meshed_network import Solver
 from cfmkit.elastica.equilibrium.uncondensed_system import ExpandedSolver
-from cfmkit.elastica.kernels import entry
+from cfmkit.elastica.kernels import compiled
 from cfmkit.elastica.kernels.splitting import DRIFTS, KICKS, NODES
 from cfmkit.elastica.model.layout import Layout
 
@@ -59,7 +59,7 @@ def end_state(solver: Solver, start: Any) -> Any:
     y = np.zeros((1, solver.size), dtype=start.dtype)
     y[0, solver.n : solver.n + 6] = start[[0, 1, 2, 4, 5, 3]]
     out = np.empty((1, len(solver.cut.edges) + solver.n_segments, 7), dtype=start.dtype)
-    entry.states(solver.model, solver.n_free, y, np.zeros(1, dtype=start.dtype), out)
+    compiled.states(solver.model, solver.n_free, y, np.zeros(1, dtype=start.dtype), out)
     return out[0, solver.model.segment_step[1], :6]
 
 

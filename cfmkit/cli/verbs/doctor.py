@@ -77,7 +77,7 @@ _EXTRAS = ("cluster",)
 
 
 def _folders() -> Mapping[str, Path]:
-    from cfmkit.elastica.kernels.kept import folders
+    from cfmkit.elastica.kernels.disk_cache import folders
 
     return {
         "output (the current folder)": Path.cwd(),
@@ -98,7 +98,7 @@ def _writable(path: Path) -> bool:
 
 
 def _solver() -> Record:
-    from cfmkit.elastica.kernels.kept import kept_in
+    from cfmkit.elastica.kernels.disk_cache import kept_in
 
     folder = kept_in()
     return {"compiled": folder is not None, "folder": None if folder is None else str(folder)}
@@ -114,7 +114,7 @@ def _fonts() -> Record:
 
 def _caches() -> Iterator[Record]:
     """Yield what cfmkit and its libraries keep between runs: everything there can be deleted and is made again."""
-    from cfmkit.elastica.kernels.kept import folders
+    from cfmkit.elastica.kernels.disk_cache import folders
     from cfmkit.plots.font_cache import kept_lists
 
     for what, path in {"compiled solver": next(iter(folders())), "list of fonts": kept_lists()}.items():

@@ -10,7 +10,7 @@ import numpy as np
 from cfmkit.elastica.continuation import points_at_bifurcation
 from cfmkit.elastica.continuation.state import PRIMARY, BranchEnd, Resume, Stop
 from cfmkit.elastica.equilibrium.meshed_network import Points
-from cfmkit.elastica.kernels.codes import DONE, INERTIA
+from cfmkit.elastica.kernels.status_codes import DONE, INERTIA
 from cfmkit.elastica.outcome.path import Event, PathStatus
 
 if TYPE_CHECKING:

@@ -17,7 +17,7 @@ from cfmkit.elastica.continuation import (
 )
 from cfmkit.elastica.continuation.state import PRIMARY, Leg, Resume, Stop
 from cfmkit.elastica.continuation.uncondensed import uncondensed
-from cfmkit.elastica.kernels.codes import DENIED, DONE, INERTIA, NO_START, STALLED
+from cfmkit.elastica.kernels.status_codes import DENIED, DONE, INERTIA, NO_START, STALLED
 from cfmkit.elastica.outcome.path import PathStatus
 
 if TYPE_CHECKING:

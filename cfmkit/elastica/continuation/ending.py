@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.elastica.continuation.state import Stop
-from cfmkit.elastica.kernels.codes import FULL, LONG, OUTSIDE
+from cfmkit.elastica.kernels.status_codes import FULL, LONG, OUTSIDE
 from cfmkit.elastica.outcome.path import PathStatus
 
 if TYPE_CHECKING:

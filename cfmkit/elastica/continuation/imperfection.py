@@ -57,11 +57,11 @@ def imperfect(network: Network, first: tuple[Problem, Singular] | None, size: fl
 
 def _mode(solver: ExpandedSolver, singular: Singular) -> tuple[FloatArray, float]:
     """Return the rotations along the segments by the null vector, and its largest displacement, dimensionless."""
-    from cfmkit.elastica.kernels import entry
+    from cfmkit.elastica.kernels import compiled
 
     spot = singular.spot
     ys = np.stack([solver.shifted(spot.y, spot.drive, kick * singular.null) for kick in (_KICK, -_KICK)])
     states = np.empty((2, len(solver.cut.edges) + solver.n_segments, 7))
-    entry.states(solver.model, solver.n_free, ys, np.full(2, spot.drive), states)
+    compiled.states(solver.model, solver.n_free, ys, np.full(2, spot.drive), states)
     slope = (states[0] - states[1]) / (2 * _KICK)
     return slope[:, 2], float(np.hypot(slope[:, 0], slope[:, 1]).max())

@@ -9,7 +9,7 @@ import numpy as np
 
 from cfmkit.elastica.continuation import ending, start
 from cfmkit.elastica.continuation.state import PRIMARY, Leg, Resume, Stop, Trail
-from cfmkit.elastica.kernels.codes import DONE, LONG, STALLED
+from cfmkit.elastica.kernels.status_codes import DONE, LONG, STALLED
 from cfmkit.elastica.outcome.path import PathStatus
 
 if TYPE_CHECKING:

@@ -14,7 +14,7 @@ import numpy as np
 
 from cfmkit.elastica.continuation.state import Resume, Stretch
 from cfmkit.elastica.equilibrium.meshed_network import FORCE_WEIGHT
-from cfmkit.elastica.kernels.codes import INERTIA
+from cfmkit.elastica.kernels.status_codes import INERTIA
 
 if TYPE_CHECKING:
     from cfmkit.elastica.continuation.state import Move, Problem, Trail

@@ -16,7 +16,7 @@ import numpy as np
 from cfmkit.elastica.continuation.state import PRIMARY, Problem, Trail
 from cfmkit.elastica.equilibrium.mesh import LOADS, PRESTRESS, assemble_model
 from cfmkit.elastica.equilibrium.meshed_network import MarchOptions, Solver, Spot
-from cfmkit.elastica.kernels.codes import DONE, LONG, SHORT, STALLED
+from cfmkit.elastica.kernels.status_codes import DONE, LONG, SHORT, STALLED
 from cfmkit.elastica.model.layout import Layout
 from cfmkit.elastica.model.network import Network
 from cfmkit.elastica.model.section import Taper

@@ -102,7 +102,7 @@ def _solved(network: Network, drive: Drive, control: Control, first_only: bool =
     from cfmkit.elastica.continuation.accuracy import estimate
     from cfmkit.elastica.continuation.joined_marches import follow
     from cfmkit.elastica.continuation.state import Problem
-    from cfmkit.elastica.kernels.codes import STALLED
+    from cfmkit.elastica.kernels.status_codes import STALLED
     from cfmkit.elastica.outcome.path import PathStatus
 
     layout = Layout(network, drive)

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from cfmkit.elastica.equilibrium.mesh import PRESTRESS, Mesh, assemble_model, grid, table
-from cfmkit.elastica.kernels import entry
-from cfmkit.elastica.kernels.codes import DRIVE_RATE, REACHED, REQUESTED, SHORTNESS, SOLVED, UNSTABLE
+from cfmkit.elastica.kernels import compiled
+from cfmkit.elastica.kernels.status_codes import DRIVE_RATE, REACHED, REQUESTED, SHORTNESS, SOLVED, UNSTABLE
 from cfmkit.elastica.kernels.workspace import work_space
 
 if TYPE_CHECKING:
@@ -223,7 +223,7 @@ class Solver:
         state[0], state[5] = drive, 1.0
         border = self.unit if border is None else border
         goal = drive if target is None else target
-        code, _ = entry.solve(m, self.n_free, new, state, border, goal, self.limits, tangent, self.scratch)
+        code, _ = compiled.solve(m, self.n_free, new, state, border, goal, self.limits, tangent, self.scratch)
         if code != SOLVED:
             return None
         at, unstable, shortness, increment, _, log_size = state.tolist()
@@ -231,7 +231,7 @@ class Solver:
 
     def tangent_at(self, y: FloatArray, drive: float) -> tuple[FloatArray, FloatArray]:
         """Return the tangent by the unknowns z and by the drive; under loads that follow it is not symmetric."""
-        entry.tangent(self.model, self.n_free, y.copy(), drive, self.scratch)
+        compiled.tangent(self.model, self.n_free, y.copy(), drive, self.scratch)
         h = self.scratch[0][: self.n]
         return h[:, : self.n].copy(), h[:, self.n].copy()
 
@@ -243,7 +243,7 @@ class Solver:
         `model`: other values than the network's own.
         """
         y, drive, info = np.empty((room, self.size)), np.empty(room), np.empty((room, _STORED))
-        code, stored = entry.march(
+        code, stored = compiled.march(
             self.model if model is None else model,
             self.n_free,
             spot.y.copy(),
@@ -294,5 +294,5 @@ class Solver:
         all unknowns; infinite where there is no equilibrium.
         """
         new, changes = ys.copy(), np.empty((len(drives), 3))
-        entry.solve_each(self.model, self.n_free, new, drives, self.limits, changes, self.scratch)
+        compiled.solve_each(self.model, self.n_free, new, drives, self.limits, changes, self.scratch)
         return new, changes

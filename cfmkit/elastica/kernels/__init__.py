@@ -1,1 +1,1 @@
-"""Compiled code of the beam engine. Importing `cfmkit.elastica.kernels.entry` loads compiled code: only to solve."""
+"""Compiled code of the beam engine. Importing `cfmkit.elastica.kernels.compiled` loads compiled code: only to solve."""

@@ -20,9 +20,9 @@ from numba.core.registry import cpu_target
 from numba.core.runtime.nrt import rtsys
 from numba.core.typing.context import Context
 
-from cfmkit.elastica.kernels import doors
+from cfmkit.elastica.kernels import entry_points
 from cfmkit.elastica.kernels.compiler import KERNELS, OPTIONS
-from cfmkit.elastica.kernels.machine import SYMBOL, Code
+from cfmkit.elastica.kernels.machine_code import SYMBOL, Code
 from cfmkit.elastica.kernels.packing import AXES, DATA, DTYPE, DTYPES, ENTRIES, FLAGS, READY, REFUSED, SHAPE, TYPE, Kind
 from cfmkit.elastica.kernels.signatures import DOORS, REAL, WHOLE
 
@@ -289,6 +289,6 @@ _libraries: list[Any] = []  # code lives as long as its library
 
 def _typed(name: str) -> Any:
     signature = tuple(_type(each) for each in DOORS[name])
-    dispatcher = numba.njit(**OPTIONS)(getattr(doors, name))
+    dispatcher = numba.njit(**OPTIONS)(getattr(entry_points, name))
     dispatcher.compile(signature)
     return dispatcher.overloads[signature]

@@ -13,8 +13,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from cfmkit.elastica.kernels.beam_ode import FORCE, flow, plain_flow
 from cfmkit.elastica.kernels.compiler import inlined, kernel
-from cfmkit.elastica.kernels.flow import FORCE, flow, plain_flow
 
 E, F, E2, G, C_D, SMALL = 0, 1, 2, 3, 4, 5  # blocks of a relation; C_D: c in columns 0, 1
 LARGEST, LIMIT = 3.0, 50.0  # values of a, see `sweep`, that larger ones count as: under thrust, in tension

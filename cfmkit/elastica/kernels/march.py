@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from cfmkit.elastica.kernels.codes import (
+from cfmkit.elastica.kernels.compiler import kernel
+from cfmkit.elastica.kernels.dense import copy
+from cfmkit.elastica.kernels.newton import all_slopes, solve
+from cfmkit.elastica.kernels.predictor import MISSED, aim, changes, misses, pulls, remember, set_border
+from cfmkit.elastica.kernels.status_codes import (
     BY_DRIVE,
     CHANGE,
     DENIED,
@@ -38,10 +42,6 @@ from cfmkit.elastica.kernels.codes import (
     WATCHED,
     WEIGHT,
 )
-from cfmkit.elastica.kernels.compiler import kernel
-from cfmkit.elastica.kernels.dense import copy
-from cfmkit.elastica.kernels.newton import all_slopes, solve
-from cfmkit.elastica.kernels.predictor import MISSED, aim, changes, misses, pulls, remember, set_border
 
 VEER = 0.5  # cosine of the largest angle between the changes of poses at both ends of a step along the arc
 LOOKED_INTO = 0.01  # share of the longest step along the arc that is short enough to meet several things in

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from cfmkit.elastica.kernels.beam_ode_slopes import flow_slopes
 from cfmkit.elastica.kernels.compiler import kernel
-from cfmkit.elastica.kernels.flow_slopes import flow_slopes
 from cfmkit.elastica.kernels.force_slopes import beam_slopes, load_slopes, spring_slopes, value_slopes
 from cfmkit.elastica.kernels.newton import all_values
 from cfmkit.elastica.kernels.splitting import ROWS

@@ -23,4 +23,4 @@ DOORS: dict[str, tuple[Any, ...]] = {
     "row_slopes": (WHOLE, Model.kinds, DesignSlopes.kinds, floats(2), floats(1), floats(3), floats(3), floats(1)),
     "held_slopes": (WHOLE, Model.kinds, DesignSlopes.kinds, floats(2), floats(1), floats(3), floats(3), HELD_SLOPES),
 }
-"""Arguments of each function of `cfmkit.elastica.kernels.doors`."""
+"""Arguments of each function of `cfmkit.elastica.kernels.entry_points`."""

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.elastica.kernels.codes import KEPT
 from cfmkit.elastica.kernels.packing import Packed, complexes, floats, objects
+from cfmkit.elastica.kernels.status_codes import KEPT
 
 if TYPE_CHECKING:
     from cfmkit.elastica.kernels.model import DesignSlopes, Model

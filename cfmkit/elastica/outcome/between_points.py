@@ -18,7 +18,7 @@ import numpy as np
 
 from cfmkit.arrays import read_only
 from cfmkit.elastica.equilibrium.meshed_network import Points
-from cfmkit.elastica.kernels.codes import REQUESTED
+from cfmkit.elastica.kernels.status_codes import REQUESTED
 from cfmkit.elastica.model.drive import Loading
 from cfmkit.numerics.cubic import inner_extremes, values_at
 

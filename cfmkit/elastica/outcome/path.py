@@ -137,11 +137,11 @@ class Path:
 
     @cached_property
     def _observed(self) -> tuple[FloatArray, FloatArray]:
-        from cfmkit.elastica.kernels import entry
+        from cfmkit.elastica.kernels import compiled
 
         s, out = self.solver, np.empty((len(self), self.layout.dof_count + 1))
         if len(self):
-            entry.forces(s.model, s.n_free, np.ascontiguousarray(self.points.y), self.points.drive, out, s.scratch)
+            compiled.forces(s.model, s.n_free, np.ascontiguousarray(self.points.y), self.points.drive, out, s.scratch)
         return out[:, :-1], out[:, -1]
 
     @property

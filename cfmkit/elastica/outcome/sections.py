@@ -41,7 +41,7 @@ class Sampler:
 
     def __init__(self, solver: Solver, points: Points) -> None:
         """Integrate along all beams at all points."""
-        from cfmkit.elastica.kernels import entry
+        from cfmkit.elastica.kernels import compiled
 
         self.solver, self.layout = solver, solver.layout
         rows = _ROWS if solver.tolerance > _TIGHT else 2 * _ROWS
@@ -54,7 +54,7 @@ class Sampler:
         self.states = np.empty((len(points), count, 7))
         self.drive = points.drive
         self._rows: dict[int, Rows] = {}
-        entry.states(self.model, solver.n_free, np.ascontiguousarray(points.y), points.drive, self.states)
+        compiled.states(self.model, solver.n_free, np.ascontiguousarray(points.y), points.drive, self.states)
 
     def rows(self, beam: int) -> Rows:
         """Return the rows of a beam in order; segment boundaries occur twice."""
@@ -109,7 +109,7 @@ class Sampler:
 
     def at(self, beam: int, rows: Rows, start: Any, t: FloatArray, points: Any) -> FloatArray:
         """Return states (k, 7) at parameters t (k,) of a beam, each integrated from the row number `start` (k,)."""
-        from cfmkit.elastica.kernels import entry
+        from cfmkit.elastica.kernels import compiled
 
         count, m = len(t), self.model
         values = self.step_table(beam, rows.step[start], rows.t[start], t)
@@ -125,7 +125,7 @@ class Sampler:
         old = self.states[points, rows.index[start]]
         y = np.concatenate([np.zeros(3 * count), old[:, [X, Y, TURN, H, V, MOMENT]].ravel()])
         out = np.empty((1, 2 * count, 7))
-        entry.states(single, 0, y[None], np.zeros(1), out)
+        compiled.states(single, 0, y[None], np.zeros(1), out)
         return out[0, 1::2]
 
     def load(self, beam: int, points: Any) -> Any:

@@ -1,6 +1,6 @@
 """Exact derivatives of a path's outputs by design variables: implicit differentiation, complex steps of the geometry.
 
-At an equilibrium R(z, x) = 0, so dz/dx = -(dR/dz)^-1 dR/dx, in compiled code (`cfmkit.elastica.kernels.columns`); how
+At an equilibrium R(z, x) = 0, so dz/dx = -(dR/dz)^-1 dR/dx, in compiled code (`kernels.design_derivatives`); how
 the network changes with x comes from complex steps of the function that builds it (`complex_steps`).
 Variables may change positions, shapes, sections, materials, offsets, links' arms, springs, loads, support displacements
 and directions; not the number of anything. The drive keeps its values; a support that turns takes its drive with it.

@@ -55,35 +55,35 @@ class Slopes:
 
     def _slopes(self, size: int) -> tuple[FloatArray, FloatArray]:
         """Return derivatives of the unknowns, (p, size, k), none if the size is zero, and of the force, (p, k)."""
-        from cfmkit.elastica.kernels import entry
+        from cfmkit.elastica.kernels import compiled
 
         s, count = self.path.solver, len(self.complex_steps)
         unknowns = np.empty((len(self.points) if size else 0, size, count))
         push = np.empty((len(self.points), count))
         ys, drives = self.path.points.y[self.points], self.path.points.drive[self.points]
-        if not entry.slopes(s.model, self.design, s.n_free, ys, drives, (unknowns, push), s.scratch):
+        if not compiled.slopes(s.model, self.design, s.n_free, ys, drives, (unknowns, push), s.scratch):
             raise InputError("the tangent is singular at a point of the path: no derivative there")
         return unknowns, push
 
     @cached_property
     def held(self) -> FloatArray:
         """Derivatives of the forces on all degrees of freedom and of the springs' energy, (p, dofs + 1, k)."""
-        from cfmkit.elastica.kernels import entry
+        from cfmkit.elastica.kernels import compiled
 
         s = self.path.solver
         out = np.empty((len(self.points), s.n_dofs + 1, len(self.complex_steps)))
         ys, drives = self.path.points.y[self.points], self.path.points.drive[self.points]
-        entry.held_slopes(s.model, self.design, s.n_free, ys, drives, self.unknowns, out)
+        compiled.held_slopes(s.model, self.design, s.n_free, ys, drives, self.unknowns, out)
         return out
 
     @cached_property
     def rows(self) -> FloatArray:
         """Derivatives of the sampled states, (p, rows, 7, k): x, y, turn, moment, h, v, energy; dimensionless."""
-        from cfmkit.elastica.kernels import entry
+        from cfmkit.elastica.kernels import compiled
 
         sampler, solver = self.path.sampler, self.path.solver
         design = self.complex_steps.arrays(sampler.model, sampler.cut, every=True)
         out = np.empty((len(self.points), sampler.states.shape[1], 7 * len(self.complex_steps)))
         ys, drives = self.path.points.y[self.points], self.path.points.drive[self.points]
-        entry.row_slopes(sampler.model, design, solver.n_free, ys, drives, self.unknowns, out)
+        compiled.row_slopes(sampler.model, design, solver.n_free, ys, drives, self.unknowns, out)
         return out.reshape(*out.shape[:2], 7, -1)[:, :, [2, 3, 0, 1, 5, 6, 4]]

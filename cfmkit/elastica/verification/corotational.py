@@ -263,9 +263,9 @@ class _Elements:
             u[self.layout.first[name] : self.layout.first[name] + 3] = path.motion(name)[index]
         sampler, scale = path.sampler, self.layout.scales.length
         rest = np.empty((1, *sampler.states.shape[1:]))
-        from cfmkit.elastica.kernels import entry
+        from cfmkit.elastica.kernels import compiled
 
-        entry.states(sampler.model, path.solver.n_free, path.solver.unstressed()[None], np.zeros(1), rest)
+        compiled.states(sampler.model, path.solver.n_free, path.solver.unstressed()[None], np.zeros(1), rest)
         moved = sampler.states[index] - rest[0]
         first = 3 * len(self.layout.masters)
         for k, (beam, t) in enumerate(self.inner):

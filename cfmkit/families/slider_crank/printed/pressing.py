@@ -21,7 +21,7 @@ import numpy as np
 from cfmkit.arrays import read_only
 from cfmkit.elastica import Control, Displacement, Path, PathStatus, trace
 from cfmkit.elastica.equilibrium.meshed_network import Points
-from cfmkit.elastica.kernels.codes import REQUESTED
+from cfmkit.elastica.kernels.status_codes import REQUESTED
 from cfmkit.elastica.outcome.between_points import between_points
 from cfmkit.elastica.sensitivity.neighbour import neighbouring
 from cfmkit.families.slider_crank.printed.chain import SLIDER, kink, mirrored

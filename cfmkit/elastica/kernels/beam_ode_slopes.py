@@ -1,13 +1,13 @@
 """The initial-value problem of a beam and its derivatives by any number of variables, kick by kick.
 
-The derivatives are those of the discrete solution of `cfmkit.elastica.kernels.flow`. Variables lie side by side: the
-inner loops run over them.
+The derivatives are those of the discrete solution of `cfmkit.elastica.kernels.beam_ode`. Variables lie side by side:
+the inner loops run over them.
 """
 
 from __future__ import annotations
 
+from cfmkit.elastica.kernels.beam_ode import sincos
 from cfmkit.elastica.kernels.compiler import inlined, kernel
-from cfmkit.elastica.kernels.flow import sincos
 from cfmkit.elastica.kernels.model import HALVES, SHARE, TABLE_COLUMNS
 from cfmkit.elastica.kernels.splitting import ROWS as STEP_ROWS
 from cfmkit.elastica.kernels.wide_strip import bent, by_section, strain_energy

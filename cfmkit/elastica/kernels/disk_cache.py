@@ -13,7 +13,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cfmkit.elastica.kernels.machine import Code, linked, processor
+from cfmkit.elastica.kernels.machine_code import Code, linked, processor
 from cfmkit.store.identity import installed
 from cfmkit.store.private_folder import place, private_folder, trusted
 
@@ -33,7 +33,7 @@ def digest() -> str:
     return whole.hexdigest()
 
 
-_NOT_COMPILED = ("entry.py", "kept.py", "progress.py")
+_NOT_COMPILED = ("compiled.py", "disk_cache.py", "compiling_progress.py")
 """What calls the code, keeps it and tells of it: the code does not follow from them."""
 
 _SETTINGS = ("NUMBA_BOUNDSCHECK", "NUMBA_CPU_FEATURES", "NUMBA_CPU_NAME", "NUMBA_ENABLE_AVX", "NUMBA_OPT")

@@ -8,10 +8,10 @@ drifts and kicks of the state, differentiated: one sweep for all the variables t
 
 from __future__ import annotations
 
+from cfmkit.elastica.kernels.beam_ode_slopes import flow_slopes
 from cfmkit.elastica.kernels.chain import BEFORE, E2, SMALL, E, F, G, places_of, pose_of
 from cfmkit.elastica.kernels.compiler import inlined, kernel
 from cfmkit.elastica.kernels.dense import clear, lu_solve
-from cfmkit.elastica.kernels.flow_slopes import flow_slopes
 from cfmkit.elastica.kernels.force_slopes import (
     load_slopes,
     pose_slope,

@@ -1,11 +1,11 @@
-"""The functions that are called from Python: see `cfmkit.elastica.kernels.entry`. Each returns two integers.
+"""The functions that are called from Python: see `cfmkit.elastica.kernels.compiled`. Each returns two integers.
 
 Importing this imports the compiler: only `cfmkit.elastica.kernels.build` does, where there is no compiled code yet.
 """
 
 from __future__ import annotations
 
-from cfmkit.elastica.kernels import columns as _columns
+from cfmkit.elastica.kernels import design_derivatives as _columns
 from cfmkit.elastica.kernels import march as _march
 from cfmkit.elastica.kernels import newton as _newton
 from cfmkit.elastica.kernels import observe as _observe

@@ -1,4 +1,4 @@
-"""Doors to the compiled code, see `cfmkit.elastica.kernels.doors`: compiled once, kept on disk, loaded when used."""
+"""The entry points as compiled code: compiled once, kept on disk, loaded when called."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.elastica.kernels import kept, machine
+from cfmkit.elastica.kernels import disk_cache, machine_code
+from cfmkit.elastica.kernels.compiling_progress import reported
 from cfmkit.elastica.kernels.packing import HEAD, REFUSED, Kind, flat, objects
-from cfmkit.elastica.kernels.progress import reported
 from cfmkit.elastica.kernels.signatures import DOORS, EACH, FORCES, MARCH, SOLVE, TANGENT
 from cfmkit.elastica.kernels.workspace import held_slope_space, slope_space
 
@@ -64,22 +64,22 @@ class Door:
 
 def _got(name: str) -> Callable[[bytes, Any], int]:
     """Return a door's code: what is kept, else what numba makes of the sources now."""
-    with contextlib.suppress(machine.Strange):
-        if path := kept.library(name):
-            return machine.in_library(path)
-    with contextlib.suppress(machine.Strange):
-        if found := kept.read(name):
-            return machine.loaded(found)
+    with contextlib.suppress(machine_code.Strange):
+        if path := disk_cache.library(name):
+            return machine_code.in_library(path)
+    with contextlib.suppress(machine_code.Strange):
+        if found := disk_cache.read(name):
+            return machine_code.loaded(found)
     with reported(name) as report:
         from cfmkit.elastica.kernels import build
 
         try:
             code = build.compiled(name, report)
-            run = machine.loaded(code)
-        except (AttributeError, TypeError, machine.Strange) as error:  # another version of numba or of LLVM
+            run = machine_code.loaded(code)
+        except (AttributeError, TypeError, machine_code.Strange) as error:  # another version of numba or of LLVM
             _LOG.info("compiled code of '%s' cannot be kept (%s): it is compiled in every process", name, error)
-            return machine.callable_at(build.called(name))
-        kept.write(name, code)
+            return machine_code.callable_at(build.called(name))
+        disk_cache.write(name, code)
     return run
 
 
@@ -150,7 +150,7 @@ def states(m: Model, n_free: int, ys: Any, drives: Any, out: Any) -> None:
 def slopes(
     m: Model, design: DesignSlopes, n_free: int, ys: Any, drives: Any, outs: tuple[Any, Any], scratch: WorkSpace
 ) -> bool:
-    """Set the derivatives of solutions; see `cfmkit.elastica.kernels.columns.slopes`."""
+    """Set the derivatives of solutions; see `cfmkit.elastica.kernels.design_derivatives.slopes`."""
     room = slope_space(m, design, len(scratch[0]) - 1)
     given = objects((ys, drives, *outs))
     return _doors["slopes"](_whole(n_free), m.block, design.block, given, scratch.block, objects(flat(room)))[0] == 1
