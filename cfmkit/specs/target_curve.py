@@ -117,7 +117,7 @@ class TargetCurve:
     def covers(self, low: float, high: float) -> bool:
         """Return whether it is known between two places [m or rad], but for rounding."""
         first, last = self.extent
-        slack = 1e-9 * (high - low)
+        slack = 1e-6 * (high - low)
         return first <= low + slack and high - slack <= last
 
     def between(self, low: float, high: float) -> ThroughPoints:
