@@ -12,7 +12,7 @@ from cam_support import analyze, cam, design
 from pydantic import ValidationError
 
 import cfmkit
-from cfmkit.errors import DataError
+from cfmkit.errors import DataError, SpecError
 from cfmkit.families import family
 from cfmkit.families.base import Run
 from cfmkit.families.slider_crank.springs.assembly import assemble
@@ -130,6 +130,40 @@ def test_a_fault_of_a_file_is_told_with_its_line(tmp_path, line, told):
     with pytest.raises(DataError, match=r"springs\.csv:3") as caught:
         offers(DataSource("springs.csv", tmp_path), "extension")
     assert told in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("data", "told"),
+    [
+        (b"name,stiffness [N/mm],name\nA,1,B\n", "'name' is there twice"),
+        (b"name,stiffness [N/mm]\nA,1\nA,2\n", "csv:3: there are two springs 'A' with different values"),
+        (b"name,stiffness [N/mm]\n", "lists no spring"),
+        (b"", "lists no spring"),
+        (b"\xff\xfen\x00", "byte 1 is not UTF-8"),
+        (b"name;stiffness [N/mm]\nA;0,4\n", "cells are parted by commas"),
+        (b"name,stiffness [N/mm],fatigue\nA,1,x\n", "'fatigue' is no column"),
+        (b"stiffness [N/mm]\n1\n", "csv:2: name: missing"),
+    ],
+)
+def test_a_file_that_is_no_list_of_springs_is_refused_in_one_line(tmp_path, data, told):
+    (tmp_path / "springs.csv").write_bytes(data)
+    with pytest.raises(DataError) as caught:
+        offers(DataSource("springs.csv", tmp_path), "extension")
+    assert told in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_cells_of_a_file_have_the_units_of_its_header(tmp_path):
+    (tmp_path / "springs.csv").write_text("name,stiffness [lbf/in],max_elongation [in],life\nA,2,7,1e5\nA,2,7,1e5\n")
+    one, same = offers(DataSource("springs.csv", tmp_path), "extension")
+    assert one == same
+    assert (one.rate, one.largest, one.life) == pytest.approx((2 * 4.4482216152605 / 0.0254, 0.1778, 1e5))
+
+
+def test_two_different_springs_of_one_name_are_refused_in_a_list():
+    pair = ({"name": "A", "stiffness": "1 N/mm"}, {"name": "A", "stiffness": "2 N/mm"})
+    with pytest.raises(SpecError, match="two springs 'A' with different values"):
+        chosen(pair)
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,7 @@ from cfmkit.stock.springs.helical import SHEAR_MODULUS, YOUNGS_MODULUS, Wound
 from cfmkit.tables.data_files import DataSource
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
     from cfmkit.stock.springs.helical import Kind
 
@@ -169,10 +169,21 @@ class CatalogueSpring(WireLimits):
         )
 
 
+def check_names(springs: Sequence[CatalogueSpring]) -> None:
+    """Raise `ValueError` if two springs of one name are not the same."""
+    known: dict[str, CatalogueSpring] = {}
+    for one in springs:
+        if known.setdefault(one.name, one) != one:
+            raise ValueError(f"there are two springs {one.name!r} with different values: a name stands for one spring")
+
+
 def _named(value: Any, handler: Any, info: ValidationInfo) -> Any:
     """Return a file's name as a file beside the specification; lists and the generic series' word as they are."""
     found = handler(value)
-    if not isinstance(found, str) or found == GENERIC:
+    if not isinstance(found, str):
+        check_names(found)
+        return found
+    if found == GENERIC:
         return found
     folder = getattr(value, "folder", None) or (info.context or {}).get("folder") or "."
     return DataSource(found, folder)
@@ -220,42 +231,75 @@ def offers(catalogue: tuple[CatalogueSpring, ...] | str, *kinds: Kind) -> tuple[
     return tuple(item.offer for item in catalogue if item.kind in kinds)
 
 
+_NUMBER = re.compile(r"[0-9]+(\.[0-9]+)?([eE][+-]?[0-9]+)?")
 _HEADER = re.compile(r"\s*(?P<name>[a-z_]+)\s*(?:\[(?P<unit>[^\[\]]+)\])?\s*")
 
 
 def _from_file(source: DataSource) -> Iterator[CatalogueSpring]:
     """Yield the springs of a CSV: columns are the keys of a catalogue's spring, with units: ``stiffness [N/mm]``."""
-    with source.path.open(encoding="utf-8-sig", newline="") as stream:
-        rows = csv.reader(stream)
-        heads = [_HEADER.fullmatch(cell) for cell in next(rows, [])]
-        names = [head["name"] if head else "" for head in heads]
-        if wrong := [name for name in names if name not in CatalogueSpring.model_fields]:
-            allowed = ", ".join(CatalogueSpring.model_fields)
-            raise DataError(f"{source}:1: {wrong[0]!r} is no column of a list of springs; columns are {allowed}")
+    rows = csv.reader(_lines(source), strict=True)
+    try:
+        heads = _heads(next(rows, []), source)
+        found: list[CatalogueSpring] = []
         for cells in rows:
             if not any(cell.strip() for cell in cells):
                 continue
             if len(cells) != len(heads):
                 raise DataError(f"{source}:{rows.line_num}: has {len(cells)} cells, but the header has {len(heads)}")
-            units = (head["unit"] for head in heads if head)
             block = {
                 name: _cell(name, cell.strip(), unit)
-                for name, unit, cell in zip(names, units, cells, strict=True)
+                for (name, unit), cell in zip(heads, cells, strict=True)
                 if cell.strip()
             }
             try:
-                yield CatalogueSpring.model_validate(block)
+                found.append(CatalogueSpring.model_validate(block))
+                check_names(found)
             except ValidationError as error:
                 first = error.errors()[0]
                 place = ".".join(str(part) for part in first["loc"]) or str(block.get("name", ""))
-                told = first["msg"].removeprefix("Value error, ")
+                told = "missing" if first["type"] == "missing" else first["msg"].removeprefix("Value error, ")
                 raise DataError(f"{source}:{rows.line_num}: {place}: {told}") from None
+            except ValueError as error:
+                raise DataError(f"{source}:{rows.line_num}: {error}") from None
+    except csv.Error as error:
+        raise DataError(f"{source}:{rows.line_num}: {error}") from None
+    if not found:
+        raise DataError(f"{source}: lists no spring: a header and a line for each are needed")
+    yield from found
+
+
+def _lines(source: DataSource) -> list[str]:
+    """Return the lines of a file."""
+    try:
+        text = source.path.read_bytes().decode("utf-8-sig")
+    except OSError as error:
+        raise DataError(f"{source}: cannot be read: {(error.strerror or str(error)).lower()}") from None
+    except UnicodeDecodeError as error:
+        raise DataError(f"{source}: byte {error.start + 1} is not UTF-8") from None
+    return text.splitlines(keepends=True)
+
+
+def _heads(cells: Sequence[str], source: DataSource) -> list[tuple[str, str | None]]:
+    """Return name and unit of each column."""
+    allowed = [name for name in CatalogueSpring.model_fields if name != "fatigue"]  # a block, which no cell holds
+    found: list[tuple[str, str | None]] = []
+    for cell in cells:
+        head = _HEADER.fullmatch(cell)
+        name = head["name"] if head else cell.strip()
+        if name not in allowed:
+            hint = "; cells are parted by commas" if ";" in name else ""
+            listed = ", ".join(allowed)
+            raise DataError(f"{source}:1: {name!r} is no column of a list of springs{hint}; columns are {listed}")
+        if name in dict(found):
+            raise DataError(f"{source}:1: the column {name!r} is there twice")
+        found.append((name, head["unit"] if head else None))
+    return found
 
 
 def _cell(name: str, cell: str, unit: str | None) -> object:
     """Return a cell as a specification would say it."""
     if name == "counts":
         return tuple(int(one) if one.isdigit() else one for one in cell.split())
-    if name == "turns":
-        return float(cell) if cell.replace(".", "", 1).isdigit() else cell
+    if name in ("turns", "life") and _NUMBER.fullmatch(cell):
+        return float(cell)
     return cell if unit is None else f"{cell} {unit}"
