@@ -56,7 +56,20 @@ class Fatigue(Model):
         for (before, above), (after, below) in pairwise(self.points or ()):
             if after <= before or below > above:
                 raise ValueError("'points' must have increasing cycles and amplitudes that do not rise")
+        if self.points is not None:
+            self._within_points(self.points)
         return self
+
+    def _within_points(self, points: tuple[tuple[float, float], ...]) -> None:
+        """Raise if an amplitude is more than the material bears once, or more cycles are wanted than were shown."""
+        if points[0][1] > self.ultimate_strength:
+            told = f"{format_short(points[0][1], 'stress')} is above {format_short(self.ultimate_strength, 'stress')}"
+            raise ValueError(f"an amplitude of 'points' is above 'ultimate_strength': {told}")
+        if self.cycles is not None and self.cycles > points[-1][0] * (1 + 1e-12):
+            raise ValueError(
+                f"'cycles' is {self.cycles:g}, but 'points' end at {points[-1][0]:g}: more have not been shown; add "
+                "points, or give Basquin's line"
+            )
 
     @property
     def law(self) -> FatigueLaw:

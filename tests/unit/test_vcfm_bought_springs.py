@@ -144,3 +144,23 @@ def test_the_refined_design_keeps_force_and_stress_by_the_exact_model(spec):
     exact = cfmkit.analyze(found.spec.replace({"analysis.fidelity": "exact"}))
     assert exact.values["window_force"].value == pytest.approx(11.15, rel=2e-3)
     assert exact.values["travel_stress_max"].value <= 30e6 * 1.0002
+
+
+def test_leaves_that_relax_beside_springs_that_do_not_have_no_common_law(spec):
+    relaxing = {"mechanism.material.relaxation": {"terms": [["20 %", "10 h"]]}}
+    assert spec.replace(relaxing).durability is None
+    leaf = {"length": "30 mm", "angle": "7 deg", "thickness": "1.5 mm", "width": "10 mm"}
+    cut = spec.replace({"mechanism.springs": None, "mechanism.positive": leaf, "design": None})
+    assert cut.replace(relaxing).durability.relaxation is not None
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ({"points": [[1e3, "80 MPa"], [1e5, "35 MPa"]]}, "above 'ultimate_strength'"),
+        ({"points": [[1e3, "40 MPa"], [1e5, "35 MPa"]], "cycles": 1e6}, "more have not been shown"),
+    ],
+)
+def test_what_fatigue_data_do_not_show_is_refused(spec, changes, told):
+    with pytest.raises(SpecError, match=told):
+        spec.replace({"mechanism.material.fatigue": {"ultimate_strength": "60 MPa"} | changes})

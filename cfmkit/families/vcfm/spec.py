@@ -429,8 +429,11 @@ class VcfmSpec(Spec):
 
     @property
     def durability(self) -> Durability | None:
-        """Of leaves and spring."""
-        return self.mechanism.material.durability
+        """Of leaves and spring; bought springs do not relax with the leaves, so that no law holds for their sum."""
+        found = self.mechanism.material.durability
+        if found is None or self.mechanism.springs is None:
+            return found
+        return None if found.fatigue is None else Durability(found.fatigue)
 
     @property
     def motion(self) -> Literal["length", "angle"]:
