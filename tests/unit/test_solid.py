@@ -14,6 +14,7 @@ from cfmkit.solid.boundary import Ring
 from cfmkit.solid.elements import Elements, equivalent
 from cfmkit.solid.equilibrium import SolidProblem
 from cfmkit.solid.mesh import Mesh, mesh
+from cfmkit.solid.meshed_part import HeldOrDriven, Part
 from cfmkit.solid.path_following import PathEnd, PosePath, follow
 from cfmkit.solid.plane_stress_law import NeoHookean, SaintVenantKirchhoff
 from cfmkit.solid.rigid_groups import Group, Supports
@@ -81,6 +82,31 @@ def test_an_outline_that_crosses_itself_is_refused():
     bow = np.array([[0, 0], [1, 1], [1, 0], [0, 1]]) * 1e-2
     with pytest.raises(GeometryError, match="crosses itself"):
         mesh((Ring.of(bow, False),), 1e-3)
+
+
+def test_outlines_that_cross_each_other_are_refused():
+    rings = tuple(Ring.of(box(x, 0, x + 10e-3, 2e-3), False) for x in (0.0, 5e-3))
+    with pytest.raises(GeometryError, match="crosses itself"):
+        mesh(rings, 1e-3)
+
+
+def test_a_held_place_beside_the_part_has_no_nodes_and_is_named():
+    away = HeldOrDriven("root", (box(1.0, 1.0, 2.0, 2.0),), np.zeros(2))
+    part = Part((Ring.of(box(0, 0, 10e-3, 1e-3), False),), 1e-3, 1e-3, HOOKE, (away,))
+    with pytest.raises(GeometryError, match="no node of the mesh lies where root is held"):
+        part.meshed(0.5e-3)
+
+
+def test_no_pose_is_kept_beyond_where_the_solver_stops(monkeypatch):
+    """The path ends with the last equilibrium: nothing of the iterates that follow is reported."""
+    held, _, shortening = strut()
+    solve, end = held.solve, 0.55 * shortening
+    limited = lambda self, start, travel: solve(start, travel) if travel < end else None  # noqa: E731
+    monkeypatch.setattr(type(held), "solve", limited)
+    course = follow(held, np.linspace(0, shortening, 5).tolist())
+    assert course.ending is PathEnd.LOST
+    assert course.ended
+    assert 0.54 * shortening < course.travel[-1] < end
 
 
 def test_meshes_are_equal_byte_for_byte():

@@ -8,6 +8,7 @@ import pytest
 import cfmkit
 from cfmkit import api
 from cfmkit.errors import SpecError
+from cfmkit.families import family
 from cfmkit.families.vcfm.outline import solved_leaf, solved_spring
 from cfmkit.results import Status
 
@@ -91,3 +92,19 @@ def test_sharp_corners_are_told_and_a_mesh_that_is_too_large_for_the_machine_is_
     found = api.analyze(spec("straight", *QUICK, "analysis.solid.mesh=0.001 mm"))
     assert found.status is Status.NO_EQUILIBRIUM
     assert found.message.startswith("the part cannot be meshed: the mesh would have more than 400000 nodes")
+
+
+def test_ends_of_windows_are_poses_of_leaf_and_spring():
+    made = spec("ding2022", "analysis.fidelity=solid", "analysis.window=[1.3 mm, 4.3 mm]", "analysis.preloads=[0.5 mm]")
+    leaf, spring = family("vcfm").driven_parts(made)
+    for place in (1.3e-3, 4.3e-3):
+        assert np.abs(np.array(leaf.stops) - place).min() < 1e-12
+        assert np.abs(np.array(spring.stops) - 0.5 * (0.5e-3 + place)).min() < 1e-12
+
+
+def test_a_leaf_whose_solver_stops_at_once_has_no_curve(monkeypatch):
+    monkeypatch.setattr("cfmkit.solid.path_following.advanced", lambda *_: None)
+    found = api.analyze(spec("straight", *QUICK, "analysis.solid.mesh=1 mm"))
+    assert found.status is Status.NO_EQUILIBRIUM
+    assert not found.curves
+    assert found.message.startswith("no curve: ")

@@ -15,17 +15,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.errors import GeometryError
+from cfmkit.errors import GeometryError, SolutionError
 from cfmkit.families.vcfm.build import coils, parts
 from cfmkit.families.vcfm.exact_model import ExactSampler, problem_of, spring_chain
 from cfmkit.families.vcfm.findings import finding
 from cfmkit.families.vcfm.model import LawSampler, rest_of, result_of, solve, travel_grid
 from cfmkit.families.vcfm.outline import solved_leaf, solved_spring
 from cfmkit.results import Result, Status
+from cfmkit.specs.units import between
 from cfmkit.stock.spec import CutPart
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterator, Sequence
 
     from cfmkit.arrays import FloatArray
     from cfmkit.families.base import Run
@@ -115,7 +116,7 @@ class SolidSampler(ExactSampler):
         self.coils = None if spec.mechanism.springs is None else coils(spec.mechanism.springs)
         leaf, *spring = elastic_parts(spec)
         leaves = leaf.solved(lambda part, _: run.progress(0.6 * part, "leaf"))
-        self.pushed, self.mesh_error = SolidPath(leaves.fine), leaves.error
+        self.pushed, self.mesh_error = _path(leaves.fine), leaves.error
         self.pulled = _pulled(spec, leaf, -back, lambda part: run.progress(0.6 + 0.1 * part, "leaf, back"))
         self.sides, self.problem = [], problem_of("leaves were", (self.pushed, self.pulled), 1.0)
         for one in spring:
@@ -123,7 +124,7 @@ class SolidSampler(ExactSampler):
             back_again = self.chain.travel * min(min(preloads) - back, -0.02 * end)
             springs = one.solved(lambda part, _: run.progress(0.7 + 0.2 * part, "spring"))
             pull = _pulled(spec, one, back_again, lambda part: run.progress(0.9 + 0.1 * part, "spring, back"))
-            self.sides, self.mesh_error = [SolidPath(springs.fine), pull], self.mesh_error.worse(springs.error)
+            self.sides, self.mesh_error = [_path(springs.fine), pull], self.mesh_error.worse(springs.error)
             self.problem = self.problem or problem_of("spring was", self.sides, self.chain.travel)
 
 
@@ -160,11 +161,16 @@ def elastic_parts(spec: VcfmSpec) -> tuple[DrivenPart, ...]:
     if spec.mechanism.springs is None:
         pieces["spring"] = solved_spring(spec)
         ends["spring"] = spring_chain(spec).travel * (max(*spec.analysis.preloads, 0.0) + spec.travel)
+    own = [place for _, window in spec.windows() for place in between(window, (0.0, spec.travel))]
+    places = {"leaf": own}
+    if spec.mechanism.springs is None:
+        share, preload = spring_chain(spec).travel, spec.analysis.preloads[0]
+        places["spring"] = [share * (preload + place) for place in own]
     found = []
     for name, piece in pieces.items():
         part = part_of(spec, piece)
         size = spec.analysis.solid.mesh or part.thinnest / ACROSS
-        found.append(DrivenPart(f"vcfm-{name}", part, size, _stops(spec, ends[name], 1)))
+        found.append(DrivenPart(f"vcfm-{name}", part, size, _stops(spec, ends[name], 1, places[name])))
     return tuple(found)
 
 
@@ -173,15 +179,25 @@ def _seams(polygon: FloatArray) -> tuple[FloatArray, ...]:
     return tuple(np.array([a, b]) for a, b in zip(polygon, np.roll(polygon, -1, axis=0), strict=True))
 
 
-def _stops(spec: VcfmSpec, end: float, fewer: int) -> tuple[float, ...]:
-    """Return the travels to solve for, up to an end [m]; of the poses wanted one in `fewer`."""
+def _stops(spec: VcfmSpec, end: float, fewer: int, places: Sequence[float] = ()) -> tuple[float, ...]:
+    """Return the travels to solve for, up to an end [m]: of the poses wanted one in `fewer`, and places on the way."""
     count = max(5, spec.analysis.solid.poses // fewer)
-    return tuple((end * np.linspace(0.0, 1.0, count) ** GATHERED).tolist())
+    shares = np.linspace(0.0, 1.0, count) ** GATHERED
+    more = [place / end for place in places if 0.0 < place / end < 1.0]
+    found = np.unique(np.concatenate([shares, more]))
+    return tuple((end * np.delete(found, np.flatnonzero(np.diff(found) < 1e-9) + 1)).tolist())
 
 
 def _pulled(spec: VcfmSpec, driven: DrivenPart, end: float, report: Callable[[float], None]) -> SolidPath:
     """Return a part that is pulled back to a travel [m], on one mesh and with a quarter of the poses."""
-    return SolidPath(driven.part.meshed(driven.size).followed(_stops(spec, end, 4), report))
+    return _path(driven.part.meshed(driven.size).followed(_stops(spec, end, 4), report))
+
+
+def _path(solved: MeshSolution) -> SolidPath:
+    """Return a path that has a curve; SolutionError where a part has no second pose."""
+    if len(solved.course.poses) < 2:
+        raise SolutionError(solved.course.ended)
+    return SolidPath(solved)
 
 
 def analyze(spec: VcfmSpec, run: Run) -> Result:
@@ -197,6 +213,8 @@ def analyze(spec: VcfmSpec, run: Run) -> Result:
     except GeometryError as error:
         message = f"the part cannot be meshed: {error}; look at analysis.solid.mesh and mechanism.part"
         return Result(spec, Status.NO_EQUILIBRIUM, message)
+    except SolutionError as error:
+        return Result(spec, Status.NO_EQUILIBRIUM, f"no curve: {error}; look at analysis.solid.mesh")
     found = result_of(solve(spec, made, sampler))
     return replace(found, warnings=(*found.warnings, *_findings(spec, sampler)))
 
