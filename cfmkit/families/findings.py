@@ -16,6 +16,10 @@ TOO_SOFT = 0.01
 """Share of the energy of bending above which wide beams that are solved as narrow ones are reported."""
 
 
+NARROW = 3.0
+"""Width over thickness up to which plane stress is within about 1 % of a solid in three dimensions (docs/solid.md)."""
+
+
 class Finder(Protocol):
     """Makes the findings of one family."""
 
@@ -78,6 +82,23 @@ def too_soft(share: float, where: str) -> str:
     return (
         f"beams that are wide for their thickness cannot curl across their width: to bend them takes about "
         f"{percent(share)} more energy {where}, and as much more force or a little more; clamped ends add to it"
+    )
+
+
+def bracket(width: float, thickness: float, poisson_ratio: float) -> str:
+    """Return what the finding `wide_beam` says of a part that is solved in plane stress; nothing of a narrow one.
+
+    Examples
+    --------
+    >>> bracket(10e-3, 1e-3, 0.35)
+    '10 mm wide at 1 mm of thickness: the force is between that of plane stress, as solved, and 14 % more, plane strain'
+    """
+    if not width > NARROW * thickness:
+        return ""
+    more = percent(1.0 / (1.0 - poisson_ratio**2) - 1.0)
+    return (
+        f"{mm(width)} wide at {mm(thickness)} of thickness: the force is between that of plane stress, as solved, and "
+        f"{more} more, plane strain"
     )
 
 

@@ -35,7 +35,7 @@ def test_lans_part_has_the_force_and_the_peak_stress_of_a_much_finer_mesh():
     assert metrics["stress_max"].value == pytest.approx(60.65e6, rel=0.02)
     assert abs(result.values["peak_stress_x"].value) == pytest.approx(12.12e-3, abs=0.1e-3)
     assert result.values["peak_stress_y"].value == pytest.approx(25.00e-3, abs=0.1e-3)
-    assert {found.name for found in result.warnings} == {"overstressed"}
+    assert {found.name for found in result.warnings} == {"overstressed", "wide_beam"}
 
 
 @pytest.mark.slow

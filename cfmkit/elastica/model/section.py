@@ -183,7 +183,7 @@ def curl_hindered(z: Any) -> Any:
     Examples
     --------
     >>> curl_hindered(np.array([0.0, 180.0, 1e8])).round(3).tolist()
-    [0.0, 0.492, 0.98]
+    [0.0, 0.414, 0.98]
     """
     th = np.sqrt(np.sqrt(np.maximum(z, 1e-4)))  # below: th^4/180, less than rounding of the closed form is worth
     e = np.exp(-th)

@@ -20,6 +20,7 @@ from cfmkit.families.beam.findings import finding
 from cfmkit.families.beam.outline import drawing, regions
 from cfmkit.families.beam.parts.spec import PartSpec
 from cfmkit.families.beam.scalar_results import DEFINITIONS, extremes, ranges
+from cfmkit.families.findings import bracket
 from cfmkit.results import Quantity, Result, Status
 from cfmkit.specs.units import between, format_short
 
@@ -283,6 +284,9 @@ def _findings(solution: SolidSolution) -> Iterator[Finding]:
         )
     for name, told in solution.error.too_large():
         yield finding(name, told)
+    thinnest = min(thinnest_of(beam.section) for beam in solution.assembly.network.beams.values())
+    if told := bracket(spec.mechanism.width, thinnest, spec.mechanism.material.poisson):
+        yield finding("wide_beam", told)
     allowable = solution.assembly.allowable_stress
     if allowable is not None and solution.worst is not None and solution.worst[0] > allowable:
         largest, spot = solution.worst

@@ -346,7 +346,7 @@ def _buckling(solution: Solution) -> Iterator[Finding]:
 
 
 def _width(solution: Solution) -> Iterator[Finding]:
-    exact = solution.spec.analysis.fidelity in TRACED
+    exact = solution.spec.analysis.fidelity == "exact"
     cures, hint = (("mechanism.wide_beams=true",), "") if exact else ((), "; only 'analysis.fidelity: exact' counts it")
     for name, share, place in solution.hindered_curling:
         if told := too_soft(share, f"in the {name} at {mm(place)}"):

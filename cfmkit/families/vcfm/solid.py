@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.errors import GeometryError, SolutionError
+from cfmkit.families.findings import bracket
 from cfmkit.families.vcfm.build import coils, parts
 from cfmkit.families.vcfm.exact_model import ExactSampler, problem_of, spring_chain
 from cfmkit.families.vcfm.findings import finding
@@ -225,3 +226,7 @@ def _findings(spec: VcfmSpec, sampler: SolidSampler) -> Iterator[Finding]:
         yield finding("sharp_corners", told, "mechanism.part.fillet=0.5 mm")
     for name, told in sampler.mesh_error.too_large():
         yield finding(name, told)
+    about = spec.mechanism
+    for part in (about.bistable, about.positive):
+        if part is not None and (told := bracket(part.width, part.thickness, about.material.poisson)):
+            yield finding("wide_beam", told)

@@ -137,7 +137,7 @@ class Solution:
         Their curvature is taken from the stress, as if they were bent to half a sine.
         """
         about, push = self.spec.mechanism, self.nominal
-        if about.wide_beams or self.spec.analysis.fidelity == "truss":
+        if about.wide_beams or self.spec.analysis.fidelity in ("truss", "solid"):
             return
         own, nu = about.material.modulus, about.material.poisson
         parts = (("leaves", about.bistable, push.leaves.stress), ("spring", about.positive, push.spring_stress))

@@ -17,6 +17,7 @@ import numpy as np
 from cfmkit.arrays import read_only
 from cfmkit.curves import Column, Curve
 from cfmkit.errors import GeometryError, InputError
+from cfmkit.families.findings import bracket
 from cfmkit.families.no_mechanism import CannotBuild, no_result
 from cfmkit.families.slider_crank.build import linkage_of, resolve, unloaded_angle
 from cfmkit.families.slider_crank.findings import finding
@@ -239,7 +240,10 @@ def _findings(solution: SolidSolution) -> Iterator[Finding]:
         yield finding("sharp_corners", told, "mechanism.part.fillet=0.5 mm")
     for name, told in solution.error.too_large():
         yield finding(name, told)
-    limit = elasticity(solution.spec.mechanism).allowable_stress
+    piece, made_of = solved_piece(solution.spec), elasticity(solution.spec.mechanism)
+    if told := bracket(piece.sheet.thickness or 0.0, piece.thinnest, made_of.poisson_ratio):
+        yield finding("wide_beam", told)
+    limit = made_of.allowable_stress
     peaks, places = solution.fine.peaks
     if limit is not None and peaks.max() > limit:
         worst = int(peaks.argmax())
