@@ -61,12 +61,14 @@ def curling(z):
     th = np.sqrt(np.sqrt(z))
     e, c, s = np.exp(-th), np.cos(th), np.sin(th)
     below = 1.0 + 2.0 * e * s - e * e
+    # no complex powers: they call a function of numba's, and code that needs it cannot be kept
+    squared, cube = below * below, th * th * th
     g = 2.0 / th * (1.0 - 2.0 * e * c + e * e) / below
-    f = 2.0 * e * (1.0 - e * e) * s / below**2  # sinh sin / (sinh + sin)^2
-    grows = 2.0 * e * ((1.0 + e * e) * s + (1.0 - e * e) * c) / below**2 - 2.0 * f * (1.0 + 2.0 * e * c + e * e) / below
+    f = 2.0 * e * (1.0 - e * e) * s / squared  # sinh sin / (sinh + sin)^2
+    grows = 2.0 * e * ((1.0 + e * e) * s + (1.0 - e * e) * c) / squared - 2.0 * f * (1.0 + 2.0 * e * c + e * e) / below
     once = (4.0 * f - g) / th
     twice = (4.0 * grows - 2.0 * once) / th
-    return g, once / (4.0 * th**3), (twice - 3.0 * once / th) / (16.0 * th**6)
+    return g, once / (4.0 * cube), (twice - 3.0 * once / th) / (16.0 * cube * cube)
 
 
 @inlined
