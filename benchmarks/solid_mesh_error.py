@@ -10,16 +10,12 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
-import math
 import re
 from pathlib import Path
-
-import numpy as np
 
 import cfmkit
 from cfmkit.families import family
 from cfmkit.solid.meshed_part import COARSER
-from cfmkit.solid.two_meshes import FORCE_LEAST, STRESS_LEAST
 
 FINEST = 0.5
 """Side of the reference's elements, in those of the finer mesh: errors of second order or better are a quarter."""
