@@ -10,12 +10,16 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
+import math
 import re
 from pathlib import Path
+
+import numpy as np
 
 import cfmkit
 from cfmkit.families import family
 from cfmkit.solid.meshed_part import COARSER
+from cfmkit.solid.two_meshes import FORCE_LEAST, STRESS_LEAST
 
 FINEST = 0.5
 """Side of the reference's elements, in those of the finer mesh: errors of second order or better are a quarter."""
@@ -75,7 +79,35 @@ def rows(name: str, changes: list[str]) -> list[Row]:
         meshes = [one.part.meshed(share * one.size).followed(stops) for share in (COARSER, 1.0, FINEST)]
         if min(len(solved.course.poses) for solved in meshes) < 3:
             continue
-        force, stress = factor(found, 0), factor(found, 1)
+        told = " ".join(change.partition("=")[2] for change in changes)
+        label = " ".join(filter(None, (config, one.name.removeprefix("vcfm-") if "vcfm-" in one.name else "", told)))
+        coarse, fine, finest = meshes
+        found.append(Row(label, fine.differences(coarse), finest.differences(fine)))
+    return found
+
+
+def ratios(row: Row) -> tuple[float, float]:
+    """Return the errors in differences, which count as `FORCE_LEAST` and `STRESS_LEAST` at least."""
+    force, stress = row.differences
+    return row.errors[0] / max(force, FORCE_LEAST), row.errors[1] / max(stress, STRESS_LEAST)
+
+
+def factor(found: list[Row], which: int) -> float:
+    """Return the factor below which `SHARE` of errors over differences are, rounded upwards to a tenth."""
+    shares = np.array([ratios(row)[which] for row in found])
+    return math.ceil(10 * float(np.quantile(shares, SHARE, method="higher"))) / 10
+
+
+def table(found: list[Row]) -> str:
+    """Return all parts and the factors, as Markdown."""
+    head = "| part | force: difference | error | ratio | stress: difference | error | ratio |\n" + "|---" * 7 + "|\n"
+    lines = []
+    for row in found:
+        cells = []
+        for difference, error, ratio in zip(row.differences, row.errors, ratios(row), strict=True):
+            cells += [f"{difference:.1e}", f"{error:.1e}", f"{ratio:.2f}"]
+        lines.append(f"| `{row.name}` | {' | '.join(cells)} |")
+    force, stress = factor(found, 0), factor(found, 1)
     told = (
         f"{len(found)} parts: 95 % of the ratios, times 4/3 for the reference's own error, are below {force} (force) "
         f"and {stress} (stress)."
