@@ -93,9 +93,12 @@ def ratios(row: Row) -> tuple[float, float]:
 
 
 def factor(found: list[Row], which: int) -> float:
-    """Return the factor below which `SHARE` of errors over differences are, rounded upwards to a tenth."""
-    shares = np.array([ratios(row)[which] for row in found])
-    return math.ceil(10 * float(np.quantile(shares, SHARE, method="higher"))) / 10
+    """Return the factor below which `SHARE` of errors over differences are, rounded upwards to a tenth.
+
+    The reference has an error of its own, of second order in its size: ratios are larger by that.
+    """
+    shares = np.array([ratios(row)[which] for row in found]) / (1.0 - FINEST**2)
+    return math.ceil(10 * float(np.quantile(shares, SHARE, method="inverted_cdf"))) / 10
 
 
 def table(found: list[Row]) -> str:
