@@ -329,7 +329,7 @@ class Spec(Model):
         return self
 
     @property
-    def widths(self) -> Mapping[str, float | None]:
+    def out_of_plane_widths(self) -> Mapping[str, float | None]:
         """What is cut from a sheet: each width out of the plane [m], by its key below `mechanism`."""
         return {}
 

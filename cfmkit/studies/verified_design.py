@@ -112,7 +112,7 @@ def _mean(result: Result) -> float | None:
 
 
 def _widths(spec: Spec) -> Mapping[str, float]:
-    return {f"mechanism.{key}": float(width) for key, width in spec.widths.items() if width is not None}
+    return {f"mechanism.{key}": float(width) for key, width in spec.out_of_plane_widths.items() if width is not None}
 
 
 def _sheet(spec: Spec) -> bool:

@@ -208,11 +208,11 @@ class BeamSpec(Spec):
 
     @model_validator(mode="after")
     def _is_cut_from_one_sheet(self) -> Self:
-        refuse("BeamSpec", sheet_faults(self.mechanism.part, self.widths))
+        refuse("BeamSpec", sheet_faults(self.mechanism.part, self.out_of_plane_widths))
         return self
 
     @property
-    def widths(self) -> Mapping[str, float | None]:
+    def out_of_plane_widths(self) -> Mapping[str, float | None]:
         """Of all beams, and of those that have their own; None where one has none."""
         own = {f"beams.{name}.width": one.width for name, one in self.mechanism.beams.items()}
         return {"width": self.mechanism.width} | own

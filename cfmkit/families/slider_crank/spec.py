@@ -133,11 +133,11 @@ class SliderCrankSpec(Spec):
 
     @model_validator(mode="after")
     def _is_cut_from_one_sheet(self) -> Self:
-        refuse("Spec", sheet_faults(self.mechanism.part, self.widths))
+        refuse("Spec", sheet_faults(self.mechanism.part, self.out_of_plane_widths))
         return self
 
     @property
-    def widths(self) -> Mapping[str, float | None]:
+    def out_of_plane_widths(self) -> Mapping[str, float | None]:
         """Of flexures and strip, where there are any."""
         own, strip = self.mechanism.flexures, self.mechanism.beam
         names = ("pivot", "crank_pin", "slider_pin")

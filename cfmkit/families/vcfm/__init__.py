@@ -40,8 +40,6 @@ FAMILY = Family(
         "force_per_preload",
         "rest_shift_max",
         "spring_stress_max",
-        "spring_deflection_max",
-        "wire_stress_max",
         "bistable_stress_max",
         "travel_stress_max",
         "travel_safety_factor",

@@ -376,11 +376,11 @@ class VcfmSpec(Spec):
         part = self.mechanism
         if self.design is not None and part.part is not None and part.part.sheet is not None:
             refuse("Spec", {("mechanism", "part", "sheet"): "a design finds both widths: drop the sheet, or 'design'"})
-        refuse("Spec", sheet_faults(part.part, self.widths))
+        refuse("Spec", sheet_faults(part.part, self.out_of_plane_widths))
         return self
 
     @property
-    def widths(self) -> Mapping[str, float | None]:
+    def out_of_plane_widths(self) -> Mapping[str, float | None]:
         """Of leaves, and of a spring that is cut."""
         spring = self.mechanism.positive
         own = {} if spring is None else {"positive.width": spring.width}
