@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.curves import Curve
     from cfmkit.specs.spec import Spec
-    from cfmkit.specs.target_curve import TargetCurve
+    from cfmkit.specs.target_function import TargetCurve
     from cfmkit.tables import Table
 
 

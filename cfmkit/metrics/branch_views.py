@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from cfmkit.curves import Curve, Kind
     from cfmkit.metrics.fatigue_and_relaxation import Durability
     from cfmkit.results import ClosedForm
-    from cfmkit.specs.target_curve import TargetCurve
+    from cfmkit.specs.target_function import TargetCurve
 
 
 ZERO = 1e-9

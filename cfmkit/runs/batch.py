@@ -113,8 +113,8 @@ def _natural(spec: Spec) -> str:
 
 def _data_of(spec: Spec) -> tuple[tuple[str, str | None], ...]:
     """Return the data files that a specification names, and the hashes of their content."""
+    from cfmkit.specs.data_files import named_in
     from cfmkit.store import file_hash
-    from cfmkit.tables.data_files import named_in
 
     return tuple((str(source), file_hash(source.path.resolve())) for source in named_in(spec.model_dump()))
 

@@ -120,9 +120,9 @@ def copy(name: str, out: str | os.PathLike[str] = ".", schema: bool = False) -> 
         If a file is there already, or cannot be written.
     """
     from cfmkit import api
+    from cfmkit.specs.data_files import named_in
     from cfmkit.store.disk import discard, make_folders, reporting, write_new
     from cfmkit.studies.batch_entries import is_figure
-    from cfmkit.tables.data_files import named_in
 
     chosen = example(name)
     target = Path(out) / chosen.path.name

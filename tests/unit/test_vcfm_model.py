@@ -392,10 +392,10 @@ def test_both_structures_can_be_written_for_cutting(kind, structure, loaded):
     )  # fmt: skip
     drawing = api.drawing(spec)
     assert {"vcfm.dxf", "vcfm.svg", "leaf.csv"} <= set(files(drawing))
-    holes = [contour for contour in drawing.contours if contour.hole]
+    cut = [contour for contour in drawing.contours if contour.layer == "cut"]
     inside = loaded == "whole" and structure != "straight"
-    assert len(holes) == 2 + inside
-    assert len(drawing.contours) == 4 + inside
+    assert len([contour for contour in cut if contour.hole]) == 2 + inside
+    assert len(cut) == 4 + inside
     assert not [note for note in drawing.notes if "fillet" in note]
 
 

@@ -15,13 +15,13 @@ from cfmkit.families.beam.parts.spec import (
 )
 from cfmkit.families.beam.shaping.spec import Optimise, optimise_faults
 from cfmkit.metrics.fatigue_and_relaxation import Durability
+from cfmkit.specs.data_files import DataSource
 from cfmkit.specs.formula import formula
 from cfmkit.specs.spec import Analysis, DesignBlock, Displacement, Model, SolidAnalysis, Spec, refuse
 from cfmkit.specs.target_curve import Target
 from cfmkit.specs.units import DIMENSIONS, Factor, Force, Length, Ratio, Torque
 from cfmkit.specs.units.fields import LARGEST
 from cfmkit.stock.spec import sheet_faults
-from cfmkit.tables.data_files import DataSource
 
 Fidelity = Literal["inextensible", "extensible", "reissner", "solid"]
 _EXTENT = {"displacement": "travel", "rotation": "travel", "force": "force", "moment": "moment", "loads": "factor"}

@@ -15,7 +15,7 @@ from cfmkit.families.cam.solution import ON_CORNER, pressure_angle
 from cfmkit.families.cam.statics import Forces, Losses, forces, normal_turn
 from cfmkit.metrics.continuous_curves import extremes
 from cfmkit.results import Quantity
-from cfmkit.specs.target_curve import TargetCurve
+from cfmkit.specs.target_function import TargetCurve
 from cfmkit.specs.units import between
 from cfmkit.stock.springs.in_use import WIRE_DEFINITIONS, SpringInUse, wire_quantities
 

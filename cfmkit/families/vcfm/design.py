@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from cfmkit.families.base import Run
     from cfmkit.families.vcfm.exact_model import ExactSampler
     from cfmkit.families.vcfm.spec import VcfmDesign, VcfmSpec
-    from cfmkit.specs.target_curve import TargetCurve
+    from cfmkit.specs.target_function import TargetCurve
 
 
 ROUNDS = 8

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from cfmkit.families.base import Run
     from cfmkit.families.beam.shaping.spec import Optimise
     from cfmkit.families.beam.spec import BeamSpec
-    from cfmkit.specs.target_curve import TargetCurve
+    from cfmkit.specs.target_function import TargetCurve
 
 
 def shaped(spec: BeamSpec, wanted: Optimise, run: Run) -> Design:

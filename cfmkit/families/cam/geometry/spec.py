@@ -10,9 +10,9 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from cfmkit.numerics.through_points import ThroughPoints
 from cfmkit.specs.block import Model
+from cfmkit.specs.data_files import DataSource
 from cfmkit.specs.target_curve import MOST_POINTS, Interpolation
 from cfmkit.specs.units import Length, Ratio
-from cfmkit.tables.data_files import DataSource
 
 PositiveLength = Annotated[Length, Field(gt=0)]
 NonNegativeLength = Annotated[Length, Field(ge=0)]

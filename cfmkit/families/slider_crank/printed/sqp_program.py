@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from cfmkit.arrays import FloatArray
     from cfmkit.elastica import Network, Path
     from cfmkit.families.slider_crank.printed.chain import Elasticity
-    from cfmkit.specs.target_curve import TargetCurve
+    from cfmkit.specs.target_function import TargetCurve
 
 
 SMALL = 1e-3

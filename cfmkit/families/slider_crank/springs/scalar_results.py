@@ -140,8 +140,10 @@ def _trim(solution: Solution) -> Iterator[tuple[str, float | None]]:
     if solution.assembly.drive == "force":
         motion = solution.motion
         window = solution.character.window or (float(motion[0]), float(motion[-1]))
-        change = solution.assembly.rates @ mean_effort_per_angle(solution.assembly, window)
-        yield "force_per_degree", float(change) * float(np.radians(1.0)) if np.isfinite(change) else None
+        per_rate = mean_effort_per_angle(solution.assembly, window)
+        bounded = bool(np.isfinite(per_rate).all())  # not where the window reaches a pole of the force
+        per_degree = float(np.radians(1.0))
+        yield "force_per_degree", float(solution.assembly.rates @ per_rate) * per_degree if bounded else None
 
 
 def _numbers(solution: Solution) -> Iterator[tuple[str, tuple[float | None, str]]]:

@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING, Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from cfmkit.specs.spec import DesignBlock, Model, refuse
-from cfmkit.specs.target_curve import Target, TargetCurve
+from cfmkit.specs.target_curve import Target
 from cfmkit.specs.units import Angle, Force, Length, Ratio, RotationalStiffness, Stiffness, Torque
 from cfmkit.stock.springs.spec import AGREE, Catalogue, Life, SpringWire
 
 if TYPE_CHECKING:
+    from cfmkit.specs.target_function import TargetCurve
     from cfmkit.stock.springs.helical import Kind
 
 PositiveLength = Annotated[Length, Field(gt=0)]

@@ -1,0 +1,71 @@
+"""A target curve as a function of the motion: values, range, extremes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+from cfmkit.numerics.through_points import ThroughPoints
+
+
+@dataclass(frozen=True)
+class TargetCurve:
+    """A force over displacements, or a torque over angles, that a mechanism is to have.
+
+    Attributes
+    ----------
+    function : ThroughPoints or (float, float)
+        Through points [m or rad, N or N m]; or a line, its value at zero and its slope.
+    kind : {"force", "torque"} or None
+        What it is; None where nothing but zeros says so.
+
+    Examples
+    --------
+    >>> TargetCurve((10.0, -500.0)).at(0.01)
+    5.0
+    """
+
+    function: ThroughPoints | tuple[float, float]
+    kind: str | None = None
+
+    def at(self, places: Any) -> Any:
+        """Return the effort that is wanted at places [N or N m]."""
+        if isinstance(self.function, ThroughPoints):
+            return self.function.at(places)
+        level, slope = self.function
+        return level + slope * places
+
+    @property
+    def extent(self) -> tuple[float, float]:
+        """Between which ends of the motion it is known [m or rad]."""
+        if isinstance(self.function, ThroughPoints):
+            return self.function.places[0], self.function.places[-1]
+        return -float("inf"), float("inf")
+
+    def scaled(self, factor: float) -> TargetCurve:
+        """Return it with all efforts multiplied by a factor."""
+        if isinstance(self.function, ThroughPoints):
+            values = tuple(factor * value for value in self.function.values)
+            return replace(self, function=replace(self.function, values=values))
+        level, slope = self.function
+        return replace(self, function=(factor * level, factor * slope))
+
+    def covers(self, low: float, high: float) -> bool:
+        """Return whether it is known between two places [m or rad], but for rounding."""
+        first, last = self.extent
+        slack = 1e-6 * (high - low)
+        return first <= low + slack and high - slack <= last
+
+    def between(self, low: float, high: float) -> ThroughPoints:
+        """Return it as a function through points, of which a line has two [m or rad]."""
+        if isinstance(self.function, ThroughPoints):
+            return self.function
+        return ThroughPoints((low, high), (float(self.at(low)), float(self.at(high))))
+
+    def extremes(self, low: float, high: float) -> tuple[float, float]:
+        """Return the smallest and the largest effort between two places [N or N m]."""
+        return self.between(low, high).extremes(low, high)
+
+    def largest(self, low: float, high: float) -> float:
+        """Return the largest magnitude between two places [N or N m]."""
+        return max(map(abs, self.extremes(low, high)))
