@@ -26,7 +26,7 @@ from cfmkit.studies.plan import grid
 from cfmkit.studies.pool import Pool
 from cfmkit.studies.study import Metric, Row, Study
 from cfmkit.studies.sweep import outputs, summary_of
-from cfmkit.studies.variation import axes, wish
+from cfmkit.studies.varied_axes import axes, wish
 
 ROOT = Path(__file__).parents[1]
 SPEC = cfmkit.load(ROOT / "configs" / "cam.yaml").replace({"requirements": ()})

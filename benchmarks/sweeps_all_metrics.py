@@ -42,7 +42,7 @@ def measured(name: str, configs: Path, singly: bool) -> tuple[float, int, bool]:
     """Return processor time of a sweep [s], its rows, and whether blocks were used."""
     import cfmkit
     from cfmkit.studies import engine, sweep
-    from cfmkit.studies.variation import wish
+    from cfmkit.studies.varied_axes import wish
 
     file, *vary = SWEEPS[name]
     request = getattr(sweep, "SweepRequest", None) or sweep.Request  # as older checkouts call it

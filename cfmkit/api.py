@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from cfmkit.export.contours import Drawing
     from cfmkit.metrics import Outcome, Window
     from cfmkit.results import Design, Quantity, Result
-    from cfmkit.runs.notebook import AnalysisView
+    from cfmkit.runs.analysis_view import AnalysisView
     from cfmkit.specs.spec import Spec
     from cfmkit.studies.outcome import StudyResult
     from cfmkit.studies.suggest.search import Suggestions
@@ -141,7 +141,7 @@ def analyze(spec: AnySpec, run: Run | None = None) -> AnalysisView:
     50.0002
     """
     from cfmkit.metrics import windows_judged
-    from cfmkit.runs.notebook import AnalysisView
+    from cfmkit.runs.analysis_view import AnalysisView
 
     spec = spec_of(spec)
     return AnalysisView.of(windows_judged(family(spec.family).analyze(spec, run or Run())))

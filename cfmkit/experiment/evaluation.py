@@ -20,12 +20,12 @@ import numpy as np
 
 from cfmkit.curves import Column, Curve
 from cfmkit.errors import DataError
-from cfmkit.experiment.branch_passages import settled
 from cfmkit.experiment.branches import LOAD, UNLOAD, WHOLE, Stroke, Strokes, covered, split
 from cfmkit.experiment.corrections import corrected
 from cfmkit.experiment.hysteresis import repeatability, turned_loop
 from cfmkit.experiment.low_pass import DEFAULT_ORDER, LowPass, low_passed
 from cfmkit.experiment.reading import read_recording
+from cfmkit.experiment.reversal_transitions import settled
 from cfmkit.metrics import Frame, Window, measure
 from cfmkit.metrics.branch_views import span_text
 from cfmkit.numerics.robust_statistics import spikes
@@ -39,8 +39,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.experiment.branch_passages import Settled
     from cfmkit.experiment.reading import Recording
+    from cfmkit.experiment.reversal_transitions import Settled
 
 LEFT_OUT = ("reversals", "spikes")
 """What verbs leave out of a recording unless it is to count as recorded."""

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from cfmkit.curves import Curve
-    from cfmkit.runs.notebook import AnalysisView
+    from cfmkit.runs.analysis_view import AnalysisView
     from cfmkit.specs.spec import Spec
 
 VERDICTS: Mapping[str, str] = {
@@ -247,7 +247,7 @@ def number(text: str) -> Number:
     ('>', 0.53, 0.01)
     """
     from cfmkit.errors import QuantityError
-    from cfmkit.specs.units.numbers import read_number
+    from cfmkit.specs.units.decimal_numbers import read_number
     from cfmkit.specs.units.registry import unit_size
 
     sign, rest = (text[0], text[1:].strip()) if text[:1] in "<>~" else ("", text)
@@ -389,7 +389,7 @@ def _named(name: str, scope: _Scope) -> Any:
 def _varied(spec: Spec, path: str) -> tuple[float, ...]:
     """Return the values that a sweep gives to something."""
     from cfmkit.studies.plan import stepped
-    from cfmkit.studies.variation import axes, wishes
+    from cfmkit.studies.varied_axes import axes, wishes
 
     for axis in axes(spec, wishes(spec.sweep.vary)) if spec.sweep else ():
         if axis.leaf.path == path:

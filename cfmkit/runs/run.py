@@ -242,7 +242,7 @@ def designed(spec: Spec, run: Run) -> Report:
 
 def _of_many_parts(found: Report, nominal: Result, given: Spec, run: Run) -> Report:
     """Return a report with what is known of many parts of its design, and what to do at the bench with one."""
-    from cfmkit.studies.bench_note import bench
+    from cfmkit.studies.bench_instructions import bench
 
     found = _with_yield(found, nominal, given, run)
     told = bench(nominal, run)

@@ -198,7 +198,7 @@ def _sweep_faults(document: Document, spec: Spec) -> Iterator[Problem]:
     """Yield what is wrong with paths and values of the block `sweep`, each with its place in the file."""
     if spec.sweep is None:
         return
-    from cfmkit.studies.variation import faults, wishes
+    from cfmkit.studies.varied_axes import faults, wishes
 
     drawn, joint = spec.sweep.combine in ("lhs", "sobol"), spec.sweep.combine == "zip"
     for wish, message in faults(spec, wishes(spec.sweep.vary), drawn, joint):

@@ -19,7 +19,7 @@ from scipy.spatial import Delaunay, cKDTree
 
 from cfmkit.arrays import read_only
 from cfmkit.errors import GeometryError
-from cfmkit.solid.boundary import GRADING, Ring, Sizes, sizes
+from cfmkit.solid.edge_rings import GRADING, Ring, Sizes, sizes
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -118,7 +118,7 @@ class MeshError:
         return STRESS_FACTOR * max(self.stress_difference, STRESS_LEAST)
 
     def values(self) -> dict[str, float]:
-        """Return them by the names that every family gives them (`families.mesh_values`)."""
+        """Return them by the names that every family gives them (`families.mesh_error_definitions`)."""
         return {
             "mesh_force_difference": self.force_difference,
             "mesh_stress_difference": self.stress_difference,

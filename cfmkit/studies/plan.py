@@ -17,14 +17,14 @@ from numpy.typing import NDArray
 from cfmkit.errors import UsageError
 from cfmkit.specs.units import Place, format_quantity, from_border, place_of, to_border
 from cfmkit.specs.units.decimals import even_grid, shift_decimal
-from cfmkit.studies.variation import is_place
+from cfmkit.studies.varied_axes import is_place
 from cfmkit.tables import border_values
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.studies.variation import Axis
+    from cfmkit.studies.varied_axes import Axis
 
 Combine = Literal["grid", "zip", "lhs", "sobol"]
 Levels = tuple[Any, ...] | NDArray[Any]

@@ -18,7 +18,7 @@ from cfmkit.errors import ExitCode
 from cfmkit.metrics import other_name
 from cfmkit.results import WINDOW_OUTSIDE, Status
 from cfmkit.specs.units import border_unit, to_border
-from cfmkit.studies.variation import written
+from cfmkit.studies.varied_axes import written
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

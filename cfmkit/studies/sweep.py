@@ -13,7 +13,7 @@ from cfmkit.studies.plan import MOST_POINTS, Draw, grid, sampled, zipped
 from cfmkit.studies.study import Study
 from cfmkit.studies.summary import Summary, main_columns
 from cfmkit.studies.tables import curves_csv, results_csv
-from cfmkit.studies.variation import WantedVariation, axes, wishes
+from cfmkit.studies.varied_axes import WantedVariation, axes, wishes
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -10,7 +10,7 @@ import pytest
 import cfmkit
 from cfmkit.families.base import Run
 from cfmkit.specs.spec import Requirement
-from cfmkit.studies.bench_note import bench
+from cfmkit.studies.bench_instructions import bench
 
 MODULUS = "mechanism.material.youngs_modulus"
 

@@ -8,7 +8,7 @@ import pytest
 
 from cfmkit import families
 from cfmkit.cli.main import main
-from cfmkit.runs.dimension_drawing import drawn, scheme
+from cfmkit.runs.family_drawing import drawn, scheme
 from cfmkit.specs.keys import keys
 
 DRAWN = [record.name for record in families.records() if record.scheme]

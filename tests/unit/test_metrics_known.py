@@ -15,7 +15,7 @@ from cfmkit.studies.noted_metrics import metrics_of, sample_curve
 from cfmkit.studies.sensitivity.setup import prepare as prepare_sensitivity
 from cfmkit.studies.summary import Summary, main_columns
 from cfmkit.studies.sweep import SweepRequest, prepare
-from cfmkit.studies.variation import wish
+from cfmkit.studies.varied_axes import wish
 
 TORQUE = cfmkit.load("configs/slider_crank_li2019.yaml")
 CAM = cfmkit.load("configs/cam.yaml").replace({"analysis.points": 41})

@@ -45,7 +45,7 @@ def test_a_result_is_shown_with_metrics_requirements_and_one_figure(result):
 
 def test_a_result_without_a_curve_is_shown_with_its_reason():
     spec = cfmkit.load(CONFIGS / "cam.yaml").replace({"name": HOSTILE})
-    from cfmkit.runs.notebook import AnalysisView
+    from cfmkit.runs.analysis_view import AnalysisView
 
     shown = AnalysisView.of(Result(spec, Status.NO_EQUILIBRIUM, "nothing holds it"))._repr_html_()
     assert "nothing holds it" in shown

@@ -12,7 +12,7 @@ from cfmkit.plots.style import png
 from cfmkit.studies.engine import run
 from cfmkit.studies.pictures import _nominal, findings
 from cfmkit.studies.sweep import SweepRequest, prepare, summary_of
-from cfmkit.studies.variation import wishes
+from cfmkit.studies.varied_axes import wishes
 from cfmkit.tables import Table, TableColumn
 
 X = np.repeat(np.linspace(1.0, 3.0, 5), 4)

@@ -16,7 +16,7 @@ from cfmkit.plots.style import png
 from cfmkit.studies.noted_metrics import metrics_of
 from cfmkit.studies.plan import grid, zipped
 from cfmkit.studies.study import Study
-from cfmkit.studies.variation import axes, wishes
+from cfmkit.studies.varied_axes import axes, wishes
 from cfmkit.studies.vectorised_blocks import evaluate_block, measures
 
 NAMES = {

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cfmkit.errors import GeometryError
-from cfmkit.solid.boundary import Ring
+from cfmkit.solid.edge_rings import Ring
 from cfmkit.solid.elements import Elements, equivalent
 from cfmkit.solid.equilibrium import SolidProblem
 from cfmkit.solid.mesh import Mesh, mesh

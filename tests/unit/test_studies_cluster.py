@@ -19,7 +19,7 @@ from cfmkit.studies.plan import grid
 from cfmkit.studies.pool import Pool
 from cfmkit.studies.study import Study
 from cfmkit.studies.sweep import outputs, summary_of
-from cfmkit.studies.variation import axes, wish
+from cfmkit.studies.varied_axes import axes, wish
 
 distributed = pytest.importorskip("distributed", reason="Dask is not installed: pip install 'cfmkit[cluster]'")
 pytestmark = pytest.mark.filterwarnings("ignore")

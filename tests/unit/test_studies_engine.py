@@ -20,7 +20,7 @@ from cfmkit.studies.pool import Pool
 from cfmkit.studies.rows import squeezed, unsqueezed
 from cfmkit.studies.study import Study
 from cfmkit.studies.tables import results_csv
-from cfmkit.studies.variation import axes, wish
+from cfmkit.studies.varied_axes import axes, wish
 from cfmkit.tables import read_csv
 
 SPEC = cfmkit.load("configs/cam.yaml").replace({"analysis.points": 41})

@@ -8,7 +8,7 @@ from cfmkit.errors import SpecError, UsageError
 from cfmkit.families import family, names
 from cfmkit.studies.plan import Draw, grid, sampled, zipped
 from cfmkit.studies.spec_values import leaf, paths
-from cfmkit.studies.variation import axes, wish, wishes
+from cfmkit.studies.varied_axes import axes, wish, wishes
 
 SPEC = cfmkit.load("configs/cam.yaml")
 RADIUS = "mechanism.roller_radius"

@@ -12,7 +12,7 @@ from cfmkit.cli.verbs.suggest import room, seconds
 from cfmkit.errors import SpecError, UsageError
 from cfmkit.families import family
 from cfmkit.families.base import Run, function_named
-from cfmkit.families.beam.propose import kept_shapes
+from cfmkit.families.beam.proposals_for_wish import kept_shapes
 from cfmkit.runs.suggestions import exit_code
 from cfmkit.runs.wish_file import wish_of
 from cfmkit.stock.springs.catalogue import SHEAR_SHARE
@@ -106,7 +106,7 @@ def test_a_family_out_of_reach_says_what_it_would_need():
 def test_kept_shapes_scale_as_beams_that_only_bend():
     """Twice as large with twice the thickness: twice the force at twice the travel, the stress as before."""
     from cfmkit.families.beam.model import analyze
-    from cfmkit.families.beam.propose import _written
+    from cfmkit.families.beam.proposals_for_wish import _written
 
     shape = kept_shapes()[0]
     own = shape.spec.mechanism

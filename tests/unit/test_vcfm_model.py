@@ -31,7 +31,7 @@ from cfmkit.studies.engine import Work, run
 from cfmkit.studies.noted_metrics import metrics_of
 from cfmkit.studies.plan import Draw, sampled
 from cfmkit.studies.study import Study
-from cfmkit.studies.variation import axes, wishes
+from cfmkit.studies.varied_axes import axes, wishes
 
 # --- preloads together, and lines together ---------------------------------------------------------------------
 

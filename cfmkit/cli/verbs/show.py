@@ -72,7 +72,7 @@ def _drawn(name: str | None, given: str) -> Answer:
     """Write the drawing of a family to a file that is not there yet."""
     from pathlib import Path
 
-    from cfmkit.runs.dimension_drawing import drawn, scheme
+    from cfmkit.runs.family_drawing import drawn, scheme
     from cfmkit.store.disk import reporting, write_new
 
     found = scheme(name)

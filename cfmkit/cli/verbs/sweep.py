@@ -135,7 +135,7 @@ def request(options: SweepOptions) -> SweepRequest:
     """
     from cfmkit.cli.study_verbs import names
     from cfmkit.studies.sweep import SweepRequest
-    from cfmkit.studies.variation import wish
+    from cfmkit.studies.varied_axes import wish
 
     if options.zip and options.sample:
         raise UsageError("--zip and --sample exclude each other")

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.elastica.model.beam import Fit, fit, same_value
-from cfmkit.elastica.model.bundle import Bundle, coils
+from cfmkit.elastica.model.beam_arrays import Bundle, coils
 from cfmkit.elastica.model.drive import Displacement, Drive, Rotation
 from cfmkit.elastica.model.network import LineSpring, Network, PointLoad, SlideSpring, Spring, TorsionSpring
 from cfmkit.elastica.model.numbering import NOWHERE, driven, plan_of

@@ -1,8 +1,8 @@
 """How the arrays of a network of plain beams change with design variables: all variables at once.
 
-A plain beam has a polynomial angle and one thickness (`cfmkit.elastica.model.bundle`). Where variables move nodes and
-offsets, and change such shapes and sections, and nothing else, the changes of the fits are written out and computed as
-arrays.
+A plain beam has a polynomial angle and one thickness (`cfmkit.elastica.model.beam_arrays`). Where variables move nodes
+and offsets, and change such shapes and sections, and nothing else, the changes of the fits are written out and computed
+as arrays.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 
 from cfmkit.elastica.kernels.model import TABLE_COLUMNS, DesignSlopes
 from cfmkit.elastica.model.beam import GAUSS
-from cfmkit.elastica.model.bundle import powers
+from cfmkit.elastica.model.beam_arrays import powers
 from cfmkit.elastica.model.numbering import NOWHERE
 from cfmkit.elastica.model.section import Taper
 from cfmkit.elastica.model.shapes import Polynomial

@@ -31,7 +31,7 @@ FAMILY = Family(
     outline="cfmkit.families.beam.outline",
     elastic_parts="cfmkit.families.beam.solid:elastic_parts",
     levels=("design.rescale.force", "design.optimise.force.target"),
-    propose="cfmkit.families.beam.propose:propose",
+    propose="cfmkit.families.beam.proposals_for_wish:propose",
     room="cfmkit.families.beam.bounding_box:room",
     headline=(
         "nominal_force",

@@ -19,7 +19,7 @@ import numpy as np
 from cfmkit.arrays import read_only
 from cfmkit.curves import Column, Curve
 from cfmkit.elastica import Path, PathStatus, trace
-from cfmkit.elastica.model.bundle import coils
+from cfmkit.elastica.model.beam_arrays import coils
 from cfmkit.elastica.model.layout import Layout
 from cfmkit.errors import InputError
 from cfmkit.families.beam.build import Assembly, assemble, resolve, thickest_of

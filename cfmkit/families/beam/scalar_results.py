@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfmkit.families.beam.build import thickest_of
-from cfmkit.families.mesh_values import DEFINITIONS as OF_MESHES
+from cfmkit.families.mesh_error_definitions import DEFINITIONS as OF_MESHES
 from cfmkit.numerics.cubic import bisect, crossing, first_extreme, value_at
 from cfmkit.results import Quantity
 from cfmkit.specs.units import between

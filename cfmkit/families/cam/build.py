@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from cfmkit.families.cam.curves_followed import check_bends, with_curve
 from cfmkit.families.cam.findings import finding
 from cfmkit.families.cam.geometry.curve_profile import CurveSlopeLaw
 from cfmkit.families.cam.geometry.cut import CamProfile, WholeCamUndercut, cut
@@ -23,6 +22,7 @@ from cfmkit.families.cam.geometry.track import Track
 from cfmkit.families.cam.geometry.track_records import NoTrack
 from cfmkit.families.cam.solution import Assembly
 from cfmkit.families.cam.statics import GRAVITY, Loads, Losses
+from cfmkit.families.cam.target_curve_limits import check_bends, with_curve
 from cfmkit.families.findings import mm
 from cfmkit.families.no_mechanism import CannotBuild
 

@@ -27,12 +27,12 @@ from cfmkit.families.cam.build import (
     rollers_overlap,
     weights_of,
 )
-from cfmkit.families.cam.curves_followed import check_target, largest_force, target_shape, with_curve
 from cfmkit.families.cam.findings import finding
 from cfmkit.families.cam.geometry.curve_profile import CurveSlopeLaw
 from cfmkit.families.cam.geometry.path import reach
 from cfmkit.families.cam.geometry.profile import SlopeLaw, brace_tangent
 from cfmkit.families.cam.outline import plate_notes
+from cfmkit.families.cam.target_curve_limits import check_target, largest_force, target_shape, with_curve
 from cfmkit.families.findings import at_least, at_most, mm, newton, rate
 from cfmkit.families.no_mechanism import CannotBuild, Infeasible, no_design
 from cfmkit.results import Design, Status

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.families.mesh_values import DEFINITIONS as OF_MESHES
+from cfmkit.families.mesh_error_definitions import DEFINITIONS as OF_MESHES
 from cfmkit.families.vcfm.build import share_of, strip_of
 from cfmkit.families.vcfm.leaves.springs import measured_stiffness_for
 from cfmkit.families.vcfm.leaves.truss import TrussDiamond, TrussLeaf

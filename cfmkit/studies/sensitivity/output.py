@@ -12,7 +12,7 @@ from cfmkit.results import Finding, Quantity, Status
 from cfmkit.studies.sensitivity.intervals import LEVEL
 from cfmkit.studies.sensitivity.setup import MADE
 from cfmkit.studies.tables import results_table
-from cfmkit.studies.variation import written
+from cfmkit.studies.varied_axes import written
 from cfmkit.tables import Table, TableColumn, csv_chunks, to_csv
 
 if TYPE_CHECKING:

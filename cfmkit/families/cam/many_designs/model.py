@@ -20,6 +20,7 @@ from cfmkit.families.base import BlockAnswer
 from cfmkit.families.cam.build import assemble, weights
 from cfmkit.families.cam.geometry.many_tracks import ManyTracks
 from cfmkit.families.cam.many_designs.around_one_cam import Around, BuiltSlab
+from cfmkit.families.cam.many_designs.corner_forces import CornerSlab, shapes
 from cfmkit.families.cam.many_designs.forces import Designs, Slab
 from cfmkit.families.cam.many_designs.measures import (
     BRANCHES,
@@ -30,7 +31,6 @@ from cfmkit.families.cam.many_designs.measures import (
     WINDOWED,
     measured,
 )
-from cfmkit.families.cam.many_designs.undercut import CornerSlab, shapes
 from cfmkit.families.no_mechanism import CannotBuild
 from cfmkit.specs.units import Share
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cfmkit.families.mesh_values import DEFINITIONS as OF_MESHES
+from cfmkit.families.mesh_error_definitions import DEFINITIONS as OF_MESHES
 from cfmkit.families.slider_crank.printed.chain import kink
 
 if TYPE_CHECKING:

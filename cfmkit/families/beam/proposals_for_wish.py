@@ -184,7 +184,7 @@ def _sized(
         )
     spec = _written(kept, size, block, (thicker * thin, wide), window)
     area = size**2 * kept.room.across * kept.room.along / (wish.room[0] * wish.room[1])
-    return Candidate(f"shape {kept.name}", spec, False, "cfmkit.families.beam.propose:finish", area)
+    return Candidate(f"shape {kept.name}", spec, False, "cfmkit.families.beam.proposals_for_wish:finish", area)
 
 
 def _width(wish: Wish, kept: Kept, size: float, stiffer: float, thicker: float, force: float) -> float:

@@ -130,7 +130,7 @@ def _turned(wish: Wish, crank: float, coupler: float, offset: float, unloaded: f
         "analysis": {"angle": (low, low + span), "points": 961},
     }  # fmt: skip
     spec = SliderCrankSpec.model_validate(data)
-    return Candidate("springs at pins", spec, True, "cfmkit.families.slider_crank.propose:finish")
+    return Candidate("springs at pins", spec, True, "cfmkit.families.slider_crank.proposals_for_wish:finish")
 
 
 def finish(spec: SliderCrankSpec, wish: Wish) -> SliderCrankSpec:
@@ -277,7 +277,7 @@ def _strip(
         "analysis": _analysis(travel),
     }  # fmt: skip
     spec = SliderCrankSpec.model_validate(data)
-    return Candidate("strip", spec, True, "cfmkit.families.slider_crank.propose:part", _rank(crank, wish))
+    return Candidate("strip", spec, True, "cfmkit.families.slider_crank.proposals_for_wish:part", _rank(crank, wish))
 
 
 def _tapered(
@@ -314,7 +314,7 @@ def _flexures(
         "analysis": _analysis(travel),
     }  # fmt: skip
     spec = SliderCrankSpec.model_validate(data)
-    return Candidate("flexures", spec, True, "cfmkit.families.slider_crank.propose:part", _rank(crank, wish))
+    return Candidate("flexures", spec, True, "cfmkit.families.slider_crank.proposals_for_wish:part", _rank(crank, wish))
 
 
 def part(spec: SliderCrankSpec, wish: Wish) -> SliderCrankSpec:

@@ -65,7 +65,9 @@ def propose(wish: Wish, run: Run) -> Offer:
                 pairs = spec.mechanism.bistable.half_beams // 2
                 variant = f"{pairs} V{'s' if pairs > 1 else ', guided'}"
                 promise = over["across"] * over["along"]
-                found.append(Candidate(variant, spec, True, "cfmkit.families.vcfm.propose:finish", float(promise)))
+                found.append(
+                    Candidate(variant, spec, True, "cfmkit.families.vcfm.proposals_for_wish:finish", float(promise))
+                )
     if found:
         return Offer(tuple(_varied(sorted(found, key=lambda one: one.promise))[:OFFERED]))
     if closest is None:
