@@ -138,9 +138,17 @@ class BetweenPoints:
     def effort(self, _branch: str, places: FloatArray, /) -> FloatArray:
         """Return the effort at places of any shape [N or N m]; next to a bifurcation between the points beside it."""
         flat = np.ravel(places)
-        there = self.at(flat)
-        solved = np.where(there.accurate, self.unit * there.effort, np.interp(flat, self._points, self._efforts))
-        return np.asarray(solved.reshape(np.shape(places)))
+        solved = self._solved.get(flat.tobytes())
+        if solved is None:
+            there = self.at(flat)
+            solved = np.where(there.accurate, self.unit * there.effort, np.interp(flat, self._points, self._efforts))
+            self._solved[flat.tobytes()] = solved
+        return np.array(solved.reshape(np.shape(places)))
+
+    @cached_property
+    def _solved(self) -> dict[bytes, FloatArray]:
+        """Efforts at places that were requested: page, files and requirements each ask for those of the metrics."""
+        return {}
 
     def stress(self, _branch: str, places: FloatArray, /) -> FloatArray:
         """Return the largest stress of all beams at places of any shape [Pa]."""
