@@ -52,6 +52,7 @@ setup(
         *(f"cfmkit.configs{room}" for room in ROOMS),
         "cfmkit.docs",
         "cfmkit.docs.images",
+        "cfmkit.families.beam.shapes",  # data of the family, no module: setuptools wants every folder of data named
     ],
     package_dir={"cfmkit.configs": "configs", "cfmkit.docs": "docs"},
     cmdclass={"build_py": BuildPages},

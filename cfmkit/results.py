@@ -302,6 +302,15 @@ class Design:
         """Return the design in a line: how it ended, and what came of it."""
         return f"<Design {self.status.key}: {self.message[:500]}; {self.spec!r}>"
 
+    def _repr_html_(self) -> str:
+        """Return what a notebook shows: how the design ended, what the search found, warnings, and the new file."""
+        from html import escape
+
+        told = [f"<p>{escape(self.explanation)}</p>"]
+        told += [f"<p>{escape(word)}: {escape(text)}</p>" for word, text in self.notes]
+        told += [f"<p>{escape(one.name)}: {escape(one.message)}</p>" for one in self.warnings]
+        return "<div>" + "".join(told) + ("" if self.spec is None else self.spec._repr_html_()) + "</div>"
+
     @property
     def explanation(self) -> str:
         """The message, with the keys that stand in the way of a design and the nearest values that do not."""

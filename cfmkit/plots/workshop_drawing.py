@@ -42,6 +42,12 @@ SCALES = tuple(factor * 10.0**power for power in range(3, -4, -1) for factor in 
 ARC_POINTS = 91
 """Points of a full circle of the picture."""
 
+POINT = 25.4 / 72.0
+"""Of type [mm]."""
+
+SIDES = ((1, 1), (1, -1), (-1, 1), (-1, -1))
+"""Of a hole, where its number may stand: right or left, above or below; the first one is preferred."""
+
 MOST_HOLES = 12
 """Rows of the hole table; more are counted."""
 
@@ -91,7 +97,7 @@ def drawing_figure(drawing: Drawing, title: str, tolerances: Sequence[str] = ())
             _contour(ax, contour)
     found = list(holes(drawing))
     for number, hole in enumerate(found[:MOST_HOLES], start=1):
-        _hole(ax, hole, number, (x0, y0), scale)
+        _hole(ax, hole, number, drawing, scale)
     if found:
         ax.plot(x0, y0, marker="+", markersize=9, color=VERMILLION, zorder=6, gid="datum")
     _dimensions(ax, dimensions, (x0, y0, x1, y1), scale)
@@ -146,10 +152,14 @@ def _points(edge: Edge) -> FloatArray:
     return np.array(edge.center) + edge.radius * np.column_stack([np.cos(share), np.sin(share)])
 
 
-def _contour(ax: Axes, contour: Contour) -> None:
+def _chain(contour: Contour) -> FloatArray:
+    """Return the corners of a contour [mm], the first one again where it is closed."""
     chain = mm(np.vstack([_points(edge) for edge in contour.edges]))
-    if contour.closed:
-        chain = np.vstack([chain, chain[:1]])
+    return np.vstack([chain, chain[:1]]) if contour.closed else chain
+
+
+def _contour(ax: Axes, contour: Contour) -> None:
+    chain = _chain(contour)
     if contour.layer == "path":
         ax.plot(*chain.T, color=GREY, linewidth=0.6, dashes=(8, 2, 1, 2), zorder=2, gid="path")
     elif contour.layer in UNCUT:
@@ -159,15 +169,32 @@ def _contour(ax: Axes, contour: Contour) -> None:
         ax.plot(*chain.T, color=INK, linewidth=0.9, zorder=3, solid_joinstyle="round", gid=contour.layer)
 
 
-def _hole(ax: Axes, hole: _Hole, number: int, corner: tuple[float, float], scale: float) -> None:
-    """Draw a hole's centre and number."""
+def _hole(ax: Axes, hole: _Hole, number: int, drawing: Drawing, scale: float) -> None:
+    """Draw a hole's centre and number, the number where no line is cut."""
+    corner = mm(drawing.extents).tolist()
     x, y, radius = corner[0] + hole.x * 1e3, corner[1] + hole.y * 1e3, 0.5e3 * hole.diameter
     arm = radius + 1.2 / scale
     ax.plot([x - arm, x + arm], [y, y], color=GREY, linewidth=0.5, zorder=2)
     ax.plot([x, x], [y - arm, y + arm], color=GREY, linewidth=0.5, zorder=2)
-    ax.text(
-        x + 0.75 * arm, y + 0.75 * arm, str(number), fontsize=SMALL, color=VERMILLION, ha="left", va="bottom", zorder=6
-    )
+    near = 0.75 * arm
+    text = SMALL * POINT / scale * 0.6 * len(str(number)), SMALL * POINT / scale
+    right, up = next((side for side in SIDES if _is_clear(drawing, (x, y), side, near, text)), SIDES[0])
+    ha, va = "left" if right > 0 else "right", "bottom" if up > 0 else "top"
+    ax.text(x + right * near, y + up * near, str(number), fontsize=SMALL, color=VERMILLION, ha=ha, va=va, zorder=6)
+
+
+def _is_clear(
+    drawing: Drawing, centre: tuple[float, float], side: tuple[int, int], near: float, text: tuple[float, float]
+) -> bool:
+    """Return whether no line runs through the box of a text beside a point [mm]."""
+    from matplotlib.path import Path
+    from matplotlib.transforms import Bbox
+
+    begin = [at + direction * near for at, direction in zip(centre, side, strict=True)]
+    end = [at + direction * size for at, direction, size in zip(begin, side, text, strict=True)]
+    box = Bbox([begin, end])
+    lines = (contour for contour in drawing.contours if contour.layer not in UNCUT)
+    return not any(Path(_chain(contour)).intersects_bbox(box, filled=False) for contour in lines)
 
 
 def _dimensions(

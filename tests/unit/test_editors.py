@@ -37,8 +37,8 @@ def test_the_schema_lists_every_metric_that_an_example_requires(name):
 
 def test_new_and_examples_write_the_schema_that_their_first_line_names(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    assert main(["new", "vcfm", "--schema", "--json"]) == 0
-    assert main(["examples", "cam_as_built", "--schema", "--json"]) == 0
+    assert main(["new", "vcfm", "--json"]) == 0
+    assert main(["examples", "cam_as_built", "--json"]) == 0
     for spec in ("vcfm.yaml", "cam_as_built.yaml"):
         first = Path(spec).read_text().splitlines()[0]
         assert first.startswith(LINE)
@@ -47,11 +47,14 @@ def test_new_and_examples_write_the_schema_that_their_first_line_names(tmp_path,
     assert main(["examples", "--schema"]) == 2
 
 
-def test_without_the_option_nothing_is_different(tmp_path, monkeypatch):
+def test_a_file_of_its_own_on_request(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    assert main(["new", "cam", "--json"]) == 0
+    assert main(["new", "cam", "--no-schema", "--json"]) == 0
     assert [one.name for one in tmp_path.iterdir()] == ["cam.yaml"]
     assert not Path("cam.yaml").read_text().startswith(LINE)
+    capsys.readouterr()
+    assert main(["new", "cam", "--out", "-"]) == 0
+    assert LINE not in capsys.readouterr().out
 
 
 def completed(text, **named):

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import cfmkit
-from cfmkit.results import Result, Status
+from cfmkit.results import Design, Finding, Result, Status
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 HOSTILE = "<script>alert(1)</script>"
@@ -75,3 +75,15 @@ def test_a_spec_is_shown_as_its_file():
 def test_a_result_goes_through_a_pipe_between_processes(result):
     other = pickle.loads(pickle.dumps(result))
     np.testing.assert_array_equal(other.curve.effort, result.curve.effort)
+
+
+def test_a_design_shows_how_it_ended_and_its_file():
+    spec = cfmkit.load(CONFIGS / "cam.yaml")
+    warned = Finding("thin", f"the leaf is thin {HOSTILE}")
+    shown = Design(
+        spec, Status.COMPLETE, f"found {HOSTILE}", warnings=(warned,), notes=(("made", "88 %"),)
+    )._repr_html_()
+    assert HOSTILE not in shown
+    assert all(word in shown for word in ("found", "thin", "made: 88 %", "roller_radius"))
+    none = Design(None, Status.INFEASIBLE, "no design", nearest_feasible={"design.force": "12 N"})._repr_html_()
+    assert "design.force: 12 N" in none

@@ -75,7 +75,7 @@ def test_a_researcher_gets_a_figure_for_print_and_its_bibtex(cfmkit, tmp_path):
 
 def test_a_ci_engineer_gets_verdicts_beside_the_lines_and_a_gate(cfmkit, tmp_path):
     (tmp_path / "specs").mkdir()
-    cfmkit("new", "vcfm", "-o", "specs/a.yaml", "--schema")
+    cfmkit("new", "vcfm", "-o", "specs/a.yaml")
     cfmkit("check", "specs")
     common = ("batch", "specs/*.yaml", "--no-plots", "-o", "out", "--verb", "analyze")
     cfmkit(*common, "--junit", "junit.xml", "--summary", "summary.md")

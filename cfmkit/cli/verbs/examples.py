@@ -33,8 +33,12 @@ class ExamplesOptions(Common):
         option("--run", metavar="NAME|all", text="Run one, or all, to check this installation; nothing is kept."),
     ] = None
     schema: Annotated[
-        bool, flag("--schema", text="With a copy: write the JSON schema, too, and the line by which editors find it.")
-    ] = False
+        bool | None,
+        flag(
+            "--schema/--no-schema",
+            text="With a copy: write the JSON schema, too, and the line by which editors find it; default: yes.",
+        ),
+    ] = None
     jobs: Jobs = None
 
 
@@ -47,14 +51,14 @@ def run(options: ExamplesOptions, terminal: Terminal) -> Answer:
             raise UsageError("--run keeps nothing: it takes neither NAME nor --out")
         return _checked(options.run, options, terminal)
     if options.name is not None:
-        written = [str(path) for path in copy(options.name, options.out or ".", options.schema)]
+        written = [str(path) for path in copy(options.name, options.out or ".", options.schema is not False)]
         verb = _verb(example(options.name).family, written[0])
         page = (
             Paragraph("written", ", ".join(map(visible, written)), GOOD),
             Paragraph("next", command_line("cfmkit", verb, written[0])),
         )
         return Answer({"files": written}, page)
-    if options.out is not None or options.schema:
+    if options.out is not None or options.schema is not None:
         raise UsageError("--out and --schema are for a copy: name an example")
     records = [{"name": one.name, "family": one.family, "about": one.about} for one in examples()]
     fields = (field("name"), field("family"), field("about", wraps=True))

@@ -29,8 +29,11 @@ class NewOptions(Common):
         option("-o", "--out", metavar="FILE", text="File to write, - prints it; default: FAMILY.yaml."),
     ] = None
     schema: Annotated[
-        bool, flag("--schema", text="Write the JSON schema beside it, too, and the line by which editors find it.")
-    ] = False
+        bool,
+        flag(
+            "--schema/--no-schema", text="Write the JSON schema beside it, too, and the line by which editors find it."
+        ),
+    ] = True
 
 
 def run(options: NewOptions, terminal: Terminal) -> Answer:
@@ -39,11 +42,11 @@ def run(options: NewOptions, terminal: Terminal) -> Answer:
     from cfmkit.runs.editor_schema import content, file_name, with_line
 
     record = family(options.family)
-    text = with_line(template(options.family), record) if options.schema else template(options.family)
+    text = template(options.family)
     name = f"{options.family}.yaml" if options.out is None else options.out
     if name == "-":
         return Answer({"family": options.family, "text": text}, (Verbatim(text),))
-    _write(Path(name), text)
+    _write(Path(name), with_line(text, record) if options.schema else text)
     names = [name]
     if options.schema:
         from cfmkit.store import atomic_write
